@@ -1,0 +1,157 @@
+//! The two-link vertical arm of Reyes and Kelly (1997), section 5, with its nine parameters.
+//!
+//! `q1` is measured from the vertical pointing down, `q2` relative to link 1:
+//!
+//! ```text
+//! M = [theta1 + 2 theta2 c2,  theta3 + theta2 c2]    C = [-2 theta2 s2 dq2,  -theta2 s2 dq2]
+//!     [theta3 + theta2 c2,    theta3            ]        [   theta2 s2 dq1,   0            ]
+//! g = [theta4 s1 + theta5 s12,  theta5 s12]          f = [theta6 dq1 + theta8 sgn dq1, theta7 dq2 + theta9 sgn dq2]
+//! ```
+//!
+//! With this `C` the matrix `dM/dt - 2 C` is skew-symmetric.
+
+use super::{Arm, Parameter};
+use crate::real::{Real, lit};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+
+/// The two-link vertical arm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TwoLink<T> {
+    /// Acceleration of gravity, m/s^2.
+    pub gravity: T,
+    /// Length of link 1, m. [`TwoLink::new`] derives it from `theta` when the arm file does not give it.
+    pub length1: T,
+}
+
+/// Physical parameters of the links, Table I: masses, lengths, centres of mass, inertias about them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinkParameters<T> {
+    /// Link masses, kg.
+    pub mass: [T; 2],
+    /// Link lengths, m.
+    pub length: [T; 2],
+    /// Distance of each centre of mass from its joint, m.
+    pub com: [T; 2],
+    /// Inertia of each link about its centre of mass, kg m^2.
+    pub inertia: [T; 2],
+}
+
+impl<T: Real> TwoLink<T> {
+    /// The arm under `gravity`; without `length1` it follows from `theta2 = l1 m2 lc2` and `theta5 = g m2 lc2`.
+    pub fn new(gravity: T, length1: Option<T>, theta: &[T; 9]) -> Self {
+        let derived = if theta[4] > T::zero() { gravity * theta[1] / theta[4] } else { T::zero() };
+        Self { gravity, length1: length1.unwrap_or(derived) }
+    }
+
+    /// Base inertial parameters `theta1 ... theta5` from physical ones, the formulas of section 5.
+    pub fn inertial_from_links(links: &LinkParameters<T>, gravity: T) -> [T; 5] {
+        let LinkParameters { mass: [m1, m2], length: [l1, _], com: [c1, c2], inertia: [i1, i2] } = *links;
+        [
+            m1 * c1 * c1 + m2 * l1 * l1 + m2 * c2 * c2 + i1 + i2,
+            l1 * m2 * c2,
+            m2 * c2 * c2 + i2,
+            gravity * (c1 * m1 + m2 * l1),
+            gravity * m2 * c2,
+        ]
+    }
+}
+
+impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
+    const KIND: &'static str = "two-link";
+    const PARAMETERS: &'static [Parameter] = &[
+        Parameter { name: "theta1", unit: "kg m^2" },
+        Parameter { name: "theta2", unit: "kg m^2" },
+        Parameter { name: "theta3", unit: "kg m^2" },
+        Parameter { name: "theta4", unit: "N m" },
+        Parameter { name: "theta5", unit: "N m" },
+        Parameter { name: "viscous1", unit: "N m s/rad" },
+        Parameter { name: "viscous2", unit: "N m s/rad" },
+        Parameter { name: "coulomb1", unit: "N m" },
+        Parameter { name: "coulomb2", unit: "N m" },
+    ];
+
+    #[inline]
+    fn inertia(&self, theta: &[T; 9], q: &Vector2<T>) -> Matrix2<T> {
+        let k = theta[1] * q[1].cos();
+        Matrix2::new(theta[0] + k + k, theta[2] + k, theta[2] + k, theta[2])
+    }
+
+    fn coriolis(&self, theta: &[T; 9], q: &Vector2<T>, dq: &Vector2<T>) -> Matrix2<T> {
+        let k = theta[1] * q[1].sin();
+        Matrix2::new(-(k + k) * dq[1], -k * dq[1], k * dq[0], T::zero())
+    }
+
+    fn gravity(&self, theta: &[T; 9], q: &Vector2<T>, tilt: T) -> Vector2<T> {
+        let outer = theta[4] * (q[0] + q[1] + tilt).sin();
+        Vector2::new(theta[3] * (q[0] + tilt).sin() + outer, outer)
+    }
+
+    #[inline]
+    fn dynamics(&self, theta: &[T; 9], q: &Vector2<T>, dq: &Vector2<T>, tilt: T) -> (Matrix2<T>, Vector2<T>) {
+        let (s1, c1) = (q[0] + tilt).sin_cos();
+        let (s2, c2) = q[1].sin_cos();
+        let outer = theta[4] * (s1 * c2 + c1 * s2);
+        let (kc, ks) = (theta[1] * c2, theta[1] * s2);
+        let inertia = Matrix2::new(theta[0] + kc + kc, theta[2] + kc, theta[2] + kc, theta[2]);
+        let bias1 = theta[3] * s1 + outer - ks * dq[1] * (dq[0] + dq[0] + dq[1]);
+        (inertia, Vector2::new(bias1, outer + ks * dq[0] * dq[0]))
+    }
+
+    fn energy_regressor(&self, q: &Vector2<T>, dq: &Vector2<T>) -> SVector<T, 9> {
+        let (half, sum) = (lit::<T>(0.5), dq[0] + dq[1]);
+        let mut e = SVector::zeros();
+        e[0] = half * dq[0] * dq[0];
+        e[1] = q[1].cos() * dq[0] * sum;
+        e[2] = dq[1] * (dq[0] + half * dq[1]);
+        e[3] = T::one() - q[0].cos();
+        e[4] = T::one() - (q[0] + q[1]).cos();
+        e
+    }
+
+    fn momentum_regressor(&self, q: &Vector2<T>, dq: &Vector2<T>) -> SMatrix<T, 2, 9> {
+        let c2 = q[1].cos();
+        let mut p = SMatrix::zeros();
+        p[(0, 0)] = dq[0];
+        p[(0, 1)] = c2 * (dq[0] + dq[0] + dq[1]);
+        p[(0, 2)] = dq[1];
+        p[(1, 1)] = c2 * dq[0];
+        p[(1, 2)] = dq[0] + dq[1];
+        p
+    }
+
+    fn potential_regressor(&self, q: &Vector2<T>, dq: &Vector2<T>) -> SMatrix<T, 2, 9> {
+        let outer = (q[0] + q[1]).sin();
+        let mut b = SMatrix::zeros();
+        b[(0, 3)] = q[0].sin();
+        b[(0, 4)] = outer;
+        b[(1, 1)] = q[1].sin() * dq[0] * (dq[0] + dq[1]);
+        b[(1, 4)] = outer;
+        b
+    }
+
+    fn regressor(&self, q: &Vector2<T>, dq: &Vector2<T>, ddq: &Vector2<T>) -> SMatrix<T, 2, 9> {
+        let (s2, c2) = q[1].sin_cos();
+        let outer = (q[0] + q[1]).sin();
+        let mut y = self.friction_regressor(dq);
+        y[(0, 0)] = ddq[0];
+        y[(0, 1)] = c2 * (ddq[0] + ddq[0] + ddq[1]) - s2 * dq[1] * (dq[0] + dq[0] + dq[1]);
+        y[(0, 2)] = ddq[1];
+        y[(0, 3)] = q[0].sin();
+        y[(0, 4)] = outer;
+        y[(1, 1)] = c2 * ddq[0] + s2 * dq[0] * dq[0];
+        y[(1, 2)] = ddq[0] + ddq[1];
+        y[(1, 4)] = outer;
+        y
+    }
+
+    fn payload(&self, _theta: &[T; 9], mass: T, distance: T) -> [T; 9] {
+        let mut delta = [T::zero(); 9];
+        let (l1, g) = (self.length1, self.gravity);
+        delta[0] = mass * (l1 * l1 + distance * distance);
+        delta[1] = mass * l1 * distance;
+        delta[2] = mass * distance * distance;
+        delta[3] = g * mass * l1;
+        delta[4] = g * mass * distance;
+        delta
+    }
+}

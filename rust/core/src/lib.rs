@@ -1,0 +1,9 @@
+//! armgap-core: what a controller embeds.
+//!
+//! Arm dynamics, a dry-friction integrator, the discrete filters and the recursive least squares of Reyes and
+//! Kelly (1997), *Experimental evaluation of identification schemes on a direct drive robot*, Robotica 15,
+//! 563-571. No standard library, no allocation, no panic; `f64` and `f32`.
+#![no_std]
+
+pub mod arm;
+pub mod real;
