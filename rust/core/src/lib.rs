@@ -7,3 +7,6 @@
 
 pub mod arm;
 pub mod real;
+pub mod effect;
+pub mod integrate;
+pub mod plant;

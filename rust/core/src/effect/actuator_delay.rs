@@ -1,0 +1,58 @@
+//! Pure delay of the torque: `tau_joint(t) = tau(t - delay)`.
+//!
+//! A delay that is no whole number of samples puts a step of the held command inside an interval; the interval then
+//! carries its exact mean. Before the log begins, the first command is taken to have been held.
+
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec};
+use crate::real::Real;
+
+/// Transport delay of the command.
+#[derive(Debug)]
+pub struct ActuatorDelay;
+
+static SPEC: Spec = Spec {
+    name: "actuator_delay",
+    title: "actuator delay",
+    equation: "tau_joint(t) = tau(t - delay)",
+    source: "bus and firmware latency",
+    excited_by: "torque that changes from sample to sample",
+    scope: Scope::Joint,
+    parameters: &[EffectParameter::bounded("delay", Quantity::Time, 0.0, 1.0)],
+    starts: &[[0.5, 0.0, 0.0], [3.0, 0.0, 0.0]],
+    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
+};
+
+impl<T: Real> Effect<T> for ActuatorDelay {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn command(&self, p: &[T; MAX_PARAMETERS], t: &[T], torque: &mut [Pulse<T>]) {
+        for k in (0..torque.len()).rev() {
+            let h = super::interval(t, k);
+            let Some(&start) = t.get(k) else { continue };
+            let mean = held_mean(t, torque, k, start - p[0], start - p[0] + h);
+            if let Some(pulse) = torque.get_mut(k) {
+                *pulse = Pulse::held(mean);
+            }
+        }
+    }
+}
+
+/// Mean over `[from, to]` of the held command; intervals up to `last` are read, and none is after it.
+fn held_mean<T: Real>(t: &[T], torque: &[Pulse<T>], last: usize, from: T, to: T) -> T {
+    let length = to - from;
+    let (mut upper, mut sum, mut i) = (to, T::zero(), last);
+    loop {
+        let (Some(&begin), Some(pulse)) = (t.get(i), torque.get(i)) else { return T::zero() };
+        let lower = if i == 0 { from } else { begin.max(from) };
+        if upper > lower {
+            sum += (upper - lower) * pulse.mean();
+            upper = lower;
+        }
+        if i == 0 || begin <= from {
+            return if length > T::zero() { sum / length } else { pulse.mean() };
+        }
+        i -= 1;
+    }
+}

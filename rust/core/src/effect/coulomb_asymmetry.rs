@@ -1,0 +1,33 @@
+//! Coulomb friction whose level depends on the direction: `fc + delta` for `dq > 0`, `fc - delta` for `dq < 0`.
+//!
+//! While the joint moves this is the same function of time as a constant torque `-delta`; only at rest, where friction
+//! holds and a torque does not, do the two differ.
+
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec};
+use crate::real::Real;
+
+/// Coulomb friction that differs by direction.
+#[derive(Debug)]
+pub struct CoulombAsymmetry;
+
+static SPEC: Spec = Spec {
+    name: "coulomb_asymmetry",
+    title: "Coulomb friction that differs by direction",
+    equation: "f = (fc + delta sgn dq) sgn dq",
+    source: "Elhami and Brookfield 1996; Reyes and Kelly 1997, Table I",
+    excited_by: "motion in both directions",
+    scope: Scope::Joint,
+    parameters: &[EffectParameter::signed("delta", Quantity::Torque)],
+    starts: &[[0.05, 0.0, 0.0]],
+    hooks: Hooks { force: false, coulomb: true, command: false, measured: false },
+};
+
+impl<T: Real> Effect<T> for CoulombAsymmetry {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn coulomb(&self, p: &[T; MAX_PARAMETERS], _x: &JointPoint<T>, direction: T) -> T {
+        p[0] * direction
+    }
+}

@@ -1,0 +1,296 @@
+//! The library of unmodelled effects, one file each.
+//!
+//! An effect is what a real arm does and the rigid model of [`crate::arm`] leaves out. It acts through one or more
+//! hooks of [`Effect`], all of which default to "nothing": on the command before it becomes torque, as a torque at the
+//! joint, on the Coulomb level, on the inertia, on `theta`, on the direction of gravity, or on the measured position.
+//! Adding an effect is one file here and one line in [`catalogue`].
+
+mod actuator_delay;
+mod actuator_lag;
+mod base_tilt;
+mod coulomb_asymmetry;
+mod payload;
+mod quadratic_drag;
+mod rotor_inertia;
+mod stribeck;
+mod torque_gain;
+mod torque_offset;
+
+use crate::real::Real;
+
+/// Most parameters an effect may have.
+pub const MAX_PARAMETERS: usize = 3;
+
+/// Every effect, in the order of the documentation.
+pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
+    &[
+        &coulomb_asymmetry::CoulombAsymmetry,
+        &torque_offset::TorqueOffset,
+        &stribeck::Stribeck,
+        &quadratic_drag::QuadraticDrag,
+        &torque_gain::TorqueGain,
+        &actuator_lag::ActuatorLag,
+        &actuator_delay::ActuatorDelay,
+        &payload::Payload,
+        &base_tilt::BaseTilt,
+        &rotor_inertia::RotorInertia,
+    ]
+}
+
+/// The effect with this name.
+pub fn find<T: Real>(name: &str) -> Option<&'static dyn Effect<T>> {
+    catalogue::<T>().iter().copied().find(|effect| effect.spec().name == name)
+}
+
+/// Where an effect can sit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// On one joint.
+    Joint,
+    /// On the arm as a whole.
+    Arm,
+}
+
+/// What a parameter measures; it decides the unit and the scale of a first trial value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Joint torque (force on a linear joint).
+    Torque,
+    /// Joint inertia (mass on a linear joint).
+    Inertia,
+    /// Torque per squared speed.
+    Drag,
+    /// Torque per position.
+    Stiffness,
+    /// Torque per speed.
+    Damping,
+    /// Joint speed.
+    Speed,
+    /// Joint position.
+    Position,
+    /// Phase or direction, always an angle.
+    Angle,
+    /// Cycles per revolution, or any other count.
+    Count,
+    /// A ratio to one.
+    Ratio,
+    /// Time.
+    Time,
+    /// Mass.
+    Mass,
+    /// Length.
+    Length,
+}
+
+impl Quantity {
+    /// SI unit on a rotary or a linear joint.
+    pub const fn unit(self, rotary: bool) -> &'static str {
+        match (self, rotary) {
+            (Self::Torque, true) => "N m",
+            (Self::Torque, false) => "N",
+            (Self::Inertia, true) => "kg m^2",
+            (Self::Inertia, false) | (Self::Mass, _) => "kg",
+            (Self::Drag, true) => "N m s^2/rad^2",
+            (Self::Drag, false) => "N s^2/m^2",
+            (Self::Stiffness, true) => "N m/rad",
+            (Self::Stiffness, false) => "N/m",
+            (Self::Damping, true) => "N m s/rad",
+            (Self::Damping, false) => "N s/m",
+            (Self::Speed, true) => "rad/s",
+            (Self::Speed, false) => "m/s",
+            (Self::Position, true) | (Self::Angle, _) => "rad",
+            (Self::Position, false) | (Self::Length, _) => "m",
+            (Self::Count | Self::Ratio, _) => "1",
+            (Self::Time, _) => "s",
+        }
+    }
+}
+
+/// One parameter of an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EffectParameter {
+    /// Name in results and on the command line.
+    pub name: &'static str,
+    /// What it measures.
+    pub quantity: Quantity,
+    /// Smallest admissible value, SI.
+    pub lower: f64,
+    /// Largest admissible value, SI.
+    pub upper: f64,
+    /// Value at which the effect vanishes (for the first parameter; others have none of their own).
+    pub neutral: f64,
+}
+
+impl EffectParameter {
+    /// A parameter that may take any value and vanishes at zero.
+    pub const fn signed(name: &'static str, quantity: Quantity) -> Self {
+        Self { name, quantity, lower: f64::NEG_INFINITY, upper: f64::INFINITY, neutral: 0.0 }
+    }
+
+    /// A parameter between bounds that vanishes at zero.
+    pub const fn bounded(name: &'static str, quantity: Quantity, lower: f64, upper: f64) -> Self {
+        Self { name, quantity, lower, upper, neutral: 0.0 }
+    }
+}
+
+/// Which hooks an effect uses, so that the integrator calls no other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Hooks {
+    /// [`Effect::force`].
+    pub force: bool,
+    /// [`Effect::coulomb`].
+    pub coulomb: bool,
+    /// [`Effect::command`].
+    pub command: bool,
+    /// [`Effect::measured`].
+    pub measured: bool,
+}
+
+/// What an effect is: the part that does not depend on the scalar type.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spec {
+    /// Name in results and on the command line.
+    pub name: &'static str,
+    /// Name for people.
+    pub title: &'static str,
+    /// Equation, in the notation of `docs/notation.md`.
+    pub equation: &'static str,
+    /// Where it comes from.
+    pub source: &'static str,
+    /// What a log must contain for it to leave a trace.
+    pub excited_by: &'static str,
+    /// One joint or the whole arm.
+    pub scope: Scope,
+    /// Its parameters; the first one switches it off at its neutral value.
+    pub parameters: &'static [EffectParameter],
+    /// Trial values, in units of the log's own scale of each quantity (see the fit's `scale`).
+    pub starts: &'static [[f64; MAX_PARAMETERS]],
+    /// Hooks in use.
+    pub hooks: Hooks,
+}
+
+/// A joint at one instant, as a torque law sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointPoint<T> {
+    /// Time since the start of the log, s.
+    pub t: T,
+    /// Position.
+    pub q: T,
+    /// Velocity.
+    pub dq: T,
+    /// Torque of the actuator.
+    pub tau: T,
+    /// Torque that gravity and the motion of the other links put on the joint, `C dq + g`.
+    pub load: T,
+    /// Nominal friction `b |dq| + fc` at this speed.
+    pub friction: T,
+}
+
+/// One unmodelled effect: a law with up to [`MAX_PARAMETERS`] parameters `p`.
+pub trait Effect<T: Real>: Sync {
+    /// Name, parameters, hooks.
+    fn spec(&self) -> &'static Spec;
+
+    /// Torque added to the actuator's side of the joint's equation.
+    fn force(&self, _p: &[T; MAX_PARAMETERS], _x: &JointPoint<T>) -> T {
+        T::zero()
+    }
+
+    /// Addition to the Coulomb level while the joint slides, or is about to slide, in `direction` (+1 or -1).
+    fn coulomb(&self, _p: &[T; MAX_PARAMETERS], _x: &JointPoint<T>, _direction: T) -> T {
+        T::zero()
+    }
+
+    /// Inertia added to the joint's own acceleration only.
+    fn inertia(&self, _p: &[T; MAX_PARAMETERS]) -> T {
+        T::zero()
+    }
+
+    /// Mass and distance along the last link of an added point mass.
+    fn payload(&self, _p: &[T; MAX_PARAMETERS]) -> Option<(T, T)> {
+        None
+    }
+
+    /// Angle by which the base is turned against gravity.
+    fn tilt(&self, _p: &[T; MAX_PARAMETERS]) -> T {
+        T::zero()
+    }
+
+    /// Rewrites a whole log's command of one joint, sample times `t`, into the torque that reaches the joint.
+    fn command(&self, _p: &[T; MAX_PARAMETERS], _t: &[T], _torque: &mut [Pulse<T>]) {}
+
+    /// Position the encoder shows when the joint stands at `q`.
+    fn measured(&self, _p: &[T; MAX_PARAMETERS], q: T) -> T {
+        q
+    }
+}
+
+/// Torque over one sample interval: its values at the start, the middle and the end.
+///
+/// Between them it is quadratic, so Simpson's rule gives its mean. Laws that smear a step choose the middle value such
+/// that the mean, and with it the impulse, is exact however fast they are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pulse<T> {
+    /// At the sample.
+    pub start: T,
+    /// Half-way to the next sample.
+    pub middle: T,
+    /// Just before the next sample.
+    pub end: T,
+}
+
+impl<T: Real> Pulse<T> {
+    /// A torque held constant over the interval.
+    #[inline]
+    pub fn held(tau: T) -> Self {
+        Self { start: tau, middle: tau, end: tau }
+    }
+
+    /// A torque from `start` to `end` with the given mean.
+    pub fn with_mean(start: T, mean: T, end: T) -> Self {
+        let (four, six) = (crate::real::lit::<T>(4.0), crate::real::lit::<T>(6.0));
+        Self { start, middle: (six * mean - start - end) / four, end }
+    }
+
+    /// Mean over the interval (Simpson's rule, exact here).
+    #[inline]
+    pub fn mean(&self) -> T {
+        let (four, six) = (crate::real::lit::<T>(4.0), crate::real::lit::<T>(6.0));
+        (self.start + four * self.middle + self.end) / six
+    }
+
+    /// Value at the fraction `s` of the interval, from 0 to 1.
+    #[inline]
+    pub fn at(&self, s: T) -> T {
+        let two = crate::real::lit::<T>(2.0);
+        let one = T::one();
+        let (l0, l1, l2) = ((two * s - one) * (s - one), two * two * s * (one - s), s * (two * s - one));
+        l0 * self.start + l1 * self.middle + l2 * self.end
+    }
+
+    /// The same law applied to each of the three values.
+    pub fn map(self, f: impl Fn(T) -> T) -> Self {
+        Self { start: f(self.start), middle: f(self.middle), end: f(self.end) }
+    }
+}
+
+/// An effect placed on an arm with its parameters' values.
+#[derive(Clone, Copy)]
+pub struct Active<T: Real> {
+    /// The law.
+    pub law: &'static dyn Effect<T>,
+    /// 0-based joint; ignored by effects of the whole arm.
+    pub joint: usize,
+    /// Parameter values, SI, padded with zeros.
+    pub p: [T; MAX_PARAMETERS],
+}
+
+/// Length of the interval after sample `k`; the last one is as long as the one before it.
+#[inline]
+pub fn interval<T: Real>(t: &[T], k: usize) -> T {
+    match (t.get(k), t.get(k + 1)) {
+        (Some(&a), Some(&b)) => b - a,
+        (Some(&b), None) if k > 0 => t.get(k - 1).map_or_else(T::zero, |&a| b - a),
+        _ => T::zero(),
+    }
+}

@@ -1,0 +1,30 @@
+//! Drag that grows with the square of speed: `-c dq |dq|` (air, churning lubricant, a fan-like load).
+
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec};
+use crate::real::Real;
+
+/// Drag quadratic in speed.
+#[derive(Debug)]
+pub struct QuadraticDrag;
+
+static SPEC: Spec = Spec {
+    name: "quadratic_drag",
+    title: "quadratic drag",
+    equation: "f = c dq |dq|",
+    source: "Bittencourt and Gunnarsson 2012; polynomial damping of common simulators",
+    excited_by: "a wide range of speeds",
+    scope: Scope::Joint,
+    parameters: &[EffectParameter::signed("c", Quantity::Drag)],
+    starts: &[[0.05, 0.0, 0.0]],
+    hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
+};
+
+impl<T: Real> Effect<T> for QuadraticDrag {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn force(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>) -> T {
+        -p[0] * x.dq * x.dq.abs()
+    }
+}

@@ -1,0 +1,32 @@
+//! The joint receives `gain` times the commanded torque: a wrong torque constant, gear ratio or amplifier gain.
+
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec};
+use crate::real::Real;
+
+/// Wrong gain from command to torque.
+#[derive(Debug)]
+pub struct TorqueGain;
+
+static SPEC: Spec = Spec {
+    name: "torque_gain",
+    title: "wrong torque gain",
+    equation: "tau_joint = gain tau",
+    source: "Gautier and Briot 2014, drive gains",
+    excited_by: "any torque; seen only against trusted parameters or the other joints",
+    scope: Scope::Joint,
+    parameters: &[EffectParameter { name: "gain", quantity: Quantity::Ratio, lower: 0.05, upper: 20.0, neutral: 1.0 }],
+    starts: &[[1.05, 0.0, 0.0]],
+    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
+};
+
+impl<T: Real> Effect<T> for TorqueGain {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn command(&self, p: &[T; MAX_PARAMETERS], _t: &[T], torque: &mut [Pulse<T>]) {
+        for pulse in torque {
+            *pulse = pulse.map(|tau| p[0] * tau);
+        }
+    }
+}

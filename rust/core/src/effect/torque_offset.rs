@@ -1,0 +1,30 @@
+//! A constant torque: amplifier or current-sensor bias, `tau + offset`.
+
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec};
+use crate::real::Real;
+
+/// Constant torque added to the command.
+#[derive(Debug)]
+pub struct TorqueOffset;
+
+static SPEC: Spec = Spec {
+    name: "torque_offset",
+    title: "constant torque offset",
+    equation: "tau_joint = tau + offset",
+    source: "amplifier and current-sensor bias; Swevers et al. 2007",
+    excited_by: "any motion",
+    scope: Scope::Joint,
+    parameters: &[EffectParameter::signed("offset", Quantity::Torque)],
+    starts: &[[0.05, 0.0, 0.0]],
+    hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
+};
+
+impl<T: Real> Effect<T> for TorqueOffset {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn force(&self, p: &[T; MAX_PARAMETERS], _x: &JointPoint<T>) -> T {
+        p[0]
+    }
+}

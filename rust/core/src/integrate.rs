@@ -1,0 +1,339 @@
+//! Classical Runge-Kutta over one sample interval, with changes of the friction modes located inside it.
+//!
+//! While no joint reverses, sticks or breaks away the right-hand side is smooth and the step is of order four. A joint whose
+//! velocity would change sign is stopped at the instant it reaches zero; there it either sticks, if friction can hold it, or
+//! goes on in the direction of the torque. A stuck joint breaks away at the instant the torque it needs exceeds its Coulomb
+//! level. So the arm left under a torque below that level does not creep, and a step across a reversal keeps its accuracy.
+
+use crate::arm::Arm;
+use crate::effect::Pulse;
+use crate::plant::{Mode, Motion, Plant};
+use crate::real::{Real, lit};
+use nalgebra::SVector;
+
+/// Mode changes located within one sub-step before the rest of it is taken with all crossing joints held.
+const MAX_EVENTS: usize = 16;
+
+/// Corrections of the located instant; each squares the error of the last.
+const MAX_REFINEMENTS: usize = 4;
+
+/// Position, velocity and friction mode of every joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State<T, const N: usize> {
+    /// Positions.
+    pub q: SVector<T, N>,
+    /// Velocities.
+    pub dq: SVector<T, N>,
+    /// Friction modes.
+    pub modes: [Mode; N],
+}
+
+impl<T: Real, const N: usize> State<T, N> {
+    /// A state whose modes follow from its velocities: a joint at rest starts stuck and is released if its torque demands it.
+    pub fn new(q: SVector<T, N>, dq: SVector<T, N>) -> Self {
+        Self { q, dq, modes: core::array::from_fn(|j| Mode::of(dq[j])) }
+    }
+
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.q.iter().chain(self.dq.iter()).all(|x| x.is_finite())
+    }
+}
+
+/// A sample interval: where it starts, how long it is, and the torque over it.
+#[derive(Debug, Clone, Copy)]
+pub struct Interval<'a, T, const N: usize> {
+    /// Time of the sample, s.
+    pub t: T,
+    /// Length, s.
+    pub h: T,
+    /// Torque of each joint over the interval.
+    pub torque: &'a [Pulse<T>; N],
+}
+
+impl<T: Real, const N: usize> Interval<'_, T, N> {
+    /// Torque at `x` seconds after the sample.
+    #[inline]
+    fn torque_at(&self, x: T) -> SVector<T, N> {
+        let s = x / self.h;
+        SVector::from_fn(|j, _| {
+            let pulse = &self.torque[j];
+            if pulse.start == pulse.end && pulse.start == pulse.middle { pulse.start } else { pulse.at(s) }
+        })
+    }
+}
+
+/// Advances `state` over one sample interval in `substeps` equal steps.
+#[inline]
+pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
+    plant: &Plant<T, A, N, P>,
+    state: &mut State<T, N>,
+    interval: &Interval<T, N>,
+    substeps: usize,
+) {
+    if interval.h <= T::zero() {
+        return;
+    }
+    let count = substeps.max(1);
+    let dt = interval.h / lit(count as f64);
+    for i in 0..count {
+        let from = dt * lit(i as f64);
+        if plant.smoothing() > T::zero() {
+            *state = Step { plant, interval }.smooth(state, from, dt);
+        } else {
+            Step { plant, interval }.exact(state, from, dt);
+        }
+    }
+}
+
+/// One sub-step's surroundings.
+struct Step<'a, T: Real, A, const N: usize, const P: usize> {
+    plant: &'a Plant<T, A, N, P>,
+    interval: &'a Interval<'a, T, N>,
+}
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N, P> {
+    #[inline]
+    fn motion(&self, x: T, q: &SVector<T, N>, dq: &SVector<T, N>, modes: &[Mode; N]) -> Motion<T, N> {
+        let tau = self.interval.torque_at(x);
+        self.plant.acceleration(self.interval.t + x, q, dq, &tau, modes)
+    }
+
+    /// One Runge-Kutta step whose first stage is known.
+    #[inline]
+    fn runge_kutta(&self, state: &State<T, N>, x: T, dt: T, k1: &SVector<T, N>) -> State<T, N> {
+        let (half, sixth, two) = (dt * lit(0.5), dt / lit(6.0), lit::<T>(2.0));
+        let State { q, dq, modes } = state;
+        let v2 = dq + k1 * half;
+        let k2 = self.motion(x + half, &(q + dq * half), &v2, modes).ddq;
+        let v3 = dq + k2 * half;
+        let k3 = self.motion(x + half, &(q + v2 * half), &v3, modes).ddq;
+        let v4 = dq + k3 * dt;
+        let k4 = self.motion(x + dt, &(q + v3 * dt), &v4, modes).ddq;
+        State {
+            q: q + (dq + (v2 + v3) * two + v4) * sixth,
+            dq: dq + (k1 + (k2 + k3) * two + k4) * sixth,
+            modes: *modes,
+        }
+    }
+
+    /// A step with smoothed friction: no events.
+    fn smooth(&self, state: &State<T, N>, x: T, dt: T) -> State<T, N> {
+        let k1 = self.motion(x, &state.q, &state.dq, &state.modes).ddq;
+        self.runge_kutta(state, x, dt, &k1)
+    }
+
+    /// A step with exact friction: from mode change to mode change.
+    #[inline]
+    fn exact(&self, state: &mut State<T, N>, from: T, dt: T) {
+        let (mut x, mut left) = (from, dt);
+        for _ in 0..MAX_EVENTS {
+            let k1 = self.settle(state, x);
+            let trial = self.runge_kutta(state, x, left, &k1);
+            let Some(event) = self.first_event(state, &trial, x, left, &k1) else {
+                *state = trial;
+                return;
+            };
+            let Located { length, reached } = self.locate(state, &event, x, left, &k1);
+            *state = event.apply(reached);
+            x += length;
+            left -= length;
+            if left <= T::zero() {
+                return;
+            }
+        }
+        let k1 = self.settle(state, x);
+        let mut last = self.runge_kutta(state, x, left, &k1);
+        hold_reversed(&mut last);
+        *state = last;
+    }
+
+    /// Releases stuck joints that friction cannot hold, and sticks joints that were released to no avail; returns `ddq`.
+    #[inline]
+    fn settle(&self, state: &mut State<T, N>, x: T) -> SVector<T, N> {
+        let mut motion = self.motion(x, &state.q, &state.dq, &state.modes);
+        let mut tried = [false; N];
+        for _ in 0..2 * N {
+            let Some((j, mode)) = self.unsettled(state, &motion, x, &tried) else { break };
+            tried[j] = mode == Mode::Stuck;
+            state.modes[j] = mode;
+            motion = self.motion(x, &state.q, &state.dq, &state.modes);
+        }
+        motion.ddq
+    }
+
+    /// The joint whose mode contradicts the motion most, and the mode it should have.
+    #[inline]
+    fn unsettled(
+        &self,
+        state: &State<T, N>,
+        motion: &Motion<T, N>,
+        x: T,
+        tried: &[bool; N],
+    ) -> Option<(usize, Mode)> {
+        let (mut found, mut worst) = (None, T::zero());
+        for j in 0..N {
+            if state.dq[j] != T::zero() {
+                if state.modes[j] != Mode::of(state.dq[j]) {
+                    return Some((j, Mode::of(state.dq[j])));
+                }
+            } else if state.modes[j] == Mode::Stuck {
+                let tau = self.interval.torque_at(x);
+                let (excess, direction) =
+                    self.plant.excess(j, self.interval.t + x, &state.q, &tau, motion.holding[j]);
+                if excess > worst && !tried[j] {
+                    (found, worst) = (Some((j, Mode::of(direction))), excess);
+                }
+            } else if motion.ddq[j] * state.modes[j].direction() < T::zero() {
+                return Some((j, Mode::Stuck));
+            }
+        }
+        found
+    }
+
+    /// The mode change that a trial step runs into first, if any.
+    #[inline]
+    fn first_event(
+        &self,
+        state: &State<T, N>,
+        trial: &State<T, N>,
+        x: T,
+        dt: T,
+        k1: &SVector<T, N>,
+    ) -> Option<Event<T>> {
+        let reverses =
+            |j: usize| state.modes[j] != Mode::Stuck && trial.dq[j] * state.modes[j].direction() < T::zero();
+        let any_stuck = state.modes.contains(&Mode::Stuck);
+        if !any_stuck && !(0..N).any(reverses) {
+            return None;
+        }
+        let end = self.motion(x + dt, &trial.q, &trial.dq, &trial.modes);
+        let mut first: Option<Event<T>> = None;
+        for j in 0..N {
+            let event = if reverses(j) {
+                let s = hermite_root(state.dq[j], k1[j] * dt, trial.dq[j], end.ddq[j] * dt);
+                Some(Event { joint: j, s, change: Change::Stop })
+            } else if state.modes[j] == Mode::Stuck {
+                self.release(j, state, trial, x, dt, &end)
+            } else {
+                None
+            };
+            if let Some(event) = event
+                && first.as_ref().is_none_or(|earliest| event.s < earliest.s)
+            {
+                first = Some(event);
+            }
+        }
+        first
+    }
+
+    /// When a stuck joint breaks away within the step, by linear interpolation of the torque that it lacks.
+    fn release(
+        &self,
+        j: usize,
+        state: &State<T, N>,
+        trial: &State<T, N>,
+        x: T,
+        dt: T,
+        end: &Motion<T, N>,
+    ) -> Option<Event<T>> {
+        let t = self.interval.t;
+        let tau_end = self.interval.torque_at(x + dt);
+        let (after, direction) = self.plant.excess(j, t + x + dt, &trial.q, &tau_end, end.holding[j]);
+        if after <= T::zero() {
+            return None;
+        }
+        let start = self.motion(x, &state.q, &state.dq, &state.modes);
+        let tau = self.interval.torque_at(x);
+        let (before, _) = self.plant.excess(j, t + x, &state.q, &tau, start.holding[j]);
+        let s = if before < T::zero() { before / (before - after) } else { T::zero() };
+        Some(Event { joint: j, s, change: Change::Release(Mode::of(direction)) })
+    }
+
+    /// Integrates up to the event; the instant of a stop is corrected until the velocity vanishes to rounding.
+    fn locate(&self, state: &State<T, N>, event: &Event<T>, x: T, dt: T, k1: &SVector<T, N>) -> Located<T, N> {
+        let mut s = event.s;
+        let mut reached = self.runge_kutta(state, x, s * dt, k1);
+        if matches!(event.change, Change::Stop) {
+            for _ in 0..MAX_REFINEMENTS {
+                let slope = self.motion(x + s * dt, &reached.q, &reached.dq, &reached.modes).ddq[event.joint] * dt;
+                let correction = reached.dq[event.joint] / slope;
+                let next = s - correction;
+                if !(next > T::zero() && next <= T::one()) || correction.abs() < lit(1e-12) {
+                    break;
+                }
+                s = next;
+                reached = self.runge_kutta(state, x, s * dt, k1);
+            }
+        }
+        Located { length: s * dt, reached }
+    }
+}
+
+/// A change of one joint's mode at the fraction `s` of a step.
+struct Event<T> {
+    joint: usize,
+    s: T,
+    change: Change,
+}
+
+/// What happens at an event.
+enum Change {
+    /// The velocity reaches zero.
+    Stop,
+    /// Friction no longer holds.
+    Release(Mode),
+}
+
+/// A state at a located event and the time it took to get there.
+struct Located<T, const N: usize> {
+    length: T,
+    reached: State<T, N>,
+}
+
+impl<T: Real> Event<T> {
+    /// The state just after the event.
+    fn apply<const N: usize>(&self, mut state: State<T, N>) -> State<T, N> {
+        let j = self.joint;
+        match self.change {
+            Change::Stop => (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck),
+            Change::Release(mode) => state.modes[j] = mode,
+        }
+        state
+    }
+}
+
+/// First root in `(0, 1)` of the cubic with values `v0, v1` and slopes `d0, d1` at the ends, where `v0 v1 <= 0` or the curve
+/// leaves zero first; found by bisection and Newton on the polynomial alone.
+fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
+    let (two, three) = (lit::<T>(2.0), lit::<T>(3.0));
+    let (c3, c2) = (two * (v0 - v1) + d0 + d1, three * (v1 - v0) - two * d0 - d1);
+    let value = |s: T| v0 + s * (d0 + s * (c2 + s * c3));
+    let slope = |s: T| d0 + s * (two * c2 + s * three * c3);
+    let (mut low, mut high) = (T::zero(), T::one());
+    let mut s = if v0 == T::zero() { lit(0.5) } else { v0 / (v0 - v1) };
+    for _ in 0..40 {
+        let f = value(s);
+        if f * v1 > T::zero() {
+            high = s;
+        } else {
+            low = s;
+        }
+        let newton = s - f / slope(s);
+        let next = if newton > low && newton < high { newton } else { (low + high) / two };
+        if (next - s).abs() < lit(1e-13) {
+            return next;
+        }
+        s = next;
+    }
+    s
+}
+
+/// Holds every joint whose velocity contradicts its mode.
+fn hold_reversed<T: Real, const N: usize>(state: &mut State<T, N>) {
+    for j in 0..N {
+        if state.dq[j] * state.modes[j].direction() < T::zero() {
+            (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck);
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! The integrator against what mechanics demands of it.
+
+use armgap_core::arm::{Arm, TwoLink};
+use armgap_core::effect::{Active, Pulse, find};
+use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::plant::Plant;
+use nalgebra::{SVector, Vector2};
+
+const THETA: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6, 1.734];
+const H: f64 = 0.0025;
+
+type Seed = Plant<f64, TwoLink<f64>, 2, 9>;
+
+fn seed(theta: [f64; 9]) -> Seed {
+    Plant::new(TwoLink::new(9.81, Some(0.45), &theta), theta)
+}
+
+/// The torques (31) and (32).
+fn seed_torque(t: f64) -> [f64; 2] {
+    [
+        (1.0 - (-0.8 * t).exp()) * 29.0 + 68.0 * (16.0 * t + 0.1).sin() + 9.0 * (20.0 * t + 0.15).sin(),
+        (1.0 - (-1.8 * t).exp()) * 1.2 + 8.0 * (26.0 * t + 0.08).sin() + 2.0 * (12.0 * t + 0.34).sin(),
+    ]
+}
+
+fn run(plant: &Seed, start: State<f64, 2>, duration: f64, h: f64, substeps: usize, tau: impl Fn(f64) -> [f64; 2]) -> State<f64, 2> {
+    let mut state = start;
+    for k in 0..(duration / h).round() as usize {
+        let t = k as f64 * h;
+        let torque = tau(t).map(Pulse::held);
+        advance(plant, &mut state, &Interval { t, h, torque: &torque }, substeps);
+    }
+    state
+}
+
+fn at_rest() -> State<f64, 2> {
+    State::new(Vector2::zeros(), Vector2::zeros())
+}
+
+#[test]
+fn an_arm_below_its_coulomb_level_does_not_creep() {
+    let mut start = at_rest();
+    start.q = Vector2::new(0.1, -0.05);
+    let end = run(&seed(THETA), start, 10.0, H, 1, |t| [2.0 + (7.0 * t).sin(), 0.8 * (3.0 * t).cos()]);
+    assert_eq!(end.q, start.q);
+    assert_eq!(end.dq, Vector2::zeros());
+}
+
+#[test]
+fn a_sliding_arm_stops_and_stays() {
+    let start = State::new(Vector2::zeros(), Vector2::new(0.3, -0.8));
+    let stopped = run(&seed(THETA), start, 2.0, H, 1, |_| [0.0, 0.0]);
+    let later = run(&seed(THETA), stopped, 5.0, H, 1, |_| [0.0, 0.0]);
+    assert_eq!(stopped.dq, Vector2::zeros());
+    assert_eq!(stopped.q, later.q);
+}
+
+#[test]
+fn order_is_four_where_friction_is_smooth() {
+    let plant = seed(THETA).with_smoothing(1.0);
+    let end = |n| run(&plant, at_rest(), 0.5, 0.0125, n, seed_torque).q;
+    let reference = end(64);
+    let errors = [1, 2, 4].map(|n| (end(n) - reference).norm());
+    let orders = [errors[0] / errors[1], errors[1] / errors[2]].map(f64::log2);
+    assert!(orders.iter().all(|p| (3.7..4.6).contains(p)), "orders {orders:?} of errors {errors:?}");
+}
+
+#[test]
+fn reversals_keep_their_accuracy() {
+    // 2 s of the seed's run hold some thirty reversals of each joint.
+    let plant = seed(THETA);
+    let end = |n| run(&plant, at_rest(), 2.0, H, n, seed_torque).q;
+    let reference = end(32);
+    let errors = [1, 2, 4].map(|n| (end(n) - reference).amax());
+    assert!(errors[0] < 1e-6, "{errors:?}");
+    assert!(errors[2] < errors[0] / 20.0, "{errors:?}");
+}
+
+#[test]
+fn energy_is_kept_without_friction() {
+    let mut theta = THETA;
+    theta[5..].fill(0.0);
+    let plant = seed(theta);
+    let arm = TwoLink::new(9.81, Some(0.45), &theta);
+    let energy = |s: &State<f64, 2>| arm.energy_regressor(&s.q, &s.dq).dot(&SVector::from(theta));
+    let start = State::new(Vector2::new(1.2, -0.7), Vector2::zeros());
+    let end = run(&plant, start, 10.0, H, 1, |_| [0.0, 0.0]);
+    let drift = (energy(&end) - energy(&start)).abs() / energy(&start);
+    assert!(drift < 1e-8, "relative drift {drift:e}");
+}
+
+#[test]
+fn work_equals_stored_plus_dissipated_energy() {
+    // Work of a held torque is tau (q(k+1) - q(k)); without viscous friction Coulomb friction takes fc times the path.
+    let mut theta = THETA;
+    theta[5] = 0.0;
+    theta[6] = 0.0;
+    let plant = seed(theta);
+    let arm = TwoLink::new(9.81, Some(0.45), &theta);
+    let (mut state, mut supplied, mut dissipated) = (at_rest(), 0.0, 0.0);
+    for k in 0..4000 {
+        let t = k as f64 * H;
+        let tau = seed_torque(t);
+        let torque = tau.map(Pulse::held);
+        for i in 0..8 {
+            let before = state;
+            let interval = Interval { t: t + H / 8.0 * f64::from(i), h: H / 8.0, torque: &torque };
+            advance(&plant, &mut state, &interval, 1);
+            for j in 0..2 {
+                let path = state.q[j] - before.q[j];
+                supplied += tau[j] * path;
+                dissipated += theta[7 + j] * path.abs();
+            }
+        }
+    }
+    let stored = arm.energy_regressor(&state.q, &state.dq).dot(&SVector::from(theta));
+    let gap = (supplied - stored - dissipated).abs() / dissipated;
+    assert!(gap < 1e-4, "relative gap {gap:e}");
+}
+
+#[test]
+fn effects_leave_the_rigid_arm_at_their_neutral_value() {
+    let reference = run(&seed(THETA), at_rest(), 1.0, H, 1, seed_torque);
+    for law in armgap_core::effect::catalogue::<f64>() {
+        let spec = law.spec();
+        let mut p = [1.0; 3];
+        p[0] = spec.parameters[0].neutral;
+        let plant = seed(THETA).with_effect(Active { law: *law, joint: 1, p }).expect("room for one effect");
+        let end = run(&plant, at_rest(), 1.0, H, 1, seed_torque);
+        assert!((end.q - reference.q).amax() < 1e-12, "{}", spec.name);
+    }
+}
+
+#[test]
+fn a_smoothed_sign_tends_to_dry_friction() {
+    let exact = run(&seed(THETA), at_rest(), 1.0, H, 4, seed_torque).q;
+    let gap = |width| (run(&seed(THETA).with_smoothing(width), at_rest(), 1.0, H, 16, seed_torque).q - exact).amax();
+    let gaps = [0.1, 0.01, 0.001].map(gap);
+    assert!(gaps[0] > 4.0 * gaps[1] && gaps[1] > 4.0 * gaps[2], "{gaps:?}");
+}
+
+#[test]
+fn a_delayed_command_keeps_its_impulse() {
+    let t: Vec<f64> = (0..50).map(|k| f64::from(k) * H + 1e-4 * f64::from(k % 3)).collect();
+    let u: Vec<f64> = t.iter().map(|&t| seed_torque(t)[0]).collect();
+    for (name, p) in [("actuator_delay", 0.0061), ("actuator_lag", 0.004), ("actuator_lag", 1e-5)] {
+        let mut pulses: Vec<_> = u.iter().map(|&u| Pulse::held(u)).collect();
+        find::<f64>(name).expect("in the catalogue").command(&[p, 0.0, 0.0], &t, &mut pulses);
+        let shifted: f64 = pulses.iter().zip(t.windows(2)).map(|(pulse, t)| pulse.mean() * (t[1] - t[0])).sum();
+        let fine = 20_000;
+        let (span, mut y, mut exact) = (t[49] - t[0], u[0], 0.0);
+        for i in 0..fine {
+            let now = t[0] + (f64::from(i) + 0.5) * span / f64::from(fine);
+            let held = |now: f64| u[t.partition_point(|&x| x <= now).max(1) - 1];
+            let dt = span / f64::from(fine);
+            let value = if name == "actuator_delay" { held(now - p) } else {
+                let mean = held(now) + (y - held(now)) * (1.0 - (-dt / p).exp()) * p / dt;
+                y = held(now) + (y - held(now)) * (-dt / p).exp();
+                mean
+            };
+            exact += value * dt;
+        }
+        assert!((shifted - exact).abs() < 1e-3 * exact.abs().max(0.01), "{name} {p}: {shifted} against {exact}");
+    }
+}
