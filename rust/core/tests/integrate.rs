@@ -57,8 +57,8 @@ fn a_sliding_arm_stops_and_stays() {
 
 #[test]
 fn order_is_four_where_friction_is_smooth() {
-    let plant = seed(THETA).with_smoothing(1.0);
-    let end = |n| run(&plant, at_rest(), 0.5, 0.0125, n, seed_torque).q;
+    let plant = seed(THETA).with_smoothing(2.0);
+    let end = |n| run(&plant, at_rest(), 0.5, 0.005, n, seed_torque).q;
     let reference = end(64);
     let errors = [1, 2, 4].map(|n| (end(n) - reference).norm());
     let orders = [errors[0] / errors[1], errors[1] / errors[2]].map(f64::log2);
