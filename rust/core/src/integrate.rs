@@ -31,7 +31,11 @@ pub struct State<T, const N: usize> {
 impl<T: Real, const N: usize> State<T, N> {
     /// A state whose modes follow from its velocities: a joint at rest starts stuck and is released if its torque demands it.
     pub fn new(q: SVector<T, N>, dq: SVector<T, N>) -> Self {
-        Self { q, dq, modes: core::array::from_fn(|j| Mode::of(dq[j])) }
+        Self {
+            q,
+            dq,
+            modes: core::array::from_fn(|j| Mode::of(dq[j])),
+        }
     }
 
     /// Whether every number is finite.
@@ -58,7 +62,11 @@ impl<T: Real, const N: usize> Interval<'_, T, N> {
         let s = x / self.h;
         SVector::from_fn(|j, _| {
             let pulse = &self.torque[j];
-            if pulse.start == pulse.end && pulse.start == pulse.middle { pulse.start } else { pulse.at(s) }
+            if pulse.start == pulse.end && pulse.start == pulse.middle {
+                pulse.start
+            } else {
+                pulse.at(s)
+            }
         })
     }
 }
@@ -94,9 +102,16 @@ struct Step<'a, T: Real, A, const N: usize, const P: usize> {
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N, P> {
     #[inline]
-    fn motion(&self, x: T, q: &SVector<T, N>, dq: &SVector<T, N>, modes: &[Mode; N]) -> Motion<T, N> {
+    fn motion(
+        &self,
+        x: T,
+        q: &SVector<T, N>,
+        dq: &SVector<T, N>,
+        modes: &[Mode; N],
+    ) -> Motion<T, N> {
         let tau = self.interval.torque_at(x);
-        self.plant.acceleration(self.interval.t + x, q, dq, &tau, modes)
+        self.plant
+            .acceleration(self.interval.t + x, q, dq, &tau, modes)
     }
 
     /// One Runge-Kutta step whose first stage is known.
@@ -154,7 +169,9 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         let mut motion = self.motion(x, &state.q, &state.dq, &state.modes);
         let mut tried = [false; N];
         for _ in 0..2 * N {
-            let Some((j, mode)) = self.unsettled(state, &motion, x, &tried) else { break };
+            let Some((j, mode)) = self.unsettled(state, &motion, x, &tried) else {
+                break;
+            };
             tried[j] = mode == Mode::Stuck;
             state.modes[j] = mode;
             motion = self.motion(x, &state.q, &state.dq, &state.modes);
@@ -180,7 +197,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
             } else if state.modes[j] == Mode::Stuck {
                 let tau = self.interval.torque_at(x);
                 let (excess, direction) =
-                    self.plant.excess(j, self.interval.t + x, &state.q, &tau, motion.holding[j]);
+                    self.plant
+                        .excess(j, self.interval.t + x, &state.q, &tau, motion.holding[j]);
                 if excess > worst && !tried[j] {
                     (found, worst) = (Some((j, Mode::of(direction))), excess);
                 }
@@ -201,8 +219,9 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         dt: T,
         k1: &SVector<T, N>,
     ) -> Option<Event<T>> {
-        let reverses =
-            |j: usize| state.modes[j] != Mode::Stuck && trial.dq[j] * state.modes[j].direction() < T::zero();
+        let reverses = |j: usize| {
+            state.modes[j] != Mode::Stuck && trial.dq[j] * state.modes[j].direction() < T::zero()
+        };
         let any_stuck = state.modes.contains(&Mode::Stuck);
         if !any_stuck && !(0..N).any(reverses) {
             return None;
@@ -212,7 +231,11 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         for j in 0..N {
             let event = if reverses(j) {
                 let s = hermite_root(state.dq[j], k1[j] * dt, trial.dq[j], end.ddq[j] * dt);
-                Some(Event { joint: j, s, change: Change::Stop })
+                Some(Event {
+                    joint: j,
+                    s,
+                    change: Change::Stop,
+                })
             } else if state.modes[j] == Mode::Stuck {
                 self.release(j, state, trial, x, dt, &end)
             } else {
@@ -239,24 +262,46 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
     ) -> Option<Event<T>> {
         let t = self.interval.t;
         let tau_end = self.interval.torque_at(x + dt);
-        let (after, direction) = self.plant.excess(j, t + x + dt, &trial.q, &tau_end, end.holding[j]);
+        let (after, direction) =
+            self.plant
+                .excess(j, t + x + dt, &trial.q, &tau_end, end.holding[j]);
         if after <= T::zero() {
             return None;
         }
         let start = self.motion(x, &state.q, &state.dq, &state.modes);
         let tau = self.interval.torque_at(x);
-        let (before, _) = self.plant.excess(j, t + x, &state.q, &tau, start.holding[j]);
-        let s = if before < T::zero() { before / (before - after) } else { T::zero() };
-        Some(Event { joint: j, s, change: Change::Release(Mode::of(direction)) })
+        let (before, _) = self
+            .plant
+            .excess(j, t + x, &state.q, &tau, start.holding[j]);
+        let s = if before < T::zero() {
+            before / (before - after)
+        } else {
+            T::zero()
+        };
+        Some(Event {
+            joint: j,
+            s,
+            change: Change::Release(Mode::of(direction)),
+        })
     }
 
     /// Integrates up to the event; the instant of a stop is corrected until the velocity vanishes to rounding.
-    fn locate(&self, state: &State<T, N>, event: &Event<T>, x: T, dt: T, k1: &SVector<T, N>) -> Located<T, N> {
+    fn locate(
+        &self,
+        state: &State<T, N>,
+        event: &Event<T>,
+        x: T,
+        dt: T,
+        k1: &SVector<T, N>,
+    ) -> Located<T, N> {
         let mut s = event.s;
         let mut reached = self.runge_kutta(state, x, s * dt, k1);
         if matches!(event.change, Change::Stop) {
             for _ in 0..MAX_REFINEMENTS {
-                let slope = self.motion(x + s * dt, &reached.q, &reached.dq, &reached.modes).ddq[event.joint] * dt;
+                let slope = self
+                    .motion(x + s * dt, &reached.q, &reached.dq, &reached.modes)
+                    .ddq[event.joint]
+                    * dt;
                 let correction = reached.dq[event.joint] / slope;
                 let next = s - correction;
                 if !(next > T::zero() && next <= T::one()) || correction.abs() < lit(1e-12) {
@@ -266,7 +311,10 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
                 reached = self.runge_kutta(state, x, s * dt, k1);
             }
         }
-        Located { length: s * dt, reached }
+        Located {
+            length: s * dt,
+            reached,
+        }
     }
 }
 
@@ -311,7 +359,11 @@ fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
     let value = |s: T| v0 + s * (d0 + s * (c2 + s * c3));
     let slope = |s: T| d0 + s * (two * c2 + s * three * c3);
     let (mut low, mut high) = (T::zero(), T::one());
-    let mut s = if v0 == T::zero() { lit(0.5) } else { v0 / (v0 - v1) };
+    let mut s = if v0 == T::zero() {
+        lit(0.5)
+    } else {
+        v0 / (v0 - v1)
+    };
     for _ in 0..40 {
         let f = value(s);
         if f * v1 > T::zero() {
@@ -320,7 +372,11 @@ fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
             low = s;
         }
         let newton = s - f / slope(s);
-        let next = if newton > low && newton < high { newton } else { (low + high) / two };
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            (low + high) / two
+        };
         if (next - s).abs() < lit(1e-13) {
             return next;
         }

@@ -6,7 +6,7 @@
 #![no_std]
 
 pub mod arm;
-pub mod real;
 pub mod effect;
 pub mod integrate;
 pub mod plant;
+pub mod real;

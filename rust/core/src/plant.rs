@@ -132,7 +132,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     #[inline]
     fn point(&self, j: usize, t: T, q: T, dq: T, tau: T, load: T) -> JointPoint<T> {
         let friction = self.viscous[j] * dq.abs() + self.coulomb[j];
-        JointPoint { t, q, dq, tau, load, friction }
+        JointPoint {
+            t,
+            q,
+            dq,
+            tau,
+            load,
+            friction,
+        }
     }
 
     /// Coulomb level of joint `j` in a direction, never negative.
@@ -168,7 +175,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     fn dry_friction(&self, j: usize, x: &JointPoint<T>, mode: Mode) -> T {
         if self.smoothing > T::zero() {
             let soft = (x.dq / self.smoothing).tanh();
-            return self.level(j, x, if soft < T::zero() { -T::one() } else { T::one() }) * soft;
+            return self.level(
+                j,
+                x,
+                if soft < T::zero() {
+                    -T::one()
+                } else {
+                    T::one()
+                },
+            ) * soft;
         }
         match mode {
             Mode::Stuck => T::zero(),
@@ -191,15 +206,21 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         for j in 0..N {
             let x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
             inertia[(j, j)] += self.armature[j];
-            rhs[j] = tau[j] - bias[j] - self.viscous[j] * dq[j] - self.dry_friction(j, &x, modes[j])
-                + self.force(j, &x);
+            rhs[j] =
+                tau[j] - bias[j] - self.viscous[j] * dq[j] - self.dry_friction(j, &x, modes[j])
+                    + self.force(j, &x);
         }
         self.solve(&inertia, &rhs, modes)
     }
 
     /// `M ddq = rhs` with the rows and columns of stuck joints taken out.
     #[inline]
-    fn solve(&self, inertia: &SMatrix<T, N, N>, rhs: &SVector<T, N>, modes: &[Mode; N]) -> Motion<T, N> {
+    fn solve(
+        &self,
+        inertia: &SMatrix<T, N, N>,
+        rhs: &SVector<T, N>,
+        modes: &[Mode; N],
+    ) -> Motion<T, N> {
         let stuck = self.stuck(modes);
         let (mut reduced, mut b) = (*inertia, *rhs);
         for j in 0..N {
@@ -243,7 +264,11 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         tau: &SVector<T, N>,
         holding: T,
     ) -> (T, T) {
-        let direction = if holding < T::zero() { -T::one() } else { T::one() };
+        let direction = if holding < T::zero() {
+            -T::one()
+        } else {
+            T::one()
+        };
         // At rest the load of a joint is what has to be held.
         let x = self.point(j, t, q[j], T::zero(), tau[j], holding - tau[j]);
         (holding.abs() - self.level(j, &x, direction), direction)
@@ -254,7 +279,9 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         if self.smoothing == T::zero() {
             return T::zero();
         }
-        let (inertia, _) = self.arm.dynamics(&self.theta, q, &SVector::zeros(), self.tilt);
+        let (inertia, _) = self
+            .arm
+            .dynamics(&self.theta, q, &SVector::zeros(), self.tilt);
         let mut fastest = T::zero();
         for j in 0..N {
             let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
@@ -274,7 +301,10 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
 /// Solves `a x = b` for symmetric positive definite `a` by `L D L'`; an indefinite `a` gives non-finite numbers, not a panic.
 #[inline]
-fn solve_positive_definite<T: Real, const N: usize>(mut a: SMatrix<T, N, N>, mut b: SVector<T, N>) -> SVector<T, N> {
+fn solve_positive_definite<T: Real, const N: usize>(
+    mut a: SMatrix<T, N, N>,
+    mut b: SVector<T, N>,
+) -> SVector<T, N> {
     for k in 0..N {
         let pivot = T::one() / a[(k, k)];
         for i in (k + 1)..N {

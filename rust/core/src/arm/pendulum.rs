@@ -16,10 +16,22 @@ pub struct Pendulum<T> {
 impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
     const KIND: &'static str = "pendulum";
     const PARAMETERS: &'static [Parameter] = &[
-        Parameter { name: "theta1", unit: "kg m^2" },
-        Parameter { name: "theta2", unit: "N m" },
-        Parameter { name: "viscous1", unit: "N m s/rad" },
-        Parameter { name: "coulomb1", unit: "N m" },
+        Parameter {
+            name: "theta1",
+            unit: "kg m^2",
+        },
+        Parameter {
+            name: "theta2",
+            unit: "N m",
+        },
+        Parameter {
+            name: "viscous1",
+            unit: "N m s/rad",
+        },
+        Parameter {
+            name: "coulomb1",
+            unit: "N m",
+        },
     ];
 
     fn inertia(&self, theta: &[T; 4], _q: &SVector<T, 1>) -> SMatrix<T, 1, 1> {
@@ -36,7 +48,12 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
 
     fn energy_regressor(&self, q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SVector<T, 4> {
         let half: T = crate::real::lit(0.5);
-        SVector::from([half * dq[0] * dq[0], T::one() - q[0].cos(), T::zero(), T::zero()])
+        SVector::from([
+            half * dq[0] * dq[0],
+            T::one() - q[0].cos(),
+            T::zero(),
+            T::zero(),
+        ])
     }
 
     fn momentum_regressor(&self, _q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
@@ -61,6 +78,11 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
 
     fn payload(&self, _theta: &[T; 4], mass: T, distance: T) -> [T; 4] {
         let inertia = mass * distance * distance;
-        [inertia, mass * self.gravity * distance, T::zero(), T::zero()]
+        [
+            inertia,
+            mass * self.gravity * distance,
+            T::zero(),
+            T::zero(),
+        ]
     }
 }

@@ -19,7 +19,12 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     parameters: &[EffectParameter::bounded("delay", Quantity::Time, 0.0, 1.0)],
     starts: &[[0.5, 0.0, 0.0], [3.0, 0.0, 0.0]],
-    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
+    hooks: Hooks {
+        force: false,
+        coulomb: false,
+        command: true,
+        measured: false,
+    },
 };
 
 impl<T: Real> Effect<T> for ActuatorDelay {
@@ -44,14 +49,20 @@ fn held_mean<T: Real>(t: &[T], torque: &[Pulse<T>], last: usize, from: T, to: T)
     let length = to - from;
     let (mut upper, mut sum, mut i) = (to, T::zero(), last);
     loop {
-        let (Some(&begin), Some(pulse)) = (t.get(i), torque.get(i)) else { return T::zero() };
+        let (Some(&begin), Some(pulse)) = (t.get(i), torque.get(i)) else {
+            return T::zero();
+        };
         let lower = if i == 0 { from } else { begin.max(from) };
         if upper > lower {
             sum += (upper - lower) * pulse.mean();
             upper = lower;
         }
         if i == 0 || begin <= from {
-            return if length > T::zero() { sum / length } else { pulse.mean() };
+            return if length > T::zero() {
+                sum / length
+            } else {
+                pulse.mean()
+            };
         }
         i -= 1;
     }

@@ -14,9 +14,20 @@ static SPEC: Spec = Spec {
     source: "Gautier and Briot 2014, drive gains",
     excited_by: "any torque; seen only against trusted parameters or the other joints",
     scope: Scope::Joint,
-    parameters: &[EffectParameter { name: "gain", quantity: Quantity::Ratio, lower: 0.05, upper: 20.0, neutral: 1.0 }],
+    parameters: &[EffectParameter {
+        name: "gain",
+        quantity: Quantity::Ratio,
+        lower: 0.05,
+        upper: 20.0,
+        neutral: 1.0,
+    }],
     starts: &[[1.05, 0.0, 0.0]],
-    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
+    hooks: Hooks {
+        force: false,
+        coulomb: false,
+        command: true,
+        measured: false,
+    },
 };
 
 impl<T: Real> Effect<T> for TorqueGain {

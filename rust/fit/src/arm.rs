@@ -1,0 +1,57 @@
+//! From an arm's description at run time to one of the arms known at compile time.
+
+use armgap_core::arm::{Arm, Axis, Kind, Pendulum, TwoLink};
+
+/// An arm as an arm file describes it; lists have one entry per parameter or joint.
+#[derive(Debug, Clone)]
+pub struct ArmDescription {
+    /// Kind of arm.
+    pub kind: Kind,
+    /// Acceleration of gravity, m/s^2.
+    pub gravity: f64,
+    /// Trusted values of all parameters.
+    pub theta: Vec<f64>,
+    /// One-sigma trust in each.
+    pub sigma: Vec<f64>,
+    /// Encoder counts per revolution.
+    pub counts_per_rev: Option<Vec<f64>>,
+    /// Torque limit per joint.
+    pub torque_limit: Option<Vec<f64>>,
+    /// Link lengths, m.
+    pub link_length: Option<Vec<f64>>,
+}
+
+/// Something to be done with an arm whose size is known at compile time.
+pub trait WithArm {
+    /// Result.
+    type Output;
+
+    /// Does it.
+    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        self,
+        arm: A,
+        theta: [f64; P],
+    ) -> Self::Output;
+}
+
+impl ArmDescription {
+    /// Runs `work` with the arm of this kind; `None` if the number of parameters does not fit the kind.
+    pub fn dispatch<W: WithArm>(&self, work: W) -> Option<W::Output> {
+        let gravity = self.gravity;
+        let first_length = self.link_length.as_ref().and_then(|l| l.first().copied());
+        match self.kind {
+            Kind::Axis => {
+                let theta: [f64; 4] = self.theta.as_slice().try_into().ok()?;
+                Some(work.call::<_, 1, 4>(Axis { gravity }, theta))
+            }
+            Kind::Pendulum => {
+                let theta: [f64; 4] = self.theta.as_slice().try_into().ok()?;
+                Some(work.call::<_, 1, 4>(Pendulum { gravity }, theta))
+            }
+            Kind::TwoLink => {
+                let theta: [f64; 9] = self.theta.as_slice().try_into().ok()?;
+                Some(work.call::<_, 2, 9>(TwoLink::new(gravity, first_length, &theta), theta))
+            }
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! Which effect: screening, full fits of what passes, and the holdout's decision, one cause after another.
+
+use crate::model::{Hypothesis, Placed};
+use crate::screen::{Scored, candidates, screen};
+use crate::solve::Fit;
+use crate::study::{Study, Weights};
+use armgap_core::arm::Arm;
+use rayon::prelude::*;
+
+/// Candidates that get a full fit in each stage.
+const FULL_FITS: usize = 12;
+
+/// Candidates that are fitted again under the weights of the best.
+const FINALISTS: usize = 6;
+
+/// Widths of smoothed friction that are tried as a nuisance, relative to the slowest joint's RMS speed.
+const SMOOTHING: [f64; 3] = [0.01, 0.03, 0.1];
+
+/// One alternative to the current model, fitted on the training windows and judged on the holdout.
+#[derive(Debug, Clone)]
+pub struct Contender<const P: usize> {
+    /// The added effect; none for the current model, with or without smoother friction.
+    pub effect: Option<Placed>,
+    /// The fit.
+    pub fit: Fit<P>,
+    /// Tempered cost of every training window.
+    pub training: Vec<f64>,
+    /// Tempered cost of every holdout window.
+    pub holdout: Vec<f64>,
+}
+
+impl<const P: usize> Contender<P> {
+    /// Cost on all windows, and of leaving the trusted values.
+    pub fn score(&self) -> f64 {
+        self.training.iter().chain(&self.holdout).sum::<f64>() + self.fit.prior_cost
+    }
+
+    /// Advantage over `other` of every window, training first.
+    pub fn advantages(&self, other: &Self) -> Vec<f64> {
+        let here = self.training.iter().chain(&self.holdout);
+        other
+            .training
+            .iter()
+            .chain(&other.holdout)
+            .zip(here)
+            .map(|(b, a)| b - a)
+            .collect()
+    }
+
+    /// Mean advantage over `other` per window, in units of its standard error.
+    pub fn z_over(&self, other: &Self) -> f64 {
+        z_score(&self.advantages(other))
+    }
+
+    /// The same on the holdout windows alone.
+    pub fn holdout_z_over(&self, other: &Self) -> f64 {
+        z_score(&self.advantages(other)[self.training.len()..])
+    }
+}
+
+/// Mean in units of its standard error.
+fn z_score(x: &[f64]) -> f64 {
+    let n = x.len() as f64;
+    let mean = x.iter().sum::<f64>() / n;
+    let variance = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    mean / (variance / n).sqrt().max(1e-12)
+}
+
+/// One stage: the current model and its alternatives, under common weights.
+pub struct Stage<const N: usize, const P: usize> {
+    /// The current model, refitted.
+    pub base: Contender<P>,
+    /// Alternatives, best first.
+    pub contenders: Vec<Contender<P>>,
+    /// First-order tests of all candidates around the current model.
+    pub screened: Vec<Scored>,
+    /// Weights in force.
+    pub weights: Weights<N>,
+    /// Cost the measurement noise alone would leave on the holdout, under these weights.
+    pub floor: f64,
+}
+
+impl<const N: usize, const P: usize> Stage<N, P> {
+    /// Share of the holdout's cost above the floor that a contender removes.
+    pub fn share(&self, contender: &Contender<P>) -> f64 {
+        let base: f64 = self.base.holdout.iter().sum();
+        let here: f64 = contender.holdout.iter().sum();
+        (base - here) / (base - self.floor).max(1e-9 * base)
+    }
+
+    /// How far the current model's cost lies above the floor, as a factor.
+    pub fn excess(&self) -> f64 {
+        self.base.holdout.iter().sum::<f64>() / self.floor
+    }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+    /// One stage around the current model.
+    pub fn stage(&self, current: &Hypothesis<P>, scale: [f64; N]) -> Stage<N, P> {
+        let (fit, weights) = self.settle(current, scale);
+        let all = self.open_candidates(&fit.hypothesis);
+        let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
+        let mut starts: Vec<Hypothesis<P>> = promising(&screened)
+            .into_iter()
+            .map(|effect| fit.hypothesis.with(effect))
+            .collect();
+        starts.extend(self.smoother(&fit.hypothesis));
+        let first = self.contend(&weights, &fit.hypothesis, starts);
+        let (base, contenders, weights) = self.final_round(&fit.hypothesis, first, weights);
+        let floor = self.floor(&weights);
+        Stage {
+            base,
+            contenders,
+            screened,
+            weights,
+            floor,
+        }
+    }
+
+    /// Candidates not yet in the model.
+    pub fn open_candidates(&self, model: &Hypothesis<P>) -> Vec<Placed> {
+        let taken = |c: &Placed| model.effects.iter().any(|e| e.same_place(c));
+        candidates(&self.scales)
+            .into_iter()
+            .filter(|c| !taken(c))
+            .collect()
+    }
+
+    /// The model with smoother friction, or with exact friction if it is smoothed now.
+    fn smoother(&self, model: &Hypothesis<P>) -> Vec<Hypothesis<P>> {
+        let slowest = self
+            .scales
+            .speed
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
+        let widths = SMOOTHING.iter().map(|w| w * slowest).chain([0.0]);
+        let other = widths.filter(|w| *w != model.smoothing);
+        other
+            .map(|smoothing| Hypothesis {
+                smoothing,
+                ..model.clone()
+            })
+            .collect()
+    }
+
+    /// Fits all starts and judges them, best first.
+    fn contend(
+        &self,
+        weights: &Weights<N>,
+        base: &Hypothesis<P>,
+        starts: Vec<Hypothesis<P>>,
+    ) -> Vec<Contender<P>> {
+        let known = base.effects.len();
+        let mut contenders: Vec<Contender<P>> = starts
+            .into_par_iter()
+            .map(|start| {
+                let fit = self.problem(&weights.training).solve(&start);
+                let training = self
+                    .problem(&weights.training)
+                    .window_costs(&fit.hypothesis);
+                let holdout = self.judge(&weights.holdout).window_costs(&fit.hypothesis);
+                let effect = fit.hypothesis.effects.get(known).copied();
+                Contender {
+                    effect,
+                    fit,
+                    training,
+                    holdout,
+                }
+            })
+            .filter(|c| c.score().is_finite())
+            .collect();
+        contenders.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        let mut best: Vec<Contender<P>> = Vec::new();
+        for contender in contenders {
+            let same = |c: &Contender<P>| match (&c.effect, &contender.effect) {
+                (Some(a), Some(b)) => a.same_place(b),
+                (None, None) => true,
+                _ => false,
+            };
+            if !best.iter().any(same) {
+                best.push(contender);
+            }
+        }
+        best
+    }
+
+    /// Re-weights by the best contender's residual and fits the finalists and the current model again.
+    fn final_round(
+        &self,
+        current: &Hypothesis<P>,
+        mut contenders: Vec<Contender<P>>,
+        mut weights: Weights<N>,
+    ) -> (Contender<P>, Vec<Contender<P>>, Weights<N>) {
+        for _ in 0..3 {
+            let Some(best) = contenders.first() else {
+                break;
+            };
+            let scale = self.residual_scale(&weights.training, &best.fit.hypothesis);
+            let shrunk = (0..N)
+                .map(|j| weights.training.scale[j] / scale[j])
+                .fold(0.0, f64::max);
+            if shrunk < 1.15 {
+                break;
+            }
+            weights = self.weights(&best.fit.hypothesis, scale);
+            contenders.truncate(FINALISTS);
+            let starts = contenders.into_iter().map(|c| c.fit.hypothesis).collect();
+            contenders = self.contend(&weights, current, starts);
+        }
+        let base = self
+            .contend(&weights, current, vec![current.clone()])
+            .remove(0);
+        (base, contenders, weights)
+    }
+
+    /// Cost that measurement noise alone leaves on the holdout.
+    fn floor(&self, weights: &Weights<N>) -> f64 {
+        let per_row: f64 = (0..N)
+            .map(|j| (self.noise[j] / weights.holdout.scale[j]).powi(2))
+            .sum();
+        per_row * self.holdout.data.rows as f64
+    }
+}
+
+/// The best start of each of the best-scoring candidates.
+fn promising(screened: &[Scored]) -> Vec<Placed> {
+    let mut order: Vec<&Scored> = screened.iter().filter(|s| s.gain > 0.0).collect();
+    order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut chosen: Vec<Placed> = Vec::new();
+    for scored in order {
+        if chosen.len() < FULL_FITS && !chosen.iter().any(|c| c.same_place(&scored.effect)) {
+            chosen.push(scored.effect);
+        }
+    }
+    chosen
+}

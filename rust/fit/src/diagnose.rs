@@ -1,0 +1,221 @@
+//! The diagnosis: where the gap lies, which effect causes it, how far it shrinks.
+
+use crate::arm::{ArmDescription, WithArm};
+use crate::report::Diagnosis;
+use crate::scale::Scales;
+use crate::solve::Prior;
+use crate::study::{Sample, Study};
+use crate::track::Track;
+use crate::window::Dataset;
+use armgap_core::arm::{Arm, Kind};
+use std::time::Instant;
+
+/// One log: sample times, positions and torques, row by row.
+#[derive(Debug, Clone)]
+pub struct LogData<'a> {
+    /// Name in results.
+    pub name: String,
+    /// Sample times, s, increasing.
+    pub t: &'a [f64],
+    /// Positions, one row per sample.
+    pub q: &'a [f64],
+    /// Torques, one row per sample, held until the next.
+    pub tau: &'a [f64],
+}
+
+/// What a diagnosis may be told.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Prediction horizon, s.
+    pub horizon: f64,
+    /// Causes named at most.
+    pub max_causes: usize,
+    /// Seed of the resampling that gives probabilities and intervals.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            horizon: 0.25,
+            max_causes: 4,
+            seed: 1,
+        }
+    }
+}
+
+/// Why there is no diagnosis.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DiagnoseError {
+    /// The number of parameters does not fit the kind of arm.
+    Parameters(Kind),
+    /// Too few samples of `set` for windows of the horizon: found, needed.
+    TooShort {
+        /// `training` or `holdout`.
+        set: &'static str,
+        /// Windows found.
+        windows: usize,
+        /// Windows needed.
+        needed: usize,
+    },
+    /// A log holds a number that is not finite, or times that do not increase.
+    BadSamples(String),
+    /// The horizon is not a positive number of seconds.
+    Horizon(f64),
+}
+
+impl std::fmt::Display for DiagnoseError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Parameters(kind) => write!(
+                f,
+                "a {} needs {} parameters",
+                kind.name(),
+                kind.parameters().len()
+            ),
+            Self::TooShort {
+                set,
+                windows,
+                needed,
+            } => write!(
+                f,
+                "the {set} logs hold {windows} windows of the prediction horizon, {needed} are needed; give more data or a shorter horizon"
+            ),
+            Self::BadSamples(name) => write!(
+                f,
+                "log `{name}` holds values that are not finite, or times that do not increase"
+            ),
+            Self::Horizon(h) => write!(
+                f,
+                "the horizon must be a positive number of seconds, not {h}"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for DiagnoseError {}
+
+/// Windows without which nothing can be said.
+const FEWEST_WINDOWS: usize = 4;
+
+/// Diagnoses the gap between an arm and its logs.
+pub fn diagnose(
+    arm: &ArmDescription,
+    training: &[LogData<'_>],
+    holdout: &[LogData<'_>],
+    options: &Options,
+) -> Result<Diagnosis, DiagnoseError> {
+    if !(options.horizon > 0.0 && options.horizon.is_finite()) {
+        return Err(DiagnoseError::Horizon(options.horizon));
+    }
+    for log in training.iter().chain(holdout) {
+        let finite = log
+            .t
+            .iter()
+            .chain(log.q)
+            .chain(log.tau)
+            .all(|x| x.is_finite());
+        if !finite || log.t.windows(2).any(|w| w[1] <= w[0]) || log.t.len() < 2 {
+            return Err(DiagnoseError::BadSamples(log.name.clone()));
+        }
+    }
+    arm.dispatch(Request {
+        arm,
+        training,
+        holdout,
+        options,
+    })
+    .ok_or(DiagnoseError::Parameters(arm.kind))?
+}
+
+struct Request<'a> {
+    arm: &'a ArmDescription,
+    training: &'a [LogData<'a>],
+    holdout: &'a [LogData<'a>],
+    options: &'a Options,
+}
+
+impl WithArm for Request<'_> {
+    type Output = Result<Diagnosis, DiagnoseError>;
+
+    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        self,
+        arm: A,
+        theta: [f64; P],
+    ) -> Self::Output {
+        let started = Instant::now();
+        let study = self.study::<A, N, P>(arm, theta)?;
+        let mut diagnosis = crate::report::compose(&study, self.arm, self.options);
+        diagnosis.seconds = started.elapsed().as_secs_f64();
+        Ok(diagnosis)
+    }
+}
+
+impl Request<'_> {
+    fn study<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        &self,
+        arm: A,
+        theta: [f64; P],
+    ) -> Result<Study<A, N, P>, DiagnoseError> {
+        let training = self.sample::<N>("training", self.training)?;
+        let holdout = self.sample::<N>("holdout", self.holdout)?;
+        let length = self
+            .arm
+            .link_length
+            .as_ref()
+            .and_then(|l| l.last().copied());
+        let scales = Scales::new(
+            &arm,
+            &theta,
+            &training.data.tracks,
+            self.arm.gravity,
+            length,
+        );
+        let sigma = std::array::from_fn(|i| self.arm.sigma[i]);
+        let prior = Prior {
+            theta,
+            sigma,
+            inertial: A::INERTIAL,
+        };
+        let noise = std::array::from_fn(|j| {
+            crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
+        });
+        Ok(Study {
+            arm,
+            prior,
+            scales,
+            training,
+            holdout,
+            noise,
+        })
+    }
+
+    fn sample<const N: usize>(
+        &self,
+        set: &'static str,
+        logs: &[LogData<'_>],
+    ) -> Result<Sample<N>, DiagnoseError> {
+        let steps = self.arm.counts_per_rev.as_ref().map(|counts| {
+            std::array::from_fn(|j| {
+                if self.arm.kind.rotary() {
+                    std::f64::consts::TAU / counts[j]
+                } else {
+                    1.0 / counts[j]
+                }
+            })
+        });
+        let tracks = logs
+            .iter()
+            .map(|log| Track::new(&log.name, log.t, log.q, log.tau, steps))
+            .collect();
+        let data = Dataset::new(tracks, self.options.horizon);
+        if data.windows.len() < FEWEST_WINDOWS {
+            return Err(DiagnoseError::TooShort {
+                set,
+                windows: data.windows.len(),
+                needed: FEWEST_WINDOWS,
+            });
+        }
+        Ok(Sample::new(data))
+    }
+}

@@ -1,0 +1,19 @@
+//! armgap-fit: from logs and a nominal arm to a diagnosis.
+//!
+//! The way of the data: `track` (log) -> `window` (short rollouts) -> `metric` (what a residual weighs) -> `solve` (output error)
+//! -> `attribute` (which effect) and `locate` (where) -> `report` (the result as data).
+
+pub mod arm;
+pub mod attribute;
+pub mod diagnose;
+pub mod metric;
+pub mod model;
+pub mod report;
+pub mod scale;
+pub mod screen;
+pub mod simulate;
+pub mod smooth;
+pub mod solve;
+pub mod study;
+pub mod track;
+pub mod window;

@@ -1,0 +1,288 @@
+//! What a residual weighs once each window's start has been fitted to it.
+//!
+//! The start of a window is measured, with noise. Its error is a nuisance with a prior; to first order it is projected out: with
+//! `X` the sensitivity of the window's prediction to its start and `L L'` the precision of the measured start,
+//!
+//! ```text
+//! cost(r) = min over d of |W^(1/2) (r - X d)|^2 + |L' (c + d)|^2 = |a|^2 - |Q' a|^2,     a = [W^(1/2) r; -L' c],
+//! ```
+//!
+//! where `Q` is an orthonormal basis of `[W^(1/2) X; L']` and `c` the displacement the prediction already starts from (variable
+//! projection, Golub and Pereyra 1973).
+
+use crate::model::Hypothesis;
+use crate::window::{Dataset, Shift};
+use armgap_core::arm::Arm;
+use nalgebra::{DMatrix, DVector, SVector};
+use rayon::prelude::*;
+
+/// How much less a measured start is trusted than its own noise says: a local cubic also errs where the acceleration jumps.
+const START_INFLATION: f64 = 2.0;
+
+/// Heaviness of the tail of windows' costs: a window this many times worse than typical has about half its weight.
+const TAIL: f64 = 3.0;
+
+/// Displacements for the sensitivity to a start, in m or rad and per second.
+const START_STEP: f64 = 1e-6;
+
+/// One window's projection.
+#[derive(Debug, Clone)]
+struct Projection {
+    /// Rows of `Q` that belong to samples.
+    samples: DMatrix<f64>,
+    /// Rows of `Q` that belong to the prior of the start.
+    prior: DMatrix<f64>,
+    /// `-L' c`.
+    pull: DVector<f64>,
+    /// `R^-1` of the same factorisation: start corrections from coordinates.
+    back: DMatrix<f64>,
+}
+
+/// Weights of a dataset's residuals.
+#[derive(Debug, Clone)]
+pub struct Metric<const N: usize> {
+    /// Standard deviation each joint's residual is measured in.
+    pub scale: [f64; N],
+    /// Displacement of each window's start that the predictions are made with.
+    pub starts: Vec<Shift<N>>,
+    /// Weight of each window; less than one where the model fails far beyond what is typical.
+    pub trust: Vec<f64>,
+    /// Cost of a typical window under the hypothesis the metric was made for.
+    pub typical: f64,
+    projections: Vec<Projection>,
+}
+
+/// Inner products of columns under the metric, the residual last.
+#[derive(Debug, Clone)]
+pub struct Gram {
+    /// Sum over windows.
+    pub total: DMatrix<f64>,
+    /// Per window, the products of every column with the residual.
+    pub scores: Vec<DVector<f64>>,
+}
+
+impl<const N: usize> Metric<N> {
+    /// The metric around a hypothesis, with starts displaced by `starts`.
+    pub fn new<A: Arm<f64, N, P>, const P: usize>(
+        data: &Dataset<N>,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+        scale: [f64; N],
+        starts: Vec<Shift<N>>,
+    ) -> Self {
+        let sensitivities = start_sensitivities(data, arm, hypothesis, &starts);
+        let project = |(index, shift): (usize, &Shift<N>)| {
+            let window = &data.windows[index];
+            let columns: Vec<&[f64]> = sensitivities.iter().map(|c| &c[window.range()]).collect();
+            projection(&columns, &scale, &window.start.covariance, shift)
+        };
+        let projections = starts.iter().enumerate().map(project).collect();
+        let trust = vec![1.0; starts.len()];
+        Self {
+            scale,
+            starts,
+            trust,
+            typical: 1.0,
+            projections,
+        }
+    }
+
+    /// The same metric with windows trusted by how well a hypothesis of this residual explains them.
+    pub fn robust(mut self, data: &Dataset<N>, residual: &[f64]) -> Self {
+        let costs = self.costs(data, residual);
+        self.typical = crate::track::median(costs.clone()).max(f64::MIN_POSITIVE);
+        self.trust = costs
+            .iter()
+            .map(|cost| (1.0 + TAIL) / (TAIL + cost / self.typical))
+            .collect();
+        self
+    }
+
+    /// Cost of a window with its tail cut: that of a multivariate Student variable, linear for typical windows and
+    /// logarithmic far beyond.
+    pub fn tempered(&self, cost: f64) -> f64 {
+        self.typical * (1.0 + TAIL) * (cost / (TAIL * self.typical)).ln_1p()
+    }
+
+    /// Sum of the windows' costs, each by its trust.
+    pub fn total(&self, costs: &[f64]) -> f64 {
+        costs
+            .iter()
+            .zip(&self.trust)
+            .map(|(cost, trust)| cost * trust)
+            .sum()
+    }
+
+    /// Divides a flat vector by the joints' scales.
+    pub fn whiten(&self, column: &mut [f64]) {
+        for row in column.chunks_exact_mut(N) {
+            for (value, scale) in row.iter_mut().zip(self.scale) {
+                *value /= scale;
+            }
+        }
+    }
+
+    /// Inner products of whitened `columns` and, last, a whitened `residual`.
+    pub fn gram(&self, data: &Dataset<N>, columns: &[Vec<f64>], residual: &[f64]) -> Gram {
+        let k = columns.len();
+        let one =
+            |((window, projection), trust): ((&crate::window::Window<N>, &Projection), &f64)| {
+                let range = window.range();
+                let mut a = DMatrix::zeros(range.len(), k + 1);
+                for (c, column) in columns.iter().enumerate() {
+                    a.column_mut(c).copy_from_slice(&column[range.clone()]);
+                }
+                a.column_mut(k).copy_from_slice(&residual[range]);
+                let mut coordinates = projection.samples.tr_mul(&a);
+                let pulled = projection.prior.tr_mul(&projection.pull);
+                coordinates.column_mut(k).axpy(1.0, &pulled, 1.0);
+                let mut gram = a.tr_mul(&a) - coordinates.tr_mul(&coordinates);
+                gram[(k, k)] += projection.pull.norm_squared();
+                gram * *trust
+            };
+        let grams: Vec<DMatrix<f64>> = data
+            .windows
+            .par_iter()
+            .zip(&self.projections)
+            .zip(&self.trust)
+            .map(one)
+            .collect();
+        let mut total = DMatrix::zeros(k + 1, k + 1);
+        for gram in &grams {
+            total += gram;
+        }
+        let scores = grams.iter().map(|g| g.column(k).into_owned()).collect();
+        Gram { total, scores }
+    }
+
+    /// Cost of every window for a whitened residual.
+    pub fn costs(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
+        let one = |(window, projection): (&crate::window::Window<N>, &Projection)| {
+            let r = DVector::from_column_slice(&residual[window.range()]);
+            let coordinates =
+                projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.pull);
+            (r.norm_squared() + projection.pull.norm_squared() - coordinates.norm_squared())
+                .max(0.0)
+        };
+        data.windows
+            .iter()
+            .zip(&self.projections)
+            .map(one)
+            .collect()
+    }
+
+    /// The residual that is left once the starts are fitted, whitened, in the order of the flat vector.
+    pub fn remainder(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
+        let mut left = residual.to_vec();
+        for (window, projection) in data.windows.iter().zip(&self.projections) {
+            let r = DVector::from_column_slice(&residual[window.range()]);
+            let coordinates =
+                projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.pull);
+            let fitted = &projection.samples * coordinates;
+            for (value, part) in left[window.range()].iter_mut().zip(fitted.iter()) {
+                *value -= part;
+            }
+        }
+        left
+    }
+
+    /// The displacements of all starts that fit a whitened residual best.
+    pub fn refit_starts(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<Shift<N>> {
+        let windows = data.windows.iter().zip(&self.projections).zip(&self.starts);
+        windows
+            .map(|((window, projection), shift)| {
+                let r = DVector::from_column_slice(&residual[window.range()]);
+                let coordinates =
+                    projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.pull);
+                let change = &projection.back * coordinates;
+                Shift {
+                    q: shift.q + SVector::from_fn(|j, _| change[j]),
+                    dq: shift.dq + SVector::from_fn(|j, _| change[N + j]),
+                }
+            })
+            .collect()
+    }
+}
+
+/// Derivatives of all predictions by the starts' positions and velocities.
+fn start_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    data: &Dataset<N>,
+    arm: &A,
+    hypothesis: &Hypothesis<P>,
+    starts: &[Shift<N>],
+) -> Vec<Vec<f64>> {
+    let centre = data.predict(arm, hypothesis, starts);
+    (0..2 * N)
+        .into_par_iter()
+        .map(|i| {
+            let displaced: Vec<Shift<N>> = starts
+                .iter()
+                .map(|shift| {
+                    let mut moved = *shift;
+                    if i < N {
+                        moved.q[i] += START_STEP
+                    } else {
+                        moved.dq[i - N] += START_STEP
+                    }
+                    moved
+                })
+                .collect();
+            let moved = data.predict(arm, hypothesis, &displaced);
+            moved
+                .iter()
+                .zip(&centre)
+                .map(|(a, b)| ((a - b) / START_STEP).clamp(-1e4, 1e4))
+                .collect()
+        })
+        .collect()
+}
+
+/// The projection of one window from its start's sensitivities, scales and covariance.
+fn projection<const N: usize>(
+    columns: &[&[f64]],
+    scale: &[f64; N],
+    covariance: &[[f64; 3]; N],
+    shift: &Shift<N>,
+) -> Projection {
+    let rows = columns[0].len();
+    let mut stacked = DMatrix::zeros(rows + 2 * N, 2 * N);
+    for (c, column) in columns.iter().enumerate() {
+        for (r, value) in column.iter().enumerate() {
+            stacked[(r, c)] = value / scale[r % N];
+        }
+    }
+    let root = start_precision_root(covariance);
+    stacked.view_mut((rows, 0), (2 * N, 2 * N)).copy_from(&root);
+    let displacement = DVector::from_fn(
+        2 * N,
+        |i, _| if i < N { shift.q[i] } else { shift.dq[i - N] },
+    );
+    let pull = -(&root * displacement);
+    let qr = stacked.qr();
+    let q = qr.q();
+    let back = qr
+        .r()
+        .try_inverse()
+        .unwrap_or_else(|| DMatrix::zeros(2 * N, 2 * N));
+    Projection {
+        samples: q.rows(0, rows).into_owned(),
+        prior: q.rows(rows, 2 * N).into_owned(),
+        pull,
+        back,
+    }
+}
+
+/// `L'` with `L L'` the precision of a measured start, positions first, then velocities.
+fn start_precision_root<const N: usize>(covariance: &[[f64; 3]; N]) -> DMatrix<f64> {
+    let mut root = DMatrix::zeros(2 * N, 2 * N);
+    let inflation = START_INFLATION * START_INFLATION;
+    for (j, &[vq, cov, vdq]) in covariance.iter().enumerate() {
+        let (vq, cov, vdq) = (vq * inflation, cov * inflation, vdq * inflation);
+        // Cholesky of the inverse of [[vq, cov], [cov, vdq]].
+        let given_q = (vdq - cov * cov / vq).max(1e-300);
+        root[(j, j)] = 1.0 / vq.sqrt();
+        root[(N + j, j)] = -cov / vq / given_q.sqrt();
+        root[(N + j, N + j)] = 1.0 / given_q.sqrt();
+    }
+    root
+}

@@ -1,0 +1,161 @@
+//! A hypothesis about the arm: parameter values, friction smoothing, and effects placed on joints.
+
+use armgap_core::arm::Arm;
+use armgap_core::effect::{Active, Effect, MAX_PARAMETERS, Pulse, Scope};
+use armgap_core::plant::Plant;
+
+/// An effect on a joint, with values for its parameters.
+#[derive(Clone, Copy)]
+pub struct Placed {
+    /// The law.
+    pub law: &'static dyn Effect<f64>,
+    /// 0-based joint; 0 for effects of the whole arm.
+    pub joint: usize,
+    /// Parameter values, SI.
+    pub p: [f64; MAX_PARAMETERS],
+}
+
+impl std::fmt::Debug for Placed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{}:{}:{:?}",
+            self.law.spec().name,
+            self.joint + 1,
+            &self.p[..self.len()]
+        )
+    }
+}
+
+impl Placed {
+    /// Number of parameters in use.
+    pub fn len(&self) -> usize {
+        self.law.spec().parameters.len()
+    }
+
+    /// An effect without parameters does not exist.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// The same effect on the same joint, whatever its values.
+    pub fn same_place(&self, other: &Self) -> bool {
+        self.law.spec().name == other.law.spec().name && self.joint == other.joint
+    }
+
+    /// 1-based joint, or none for effects of the whole arm.
+    pub fn joint_number(&self) -> Option<usize> {
+        (self.law.spec().scope == Scope::Joint).then_some(self.joint + 1)
+    }
+}
+
+/// Everything a simulation needs besides the log.
+#[derive(Debug, Clone)]
+pub struct Hypothesis<const P: usize> {
+    /// The arm's parameters.
+    pub theta: [f64; P],
+    /// Width of the smoothed sign of friction, rad/s; zero for exact dry friction.
+    pub smoothing: f64,
+    /// Effects with their values.
+    pub effects: Vec<Placed>,
+}
+
+impl<const P: usize> Hypothesis<P> {
+    /// The arm without effects.
+    pub fn rigid(theta: [f64; P]) -> Self {
+        Self {
+            theta,
+            smoothing: 0.0,
+            effects: Vec::new(),
+        }
+    }
+
+    /// The same with one more effect.
+    pub fn with(&self, effect: Placed) -> Self {
+        let mut more = self.clone();
+        more.effects.push(effect);
+        more
+    }
+
+    /// Free values: `theta`, then the effects' parameters.
+    pub fn values(&self) -> Vec<f64> {
+        let effects = self
+            .effects
+            .iter()
+            .flat_map(|e| e.p[..e.len()].iter().copied());
+        self.theta.iter().copied().chain(effects).collect()
+    }
+
+    /// The same hypothesis with other values.
+    pub fn with_values(&self, values: &[f64]) -> Self {
+        let mut other = self.clone();
+        let mut rest = values.iter().copied();
+        for (slot, value) in other.theta.iter_mut().zip(rest.by_ref()) {
+            *slot = value;
+        }
+        for effect in &mut other.effects {
+            let n = effect.len();
+            for (slot, value) in effect.p[..n].iter_mut().zip(rest.by_ref()) {
+                *slot = value;
+            }
+        }
+        other
+    }
+
+    /// The simulator of this hypothesis; `None` if it names more effects than a plant carries.
+    pub fn plant<A: Arm<f64, N, P>, const N: usize>(&self, arm: &A) -> Option<Plant<f64, A, N, P>> {
+        let plant = Plant::new(arm.clone(), self.theta).with_smoothing(self.smoothing);
+        self.effects.iter().try_fold(plant, |plant, e| {
+            plant.with_effect(Active {
+                law: e.law,
+                joint: e.joint,
+                p: e.p,
+            })
+        })
+    }
+
+    /// Rewrites the held commands of a log into the torque that reaches the joints.
+    pub fn command<const N: usize>(
+        &self,
+        t: &[f64],
+        held: &[[Pulse<f64>; N]],
+    ) -> Option<Vec<[Pulse<f64>; N]>> {
+        if !self.effects.iter().any(|e| e.law.spec().hooks.command) {
+            return None;
+        }
+        let mut torque = held.to_vec();
+        let mut column = Vec::with_capacity(torque.len());
+        for effect in self.effects.iter().filter(|e| e.law.spec().hooks.command) {
+            column.clear();
+            column.extend(torque.iter().map(|row| row[effect.joint]));
+            effect.law.command(&effect.p, t, &mut column);
+            for (row, pulse) in torque.iter_mut().zip(&column) {
+                row[effect.joint] = *pulse;
+            }
+        }
+        Some(torque)
+    }
+
+    /// Position that joint `j`'s encoder shows.
+    pub fn measured(&self, j: usize, q: f64) -> f64 {
+        let on_joint = self
+            .effects
+            .iter()
+            .filter(|e| e.law.spec().hooks.measured && e.joint == j);
+        on_joint.fold(q, |q, e| e.law.measured(&e.p, q))
+    }
+
+    /// Position of joint `j` that its encoder shows as `reading`, by fixed-point iteration.
+    pub fn actual(&self, j: usize, reading: f64) -> f64 {
+        let mut q = reading;
+        for _ in 0..4 {
+            q += reading - self.measured(j, q);
+        }
+        q
+    }
+
+    /// Whether any effect changes what the encoders show.
+    pub fn distorts(&self) -> bool {
+        self.effects.iter().any(|e| e.law.spec().hooks.measured)
+    }
+}

@@ -1,0 +1,104 @@
+//! Typical sizes on a given arm and log, by quantity: what "small" and "large" mean for an effect's parameter.
+
+use crate::model::Placed;
+use crate::track::Track;
+use armgap_core::arm::Arm;
+use armgap_core::effect::Quantity;
+use nalgebra::SVector;
+
+/// Typical sizes per joint.
+#[derive(Debug, Clone)]
+pub struct Scales<const N: usize> {
+    /// RMS torque.
+    pub torque: [f64; N],
+    /// RMS speed.
+    pub speed: [f64; N],
+    /// RMS deviation of position from its mean.
+    pub position: [f64; N],
+    /// Own inertia at `q = 0`.
+    pub inertia: [f64; N],
+    /// Median sample period, s.
+    pub period: f64,
+    /// Length of the last link, m; 1 where unknown.
+    pub length: f64,
+    /// Acceleration of gravity, m/s^2.
+    pub gravity: f64,
+}
+
+impl<const N: usize> Scales<N> {
+    /// Sizes seen in `tracks` on this arm.
+    pub fn new<A: Arm<f64, N, P>, const P: usize>(
+        arm: &A,
+        theta: &[f64; P],
+        tracks: &[Track<N>],
+        gravity: f64,
+        length: Option<f64>,
+    ) -> Self {
+        let inertia = arm.inertia(theta, &SVector::zeros());
+        Self {
+            torque: std::array::from_fn(|j| {
+                rms(tracks
+                    .iter()
+                    .flat_map(|t| t.held.iter().map(move |p| p[j].start)))
+            }),
+            speed: std::array::from_fn(|j| rms(tracks.iter().flat_map(|t| speeds(t, j)))),
+            position: std::array::from_fn(|j| {
+                spread(tracks.iter().flat_map(|t| t.column(j)).collect())
+            }),
+            inertia: std::array::from_fn(|j| inertia[(j, j)]),
+            period: tracks.first().map_or(1e-3, Track::period),
+            length: length.unwrap_or(0.3),
+            gravity: gravity.abs().max(1.0),
+        }
+    }
+
+    /// Size of one quantity on joint `j`.
+    pub fn size(&self, quantity: Quantity, j: usize) -> f64 {
+        let value = match quantity {
+            Quantity::Torque => self.torque[j],
+            Quantity::Inertia => self.inertia[j],
+            Quantity::Drag => self.torque[j] / (self.speed[j] * self.speed[j]),
+            Quantity::Damping => self.torque[j] / self.speed[j],
+            Quantity::Stiffness => self.torque[j] / self.position[j],
+            Quantity::Speed => self.speed[j],
+            Quantity::Position => self.position[j],
+            Quantity::Angle | Quantity::Count | Quantity::Ratio => 1.0,
+            Quantity::Time => self.period,
+            Quantity::Mass => self.torque[N - 1] / (self.gravity * self.length),
+            Quantity::Length => self.length,
+        };
+        if value.is_finite() && value > 0.0 {
+            value
+        } else {
+            1.0
+        }
+    }
+
+    /// Sizes of all parameters of an effect.
+    pub fn of(&self, effect: &Placed) -> Vec<f64> {
+        effect
+            .law
+            .spec()
+            .parameters
+            .iter()
+            .map(|p| self.size(p.quantity, effect.joint))
+            .collect()
+    }
+}
+
+fn speeds<const N: usize>(track: &Track<N>, j: usize) -> Vec<f64> {
+    (0..track.len())
+        .step_by(5)
+        .map(|k| track.local(j, k).dq)
+        .collect()
+}
+
+fn rms(x: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = x.fold((0.0, 0.0), |(sum, n), x| (sum + x * x, n + 1.0));
+    if n > 0.0 { (sum / n).sqrt() } else { 0.0 }
+}
+
+fn spread(x: Vec<f64>) -> f64 {
+    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+    rms(x.into_iter().map(|x| x - mean))
+}

@@ -1,0 +1,144 @@
+//! Score tests: how much each candidate would reduce the cost, to first order, from one shared Jacobian.
+//!
+//! With `H` the inner products of the sensitivities of the free values (trust in them included) and `s` their products with the
+//! residual, a further parameter with sensitivity `c` reduces the cost by `(s_c - H_c H^-1 s)^2 / (H_cc - H_c H^-1 H_c')` (Rao 1948).
+
+use crate::model::{Hypothesis, Placed};
+use crate::scale::Scales;
+use crate::solve::{Problem, neutral, scaled_inverse};
+use armgap_core::arm::Arm;
+use armgap_core::effect::{Quantity, Scope, catalogue};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Size of the trial displacement of a candidate's first parameter, relative to its start value.
+const TRIAL: f64 = 1e-3;
+
+/// A candidate at one start value, tested to first order.
+#[derive(Debug, Clone)]
+pub struct Scored {
+    /// The effect, its first parameter at the value the test suggests.
+    pub effect: Placed,
+    /// Expected decrease of the cost.
+    pub gain: f64,
+    /// Estimated deviation of the first parameter from neutral.
+    pub estimate: f64,
+    /// Its standard deviation, from the windows' scatter.
+    pub sigma: f64,
+    /// Standard deviation if the residual were white with the metric's scale: what the log could tell at best.
+    pub information_sigma: f64,
+    /// Share of the candidate's trace that the arm's own parameters cannot imitate.
+    pub distinct: f64,
+}
+
+/// Every effect on every joint it can sit on, at each of its start values.
+pub fn candidates<const N: usize>(scales: &Scales<N>) -> Vec<Placed> {
+    let mut all = Vec::new();
+    for law in catalogue::<f64>() {
+        let spec = law.spec();
+        let joints = if spec.scope == Scope::Joint { N } else { 1 };
+        for joint in 0..joints {
+            for start in spec.starts {
+                let mut effect = Placed {
+                    law: *law,
+                    joint,
+                    p: *start,
+                };
+                for (value, parameter) in effect.p.iter_mut().zip(spec.parameters) {
+                    let size = if parameter.quantity == Quantity::Ratio {
+                        1.0
+                    } else {
+                        scales.size(parameter.quantity, joint)
+                    };
+                    *value = (*value * size).clamp(parameter.lower, parameter.upper);
+                }
+                all.push(effect);
+            }
+        }
+    }
+    all
+}
+
+/// Scores all candidates around a fitted hypothesis.
+pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    problem: &Problem<A, N, P>,
+    base: &Hypothesis<P>,
+    candidates: &[Placed],
+) -> Vec<Scored> {
+    let residual = problem.residual(base);
+    let free: Vec<usize> = (0..base.values().len()).collect();
+    let mut columns = problem.sensitivities(base, &residual, &free);
+    let k = columns.len();
+    let traces: Vec<Vec<f64>> = candidates
+        .par_iter()
+        .map(|c| trace(problem, base, &residual, c))
+        .collect();
+    columns.extend(traces);
+    let gram = problem.metric.gram(problem.data, &columns, &residual);
+    let last = gram.total.nrows() - 1;
+    let mut own = gram.total.view((0, 0), (k, k)).into_owned();
+    let mut own_score = gram.total.column(last).rows(0, k).into_owned();
+    for i in 0..P {
+        let precision = 1.0 / problem.prior.sigma[i].powi(2);
+        own[(i, i)] += precision;
+        own_score[i] += precision * (problem.prior.theta[i] - base.theta[i]);
+    }
+    let inverse = scaled_inverse(&own).unwrap_or_else(|| DMatrix::zeros(k, k));
+    let score = |(i, effect): (usize, &Placed)| {
+        let c = k + i;
+        let cross: DVector<f64> = gram.total.column(c).rows(0, k).into_owned();
+        let weights = &inverse * &cross;
+        let raw = gram.total[(c, c)];
+        let information = (raw - weights.dot(&cross)).max(1e-12 * raw);
+        let slope = gram.total[(c, last)] - weights.dot(&own_score);
+        let scatter: f64 = gram
+            .scores
+            .iter()
+            .map(|s| (s[c] - weights.dot(&s.rows(0, k))).powi(2))
+            .sum();
+        scored(effect, raw, information, slope, scatter)
+    };
+    candidates.iter().enumerate().map(score).collect()
+}
+
+/// Sensitivity of the whitened prediction to the candidate's first parameter at its neutral value.
+fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    problem: &Problem<A, N, P>,
+    base: &Hypothesis<P>,
+    residual: &[f64],
+    candidate: &Placed,
+) -> Vec<f64> {
+    let mut moved = neutral(candidate);
+    let step = TRIAL * (candidate.p[0] - moved.p[0]);
+    moved.p[0] += step;
+    let there = problem.residual(&base.with(moved));
+    residual
+        .iter()
+        .zip(&there)
+        .map(|(here, there)| (here - there) / step)
+        .collect()
+}
+
+/// The test of one candidate; a parameter that would have to cross its bound has nothing to gain.
+fn scored(effect: &Placed, raw: f64, information: f64, slope: f64, scatter: f64) -> Scored {
+    let parameter = &effect.law.spec().parameters[0];
+    let estimate = slope / information;
+    let start = (effect.p[0] - parameter.neutral).abs();
+    let admissible =
+        (parameter.neutral + estimate).clamp(parameter.lower, parameter.upper) - parameter.neutral;
+    let mut suggested = *effect;
+    suggested.p[0] = parameter.neutral + admissible.clamp(-20.0 * start, 20.0 * start);
+    let gain = if raw > 0.0 {
+        (2.0 * slope - information * admissible) * admissible
+    } else {
+        0.0
+    };
+    Scored {
+        effect: suggested,
+        gain: if gain.is_finite() { gain.max(0.0) } else { 0.0 },
+        estimate,
+        sigma: scatter.sqrt() / information,
+        information_sigma: 1.0 / information.sqrt(),
+        distinct: if raw > 0.0 { information / raw } else { 0.0 },
+    }
+}

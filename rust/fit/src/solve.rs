@@ -1,0 +1,333 @@
+//! Gauss-Newton with Levenberg's damping over the arm's parameters and the effects' together (output error).
+//!
+//! Minimises `cost = |residual|^2 (metric) + |(theta - nominal) / sigma|^2`, where the second term is the arm file's own trust in its
+//! values, over the free values within their bounds.
+
+use crate::metric::{Gram, Metric};
+use crate::model::{Hypothesis, Placed};
+use crate::scale::Scales;
+use crate::window::Dataset;
+use armgap_core::arm::Arm;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Relative displacement for sensitivities; events are located to 1e-12, so a forward difference is good to 1e-6.
+const RELATIVE_STEP: f64 = 1e-6;
+
+/// Iterations at most.
+const MAX_ITERATIONS: usize = 15;
+
+/// A decrease of the cost by less than this part of it ends the search.
+const ENOUGH: f64 = 1e-5;
+
+/// Trusted values of the arm's parameters.
+#[derive(Debug, Clone, Copy)]
+pub struct Prior<const P: usize> {
+    /// Values of the arm file.
+    pub theta: [f64; P],
+    /// One-sigma trust in them.
+    pub sigma: [f64; P],
+    /// How many of the first parameters are inertial; the rest is friction and may not be negative.
+    pub inertial: usize,
+}
+
+impl<const P: usize> Prior<P> {
+    /// Squared distance from the trusted values in units of sigma.
+    pub fn cost(&self, theta: &[f64; P]) -> f64 {
+        (0..P)
+            .map(|i| ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2))
+            .sum()
+    }
+}
+
+/// Data and the weights to judge them by.
+pub struct Problem<'a, A, const N: usize, const P: usize> {
+    /// The arm.
+    pub arm: &'a A,
+    /// Logs cut into windows.
+    pub data: &'a Dataset<N>,
+    /// Measured positions of the windows.
+    pub measured: &'a [f64],
+    /// Weights.
+    pub metric: &'a Metric<N>,
+    /// Trusted values.
+    pub prior: &'a Prior<P>,
+    /// Typical sizes of the effects' parameters.
+    pub scales: &'a Scales<N>,
+}
+
+/// The end of a search.
+#[derive(Debug, Clone)]
+pub struct Fit<const P: usize> {
+    /// Best hypothesis found.
+    pub hypothesis: Hypothesis<P>,
+    /// Cost of the data.
+    pub data_cost: f64,
+    /// Cost of the distance from trusted values.
+    pub prior_cost: f64,
+    /// Covariance of the free values, with each window as one independent observation.
+    pub covariance: DMatrix<f64>,
+}
+
+impl<const P: usize> Fit<P> {
+    /// Standard deviation of the free value `i`.
+    pub fn sigma(&self, i: usize) -> f64 {
+        self.covariance[(i, i)].max(0.0).sqrt()
+    }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
+    /// Whitened residual, measured minus predicted.
+    pub fn residual(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        let predicted = self.data.predict(self.arm, hypothesis, &self.metric.starts);
+        let mut residual: Vec<f64> = self
+            .measured
+            .iter()
+            .zip(&predicted)
+            .map(|(y, p)| y - p)
+            .collect();
+        self.metric.whiten(&mut residual);
+        residual
+    }
+
+    /// Tempered cost of every window.
+    pub fn window_costs(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        let costs = self.metric.costs(self.data, &self.residual(hypothesis));
+        costs
+            .into_iter()
+            .map(|cost| self.metric.tempered(cost))
+            .collect()
+    }
+
+    /// Whitened sensitivities of the prediction to the free values `which`, given the residual at `hypothesis`.
+    pub fn sensitivities(
+        &self,
+        hypothesis: &Hypothesis<P>,
+        residual: &[f64],
+        which: &[usize],
+    ) -> Vec<Vec<f64>> {
+        let values = hypothesis.values();
+        let steps = self.steps(hypothesis);
+        which
+            .par_iter()
+            .map(|&i| {
+                let mut moved = values.clone();
+                moved[i] += steps[i];
+                let there = self.residual(&hypothesis.with_values(&moved));
+                residual
+                    .iter()
+                    .zip(&there)
+                    .map(|(here, there)| (here - there) / steps[i])
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// Displacements for sensitivities, inward at an upper bound.
+    fn steps(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        let sizes = self.sizes(hypothesis);
+        let (_, upper) = self.bounds(hypothesis);
+        let values = hypothesis.values();
+        (0..values.len())
+            .map(|i| {
+                let step = RELATIVE_STEP * sizes[i];
+                if values[i] + step > upper[i] {
+                    -step
+                } else {
+                    step
+                }
+            })
+            .collect()
+    }
+
+    /// Typical sizes of the free values.
+    pub fn sizes(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        let theta = (0..P).map(|i| self.prior.theta[i].abs().max(self.prior.sigma[i]));
+        let effects = hypothesis.effects.iter().flat_map(|e| self.scales.of(e));
+        theta.chain(effects).collect()
+    }
+
+    /// Bounds of the free values.
+    fn bounds(&self, hypothesis: &Hypothesis<P>) -> (Vec<f64>, Vec<f64>) {
+        let friction = |i: usize| {
+            if i < self.prior.inertial {
+                f64::NEG_INFINITY
+            } else {
+                0.0
+            }
+        };
+        let mut lower: Vec<f64> = (0..P).map(friction).collect();
+        let mut upper = vec![f64::INFINITY; P];
+        for parameter in hypothesis
+            .effects
+            .iter()
+            .flat_map(|e| e.law.spec().parameters)
+        {
+            lower.push(parameter.lower);
+            upper.push(parameter.upper);
+        }
+        (lower, upper)
+    }
+
+    /// Minimises the cost from `start`, over all free values.
+    pub fn solve(&self, start: &Hypothesis<P>) -> Fit<P> {
+        let all: Vec<usize> = (0..start.values().len()).collect();
+        let (lower, upper) = self.bounds(start);
+        let mut at = Point::new(self, start.clone());
+        let mut damping = 1e-4;
+        let mut gram = self.gram(&at, &all);
+        for _ in 0..MAX_ITERATIONS {
+            let (normal, gradient) = self.normal_equations(&gram, &at.hypothesis);
+            let mut improved = false;
+            for _ in 0..6 {
+                let values = step(
+                    &normal,
+                    &gradient,
+                    damping,
+                    &at.hypothesis.values(),
+                    &lower,
+                    &upper,
+                );
+                let trial = Point::new(self, at.hypothesis.with_values(&values));
+                if trial.cost() < at.cost() {
+                    improved = at.cost() - trial.cost() > ENOUGH * at.cost();
+                    at = trial;
+                    damping = (damping * 0.1).max(1e-9);
+                    break;
+                }
+                damping = (damping * 10.0).min(1e6);
+            }
+            if !improved {
+                break;
+            }
+            gram = self.gram(&at, &all);
+        }
+        let covariance = self.covariance(&gram, &at);
+        Fit {
+            hypothesis: at.hypothesis,
+            data_cost: at.data_cost,
+            prior_cost: at.prior_cost,
+            covariance,
+        }
+    }
+
+    fn gram(&self, at: &Point<P>, which: &[usize]) -> Gram {
+        let columns = self.sensitivities(&at.hypothesis, &at.residual, which);
+        self.metric.gram(self.data, &columns, &at.residual)
+    }
+
+    /// Normal matrix and right-hand side, the prior included.
+    fn normal_equations(
+        &self,
+        gram: &Gram,
+        hypothesis: &Hypothesis<P>,
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let k = gram.total.nrows() - 1;
+        let mut normal = gram.total.view((0, 0), (k, k)).into_owned();
+        let mut gradient = gram.total.column(k).rows(0, k).into_owned();
+        for i in 0..P {
+            let precision = 1.0 / self.prior.sigma[i].powi(2);
+            normal[(i, i)] += precision;
+            gradient[i] += precision * (self.prior.theta[i] - hypothesis.theta[i]);
+        }
+        (normal, gradient)
+    }
+
+    /// Sandwich covariance: curvature inside, the windows' own scatter of scores between (White 1982).
+    fn covariance(&self, gram: &Gram, at: &Point<P>) -> DMatrix<f64> {
+        let (normal, _) = self.normal_equations(gram, &at.hypothesis);
+        let k = normal.nrows();
+        let Some(inverse) = scaled_inverse(&normal) else {
+            return DMatrix::from_diagonal_element(k, k, f64::INFINITY);
+        };
+        let mut scatter = DMatrix::zeros(k, k);
+        for score in &gram.scores {
+            let s = score.rows(0, k);
+            scatter += s * s.transpose();
+        }
+        for i in 0..P {
+            scatter[(i, i)] += 1.0 / self.prior.sigma[i].powi(2);
+        }
+        &inverse * scatter * &inverse
+    }
+}
+
+/// A hypothesis with its residual and cost.
+struct Point<const P: usize> {
+    hypothesis: Hypothesis<P>,
+    residual: Vec<f64>,
+    data_cost: f64,
+    prior_cost: f64,
+}
+
+impl<const P: usize> Point<P> {
+    fn new<A: Arm<f64, N, P>, const N: usize>(
+        problem: &Problem<A, N, P>,
+        hypothesis: Hypothesis<P>,
+    ) -> Self {
+        let residual = problem.residual(&hypothesis);
+        let data_cost = problem
+            .metric
+            .total(&problem.metric.costs(problem.data, &residual));
+        let prior_cost = problem.prior.cost(&hypothesis.theta);
+        Self {
+            hypothesis,
+            residual,
+            data_cost,
+            prior_cost,
+        }
+    }
+
+    fn cost(&self) -> f64 {
+        self.data_cost + self.prior_cost
+    }
+}
+
+/// One damped step; values at a bound that the step would leave stay there.
+fn step(
+    normal: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    damping: f64,
+    values: &[f64],
+    lower: &[f64],
+    upper: &[f64],
+) -> Vec<f64> {
+    let at_bound = |i: usize| {
+        (values[i] <= lower[i] && gradient[i] < 0.0) || (values[i] >= upper[i] && gradient[i] > 0.0)
+    };
+    let free: Vec<usize> = (0..values.len()).filter(|&i| !at_bound(i)).collect();
+    let mut reduced = DMatrix::from_fn(free.len(), free.len(), |a, b| normal[(free[a], free[b])]);
+    for a in 0..free.len() {
+        reduced[(a, a)] *= 1.0 + damping;
+    }
+    let right = DVector::from_fn(free.len(), |a, _| gradient[free[a]]);
+    let mut next = values.to_vec();
+    if let Some(inverse) = scaled_inverse(&reduced) {
+        let change = inverse * right;
+        for (a, &i) in free.iter().enumerate() {
+            next[i] = (values[i] + change[a]).clamp(lower[i], upper[i]);
+        }
+    }
+    next
+}
+
+/// Inverse of a symmetric positive definite matrix, scaled to a unit diagonal first.
+pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let k = matrix.nrows();
+    let scale = DVector::from_fn(k, |i, _| 1.0 / matrix[(i, i)].max(1e-300).sqrt());
+    let mut scaled = DMatrix::from_fn(k, k, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    for i in 0..k {
+        scaled[(i, i)] += 1e-12;
+    }
+    let inverse = scaled.cholesky()?.inverse();
+    Some(DMatrix::from_fn(k, k, |i, j| {
+        inverse[(i, j)] * scale[i] * scale[j]
+    }))
+}
+
+/// The effect at its neutral value, other parameters as they are.
+pub fn neutral(effect: &Placed) -> Placed {
+    let mut off = *effect;
+    off.p[0] = effect.law.spec().parameters[0].neutral;
+    off
+}

@@ -1,0 +1,167 @@
+//! One log, ready to be simulated against: times, positions, held torques, and what its noise looks like.
+
+use crate::smooth::{Local, local_cubic};
+use armgap_core::effect::Pulse;
+use nalgebra::SVector;
+
+/// Half widths, in samples, that a local cubic may have.
+const HALF_WIDTHS: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 27];
+
+/// Half width of the confidence intervals that successive widths must share, in standard deviations.
+const CONFIDENCE: f64 = 2.0;
+
+/// A log of `N` joints.
+#[derive(Debug, Clone)]
+pub struct Track<const N: usize> {
+    /// Name in results.
+    pub name: String,
+    /// Sample times, s, increasing; starts where the log starts.
+    pub t: Vec<f64>,
+    /// Measured positions.
+    pub q: Vec<SVector<f64, N>>,
+    /// Commanded torque, held until the next sample.
+    pub held: Vec<[Pulse<f64>; N]>,
+    /// Standard deviation of the position measurement, per joint.
+    pub noise: [f64; N],
+    /// Smallest step of the position measurement, per joint; zero where none is seen.
+    pub step: [f64; N],
+}
+
+/// A measured start: position and velocity of each joint with their covariance.
+#[derive(Debug, Clone, Copy)]
+pub struct Start<const N: usize> {
+    /// Positions.
+    pub q: SVector<f64, N>,
+    /// Velocities.
+    pub dq: SVector<f64, N>,
+    /// Per joint: variance of position, covariance, variance of velocity.
+    pub covariance: [[f64; 3]; N],
+}
+
+impl<const N: usize> Track<N> {
+    /// A track from columns; `counts_per_rev` gives encoder steps where the arm file knows them.
+    pub fn new(name: &str, t: &[f64], q: &[f64], tau: &[f64], steps: Option<[f64; N]>) -> Self {
+        let rows = |x: &[f64]| -> Vec<[f64; N]> {
+            x.chunks_exact(N)
+                .map(|row| std::array::from_fn(|j| row[j]))
+                .collect()
+        };
+        let mut track = Self {
+            name: name.to_owned(),
+            t: t.to_vec(),
+            q: rows(q).into_iter().map(SVector::from).collect(),
+            held: rows(tau)
+                .into_iter()
+                .map(|row| row.map(Pulse::held))
+                .collect(),
+            noise: [0.0; N],
+            step: [0.0; N],
+        };
+        for j in 0..N {
+            let column = track.column(j);
+            track.step[j] = steps.map_or_else(|| smallest_step(&column), |s| s[j]);
+            track.noise[j] = noise_level(&track.t, &column, track.step[j]);
+        }
+        track
+    }
+
+    /// Positions of one joint.
+    pub fn column(&self, j: usize) -> Vec<f64> {
+        self.q.iter().map(|q| q[j]).collect()
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+
+    /// Median sample period, s.
+    pub fn period(&self) -> f64 {
+        median(self.t.windows(2).map(|w| w[1] - w[0]).collect())
+    }
+
+    /// The measured state at a sample, from a local cubic in each joint.
+    pub fn start(&self, at: usize) -> Start<N> {
+        let mut start = Start {
+            q: self.q[at],
+            dq: SVector::zeros(),
+            covariance: [[0.0; 3]; N],
+        };
+        for j in 0..N {
+            let local = self.local(j, at);
+            let variance = self.noise[j] * self.noise[j];
+            (start.q[j], start.dq[j]) = (local.q, local.dq);
+            start.covariance[j] = local.covariance.map(|c| c * variance);
+        }
+        start
+    }
+
+    /// The local cubic of joint `j` around a sample, as wide as the motion there allows.
+    ///
+    /// Widths grow while the confidence intervals of their velocities still have a point in common; a jump of the acceleration
+    /// nearby ends that early, smooth motion late (intersection of confidence intervals, Goldenshluger and Nemirovski 1997).
+    pub fn local(&self, j: usize, at: usize) -> Local {
+        let fit = |half: usize| local_cubic(&self.t, |k| self.q[k][j], at, half);
+        let mut best = fit(HALF_WIDTHS[0]);
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        for half in HALF_WIDTHS.into_iter().filter(|half| 2 * half < self.len()) {
+            let local = fit(half);
+            let radius = CONFIDENCE * self.noise[j] * local.covariance[2].sqrt();
+            (low, high) = (low.max(local.dq - radius), high.min(local.dq + radius));
+            if low > high {
+                break;
+            }
+            best = local;
+        }
+        best
+    }
+}
+
+/// Median of a list; zero for an empty one.
+pub fn median(mut x: Vec<f64>) -> f64 {
+    if x.is_empty() {
+        return 0.0;
+    }
+    x.sort_by(f64::total_cmp);
+    x[x.len() / 2]
+}
+
+/// Smallest non-zero difference that repeats throughout a column, if the column sits on such a grid.
+fn smallest_step(q: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = q
+        .windows(2)
+        .map(|w| (w[1] - w[0]).abs())
+        .filter(|d| *d > 1e-12)
+        .collect();
+    if steps.len() < 20 {
+        return 0.0;
+    }
+    steps.sort_by(f64::total_cmp);
+    let step = steps[steps.len() / 200];
+    let on_grid = steps
+        .iter()
+        .filter(|d| ((*d / step).round() * step - *d).abs() < 0.05 * step)
+        .count();
+    if on_grid * 10 > steps.len() * 9 {
+        step
+    } else {
+        0.0
+    }
+}
+
+/// Standard deviation of the measurement: what a narrow local cubic leaves in most places, at least a uniform encoder's.
+fn noise_level(t: &[f64], q: &[f64], step: f64) -> f64 {
+    let half = 3;
+    let residuals = (half..t.len().saturating_sub(half)).step_by(3);
+    let misfits: Vec<f64> = residuals
+        .map(|at| local_cubic(t, |k| q[k], at, half).misfit)
+        .collect();
+    // The median of a chi-squared variable with three degrees of freedom is 0.789 of its mean.
+    let typical = (median(misfits) / 0.789).sqrt();
+    typical.max(step / 12.0_f64.sqrt()).max(1e-9)
+}

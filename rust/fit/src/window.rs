@@ -1,0 +1,205 @@
+//! Short windows cut from logs, and the simulation of a hypothesis over them.
+//!
+//! Every window starts from its measured state and runs under the logged torque; the predicted positions of all windows lie in one
+//! flat vector, row by row and joint by joint.
+
+use crate::model::Hypothesis;
+use crate::track::{Start, Track};
+use armgap_core::arm::Arm;
+use armgap_core::effect::interval;
+use armgap_core::integrate::{Interval, State, advance};
+use nalgebra::SVector;
+
+/// A prediction that left this range [rad or m] has diverged; it is kept there so that its cost stays finite.
+const DIVERGED: f64 = 1e3;
+
+/// Sub-steps per sample are capped here; smoothing narrower than that allows is refused by its cost.
+const MAX_SUBSTEPS: usize = 16;
+
+/// Samples `first ..= last` of one track; row 0 is sample `first + 1`.
+#[derive(Debug, Clone, Copy)]
+pub struct Window<const N: usize> {
+    /// Index of the track.
+    pub track: usize,
+    /// Sample the window starts from.
+    pub first: usize,
+    /// Last sample predicted.
+    pub last: usize,
+    /// Where its rows begin in the flat vector, in rows.
+    pub offset: usize,
+    /// Measured start.
+    pub start: Start<N>,
+}
+
+impl<const N: usize> Window<N> {
+    /// Number of predicted samples.
+    pub fn rows(&self) -> usize {
+        self.last - self.first
+    }
+
+    /// Range of the window in a flat vector of `N` values per row.
+    pub fn range(&self) -> std::ops::Range<usize> {
+        self.offset * N..(self.offset + self.rows()) * N
+    }
+}
+
+/// Several logs cut into windows.
+#[derive(Debug, Clone)]
+pub struct Dataset<const N: usize> {
+    /// The logs.
+    pub tracks: Vec<Track<N>>,
+    /// The windows, in order.
+    pub windows: Vec<Window<N>>,
+    /// Predicted samples in all.
+    pub rows: usize,
+}
+
+impl<const N: usize> Dataset<N> {
+    /// Cuts every track into windows of `horizon` seconds; a gap in the samples ends a window.
+    pub fn new(tracks: Vec<Track<N>>, horizon: f64) -> Self {
+        let mut windows = Vec::new();
+        let mut rows = 0;
+        for (index, track) in tracks.iter().enumerate() {
+            for (first, last) in cut(&track.t, horizon) {
+                windows.push(Window {
+                    track: index,
+                    first,
+                    last,
+                    offset: rows,
+                    start: track.start(first),
+                });
+                rows += last - first;
+            }
+        }
+        Self {
+            tracks,
+            windows,
+            rows,
+        }
+    }
+
+    /// Measured positions in the order of the flat vector.
+    pub fn measured(&self) -> Vec<f64> {
+        let samples = |w: &Window<N>| {
+            let track = w.track;
+            (w.first + 1..=w.last).map(move |k| (track, k))
+        };
+        self.windows
+            .iter()
+            .flat_map(samples)
+            .flat_map(|(track, k)| self.tracks[track].q[k].iter().copied().collect::<Vec<_>>())
+            .collect()
+    }
+
+    /// Starts as measured.
+    pub fn measured_starts(&self) -> Vec<Shift<N>> {
+        vec![Shift::none(); self.windows.len()]
+    }
+
+    /// Predicted positions of all windows, each from its measured start displaced by its entry of `starts`.
+    pub fn predict<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+        starts: &[Shift<N>],
+    ) -> Vec<f64> {
+        let mut predicted = vec![DIVERGED; self.rows * N];
+        let Some(plant) = hypothesis.plant(arm) else {
+            return predicted;
+        };
+        let commands: Vec<_> = self
+            .tracks
+            .iter()
+            .map(|track| hypothesis.command(&track.t, &track.held))
+            .collect();
+        for (window, shift) in self.windows.iter().zip(starts) {
+            let track = &self.tracks[window.track];
+            let torque = commands[window.track].as_deref().unwrap_or(&track.held);
+            let q = window.start.q + shift.q;
+            let q = SVector::from_fn(|j, _| {
+                if hypothesis.distorts() {
+                    hypothesis.actual(j, q[j])
+                } else {
+                    q[j]
+                }
+            });
+            let mut state = State::new(q, window.start.dq + shift.dq);
+            let out = &mut predicted[window.range()];
+            for (k, row) in (window.first..window.last).zip(out.chunks_exact_mut(N)) {
+                let h = interval(&track.t, k);
+                let substeps = substeps(h * plant.friction_rate(&state.q));
+                let step = Interval {
+                    t: track.t[k],
+                    h,
+                    torque: &torque[k],
+                };
+                advance(&plant, &mut state, &step, substeps);
+                if !state.is_finite() || state.q.amax() > DIVERGED {
+                    break;
+                }
+                for j in 0..N {
+                    row[j] = if hypothesis.distorts() {
+                        hypothesis.measured(j, state.q[j])
+                    } else {
+                        state.q[j]
+                    };
+                }
+            }
+        }
+        predicted
+    }
+}
+
+/// A displacement of a window's start state.
+#[derive(Debug, Clone, Copy)]
+pub struct Shift<const N: usize> {
+    /// Added to the positions.
+    pub q: SVector<f64, N>,
+    /// Added to the velocities.
+    pub dq: SVector<f64, N>,
+}
+
+impl<const N: usize> Shift<N> {
+    /// No displacement.
+    pub fn none() -> Self {
+        Self {
+            q: SVector::zeros(),
+            dq: SVector::zeros(),
+        }
+    }
+}
+
+/// Steps per sample that keep Runge-Kutta stable against smoothed friction of this rate times the sample period.
+fn substeps(stiffness: f64) -> usize {
+    ((stiffness / 1.5).ceil() as usize).clamp(1, MAX_SUBSTEPS)
+}
+
+/// Index pairs `(first, last)` of consecutive windows of about `horizon` seconds, of equal length within a stretch without gaps.
+pub fn cut(t: &[f64], horizon: f64) -> Vec<(usize, usize)> {
+    let period = crate::track::median(t.windows(2).map(|w| w[1] - w[0]).collect());
+    let largest = (10.0 * period).max(0.25 * horizon);
+    let mut found = Vec::new();
+    let mut begin = 0;
+    for k in 1..=t.len() {
+        if k < t.len() && t[k] - t[k - 1] <= largest {
+            continue;
+        }
+        let stretch = &t[begin..k];
+        let duration = stretch[stretch.len() - 1] - stretch[0];
+        let count = ((duration / horizon + 0.2).floor() as usize).min((stretch.len() - 1) / 4);
+        let edge = |i: usize| {
+            let time = stretch[0] + duration * i as f64 / count as f64;
+            begin
+                + stretch
+                    .partition_point(|&x| x < time - 1e-9)
+                    .min(stretch.len() - 1)
+        };
+        found.extend(
+            (0..count)
+                .map(|i| (edge(i), edge(i + 1)))
+                .filter(|(a, b)| b > a),
+        );
+        begin = k;
+    }
+    found
+}

@@ -1,0 +1,255 @@
+//! Descriptions that both sides share: kinds of arm, effects, and their parameters.
+
+use armgap_core::arm::{Kind, LinkParameters, TwoLink};
+use armgap_core::effect::{Scope, catalogue, find};
+use armgap_fit::arm::ArmDescription;
+use armgap_fit::model::Placed;
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use std::collections::BTreeMap;
+
+/// The kinds of arm, as a list of dicts.
+#[pyfunction]
+pub fn arm_kinds(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
+    let list = PyList::empty(py);
+    for kind in Kind::ALL {
+        let entry = PyDict::new(py);
+        entry.set_item("kind", kind.name())?;
+        entry.set_item("n_joints", kind.joints())?;
+        entry.set_item("n_inertial", kind.inertial())?;
+        entry.set_item("rotary", kind.rotary())?;
+        let names: Vec<&str> = kind.parameters().iter().map(|p| p.name).collect();
+        let units: Vec<&str> = kind.parameters().iter().map(|p| p.unit).collect();
+        entry.set_item("parameter_names", names)?;
+        entry.set_item("parameter_units", units)?;
+        list.append(entry)?;
+    }
+    Ok(list)
+}
+
+/// The effect library, as a list of dicts.
+#[pyfunction]
+pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
+    let list = PyList::empty(py);
+    for law in catalogue::<f64>() {
+        let spec = law.spec();
+        let entry = PyDict::new(py);
+        entry.set_item("name", spec.name)?;
+        entry.set_item("title", spec.title)?;
+        entry.set_item("equation", spec.equation)?;
+        entry.set_item("source", spec.source)?;
+        entry.set_item("excited_by", spec.excited_by)?;
+        entry.set_item(
+            "scope",
+            if spec.scope == Scope::Joint {
+                "joint"
+            } else {
+                "arm"
+            },
+        )?;
+        let parameters = PyList::empty(py);
+        for parameter in spec.parameters {
+            let p = PyDict::new(py);
+            p.set_item("name", parameter.name)?;
+            p.set_item("unit", parameter.quantity.unit(true))?;
+            p.set_item("unit_linear", parameter.quantity.unit(false))?;
+            p.set_item("lower", parameter.lower)?;
+            p.set_item("upper", parameter.upper)?;
+            p.set_item("neutral", parameter.neutral)?;
+            parameters.append(p)?;
+        }
+        entry.set_item("parameters", parameters)?;
+        list.append(entry)?;
+    }
+    Ok(list)
+}
+
+/// Inertial base parameters from the physical parameters of the links.
+#[pyfunction]
+pub fn theta_from_links<'py>(
+    py: Python<'py>,
+    kind: &str,
+    gravity: f64,
+    mass: Vec<f64>,
+    length: Vec<f64>,
+    com: Vec<f64>,
+    inertia: Vec<f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let kind = kind_of(kind)?;
+    let wrong = || {
+        PyValueError::new_err(format!(
+            "links of a {} need one entry per joint",
+            kind.name()
+        ))
+    };
+    let theta = match kind {
+        Kind::Axis => vec![one(&mass).ok_or_else(wrong)?, 0.0],
+        Kind::Pendulum => {
+            let (m, c) = (one(&mass).ok_or_else(wrong)?, one(&com).ok_or_else(wrong)?);
+            vec![
+                m * c * c + one(&inertia).ok_or_else(wrong)?,
+                m * gravity * c,
+            ]
+        }
+        Kind::TwoLink => {
+            let two = |x: Vec<f64>| <[f64; 2]>::try_from(x).map_err(|_| wrong());
+            let links = LinkParameters {
+                mass: two(mass)?,
+                length: two(length)?,
+                com: two(com)?,
+                inertia: two(inertia)?,
+            };
+            TwoLink::inertial_from_links(&links, gravity).to_vec()
+        }
+    };
+    Ok(PyArray1::from_vec(py, theta))
+}
+
+fn one(x: &[f64]) -> Option<f64> {
+    if let [value] = x { Some(*value) } else { None }
+}
+
+/// A kind by name.
+pub fn kind_of(name: &str) -> PyResult<Kind> {
+    let known: Vec<&str> = Kind::ALL.iter().map(|k| k.name()).collect();
+    Kind::from_name(name).ok_or_else(|| {
+        PyValueError::new_err(format!(
+            "unknown kind of arm `{name}`; known: {}",
+            known.join(", ")
+        ))
+    })
+}
+
+/// Effects given as `(name, 1-based joint or None, {parameter: value})`.
+pub fn placed(
+    kind: Kind,
+    effects: Vec<(String, Option<usize>, BTreeMap<String, f64>)>,
+) -> PyResult<Vec<Placed>> {
+    effects
+        .into_iter()
+        .map(|(name, joint, values)| {
+            let law = find::<f64>(&name).ok_or_else(|| {
+                let known: Vec<&str> = catalogue::<f64>().iter().map(|l| l.spec().name).collect();
+                PyValueError::new_err(format!(
+                    "unknown effect `{name}`; known: {}",
+                    known.join(", ")
+                ))
+            })?;
+            let spec = law.spec();
+            let joint = match (spec.scope, joint) {
+                (Scope::Arm, None) => 0,
+                (Scope::Joint, Some(j)) if (1..=kind.joints()).contains(&j) => j - 1,
+                (Scope::Arm, Some(_)) => {
+                    return Err(PyValueError::new_err(format!(
+                        "`{name}` is of the whole arm; leave its joint empty"
+                    )));
+                }
+                _ => {
+                    let last = kind.joints();
+                    return Err(PyValueError::new_err(format!(
+                        "`{name}` needs a joint from 1 to {last}"
+                    )));
+                }
+            };
+            let mut p = [0.0; 3];
+            for (slot, parameter) in p.iter_mut().zip(spec.parameters) {
+                let value = *values.get(parameter.name).ok_or_else(|| {
+                    PyValueError::new_err(format!(
+                        "`{name}` needs its parameter `{}`",
+                        parameter.name
+                    ))
+                })?;
+                if !(value >= parameter.lower && value <= parameter.upper) {
+                    return Err(PyValueError::new_err(format!(
+                        "`{name}`: {} = {value} is outside [{}, {}]",
+                        parameter.name, parameter.lower, parameter.upper
+                    )));
+                }
+                *slot = value;
+            }
+            if let Some(extra) = values
+                .keys()
+                .find(|k| !spec.parameters.iter().any(|p| p.name == k.as_str()))
+            {
+                return Err(PyValueError::new_err(format!(
+                    "`{name}` has no parameter `{extra}`"
+                )));
+            }
+            Ok(Placed { law, joint, p })
+        })
+        .collect()
+}
+
+/// A contiguous view of a vector.
+pub fn vector<'a>(x: &'a PyReadonlyArray1<'_, f64>, name: &str) -> PyResult<&'a [f64]> {
+    x.as_slice().map_err(|_| {
+        PyValueError::new_err(format!("`{name}` must be a contiguous array of float64"))
+    })
+}
+
+/// A contiguous view of a matrix with `rows` rows and `columns` columns.
+pub fn matrix<'a>(
+    x: &'a PyReadonlyArray2<'_, f64>,
+    name: &str,
+    rows: usize,
+    columns: usize,
+) -> PyResult<&'a [f64]> {
+    let shape = numpy::PyUntypedArrayMethods::shape(&**x);
+    if shape != [rows, columns] {
+        return Err(PyValueError::new_err(format!(
+            "`{name}` has shape {shape:?}, expected [{rows}, {columns}]"
+        )));
+    }
+    x.as_slice().map_err(|_| {
+        PyValueError::new_err(format!("`{name}` must be a C-contiguous array of float64"))
+    })
+}
+
+/// The arm of an `arm` dict.
+pub fn description(arm: &Bound<'_, PyDict>) -> PyResult<ArmDescription> {
+    fn get<'py, T: for<'a> FromPyObject<'a, 'py>>(
+        arm: &Bound<'py, PyDict>,
+        key: &str,
+    ) -> PyResult<Option<T>> {
+        match arm.get_item(key)? {
+            Some(value) if !value.is_none() => {
+                Ok(Some(value.extract().map_err(|_| {
+                    PyValueError::new_err(format!("arm: `{key}` has the wrong type"))
+                })?))
+            }
+            _ => Ok(None),
+        }
+    }
+    let needed = |key: &str| PyValueError::new_err(format!("arm: `{key}` is missing"));
+    let kind: String = get(arm, "kind")?.ok_or_else(|| needed("kind"))?;
+    let description = ArmDescription {
+        kind: kind_of(&kind)?,
+        gravity: get(arm, "gravity")?.ok_or_else(|| needed("gravity"))?,
+        theta: get(arm, "theta")?.ok_or_else(|| needed("theta"))?,
+        sigma: get(arm, "sigma")?.ok_or_else(|| needed("sigma"))?,
+        counts_per_rev: get(arm, "counts_per_rev")?,
+        torque_limit: get(arm, "torque_limit")?,
+        link_length: get(arm, "link_length")?,
+    };
+    let (p, n) = (
+        description.kind.parameters().len(),
+        description.kind.joints(),
+    );
+    let lists = [
+        ("theta", Some(&description.theta), p),
+        ("sigma", Some(&description.sigma), p),
+        ("counts_per_rev", description.counts_per_rev.as_ref(), n),
+        ("torque_limit", description.torque_limit.as_ref(), n),
+        ("link_length", description.link_length.as_ref(), n),
+    ];
+    for (key, list, length) in lists {
+        if list.is_some_and(|l| l.len() != length) {
+            return Err(PyValueError::new_err(format!(
+                "arm: `{key}` needs {length} values"
+            )));
+        }
+    }
+    Ok(description)
+}

@@ -1,0 +1,24 @@
+//! The Python module `armgap._native`: views in, check, release the GIL, arrays out. Nothing is computed here.
+
+mod convert;
+mod diagnose;
+mod simulate;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::convert::{arm_kinds, effects, theta_from_links};
+    #[pymodule_export]
+    use crate::diagnose::diagnose;
+    #[pymodule_export]
+    use crate::simulate::simulate;
+
+    use super::{Bound, PyModule, PyModuleMethods, PyResult};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

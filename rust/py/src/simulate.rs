@@ -1,0 +1,65 @@
+//! `simulate`.
+
+use crate::convert::{kind_of, matrix, placed, vector};
+use armgap_fit::arm::ArmDescription;
+use armgap_fit::simulate::Simulation;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+
+/// Positions and velocities of an arm under held torques.
+#[pyfunction]
+#[pyo3(signature = (kind, gravity, link_length, theta, t, tau, q0, dq0, effects, tolerance=1e-9, smoothing=0.0))]
+pub fn simulate<'py>(
+    py: Python<'py>,
+    kind: &str,
+    gravity: f64,
+    link_length: Option<Vec<f64>>,
+    theta: Vec<f64>,
+    t: PyReadonlyArray1<'py, f64>,
+    tau: PyReadonlyArray2<'py, f64>,
+    q0: PyReadonlyArray1<'py, f64>,
+    dq0: PyReadonlyArray1<'py, f64>,
+    effects: Vec<(String, Option<usize>, BTreeMap<String, f64>)>,
+    tolerance: f64,
+    smoothing: f64,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+    let kind = kind_of(kind)?;
+    let n = kind.joints();
+    let t = vector(&t, "t")?;
+    let tau = matrix(&tau, "tau", t.len(), n)?;
+    let (q0, dq0) = (vector(&q0, "q0")?, vector(&dq0, "dq0")?);
+    if q0.len() != n || dq0.len() != n {
+        return Err(PyValueError::new_err(format!(
+            "`q0` and `dq0` need {n} values"
+        )));
+    }
+    let effects = placed(kind, effects)?;
+    let arm = ArmDescription {
+        kind,
+        gravity,
+        sigma: vec![1.0; theta.len()],
+        theta,
+        counts_per_rev: None,
+        torque_limit: None,
+        link_length,
+    };
+    let work = Simulation {
+        t,
+        tau,
+        q0,
+        dq0,
+        effects: &effects,
+        tolerance,
+        smoothing,
+    };
+    let trajectory = py
+        .detach(|| arm.dispatch(work))
+        .ok_or_else(|| {
+            PyValueError::new_err(format!("`theta` needs {} values", kind.parameters().len()))
+        })?
+        .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let shape = |x: Vec<f64>| PyArray1::from_vec(py, x).reshape([t.len(), n]);
+    Ok((shape(trajectory.q)?, shape(trajectory.dq)?))
+}
