@@ -68,7 +68,9 @@ fn z_score(x: &[f64]) -> f64 {
 
 /// One stage: the current model and its alternatives, under common weights.
 pub struct Stage<const N: usize, const P: usize> {
-    /// The current model, refitted.
+    /// The current model, fitted under weights of its own residual.
+    pub settled: Fit<P>,
+    /// The current model, fitted under the common weights.
     pub base: Contender<P>,
     /// Alternatives, best first.
     pub contenders: Vec<Contender<P>>,
@@ -109,6 +111,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let (base, contenders, weights) = self.final_round(&fit.hypothesis, first, weights);
         let floor = self.floor(&weights);
         Stage {
+            settled: fit,
             base,
             contenders,
             screened,

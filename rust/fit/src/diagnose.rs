@@ -145,7 +145,7 @@ impl WithArm for Request<'_> {
     ) -> Self::Output {
         let started = Instant::now();
         let study = self.study::<A, N, P>(arm, theta)?;
-        let mut diagnosis = crate::report::compose(&study, self.arm, self.options);
+        let mut diagnosis = crate::compose::compose(&study, self.arm, self.options);
         diagnosis.seconds = started.elapsed().as_secs_f64();
         Ok(diagnosis)
     }

@@ -5,7 +5,11 @@
 
 pub mod arm;
 pub mod attribute;
+pub mod compose;
+pub mod decide;
 pub mod diagnose;
+pub mod equivalent;
+pub mod locate;
 pub mod metric;
 pub mod model;
 pub mod report;

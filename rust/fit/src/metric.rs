@@ -205,7 +205,7 @@ impl<const N: usize> Metric<N> {
 }
 
 /// Derivatives of all predictions by the starts' positions and velocities.
-fn start_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+pub fn start_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     data: &Dataset<N>,
     arm: &A,
     hypothesis: &Hypothesis<P>,

@@ -1,91 +1,288 @@
-//! dev
-use crate::arm::ArmDescription;
-use crate::diagnose::Options;
-use crate::model::Hypothesis;
-use crate::study::Study;
-use armgap_core::arm::Arm;
+//! The diagnosis as data: the schema `armgap.diagnosis/1` and what a report draws besides.
+
+use crate::locate::{Place, Regime};
 use serde::Serialize;
-/// d
-#[derive(Debug, Serialize, Default)]
-pub struct Diagnosis {
-    /// s
-    pub seconds: f64,
+use std::collections::BTreeMap;
+
+/// Named values in the order of the model.
+pub type Named<T> = BTreeMap<String, T>;
+
+/// A number with its uncertainty.
+#[derive(Debug, Clone, Serialize)]
+pub struct Value {
+    /// Value, SI.
+    pub value: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+    /// SI unit.
+    pub unit: &'static str,
 }
-/// c
-pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    study: &Study<A, N, P>,
-    _arm: &ArmDescription,
-    _o: &Options,
-) -> Diagnosis {
-    let rms = |h: &Hypothesis<P>| -> Vec<f64> {
-        let d = &study.holdout.data;
-        let p = d.predict(&study.arm, h, &d.measured_starts());
-        (0..N)
-            .map(|j| {
-                (p.iter()
-                    .zip(&study.holdout.measured)
-                    .skip(j)
-                    .step_by(N)
-                    .map(|(a, b)| (a - b).powi(2))
-                    .sum::<f64>()
-                    / d.rows as f64)
-                    .sqrt()
-            })
-            .collect()
-    };
-    let t0 = std::time::Instant::now();
-    let nominal = Hypothesis::rigid(study.prior.theta);
-    eprintln!(
-        "windows {} {} rows {} noise {:?} step {:?}",
-        study.training.data.windows.len(),
-        study.holdout.data.windows.len(),
-        study.training.data.rows,
-        study.noise,
-        study.training.data.tracks[0].step
-    );
-    eprintln!("nominal gap {:?}", rms(&nominal));
-    let mut scale = study.rough_scale(&nominal);
-    let mut current = nominal;
-    for s in 0..3 {
-        let stage = study.stage(&current, scale);
-        eprintln!(
-            "== stage {s} t={:.2}s scale {:?} base gap {:?} excess {:.2} prior {:.1} smoothing {}",
-            t0.elapsed().as_secs_f64(),
-            stage.weights.training.scale,
-            rms(&stage.base.fit.hypothesis),
-            stage.excess(),
-            stage.base.fit.prior_cost,
-            stage.base.fit.hypothesis.smoothing
-        );
-        let mut sc: Vec<_> = stage.screened.iter().collect();
-        sc.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        for x in sc.iter().take(8) {
-            eprintln!(
-                "   screen {:?} gain {:.1} est {:.4} sig {:.4} distinct {:.4}",
-                x.effect, x.gain, x.estimate, x.sigma, x.distinct
-            );
-        }
-        for c in &stage.contenders {
-            eprintln!(
-                "   {:?} sm {:.4} train {:.1} hold {:.1} prior {:.1} share {:.3} z {:.1} gap {:?}",
-                c.effect,
-                c.fit.hypothesis.smoothing,
-                c.fit.data_cost,
-                c.holdout.iter().sum::<f64>(),
-                c.fit.prior_cost,
-                stage.share(c),
-                c.z_over(&stage.base),
-                rms(&c.fit.hypothesis)
-            );
-        }
-        let Some(best) = stage.contenders.first() else {
-            break;
-        };
-        if stage.share(best) < 0.1 {
-            break;
-        }
-        current = best.fit.hypothesis.clone();
-        scale = stage.weights.training.scale;
-    }
-    Diagnosis::default()
+
+/// A diagnosis.
+#[derive(Debug, Clone, Serialize)]
+pub struct Diagnosis {
+    /// Name of this schema.
+    pub schema: &'static str,
+    /// `none`, `parameters`, `effect` or `unexplained`.
+    pub verdict: &'static str,
+    /// How far.
+    pub gap: Gap,
+    /// Where.
+    #[serde(rename = "where")]
+    pub places: Vec<Place>,
+    /// Which.
+    pub causes: Vec<Cause>,
+    /// What was looked for and not found.
+    pub ruled_out: Vec<RuledOut>,
+    /// The arm's parameters.
+    pub parameters: Parameters,
+    /// The arm.
+    pub arm: ArmSummary,
+    /// Logs the model was fitted to.
+    pub training: Vec<LogSummary>,
+    /// Logs it was judged on.
+    pub holdout: Vec<LogSummary>,
+    /// All fitted candidates of the first stage, best first.
+    pub ranking: Vec<Ranked>,
+    /// The course of the attribution.
+    pub stages: Vec<StageSummary>,
+    /// The gap by joint and regime.
+    pub regimes: Vec<Regime>,
+    /// Predictions on the holdout, window by window.
+    pub series: Vec<Series>,
+    /// Predictions of the whole holdout from its first sample.
+    pub free_run_series: Vec<FreeRunSeries>,
+    /// What the position measurement looks like.
+    pub noise: Noise,
+    /// Settings.
+    pub options: OptionSummary,
+    /// Version of this library.
+    pub version: &'static str,
+    /// Time it took, s.
+    pub seconds: f64,
+    /// Remarks.
+    pub notes: Vec<String>,
+}
+
+/// How far predictions miss on the holdout, RMS per joint.
+#[derive(Debug, Clone, Serialize)]
+pub struct Gap {
+    /// Prediction horizon, s.
+    pub horizon_s: f64,
+    /// Unit of the position errors per joint.
+    pub unit: &'static str,
+    /// Arm file as it is.
+    pub before: Vec<f64>,
+    /// Parameters re-estimated.
+    pub refit: Vec<f64>,
+    /// Causes added.
+    pub after: Vec<f64>,
+    /// What measurement noise alone leaves.
+    pub floor: Vec<f64>,
+    /// Share of the gap above the floor that is closed.
+    pub closed: f64,
+    /// 95 % interval of it.
+    pub closed_ci: [f64; 2],
+    /// Over the whole holdout from its first sample.
+    pub free_run: FreeRun,
+}
+
+/// RMS errors in free run.
+#[derive(Debug, Clone, Serialize)]
+pub struct FreeRun {
+    /// Arm file as it is.
+    pub before: Vec<f64>,
+    /// Causes added.
+    pub after: Vec<f64>,
+}
+
+/// One cause.
+#[derive(Debug, Clone, Serialize)]
+pub struct Cause {
+    /// Effect.
+    pub effect: &'static str,
+    /// Name for people.
+    pub title: &'static str,
+    /// 1-based joint.
+    pub joint: Option<usize>,
+    /// Probability.
+    pub probability: f64,
+    /// Its parameters.
+    pub parameters: Named<Value>,
+    /// Share of the gap above the floor it removed when it was added.
+    pub closed: f64,
+    /// What this log does not tell from it.
+    pub equivalents: Vec<EquivalentSummary>,
+}
+
+/// A look-alike.
+#[derive(Debug, Clone, Serialize)]
+pub struct EquivalentSummary {
+    /// Effect.
+    pub effect: &'static str,
+    /// 1-based joint.
+    pub joint: Option<usize>,
+    /// Why.
+    pub why: String,
+}
+
+/// A candidate that is not a cause.
+#[derive(Debug, Clone, Serialize)]
+pub struct RuledOut {
+    /// Effect.
+    pub effect: &'static str,
+    /// 1-based joint.
+    pub joint: Option<usize>,
+    /// `absent`, `not excited` or `undecided`.
+    pub status: &'static str,
+    /// Upper bound of its size.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bound: Option<Bound>,
+    /// Reason.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+}
+
+/// An upper bound.
+#[derive(Debug, Clone, Serialize)]
+pub struct Bound {
+    /// Parameter.
+    pub parameter: &'static str,
+    /// Largest deviation from its neutral value.
+    pub value: f64,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Confidence level.
+    pub level: f64,
+}
+
+/// The arm's parameters before, re-estimated, and with the causes.
+#[derive(Debug, Clone, Serialize)]
+pub struct Parameters {
+    /// Arm file.
+    pub nominal: Named<Value>,
+    /// Re-estimated.
+    pub refit: Named<Value>,
+    /// Re-estimated with the causes.
+    pub with_causes: Named<Value>,
+}
+
+/// The arm in brief.
+#[derive(Debug, Clone, Serialize)]
+pub struct ArmSummary {
+    /// Kind.
+    pub kind: &'static str,
+    /// Joints.
+    pub n_joints: usize,
+    /// Parameter names in the order of `theta`.
+    pub parameter_names: Vec<&'static str>,
+    /// Their units.
+    pub parameter_units: Vec<&'static str>,
+    /// Unit of each joint's position.
+    pub joint_unit: Vec<&'static str>,
+}
+
+/// A log in brief.
+#[derive(Debug, Clone, Serialize)]
+pub struct LogSummary {
+    /// Name.
+    pub name: String,
+    /// Samples.
+    pub samples: usize,
+    /// Duration, s.
+    pub duration_s: f64,
+    /// Windows.
+    pub windows: usize,
+}
+
+/// A fitted candidate.
+#[derive(Debug, Clone, Serialize)]
+pub struct Ranked {
+    /// Effect.
+    pub effect: &'static str,
+    /// Name for people.
+    pub title: &'static str,
+    /// 1-based joint.
+    pub joint: Option<usize>,
+    /// Share of the holdout's gap above the floor it removes.
+    pub closed: f64,
+    /// Decrease of the cost of all windows, in units of the residual's variance.
+    pub gain: f64,
+    /// Mean decrease per window in standard errors.
+    pub z: f64,
+    /// RMS on the holdout per joint.
+    pub rms: Vec<f64>,
+    /// Its parameters.
+    pub parameters: Named<Value>,
+}
+
+/// One step of the attribution.
+#[derive(Debug, Clone, Serialize)]
+pub struct StageSummary {
+    /// What the step added.
+    pub added: Option<EquivalentSummary>,
+    /// RMS on the holdout per joint before the step.
+    pub rms: Vec<f64>,
+    /// Cost above the noise floor before the step, as a factor.
+    pub excess: f64,
+}
+
+/// Measured and predicted positions of one joint.
+#[derive(Debug, Clone, Serialize)]
+pub struct Series {
+    /// Log.
+    pub log: String,
+    /// 1-based joint.
+    pub joint: usize,
+    /// Times, s.
+    pub t: Vec<f64>,
+    /// Measured.
+    pub measured: Vec<f64>,
+    /// Arm file as it is.
+    pub before: Vec<f64>,
+    /// Parameters re-estimated.
+    pub refit: Vec<f64>,
+    /// Causes added.
+    pub after: Vec<f64>,
+    /// Indices at which a new window starts.
+    pub window_start: Vec<usize>,
+}
+
+/// Measured and predicted positions in free run.
+#[derive(Debug, Clone, Serialize)]
+pub struct FreeRunSeries {
+    /// Log.
+    pub log: String,
+    /// 1-based joint.
+    pub joint: usize,
+    /// Times, s.
+    pub t: Vec<f64>,
+    /// Measured.
+    pub measured: Vec<f64>,
+    /// Arm file as it is.
+    pub before: Vec<f64>,
+    /// Causes added.
+    pub after: Vec<f64>,
+}
+
+/// Measurement noise.
+#[derive(Debug, Clone, Serialize)]
+pub struct Noise {
+    /// Standard deviation of the positions per joint.
+    pub position_sigma: Vec<f64>,
+    /// Encoder step per joint, zero where none is seen.
+    pub encoder_step: Vec<f64>,
+}
+
+/// Settings of a diagnosis.
+#[derive(Debug, Clone, Serialize)]
+pub struct OptionSummary {
+    /// Horizon, s.
+    pub horizon_s: f64,
+    /// Causes at most.
+    pub max_causes: usize,
+    /// Seed.
+    pub seed: u64,
+    /// Width of smoothed friction that the logs asked for, rad/s; zero for dry friction.
+    pub friction_smoothing: f64,
 }

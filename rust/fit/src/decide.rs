@@ -1,0 +1,255 @@
+//! One cause after another: what is accepted, what is dropped again, and with what probability.
+//!
+//! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the
+//! windows' own scatter. After every addition all causes are fitted together again, and one that has become idle is dropped.
+
+use crate::attribute::{Contender, Stage};
+use crate::model::{Hypothesis, Placed};
+use crate::solve::Fit;
+use crate::study::Study;
+use armgap_core::arm::Arm;
+
+/// Mean advantage per window, in standard errors, below which a cause is not accepted.
+const CERTAIN: f64 = 3.5;
+
+/// The same on the holdout alone, where a cause must at least not fail.
+const HOLDOUT_CERTAIN: f64 = 1.0;
+
+/// Share of the gap above the floor below which an improvement does not matter.
+const MATTERS: f64 = 0.05;
+
+/// Cost above the floor, as a factor, below which there is nothing left to explain.
+const ABOVE_FLOOR: f64 = 1.25;
+
+/// Decrease of the distance from trusted values, in squared sigmas, that makes a cause on its own.
+const TRUST_GAIN: f64 = 16.0;
+
+/// Resamples of the windows.
+const RESAMPLES: usize = 400;
+
+/// A contender whose cost is within this part of the winner's advantage is a look-alike.
+const LOOK_ALIKE: f64 = 0.03;
+
+/// A cause that was accepted.
+#[derive(Debug, Clone)]
+pub struct Cause {
+    /// The effect with its values in the final model.
+    pub effect: Placed,
+    /// Standard deviations of its values.
+    pub sigma: Vec<f64>,
+    /// Probability that it, or one of its look-alikes, is what the windows show.
+    pub probability: f64,
+    /// Share of the holdout's gap above the floor that it removed when it was added.
+    pub share: f64,
+    /// Effects that this log does not tell from it.
+    pub look_alikes: Vec<Placed>,
+}
+
+/// The whole course of an attribution.
+pub struct Attribution<const N: usize, const P: usize> {
+    /// Parameters re-estimated, no effects.
+    pub refit: Fit<P>,
+    /// The final model.
+    pub model: Fit<P>,
+    /// Accepted causes, strongest first.
+    pub causes: Vec<Cause>,
+    /// Every stage, the last one being the one that accepted nothing.
+    pub stages: Vec<Stage<N, P>>,
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+    /// Attributes the gap to at most `max_causes` effects.
+    pub fn attribute(&self, max_causes: usize, seed: u64) -> Attribution<N, P> {
+        let nominal = Hypothesis::rigid(self.prior.theta);
+        let mut scale = self.rough_scale(&nominal);
+        let mut stage = self.stage(&nominal, scale);
+        let refit = stage.settled.clone();
+        let mut model = refit.clone();
+        let (mut causes, mut stages): (Vec<Cause>, Vec<Stage<N, P>>) = (Vec::new(), Vec::new());
+        let mut smoothed = false;
+        while causes.len() < max_causes {
+            let Some(choice) = choose(&stage, smoothed) else {
+                break;
+            };
+            let best = &stage.contenders[choice];
+            model = best.fit.clone();
+            match best.effect {
+                Some(_) => causes.push(name(&stage, choice, seed)),
+                None => smoothed = true,
+            }
+            scale = stage.weights.training.scale;
+            let next = self.stage(&model.hypothesis, scale);
+            stages.push(std::mem::replace(&mut stage, next));
+            model = stage.settled.clone();
+        }
+        self.prune(&mut model, &mut causes, &stage);
+        stages.push(stage);
+        refresh(&model, &mut causes);
+        Attribution {
+            refit,
+            model,
+            causes,
+            stages,
+        }
+    }
+
+    /// Drops causes that the others have made idle.
+    fn prune(&self, model: &mut Fit<P>, causes: &mut Vec<Cause>, stage: &Stage<N, P>) {
+        let mut i = 0;
+        while causes.len() > 1 && i < causes.len() {
+            let full = self.judged(stage, model.clone(), None);
+            let mut without = model.hypothesis.clone();
+            without.effects.remove(i);
+            let fit = self.problem(&stage.weights.training).solve(&without);
+            let reduced = self.judged(stage, fit, None);
+            let idle = full.z_over(&reduced) < CERTAIN
+                && reduced.fit.prior_cost - full.fit.prior_cost < TRUST_GAIN;
+            if idle {
+                *model = reduced.fit;
+                causes.remove(i);
+                i = 0;
+            } else {
+                i += 1;
+            }
+        }
+    }
+
+    fn judged(&self, stage: &Stage<N, P>, fit: Fit<P>, effect: Option<Placed>) -> Contender<P> {
+        let training = self
+            .problem(&stage.weights.training)
+            .window_costs(&fit.hypothesis);
+        let holdout = self
+            .judge(&stage.weights.holdout)
+            .window_costs(&fit.hypothesis);
+        Contender {
+            effect,
+            fit,
+            training,
+            holdout,
+        }
+    }
+}
+
+/// Index of the contender to adopt, if any deserves it; smoother friction is adopted once.
+fn choose<const N: usize, const P: usize>(stage: &Stage<N, P>, smoothed: bool) -> Option<usize> {
+    let (index, best) = stage
+        .contenders
+        .iter()
+        .enumerate()
+        .find(|(_, c)| c.effect.is_some() || !smoothed)?;
+    let moves = stage.excess() > ABOVE_FLOOR
+        && stage.share(best) > MATTERS
+        && best.z_over(&stage.base) > CERTAIN
+        && best.holdout_z_over(&stage.base) > HOLDOUT_CERTAIN;
+    let trust = stage.base.fit.prior_cost - best.fit.prior_cost;
+    let plausible = (P as f64) + 3.0 * (2.0 * P as f64).sqrt();
+    let restores = best.effect.is_some()
+        && trust > TRUST_GAIN
+        && stage.base.fit.prior_cost > plausible
+        && best.fit.prior_cost < 0.4 * stage.base.fit.prior_cost
+        && best.score() < stage.base.score();
+    (moves || restores).then_some(index)
+}
+
+/// The chosen contender as a cause, with its look-alikes and probability.
+fn name<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usize, seed: u64) -> Cause {
+    let best = &stage.contenders[choice];
+    let advantage = stage.base.score() - best.score();
+    let alike = |c: &&Contender<P>| {
+        let close = c.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0);
+        close || best.z_over(c) < 1.0
+    };
+    let others = stage
+        .contenders
+        .iter()
+        .enumerate()
+        .filter(|(i, c)| *i != choice && c.effect.is_some());
+    let look_alikes: Vec<Placed> = others
+        .map(|(_, c)| c)
+        .filter(alike)
+        .filter_map(|c| c.effect)
+        .take(3)
+        .collect();
+    let effect = best
+        .effect
+        .unwrap_or_else(|| unreachable!("only effects are named"));
+    Cause {
+        effect,
+        sigma: Vec::new(),
+        probability: probability(stage, choice, &look_alikes, seed),
+        share: stage.share(best).clamp(0.0, 1.0),
+        look_alikes,
+    }
+}
+
+/// How often the chosen contender, or a look-alike, has the lowest cost when the windows are drawn again.
+fn probability<const N: usize, const P: usize>(
+    stage: &Stage<N, P>,
+    choice: usize,
+    look_alikes: &[Placed],
+    seed: u64,
+) -> f64 {
+    let advantages: Vec<Vec<f64>> = stage
+        .contenders
+        .iter()
+        .map(|c| c.advantages(&stage.base))
+        .collect();
+    let own: Vec<f64> = stage
+        .contenders
+        .iter()
+        .map(|c| stage.base.fit.prior_cost - c.fit.prior_cost)
+        .collect();
+    let ours = |i: usize| {
+        i == choice
+            || stage.contenders[i]
+                .effect
+                .is_some_and(|e| look_alikes.iter().any(|l| l.same_place(&e)))
+    };
+    let windows = advantages[choice].len();
+    let mut random = Random(seed);
+    let mut wins = 0;
+    for _ in 0..RESAMPLES {
+        let draw: Vec<usize> = (0..windows).map(|_| random.below(windows)).collect();
+        let gain = |i: usize| own[i] + draw.iter().map(|&w| advantages[i][w]).sum::<f64>();
+        let winner = (0..advantages.len()).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
+        if winner.is_some_and(|w| ours(w) && gain(w) > 0.0) {
+            wins += 1;
+        }
+    }
+    (f64::from(wins) + 0.5) / (RESAMPLES as f64 + 1.0)
+}
+
+/// Values and standard deviations of the causes from the final model.
+fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
+    for cause in causes.iter_mut() {
+        let mut first = P;
+        for effect in &model.hypothesis.effects {
+            if effect.same_place(&cause.effect) {
+                cause.effect = *effect;
+                cause.sigma = (first..first + effect.len())
+                    .map(|i| model.sigma(i))
+                    .collect();
+            }
+            first += effect.len();
+        }
+    }
+    causes.sort_by(|a, b| b.share.total_cmp(&a.share));
+}
+
+/// A small generator of uniform numbers (splitmix64, Steele, Lea and Flood 2014), so that a seed gives the same result everywhere.
+pub struct Random(pub u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number from 0 to `n - 1`.
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.next() % n.max(1) as u64) as usize
+    }
+}

@@ -1,0 +1,67 @@
+//! Pairs of effects that no log of motion alone tells apart.
+
+use crate::model::Placed;
+
+/// An effect that could stand in for another, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Equivalent {
+    /// Name of the effect.
+    pub effect: &'static str,
+    /// 1-based joint; none for effects of the whole arm.
+    pub joint: Option<usize>,
+    /// Why the two cannot be told apart.
+    pub why: String,
+}
+
+/// Effects that are the same as this one on an arm with `joints` joints, whatever the motion.
+pub fn known(effect: &Placed, joints: usize) -> Vec<Equivalent> {
+    let joint = effect.joint_number();
+    let one = |effect, joint, why: &str| {
+        vec![Equivalent {
+            effect,
+            joint,
+            why: why.to_owned(),
+        }]
+    };
+    match effect.law.spec().name {
+        "coulomb_asymmetry" => {
+            one("torque_offset", joint, "the same function of time while the joint moves; a reading at rest with the motor off separates them")
+        }
+        "torque_offset" => {
+            one("coulomb_asymmetry", joint, "the same function of time while the joint moves; a reading at rest with the motor off separates them")
+        }
+        "base_tilt" => {
+            one("encoder_offset", Some(1), "both turn gravity by one angle; a level on the base separates them")
+        }
+        "encoder_offset" if joint == Some(1) => {
+            one("base_tilt", None, "both turn gravity by one angle; a level on the base separates them")
+        }
+        "torque_gain" => (1..=joints)
+            .filter(|j| Some(*j) != joint)
+            .map(|j| Equivalent {
+                effect: "torque_gain",
+                joint: Some(j),
+                why: "the inverse gain there with all parameters scaled; a known added mass separates them".to_owned(),
+            })
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// The known equivalents and the look-alikes found in the data, none twice.
+pub fn all(effect: &Placed, look_alikes: &[Placed], joints: usize) -> Vec<Equivalent> {
+    let mut list = known(effect, joints);
+    for other in look_alikes {
+        let (name, joint) = (other.law.spec().name, other.joint_number());
+        if !list.iter().any(|e| e.effect == name && e.joint == joint) {
+            let why =
+                "explains these logs about as well; other motions may separate them".to_owned();
+            list.push(Equivalent {
+                effect: name,
+                joint,
+                why,
+            });
+        }
+    }
+    list
+}

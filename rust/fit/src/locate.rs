@@ -1,0 +1,369 @@
+//! Where the gap lies: the torque that each joint lacks, over the regimes of its motion.
+//!
+//! The prediction of a window and the measurement run under the same torque, so their difference is smooth; its second derivative
+//! is the acceleration the model lacks, and `M(q)` times that the torque it lacks.
+
+use crate::metric::Metric;
+use crate::model::Hypothesis;
+use crate::smooth::local_cubic;
+use crate::window::Dataset;
+use armgap_core::arm::Arm;
+use nalgebra::SVector;
+use serde::Serialize;
+
+/// Half width, in samples, of the cubic whose curvature is the missing acceleration.
+const HALF_WIDTH: usize = 8;
+
+/// A joint is near a reversal if its velocity changes sign within this time, s.
+const REVERSAL_S: f64 = 0.05;
+
+/// Bins of a regime variable.
+const BINS: usize = 6;
+
+/// A regime stands out if its mean square residual is this many times the joint's.
+const STANDS_OUT: f64 = 1.6;
+
+/// One sample's state and lacking torque, per joint.
+#[derive(Debug, Clone, Copy)]
+pub struct Lack<const N: usize> {
+    /// Time within the log, s.
+    pub t: f64,
+    /// Positions.
+    pub q: SVector<f64, N>,
+    /// Velocities.
+    pub dq: SVector<f64, N>,
+    /// Commanded torques.
+    pub tau: SVector<f64, N>,
+    /// Whether each joint is near a reversal.
+    pub reversal: [bool; N],
+    /// Lacking torques.
+    pub lack: SVector<f64, N>,
+}
+
+/// Lacking torque at every other sample of all windows under a hypothesis.
+pub fn lacking_torque<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    arm: &A,
+    data: &Dataset<N>,
+    metric: &Metric<N>,
+    hypothesis: &Hypothesis<P>,
+) -> Vec<Lack<N>> {
+    let predicted = data.predict(arm, hypothesis, &metric.starts);
+    let mut found = Vec::new();
+    for window in &data.windows {
+        let track = &data.tracks[window.track];
+        let rows = &predicted[window.range()];
+        let times = &track.t[window.first + 1..=window.last];
+        if times.len() < 2 * HALF_WIDTH + 1 {
+            continue;
+        }
+        for i in (0..times.len()).step_by(2) {
+            let k = window.first + 1 + i;
+            let curvature = SVector::<f64, N>::from_fn(|j, _| {
+                let error = |r: usize| track.q[window.first + 1 + r][j] - rows[r * N + j];
+                local_cubic(times, error, i, HALF_WIDTH).ddq
+            });
+            let dq = SVector::from_fn(|j, _| velocity(&track.t, |s| track.q[s][j], k));
+            let inertia = arm.inertia(&hypothesis.theta, &track.q[k]);
+            found.push(Lack {
+                t: track.t[k] - track.t[0],
+                q: track.q[k],
+                dq,
+                tau: SVector::from_fn(|j, _| track.held[k][j].start),
+                reversal: std::array::from_fn(|j| reverses(&track.t, |s| track.q[s][j], k)),
+                lack: inertia * curvature,
+            });
+        }
+    }
+    found
+}
+
+fn velocity(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> f64 {
+    local_cubic(t, q, k, 6).dq
+}
+
+/// Whether the direction of motion differs between the two halves of the reversal time around `k`.
+fn reverses(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> bool {
+    let near = |x: f64| t.partition_point(|&s| s < x).min(t.len() - 1);
+    let (a, b) = (near(t[k] - REVERSAL_S), near(t[k] + REVERSAL_S));
+    (q(b) - q(k)) * (q(k) - q(a)) < 0.0
+}
+
+/// RMS lacking torque of one joint over bins of one variable.
+#[derive(Debug, Clone, Serialize)]
+pub struct Regime {
+    /// 1-based joint.
+    pub joint: usize,
+    /// The variable, for example `abs(dq1)`.
+    pub variable: String,
+    /// Its unit.
+    pub unit: String,
+    /// Bin edges.
+    pub edges: Vec<f64>,
+    /// Unit of the RMS figures.
+    pub torque_unit: &'static str,
+    /// RMS lacking torque with the arm file as it is.
+    pub before: Vec<f64>,
+    /// With parameters re-estimated.
+    pub refit: Vec<f64>,
+    /// With the causes.
+    pub after: Vec<f64>,
+    /// Samples in each bin.
+    pub count: Vec<usize>,
+}
+
+/// Where most of a joint's gap lies.
+#[derive(Debug, Clone, Serialize)]
+pub struct Place {
+    /// 1-based joint.
+    pub joint: usize,
+    /// Share of the whole gap that this joint bears.
+    pub share: f64,
+    /// Name of the regime.
+    pub regime: String,
+    /// The regime in figures.
+    pub detail: String,
+    /// The regime as a range of a variable; none where the gap is spread evenly.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range: Option<Range>,
+}
+
+/// A range of a variable.
+#[derive(Debug, Clone, Serialize)]
+pub struct Range {
+    /// The variable.
+    pub variable: String,
+    /// Lower end.
+    pub from: f64,
+    /// Upper end.
+    pub to: f64,
+}
+
+/// A variable that regimes are cut along.
+struct Axis<const N: usize> {
+    name: String,
+    unit: &'static str,
+    low: &'static str,
+    middle: &'static str,
+    high: &'static str,
+    value: fn(&Lack<N>, usize) -> f64,
+}
+
+fn axes<const N: usize>(joint: usize, rotary: bool) -> Vec<Axis<N>> {
+    let j = joint + 1;
+    let pick = |rotary_unit, linear_unit| if rotary { rotary_unit } else { linear_unit };
+    let axis = |name, unit, names: [&'static str; 3], value| Axis {
+        name,
+        unit,
+        low: names[0],
+        middle: names[1],
+        high: names[2],
+        value,
+    };
+    vec![
+        axis(
+            format!("abs(dq{j})"),
+            pick("rad/s", "m/s"),
+            ["low speed", "medium speed", "high speed"],
+            |x, j| x.dq[j].abs(),
+        ),
+        axis(
+            format!("reversal{j}"),
+            "1",
+            ["away from reversals", "", "reversals"],
+            |x, j| f64::from(u8::from(x.reversal[j])),
+        ),
+        axis(
+            format!("q{j}"),
+            pick("rad", "m"),
+            [
+                "one end of the travel",
+                "part of the travel",
+                "one end of the travel",
+            ],
+            |x, j| x.q[j],
+        ),
+        axis(
+            format!("abs(tau{j})"),
+            pick("N m", "N"),
+            ["low torque", "medium torque", "high torque"],
+            |x, j| x.tau[j].abs(),
+        ),
+        axis(
+            "t".to_owned(),
+            "s",
+            ["start of the log", "part of the log", "end of the log"],
+            |x, _| x.t,
+        ),
+    ]
+}
+
+/// Bin edges: quantiles, except for a variable with two values.
+fn edges(mut values: Vec<f64>) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    let (first, last) = (values[0], values[values.len() - 1]);
+    if values.iter().all(|v| *v == 0.0 || *v == 1.0) {
+        return vec![0.0, 0.5, 1.0];
+    }
+    let mut edges: Vec<f64> = (0..=BINS)
+        .map(|i| values[i * (values.len() - 1) / BINS])
+        .collect();
+    (edges[0], edges[BINS]) = (first, last);
+    edges.dedup();
+    edges
+}
+
+fn bin(edges: &[f64], value: f64) -> usize {
+    edges[1..edges.len() - 1].partition_point(|edge| *edge <= value)
+}
+
+/// The three hypotheses' lacking torques, sample by sample.
+pub struct Lacks<const N: usize> {
+    /// Arm file as it is.
+    pub before: Vec<Lack<N>>,
+    /// Parameters re-estimated.
+    pub refit: Vec<Lack<N>>,
+    /// With the causes.
+    pub after: Vec<Lack<N>>,
+}
+
+/// The gap over every joint and regime.
+pub fn regimes<const N: usize>(lacks: &Lacks<N>, rotary: bool) -> Vec<Regime> {
+    let mut all = Vec::new();
+    if lacks.refit.is_empty() {
+        return all;
+    }
+    for joint in 0..N {
+        for axis in axes::<N>(joint, rotary) {
+            let edges = edges(lacks.refit.iter().map(|x| (axis.value)(x, joint)).collect());
+            if edges.len() < 2 {
+                continue;
+            }
+            let (refit, count) = binned(&lacks.refit, joint, &axis, &edges);
+            all.push(Regime {
+                joint: joint + 1,
+                variable: axis.name.clone(),
+                unit: axis.unit.to_owned(),
+                torque_unit: if rotary { "N m" } else { "N" },
+                before: binned(&lacks.before, joint, &axis, &edges).0,
+                refit,
+                after: binned(&lacks.after, joint, &axis, &edges).0,
+                count,
+                edges,
+            });
+        }
+    }
+    all
+}
+
+fn binned<const N: usize>(
+    lacks: &[Lack<N>],
+    joint: usize,
+    axis: &Axis<N>,
+    edges: &[f64],
+) -> (Vec<f64>, Vec<usize>) {
+    let bins = edges.len() - 1;
+    let (mut squares, mut count) = (vec![0.0; bins], vec![0; bins]);
+    for x in lacks {
+        let b = bin(edges, (axis.value)(x, joint)).min(bins - 1);
+        squares[b] += x.lack[joint].powi(2);
+        count[b] += 1;
+    }
+    let rms = squares
+        .iter()
+        .zip(&count)
+        .map(|(s, n)| if *n > 0 { (s / *n as f64).sqrt() } else { 0.0 });
+    (rms.collect(), count)
+}
+
+/// Each joint's share of the gap and the regime that stands out in it, most of the gap first.
+///
+/// `gap` are the lacking torques that shares are taken of, `torque` the joints' typical torques.
+pub fn places<const N: usize>(
+    gap: &[Lack<N>],
+    regimes: &[Regime],
+    torque: &[f64; N],
+) -> Vec<Place> {
+    let mean_square =
+        |j: usize| gap.iter().map(|x| x.lack[j].powi(2)).sum::<f64>() / gap.len().max(1) as f64;
+    let weight: Vec<f64> = (0..N)
+        .map(|j| mean_square(j) / torque[j].powi(2).max(1e-300))
+        .collect();
+    let whole: f64 = weight.iter().sum();
+    let mut places: Vec<Place> = (0..N)
+        .map(|j| {
+            let share = if whole > 0.0 { weight[j] / whole } else { 0.0 };
+            standing_out(j, share, regimes)
+        })
+        .collect();
+    places.sort_by(|a, b| b.share.total_cmp(&a.share));
+    places
+}
+
+/// The regime of joint `j` in which the mean square residual exceeds the joint's own most.
+fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Place {
+    let mut best: Option<(f64, &Regime, usize)> = None;
+    for regime in regimes.iter().filter(|r| r.joint == j + 1) {
+        let samples: usize = regime.count.iter().sum();
+        let pairs = || regime.refit.iter().zip(&regime.count);
+        let mean = pairs().map(|(r, n)| r * r * *n as f64).sum::<f64>() / samples.max(1) as f64;
+        for (b, (rms, count)) in pairs().enumerate() {
+            let contrast = rms * rms / mean.max(1e-300);
+            if *count * 20 >= samples && contrast > best.map_or(STANDS_OUT, |x| x.0) {
+                best = Some((contrast, regime, b));
+            }
+        }
+    }
+    let Some((_, regime, b)) = best else {
+        return Place {
+            joint: j + 1,
+            share,
+            regime: "everywhere".into(),
+            detail: "no regime stands out".into(),
+            range: None,
+        };
+    };
+    let (from, to) = (regime.edges[b], regime.edges[b + 1]);
+    let name = regime_name(regime, b);
+    let detail = if regime.variable.starts_with("reversal") {
+        format!(
+            "within {REVERSAL_S} s of a change of direction of joint {}",
+            j + 1
+        )
+    } else {
+        format!(
+            "{} from {from:.3} to {to:.3} {}",
+            regime.variable, regime.unit
+        )
+    };
+    Place {
+        joint: j + 1,
+        share,
+        regime: name,
+        detail,
+        range: Some(Range {
+            variable: regime.variable.clone(),
+            from,
+            to,
+        }),
+    }
+}
+
+fn regime_name(regime: &Regime, b: usize) -> String {
+    let bins = regime.count.len();
+    let all = axes::<1>(0, true);
+    let kind = |name: &str| {
+        name.trim_end_matches(|c: char| c.is_ascii_digit() || c == ')')
+            .to_owned()
+    };
+    let axis = all.iter().find(|a| kind(&a.name) == kind(&regime.variable));
+    let position = if b == 0 {
+        0
+    } else if b + 1 == bins {
+        2
+    } else {
+        1
+    };
+    axis.map_or_else(String::new, |a| {
+        [a.low, a.middle, a.high][position].to_owned()
+    })
+}
