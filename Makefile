@@ -1,0 +1,62 @@
+# armgap: `make help` lists the targets.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUST_SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml Cargo.lock
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint test-rust test-python reproduce bench wheel clean all tools
+
+help: ## list the targets
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
+
+tools:
+	@command -v cargo >/dev/null || { echo "armgap needs Rust: cargo was not found; install it from https://rustup.rs" >&2; exit 1; }
+	@command -v cc >/dev/null || { echo "armgap needs a C linker: cc was not found; install gcc or clang" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { echo "armgap needs Python 3.11 or newer as $(PYTHON); set PYTHON=..." >&2; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "armgap needs the venv module of $(PYTHON); on Debian: apt-get install python3-venv" >&2; exit 1; }
+
+$(VENV)/.tools: pyproject.toml | tools
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install -q --disable-pip-version-check "maturin>=1.9,<2"
+	@touch $@
+
+$(VENV)/.built: $(VENV)/.tools pyproject.toml $(RUST_SOURCES)
+	@echo "building armgap (about a minute the first time)"
+	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --release --extras trial,dev
+	@touch $@
+
+setup: $(VENV)/.built ## virtual environment and build, all that the other targets need
+
+demo: setup ## diagnose the sample log, or yours: make demo LOG="a.csv b.csv" ARM=arm.toml HOLDOUT=c.csv
+	@$(BIN)/armgap demo $(LOG) $(if $(ARM),--arm $(ARM)) $(foreach h,$(HOLDOUT),--holdout $(h))
+
+lint: setup ## formatting, types and stubs
+	$(BIN)/ruff format --check python tests
+	$(BIN)/ruff check python tests
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest armgap._native --mypy-config-file pyproject.toml
+	cargo fmt --check
+	cargo clippy -q --release --all-targets --workspace --exclude armgap-py -- -D warnings
+
+test-rust: tools ## the Rust tests
+	cargo test -q --release --workspace --exclude armgap-py
+
+test-python: setup ## the Python tests
+	$(BIN)/python -m pytest
+
+test: lint test-rust test-python ## everything that has to hold
+
+reproduce: setup ## the seed paper's tables and figures beside our own
+	$(BIN)/armgap reproduce
+
+bench: ## cost per sample of the core
+	cargo bench -p armgap-benches
+
+wheel: $(VENV)/.tools ## a wheel in dist/
+	$(BIN)/maturin build --release -o dist
+
+all: test demo ## what has to hold before a change lands
+
+clean: ## remove everything that was built
+	rm -rf $(VENV) target dist

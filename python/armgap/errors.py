@@ -1,0 +1,119 @@
+"""Everything armgap can complain about: one tree, one line per complaint.
+
+Each error carries where it happened (`file`, `column`, `row`) and what to do about it (`remedy`); its text names all of them. Rows count
+data rows from 1; a row of ``None`` means the whole column or file.
+"""
+
+from __future__ import annotations
+
+from os import PathLike
+
+__all__ = [
+    "CATALOGUE",
+    "ArmFileError",
+    "ArmgapError",
+    "ColumnError",
+    "LogReadError",
+    "LogShapeError",
+    "OptionError",
+    "ResultError",
+    "SampleError",
+    "TimeError",
+    "UnitError",
+]
+
+
+class ArmgapError(Exception):
+    """Base of all errors of this package.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong, without a full stop.
+    remedy : str
+        What to do about it.
+    file : path-like, optional
+        File it was found in.
+    column : str, optional
+        Column of a log, or key of an arm file.
+    row : int, optional
+        Data row, counted from 1.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        remedy: str = "",
+        file: str | PathLike[str] | None = None,
+        column: str | None = None,
+        row: int | None = None,
+    ) -> None:
+        self.problem = problem
+        self.remedy = remedy
+        self.file = None if file is None else str(file)
+        self.column = column
+        self.row = row
+        place = [str(file)] if file is not None else []
+        place += [f"column `{column}`"] if column is not None else []
+        place += [f"row {row}"] if row is not None else []
+        text = f"{', '.join(place)}: {problem}" if place else problem
+        super().__init__(" ".join((f"{text}; {remedy}" if remedy else text).split()))
+
+
+class LogReadError(ArmgapError, OSError):
+    """A log cannot be read at all: missing, a folder, or not the format its name promises."""
+
+    def __str__(self) -> str:
+        """Return the one-line text."""
+        return str(self.args[0])
+
+
+class ColumnError(ArmgapError, ValueError):
+    """A column is missing, named twice, or holds something other than numbers."""
+
+
+class SampleError(ArmgapError, ValueError):
+    """A sample is missing or not finite."""
+
+
+class TimeError(ArmgapError, ValueError):
+    """Times repeat, run backwards, or leave a hole that cannot be bridged."""
+
+
+class UnitError(ArmgapError, ValueError):
+    """Values have the magnitude of another unit."""
+
+
+class LogShapeError(ArmgapError, ValueError):
+    """A log is too short, does not move, or does not fit the arm."""
+
+
+class ArmFileError(ArmgapError, ValueError):
+    """An arm file is missing, not TOML, or describes no possible arm."""
+
+
+class OptionError(ArmgapError, ValueError):
+    """An option or argument has an impossible value."""
+
+
+class ResultError(ArmgapError, OSError):
+    """A result cannot be written where it was asked for."""
+
+    def __str__(self) -> str:
+        """Return the one-line text."""
+        return str(self.args[0])
+
+
+CATALOGUE: tuple[type[ArmgapError], ...] = (
+    LogReadError,
+    ColumnError,
+    SampleError,
+    TimeError,
+    UnitError,
+    LogShapeError,
+    ArmFileError,
+    OptionError,
+    ResultError,
+)
+"""Every leaf of the tree; each has its case in the table of bad inputs."""
