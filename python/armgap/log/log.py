@@ -1,0 +1,195 @@
+"""A log of an arm, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import ArrayLike, NDArray
+
+from armgap.errors import OptionError, ResultError
+from armgap.log import checks, columns, read
+
+if TYPE_CHECKING:
+    from armgap.arm import Arm
+
+__all__ = ["Finding", "Log"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something about a log that its reader should know but that does not stop the work.
+
+    Attributes
+    ----------
+    kind : str
+        ``"sampling"``, ``"gap"``, ``"constant"``, ``"limit"`` or ``"columns"``.
+    message : str
+        In words.
+    """
+
+    kind: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Log:
+    """A log of an arm: one row per sample, everything in SI units.
+
+    Attributes
+    ----------
+    name : str
+        Name in results, usually the file's.
+    t : ndarray, shape (n_samples,)
+        Sample times [s], increasing, from 0.
+    q : ndarray, shape (n_samples, n_joints)
+        Positions as measured [rad or m].
+    tau : ndarray, shape (n_samples, n_joints)
+        Torques commanded at `t` and held until the next sample [N m or N].
+    dq : ndarray, shape (n_samples, n_joints), optional
+        Velocities, where a sensor gives them [rad/s or m/s].
+    findings : tuple of Finding
+        What was noticed while reading.
+    path : Path, optional
+        File it was read from.
+    """
+
+    name: str
+    t: NDArray[np.float64]
+    q: NDArray[np.float64]
+    tau: NDArray[np.float64]
+    dq: NDArray[np.float64] | None = None
+    findings: tuple[Finding, ...] = ()
+    path: Path | None = None
+
+    @classmethod
+    def read(
+        cls, path: str | Path, *, columns: Mapping[str, str] | None = None, arm: Arm | None = None
+    ) -> Log:
+        """Read a log from Parquet or CSV and check it.
+
+        Parameters
+        ----------
+        path : path-like
+            File; ``-`` reads CSV from standard input.
+        columns : mapping, optional
+            The file's own names of columns: ``{"q1": "shoulder_position"}``. Adds to the arm file's mapping and wins over it.
+        arm : Arm, optional
+            Arm the log belongs to; its joints, sample period and limits are checked too.
+
+        Raises
+        ------
+        LogReadError, ColumnError, SampleError, TimeError, UnitError, LogShapeError
+            Each names the file, column and row, and what to do.
+        """
+        frame, name, source = read.table(path)
+        return cls._build(frame, name, source, columns, arm)
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: Any,
+        *,
+        name: str = "log",
+        columns: Mapping[str, str] | None = None,
+        arm: Arm | None = None,
+    ) -> Log:
+        """Take a log from a data frame (polars, or anything polars can convert, such as pandas or pyarrow)."""
+        table = frame if isinstance(frame, pl.DataFrame) else pl.DataFrame(frame)
+        return cls._build(table, name, None, columns, arm)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        t: ArrayLike,
+        q: ArrayLike,
+        tau: ArrayLike,
+        dq: ArrayLike | None = None,
+        *,
+        name: str = "log",
+        arm: Arm | None = None,
+    ) -> Log:
+        """Take a log from arrays; `q`, `tau` and `dq` have shape (n_samples, n_joints), or (n_samples,) for one joint."""
+        data: dict[str, NDArray[np.float64]] = {"t": np.asarray(t, dtype=np.float64)}
+        for prefix, values in (("q", q), ("tau", tau), ("dq", dq)):
+            if values is None:
+                continue
+            array = np.asarray(values, dtype=np.float64)
+            array = array[:, None] if array.ndim == 1 else array
+            if array.ndim != 2 or len(array) != len(data["t"]):
+                raise OptionError(
+                    f"`{prefix}` has shape {array.shape}, `t` has {len(data['t'])} samples",
+                    remedy="give one row per sample and one column per joint",
+                )
+            data |= {f"{prefix}{j + 1}": array[:, j] for j in range(array.shape[1])}
+        return cls._build(pl.DataFrame(data), name, None, None, arm)
+
+    @classmethod
+    def _build(
+        cls,
+        frame: pl.DataFrame,
+        name: str,
+        source: Path | None,
+        mapping: Mapping[str, str] | None,
+        arm: Arm | None,
+    ) -> Log:
+        place = source if source is not None else name
+        names = columns.resolve(frame, place, mapping or {}, arm)
+        arrays = columns.extract(frame, place, names)
+        noticed = checks.run(arrays, place, names, arm)
+        findings = tuple(Finding(kind, message) for kind, message in noticed)
+        t = arrays.t - arrays.t[0]
+        return cls(name, t, arrays.q, arrays.tau, arrays.dq, findings, source)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints."""
+        return int(self.q.shape[1])
+
+    @property
+    def sample_period(self) -> float:
+        """Median sample period [s]."""
+        return float(np.median(np.diff(self.t)))
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.t)
+
+    def part(self, first: int, last: int, name: str) -> Log:
+        """Return the samples `first` up to, not including, `last` as a log of its own."""
+        rows = slice(first, last)
+        dq = None if self.dq is None else self.dq[rows]
+        t = self.t[rows] - self.t[first]
+        return Log(name, t, self.q[rows], self.tau[rows], dq, self.findings, self.path)
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return the log as a table with the columns ``t, q1 …, tau1 …`` and, where there are any, ``dq1 …``."""
+        data = {"t": self.t}
+        for prefix, values in (("q", self.q), ("tau", self.tau), ("dq", self.dq)):
+            if values is not None:
+                data |= {f"{prefix}{j + 1}": values[:, j] for j in range(self.n_joints)}
+        return pl.DataFrame(data)
+
+    def write(self, path: str | Path) -> None:
+        """Write the log as Parquet, or as CSV if the name ends in ``.csv``; nothing is left behind if that fails."""
+        path = Path(path)
+        temporary = path.with_name(path.name + ".partial")
+        try:
+            if path.suffix.lower() == ".csv":
+                self.to_polars().write_csv(temporary)
+            else:
+                self.to_polars().write_parquet(temporary)
+            temporary.replace(path)
+        except OSError as error:
+            temporary.unlink(missing_ok=True)
+            reason = error.strerror or str(error)
+            raise ResultError(f"cannot be written ({reason})", remedy="choose another place", file=path) from None
