@@ -37,6 +37,9 @@ pub fn diagnose(
     if let Some(value) = options.get_item("horizon")? {
         chosen.horizon = value.extract()?;
     }
+    if let Some(value) = options.get_item("max_causes")? {
+        chosen.max_causes = value.extract()?;
+    }
     if let Some(value) = options.get_item("seed")? {
         chosen.seed = value.extract()?;
     }

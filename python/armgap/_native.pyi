@@ -1,0 +1,37 @@
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+def arm_kinds() -> list[dict[str, Any]]: ...
+def effects() -> list[dict[str, Any]]: ...
+def theta_from_links(
+    kind: str,
+    gravity: float,
+    mass: Sequence[float],
+    length: Sequence[float],
+    com: Sequence[float],
+    inertia: Sequence[float],
+) -> NDArray[np.float64]: ...
+def simulate(
+    kind: str,
+    gravity: float,
+    link_length: Sequence[float] | None,
+    theta: Sequence[float],
+    t: NDArray[np.float64],
+    tau: NDArray[np.float64],
+    q0: NDArray[np.float64],
+    dq0: NDArray[np.float64],
+    effects: Sequence[tuple[str, int | None, dict[str, float]]],
+    tolerance: float = 1e-9,
+    smoothing: float = 0.0,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def diagnose(
+    arm: dict[str, Any],
+    training: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]],
+    holdout: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]],
+    options: dict[str, Any],
+) -> str: ...

@@ -1,0 +1,70 @@
+"""The command ``armgap``: one file per sub-command, loaded when it is used."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+
+import click
+
+from armgap import __version__
+from armgap.errors import ArmgapError
+
+__all__ = ["main"]
+
+COMMANDS = {
+    "identify": "armgap.cli.identify",
+    "simulate": "armgap.cli.simulate",
+    "diagnose": "armgap.cli.diagnose",
+    "reproduce": "armgap.cli.reproduce",
+    "demo": "armgap.cli.demo",
+}
+"""Sub-commands and the module whose ``command`` each one is."""
+
+UNUSABLE_INPUT = 2
+INTERRUPTED = 130
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """List the names of all sub-commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return a sub-command by name."""
+        if cmd_name not in COMMANDS:
+            return None
+        command = import_module(COMMANDS[cmd_name]).command
+        assert isinstance(command, click.Command)
+        return command
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="armgap")
+def cli() -> None:
+    """Find out why a real robot arm does not do what the simulation said."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line; unusable input ends it with status 2 and one line on standard error."""
+    try:
+        status = cli.main(args=arguments, prog_name="armgap", standalone_mode=False)
+    except ArmgapError as error:
+        _fail(str(error))
+    except click.exceptions.Exit as stop:
+        sys.exit(stop.exit_code)
+    except click.ClickException as error:
+        _fail(" ".join(error.format_message().split()))
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("armgap: interrupted", err=True)
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        sys.exit(0)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _fail(message: str) -> None:
+    click.echo(f"armgap: {message}", err=True)
+    sys.exit(UNUSABLE_INPUT)

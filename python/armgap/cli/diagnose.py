@@ -1,0 +1,68 @@
+"""``armgap diagnose``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armgap.cli.common import (
+    arm_option,
+    columns_option,
+    console,
+    json_option,
+    parse_columns,
+    quiet_option,
+    working,
+    write,
+)
+
+__all__ = ["command"]
+
+
+@click.command("diagnose")
+@click.argument("logs", nargs=-1, required=True, metavar="LOG…")
+@arm_option
+@click.option("--holdout", multiple=True, metavar="LOG", help="Log to judge on; may be repeated.")
+@click.option("--horizon", default=0.25, show_default=True, help="Prediction horizon [s].")
+@click.option("--max-causes", default=4, show_default=True, help="Causes named at most.")
+@click.option("--seed", default=1, show_default=True, help="Seed of the resampling.")
+@click.option("--report", "report_file", metavar="OUT.html", help="Write the report.")
+@json_option
+@columns_option
+@quiet_option
+def command(
+    logs: tuple[str, ...],
+    arm_file: str,
+    holdout: tuple[str, ...],
+    horizon: float,
+    max_causes: int,
+    seed: int,
+    report_file: str | None,
+    json_file: str | None,
+    columns: str | None,
+    quiet: bool,
+) -> None:
+    """Say where the gap between LOGs and the nominal arm lies, what causes it, and how far it shrinks."""
+    from armgap.arm import Arm
+    from armgap.diagnose import diagnose
+    from armgap.log import Log
+
+    mapping = parse_columns(columns)
+    arm = Arm.read(Path(arm_file))
+    training = [Log.read(path, columns=mapping, arm=arm) for path in logs]
+    held = [Log.read(path, columns=mapping, arm=arm) for path in holdout] or None
+    with working("diagnosing", quiet=quiet):
+        result = diagnose(training, arm, holdout=held, horizon=horizon, max_causes=max_causes, seed=seed)
+    if report_file is not None:
+        from armgap.report import write_html
+
+        write(report_file, lambda path: write_html(result, path))
+    if json_file is not None:
+        write(json_file, result.to_json(indent=2))
+    if not quiet and json_file != "-":
+        from armgap.report import summary_table
+
+        console().print(summary_table(result))
+        if report_file is not None:
+            console().print(f"report: {report_file}")

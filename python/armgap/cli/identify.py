@@ -1,0 +1,77 @@
+"""``armgap identify``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armgap.cli.common import arm_option, columns_option, console, json_option, parse_columns, quiet_option, write
+
+__all__ = ["command"]
+
+SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
+
+
+@click.command("identify")
+@click.argument("logs", nargs=-1, required=True, metavar="LOG…")
+@arm_option
+@click.option("--scheme", type=click.Choice([*SCHEMES, "all"]), default="all", show_default=True)
+@click.option("--filters", type=click.Choice(["paper", "exact"]), default="exact", show_default=True)
+@click.option("--cutoff", default=50.0, show_default=True, help="Filter cut-off [rad/s].")
+@click.option(
+    "--velocity",
+    type=click.Choice(["backward", "central", "local-cubic", "sensor"]),
+    help="Velocity estimate; backward for the paper's filters, central for the exact ones.",
+)
+@click.option("--asymmetry", is_flag=True, help="Estimate a torque offset per joint (asymmetric Coulomb friction) too.")
+@json_option
+@columns_option
+@quiet_option
+def command(
+    logs: tuple[str, ...],
+    arm_file: str,
+    scheme: str,
+    filters: str,
+    cutoff: float,
+    velocity: str | None,
+    asymmetry: bool,
+    json_file: str | None,
+    columns: str | None,
+    quiet: bool,
+) -> None:
+    """Estimate the arm's parameters from LOGs by recursive least squares, with the seed paper's three schemes."""
+    import json
+
+    from rich.table import Table
+
+    from armgap.arm import Arm
+    from armgap.identify import identify
+    from armgap.log import Log
+
+    arm = Arm.read(Path(arm_file))
+    mapping = parse_columns(columns)
+    read = [Log.read(path, columns=mapping, arm=arm) for path in logs]
+    schemes = SCHEMES if scheme == "all" else (scheme,)
+    results = [
+        identify(log, arm, scheme=s, filters=filters, cutoff=cutoff, velocity=velocity, asymmetry=asymmetry)
+        for log in read
+        for s in schemes
+    ]
+    if json_file is not None:
+        write(json_file, json.dumps([r.to_dict() for r in results], indent=2))
+    if quiet or json_file == "-":
+        return
+    for log in read:
+        mine = [r for r in results if r.log == log.name]
+        table = Table(title=f"{log.name}: {filters} filters, {cutoff:g} rad/s")
+        table.add_column("parameter")
+        table.add_column("arm file", justify="right")
+        for r in mine:
+            table.add_column(r.scheme, justify="right")
+        table.add_column("unit")
+        for i, name in enumerate(mine[0].parameter_names):
+            nominal = f"{arm.theta[i]:.4g}" if i < len(arm.theta) else ""
+            cells = [f"{r.theta[i]:.4g} ± {r.sigma[i]:.2g}" for r in mine]
+            table.add_row(name, nominal, *cells, mine[0].parameter_units[i])
+        console().print(table)

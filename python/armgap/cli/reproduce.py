@@ -1,0 +1,5 @@
+"""``armgap reproduce``."""
+
+from armgap.reproduce import command
+
+__all__ = ["command"]

@@ -1,0 +1,313 @@
+"""The diagnosis: where the gap lies, which effect causes it, how far it shrinks."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armgap import _native
+from armgap.arm import Arm
+from armgap.errors import LogShapeError, OptionError
+from armgap.log import Log
+
+__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
+
+_HELD_OUT = 0.4
+LogLike = Log | str | os.PathLike[str]
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number with its standard deviation and SI unit."""
+
+    value: float
+    sigma: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Gap:
+    """How far predictions miss on the holdout: RMS position error per joint.
+
+    Attributes
+    ----------
+    horizon_s : float
+        Prediction horizon [s].
+    before, refit, after, floor : tuple of float
+        With the arm file as it is, with its parameters re-estimated, with the causes added, and what measurement noise alone leaves
+        [rad or m].
+    closed : float
+        Share of the gap above the floor that is closed, over all joints.
+    closed_ci : tuple of float
+        95 % interval of it, from resampled windows.
+    free_run_before, free_run_after : tuple of float
+        The same over the whole holdout, simulated from its first sample.
+    """
+
+    horizon_s: float
+    before: tuple[float, ...]
+    refit: tuple[float, ...]
+    after: tuple[float, ...]
+    floor: tuple[float, ...]
+    closed: float
+    closed_ci: tuple[float, float]
+    free_run_before: tuple[float, ...]
+    free_run_after: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a part of the gap lies."""
+
+    joint: int
+    share: float
+    regime: str
+    detail: str
+    variable: str | None = None
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class Equivalent:
+    """An effect that these logs do not tell from a named one, and why."""
+
+    effect: str
+    joint: int | None
+    why: str
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A named cause."""
+
+    effect: str
+    title: str
+    joint: int | None
+    probability: float
+    parameters: dict[str, Value]
+    closed: float
+    equivalents: tuple[Equivalent, ...]
+
+
+@dataclass(frozen=True)
+class Bound:
+    """An upper bound on an effect's size."""
+
+    parameter: str
+    value: float
+    unit: str
+    level: float
+
+
+@dataclass(frozen=True)
+class RuledOut:
+    """A candidate that was looked for and not found: ``absent``, ``not excited`` or ``undecided``."""
+
+    effect: str
+    joint: int | None
+    status: str
+    bound: Bound | None
+    why: str | None
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The result of `diagnose`.
+
+    Attributes
+    ----------
+    verdict : str
+        ``"none"``: the gap is within noise; ``"parameters"``: right structure, wrong values; ``"effect"``: causes named;
+        ``"unexplained"``: a gap that no effect in the library explains.
+    gap : Gap
+        How far.
+    where : tuple of Place
+        Where, most of the gap first.
+    causes : tuple of Cause
+        Which, strongest first.
+    ruled_out : tuple of RuledOut
+        What was looked for and not found.
+    parameters : dict
+        ``nominal``, ``refit`` and ``with_causes``: name to `Value`.
+    extra : dict
+        What a report draws besides: curves, ranking, options.
+    """
+
+    verdict: str
+    gap: Gap
+    where: tuple[Place, ...]
+    causes: tuple[Cause, ...]
+    ruled_out: tuple[RuledOut, ...]
+    parameters: dict[str, dict[str, Value]]
+    extra: dict[str, Any] = field(default_factory=dict, repr=False)
+    _data: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Diagnosis:
+        """Build a diagnosis from its JSON object."""
+        known = {"schema", "verdict", "gap", "where", "causes", "ruled_out", "parameters"}
+        gap = data["gap"]
+        parameters = {
+            stage: {name: Value(**value) for name, value in values.items()}
+            for stage, values in data["parameters"].items()
+        }
+        return cls(
+            verdict=data["verdict"],
+            gap=Gap(
+                gap["horizon_s"],
+                tuple(gap["before"]),
+                tuple(gap["refit"]),
+                tuple(gap["after"]),
+                tuple(gap["floor"]),
+                gap["closed"],
+                (gap["closed_ci"][0], gap["closed_ci"][1]),
+                tuple(gap["free_run"]["before"]),
+                tuple(gap["free_run"]["after"]),
+            ),
+            where=tuple(_place(p) for p in data["where"]),
+            causes=tuple(_cause(c) for c in data["causes"]),
+            ruled_out=tuple(_ruled_out(r) for r in data["ruled_out"]),
+            parameters=parameters,
+            extra={key: value for key, value in data.items() if key not in known},
+            _data=data,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object, schema ``armgap.diagnosis/1``."""
+        return self._data
+
+    def to_json(self, indent: int | None = None) -> str:
+        """Return the diagnosis as JSON, schema ``armgap.diagnosis/1``."""
+        return json.dumps(self._data, indent=indent, allow_nan=False)
+
+
+def _place(data: dict[str, Any]) -> Place:
+    spread = data.get("range") or {}
+    return Place(
+        data["joint"], data["share"], data["regime"], data["detail"],
+        spread.get("variable"), spread.get("from"), spread.get("to"),
+    )  # fmt: skip
+
+
+def _cause(data: dict[str, Any]) -> Cause:
+    return Cause(
+        data["effect"],
+        data.get("title", data["effect"].replace("_", " ")),
+        data["joint"],
+        data["probability"],
+        {name: Value(**value) for name, value in data["parameters"].items()},
+        data["closed"],
+        tuple(Equivalent(**e) for e in data["equivalents"]),
+    )
+
+
+def _ruled_out(data: dict[str, Any]) -> RuledOut:
+    bound = data.get("bound")
+    return RuledOut(
+        data["effect"], data["joint"], data["status"], Bound(**bound) if bound else None, data.get("why")
+    )
+
+
+def diagnose(
+    logs: LogLike | Sequence[LogLike],
+    arm: Arm | str | os.PathLike[str],
+    *,
+    holdout: LogLike | Sequence[LogLike] | None = None,
+    horizon: float = 0.25,
+    max_causes: int = 4,
+    seed: int = 1,
+) -> Diagnosis:
+    """Diagnose the gap between an arm's nominal model and its logs.
+
+    Candidate effects are fitted together with the arm's parameters by output error over short windows of the training logs, and judged
+    on windows of the holdout logs, whose motion should be another.
+
+    Parameters
+    ----------
+    logs : Log, path, or sequence of these
+        Training logs.
+    arm : Arm or path
+        Nominal model.
+    holdout : Log, path, or sequence of these, optional
+        Logs to judge on. Without it the last 40 % of every training log are held out.
+    horizon : float, default 0.25
+        Prediction horizon [s].
+    max_causes : int, default 4
+        Causes named at most.
+    seed : int, default 1
+        Seed of the resampling behind probabilities and intervals.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    ArmgapError
+        A leaf of it, if a log, the arm or an option cannot be used.
+    """
+    arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
+    if not (np.isfinite(horizon) and horizon > 0):
+        raise OptionError(f"the horizon is {horizon}", remedy="give a positive number of seconds")
+    training = _logs(logs, arm)
+    notes = []
+    if holdout is None:
+        training, held = _split(training)
+        notes.append(f"no holdout was given: the last {_HELD_OUT:.0%} of every log were held out")
+    else:
+        held = _logs(holdout, arm)
+    for log in (*training, *held):
+        if log.duration < horizon:
+            raise LogShapeError(
+                f"lasts {log.duration:.3g} s, less than the horizon of {horizon:g} s",
+                remedy="give a longer log or a shorter --horizon",
+                file=log.path or log.name,
+            )
+    options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed)}
+    try:
+        text = _native.diagnose(arm.to_native(), _columns(training), _columns(held), options)
+    except ValueError as error:
+        raise LogShapeError(str(error), remedy="see the log and the options") from None
+    data = json.loads(text)
+    data["arm"]["name"] = arm.name
+    data["notes"] = notes + data["notes"]
+    data["log_findings"] = [
+        {"log": log.name, "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings
+    ]
+    return Diagnosis.from_dict(data)
+
+
+def _logs(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:
+    several = [logs] if isinstance(logs, Log | str | os.PathLike) else list(logs)
+    if not several:
+        raise OptionError("no log was given", remedy="give at least one")
+    read = [log if isinstance(log, Log) else Log.read(Path(log), arm=arm) for log in several]
+    for log in read:
+        if log.n_joints != arm.n_joints:
+            raise LogShapeError(
+                f"has {log.n_joints} joints, the arm has {arm.n_joints}",
+                remedy="use the arm file that belongs to this log",
+                file=log.path or log.name,
+            )
+    return read
+
+
+def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
+    training, held = [], []
+    for log in logs:
+        cut = int(np.searchsorted(log.t, (1 - _HELD_OUT) * log.duration))
+        training.append(log.part(0, cut, f"{log.name} (first part)"))
+        held.append(log.part(cut, len(log), f"{log.name} (last part)"))
+    return training, held
+
+
+def _columns(logs: list[Log]) -> list[tuple[str, Any, Any, Any]]:
+    fix = np.ascontiguousarray
+    return [(log.name, fix(log.t), fix(log.q), fix(log.tau)) for log in logs]
