@@ -40,8 +40,8 @@ class Gap:
     horizon_s : float
         Prediction horizon [s].
     before, refit, after, floor : tuple of float
-        With the arm file as it is, with its parameters re-estimated, with the causes added, and what measurement noise alone leaves
-        [rad or m].
+        With the arm file as it is, with its parameters re-estimated, with the causes added, and what measurement noise
+        alone leaves [rad or m].
     closed : float
         Share of the gap above the floor that is closed, over all joints.
     closed_ci : tuple of float
@@ -124,8 +124,8 @@ class Diagnosis:
     Attributes
     ----------
     verdict : str
-        ``"none"``: the gap is within noise; ``"parameters"``: right structure, wrong values; ``"effect"``: causes named;
-        ``"unexplained"``: a gap that no effect in the library explains.
+        ``"none"``: the gap is within noise; ``"parameters"``: right structure, wrong values; ``"effect"``: causes
+        named; ``"unexplained"``: a gap that no effect in the library explains.
     gap : Gap
         How far.
     where : tuple of Place
@@ -210,9 +210,7 @@ def _cause(data: dict[str, Any]) -> Cause:
 
 def _ruled_out(data: dict[str, Any]) -> RuledOut:
     bound = data.get("bound")
-    return RuledOut(
-        data["effect"], data["joint"], data["status"], Bound(**bound) if bound else None, data.get("why")
-    )
+    return RuledOut(data["effect"], data["joint"], data["status"], Bound(**bound) if bound else None, data.get("why"))
 
 
 def diagnose(
@@ -226,8 +224,8 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose the gap between an arm's nominal model and its logs.
 
-    Candidate effects are fitted together with the arm's parameters by output error over short windows of the training logs, and judged
-    on windows of the holdout logs, whose motion should be another.
+    Candidate effects are fitted together with the arm's parameters by output error over short windows of the training
+    logs, and judged on windows of the holdout logs, whose motion should be another.
 
     Parameters
     ----------

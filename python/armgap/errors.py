@@ -1,7 +1,7 @@
 """Everything armgap can complain about: one tree, one line per complaint.
 
-Each error carries where it happened (`file`, `column`, `row`) and what to do about it (`remedy`); its text names all of them. Rows count
-data rows from 1; a row of ``None`` means the whole column or file.
+Each error carries where it happened (`file`, `column`, `row`) and what to do about it (`remedy`); its text names all of
+them. Rows count data rows from 1; a row of ``None`` means the whole column or file.
 """
 
 from __future__ import annotations
@@ -40,6 +40,9 @@ class ArmgapError(Exception):
         Data row, counted from 1.
     """
 
+    part = "column"
+    """What `column` is called in the text."""
+
     def __init__(
         self,
         problem: str,
@@ -55,7 +58,7 @@ class ArmgapError(Exception):
         self.column = column
         self.row = row
         place = [str(file)] if file is not None else []
-        place += [f"column `{column}`"] if column is not None else []
+        place += [f"{self.part} `{column}`"] if column is not None else []
         place += [f"row {row}"] if row is not None else []
         text = f"{', '.join(place)}: {problem}" if place else problem
         super().__init__(" ".join((f"{text}; {remedy}" if remedy else text).split()))
@@ -91,6 +94,8 @@ class LogShapeError(ArmgapError, ValueError):
 
 class ArmFileError(ArmgapError, ValueError):
     """An arm file is missing, not TOML, or describes no possible arm."""
+
+    part = "key"
 
 
 class OptionError(ArmgapError, ValueError):

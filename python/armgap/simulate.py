@@ -48,7 +48,8 @@ class Effect:
         match = re.fullmatch(r"([a-z_]+):([0-9]*):(.*)", text.strip())
         if match is None:
             raise OptionError(
-                f"`{text}` is not an effect", remedy="write NAME:JOINT:key=value,... such as stribeck:2:amplitude=0.5,velocity=0.2"
+                f"`{text}` is not an effect",
+                remedy="write NAME:JOINT:key=value,... such as stribeck:2:amplitude=0.5,velocity=0.2",
             )
         name, joint, pairs = match.groups()
         values = {}
@@ -108,8 +109,8 @@ def simulate(
 ) -> Log:
     """Simulate an arm under torques held from sample to sample.
 
-    Classical Runge-Kutta with the changes between sliding and sticking located inside the steps; the steps are halved until no
-    position changes by more than `tolerance`.
+    Classical Runge-Kutta with the changes between sliding and sticking located inside the steps; the steps are halved
+    until no position changes by more than `tolerance`.
 
     Parameters
     ----------

@@ -13,13 +13,14 @@ from armgap.errors import ArmgapError
 __all__ = ["main"]
 
 COMMANDS = {
-    "identify": "armgap.cli.identify",
-    "simulate": "armgap.cli.simulate",
-    "diagnose": "armgap.cli.diagnose",
-    "reproduce": "armgap.cli.reproduce",
-    "demo": "armgap.cli.demo",
+    "diagnose": ("armgap.cli.diagnose", "Where the gap lies, what causes it, how far it shrinks."),
+    "identify": ("armgap.cli.identify", "Estimate the arm's parameters from logs."),
+    "simulate": ("armgap.cli.simulate", "Simulate an arm, with effects on request."),
+    "demo": ("armgap.cli.demo", "Diagnose the sample log and open its sealed key."),
+    "reproduce": ("armgap.cli.reproduce", "The seed paper's tables and figures beside our own."),
+    "trial": ("armgap.cli.trial", "Blind trials: sealed cases, diagnosed and scored."),
 }
-"""Sub-commands and the module whose ``command`` each one is."""
+"""Sub-commands, the module whose ``command`` each one is, and one line about it."""
 
 UNUSABLE_INPUT = 2
 INTERRUPTED = 130
@@ -36,9 +37,14 @@ class LazyGroup(click.Group):
         """Return a sub-command by name."""
         if cmd_name not in COMMANDS:
             return None
-        command = import_module(COMMANDS[cmd_name]).command
+        command = import_module(COMMANDS[cmd_name][0]).command
         assert isinstance(command, click.Command)
         return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the sub-commands without loading them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

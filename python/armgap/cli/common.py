@@ -14,11 +14,31 @@ from rich.console import Console
 
 from armgap.errors import OptionError, ResultError
 
-__all__ = ["arm_option", "columns_option", "console", "json_option", "parse_columns", "quiet_option", "working", "write"]
+__all__ = [
+    "ManyValues",
+    "arm_option",
+    "check_outputs",
+    "columns_option",
+    "console",
+    "json_option",
+    "parse_columns",
+    "parse_units",
+    "quiet_option",
+    "units_option",
+    "working",
+    "write",
+]
 
 arm_option = click.option("--arm", "arm_file", required=True, metavar="ARM.toml", help="Arm file: the nominal model.")
 columns_option = click.option(
-    "--columns", metavar="q1=NAME,…", help="The log's own names of its columns, for example t=time,q1=shoulder_pos."
+    "--columns",
+    metavar="q1=NAME,…",
+    help="The log's own names of its columns, for example t=time,q1=shoulder_pos.",
+)
+units_option = click.option(
+    "--units",
+    metavar="t=ms,q=deg",
+    help="Units of the log where they are not SI; also settles what looks like another unit.",
 )
 json_option = click.option("--json", "json_file", metavar="OUT", help="Write the result as JSON; - is standard output.")
 quiet_option = click.option("--quiet", is_flag=True, help="No progress and no summary.")
@@ -29,17 +49,63 @@ def console(*, error: bool = False) -> Console:
     return Console(stderr=error, no_color=bool(os.environ.get("NO_COLOR")) or None)
 
 
+class ManyValues(click.Command):
+    """A command whose ``--holdout`` takes every value up to the next option."""
+
+    spread = ("--holdout",)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Repeat the option before each of its values, which is what click understands."""
+        written: list[str] = []
+        repeat: str | None = None
+        for index, word in enumerate(args):
+            if word == "--":
+                written += args[index:]
+                break
+            if word.startswith("-") and word != "-":
+                repeat = word if word in self.spread else None
+                written.append(word)
+            elif repeat is not None and written[-1] != repeat:
+                written += [repeat, word]
+            else:
+                written.append(word)
+        return super().parse_args(ctx, written)
+
+
 def parse_columns(text: str | None) -> dict[str, str]:
     """Read ``q1=name,q2=name``."""
+    return _pairs("--columns", text, "q1=NAME,tau1=NAME")
+
+
+def parse_units(text: str | None) -> dict[str, str]:
+    """Read ``t=ms,q=deg``."""
+    return _pairs("--units", text, "t=ms,q=deg")
+
+
+def _pairs(option: str, text: str | None, example: str) -> dict[str, str]:
     mapping: dict[str, str] = {}
     for pair in filter(None, (text or "").split(",")):
         key, sep, name = (part.strip() for part in pair.partition("="))
         if not sep or not key or not name:
-            raise OptionError(f"--columns: `{pair}` is not a pair", remedy="write --columns q1=NAME,tau1=NAME")
+            raise OptionError(f"{option}: `{pair}` is not a pair", remedy=f"write {option} {example}")
         if key in mapping:
-            raise OptionError(f"--columns: `{key}` is mapped twice", remedy="map each column once")
+            raise OptionError(f"{option}: `{key}` is given twice", remedy=f"write {option} {example}")
         mapping[key] = name
     return mapping
+
+
+def check_outputs(*paths: str | None) -> None:
+    """Raise before any work is done if a result could not be written where it is asked for."""
+    for path in filter(None, paths):
+        target = Path(path)
+        if path == "-":
+            continue
+        if target.is_dir():
+            raise ResultError("is a folder", remedy="name a file", file=path)
+        if not target.parent.is_dir():
+            raise ResultError("its folder does not exist", remedy="make the folder first", file=path)
+        if not os.access(target.parent, os.W_OK):
+            raise ResultError("its folder cannot be written to", remedy="choose another place", file=path)
 
 
 @contextmanager

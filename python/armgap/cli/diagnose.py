@@ -7,12 +7,16 @@ from pathlib import Path
 import click
 
 from armgap.cli.common import (
+    ManyValues,
     arm_option,
+    check_outputs,
     columns_option,
     console,
     json_option,
     parse_columns,
+    parse_units,
     quiet_option,
+    units_option,
     working,
     write,
 )
@@ -20,16 +24,17 @@ from armgap.cli.common import (
 __all__ = ["command"]
 
 
-@click.command("diagnose")
+@click.command("diagnose", cls=ManyValues)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG…")
 @arm_option
-@click.option("--holdout", multiple=True, metavar="LOG", help="Log to judge on; may be repeated.")
+@click.option("--holdout", multiple=True, metavar="LOG…", help="Logs to judge on; after the LOGs to learn from.")
 @click.option("--horizon", default=0.25, show_default=True, help="Prediction horizon [s].")
 @click.option("--max-causes", default=4, show_default=True, help="Causes named at most.")
 @click.option("--seed", default=1, show_default=True, help="Seed of the resampling.")
 @click.option("--report", "report_file", metavar="OUT.html", help="Write the report.")
 @json_option
 @columns_option
+@units_option
 @quiet_option
 def command(
     logs: tuple[str, ...],
@@ -41,6 +46,7 @@ def command(
     report_file: str | None,
     json_file: str | None,
     columns: str | None,
+    units: str | None,
     quiet: bool,
 ) -> None:
     """Say where the gap between LOGs and the nominal arm lies, what causes it, and how far it shrinks."""
@@ -48,10 +54,11 @@ def command(
     from armgap.diagnose import diagnose
     from armgap.log import Log
 
-    mapping = parse_columns(columns)
+    check_outputs(json_file, report_file)
+    naming = {"columns": parse_columns(columns), "units": parse_units(units)}
     arm = Arm.read(Path(arm_file))
-    training = [Log.read(path, columns=mapping, arm=arm) for path in logs]
-    held = [Log.read(path, columns=mapping, arm=arm) for path in holdout] or None
+    training = [Log.read(path, arm=arm, **naming) for path in logs]
+    held = [Log.read(path, arm=arm, **naming) for path in holdout] or None
     with working("diagnosing", quiet=quiet):
         result = diagnose(training, arm, holdout=held, horizon=horizon, max_causes=max_causes, seed=seed)
     if report_file is not None:

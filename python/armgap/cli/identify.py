@@ -6,7 +6,18 @@ from pathlib import Path
 
 import click
 
-from armgap.cli.common import arm_option, columns_option, console, json_option, parse_columns, quiet_option, write
+from armgap.cli.common import (
+    arm_option,
+    check_outputs,
+    columns_option,
+    console,
+    json_option,
+    parse_columns,
+    parse_units,
+    quiet_option,
+    units_option,
+    write,
+)
 
 __all__ = ["command"]
 
@@ -27,6 +38,7 @@ SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
 @click.option("--asymmetry", is_flag=True, help="Estimate a torque offset per joint (asymmetric Coulomb friction) too.")
 @json_option
 @columns_option
+@units_option
 @quiet_option
 def command(
     logs: tuple[str, ...],
@@ -38,6 +50,7 @@ def command(
     asymmetry: bool,
     json_file: str | None,
     columns: str | None,
+    units: str | None,
     quiet: bool,
 ) -> None:
     """Estimate the arm's parameters from LOGs by recursive least squares, with the seed paper's three schemes."""
@@ -49,9 +62,10 @@ def command(
     from armgap.identify import identify
     from armgap.log import Log
 
+    check_outputs(json_file)
     arm = Arm.read(Path(arm_file))
-    mapping = parse_columns(columns)
-    read = [Log.read(path, columns=mapping, arm=arm) for path in logs]
+    naming = {"columns": parse_columns(columns), "units": parse_units(units)}
+    read = [Log.read(path, arm=arm, **naming) for path in logs]
     schemes = SCHEMES if scheme == "all" else (scheme,)
     results = [
         identify(log, arm, scheme=s, filters=filters, cutoff=cutoff, velocity=velocity, asymmetry=asymmetry)

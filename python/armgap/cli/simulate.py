@@ -7,7 +7,16 @@ from pathlib import Path
 
 import click
 
-from armgap.cli.common import arm_option, columns_option, console, parse_columns, quiet_option
+from armgap.cli.common import (
+    arm_option,
+    check_outputs,
+    columns_option,
+    console,
+    parse_columns,
+    parse_units,
+    quiet_option,
+    units_option,
+)
 from armgap.errors import OptionError
 
 __all__ = ["command"]
@@ -18,12 +27,17 @@ __all__ = ["command"]
 @click.option("--torque", required=True, metavar="LOG|seed", help="Log whose times and torques to use, or `seed`.")
 @click.option("--duration", type=float, help="Duration [s]; 10 for the seed's torques, the whole log otherwise.")
 @click.option(
-    "--effect", "effect_texts", multiple=True, metavar="NAME:JOINT:key=value,…", help="Effect to add; may be repeated."
+    "--effect",
+    "effect_texts",
+    multiple=True,
+    metavar="NAME:JOINT:key=value,…",
+    help="Effect to add; may be repeated.",
 )
 @click.option("--noise", default=0.0, show_default=True, help="White noise on positions [rad or m].")
 @click.option("--seed", default=0, show_default=True, help="Seed of the noise.")
 @click.option("-o", "--output", required=True, metavar="OUT.parquet", help="Log to write.")
 @columns_option
+@units_option
 @quiet_option
 def command(
     arm_file: str,
@@ -34,6 +48,7 @@ def command(
     seed: int,
     output: str,
     columns: str | None,
+    units: str | None,
     quiet: bool,
 ) -> None:
     """Simulate the arm of an arm file, with effects on request, and write the log."""
@@ -43,6 +58,7 @@ def command(
     from armgap.log import Log
     from armgap.simulate import Effect, seed_torque, simulate
 
+    check_outputs(output)
     arm = Arm.read(Path(arm_file))
     effects = [Effect.parse(text) for text in effect_texts]
     if duration is not None and not (math.isfinite(duration) and duration > 0):
@@ -53,7 +69,7 @@ def command(
         t = np.arange(round((duration or 10.0) / arm.sample_period)) * arm.sample_period
         tau, start, name = seed_torque(t), None, "seed"
     else:
-        source = Log.read(torque, columns=parse_columns(columns), arm=arm)
+        source = Log.read(torque, columns=parse_columns(columns), units=parse_units(units), arm=arm)
         keep = source.t <= (duration if duration is not None else source.duration)
         t, tau, start, name = source.t[keep], source.tau[keep], source.q[0], source.name
     log = simulate(arm, t, tau, q0=start, effects=effects, noise=noise, seed=seed, name=name)

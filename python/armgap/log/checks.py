@@ -7,102 +7,57 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armgap.errors import LogShapeError, TimeError, UnitError
+from armgap.errors import LogShapeError, TimeError
 from armgap.log.columns import Arrays, Names
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["run"]
+__all__ = ["motion", "notice", "order"]
 
 _FEWEST_SAMPLES = 20
-# An arm's joint does not turn further than this in a log [rad]; forty full turns.
-_FARTHEST_RAD = 250.0
-# Degrees read as radians make a joint this much faster than any arm [rad/s].
-_FASTEST_RAD_S = 150.0
-# A sample period off by more than this factor from the arm file's is another unit of time.
-_PERIOD_FACTOR = 30.0
-_LONGEST_PERIOD_S = 0.2
-_SHORTEST_PERIOD_S = 2e-5
 # A hole longer than this many periods is a gap worth naming.
 _GAP_PERIODS = 3.0
+# A sample period further than this from the arm file's is worth naming.
+_PERIOD_MARGIN = 0.1
+# Sample times further than this part of a period from an even grid are worth naming.
+_JITTER = 0.02
 
 
-def run(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> list[tuple[str, str]]:
-    """Raise on what cannot be used; return ``(kind, message)`` of what should be known."""
-    _length(arrays, place)
-    _order(arrays, place, names)
-    _time_unit(arrays, place, names, arm)
-    _position_unit(arrays, place, names, arm)
-    _motion(arrays, place, names)
-    return [*_sampling(arrays), *_constants(arrays, names), *_limits(arrays, names, arm)]
-
-
-def _length(arrays: Arrays, place: Path | str) -> None:
+def order(arrays: Arrays, place: Path | str, names: Names) -> None:
+    """Raise unless there are enough samples and their times increase."""
     if len(arrays.t) < _FEWEST_SAMPLES:
         raise LogShapeError(
             f"holds {len(arrays.t)} samples, at least {_FEWEST_SAMPLES} are needed",
             remedy="give a longer log",
             file=place,
+            column=names.t,
+            row=len(arrays.t),
         )
-
-
-def _order(arrays: Arrays, place: Path | str, names: Names) -> None:
     steps = np.diff(arrays.t)
     bad = np.flatnonzero(steps <= 0)
     if len(bad):
-        row = int(bad[0]) + 1
-        what = "repeats the time before it" if steps[bad[0]] == 0 else "goes back in time"
-        many = f" ({len(bad)} rows do)" if len(bad) > 1 else ""
+        row = int(bad[0]) + 2
+        before, after = arrays.t[row - 2], arrays.t[row - 1]
+        what = f"repeats the time {after:.10g}" if after == before else f"goes back from {before:.10g} to {after:.10g}"
+        many = f" ({len(bad)} rows do so)" if len(bad) > 1 else ""
         raise TimeError(
-            f"{what}{many}", remedy="sort the log by time and drop repeats", file=place, column=names.t, row=row + 1
+            f"{what}{many}",
+            remedy="sort the log by time and drop repeats",
+            file=place,
+            column=names.t,
+            row=row,
         )
 
 
-def _time_unit(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
-    period = float(np.median(np.diff(arrays.t)))
-    expected = arm.sample_period if arm is not None else None
-    low, high = _SHORTEST_PERIOD_S, _LONGEST_PERIOD_S
-    if expected is not None:
-        low, high = expected / _PERIOD_FACTOR, expected * _PERIOD_FACTOR
-    if low <= period <= high:
-        return
-    against = f"the arm file says {expected:g} s" if expected is not None else "no arm is sampled so"
-    unit = next((u for u, f in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)) if low <= period * f <= high), None)
-    guess = f"it looks like {unit}; convert it to s" if unit else "give times in s"
-    raise UnitError(
-        f"the median sample period is {period:g} s, {against}", remedy=guess, file=place, column=names.t
-    )
-
-
-def _position_unit(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
-    if arm is not None and not arm.rotary:
-        return
-    steps = np.diff(arrays.t)
-    for j, name in enumerate(names.q):
-        q = arrays.q[:, j]
-        speed = float(np.quantile(np.abs(np.diff(q) / steps), 0.99))
-        travel = float(np.ptp(q))
-        far = travel > _FARTHEST_RAD or speed > _FASTEST_RAD_S
-        declared = arrays.dq is not None and _ratio(arrays, j) > 20.0
-        if far or declared:
-            why = f"moves over {travel:.4g} rad at up to {speed:.4g} rad/s"
-            why += ", many times its own velocity column" if declared else ""
-            raise UnitError(why, remedy="it looks like degrees; convert it to rad", file=place, column=name)
-
-
-def _ratio(arrays: Arrays, j: int) -> float:
-    """How many times faster positions move than the velocity column says."""
-    assert arrays.dq is not None
-    moved = float(np.mean(np.abs(np.diff(arrays.q[:, j]))))
-    said = float(np.mean(np.abs(arrays.dq[:-1, j]) * np.diff(arrays.t)))
-    return moved / said if said > 0 else 0.0
-
-
-def _motion(arrays: Arrays, place: Path | str, names: Names) -> None:
+def motion(arrays: Arrays, place: Path | str, names: Names) -> None:
+    """Raise unless some joint moves and some torque acts."""
     if np.all(np.ptp(arrays.q, axis=0) == 0):
         raise LogShapeError(
-            "no joint moves", remedy="a log without motion says nothing about the arm", file=place, column=names.q[0]
+            "no joint moves",
+            remedy="a log without motion says nothing about the arm",
+            file=place,
+            column=names.q[0],
         )
     if np.all(arrays.tau == 0):
         raise LogShapeError(
@@ -113,21 +68,40 @@ def _motion(arrays: Arrays, place: Path | str, names: Names) -> None:
         )
 
 
-def _sampling(arrays: Arrays) -> list[tuple[str, str]]:
+def notice(arrays: Arrays, names: Names, arm: Arm | None) -> list[tuple[str, str]]:
+    """Return ``(kind, message)`` of what a reader should know although it does not stop the work."""
+    return [*_sampling(arrays, arm), *_constants(arrays, names), *_limits(arrays, names, arm)]
+
+
+def _sampling(arrays: Arrays, arm: Arm | None) -> list[tuple[str, str]]:
     steps = np.diff(arrays.t)
     period = float(np.median(steps))
     found = []
-    jitter = float(np.quantile(np.abs(steps - period), 0.95))
-    if jitter > 0.02 * period:
-        found.append(("sampling", f"uneven sampling: median {period * 1e3:.3g} ms, 95 % within {jitter * 1e3:.2g} ms"))
+    jitter = float(np.max(np.abs(steps - period)))
+    off = int(np.sum(np.abs(steps - period) > _JITTER * period))
+    if off:
+        found.append(
+            (
+                "sampling",
+                f"uneven sampling: median {period * 1e3:.4g} ms, {off} of {len(steps)} periods differ by more than "
+                f"{_JITTER:.0%}, at most by {jitter * 1e3:.3g} ms",
+            )
+        )
+    if arm is not None and abs(period / arm.sample_period - 1) > _PERIOD_MARGIN:
+        found.append(
+            (
+                "period",
+                f"sampled every {period * 1e3:.4g} ms, the arm file says {arm.sample_period * 1e3:.4g} ms",
+            )
+        )
     gaps = np.flatnonzero(steps > _GAP_PERIODS * period)
     if len(gaps):
         widest = int(np.argmax(steps))
         found.append(
             (
                 "gap",
-                f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} of more than {_GAP_PERIODS:g} sample periods, "
-                f"the widest {steps[widest] * 1e3:.3g} ms after row {widest + 1}; the torque is taken to be held",
+                f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} of more than {_GAP_PERIODS:g} sample periods, the "
+                f"widest {steps[widest] * 1e3:.3g} ms after row {widest + 1}; the torque is taken to be held there",
             )
         )
     return found

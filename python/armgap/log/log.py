@@ -12,7 +12,7 @@ import polars as pl
 from numpy.typing import ArrayLike, NDArray
 
 from armgap.errors import OptionError, ResultError
-from armgap.log import checks, columns, read
+from armgap.log import checks, columns, read, units
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
@@ -27,7 +27,7 @@ class Finding:
     Attributes
     ----------
     kind : str
-        ``"sampling"``, ``"gap"``, ``"constant"``, ``"limit"`` or ``"columns"``.
+        ``"sampling"``, ``"period"``, ``"gap"``, ``"constant"``, ``"limit"`` or ``"columns"``.
     message : str
         In words.
     """
@@ -68,18 +68,27 @@ class Log:
 
     @classmethod
     def read(
-        cls, path: str | Path, *, columns: Mapping[str, str] | None = None, arm: Arm | None = None
+        cls,
+        path: str | Path,
+        *,
+        columns: Mapping[str, str] | None = None,
+        arm: Arm | None = None,
+        units: Mapping[str, str] | None = None,
     ) -> Log:
         """Read a log from Parquet or CSV and check it.
 
         Parameters
         ----------
         path : path-like
-            File; ``-`` reads CSV from standard input.
+            File; ``-`` reads standard input.
         columns : mapping, optional
-            The file's own names of columns: ``{"q1": "shoulder_position"}``. Adds to the arm file's mapping and wins over it.
+            The file's own names of columns: ``{"q1": "shoulder_position"}``. Adds to the arm file's mapping and wins
+            over it.
         arm : Arm, optional
             Arm the log belongs to; its joints, sample period and limits are checked too.
+        units : mapping, optional
+            Units of the file where they are not SI: ``{"t": "ms", "q": "deg"}``, see `armgap.log.units.FACTORS`. A
+            group of columns whose unit is declared is not checked for its magnitude.
 
         Raises
         ------
@@ -87,7 +96,7 @@ class Log:
             Each names the file, column and row, and what to do.
         """
         frame, name, source = read.table(path)
-        return cls._build(frame, name, source, columns, arm)
+        return cls._build(frame, name, source, columns, arm, units)
 
     @classmethod
     def from_frame(
@@ -97,10 +106,11 @@ class Log:
         name: str = "log",
         columns: Mapping[str, str] | None = None,
         arm: Arm | None = None,
+        units: Mapping[str, str] | None = None,
     ) -> Log:
         """Take a log from a data frame (polars, or anything polars can convert, such as pandas or pyarrow)."""
         table = frame if isinstance(frame, pl.DataFrame) else pl.DataFrame(frame)
-        return cls._build(table, name, None, columns, arm)
+        return cls._build(table, name, None, columns, arm, units)
 
     @classmethod
     def from_arrays(
@@ -113,7 +123,24 @@ class Log:
         name: str = "log",
         arm: Arm | None = None,
     ) -> Log:
-        """Take a log from arrays; `q`, `tau` and `dq` have shape (n_samples, n_joints), or (n_samples,) for one joint."""
+        """Take a log from arrays.
+
+        Parameters
+        ----------
+        t : array_like, shape (n_samples,)
+            Sample times [s].
+        q, tau, dq : array_like, shape (n_samples, n_joints), or (n_samples,) for one joint
+            Positions [rad or m], torques [N m or N], velocities [rad/s or m/s].
+        name : str
+            Name of the log in results and errors.
+        arm : Arm, optional
+            Arm the log belongs to.
+
+        Raises
+        ------
+        OptionError
+            If the shapes do not fit; otherwise as `read`.
+        """
         data: dict[str, NDArray[np.float64]] = {"t": np.asarray(t, dtype=np.float64)}
         for prefix, values in (("q", q), ("tau", tau), ("dq", dq)):
             if values is None:
@@ -126,7 +153,7 @@ class Log:
                     remedy="give one row per sample and one column per joint",
                 )
             data |= {f"{prefix}{j + 1}": array[:, j] for j in range(array.shape[1])}
-        return cls._build(pl.DataFrame(data), name, None, None, arm)
+        return cls._build(pl.DataFrame(data), name, None, None, arm, None)
 
     @classmethod
     def _build(
@@ -136,14 +163,31 @@ class Log:
         source: Path | None,
         mapping: Mapping[str, str] | None,
         arm: Arm | None,
+        declared: Mapping[str, str] | None,
     ) -> Log:
         place = source if source is not None else name
         names = columns.resolve(frame, place, mapping or {}, arm)
         arrays = columns.extract(frame, place, names)
-        noticed = checks.run(arrays, place, names, arm)
+        checks.order(arrays, place, names)
+        arrays = units.convert(arrays, declared or {}, arm)
+        checks.motion(arrays, place, names)
+        units.check(arrays, place, names, arm, declared or {})
+        noticed = checks.notice(arrays, names, arm)
+        unused = columns.unused_velocities(frame, names)
+        if unused:
+            noticed.append(("columns", f"`{'`, `'.join(unused)}` not used: velocities of other joints are missing"))
         findings = tuple(Finding(kind, message) for kind, message in noticed)
         t = arrays.t - arrays.t[0]
         return cls(name, t, arrays.q, arrays.tau, arrays.dq, findings, source)
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only views."""
+        for name in ("t", "q", "tau", "dq"):
+            values = getattr(self, name)
+            if values is not None:
+                view = values.view()
+                view.flags.writeable = False
+                object.__setattr__(self, name, view)
 
     @property
     def n_joints(self) -> int:

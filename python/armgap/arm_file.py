@@ -1,0 +1,227 @@
+"""Reading and checking of arm files: every complaint names the file and the key."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap import _native
+from armgap.arm import kinds
+from armgap.errors import ArmFileError
+
+__all__ = ["ArmFile"]
+
+_TABLES: dict[str, tuple[str, ...]] = {
+    "inertial": ("theta", "sigma"),
+    "links": ("mass", "length", "com", "inertia", "sigma"),
+    "friction": ("viscous", "coulomb", "sigma_viscous", "sigma_coulomb"),
+    "encoder": ("counts_per_rev",),
+    "actuator": ("torque_limit",),
+    "geometry": ("link_length",),
+    "columns": (),
+    "sealed": ("sha256",),
+}
+_SCALARS = ("name", "kind", "gravity", "sample_period")
+_INERTIAL_SIGMA = 0.1
+_FRICTION_SIGMA = 0.5
+_STRONGEST_GRAVITY = 30.0  # m/s^2
+# Sample periods beyond these [s] are in another unit.
+_SHORTEST_PERIOD_S = 1e-5
+_LONGEST_PERIOD_S = 0.5
+
+
+class ArmFile:
+    """One arm file being checked."""
+
+    def __init__(self, path: Path, data: dict[str, Any]) -> None:
+        self.path = path
+        self.data = data
+
+    @classmethod
+    def load(cls, path: Path) -> ArmFile:
+        """Read the file's TOML."""
+        try:
+            text = path.read_text(encoding="utf-8")
+        except OSError as error:
+            raise ArmFileError(
+                f"cannot be read ({error.strerror or error})", remedy="give the path of an arm file", file=path
+            ) from None
+        except UnicodeDecodeError:
+            raise ArmFileError("is not text", remedy="an arm file is TOML in UTF-8", file=path) from None
+        try:
+            data = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise ArmFileError(f"is not valid TOML: {error}", remedy="correct that line", file=path) from None
+        return cls(path, data)
+
+    def _error(self, key: str, problem: str, remedy: str) -> ArmFileError:
+        return ArmFileError(problem, remedy=remedy, file=self.path, column=key)
+
+    def fields(self) -> dict[str, Any]:
+        """Return the fields of an `Arm`, all of them checked."""
+        self._check_keys()
+        kind = self._kind()
+        info = kinds()[kind]
+        n, b = int(info["n_joints"]), int(info["n_inertial"])
+        gravity = self._number("gravity", default=9.81, lowest=0.0, highest=_STRONGEST_GRAVITY)
+        period = self._number("sample_period", lowest=_SHORTEST_PERIOD_S, highest=_LONGEST_PERIOD_S)
+        inertial, inertial_sigma = self._inertial(kind, gravity, n, b)
+        friction = self._table("friction")
+        viscous = self._vector(friction, "friction.viscous", n, minimum=0.0)
+        coulomb = self._vector(friction, "friction.coulomb", n, minimum=0.0)
+        sigma_viscous = self._sigma(friction, "friction.sigma_viscous", viscous, _FRICTION_SIGMA)
+        sigma_coulomb = self._sigma(friction, "friction.sigma_coulomb", coulomb, _FRICTION_SIGMA)
+        columns = self._columns(n)
+        self._check_inertia(kind, inertial)
+        return dict(
+            name=self._text("name", default=self.path.stem),
+            kind=kind,
+            gravity=gravity,
+            sample_period=period,
+            theta=np.concatenate([inertial, viscous, coulomb]),
+            sigma=np.concatenate([inertial_sigma, sigma_viscous, sigma_coulomb]),
+            counts_per_rev=self._optional("encoder.counts_per_rev", n),
+            torque_limit=self._optional("actuator.torque_limit", n),
+            link_length=self._lengths(n),
+            columns=columns,
+            sealed=self._sealed(),
+            path=self.path,
+        )
+
+    def _check_keys(self) -> None:
+        known = [*_SCALARS, *_TABLES]
+        for key, value in self.data.items():
+            if key not in known:
+                raise self._error(key, "is not a key of an arm file", _suggest(key, known))
+            if key in _TABLES and not isinstance(value, dict):
+                raise self._error(key, "must be a table", f"write [{key}]")
+            for inner in value if _TABLES.get(key) else ():
+                if inner not in _TABLES[key]:
+                    name = f"{key}.{inner}"
+                    raise self._error(name, f"is not a key of [{key}]", _suggest(inner, _TABLES[key]))
+
+    def _kind(self) -> str:
+        kind = self._text("kind")
+        if kind not in kinds():
+            raise self._error("kind", f"`{kind}` is not a kind of arm", _suggest(kind, list(kinds())))
+        return kind
+
+    def _text(self, key: str, default: str | None = None) -> str:
+        value = self.data.get(key, default)
+        if not isinstance(value, str):
+            problem = "is missing" if value is None else "must be a string"
+            raise self._error(key, problem, f'write {key} = "..."')
+        return value
+
+    def _number(self, key: str, *, lowest: float, highest: float, default: float | None = None) -> float:
+        value = self.data.get(key, default)
+        if value is None:
+            raise self._error(key, "is missing", f"write {key} = a number in SI units")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise self._error(key, f"must be a finite number, not {value!r}", "give it in SI units")
+        if not lowest <= value <= highest:
+            raise self._error(key, f"is {value}, outside {lowest:g} to {highest:g}", "give it in SI units")
+        return float(value)
+
+    def _table(self, name: str) -> dict[str, Any]:
+        if name not in self.data:
+            raise self._error(name, "is missing", f"add a [{name}] table")
+        table: dict[str, Any] = self.data[name]
+        return table
+
+    def _vector(
+        self, table: dict[str, Any], key: str, n: int, minimum: float | None = None, above: float | None = None
+    ) -> NDArray[np.float64]:
+        value = table.get(key.split(".")[1])
+        if value is None:
+            raise self._error(key, "is missing", f"give a list of {n} numbers")
+        if not isinstance(value, list) or len(value) != n:
+            found = f"{len(value)} values" if isinstance(value, list) else repr(value)
+            raise self._error(key, f"needs a list of {n} numbers, found {found}", "one entry per joint or parameter")
+        for i, x in enumerate(value):
+            if isinstance(x, bool) or not isinstance(x, int | float) or not math.isfinite(x):
+                raise self._error(key, f"entry {i + 1} is {x!r}, not a finite number", "correct it")
+            if minimum is not None and x < minimum:
+                raise self._error(key, f"entry {i + 1} is {x}, less than {minimum:g}", "correct its sign")
+            if above is not None and x <= above:
+                raise self._error(key, f"entry {i + 1} is {x}, it must be above {above:g}", "correct it")
+        return np.array(value, dtype=np.float64)
+
+    def _sigma(self, table: dict[str, Any], key: str, values: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+        if key.split(".")[1] in table:
+            return self._vector(table, key, len(values), above=0.0)
+        # A value of zero is trusted as far as the others are.
+        typical = float(np.max(np.abs(values))) if np.any(values) else 1.0
+        return share * np.where(values != 0, np.abs(values), 0.1 * typical)
+
+    def _inertial(self, kind: str, gravity: float, n: int, b: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        if ("inertial" in self.data) == ("links" in self.data):
+            problem = "stands beside [links]" if "inertial" in self.data else "is missing"
+            raise self._error("inertial", problem, "give exactly one of [inertial] and [links]")
+        if "inertial" in self.data:
+            table = self._table("inertial")
+            theta = self._vector(table, "inertial.theta", b)
+            return theta, self._sigma(table, "inertial.sigma", theta, _INERTIAL_SIGMA)
+        links = self._table("links")
+        mass = self._vector(links, "links.mass", n, above=0.0)
+        length = self._vector(links, "links.length", n, minimum=0.0)
+        com = self._vector(links, "links.com", n)
+        inertia = self._vector(links, "links.inertia", n, minimum=0.0)
+        lists = [x.tolist() for x in (mass, length, com, inertia)]
+        theta = _native.theta_from_links(kind, gravity, *lists)
+        return theta, self._sigma(links, "links.sigma", theta, _INERTIAL_SIGMA)
+
+    def _optional(self, key: str, n: int) -> NDArray[np.float64] | None:
+        table = self.data.get(key.split(".")[0], {})
+        return self._vector(table, key, n, above=0.0) if key.split(".")[1] in table else None
+
+    def _lengths(self, n: int) -> NDArray[np.float64] | None:
+        if "links" in self.data and "geometry" not in self.data:
+            return self._vector(self.data["links"], "links.length", n, minimum=0.0)
+        return self._optional("geometry.link_length", n)
+
+    def _columns(self, n: int) -> dict[str, str]:
+        known = ["t", *(f"{kind}{j}" for kind in ("q", "tau", "dq") for j in range(1, n + 1))]
+        mapping = self.data.get("columns", {})
+        for key, value in mapping.items():
+            if key not in known:
+                raise self._error(f"columns.{key}", "is not a column of a log", _suggest(key, known))
+            if not isinstance(value, str):
+                raise self._error(f"columns.{key}", "must be a string", "give the log's own name of the column")
+            if list(mapping.values()).count(value) > 1:
+                raise self._error(f"columns.{key}", f"`{value}` is mapped twice", "map each column once")
+        return dict(mapping)
+
+    def _sealed(self) -> str | None:
+        value = self.data.get("sealed", {}).get("sha256")
+        if value is not None and not (isinstance(value, str) and re.fullmatch(r"[0-9a-f]{64}", value)):
+            raise self._error("sealed.sha256", "is not a SHA-256 sum", "give 64 hexadecimal digits")
+        return value
+
+    def _check_inertia(self, kind: str, theta: NDArray[np.float64]) -> None:
+        key = "inertial.theta" if "inertial" in self.data else "links"
+        if theta[0] <= 0:
+            raise self._error(key, f"theta1 is {theta[0]:g}; an inertia must be positive", "correct it")
+        if kind == "two-link":
+            # The determinant of M(q) is a parabola in cos q2 that opens downwards: positive at both ends is enough.
+            for c in (-1.0, 1.0):
+                m11, m12, m22 = theta[0] + 2 * theta[1] * c, theta[2] + theta[1] * c, theta[2]
+                if m22 <= 0 or m11 * m22 - m12 * m12 <= 0:
+                    raise self._error(
+                        key,
+                        "gives an inertia matrix that is not positive definite",
+                        "check the order of theta and its units (kg m^2, N m)",
+                    )
+
+
+def _suggest(word: str, known: list[str] | tuple[str, ...]) -> str:
+    close = difflib.get_close_matches(word, known, n=1)
+    listed = ", ".join(known)
+    return f"did you mean `{close[0]}`? (known: {listed})" if close else f"known: {listed}"
