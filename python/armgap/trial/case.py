@@ -1,0 +1,247 @@
+"""One case: an arm, its motions, what is hidden in it, and the files it comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armgap.trial.arms import TrialArm, random_arm
+from armgap.trial.armfile import arm_toml, draw_nominal
+from armgap.trial.effects import REGISTRY, Draw, usage
+from armgap.trial.excitation import STYLES, Excitation, acceptable, draw_excitation
+from armgap.trial.key import KEY_FILE, Hidden, Key
+from armgap.trial.plant import Build
+from armgap.trial.rig import Rig, Trace, run
+from armgap.trial.visibility import visibility
+
+#: Motions drawn before a case is given up.
+ATTEMPTS = 30
+#: An effect below this many encoder steps (RMS over windows) is made larger.
+VISIBLE_STEPS = 3.0
+GROWTHS = 8
+
+Wish = tuple[str, int | None]
+
+
+class NoMotionError(RuntimeError):
+    """No acceptable motion was found for an arm; another seed will do."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A finished case.
+
+    Attributes
+    ----------
+    name : str
+        For people.
+    arm_file : str
+        Text of ``arm.toml``.
+    logs : dict of str to Trace
+        ``train-1``, ``holdout-1``, ...
+    key : Key
+        What is hidden.
+    """
+
+    name: str
+    arm_file: str
+    logs: dict[str, Trace]
+    key: Key
+
+    def write(self, folder: str | Path) -> Path:
+        """Write ``arm.toml``, one Parquet file per log, and ``key.json``."""
+        target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        (target / "arm.toml").write_text(self.arm_file, encoding="utf-8")
+        (target / KEY_FILE).write_bytes(self.key.to_json().encode())
+        for name, trace in self.logs.items():
+            _frame(trace).write_parquet(target / f"{name}.parquet", compression="zstd")
+        return target
+
+
+def make_case(
+    seed: int | Sequence[int],
+    effects: Sequence[Wish] = (),
+    *,
+    model: str = "direct-drive",
+    size: float | None = None,
+    nominal: str = "off",
+    style: str | None = None,
+    sample_period: float | None = None,
+    duration: float = 10.0,
+    n_train: int = 1,
+    n_holdout: int = 1,
+) -> Case:
+    """Make a case; the same arguments make the same case.
+
+    Parameters
+    ----------
+    seed : int or sequence of int
+        Everything random follows from it.
+    effects : sequence of (name, joint), default none
+        What to hide; joints from 1, None for an effect of the whole arm.
+    model : {"direct-drive", "geared", "pendulum", "axis"}
+        Machine around which the arm is drawn.
+    size : float, optional
+        From 0, just above detectable, to 1, large; drawn by default.
+    nominal : {"off", "exact"}
+        Whether the arm file's values are off by draws from their sigma.
+    style : {"multisine", "paper", "tracked"}, optional
+        Motion; drawn per log by default.
+    sample_period : float, optional
+        s; drawn from 1 to 5 ms by default.
+    duration : float, default 10
+        Length of each log, s.
+    n_train, n_holdout : int, default 1
+        Numbers of logs, each with its own motion.
+
+    Raises
+    ------
+    ValueError
+        An effect's name or joint is impossible for the arm.
+    NoMotionError
+        No acceptable motion was found.
+    """
+    rng = np.random.default_rng(seed)
+    arm = random_arm(rng, model, sample_period)
+    _check(arm, effects)
+    names = [f"train-{i + 1}" for i in range(n_train)] + [f"holdout-{i + 1}" for i in range(n_holdout)]
+    motions, plain = _draw_motions(rng, arm, names, style, duration)
+    hidden, logs, seen = _hide(rng, arm, effects, size, motions, plain, duration)
+    stated = draw_nominal(rng, arm, nominal == "exact")
+    details = {"seed": _plain(seed), "model": model, "kind": arm.kind, "motions": _styles(motions), **seen}
+    key = Key(hidden, nominal, arm.theta, details, rng.bytes(16).hex())
+    return Case(model, arm_toml(arm, stated, f"trial arm ({model})", key.sha256), logs, key)
+
+
+def build_rig(arm: TrialArm, hidden: Sequence[Hidden], log: str | None = None) -> Rig:
+    """Put hidden effects into a fresh rig, as they act in one log."""
+    rig = Rig(Build(arm))
+    for h in hidden:
+        if h.log in (None, log):
+            REGISTRY[h.effect].apply(rig, (h.joint or 1) - 1, h.parameters)
+    return rig
+
+
+def possible(kind: str, n_joints: int, families: Sequence[str] = ("library",)) -> list[Wish]:
+    """All effects and joints that make sense on a kind of arm."""
+    wishes: list[Wish] = []
+    for e in REGISTRY.values():
+        if e.family in families and kind in e.kinds:
+            wishes += [(e.name, j + 1) for j in range(n_joints)] if e.per_joint else [(e.name, None)]
+    return wishes
+
+
+def _check(arm: TrialArm, effects: Sequence[Wish]) -> None:
+    allowed = possible(arm.kind, arm.n_joints, ("library", "further", "outside"))
+    for wish in effects:
+        if tuple(wish) not in allowed:
+            raise ValueError(f"no effect {wish[0]!r} on joint {wish[1]} of a {arm.kind} arm")
+
+
+def _draw_motions(
+    rng: np.random.Generator, arm: TrialArm, names: list[str], style: str | None, duration: float
+) -> tuple[dict[str, tuple[str, Excitation]], dict[str, Trace]]:
+    motions, traces = {}, {}
+    for name in names:
+        motions[name], traces[name] = _draw_motion(rng, arm, style, duration)
+    return motions, traces
+
+
+def _draw_motion(
+    rng: np.random.Generator, arm: TrialArm, style: str | None, duration: float
+) -> tuple[tuple[str, Excitation], Trace]:
+    vigour = float(rng.uniform(0.8, 1.3))
+    for _ in range(ATTEMPTS):
+        chosen = style or str(rng.choice(STYLES, p=[0.4, 0.2, 0.4]))
+        motion = draw_excitation(rng, arm, chosen, vigour)
+        trace = run(Rig(Build(arm)), motion.source(arm), duration)
+        good, factor = acceptable(trace, arm)
+        if good:
+            return (chosen, motion), trace
+        vigour = min(max(vigour * factor, 0.1), 4.0)
+    raise NoMotionError(f"no motion found in {ATTEMPTS} attempts for a {arm.kind} arm; take another seed")
+
+
+def _hide(
+    rng: np.random.Generator,
+    arm: TrialArm,
+    effects: Sequence[Wish],
+    size: float | None,
+    motions: dict[str, tuple[str, Excitation]],
+    plain: dict[str, Trace],
+    duration: float,
+) -> tuple[tuple[Hidden, ...], dict[str, Trace], dict[str, Any]]:
+    """Draw the effects, run the logs with them, and enlarge effects that leave no trace."""
+    draws = rng.integers(0, 2**63, len(effects))
+    sizes = [float(rng.uniform()) if size is None else size for _ in effects]
+    for growth in range(GROWTHS):
+        grown = [s + 0.15 * growth for s in sizes]
+        hidden = _draw_hidden(draws, grown, arm, effects, list(plain.values()), list(plain))
+        if not hidden:
+            return (), _measure(arm, (), motions, duration), {"size": [], "visibility": {}}
+        logs = _measure(arm, hidden, motions, duration)
+        seen = visibility(arm, logs)
+        if _sane(logs) and max(v for steps in seen.values() for v in steps) > VISIBLE_STEPS:
+            break
+    return hidden, logs, {"size": [round(s, 3) for s in grown], "visibility": seen}
+
+
+def _draw_hidden(
+    draws: Any, sizes: list[float], arm: TrialArm, effects: Sequence[Wish], plain: list[Trace], names: list[str]
+) -> tuple[Hidden, ...]:
+    hidden: list[Hidden] = []
+    for number, size, (name, joint) in zip(draws, sizes, effects, strict=True):
+        rng, index = np.random.default_rng(int(number)), (joint or 1) - 1
+        d = Draw(rng, size, arm, index, usage(plain, index))
+        hidden += _events(d, joint) if name == "external_pulse" else [_one(d, name, joint)]
+    return tuple(hidden)
+
+
+def _one(d: Draw, name: str, joint: int | None, log: str | None = None) -> Hidden:
+    drawn = {key: float(f"{value:.6g}") for key, value in REGISTRY[name].draw(d).items()}
+    return Hidden(name, joint, drawn, log, REGISTRY[name].family)
+
+
+def _events(d: Draw, joint: int | None) -> list[Hidden]:
+    pulses = [_one(d, "external_pulse", joint, "train-1") for _ in range(int(d.rng.integers(1, 4)))]
+    pulses.sort(key=lambda p: p.parameters["time"])
+    apart = [pulses[0]]
+    for pulse in pulses[1:]:
+        if pulse.parameters["time"] - apart[-1].parameters["time"] > 0.5:
+            apart.append(pulse)
+    return apart
+
+
+def _measure(
+    arm: TrialArm, hidden: Sequence[Hidden], motions: dict[str, tuple[str, Excitation]], duration: float
+) -> dict[str, Trace]:
+    return {
+        name: run(build_rig(arm, hidden, name), motion.source(arm), duration) for name, (_, motion) in motions.items()
+    }
+
+
+def _sane(logs: dict[str, Trace]) -> bool:
+    return all(bool(np.all(np.isfinite(x.q)) and np.max(np.abs(x.q)) < 100.0) for x in logs.values())
+
+
+def _styles(motions: dict[str, tuple[str, Excitation]]) -> dict[str, str]:
+    return {name: style for name, (style, _) in motions.items()}
+
+
+def _plain(seed: int | Sequence[int]) -> int | list[int]:
+    return seed if isinstance(seed, int) else [int(s) for s in seed]
+
+
+def _frame(trace: Trace) -> Any:
+    import polars as pl  # noqa: PLC0415  (slow to load)
+
+    n = trace.q.shape[1]
+    columns = {"t": trace.t}
+    columns |= {f"q{j + 1}": trace.q[:, j] for j in range(n)}
+    columns |= {f"tau{j + 1}": trace.tau[:, j] for j in range(n)}
+    return pl.DataFrame(columns)

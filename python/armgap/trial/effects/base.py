@@ -1,0 +1,153 @@
+"""What a hidden effect is: how large to make it, and how to put it into the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from armgap.trial.arms import TrialArm
+from armgap.trial.rig import Rig, Trace
+
+Parameters = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Use:
+    """How one joint is used by a case's motions: the quantities sizes are stated against.
+
+    Attributes
+    ----------
+    torque, peak : float
+        RMS and largest command, N m.
+    speed : float
+        95th percentile of the speed, rad/s.
+    low, high : float
+        Positions reached in every log, rad.
+    duration : float
+        s.
+    """
+
+    torque: float
+    peak: float
+    speed: float
+    low: float
+    high: float
+    duration: float
+
+    @property
+    def travel(self) -> float:
+        """``high - low``."""
+        return self.high - self.low
+
+
+def usage(traces: list[Trace], joint: int) -> Use:
+    """Summarise how a joint (from 0) is used, over all logs of a case."""
+    tau = np.concatenate([x.tau[:, joint] for x in traces])
+    dq = np.concatenate([x.dq_true[:, joint] for x in traces])
+    return Use(
+        torque=float(np.sqrt(np.mean(tau**2))),
+        peak=min(float(np.max(np.abs(x.tau[:, joint]))) for x in traces),
+        speed=float(np.quantile(np.abs(dq), 0.95)),
+        low=max(float(np.min(x.q_true[:, joint])) for x in traces),
+        high=min(float(np.max(x.q_true[:, joint])) for x in traces),
+        duration=min(float(x.t[-1]) for x in traces),
+    )
+
+
+@dataclass(frozen=True)
+class Draw:
+    """Randomness and scales for one effect's parameters; ``size`` runs from 0 (barely) to 1 (large)."""
+
+    rng: np.random.Generator
+    size: float
+    arm: TrialArm
+    joint: int
+    use: Use
+
+    def between(self, low: float, high: float) -> float:
+        """Geometric interpolation by ``size``."""
+        return float(low * (high / low) ** self.size)
+
+    def uniform(self, low: float, high: float) -> float:
+        """Uniform draw."""
+        return float(self.rng.uniform(low, high))
+
+    def log_uniform(self, low: float, high: float) -> float:
+        """Log-uniform draw."""
+        return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
+
+    def sign(self) -> float:
+        """+1 or -1."""
+        return float(self.rng.choice([-1.0, 1.0]))
+
+    def high_side(self) -> float:
+        """+1 if the joint reaches further up than down from zero, else -1; a draw where both will do."""
+        up, down = self.use.high, -self.use.low
+        if min(up, down) > 0.5 * max(up, down):
+            return self.sign()
+        return 1.0 if up > down else -1.0
+
+    @property
+    def coulomb(self) -> float:
+        """Nominal Coulomb level."""
+        return self.arm.coulomb[self.joint]
+
+    @property
+    def inertia(self) -> float:
+        """Diagonal inertia at ``q = 0``."""
+        return self.arm.joint_inertia[self.joint]
+
+
+@dataclass(frozen=True)
+class TrialEffect:
+    """One effect of the generator.
+
+    Attributes
+    ----------
+    name : str
+        Standard name.
+    per_joint : bool
+        Whether it sits on one joint rather than the whole arm.
+    family : {"library", "further", "outside"}
+        One of the 24 standard effects; a known effect beyond them; one meant to be outside any library.
+    kinds : tuple of str
+        Kinds of arm on which it makes sense.
+    draw : callable
+        Parameters for a :class:`Draw`.
+    apply : callable
+        Puts it into a rig, on a joint (from 0), for the log it is given.
+    """
+
+    name: str
+    per_joint: bool
+    family: str
+    kinds: tuple[str, ...]
+    draw: Callable[[Draw], Parameters]
+    apply: Callable[[Rig, int, Parameters], None]
+
+
+ROTARY = ("pendulum", "two-link")
+ANY = ("axis", "pendulum", "two-link")
+TWO_LINK = ("two-link",)
+REGISTRY: dict[str, TrialEffect] = {}
+
+Apply = Callable[[Rig, int, Parameters], None]
+
+
+def effect(
+    name: str,
+    draw: Callable[[Draw], Parameters],
+    *,
+    per_joint: bool = True,
+    family: str = "library",
+    kinds: tuple[str, ...] = ANY,
+) -> Callable[[Apply], Apply]:
+    """Register the decorated function as what puts effect ``name`` into a rig."""
+
+    def register(apply: Apply) -> Apply:
+        REGISTRY[name] = TrialEffect(name, per_joint, family, kinds, draw, apply)
+        return apply
+
+    return register

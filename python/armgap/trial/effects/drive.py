@@ -1,0 +1,152 @@
+"""Effects of the drive: between the command and the joint."""
+
+from __future__ import annotations
+
+import math
+
+from armgap.trial.chain import DeadZone, Delay, Gain, Lag, MagneticHysteresis, Saturation, SlewLimit
+from armgap.trial.effects.base import Draw, Parameters, effect
+from armgap.trial.effects.friction import torque_law
+from armgap.trial.plant import TIME_STEP, Rotor
+from armgap.trial.rig import Rig
+
+SPAN = 2.0 * math.pi
+
+
+@effect("torque_offset", lambda d: {"offset": d.sign() * d.use.torque * d.between(0.01, 0.15)})
+def torque_offset(rig: Rig, joint: int, p: Parameters) -> None:
+    """A constant torque."""
+    torque_law(rig, joint, lambda x: p["offset"])
+
+
+def _draw_gain(d: Draw) -> Parameters:
+    return {"gain": 1.0 + d.sign() * d.between(0.1, 0.4)}
+
+
+@effect("torque_gain", _draw_gain)
+def torque_gain(rig: Rig, joint: int, p: Parameters) -> None:
+    """``gain`` times the command."""
+    rig.actuators[joint].add(Gain(p["gain"]))
+
+
+@effect("actuator_lag", lambda d: {"time_constant": d.between(0.001, 0.02)})
+def actuator_lag(rig: Rig, joint: int, p: Parameters) -> None:
+    """First-order lag of the torque."""
+    rig.actuators[joint].add(Lag(p["time_constant"]))
+
+
+def _draw_delay(d: Draw) -> Parameters:
+    parts = math.ceil(d.arm.sample_period / TIME_STEP - 1e-9)
+    dt = d.arm.sample_period / parts
+    return {"delay": dt * round(d.between(0.001, 0.02) / dt)}
+
+
+@effect("actuator_delay", _draw_delay)
+def actuator_delay(rig: Rig, joint: int, p: Parameters) -> None:
+    """Pure delay of the torque, a whole number of internal steps."""
+    rig.actuators[joint].add(Delay(p["delay"]))
+
+
+@effect("torque_saturation", lambda d: {"level": d.use.peak * (1.0 - d.between(0.06, 0.5))})
+def torque_saturation(rig: Rig, joint: int, p: Parameters) -> None:
+    """Torque clipped at ``level``, below the peaks of every log."""
+    rig.actuators[joint].add(Saturation(p["level"]))
+
+
+@effect("torque_dead_zone", lambda d: {"level": d.use.torque * d.between(0.02, 0.3)})
+def torque_dead_zone(rig: Rig, joint: int, p: Parameters) -> None:
+    """No torque below ``level``, the excess over it above."""
+    rig.actuators[joint].add(DeadZone(p["level"]))
+
+
+def _draw_ripple(d: Draw) -> Parameters:
+    cycles = d.log_uniform(2.0, 8.0)
+    n = cycles * SPAN / d.use.travel
+    return {
+        "amplitude": d.use.torque * d.between(0.02, 0.3),
+        "n": float(round(n)) if d.arm.kind != "axis" else n,
+        "phase": d.uniform(-math.pi, math.pi),
+    }
+
+
+@effect("torque_ripple", _draw_ripple)
+def torque_ripple(rig: Rig, joint: int, p: Parameters) -> None:
+    """Torque ``amplitude sin(n q + phase)``, cogging."""
+    torque_law(rig, joint, lambda x: p["amplitude"] * math.sin(p["n"] * x.q + p["phase"]))
+
+
+def _draw_elasticity(d: Draw) -> Parameters:
+    rotor = d.inertia * d.log_uniform(0.02, 0.1)
+    reduced = 1.0 / (1.0 / rotor + 1.0 / d.inertia)
+    omega = SPAN * d.between(40.0, 8.0)
+    return {
+        "stiffness": reduced * omega**2,
+        "damping": 2 * d.log_uniform(0.02, 0.2) * reduced * omega,
+        "rotor_inertia": rotor,
+    }
+
+
+@effect("joint_elasticity", _draw_elasticity)
+def joint_elasticity(rig: Rig, joint: int, p: Parameters) -> None:
+    """A rotor, additional to the nominal arm, that drives the joint through a spring and damper.
+
+    The encoder and the friction are on the joint's side of the spring.
+    """
+    rig.build.rotors[joint] = Rotor(p["rotor_inertia"], p["stiffness"], p["damping"])
+
+
+#: Share of the joint's inertia that sits before the play.
+BACKLASH_ROTOR = 0.12
+
+
+@effect("backlash", lambda d: {"gap": d.between(2e-3, 4e-2)}, kinds=("pendulum", "two-link"))
+def backlash(rig: Rig, joint: int, p: Parameters) -> None:
+    """Play of width ``gap`` between motor and joint, both ends together; the encoder is on the joint's side.
+
+    The motor's inertia is a share of the last link's, so that without play the arm is the nominal one.
+    """
+    inertia = BACKLASH_ROTOR * rig.build.arm.inertia[joint]
+    rig.build.rotors[joint] = Rotor(inertia, gap=p["gap"], part_of_link=True)
+
+
+@effect(
+    "slew_limit",
+    lambda d: {"rate": d.use.torque * 2.0 * d.between(30.0, 6.0)},
+    family="outside",
+)
+def slew_limit(rig: Rig, joint: int, p: Parameters) -> None:
+    """Torque that changes by no more than ``rate`` per second."""
+    rig.actuators[joint].add(SlewLimit(p["rate"]))
+
+
+@effect(
+    "motor_hysteresis",
+    lambda d: {"width": d.use.torque * d.between(0.1, 0.6), "share": d.uniform(0.4, 0.8)},
+    family="outside",
+)
+def motor_hysteresis(rig: Rig, joint: int, p: Parameters) -> None:
+    """Part of the torque follows the command through a play, as the flux in magnetically hard iron."""
+    rig.actuators[joint].add(MagneticHysteresis(p["width"], p["share"]))
+
+
+@effect(
+    "torque_constant_variation",
+    lambda d: {"amplitude": d.between(0.08, 0.5), "n": float(round(4 * SPAN / d.use.travel))},
+    family="outside",
+)
+def torque_constant_variation(rig: Rig, joint: int, p: Parameters) -> None:
+    """Torque constant that varies with the rotor's position: ``tau (1 + amplitude sin(n q))``."""
+    torque_law(rig, joint, lambda x: x.tau * p["amplitude"] * math.sin(p["n"] * x.q))
+
+
+@effect(
+    "speed_ripple",
+    lambda d: {
+        "amplitude": d.use.torque * d.between(0.06, 0.5) / d.use.speed,
+        "n": float(round(5 * SPAN / d.use.travel)),
+    },
+    family="outside",
+)
+def speed_ripple(rig: Rig, joint: int, p: Parameters) -> None:
+    """Torque ripple that grows with speed: ``amplitude dq sin(n q)``, from an uneven gear."""
+    torque_law(rig, joint, lambda x: p["amplitude"] * x.dq * math.sin(p["n"] * x.q))

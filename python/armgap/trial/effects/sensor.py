@@ -1,0 +1,26 @@
+"""Effects of the position sensor."""
+
+from __future__ import annotations
+
+import math
+
+from armgap.trial.effects.base import ROTARY, Draw, Parameters, effect
+from armgap.trial.rig import Rig
+
+
+@effect("encoder_offset", lambda d: {"offset": d.sign() * d.between(0.01, 0.15)}, kinds=ROTARY)
+def encoder_offset(rig: Rig, joint: int, p: Parameters) -> None:
+    """Measured ``q + offset``."""
+    rig.encoders[joint].offset += p["offset"]
+
+
+def _draw_eccentricity(d: Draw) -> Parameters:
+    size, angle = d.between(0.003, 0.05), d.uniform(-math.pi, math.pi)
+    return {"a": size * math.cos(angle), "b": size * math.sin(angle)}
+
+
+@effect("encoder_eccentricity", _draw_eccentricity, kinds=ROTARY)
+def encoder_eccentricity(rig: Rig, joint: int, p: Parameters) -> None:
+    """Measured ``q + a sin q + b cos q``."""
+    rig.encoders[joint].a += p["a"]
+    rig.encoders[joint].b += p["b"]

@@ -1,0 +1,135 @@
+"""Effects of the structure: masses, gravity, springs, stops, and what touches the arm."""
+
+from __future__ import annotations
+
+import math
+
+from armgap.trial.effects.base import ROTARY, TWO_LINK, Draw, Parameters, effect
+from armgap.trial.effects.friction import torque_law
+from armgap.trial.plant import Flexure, Point
+from armgap.trial.rig import Rig
+
+
+def _draw_payload(d: Draw) -> Parameters:
+    last = d.arm.n_joints - 1
+    distance = d.arm.length[last] * d.uniform(0.4, 1.0)
+    moment = d.arm.mass[last] * d.arm.com[last] * d.between(0.2, 1.5)
+    return {"mass": moment / distance, "distance": distance}
+
+
+@effect("payload", _draw_payload, per_joint=False, kinds=ROTARY)
+def payload(rig: Rig, joint: int, p: Parameters) -> None:
+    """A point mass on the last link."""
+    rig.build.payload = (p["mass"], p["distance"])
+
+
+@effect("base_tilt", lambda d: {"angle": d.sign() * d.between(0.01, 0.15)}, per_joint=False, kinds=ROTARY)
+def base_tilt(rig: Rig, joint: int, p: Parameters) -> None:
+    """Base turned in the plane of motion: gravity sees ``q1 + angle``."""
+    rig.build.tilt += p["angle"]
+
+
+def _draw_spring(d: Draw) -> Parameters:
+    k = d.use.torque * d.between(0.04, 0.6) / (0.5 * d.use.travel)
+    return {"k": k, "q0": d.uniform(d.use.low, d.use.high)}
+
+
+@effect("joint_spring", _draw_spring)
+def joint_spring(rig: Rig, joint: int, p: Parameters) -> None:
+    """``k (q - q0)``, MuJoCo's joint stiffness."""
+    rig.build.spring[joint] = (p["k"], p["q0"], 0.0)
+
+
+def _draw_armature(d: Draw) -> Parameters:
+    # What joint 1 adds lies inside theta1: it must stand out from the trust in theta1.
+    low = 0.2 if d.joint == 0 else 0.04
+    return {"inertia": d.inertia * d.between(low, 0.8)}
+
+
+@effect("rotor_inertia", _draw_armature)
+def rotor_inertia(rig: Rig, joint: int, p: Parameters) -> None:
+    """Inertia on the joint's own acceleration, MuJoCo's armature."""
+    rig.build.armature[joint] = p["inertia"]
+
+
+def _draw_contact(d: Draw) -> Parameters:
+    side = d.high_side()
+    reach = d.use.high if side > 0 else -d.use.low
+    overlap = max(reach, 0.0) * d.between(0.05, 0.35)
+    stiffness = d.log_uniform(1.0, 8.0) * d.use.torque / max(overlap, 1e-3)
+    damping = 2 * d.uniform(0.05, 0.4) * math.sqrt(stiffness * d.inertia)
+    return {"position": side * (reach - overlap), "stiffness": stiffness, "damping": damping}
+
+
+@effect("contact", _draw_contact)
+def contact(rig: Rig, joint: int, p: Parameters) -> None:
+    """Spring and damper beyond ``position``, on the side away from zero; it pushes and never pulls."""
+    side = math.copysign(1.0, p["position"])
+
+    def push(x: Point) -> float:
+        depth = side * (x.q - p["position"])
+        force = p["stiffness"] * depth + p["damping"] * side * x.dq
+        return -side * max(force, 0.0) if depth > 0 else 0.0
+
+    torque_law(rig, joint, push)
+
+
+def _draw_pulse(d: Draw) -> Parameters:
+    return {
+        "time": d.uniform(0.1, 0.9) * d.use.duration,
+        "duration": d.log_uniform(0.03, 0.3),
+        "impulse": d.sign() * d.inertia * d.use.speed * d.between(0.05, 0.6),
+    }
+
+
+@effect("external_pulse", _draw_pulse)
+def external_pulse(rig: Rig, joint: int, p: Parameters) -> None:
+    """A constant torque of the given impulse for ``duration`` around ``time``."""
+    half, torque = 0.5 * p["duration"], p["impulse"] / p["duration"]
+    torque_law(rig, joint, lambda x: torque if abs(x.t - p["time"]) < half else 0.0)
+
+
+def _draw_hardening(d: Draw) -> Parameters:
+    k, q0 = _draw_spring(d).values()
+    return {"k": 0.3 * k, "q0": q0, "cubic": k / (0.5 * d.use.travel) ** 2}
+
+
+@effect("hardening_spring", _draw_hardening, family="further")
+def hardening_spring(rig: Rig, joint: int, p: Parameters) -> None:
+    """``k (q - q0) + cubic (q - q0)^3``, MuJoCo's polynomial stiffness."""
+    rig.build.spring[joint] = (p["k"], p["q0"], p["cubic"])
+
+
+def _draw_coupling(d: Draw) -> Parameters:
+    gear = d.sign() * float(d.rng.choice([4.0, 6.0, 8.0]))
+    return {"inertia": d.inertia * d.between(0.05, 0.5) / gear**2, "gear": gear}
+
+
+@effect("rotor_coupling", _draw_coupling, family="further", kinds=TWO_LINK)
+def rotor_coupling(rig: Rig, joint: int, p: Parameters) -> None:
+    """Geared rotor of joint 2 on link 1: ``inertia (dq1 + gear dq2)^2 / 2``, MuJoCo's tendon armature."""
+    rig.build.coupling = (p["inertia"], p["gear"])
+
+
+@effect(
+    "cubic_drag",
+    lambda d: {"c3": (d.coulomb + d.arm.viscous[d.joint] * d.use.speed) * d.between(0.2, 1.5) / d.use.speed**3},
+    family="outside",
+)
+def cubic_drag(rig: Rig, joint: int, p: Parameters) -> None:
+    """``c3 dq^3``, MuJoCo's cubic damping."""
+    quadratic, cubic = rig.build.drag.get(joint, (0.0, 0.0))
+    rig.build.drag[joint] = (quadratic, cubic + p["c3"])
+
+
+def _draw_flexure(d: Draw) -> Parameters:
+    last = d.arm.n_joints - 1
+    moving = 0.2 * (d.arm.inertia[last] if d.arm.kind != "axis" else d.arm.mass[0])
+    omega = 2 * math.pi * d.between(20.0, 5.0)
+    return {"stiffness": moving * omega**2, "damping": 2 * 0.03 * moving * omega}
+
+
+@effect("link_flexibility", _draw_flexure, per_joint=False, family="outside")
+def link_flexibility(rig: Rig, joint: int, p: Parameters) -> None:
+    """Outer part of the last link on a spring and damper: one more mode."""
+    rig.build.flexure = Flexure(p["stiffness"], p["damping"])

@@ -1,0 +1,166 @@
+"""The sealed key of a case: what was hidden, and the hash that fixes it beforehand."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+KEY_FILE = "key.json"
+SCHEMA = "armgap.key/1"
+
+
+class SealError(ValueError):
+    """A key that cannot be trusted: missing, not the sealed one, or of an arm file without a seal.
+
+    Attributes
+    ----------
+    path : Path
+        The file at fault.
+    """
+
+    def __init__(self, path: Path, problem: str) -> None:
+        self.path = path
+        super().__init__(f"{path}: {problem}")
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """One hidden effect.
+
+    Attributes
+    ----------
+    effect : str
+        Standard name.
+    joint : int or None
+        From 1; None for the whole arm.
+    parameters : dict of str to float
+        SI.
+    log : str or None
+        The log it is in, for an event; None when it is in all of them.
+    family : str
+        ``"library"``, ``"further"`` or ``"outside"``.
+    """
+
+    effect: str
+    joint: int | None
+    parameters: dict[str, float]
+    log: str | None = None
+    family: str = "library"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {
+            "effect": self.effect,
+            "joint": self.joint,
+            "parameters": self.parameters,
+            "log": self.log,
+            "family": self.family,
+        }
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a case hides.
+
+    Attributes
+    ----------
+    effects : tuple of Hidden
+        Empty for a case without effects.
+    nominal : {"exact", "off"}
+        Whether the arm file's values are the true ones.
+    theta : tuple of float
+        The arm's true parameters: inertial, viscous, Coulomb.
+    details : dict
+        How the case was made: seed, arm, motions, and how far the effects move the arm.
+    nonce : str
+        Random; without it the hash of a short key could be searched for.
+    """
+
+    effects: tuple[Hidden, ...]
+    nominal: str
+    theta: tuple[float, ...]
+    details: dict[str, Any]
+    nonce: str
+
+    def to_json(self) -> str:
+        """Return the key as JSON, schema ``armgap.key/1``."""
+        data = {
+            "schema": SCHEMA,
+            "effects": [e.to_dict() for e in self.effects],
+            "nominal": self.nominal,
+            "theta": list(self.theta),
+            "details": self.details,
+            "nonce": self.nonce,
+        }
+        return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+    @property
+    def sha256(self) -> str:
+        """Hash of :meth:`to_json`, as the arm file states it."""
+        return hashlib.sha256(self.to_json().encode()).hexdigest()
+
+    @classmethod
+    def from_json(cls, text: str) -> Key:
+        """Read a key.
+
+        Raises
+        ------
+        ValueError
+            The text is not a key.
+        """
+        data = json.loads(text)
+        if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+            raise ValueError(f"not a key of schema {SCHEMA}")
+        return cls(
+            effects=tuple(Hidden(**e) for e in data["effects"]),
+            nominal=data["nominal"],
+            theta=tuple(data["theta"]),
+            details=data["details"],
+            nonce=data["nonce"],
+        )
+
+
+def open_key(case: str | Path) -> Key:
+    """Open the sealed key of a case folder, after checking its hash.
+
+    Parameters
+    ----------
+    case : path
+        Folder with ``arm.toml`` and ``key.json``.
+
+    Raises
+    ------
+    SealError
+        A file is missing, the arm file has no seal, or the key is not the one that was sealed.
+    """
+    folder = Path(case)
+    seal, content = _seal(folder / "arm.toml"), _content(folder / KEY_FILE)
+    found = hashlib.sha256(content).hexdigest()
+    if found != seal:
+        raise SealError(
+            folder / KEY_FILE,
+            f"not the key that was sealed: its sha256 is {found[:12]}…, arm.toml states {seal[:12]}…",
+        )
+    return Key.from_json(content.decode())
+
+
+def _seal(path: Path) -> str:
+    try:
+        arm = tomllib.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise SealError(path, f"cannot be read ({error})") from error
+    seal = arm.get("sealed", {}).get("sha256")
+    if not isinstance(seal, str):
+        raise SealError(path, "states no [sealed] sha256; only the generator's cases have a key")
+    return seal
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise SealError(path, f"cannot be read ({error.strerror})") from error
