@@ -9,12 +9,12 @@ from armgap._native import __version__
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
-    from armgap.diagnose import Diagnosis, diagnose
+    from armgap.diagnosis import Diagnosis, diagnose
     from armgap.errors import ArmgapError
-    from armgap.identify import Identification, identify
+    from armgap.identification import Identification, identify
     from armgap.log import Finding, Log
-    from armgap.reproduce import Reproduction, reproduce
-    from armgap.simulate import effects, seed_torque, simulate
+    from armgap.reproduction import Reproduction, reproduce
+    from armgap.simulation import effects, seed_torque, simulate
 
 __all__ = [
     "Arm",
@@ -36,17 +36,17 @@ __all__ = [
 _HOMES = {
     "Arm": "armgap.arm",
     "ArmgapError": "armgap.errors",
-    "Diagnosis": "armgap.diagnose",
-    "diagnose": "armgap.diagnose",
+    "Diagnosis": "armgap.diagnosis",
+    "diagnose": "armgap.diagnosis",
     "Finding": "armgap.log",
     "Log": "armgap.log",
-    "Identification": "armgap.identify",
-    "identify": "armgap.identify",
-    "Reproduction": "armgap.reproduce",
-    "reproduce": "armgap.reproduce",
-    "effects": "armgap.simulate",
-    "seed_torque": "armgap.simulate",
-    "simulate": "armgap.simulate",
+    "Identification": "armgap.identification",
+    "identify": "armgap.identification",
+    "Reproduction": "armgap.reproduction",
+    "reproduce": "armgap.reproduction",
+    "effects": "armgap.simulation",
+    "seed_torque": "armgap.simulation",
+    "simulate": "armgap.simulation",
 }
 
 

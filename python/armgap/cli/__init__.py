@@ -37,7 +37,11 @@ class LazyGroup(click.Group):
         """Return a sub-command by name."""
         if cmd_name not in COMMANDS:
             return None
-        command = import_module(COMMANDS[cmd_name][0]).command
+        try:
+            command = import_module(COMMANDS[cmd_name][0]).command
+        except ModuleNotFoundError as missing:
+            remedy = "install it with pip install 'armgap[trial]'"
+            raise click.UsageError(f"`{cmd_name}` needs {missing.name}, which is not installed; {remedy}") from None
         assert isinstance(command, click.Command)
         return command
 

@@ -51,7 +51,7 @@ def command(
 ) -> None:
     """Say where the gap between LOGs and the nominal arm lies, what causes it, and how far it shrinks."""
     from armgap.arm import Arm
-    from armgap.diagnose import diagnose
+    from armgap.diagnosis import diagnose
     from armgap.log import Log
 
     check_outputs(json_file, report_file)

@@ -59,7 +59,7 @@ def command(
     from rich.table import Table
 
     from armgap.arm import Arm
-    from armgap.identify import identify
+    from armgap.identification import identify
     from armgap.log import Log
 
     check_outputs(json_file)

@@ -1,5 +1,5 @@
 """``armgap reproduce``."""
 
-from armgap.reproduce import command
+from armgap.reproduction import command
 
 __all__ = ["command"]

@@ -56,7 +56,7 @@ def command(
 
     from armgap.arm import Arm
     from armgap.log import Log
-    from armgap.simulate import Effect, seed_torque, simulate
+    from armgap.simulation import Effect, seed_torque, simulate
 
     check_outputs(output)
     arm = Arm.read(Path(arm_file))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -117,6 +117,9 @@ class RuledOut:
     why: str | None
 
 
+_Record = TypeVar("_Record", Value, Equivalent, Bound)
+
+
 @dataclass(frozen=True)
 class Diagnosis:
     """The result of `diagnose`.
@@ -155,7 +158,7 @@ class Diagnosis:
         known = {"schema", "verdict", "gap", "where", "causes", "ruled_out", "parameters"}
         gap = data["gap"]
         parameters = {
-            stage: {name: Value(**value) for name, value in values.items()}
+            stage: {name: _take(Value, value) for name, value in values.items()}
             for stage, values in data["parameters"].items()
         }
         return cls(
@@ -188,6 +191,11 @@ class Diagnosis:
         return json.dumps(self._data, indent=indent, allow_nan=False)
 
 
+def _take(kind: type[_Record], data: dict[str, Any]) -> _Record:
+    """Build a record from the entries it knows."""
+    return kind(**{f.name: data[f.name] for f in fields(kind) if f.name in data})
+
+
 def _place(data: dict[str, Any]) -> Place:
     spread = data.get("range") or {}
     return Place(
@@ -202,15 +210,17 @@ def _cause(data: dict[str, Any]) -> Cause:
         data.get("title", data["effect"].replace("_", " ")),
         data["joint"],
         data["probability"],
-        {name: Value(**value) for name, value in data["parameters"].items()},
+        {name: _take(Value, value) for name, value in data["parameters"].items()},
         data["closed"],
-        tuple(Equivalent(**e) for e in data["equivalents"]),
+        tuple(_take(Equivalent, e) for e in data["equivalents"]),
     )
 
 
 def _ruled_out(data: dict[str, Any]) -> RuledOut:
     bound = data.get("bound")
-    return RuledOut(data["effect"], data["joint"], data["status"], Bound(**bound) if bound else None, data.get("why"))
+    return RuledOut(
+        data["effect"], data["joint"], data["status"], _take(Bound, bound) if bound else None, data.get("why")
+    )
 
 
 def diagnose(
@@ -254,6 +264,8 @@ def diagnose(
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
     if not (np.isfinite(horizon) and horizon > 0):
         raise OptionError(f"the horizon is {horizon}", remedy="give a positive number of seconds")
+    if max_causes < 0:
+        raise OptionError(f"the number of causes is {max_causes}", remedy="give 0 or more")
     training = _logs(logs, arm)
     notes = []
     if holdout is None:
@@ -261,6 +273,8 @@ def diagnose(
         notes.append(f"no holdout was given: the last {_HELD_OUT:.0%} of every log were held out")
     else:
         held = _logs(holdout, arm)
+        notes += _overlap(training, held)
+    training, held = _tell_apart(training, held)
     for log in (*training, *held):
         if log.duration < horizon:
             raise LogShapeError(
@@ -295,6 +309,30 @@ def _logs(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:
                 file=log.path or log.name,
             )
     return read
+
+
+def _overlap(training: list[Log], held: list[Log]) -> list[str]:
+    """Say which logs are both learnt from and judged on."""
+    seen = {log.path.resolve() for log in training if log.path is not None}
+    both = [log.name for log in held if log.path is not None and log.path.resolve() in seen]
+    return [f"{name} is learnt from and judged on too: its figures flatter" for name in both]
+
+
+def _tell_apart(training: list[Log], held: list[Log]) -> tuple[list[Log], list[Log]]:
+    """Give logs of the same name their folder's name, then a number."""
+    logs = [*training, *held]
+    for rename in (_with_folder, _with_number):
+        names = [log.name for log in logs]
+        logs = [rename(log, i) if names.count(log.name) > 1 else log for i, log in enumerate(logs, start=1)]
+    return logs[: len(training)], logs[len(training) :]
+
+
+def _with_folder(log: Log, _: int) -> Log:
+    return log if log.path is None else replace(log, name=f"{log.path.resolve().parent.name}/{log.name}")
+
+
+def _with_number(log: Log, number: int) -> Log:
+    return replace(log, name=f"{log.name} ({number})")
 
 
 def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
