@@ -7,6 +7,11 @@
 
 pub mod arm;
 pub mod effect;
+pub mod filter;
+pub mod identify;
 pub mod integrate;
+pub mod linear;
 pub mod plant;
 pub mod real;
+pub mod regression;
+pub mod rls;

@@ -26,8 +26,8 @@ pub trait WithArm {
     /// Result.
     type Output;
 
-    /// Does it.
-    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    /// Does it; `R = P + N` is the number of parameters with one asymmetry per joint.
+    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
         self,
         arm: A,
         theta: [f64; P],
@@ -42,15 +42,15 @@ impl ArmDescription {
         match self.kind {
             Kind::Axis => {
                 let theta: [f64; 4] = self.theta.as_slice().try_into().ok()?;
-                Some(work.call::<_, 1, 4>(Axis { gravity }, theta))
+                Some(work.call::<_, 1, 4, 5>(Axis { gravity }, theta))
             }
             Kind::Pendulum => {
                 let theta: [f64; 4] = self.theta.as_slice().try_into().ok()?;
-                Some(work.call::<_, 1, 4>(Pendulum { gravity }, theta))
+                Some(work.call::<_, 1, 4, 5>(Pendulum { gravity }, theta))
             }
             Kind::TwoLink => {
                 let theta: [f64; 9] = self.theta.as_slice().try_into().ok()?;
-                Some(work.call::<_, 2, 9>(TwoLink::new(gravity, first_length, &theta), theta))
+                Some(work.call::<_, 2, 9, 11>(TwoLink::new(gravity, first_length, &theta), theta))
             }
         }
     }

@@ -138,7 +138,7 @@ struct Request<'a> {
 impl WithArm for Request<'_> {
     type Output = Result<Diagnosis, DiagnoseError>;
 
-    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
         self,
         arm: A,
         theta: [f64; P],

@@ -9,6 +9,7 @@ pub mod compose;
 pub mod decide;
 pub mod diagnose;
 pub mod equivalent;
+pub mod identify;
 pub mod locate;
 pub mod metric;
 pub mod model;

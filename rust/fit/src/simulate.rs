@@ -71,7 +71,7 @@ impl WithArm for Simulation<'_> {
     type Output = Result<Trajectory, SimulationError>;
 
     /// Doubles the sub-steps until the positions change by less than the tolerance.
-    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
         self,
         arm: A,
         theta: [f64; P],

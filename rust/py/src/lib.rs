@@ -2,6 +2,7 @@
 
 mod convert;
 mod diagnose;
+mod identify;
 mod simulate;
 
 use pyo3::prelude::*;
@@ -12,6 +13,8 @@ mod _native {
     use crate::convert::{arm_kinds, effects, theta_from_links};
     #[pymodule_export]
     use crate::diagnose::diagnose;
+    #[pymodule_export]
+    use crate::identify::{identify, velocity};
     #[pymodule_export]
     use crate::simulate::simulate;
 
