@@ -35,3 +35,22 @@ def diagnose(
     holdout: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]],
     options: dict[str, Any],
 ) -> str: ...
+def identify(
+    kind: str,
+    gravity: float,
+    link_length: Sequence[float] | None,
+    theta: Sequence[float],
+    scheme: str,
+    paper: bool,
+    cutoff: float,
+    forgetting: float,
+    p0: float,
+    theta0: Sequence[float],
+    t: NDArray[np.float64],
+    q: NDArray[np.float64],
+    tau: NDArray[np.float64],
+    dq: NDArray[np.float64] | None,
+) -> dict[str, Any]: ...
+def velocity(
+    t: NDArray[np.float64], q: NDArray[np.float64], method: str, half_width: int = 3
+) -> NDArray[np.float64]: ...

@@ -3,12 +3,13 @@
 //! `q1` is measured from the vertical pointing down, `q2` relative to link 1:
 //!
 //! ```text
-//! M = [theta1 + 2 theta2 c2,  theta3 + theta2 c2]    C = [-2 theta2 s2 dq2,  -theta2 s2 dq2]
-//!     [theta3 + theta2 c2,    theta3            ]        [   theta2 s2 dq1,   0            ]
+//! M = [theta1 + 2 theta2 c2,  theta3 + theta2 c2]    C = [-theta2 s2 dq2,  -theta2 s2 (dq1 + dq2)]
+//!     [theta3 + theta2 c2,    theta3            ]        [ theta2 s2 dq1,   0                     ]
 //! g = [theta4 s1 + theta5 s12,  theta5 s12]          f = [theta6 dq1 + theta8 sgn dq1, theta7 dq2 + theta9 sgn dq2]
 //! ```
 //!
-//! With this `C` the matrix `dM/dt - 2 C` is skew-symmetric.
+//! `C` is the one of Christoffel's symbols, for which `dM/dt - 2 C` is skew-symmetric. The paper prints another with the same product
+//! `C dq`; for that one only `dq' (dM/dt - 2 C) dq = 0` holds.
 
 use super::{Arm, Parameter};
 use crate::real::{Real, lit};
@@ -117,7 +118,7 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
 
     fn coriolis(&self, theta: &[T; 9], q: &Vector2<T>, dq: &Vector2<T>) -> Matrix2<T> {
         let k = theta[1] * q[1].sin();
-        Matrix2::new(-(k + k) * dq[1], -k * dq[1], k * dq[0], T::zero())
+        Matrix2::new(-k * dq[1], -k * (dq[0] + dq[1]), k * dq[0], T::zero())
     }
 
     fn gravity(&self, theta: &[T; 9], q: &Vector2<T>, tilt: T) -> Vector2<T> {

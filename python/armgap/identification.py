@@ -1,0 +1,258 @@
+"""Identification by recursive least squares with the three regression models of Reyes and Kelly (1997)."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armgap import _native
+from armgap.arm import Arm
+from armgap.errors import ColumnError, OptionError
+from armgap.log import Log
+
+__all__ = ["SCHEMES", "Identification", "identify", "velocity"]
+
+Scheme = Literal["filtered-dynamic", "supplied-energy", "filtered-power"]
+Method = Literal["backward", "central", "local-cubic", "sensor", "midpoint"]
+
+SCHEMES: tuple[Scheme, ...] = ("filtered-dynamic", "supplied-energy", "filtered-power")
+"""The regression models, in the paper's order."""
+
+VELOCITIES: tuple[Method, ...] = ("backward", "central", "local-cubic", "sensor", "midpoint")
+"""Ways to get velocities."""
+
+
+@dataclass(frozen=True)
+class Identification:
+    """The result of `identify`.
+
+    Attributes
+    ----------
+    log, scheme, filters, velocity : str
+        What was identified, and how.
+    cutoff : float
+        Cut-off of the filters [rad/s].
+    parameter_names, parameter_units : tuple of str
+        Names and SI units of the entries of `theta`.
+    theta : ndarray, shape (n_parameters,)
+        Estimate after the last sample.
+    sigma : ndarray, shape (n_parameters,)
+        Standard deviations, from the last covariance and the prediction errors of the second half of the log, as if those were white.
+    t : ndarray, shape (n_samples,)
+        Sample times [s].
+    history : ndarray, shape (n_samples, n_parameters)
+        Estimates over time.
+    errors : ndarray, shape (n_samples, n_joints) or (n_samples, 1)
+        Prediction errors; NaN before the first regression.
+    updates, rejected : int
+        Samples used, and samples rejected because they were not finite.
+    """
+
+    log: str
+    scheme: str
+    filters: str
+    velocity: str
+    cutoff: float
+    parameter_names: tuple[str, ...]
+    parameter_units: tuple[str, ...]
+    theta: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    updates: int
+    rejected: int
+    t: NDArray[np.float64] = field(repr=False)
+    history: NDArray[np.float64] = field(repr=False)
+    errors: NDArray[np.float64] = field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result without its time series, ready for JSON."""
+        parameters = {
+            name: {"value": float(v), "sigma": float(s), "unit": unit}
+            for name, v, s, unit in zip(
+                self.parameter_names, self.theta, self.sigma, self.parameter_units, strict=True
+            )
+        }
+        return {
+            "schema": "armgap.identification/1",
+            "log": self.log,
+            "scheme": self.scheme,
+            "filters": self.filters,
+            "velocity": self.velocity,
+            "cutoff_rad_s": self.cutoff,
+            "parameters": parameters,
+            "updates": self.updates,
+            "rejected": self.rejected,
+        }
+
+    def to_json(self, indent: int | None = None) -> str:
+        """Return the result without its time series as JSON."""
+        return json.dumps(self.to_dict(), indent=indent)
+
+
+def velocity(
+    t: ArrayLike, q: ArrayLike, method: Literal["backward", "central", "local-cubic"] = "local-cubic", half_width: int = 3
+) -> NDArray[np.float64]:
+    """Velocities from positions.
+
+    Parameters
+    ----------
+    t : array_like, shape (n_samples,)
+        Sample times [s], evenly spaced or not.
+    q : array_like, shape (n_samples, n_joints)
+        Positions.
+    method : str
+        ``"backward"``: the mean velocity of the period before, as in the paper, so half a period late; zero at the first sample.
+        ``"central"``: the slope of the parabola through a sample and its neighbours.
+        ``"local-cubic"``: local cubic least squares over ``2 half_width + 1`` samples.
+    half_width : int, default 3
+        Half width of the local cubic, at least 2.
+
+    Returns
+    -------
+    ndarray, shape (n_samples, n_joints)
+
+    Examples
+    --------
+    >>> t = np.arange(5.0)
+    >>> velocity(t, (t**2)[:, None], "central")[1:-1, 0].round(9).tolist()
+    [2.0, 4.0, 6.0]
+    """
+    t = np.ascontiguousarray(t, dtype=np.float64)
+    q = np.ascontiguousarray(q, dtype=np.float64)
+    if t.ndim != 1 or q.ndim != 2 or len(q) != len(t):
+        raise OptionError(f"`q` has shape {q.shape} for {t.shape} times", remedy="give one row of `q` per time")
+    return _native.velocity(t, q, method, half_width)
+
+
+def identify(
+    log: Log,
+    arm: Arm,
+    *,
+    scheme: str = "filtered-power",
+    filters: str = "exact",
+    cutoff: float = 50.0,
+    forgetting: float = 1.0,
+    p0: float = 1000.0,
+    theta0: ArrayLike | None = None,
+    asymmetry: bool = False,
+    velocity: str | None = None,
+) -> Identification:
+    """Estimate the parameters of an arm from a log.
+
+    Parameters
+    ----------
+    log : Log
+        The log.
+    arm : Arm
+        The arm; its values are not used, only its kind, gravity and lengths.
+    scheme : {"filtered-power", "filtered-dynamic", "supplied-energy"}
+        Regression model: equations (30), (24) and (28) of the paper.
+    filters : {"exact", "paper"}
+        Consistent filters, or the paper's as printed.
+    cutoff : float, default 50
+        Cut-off of the filters [rad/s].
+    forgetting : float, default 1
+        Forgetting factor in (0, 1].
+    p0 : float, default 1000
+        ``P(0) = p0 I``.
+    theta0 : array_like, shape (n_parameters,), optional
+        ``theta(0)``, zero by default.
+    asymmetry : bool, default False
+        Estimate a constant resisting torque per joint too, which is what Coulomb friction of different levels adds in motion.
+    velocity : {"backward", "central", "local-cubic", "sensor", "midpoint"}, optional
+        Where velocities come from. ``"midpoint"`` takes the difference of two positions as the velocity half-way between them and aligns
+        everything else with that, as the online estimator does. By default backward for the paper's filters, central for the exact ones.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    OptionError
+        If an option has an impossible value.
+    ColumnError
+        If the sensor's velocity is asked for and the log has none.
+
+    References
+    ----------
+    F. Reyes and R. Kelly, Robotica 15 (1997) 563-571, equations (20)-(30).
+    """
+    velocity = velocity or ("backward" if filters == "paper" else "central")
+    _check(scheme, filters, cutoff, forgetting, p0, velocity)
+    names, units = list(arm.parameter_names), list(arm.parameter_units)
+    if asymmetry:
+        names += [f"asymmetry{j + 1}" for j in range(arm.n_joints)]
+        units += ["N m" if arm.rotary else "N"] * arm.n_joints
+    start = np.zeros(len(names)) if theta0 is None else np.asarray(theta0, dtype=np.float64)
+    if start.shape != (len(names),) or not np.isfinite(start).all():
+        raise OptionError(f"`theta0` has shape {start.shape}", remedy=f"give {len(names)} finite values")
+    lengths = None if arm.link_length is None else arm.link_length.tolist()
+    fix = np.ascontiguousarray
+    course = _native.identify(
+        arm.kind,
+        arm.gravity,
+        lengths,
+        arm.theta.tolist(),
+        scheme,
+        filters == "paper",
+        cutoff,
+        forgetting,
+        p0,
+        start.tolist(),
+        fix(log.t),
+        fix(log.q),
+        fix(log.tau),
+        _velocities(log, velocity),
+    )
+    errors = course["errors"]
+    late = errors[len(errors) // 2 :]
+    spread = float(np.nanmean(late**2)) if np.isfinite(late).any() else 0.0
+    return Identification(
+        log=log.name,
+        scheme=scheme,
+        filters=filters,
+        velocity=velocity,
+        cutoff=cutoff,
+        parameter_names=tuple(names),
+        parameter_units=tuple(units),
+        theta=course["theta"][-1].copy(),
+        sigma=np.sqrt(spread * np.maximum(np.diag(course["covariance"]), 0.0)),
+        updates=course["updates"],
+        rejected=course["rejected"],
+        t=log.t,
+        history=course["theta"],
+        errors=errors,
+    )
+
+
+def _velocities(log: Log, method: str) -> NDArray[np.float64] | None:
+    if method == "midpoint":
+        return None
+    if method == "sensor":
+        if log.dq is None:
+            raise ColumnError(
+                "has no velocity columns", remedy="map dq1, dq2 ... or choose another velocity", file=log.path or log.name, column="dq1"
+            )
+        return np.ascontiguousarray(log.dq)
+    return _native.velocity(np.ascontiguousarray(log.t), np.ascontiguousarray(log.q), method)
+
+
+def _check(scheme: str, filters: str, cutoff: float, forgetting: float, p0: float, velocity: str) -> None:
+    for name, value, known in (
+        ("scheme", scheme, SCHEMES),
+        ("filters", filters, ("exact", "paper")),
+        ("velocity", velocity, VELOCITIES),
+    ):
+        if value not in known:
+            raise OptionError(f"`{name}` is {value!r}", remedy=f"known: {', '.join(known)}")
+    for name, number, fine in (
+        ("cutoff", cutoff, cutoff > 0),
+        ("forgetting", forgetting, 0 < forgetting <= 1),
+        ("p0", p0, p0 > 0),
+    ):
+        if not (np.isfinite(number) and fine):
+            raise OptionError(f"`{name}` is {number}", remedy="give a positive number (at most 1 for forgetting)")
