@@ -1,0 +1,75 @@
+"""Arms and logs that several tests share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from armgap import Arm, Log, seed_torque, simulate
+
+# Reyes and Kelly (1997), Table I, with the encoders and torque limits of section 5; friction of joint 1 at its mean.
+TABLE_ONE = """\
+name = "Reyes-Kelly direct-drive arm"
+kind = "two-link"
+gravity = 9.81
+sample_period = 0.0025
+
+[links]
+mass = [23.902, 3.880]
+length = [0.45, 0.30]
+com = [0.091, 0.048]
+inertia = [1.266, 0.093]
+
+[friction]
+viscous = [2.288, 0.175]
+coulomb = [7.6095, 1.734]
+
+[encoder]
+counts_per_rev = [1024000, 655360]
+
+[actuator]
+torque_limit = [200.0, 15.0]
+"""
+
+
+@pytest.fixture(scope="session")
+def arm_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("arm") / "arm.toml"
+    path.write_text(TABLE_ONE)
+    return path
+
+
+@pytest.fixture(scope="session")
+def arm(arm_file: Path) -> Arm:
+    return Arm.read(arm_file)
+
+
+@pytest.fixture(scope="session")
+def seed_log(arm: Arm) -> Log:
+    """Two seconds of Table I's arm under the paper's torques, with velocities."""
+    t = np.arange(800) * arm.sample_period
+    return simulate(arm, t, seed_torque(t), sensor=True, name="seed")
+
+
+@pytest.fixture
+def frame(seed_log: Log) -> pl.DataFrame:
+    """The same log as a table."""
+    return seed_log.to_polars()
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Run the command line in this process; return its status and what it wrote to the two streams."""
+    from armgap.cli import main
+
+    def call(*arguments: str | Path) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as stop:
+            main([str(a) for a in arguments])
+        out, err = capsys.readouterr()
+        return int(stop.value.code or 0), out, err
+
+    return call
