@@ -286,7 +286,7 @@ def diagnose(
     try:
         text = _native.diagnose(arm.to_native(), _columns(training), _columns(held), options)
     except ValueError as error:
-        raise LogShapeError(str(error), remedy="see the log and the options") from None
+        raise _refused(str(error), training, held) from None
     data = json.loads(text)
     data["arm"]["name"] = arm.name
     data["notes"] = notes + data["notes"]
@@ -309,6 +309,14 @@ def _logs(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:
                 file=log.path or log.name,
             )
     return read
+
+
+def _refused(message: str, training: list[Log], held: list[Log]) -> LogShapeError:
+    """Name the logs that the core could not work with."""
+    problem, _, remedy = message.partition("; ")
+    logs = held if "holdout" in problem else training
+    files = ", ".join(dict.fromkeys(str(log.path or log.name) for log in logs))
+    return LogShapeError(problem, remedy=remedy or "see the log and the options", file=files)
 
 
 def _overlap(training: list[Log], held: list[Log]) -> list[str]:

@@ -140,8 +140,8 @@ def extract(frame: pl.DataFrame, place: Path | str, names: Names) -> Arrays:
     def several(group: tuple[str, ...]) -> NDArray[np.float64]:
         return np.ascontiguousarray(np.column_stack([_column(frame, place, name) for name in group]))
 
-    dq = None if names.dq is None else several(names.dq)
-    return Arrays(_times(frame, place, names.t), several(names.q), several(names.tau), dq)
+    t, q, tau = _times(frame, place, names.t), several(names.q), several(names.tau)
+    return Arrays(t, q, tau, None if names.dq is None else several(names.dq))
 
 
 def _times(frame: pl.DataFrame, place: Path | str, name: str) -> NDArray[np.float64]:
