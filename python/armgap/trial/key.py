@@ -9,22 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from armgap.errors import ArmgapError
+
 KEY_FILE = "key.json"
 SCHEMA = "armgap.key/1"
 
 
-class SealError(ValueError):
-    """A key that cannot be trusted: missing, not the sealed one, or of an arm file without a seal.
-
-    Attributes
-    ----------
-    path : Path
-        The file at fault.
-    """
-
-    def __init__(self, path: Path, problem: str) -> None:
-        self.path = path
-        super().__init__(f"{path}: {problem}")
+class SealError(ArmgapError, ValueError):
+    """A key that cannot be trusted: missing, not the sealed one, or of an arm file without a seal."""
 
 
 @dataclass(frozen=True)
@@ -138,29 +130,41 @@ def open_key(case: str | Path) -> Key:
         A file is missing, the arm file has no seal, or the key is not the one that was sealed.
     """
     folder = Path(case)
-    seal, content = _seal(folder / "arm.toml"), _content(folder / KEY_FILE)
+    seal, content = sealed_hash(folder), _content(folder / KEY_FILE)
     found = hashlib.sha256(content).hexdigest()
     if found != seal:
         raise SealError(
-            folder / KEY_FILE,
-            f"not the key that was sealed: its sha256 is {found[:12]}…, arm.toml states {seal[:12]}…",
+            f"is not the key that was sealed: its sha256 is {found[:12]}…, arm.toml states {seal[:12]}…",
+            remedy="do not trust it; make the case again from its seed",
+            file=folder / KEY_FILE,
         )
     return Key.from_json(content.decode())
 
 
-def _seal(path: Path) -> str:
+def sealed_hash(case: str | Path) -> str:
+    """Return the sha256 by which the arm file of a case folder seals its key.
+
+    Raises
+    ------
+    SealError
+        The arm file cannot be read or states no hash.
+    """
+    path = Path(case) / "arm.toml"
     try:
-        arm = tomllib.loads(path.read_text())
+        arm = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise SealError(path, f"cannot be read ({error})") from error
+        raise SealError(f"cannot be read ({error})", remedy=_CASE_FOLDER, file=path) from error
     seal = arm.get("sealed", {}).get("sha256")
     if not isinstance(seal, str):
-        raise SealError(path, "states no [sealed] sha256; only the generator's cases have a key")
+        raise SealError("states no [sealed] sha256", remedy=_CASE_FOLDER, file=path)
     return seal
+
+
+_CASE_FOLDER = "give the folder of a case that the generator made"
 
 
 def _content(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise SealError(path, f"cannot be read ({error.strerror})") from error
+        raise SealError(f"cannot be read ({error.strerror})", remedy=_CASE_FOLDER, file=path) from error

@@ -1,0 +1,181 @@
+"""``armgap demo``: a log with a sealed key, diagnosed and then checked; or a log of your own."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from armgap.cli.common import (
+    ManyValues,
+    check_outputs,
+    columns_option,
+    console,
+    json_option,
+    parse_columns,
+    parse_units,
+    quiet_option,
+    units_option,
+    working,
+    write,
+)
+from armgap.errors import OptionError
+
+if TYPE_CHECKING:
+    from armgap.diagnosis import Diagnosis
+    from armgap.trial.key import Key
+
+__all__ = ["command"]
+
+REPORT = "armgap-demo.html"
+PACKAGE = Path(__file__).resolve().parents[1]
+#: Where the sample case lies: in a checkout, or in an installed package.
+CASE_FOLDERS = (PACKAGE.parents[1] / "demo" / "case", PACKAGE / "demo_case")
+
+
+@click.command("demo", cls=ManyValues)
+@click.argument("logs", nargs=-1, metavar="[LOG…]")
+@click.option("--arm", "arm_file", metavar="ARM.toml", help="Arm file, for logs of your own.")
+@click.option("--holdout", multiple=True, metavar="LOG…", help="Logs of your own to judge on.")
+@click.option("--case", "case_folder", metavar="DIR", help="Folder of another sealed case.")
+@click.option("--fresh", type=click.IntRange(min=0), metavar="SEED", help="Make a new sealed case (needs MuJoCo).")
+@click.option("--report", "report_file", default=REPORT, show_default=True, metavar="OUT.html", help="Report to write.")
+@json_option
+@columns_option
+@units_option
+@quiet_option
+def command(
+    logs: tuple[str, ...],
+    arm_file: str | None,
+    holdout: tuple[str, ...],
+    case_folder: str | None,
+    fresh: int | None,
+    report_file: str,
+    json_file: str | None,
+    columns: str | None,
+    units: str | None,
+    quiet: bool,
+) -> None:
+    """Diagnose a sample log whose hidden cause is sealed, then open the key; or diagnose LOGs of your own."""
+    check_outputs(report_file, json_file)
+    outputs = (report_file, json_file, quiet)
+    if logs or arm_file or holdout:
+        if case_folder is not None or fresh is not None:
+            raise OptionError("a case and logs of your own were given", remedy="give one of the two")
+        _own_logs(logs, arm_file, holdout, {"columns": parse_columns(columns), "units": parse_units(units)}, outputs)
+        return
+    with _case(case_folder, fresh, quiet=quiet) as folder:
+        _sealed_case(folder, outputs)
+
+
+def _own_logs(
+    logs: tuple[str, ...],
+    arm_file: str | None,
+    holdout: tuple[str, ...],
+    naming: dict[str, Any],
+    outputs: tuple[str, str | None, bool],
+) -> None:
+    if not logs or arm_file is None:
+        missing = "no log" if not logs else "no arm file"
+        raise OptionError(f"{missing} was given", remedy="write armgap demo LOG… --arm ARM.toml [--holdout LOG…]")
+    _diagnose([Path(p) for p in logs], Path(arm_file), [Path(p) for p in holdout], naming, outputs)
+
+
+def _sealed_case(folder: Path, outputs: tuple[str, str | None, bool]) -> None:
+    from armgap.trial.key import open_key, sealed_hash
+
+    say = _voice(outputs)
+    seal = sealed_hash(folder)
+    say.print(f"what is hidden in these logs is sealed: the key's sha256 is {seal[:16]}…", highlight=False)
+    training, held = (sorted(folder.glob(f"{part}-*.parquet")) for part in ("train", "holdout"))
+    if not training:
+        raise OptionError("holds no train-*.parquet", remedy="give the folder of a sealed case", file=folder)
+    result = _diagnose(training, folder / "arm.toml", held, {}, outputs)
+    say.print(_opened(open_key(folder), result), highlight=False)
+
+
+def _diagnose(
+    logs: list[Path],
+    arm_file: Path,
+    holdout: list[Path],
+    naming: dict[str, Any],
+    outputs: tuple[str, str | None, bool],
+) -> Diagnosis:
+    from armgap.arm import Arm
+    from armgap.diagnosis import diagnose
+    from armgap.log import Log
+    from armgap.report import summary_table, write_html
+
+    report_file, json_file, quiet = outputs
+    arm = Arm.read(arm_file)
+    training, held = ([Log.read(p, arm=arm, **naming) for p in paths] for paths in (logs, holdout))
+    with working("diagnosing", quiet=quiet):
+        result = diagnose(training, arm, holdout=held or None)
+    write(report_file, lambda path: write_html(result, path))
+    if json_file is not None:
+        write(json_file, result.to_json(indent=2))
+    say = _voice(outputs)
+    say.print(summary_table(result))
+    say.print(f"report: {report_file}", highlight=False)
+    return result
+
+
+def _voice(outputs: tuple[str, str | None, bool]) -> Any:
+    """The console, silent where the summary is not wanted on standard output."""
+    say = console()
+    say.quiet = outputs[2] or outputs[1] == "-"
+    return say
+
+
+@contextmanager
+def _case(folder: str | None, fresh: int | None, *, quiet: bool) -> Iterator[Path]:
+    """The case folder that was asked for; a fresh one lasts as long as the command."""
+    if fresh is None:
+        yield Path(folder) if folder is not None else _sample_case()
+        return
+    if folder is not None:
+        raise OptionError("--case and --fresh were both given", remedy="give one of the two")
+    from armgap.trial import make_demo_case
+
+    with tempfile.TemporaryDirectory(prefix="armgap-demo-") as scratch:
+        with working(f"making the case of seed {fresh}", quiet=quiet):
+            made = make_demo_case(fresh).write(scratch)
+        yield Path(made)
+
+
+def _sample_case() -> Path:
+    for folder in CASE_FOLDERS:
+        if (folder / "arm.toml").is_file():
+            return folder
+    raise OptionError("the sample case is not installed", remedy="run this in a checkout, or give --fresh SEED")
+
+
+def _opened(key: Key, result: Diagnosis) -> str:
+    """The key in words, and whether the diagnosis found what it says."""
+    from armgap.trial.answer import in_words, judge
+
+    hidden = [f"{in_words(h.effect, h.joint)} ({_values(h.parameters)})" for h in key.effects]
+    judgement = judge(key, result)
+    lines = [f"key opened, its hash is the sealed one: {', '.join(hidden) or 'nothing hidden'}"]
+    if result.verdict == "effect" and result.causes:
+        named = in_words(result.causes[0].effect, result.causes[0].joint)
+    else:
+        named = f"verdict {result.verdict}, no cause"
+    verdict = "[bold green]right[/]" if judgement.right else "[bold red]wrong[/]"
+    why = "; no log of motion tells the two apart" if judgement.look_alike else ""
+    lines.append(f"the answer was {verdict}: {named}{why}")
+    if judgement.right and judgement.extra:
+        lines.append(
+            f"beside it {judgement.extra} named that is not there"
+            if judgement.extra == 1
+            else f"beside it {judgement.extra} named that are not there"
+        )
+    return "\n".join(lines)
+
+
+def _values(parameters: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.4g}" for name, value in parameters.items())
