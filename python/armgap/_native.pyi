@@ -4,6 +4,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "__version__",
+    "arm_kinds",
+    "diagnose",
+    "effects",
+    "identify",
+    "simulate",
+    "theta_from_links",
+    "velocity",
+]
+
 __version__: str
 
 def arm_kinds() -> list[dict[str, Any]]: ...
