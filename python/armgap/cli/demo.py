@@ -156,25 +156,25 @@ def _sample_case() -> Path:
 
 def _opened(key: Key, result: Diagnosis) -> str:
     """The key in words, and whether the diagnosis found what it says."""
-    from armgap.trial.answer import in_words, judge
+    from armgap.trial.verdict import judge
 
-    hidden = [f"{in_words(h.effect, h.joint)} ({_values(h.parameters)})" for h in key.effects]
-    judgement = judge(key, result)
-    lines = [f"key opened, its hash is the sealed one: {', '.join(hidden) or 'nothing hidden'}"]
-    if result.verdict == "effect" and result.causes:
-        named = in_words(result.causes[0].effect, result.causes[0].joint)
-    else:
-        named = f"verdict {result.verdict}, no cause"
+    hidden = [f"{_name(h.effect, h.joint)} ({_values(h.parameters)})" for h in key.effects]
+    named = [_name(c.effect, c.joint) for c in result.causes]
+    judgement = judge(result, key)
     verdict = "[bold green]right[/]" if judgement.right else "[bold red]wrong[/]"
-    why = "; no log of motion tells the two apart" if judgement.look_alike else ""
-    lines.append(f"the answer was {verdict}: {named}{why}")
+    lines = [
+        f"key opened, its hash is the sealed one: {', '.join(hidden) or 'nothing is hidden'}",
+        f"the answer was {verdict}: {named[0] if named else 'no cause named'}",
+    ]
+    if judgement.right and not judgement.exact:
+        lines[-1] += "; no log of motion tells the two apart"
     if judgement.right and judgement.extra:
-        lines.append(
-            f"beside it {judgement.extra} named that is not there"
-            if judgement.extra == 1
-            else f"beside it {judgement.extra} named that are not there"
-        )
+        lines.append(f"beside it, causes named that are not there: {judgement.extra}")
     return "\n".join(lines)
+
+
+def _name(effect: str, joint: int | None) -> str:
+    return f"{effect} of " + ("the whole arm" if joint is None else f"joint {joint}")
 
 
 def _values(parameters: dict[str, float]) -> str:

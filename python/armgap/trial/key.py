@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from armgap.errors import ArmgapError
+from armgap.errors import OptionError
 
 KEY_FILE = "key.json"
 SCHEMA = "armgap.key/1"
 
 
-class SealError(ArmgapError, ValueError):
+class SealError(OptionError):
     """A key that cannot be trusted: missing, not the sealed one, or of an arm file without a seal."""
 
 
