@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint test-rust test-python reproduce bench wheel clean all tools
+.PHONY: help setup demo test lint test-rust test-python reproduce bench wheel clean all tools lint-tools
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
@@ -15,6 +15,9 @@ tools:
 	@command -v cc >/dev/null || { echo "armgap needs a C linker: cc was not found; install gcc or clang" >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { echo "armgap needs Python 3.11 or newer as $(PYTHON); set PYTHON=..." >&2; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "armgap needs the venv module of $(PYTHON); on Debian: apt-get install python3-venv" >&2; exit 1; }
+
+lint-tools: tools
+	@{ cargo clippy --version && cargo fmt --version; } >/dev/null 2>&1 || { echo "make test needs clippy and rustfmt: rustup component add clippy rustfmt" >&2; exit 1; }
 
 $(VENV)/.tools: pyproject.toml | tools
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -31,13 +34,13 @@ setup: $(VENV)/.built ## virtual environment and build, all that the other targe
 demo: setup ## diagnose the sample log, or yours: make demo LOG="a.csv b.csv" ARM=arm.toml HOLDOUT=c.csv
 	@$(BIN)/armgap demo $(LOG) $(if $(ARM),--arm $(ARM)) $(foreach h,$(HOLDOUT),--holdout $(h))
 
-lint: setup ## formatting, types and stubs
+lint: setup lint-tools ## formatting, types and stubs
 	$(BIN)/ruff format --check python tests
 	$(BIN)/ruff check python tests
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest armgap._native --mypy-config-file pyproject.toml
 	cargo fmt --check
-	cargo clippy -q --release --all-targets --workspace --exclude armgap-py -- -D warnings
+	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy -q --all-targets --workspace -- -D warnings
 
 test-rust: tools ## the Rust tests
 	cargo test -q --release --workspace --exclude armgap-py
