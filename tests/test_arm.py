@@ -1,0 +1,146 @@
+"""Arm files: Table I to theta, defaults, and what is written reads the same."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from armgap import Arm
+from armgap.errors import ArmFileError
+from conftest import TABLE_ONE
+
+# Reyes and Kelly (1997), Table II, column "Measured", inertial parameters as printed.
+TABLE_TWO = ("2.351", "0.084", "0.102", "38.465", "1.825")
+
+ONE_JOINT = """\
+kind = "{kind}"
+sample_period = 0.001
+[inertial]
+theta = {theta}
+[friction]
+viscous = [0.5]
+coulomb = [0.0]
+"""
+
+
+def section_five(m1, m2, l1, c1, c2, i1, i2, g=9.81):
+    """Base parameters from physical ones, by the formulas of section 5."""
+    return np.array(
+        [
+            m1 * c1**2 + m2 * l1**2 + m2 * c2**2 + i1 + i2,
+            l1 * m2 * c2,
+            m2 * c2**2 + i2,
+            g * (c1 * m1 + m2 * l1),
+            g * m2 * c2,
+        ]
+    )
+
+
+TABLE_ONE_VALUES = (23.902, 3.880, 0.45, 0.091, 0.048, 1.266, 0.093)
+HALF_A_UNIT = (5e-4, 5e-4, 5e-3, 5e-4, 5e-4, 5e-4, 5e-4)  # of the last printed digit of each
+
+
+def test_theta_from_table_one(arm):
+    np.testing.assert_allclose(arm.theta[:5], section_five(*TABLE_ONE_VALUES), rtol=1e-15)
+
+
+def test_table_one_gives_table_two(arm):
+    """Four to the printed digit, rounded or cut; the fifth within what the rounding of Table I leaves open."""
+    for value, printed in list(zip(arm.theta, TABLE_TWO, strict=False))[:4]:
+        decimals = len(printed.split(".")[1])
+        cut = math.floor(value * 10**decimals) / 10**decimals
+        assert printed in (f"{value:.{decimals}f}", f"{cut:.{decimals}f}")
+    low = section_five(*(v - h for v, h in zip(TABLE_ONE_VALUES, HALF_A_UNIT, strict=True)))
+    high = section_five(*(v + h for v, h in zip(TABLE_ONE_VALUES, HALF_A_UNIT, strict=True)))
+    printed = np.array([float(x) for x in TABLE_TWO])
+    assert ((low <= printed) & (printed <= high)).all()
+    assert abs(arm.theta[4] - 1.825) < 0.0021
+
+
+def test_friction_follows_the_inertial_parameters(arm):
+    np.testing.assert_array_equal(arm.theta[5:], [2.288, 0.175, 7.6095, 1.734])
+    assert arm.parameter_names[5:] == ("viscous1", "viscous2", "coulomb1", "coulomb2")
+    assert len(arm.parameter_names) == len(arm.parameter_units) == len(arm.theta) == 9
+
+
+def test_default_trust_is_10_percent_and_50_percent(arm):
+    np.testing.assert_allclose(arm.sigma[:5], 0.1 * np.abs(arm.theta[:5]))
+    np.testing.assert_allclose(arm.sigma[5:], 0.5 * arm.theta[5:])
+    assert (arm.sigma > 0).all()
+
+
+def test_written_and_read_again(arm, tmp_path):
+    path = tmp_path / "again.toml"
+    path.write_text(arm.to_toml())
+    again = Arm.read(path)
+    for name in ("theta", "sigma", "counts_per_rev", "torque_limit", "link_length"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(arm, name))
+    assert (again.name, again.kind, again.gravity, again.sample_period) == (
+        arm.name,
+        arm.kind,
+        arm.gravity,
+        arm.sample_period,
+    )
+
+
+def test_names_with_quotes_columns_and_seal_survive(tmp_path):
+    text = TABLE_ONE.replace("Reyes-Kelly direct-drive arm", 'a \\"b\\" \\\\ c')
+    text += f'[columns]\nq1 = "shoulder \\"raw\\""\n[sealed]\nsha256 = "{"ab" * 32}"\n'
+    first, second = tmp_path / "first.toml", tmp_path / "second.toml"
+    first.write_text(text)
+    arm = Arm.read(first)
+    assert (arm.name, arm.columns, arm.sealed) == ('a "b" \\ c', {"q1": 'shoulder "raw"'}, "ab" * 32)
+    second.write_text(arm.to_toml())
+    again = Arm.read(second)
+    assert (again.name, again.columns, again.sealed) == (arm.name, arm.columns, arm.sealed)
+
+
+@pytest.mark.parametrize(("kind", "theta", "rotary"), [("axis", [12.0, 0.0], False), ("pendulum", [0.3, 4.0], True)])
+def test_one_joint(kind, theta, rotary, tmp_path):
+    path = tmp_path / "cart.toml"
+    path.write_text(ONE_JOINT.format(kind=kind, theta=theta))
+    arm = Arm.read(path)
+    assert (arm.name, arm.gravity, arm.n_joints, arm.rotary) == ("cart", 9.81, 1, rotary)
+    np.testing.assert_array_equal(arm.theta, [*theta, 0.5, 0.0])
+    assert (arm.sigma > 0).all()
+    assert arm.counts_per_rev is arm.torque_limit is arm.link_length is None
+
+
+def test_encoder_step(arm):
+    np.testing.assert_allclose(arm.encoder_step, [2 * np.pi / 1024000, 2 * np.pi / 655360])
+
+
+@pytest.mark.parametrize(
+    ("theta", "possible"),
+    [
+        # theta1 + 2 theta2 c, theta3 + theta2 c, theta3: the determinant at c = 1 changes sign between the two.
+        ([2.0, 1.0, 0.60, 10.0, 5.0], False),
+        ([2.0, 0.4, 0.60, 10.0, 5.0], True),
+        ([2.351, 0.084, 0.102, 38.465, 1.825], True),
+        ([2.351, 0.084, 2.6, 38.465, 1.825], False),
+        ([2.351, 0.084, -0.1, 38.465, 1.825], False),
+    ],
+)
+def test_inertia_matrix_has_to_be_positive_definite(theta, possible, tmp_path):
+    path = tmp_path / "arm.toml"
+    start, end = TABLE_ONE.index("[links]"), TABLE_ONE.index("[friction]")
+    path.write_text(f"{TABLE_ONE[:start]}[inertial]\ntheta = {theta}\n{TABLE_ONE[end:]}")
+    if possible:
+        np.testing.assert_array_equal(Arm.read(path).theta[:5], theta)
+    else:
+        with pytest.raises(ArmFileError, match="positive"):
+            Arm.read(path)
+    c = np.cos(np.linspace(0, np.pi, 721))
+    m11, m12, m22 = theta[0] + 2 * theta[1] * c, theta[2] + theta[1] * c, theta[2]
+    assert (m22 > 0 and bool((m11 * m22 > m12**2).all())) is possible
+
+
+def test_the_example_of_the_real_arm(pytestconfig):
+    """The makers' physical parameters of design C.1, model 1.0, give the example's theta."""
+    arm = Arm.read(pytestconfig.rootpath / "examples" / "dfki-double-pendulum.toml")
+    i1, i2, m1, m2, r1, r2, l1, g = 0.0318872, 0.0508698, 0.5234602, 0.6255677, 0.2, 0.2556931, 0.2, 9.81
+    theta = [i1 + i2 + m2 * l1**2, m2 * r2 * l1, i2, g * (m1 * r1 + m2 * l1), g * m2 * r2]
+    np.testing.assert_allclose(arm.theta[:5], theta, atol=5.1e-5)
+    assert arm.columns["tau2"] == "tau_con2"
