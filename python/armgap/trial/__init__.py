@@ -1,21 +1,29 @@
 """Blind trials: cases made by a physics engine that is not ours, with a sealed key.
 
-MuJoCo (``pip install 'armgap[trial]'``) moves the arm; actuators and encoders are modelled here. Nothing of armgap's own
-dynamics takes part, so that a diagnosis cannot be right merely because both sides share an error.
+MuJoCo (``pip install 'armgap[trial]'``) moves the arm; actuators and encoders are modelled here. Nothing of
+armgap's own dynamics takes part, so that a diagnosis cannot be right merely because both sides share an error.
 """
 
 from armgap.trial.case import Case, NoMotionError, make_case, possible
+from armgap.trial.demo import DEMO_SEED, make_demo_case
 from armgap.trial.engine import TrialEngineMissingError
 from armgap.trial.key import Hidden, Key, SealError, open_key
+from armgap.trial.trial import DEVELOPMENT_SEED, fresh_seed, make_trial, plan_trial
 
 __all__ = [
+    "DEMO_SEED",
+    "DEVELOPMENT_SEED",
     "Case",
     "Hidden",
     "Key",
     "NoMotionError",
     "SealError",
     "TrialEngineMissingError",
+    "fresh_seed",
     "make_case",
+    "make_demo_case",
+    "make_trial",
     "open_key",
+    "plan_trial",
     "possible",
 ]

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from armgap.trial.arms import TrialArm, random_arm
 from armgap.trial.armfile import arm_toml, draw_nominal
+from armgap.trial.arms import TrialArm, random_arm
 from armgap.trial.effects import REGISTRY, Draw, usage
+from armgap.trial.engine import mujoco
 from armgap.trial.excitation import STYLES, Excitation, acceptable, draw_excitation
 from armgap.trial.key import KEY_FILE, Hidden, Key
 from armgap.trial.plant import Build
@@ -113,7 +114,14 @@ def make_case(
     motions, plain = _draw_motions(rng, arm, names, style, duration)
     hidden, logs, seen = _hide(rng, arm, effects, size, motions, plain, duration)
     stated = draw_nominal(rng, arm, nominal == "exact")
-    details = {"seed": _plain(seed), "model": model, "kind": arm.kind, "motions": _styles(motions), **seen}
+    details = {
+        "seed": _plain(seed),
+        "engine": f"mujoco {mujoco().__version__}",
+        "model": model,
+        "kind": arm.kind,
+        "motions": _styles(motions),
+        **seen,
+    }
     key = Key(hidden, nominal, arm.theta, details, rng.bytes(16).hex())
     return Case(model, arm_toml(arm, stated, f"trial arm ({model})", key.sha256), logs, key)
 
@@ -238,7 +246,7 @@ def _plain(seed: int | Sequence[int]) -> int | list[int]:
 
 
 def _frame(trace: Trace) -> Any:
-    import polars as pl  # noqa: PLC0415  (slow to load)
+    import polars as pl
 
     n = trace.q.shape[1]
     columns = {"t": trace.t}

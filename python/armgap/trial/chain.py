@@ -29,6 +29,7 @@ class Delay:
     _past: deque[float] = field(default_factory=deque)
 
     def __call__(self, u: float, dt: float) -> float:
+        """The command of ``delay`` ago."""
         if not self._past:
             self._past.extend([u] * round(self.delay / dt))
         self._past.append(u)
@@ -42,6 +43,7 @@ class Gain:
     gain: float
 
     def __call__(self, u: float, dt: float) -> float:
+        """The scaled command."""
         return self.gain * u
 
 
@@ -52,6 +54,7 @@ class DeadZone:
     level: float
 
     def __call__(self, u: float, dt: float) -> float:
+        """The excess over the level."""
         return math.copysign(max(abs(u) - self.level, 0.0), u)
 
 
@@ -62,6 +65,7 @@ class Saturation:
     level: float
 
     def __call__(self, u: float, dt: float) -> float:
+        """The clipped command."""
         return min(max(u, -self.level), self.level)
 
 
@@ -73,6 +77,7 @@ class Lag:
     _y: float | None = None
 
     def __call__(self, u: float, dt: float) -> float:
+        """Mean of the lagged command over the step."""
         y = u if self._y is None else self._y
         decay = math.exp(-dt / self.time_constant)
         self._y = u + (y - u) * decay
@@ -87,6 +92,7 @@ class SlewLimit:
     _y: float | None = None
 
     def __call__(self, u: float, dt: float) -> float:
+        """The command as far as the rate allows."""
         y = u if self._y is None else self._y
         self._y = y + min(max(u - y, -self.rate * dt), self.rate * dt)
         return self._y
@@ -101,6 +107,7 @@ class MagneticHysteresis:
     _z: float = 0.0
 
     def __call__(self, u: float, dt: float) -> float:
+        """The torque on the loop."""
         self._z = min(max(self._z, u - self.width), u + self.width)
         return (1.0 - self.share) * u + self.share * self._z
 
@@ -126,6 +133,7 @@ class Actuator:
         return all(isinstance(s, Gain | DeadZone | Saturation) for s in self.stages)
 
     def __call__(self, u: float, dt: float) -> float:
+        """Torque at the joint."""
         for stage in self.stages:
             u = stage(u, dt)
         return u
@@ -141,5 +149,6 @@ class Encoder:
     b: float = 0.0
 
     def __call__(self, q: float) -> float:
+        """What the encoder shows at ``q``."""
         shown = q + self.a * math.sin(q) + self.b * math.cos(q) + self.offset
         return round(shown / self.step) * self.step

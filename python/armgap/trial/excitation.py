@@ -1,8 +1,8 @@
 """Motions for trial logs: torques in open loop, and random trajectories tracked by a controller.
 
-Open loop is a multisine with random phases around a constant, or the paper's own torques, equations (31)-(32), scaled to
-the arm. A tracked motion is a random Fourier series followed by a PD controller on the measured positions; what is
-logged is the controller's command.
+Open loop is a multisine with random phases around a constant, or the paper's own torques, equations (31)-(32),
+scaled to the arm. A tracked motion is a random Fourier series followed by a PD controller on the measured positions;
+what is logged is the controller's command.
 """
 
 from __future__ import annotations

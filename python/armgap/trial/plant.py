@@ -7,7 +7,7 @@ MuJoCo's ``frictionloss`` is a soft constraint, so its settings matter:
   the load alone would give it (some 1e-7 rad/s);
 * fourth-order Runge-Kutta between reversals, Newton's method with a tolerance of 1e-14;
 * a step in which a joint reverses, stops or starts is undone and taken again in :data:`REFINE` parts, :data:`DEPTH`
-  times over, so that the instant of a reversal is known to half a microsecond.
+  times over, so that the instant of a reversal is known to about a tenth of a microsecond.
 
 Friction that varies (with speed, load, position, time) is set on ``dof_frictionloss`` before each step, at the state
 half a step ahead. Torque laws go to ``qfrc_applied``, at the same half step. Elasticity and play are a separate
@@ -28,7 +28,7 @@ from armgap.trial.engine import mujoco
 TIME_STEP = 2.5e-4
 #: Parts into which a step with a reversal is cut, and how often.
 REFINE = 8
-DEPTH = 3
+DEPTH = 4
 #: Joint speed below which a joint counts as standing, rad/s or m/s.
 STANDING = 1e-5
 IMPEDANCE = 0.9999
@@ -119,7 +119,7 @@ class Plant:
     """
 
     def __init__(self, build: Build) -> None:
-        from armgap.trial.model import compile_model  # noqa: PLC0415  (keeps the engine optional)
+        from armgap.trial.model import compile_model
 
         self._mj = mujoco()
         self._build = build

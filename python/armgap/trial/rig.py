@@ -58,7 +58,7 @@ def run(rig: Rig, source: Source, duration: float) -> Trace:
     period = rig.build.arm.sample_period
     n = round(duration / period)
     q, tau, q_true, dq_true = (np.empty((n, plant.n)) for _ in range(4))
-    t = period * np.arange(n)
+    t: Array = period * np.arange(n, dtype=np.float64)
     for k in range(n):
         q_true[k], dq_true[k] = plant.position(), plant.velocity()
         q[k] = [e(x) for e, x in zip(rig.encoders, plant.position(), strict=True)]

@@ -41,7 +41,7 @@ class Judgement:
 
 def judge(diagnosis: Diagnosis, key: Key) -> Judgement:
     """Compare a diagnosis with the opened key."""
-    named = [(c.effect, c.joint) for c in diagnosis.causes]
+    named = [(c.effect, c.joint) for c in diagnosis.causes] if diagnosis.verdict == "effect" else []
     hidden = _distinct(key.effects)
     matches = [any(equivalent(n, h) for h in hidden) for n in named]
     return Judgement(

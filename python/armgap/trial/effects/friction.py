@@ -21,7 +21,10 @@ def friction_law(rig: Rig, joint: int, law: FrictionLaw) -> None:
 
 @effect("coulomb_asymmetry", lambda d: {"delta": d.sign() * d.coulomb * d.between(0.05, 0.5)})
 def coulomb_asymmetry(rig: Rig, joint: int, p: Parameters) -> None:
-    """Levels ``fc + delta`` forward and ``fc - delta`` backward: the symmetric set-valued friction moved by ``-delta``."""
+    """Levels ``fc + delta`` forward and ``fc - delta`` backward.
+
+    At rest friction takes any value between the two, so this is symmetric friction moved by ``-delta``, always.
+    """
     torque_law(rig, joint, lambda x: -p["delta"])
 
 

@@ -1,0 +1,189 @@
+"""Whole trials: many sealed cases of several families from one seed."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from armgap.trial.arms import MODELS
+from armgap.trial.case import Case, NoMotionError, Wish, make_case, possible
+
+#: Families of cases and their usual shares.
+FAMILIES = {"single": 0.65, "null": 0.08, "parameters": 0.07, "pair": 0.12, "outside": 0.08}
+#: Kinds of machine and how often each is drawn.
+MACHINES = {"direct-drive": 0.45, "geared": 0.35, "pendulum": 0.12, "axis": 0.08}
+#: Seed of the cases that the diagnosis may be developed on; reported scores use fresh ones.
+DEVELOPMENT_SEED = 1997
+RETRIES = 10
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One case to make.
+
+    Attributes
+    ----------
+    seed : tuple of int
+        Seed of the trial and number of the case.
+    family : str
+        Key of :data:`FAMILIES`.
+    model : str
+        Machine.
+    effects : tuple of (name, joint)
+        What to hide.
+    nominal : {"exact", "off"}
+        Whether the arm file's values are the true ones.
+    """
+
+    seed: tuple[int, ...]
+    family: str
+    model: str
+    effects: tuple[Wish, ...]
+    nominal: str
+
+    def make(self) -> Case:
+        """Make the case; a seed without an acceptable motion is followed by the next.
+
+        Raises
+        ------
+        NoMotionError
+            No seed gave a motion.
+        """
+        for attempt in range(RETRIES):
+            try:
+                return make_case((*self.seed, attempt), self.effects, model=self.model, nominal=self.nominal)
+            except NoMotionError:
+                continue
+        raise NoMotionError(f"no motion for case {self.seed} of {self.model} in {RETRIES} attempts")
+
+
+def fresh_seed() -> int:
+    """A seed that nobody has developed on."""
+    return secrets.randbelow(2**31)
+
+
+def plan_trial(seed: int, n_cases: int, families: Mapping[str, float] | None = None) -> list[Plan]:
+    """Decide what each case of a trial hides, in an order that gives nothing away.
+
+    Parameters
+    ----------
+    seed : int
+        :data:`DEVELOPMENT_SEED`, or :func:`fresh_seed` for a score.
+    n_cases : int
+        Number of cases.
+    families : mapping of str to float, optional
+        Families and their shares; default :data:`FAMILIES`.
+
+    Raises
+    ------
+    ValueError
+        A family is unknown.
+    """
+    shares = dict(families or FAMILIES)
+    unknown = set(shares) - set(FAMILIES)
+    if unknown:
+        raise ValueError(f"unknown family {sorted(unknown)[0]!r}; known are {', '.join(FAMILIES)}")
+    rng = np.random.default_rng([seed, n_cases])
+    names = _deal(shares, n_cases)
+    rng.shuffle(names)
+    singles = {model: _endless(rng, model, "library") for model in MODELS}
+    others = {model: _endless(rng, model, "outside") for model in MODELS}
+    return [_plan(rng, (seed, i), name, singles, others) for i, name in enumerate(names)]
+
+
+def make_trial(
+    seed: int,
+    n_cases: int,
+    families: Mapping[str, float] | None = None,
+    *,
+    folder: str | Path,
+    workers: int = 1,
+) -> list[Path]:
+    """Make a trial on disk: one folder per case, named by number only.
+
+    Parameters
+    ----------
+    seed, n_cases, families
+        See :func:`plan_trial`.
+    folder : path
+        Where the case folders go.
+    workers : int, default 1
+        Processes.
+
+    Returns
+    -------
+    list of Path
+        The case folders.
+    """
+    plans = plan_trial(seed, n_cases, families)
+    targets = [Path(folder) / f"case-{i:04d}" for i in range(n_cases)]
+    if workers == 1:
+        return [_make(p, t) for p, t in zip(plans, targets, strict=True)]
+    with ProcessPoolExecutor(workers) as pool:
+        return list(pool.map(_make, plans, targets))
+
+
+def _make(plan: Plan, target: Path) -> Path:
+    return plan.make().write(target)
+
+
+def _deal(shares: Mapping[str, float], n: int) -> list[str]:
+    """Numbers of cases in proportion to the shares, by largest remainder."""
+    total = sum(shares.values())
+    exact = {name: n * share / total for name, share in shares.items()}
+    names = [name for name, x in exact.items() for _ in range(int(x))]
+    rest = sorted(exact, key=lambda name: exact[name] % 1, reverse=True)
+    return names + rest[: n - len(names)]
+
+
+def _endless(rng: np.random.Generator, model: str, family: str) -> Iterator[Wish]:
+    """Every effect and joint of a machine in random order, again and again."""
+    arm = MODELS[model]
+    wishes = possible(arm.kind, arm.n_joints, (family,))
+    while True:
+        for i in rng.permutation(len(wishes)):
+            yield wishes[int(i)]
+
+
+def _plan(
+    rng: np.random.Generator,
+    seed: tuple[int, int],
+    family: str,
+    singles: dict[str, Iterator[Wish]],
+    others: dict[str, Iterator[Wish]],
+) -> Plan:
+    model = str(rng.choice(list(MACHINES), p=list(MACHINES.values())))
+    nominal = {"null": "exact", "parameters": "off"}.get(family) or str(rng.choice(["exact", "off"]))
+    if family == "pair" and model in ("pendulum", "axis"):
+        model = "direct-drive"
+    effects: tuple[Wish, ...] = ()
+    if family == "single":
+        effects = (next(singles[model]),)
+    elif family == "outside":
+        effects = (next(others[model]),)
+    elif family == "pair":
+        effects = _pair(singles[model])
+    return Plan(seed, family, model, effects, nominal)
+
+
+def _pair(wishes: Iterator[Wish]) -> tuple[Wish, Wish]:
+    first = next(wishes)
+    second = next(w for w in wishes if w[0] != first[0] and not _alike(first, w))
+    return first, second
+
+
+#: Pairs that motion cannot tell apart make no fair pair.
+LOOK_ALIKES = (
+    {"torque_offset", "coulomb_asymmetry"},
+    {"base_tilt", "encoder_offset"},
+    {"joint_elasticity", "backlash"},
+)
+
+
+def _alike(a: Wish, b: Wish) -> bool:
+    return any({a[0], b[0]} == pair for pair in LOOK_ALIKES)
