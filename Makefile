@@ -31,8 +31,8 @@ $(VENV)/.built: $(VENV)/.tools pyproject.toml $(RUST_SOURCES)
 
 setup: $(VENV)/.built ## virtual environment and build, all that the other targets need
 
-demo: setup ## diagnose the sample log, or yours: make demo LOG="a.csv b.csv" ARM=arm.toml HOLDOUT=c.csv
-	@$(BIN)/armgap demo $(LOG) $(if $(ARM),--arm $(ARM)) $(foreach h,$(HOLDOUT),--holdout $(h))
+demo: setup ## diagnose the sample log, or yours: make demo LOG="a.csv b.csv" ARM=arm.toml HOLDOUT=c.csv COLUMNS=.. UNITS=..
+	@$(BIN)/armgap demo $(LOG) $(if $(ARM),--arm $(ARM)) $(foreach h,$(HOLDOUT),--holdout $(h)) $(if $(COLUMNS),--columns "$(COLUMNS)") $(if $(UNITS),--units "$(UNITS)")
 
 lint: setup lint-tools ## formatting, types and stubs
 	$(BIN)/ruff format --check python tests
