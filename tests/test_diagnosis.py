@@ -1,0 +1,256 @@
+"""Diagnosis from Python: what goes in, what the JSON promises, what is said about the logs."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armgap import Arm, Diagnosis, Log, diagnose, simulate
+from armgap.errors import LogShapeError, OptionError
+from armgap.simulation import Effect
+
+PENDULUM = """\
+name = "Pendulum"
+kind = "pendulum"
+gravity = 9.81
+sample_period = 0.004
+
+[inertial]
+theta = [0.05, 0.6]
+
+[friction]
+viscous = [0.02]
+coulomb = [0.1]
+"""
+NOISE_RAD = 2e-4
+STRIBECK = Effect("stribeck", 1, {"amplitude": 0.15, "velocity": 0.3})
+
+NUMBER = (int, float)
+SHAPE = {
+    "schema": str,
+    "verdict": str,
+    "gap": {
+        "horizon_s": NUMBER,
+        "before": [NUMBER],
+        "refit": [NUMBER],
+        "after": [NUMBER],
+        "floor": [NUMBER],
+        "closed": NUMBER,
+        "closed_ci": [NUMBER],
+        "free_run": {"before": [NUMBER], "after": [NUMBER]},
+    },
+    "where": [{"joint": int, "share": NUMBER, "regime": str, "detail": str}],
+    "causes": [
+        {
+            "effect": str,
+            "joint": (int, type(None)),
+            "probability": NUMBER,
+            "parameters": dict,
+            "closed": NUMBER,
+            "equivalents": [{"effect": str, "joint": (int, type(None)), "why": str}],
+        }
+    ],
+    "ruled_out": [{"effect": str, "joint": (int, type(None)), "status": str}],
+    "parameters": {"nominal": dict, "refit": dict, "with_causes": dict},
+}
+"""The schema ``armgap.diagnosis/1``: keys that are always there, and their types."""
+
+
+def conforms(value: object, shape: object, place: str = "$") -> None:
+    """Assert that a JSON value has at least the keys of a shape, of its types, and no number that is not finite."""
+    if isinstance(shape, dict):
+        assert isinstance(value, dict), place
+        for key, inner in shape.items():
+            assert key in value, f"{place}.{key}"
+            conforms(value[key], inner, f"{place}.{key}")
+    elif isinstance(shape, list):
+        assert isinstance(value, list), place
+        for i, item in enumerate(value):
+            conforms(item, shape[0], f"{place}[{i}]")
+    else:
+        assert isinstance(value, shape), place
+        assert not isinstance(value, float) or math.isfinite(value), place
+
+
+@pytest.fixture(scope="module")
+def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Arm:
+    path = tmp_path_factory.mktemp("pendulum") / "pendulum.toml"
+    path.write_text(PENDULUM)
+    return Arm.read(path)
+
+
+def swing(arm: Arm, seed: int, *effects: Effect) -> Log:
+    """Eight seconds under five sines drawn from a seed."""
+    t = np.arange(2000) * arm.sample_period
+    draw = np.random.default_rng(seed).uniform(size=(3, 5))
+    height, speed, phase = 0.1 + 0.3 * draw[0], 0.5 + 8.5 * draw[1], 6 * draw[2]
+    tau = (height * np.sin(np.outer(t, speed) + phase)).sum(axis=1)
+    return simulate(arm, t, tau, effects=effects, noise=NOISE_RAD, seed=seed, name=f"run {seed}")
+
+
+@pytest.fixture(scope="module")
+def found(pendulum: Arm) -> Diagnosis:
+    training = [swing(pendulum, 1, STRIBECK), swing(pendulum, 2, STRIBECK)]
+    return diagnose(training, pendulum, holdout=swing(pendulum, 3, STRIBECK))
+
+
+@pytest.fixture(scope="module")
+def clean(pendulum: Arm) -> Diagnosis:
+    return diagnose(swing(pendulum, 1), pendulum)
+
+
+@pytest.mark.parametrize("which", ["found", "clean"])
+def test_json_keeps_the_schema(which, request):
+    result: Diagnosis = request.getfixturevalue(which)
+    data = json.loads(result.to_json())
+    conforms(data, SHAPE)
+    assert data["schema"] == "armgap.diagnosis/1"
+    assert data["verdict"] in ("none", "parameters", "effect", "unexplained")
+    for stage in data["parameters"].values():
+        for value in stage.values():
+            conforms(value, {"value": NUMBER, "sigma": NUMBER, "unit": str})
+    for cause in data["causes"]:
+        for value in cause["parameters"].values():
+            conforms(value, {"value": NUMBER, "sigma": NUMBER, "unit": str})
+    for out in data["ruled_out"]:
+        assert ("bound" in out) or ("why" in out), out
+        if "bound" in out:
+            conforms(out["bound"], {"parameter": str, "value": NUMBER, "unit": str, "level": NUMBER})
+
+
+@pytest.mark.parametrize("which", ["found", "clean"])
+def test_json_read_again_is_the_same_diagnosis(which, request):
+    result: Diagnosis = request.getfixturevalue(which)
+    again = Diagnosis.from_dict(json.loads(result.to_json(indent=2)))
+    assert again == result
+    assert again.to_dict() == result.to_dict()
+
+
+def test_keys_of_a_later_version_are_kept(found):
+    data = json.loads(found.to_json())
+    data["later"] = {"x": 1}
+    data["gap"]["later"] = 1
+    data["causes"][0]["log"] = "run 1"
+    data["causes"][0]["parameters"]["amplitude"]["later"] = 1
+    again = Diagnosis.from_dict(data)
+    assert again.extra["later"] == {"x": 1}
+    assert again.to_dict() == data
+
+
+def test_a_hidden_effect_is_named_placed_and_sized(found):
+    assert found.verdict == "effect"
+    first = found.causes[0]
+    assert (first.effect, first.joint) == ("stribeck", 1)
+    for name, truth in STRIBECK.parameters.items():
+        assert abs(first.parameters[name].value / truth - 1) < 0.05
+    assert found.gap.after[0] < 0.2 * found.gap.before[0]
+
+
+def test_a_clean_log_has_no_gap(clean):
+    assert clean.verdict == "none"
+    assert clean.causes == ()
+
+
+def test_results_cannot_be_changed(found):
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        found.verdict = "none"
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        found.gap.closed = 1.0
+
+
+def test_no_holdout_is_said_and_cut_from_the_logs(clean):
+    assert any("40%" in note for note in clean.extra["notes"])
+    assert clean.to_dict()["holdout"] != clean.to_dict()["training"]
+
+
+def test_no_training_sample_is_judged_on(pendulum):
+    from armgap.diagnosis import _split
+
+    whole = swing(pendulum, 1)
+    (first,), (last,) = _split([whole])
+    assert len(first) + len(last) == len(whole)
+    np.testing.assert_array_equal(np.concatenate([first.q, last.q]), whole.q)
+    assert last.duration == pytest.approx(0.4 * whole.duration, rel=0.01)
+
+
+def test_the_same_file_on_both_sides_is_said(pendulum, tmp_path):
+    path = tmp_path / "run.parquet"
+    swing(pendulum, 1).write(path)
+    result = diagnose(path, pendulum, holdout=path)
+    assert any("learnt from and judged on" in note for note in result.extra["notes"])
+
+
+def test_logs_of_one_name_are_told_apart(pendulum, tmp_path):
+    paths = []
+    for seed, folder in ((1, "monday"), (2, "tuesday")):
+        (tmp_path / folder).mkdir()
+        paths.append(tmp_path / folder / "run.csv")
+        swing(pendulum, seed).write(paths[-1])
+    text = diagnose(paths[:1], pendulum, holdout=paths[1:]).to_json()
+    assert "monday/run" in text
+    assert "tuesday/run" in text
+
+
+def test_findings_of_the_logs_are_in_the_result(pendulum):
+    log = swing(pendulum, 1)
+    keep = np.r_[0:900, 1000:2000]
+    holed = Log.from_arrays(log.t[keep], log.q[keep], log.tau[keep], name="holed", arm=pendulum)
+    result = diagnose(holed, pendulum, holdout=swing(pendulum, 2))
+    assert any(f["log"] == "holed" and f["kind"] == "gap" for f in result.extra["log_findings"])
+
+
+def test_the_same_input_gives_the_same_answer(pendulum):
+    def answer() -> dict:
+        data = diagnose(swing(pendulum, 1, STRIBECK), pendulum, seed=7).to_dict()
+        data.pop("seconds", None)
+        return data
+
+    assert answer() == answer()
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"horizon": 0.0}, OptionError),
+        ({"horizon": math.inf}, OptionError),
+        ({"max_causes": -1}, OptionError),
+        ({"horizon": 30.0}, LogShapeError),
+        ({"holdout": []}, OptionError),
+    ],
+)
+def test_impossible_options(options, error, pendulum):
+    with pytest.raises(error) as caught:
+        diagnose(swing(pendulum, 1), pendulum, **options)
+    assert caught.value.remedy
+
+
+def test_the_wrong_arm(pendulum, arm):
+    with pytest.raises(LogShapeError, match="1 joint"):
+        diagnose(swing(pendulum, 1), arm)
+
+
+def test_json_on_standard_output_is_all_that_is_there(pendulum, tmp_path, run):
+    log, arm_path = tmp_path / "run.parquet", tmp_path / "arm.toml"
+    swing(pendulum, 1).write(log)
+    arm_path.write_text(pendulum.to_toml())
+    status, out, err = run("diagnose", log, "--arm", arm_path, "--json", "-", "--quiet")
+    assert (status, err) == (0, "")
+    conforms(json.loads(out), SHAPE)
+
+
+def test_json_and_report_are_written_whole(pendulum, tmp_path, run):
+    log, arm_path = tmp_path / "run.parquet", tmp_path / "arm.toml"
+    swing(pendulum, 1).write(log)
+    arm_path.write_text(pendulum.to_toml())
+    out_json, report = tmp_path / "out.json", tmp_path / "out.html"
+    status, _, _ = run("diagnose", log, "--arm", arm_path, "--json", out_json, "--report", report, "--quiet")
+    assert status == 0
+    conforms(json.loads(out_json.read_text()), SHAPE)
+    assert re.match(r"\s*<!doctype html", report.read_text(), re.IGNORECASE)
+    assert sorted(p.name for p in Path(tmp_path).iterdir()) == ["arm.toml", "out.html", "out.json", "run.parquet"]
