@@ -156,6 +156,8 @@ def simulate(
     speed = np.zeros(n) if dq0 is None else np.ascontiguousarray(dq0, dtype=np.float64)
     if len(t) < 2 or np.any(np.diff(t) <= 0) or not (np.isfinite(t).all() and np.isfinite(tau).all()):
         raise OptionError("`t` must increase and everything be finite", remedy="correct the torque table")
+    if not (noise >= 0 and np.isfinite(noise)):
+        raise OptionError(f"the noise is {noise}", remedy="give its standard deviation, 0 or more")
     placed = [(e.name, e.joint, dict(e.parameters)) for e in effects]
     lengths = None if arm.link_length is None else arm.link_length.tolist()
     try:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 from rich.console import Console
@@ -20,6 +22,7 @@ __all__ = [
     "check_outputs",
     "columns_option",
     "console",
+    "interruptible",
     "json_option",
     "parse_columns",
     "parse_units",
@@ -28,6 +31,10 @@ __all__ = [
     "working",
     "write",
 ]
+
+Result = TypeVar("Result")
+_POLL_S = 0.05
+_PIPE_WIDTH = 120
 
 arm_option = click.option("--arm", "arm_file", required=True, metavar="ARM.toml", help="Arm file: the nominal model.")
 columns_option = click.option(
@@ -46,7 +53,9 @@ quiet_option = click.option("--quiet", is_flag=True, help="No progress and no su
 
 def console(*, error: bool = False) -> Console:
     """Return a console that honours ``NO_COLOR`` and pipes."""
-    return Console(stderr=error, no_color=bool(os.environ.get("NO_COLOR")) or None)
+    stream = sys.stderr if error else sys.stdout
+    width = None if stream.isatty() else _PIPE_WIDTH
+    return Console(stderr=error, width=width, no_color=bool(os.environ.get("NO_COLOR")) or None)
 
 
 class ManyValues(click.Command):
@@ -118,10 +127,30 @@ def working(message: str, *, quiet: bool) -> Iterator[None]:
         yield
 
 
+def interruptible(work: Callable[[], Result]) -> Result:
+    """Do long work in a thread, so that an interrupt ends the program at once; the work writes nothing by itself."""
+    done: list[Result] = []
+    failed: list[BaseException] = []
+
+    def attempt() -> None:
+        try:
+            done.append(work())
+        except BaseException as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=attempt, daemon=True)
+    thread.start()
+    while thread.is_alive():
+        thread.join(_POLL_S)
+    if failed:
+        raise failed[0]
+    return done[0]
+
+
 def write(path: str | Path, content: str | Callable[[Path], Any]) -> None:
     """Write text, or let `content` write, to a temporary file that takes its place only when it is complete."""
     if str(path) == "-":
-        click.echo(content if isinstance(content, str) else "")
+        _to_stdout(content)
         return
     target = Path(path)
     temporary = target.with_name(f".{target.name}.partial")
@@ -136,3 +165,13 @@ def write(path: str | Path, content: str | Callable[[Path], Any]) -> None:
         raise ResultError(f"cannot be written ({reason})", remedy="choose another place", file=target) from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _to_stdout(content: str | Callable[[Path], Any]) -> None:
+    if isinstance(content, str):
+        click.echo(content)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "out"
+        content(file)
+        click.echo(file.read_text(encoding="utf-8"))

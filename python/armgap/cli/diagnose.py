@@ -12,6 +12,7 @@ from armgap.cli.common import (
     check_outputs,
     columns_option,
     console,
+    interruptible,
     json_option,
     parse_columns,
     parse_units,
@@ -60,7 +61,9 @@ def command(
     training = [Log.read(path, arm=arm, **naming) for path in logs]
     held = [Log.read(path, arm=arm, **naming) for path in holdout] or None
     with working("diagnosing", quiet=quiet):
-        result = diagnose(training, arm, holdout=held, horizon=horizon, max_causes=max_causes, seed=seed)
+        result = interruptible(
+            lambda: diagnose(training, arm, holdout=held, horizon=horizon, max_causes=max_causes, seed=seed)
+        )
     if report_file is not None:
         from armgap.report import write_html
 
