@@ -69,10 +69,7 @@ impl<T: Real> State<T> {
     /// A channel at rest at zero, seeing `input` first.
     #[inline]
     pub fn from_zero(input: T) -> Self {
-        Self {
-            y: T::zero(),
-            input,
-        }
+        Self { y: T::zero(), input }
     }
 
     /// A channel in the steady state of its first input.

@@ -7,9 +7,7 @@
 use crate::arm::Arm;
 use crate::filter::Cutoff;
 use crate::real::{Real, lit};
-use crate::regression::{
-    FilteredDynamic, FilteredPower, Passage, Scheme, Snapshot, SuppliedEnergy, Variant,
-};
+use crate::regression::{FilteredDynamic, FilteredPower, Passage, Scheme, Snapshot, SuppliedEnergy, Variant};
 use crate::rls::{Rls, Update};
 use nalgebra::SVector;
 
@@ -73,9 +71,7 @@ pub struct Estimator<T: Real, A, const N: usize, const P: usize, const R: usize>
     rejected: u64,
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>
-    Estimator<T, A, N, P, R>
-{
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Estimator<T, A, N, P, R> {
     /// An estimator that has seen nothing yet.
     pub fn new(arm: A, settings: Settings<T, R>) -> Self {
         const {
@@ -144,9 +140,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>
                 Regression::Dynamic(FilteredDynamic::new(&self.arm, variant, now, tau))
             }
             Scheme::SuppliedEnergy => Regression::Energy(SuppliedEnergy::new(&self.arm, now, tau)),
-            Scheme::FilteredPower => {
-                Regression::Power(FilteredPower::new(&self.arm, variant, now, tau))
-            }
+            Scheme::FilteredPower => Regression::Power(FilteredPower::new(&self.arm, variant, now, tau)),
         });
     }
 
@@ -199,9 +193,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>
         passage: &Passage<T, N>,
         tau: &SVector<T, N>,
     ) -> Outcome<T, N> {
-        let Settings {
-            variant, cutoff, ..
-        } = self.settings;
+        let Settings { variant, cutoff, .. } = self.settings;
         let arm = &self.arm;
         match &mut self.regression {
             None => Outcome::Starting,

@@ -102,16 +102,9 @@ struct Step<'a, T: Real, A, const N: usize, const P: usize> {
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N, P> {
     #[inline]
-    fn motion(
-        &self,
-        x: T,
-        q: &SVector<T, N>,
-        dq: &SVector<T, N>,
-        modes: &[Mode; N],
-    ) -> Motion<T, N> {
+    fn motion(&self, x: T, q: &SVector<T, N>, dq: &SVector<T, N>, modes: &[Mode; N]) -> Motion<T, N> {
         let tau = self.interval.torque_at(x);
-        self.plant
-            .acceleration(self.interval.t + x, q, dq, &tau, modes)
+        self.plant.acceleration(self.interval.t + x, q, dq, &tau, modes)
     }
 
     /// One Runge-Kutta step whose first stage is known.
@@ -219,9 +212,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         dt: T,
         k1: &SVector<T, N>,
     ) -> Option<Event<T>> {
-        let reverses = |j: usize| {
-            state.modes[j] != Mode::Stuck && trial.dq[j] * state.modes[j].direction() < T::zero()
-        };
+        let reverses =
+            |j: usize| state.modes[j] != Mode::Stuck && trial.dq[j] * state.modes[j].direction() < T::zero();
         let any_stuck = state.modes.contains(&Mode::Stuck);
         if !any_stuck && !(0..N).any(reverses) {
             return None;
@@ -262,17 +254,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
     ) -> Option<Event<T>> {
         let t = self.interval.t;
         let tau_end = self.interval.torque_at(x + dt);
-        let (after, direction) =
-            self.plant
-                .excess(j, t + x + dt, &trial.q, &tau_end, end.holding[j]);
+        let (after, direction) = self
+            .plant
+            .excess(j, t + x + dt, &trial.q, &tau_end, end.holding[j]);
         if after <= T::zero() {
             return None;
         }
         let start = self.motion(x, &state.q, &state.dq, &state.modes);
         let tau = self.interval.torque_at(x);
-        let (before, _) = self
-            .plant
-            .excess(j, t + x, &state.q, &tau, start.holding[j]);
+        let (before, _) = self.plant.excess(j, t + x, &state.q, &tau, start.holding[j]);
         let s = if before < T::zero() {
             before / (before - after)
         } else {
@@ -359,11 +349,7 @@ fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
     let value = |s: T| v0 + s * (d0 + s * (c2 + s * c3));
     let slope = |s: T| d0 + s * (two * c2 + s * three * c3);
     let (mut low, mut high) = (T::zero(), T::one());
-    let mut s = if v0 == T::zero() {
-        lit(0.5)
-    } else {
-        v0 / (v0 - v1)
-    };
+    let mut s = if v0 == T::zero() { lit(0.5) } else { v0 / (v0 - v1) };
     for _ in 0..40 {
         let f = value(s);
         if f * v1 > T::zero() {

@@ -176,15 +176,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     fn dry_friction(&self, j: usize, x: &JointPoint<T>, mode: Mode) -> T {
         if self.smoothing > T::zero() {
             let soft = (x.dq / self.smoothing).tanh();
-            return self.level(
-                j,
-                x,
-                if soft < T::zero() {
-                    -T::one()
-                } else {
-                    T::one()
-                },
-            ) * soft;
+            return self.level(j, x, if soft < T::zero() { -T::one() } else { T::one() }) * soft;
         }
         match mode {
             Mode::Stuck => T::zero(),
@@ -207,21 +199,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         for j in 0..N {
             let x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
             inertia[(j, j)] += self.armature[j];
-            rhs[j] =
-                tau[j] - bias[j] - self.viscous[j] * dq[j] - self.dry_friction(j, &x, modes[j])
-                    + self.force(j, &x);
+            rhs[j] = tau[j] - bias[j] - self.viscous[j] * dq[j] - self.dry_friction(j, &x, modes[j])
+                + self.force(j, &x);
         }
         self.solve(&inertia, &rhs, modes)
     }
 
     /// `M ddq = rhs` with the rows and columns of stuck joints taken out.
     #[inline]
-    fn solve(
-        &self,
-        inertia: &SMatrix<T, N, N>,
-        rhs: &SVector<T, N>,
-        modes: &[Mode; N],
-    ) -> Motion<T, N> {
+    fn solve(&self, inertia: &SMatrix<T, N, N>, rhs: &SVector<T, N>, modes: &[Mode; N]) -> Motion<T, N> {
         let stuck = self.stuck(modes);
         let (mut reduced, mut b) = (*inertia, *rhs);
         for j in 0..N {
@@ -257,19 +243,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// By how much the holding torque of joint `j` exceeds what friction can give, and the direction it would slide in.
     /// Not positive: it stays.
     #[inline]
-    pub fn excess(
-        &self,
-        j: usize,
-        t: T,
-        q: &SVector<T, N>,
-        tau: &SVector<T, N>,
-        holding: T,
-    ) -> (T, T) {
-        let direction = if holding < T::zero() {
-            -T::one()
-        } else {
-            T::one()
-        };
+    pub fn excess(&self, j: usize, t: T, q: &SVector<T, N>, tau: &SVector<T, N>, holding: T) -> (T, T) {
+        let direction = if holding < T::zero() { -T::one() } else { T::one() };
         // At rest the load of a joint is what has to be held.
         let x = self.point(j, t, q[j], T::zero(), tau[j], holding - tau[j]);
         (holding.abs() - self.level(j, &x, direction), direction)
@@ -280,9 +255,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         if self.smoothing == T::zero() {
             return T::zero();
         }
-        let (inertia, _) = self
-            .arm
-            .dynamics(&self.theta, q, &SVector::zeros(), self.tilt);
+        let (inertia, _) = self.arm.dynamics(&self.theta, q, &SVector::zeros(), self.tilt);
         let mut fastest = T::zero();
         for j in 0..N {
             let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());

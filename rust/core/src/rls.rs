@@ -77,11 +77,7 @@ impl<T: Real, const R: usize> Rls<T, R> {
 
     /// One sample with `M` errors: `psi` has one row per error.
     #[inline]
-    pub fn update<const M: usize>(
-        &mut self,
-        psi: &SMatrix<T, M, R>,
-        y: &SVector<T, M>,
-    ) -> Update<T, M> {
+    pub fn update<const M: usize>(&mut self, psi: &SMatrix<T, M, R>, y: &SVector<T, M>) -> Update<T, M> {
         let finite = psi.iter().chain(y.iter()).all(|x| x.is_finite());
         if !finite {
             self.rejected += 1;
@@ -113,11 +109,7 @@ impl<T: Real, const R: usize> Rls<T, R> {
 
     /// Equation (21), upper triangle computed and mirrored.
     #[inline]
-    fn reduced<const M: usize>(
-        &self,
-        g: &SMatrix<T, R, M>,
-        s: &SMatrix<T, M, M>,
-    ) -> SMatrix<T, R, R> {
+    fn reduced<const M: usize>(&self, g: &SMatrix<T, R, M>, s: &SMatrix<T, M, M>) -> SMatrix<T, R, R> {
         let scale = T::one() / self.forgetting;
         let mut p = self.p;
         for j in 0..R {

@@ -25,17 +25,12 @@ fn check<A: Arm<f64, N, P>, const N: usize, const P: usize>(arm: &A, theta: [f64
     // Momentum, energy and dissipation regressors.
     assert!((arm.momentum_regressor(&q, &dq) * vector - m * dq).amax() < 1e-12 * scale);
     let energy = arm.kinetic_energy(&theta, &q, &dq) + arm.potential_energy(&theta, &q);
-    assert!(
-        (arm.energy_regressor(&q, &dq).dot(&vector) - energy).abs() < 1e-12 * (1.0 + energy.abs())
-    );
+    assert!((arm.energy_regressor(&q, &dq).dot(&vector) - energy).abs() < 1e-12 * (1.0 + energy.abs()));
     let lost = dq.dot(&arm.friction(&theta, &dq));
-    assert!(
-        (arm.dissipation_regressor(&dq).dot(&vector) - lost).abs() < 1e-12 * (1.0 + lost.abs())
-    );
+    assert!((arm.dissipation_regressor(&dq).dot(&vector) - lost).abs() < 1e-12 * (1.0 + lost.abs()));
 
     // dM/dt - 2 C is skew-symmetric.
-    let rate = (arm.inertia(&theta, &(q + dq * STEP)) - arm.inertia(&theta, &(q - dq * STEP)))
-        / (2.0 * STEP);
+    let rate = (arm.inertia(&theta, &(q + dq * STEP)) - arm.inertia(&theta, &(q - dq * STEP))) / (2.0 * STEP);
     let skew: SMatrix<f64, N, N> = rate - c * 2.0;
     assert!((skew + skew.transpose()).amax() < 1e-7 * (1.0 + rate.amax()));
 
@@ -88,8 +83,7 @@ fn a_payload_moves_the_parameters_as_a_heavier_link_does() {
     let (mass, distance) = (0.5, 0.25);
     let total = bare.mass[1] + mass;
     let com = (bare.mass[1] * bare.com[1] + mass * distance) / total;
-    let about_joint =
-        bare.inertia[1] + bare.mass[1] * bare.com[1].powi(2) + mass * distance * distance;
+    let about_joint = bare.inertia[1] + bare.mass[1] * bare.com[1].powi(2) + mass * distance * distance;
     let loaded = LinkParameters {
         mass: [2.0, total],
         com: [0.2, com],
@@ -103,10 +97,6 @@ fn a_payload_moves_the_parameters_as_a_heavier_link_does() {
     }
     .payload(&[0.0; 9], mass, distance);
     for i in 0..5 {
-        assert!(
-            (after[i] - before[i] - delta[i]).abs() < 1e-12,
-            "theta{}",
-            i + 1
-        );
+        assert!((after[i] - before[i] - delta[i]).abs() < 1e-12, "theta{}", i + 1);
     }
 }

@@ -6,9 +6,7 @@ use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
 use nalgebra::{SVector, Vector2};
 
-const THETA: [f64; 9] = [
-    2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6, 1.734,
-];
+const THETA: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6, 1.734];
 const H: f64 = 0.0025;
 
 type Seed = Plant<f64, TwoLink<f64>, 2, 9>;
@@ -20,12 +18,8 @@ fn seed(theta: [f64; 9]) -> Seed {
 /// The torques (31) and (32).
 fn seed_torque(t: f64) -> [f64; 2] {
     [
-        (1.0 - (-0.8 * t).exp()) * 29.0
-            + 68.0 * (16.0 * t + 0.1).sin()
-            + 9.0 * (20.0 * t + 0.15).sin(),
-        (1.0 - (-1.8 * t).exp()) * 1.2
-            + 8.0 * (26.0 * t + 0.08).sin()
-            + 2.0 * (12.0 * t + 0.34).sin(),
+        (1.0 - (-0.8 * t).exp()) * 29.0 + 68.0 * (16.0 * t + 0.1).sin() + 9.0 * (20.0 * t + 0.15).sin(),
+        (1.0 - (-1.8 * t).exp()) * 1.2 + 8.0 * (26.0 * t + 0.08).sin() + 2.0 * (12.0 * t + 0.34).sin(),
     ]
 }
 
@@ -186,10 +180,7 @@ fn a_smoothed_sign_tends_to_dry_friction() {
             .amax()
     };
     let gaps = [0.1, 0.01, 0.001].map(gap);
-    assert!(
-        gaps[0] > 4.0 * gaps[1] && gaps[1] > 4.0 * gaps[2],
-        "{gaps:?}"
-    );
+    assert!(gaps[0] > 4.0 * gaps[1] && gaps[1] > 4.0 * gaps[2], "{gaps:?}");
 }
 
 #[test]

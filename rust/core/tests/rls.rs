@@ -44,14 +44,7 @@ fn batch(rows: &[(SMatrix<f64, 3, 6>, SVector<f64, 3>)], p0: f64) -> SVector<f64
 fn with_forgetting_one_it_is_batch_least_squares_in_any_order_of_joints() {
     let data = rows(2000);
     let expected = batch(&data, 1000.0);
-    for order in [
-        [0, 1, 2],
-        [0, 2, 1],
-        [1, 0, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [2, 1, 0],
-    ] {
+    for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
         let mut rls = Rls::new(SVector::<f64, 6>::zeros(), 1000.0, 1.0);
         for (psi, y) in &data {
             let psi = SMatrix::<f64, 3, 6>::from_fn(|i, j| psi[(order[i], j)]);
@@ -84,9 +77,7 @@ fn covariance_stays_positive_definite_over_a_million_updates() {
     let mut noise = Noise(3);
     let mut rls = Rls::new(SVector::<f64, 6>::zeros(), 1000.0, 1.0);
     for k in 0..1_000_000 {
-        let psi = SMatrix::<f64, 2, 6>::from_fn(|_, j| {
-            noise.next() * [1.0, 1e-2, 10.0, 1.0, 0.3, 5.0][j]
-        });
+        let psi = SMatrix::<f64, 2, 6>::from_fn(|_, j| noise.next() * [1.0, 1e-2, 10.0, 1.0, 0.3, 5.0][j]);
         let y = psi * SVector::from(TRUTH);
         rls.update(&psi, &y);
         if k % 50_000 == 0 || k == 999_999 {

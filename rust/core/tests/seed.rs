@@ -24,12 +24,8 @@ fn theta() -> [f64; 9] {
 
 fn torque(t: f64) -> [f64; 2] {
     [
-        (1.0 - (-0.8 * t).exp()) * 29.0
-            + 68.0 * (16.0 * t + 0.1).sin()
-            + 9.0 * (20.0 * t + 0.15).sin(),
-        (1.0 - (-1.8 * t).exp()) * 1.2
-            + 8.0 * (26.0 * t + 0.08).sin()
-            + 2.0 * (12.0 * t + 0.34).sin(),
+        (1.0 - (-0.8 * t).exp()) * 29.0 + 68.0 * (16.0 * t + 0.1).sin() + 9.0 * (20.0 * t + 0.15).sin(),
+        (1.0 - (-1.8 * t).exp()) * 1.2 + 8.0 * (26.0 * t + 0.08).sin() + 2.0 * (12.0 * t + 0.34).sin(),
     ]
 }
 
@@ -96,11 +92,7 @@ fn positions_only(samples: &[Sample<f64, 2>]) -> Vec<Sample<f64, 2>> {
     samples.iter().map(|s| Sample { dq: None, ..*s }).collect()
 }
 
-fn estimate<const R: usize>(
-    samples: &[Sample<f64, 2>],
-    scheme: Scheme,
-    variant: Variant,
-) -> SVector<f64, R> {
+fn estimate<const R: usize>(samples: &[Sample<f64, 2>], scheme: Scheme, variant: Variant) -> SVector<f64, R> {
     let arm = TwoLink::new(9.81, Some(0.45), &theta());
     let settings = Settings {
         scheme,
@@ -126,11 +118,7 @@ fn table_1_gives_the_measured_column_of_table_2() {
     // Table II follows from Table I digit by digit once first moments carry three decimals, as a table of measurements would:
     // m1 lc1 = 2.175, m2 l1 = 1.746 and m2 lc2 = 0.186 kg m. theta1 is cut, not rounded, after its third decimal.
     let [theta1, _, theta3, ..] = theta();
-    let (m1_lc1, m2_l1, m2_lc2) = (
-        moment(23.902, 0.091),
-        moment(3.880, 0.45),
-        moment(3.880, 0.048),
-    );
+    let (m1_lc1, m2_l1, m2_lc2) = (moment(23.902, 0.091), moment(3.880, 0.45), moment(3.880, 0.048));
     let derived = [
         (theta1 * 1e3).floor() / 1e3,
         0.45 * m2_lc2,
@@ -138,10 +126,7 @@ fn table_1_gives_the_measured_column_of_table_2() {
         9.81 * (m1_lc1 + m2_l1),
         9.81 * m2_lc2,
     ];
-    for (ours, paper) in derived
-        .iter()
-        .zip(["2.351", "0.084", "0.102", "38.465", "1.825"])
-    {
+    for (ours, paper) in derived.iter().zip(["2.351", "0.084", "0.102", "38.465", "1.825"]) {
         assert_eq!(format!("{ours:.3}"), paper);
     }
     // Without that rounding the distance stays below two units of the last digit that the paper prints.
@@ -172,12 +157,7 @@ fn exact_filters_recover_all_nine_parameters() {
         let found = estimate::<11>(&samples, scheme, Variant::Exact);
         for (i, truth) in theta().iter().enumerate() {
             let off = relative(found[i], *truth);
-            assert!(
-                off.abs() < 0.01,
-                "{}: theta{} off by {off}",
-                scheme.name(),
-                i + 1
-            );
+            assert!(off.abs() < 0.01, "{}: theta{} off by {off}", scheme.name(), i + 1);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::model::{Hypothesis, Placed};
 use crate::screen::{Scored, candidates, screen};
-use crate::solve::Fit;
+use crate::solve::{Effort, Fit};
 use crate::study::{Study, Weights};
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
@@ -11,7 +11,16 @@ use rayon::prelude::*;
 const FULL_FITS: usize = 12;
 
 /// Candidates that are fitted again under the weights of the best.
-const FINALISTS: usize = 6;
+const FINALISTS: usize = 4;
+
+/// Rounds in which the finalists are fitted under weights of the best one's residual.
+const MAX_REWEIGHTINGS: usize = 3;
+
+/// A residual whose scale has shrunk by less than this factor needs no new weights.
+const SHRUNK: f64 = 1.15;
+
+/// A candidate that leaves less than this part of its trace unexplained by the arm's own parameters shows only against trusted values.
+const ABSORBED: f64 = 0.03;
 
 /// Widths of smoothed friction that are tried as a nuisance, relative to the slowest joint's RMS speed.
 const SMOOTHING: [f64; 3] = [0.01, 0.03, 0.1];
@@ -80,6 +89,8 @@ pub struct Stage<const N: usize, const P: usize> {
     pub weights: Weights<N>,
     /// Cost the measurement noise alone would leave on the holdout, under these weights.
     pub floor: f64,
+    /// Cost that predicting no motion at all within each window would have on the holdout.
+    pub motion: f64,
 }
 
 impl<const N: usize, const P: usize> Stage<N, P> {
@@ -88,6 +99,18 @@ impl<const N: usize, const P: usize> Stage<N, P> {
         let base: f64 = self.base.holdout.iter().sum();
         let here: f64 = contender.holdout.iter().sum();
         (base - here) / (base - self.floor).max(1e-9 * base)
+    }
+
+    /// RMS improvement of a contender on the holdout, relative to the motion within the windows.
+    pub fn relevance(&self, contender: &Contender<P>) -> f64 {
+        let base: f64 = self.base.holdout.iter().sum();
+        let here: f64 = contender.holdout.iter().sum();
+        ((base - here).max(0.0) / self.motion).sqrt()
+    }
+
+    /// RMS error of the current model on the holdout, relative to the motion within the windows.
+    pub fn relative_error(&self) -> f64 {
+        (self.base.holdout.iter().sum::<f64>() / self.motion).sqrt()
     }
 
     /// How far the current model's cost lies above the floor, as a factor.
@@ -104,12 +127,16 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
         let mut starts: Vec<Hypothesis<P>> = promising(&screened)
             .into_iter()
-            .map(|effect| fit.hypothesis.with(effect))
+            .map(|effect| {
+                self.loaded(&fit.hypothesis, effect)
+                    .unwrap_or_else(|| fit.hypothesis.with(effect))
+            })
             .collect();
         starts.extend(self.smoother(&fit.hypothesis));
-        let first = self.contend(&weights, &fit.hypothesis, starts);
+        let first = self.contend(&weights, &fit.hypothesis, starts, Effort::ROUGH);
         let (base, contenders, weights) = self.final_round(&fit.hypothesis, first, weights);
         let floor = self.floor(&weights);
+        let motion = self.motion(&weights);
         Stage {
             settled: fit,
             base,
@@ -117,6 +144,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             screened,
             weights,
             floor,
+            motion,
         }
     }
 
@@ -129,14 +157,39 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             .collect()
     }
 
+    /// The model with the load that brings its parameters closest to their trusted values, the motion staying the same; none for effects
+    /// that are no loads.
+    ///
+    /// For a given distance the parameters' shift is linear in the mass, so one line of candidates over the distance suffices.
+    fn loaded(&self, model: &Hypothesis<P>, effect: Placed) -> Option<Hypothesis<P>> {
+        effect.law.payload(&effect.p)?;
+        let off: Vec<f64> = (0..P)
+            .map(|i| (model.theta[i] - self.prior.theta[i]) / self.prior.sigma[i])
+            .collect();
+        let attempt = |step: usize| {
+            let distance = self.scales.length * 0.02 * step as f64;
+            let unit = self.arm.payload(&model.theta, 1.0, distance);
+            let shift: Vec<f64> = (0..P).map(|i| unit[i] / self.prior.sigma[i]).collect();
+            let along: f64 = shift.iter().map(|s| s * s).sum();
+            let mass = (off.iter().zip(&shift).map(|(o, s)| o * s).sum::<f64>() / along).max(0.0);
+            let left: f64 = off.iter().zip(&shift).map(|(o, s)| (o - mass * s).powi(2)).sum();
+            (left, mass, distance, unit)
+        };
+        let best = (1..=150).map(attempt).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (_, mass, distance, unit) = best;
+        let mut start = model.with(Placed {
+            p: [mass, distance, 0.0],
+            ..effect
+        });
+        for (value, shift) in start.theta.iter_mut().zip(unit) {
+            *value -= mass * shift;
+        }
+        Some(start)
+    }
+
     /// The model with smoother friction, or with exact friction if it is smoothed now.
     fn smoother(&self, model: &Hypothesis<P>) -> Vec<Hypothesis<P>> {
-        let slowest = self
-            .scales
-            .speed
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min);
+        let slowest = self.scales.speed.iter().copied().fold(f64::INFINITY, f64::min);
         let widths = SMOOTHING.iter().map(|w| w * slowest).chain([0.0]);
         let other = widths.filter(|w| *w != model.smoothing);
         other
@@ -153,15 +206,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         weights: &Weights<N>,
         base: &Hypothesis<P>,
         starts: Vec<Hypothesis<P>>,
+        effort: Effort,
     ) -> Vec<Contender<P>> {
         let known = base.effects.len();
         let mut contenders: Vec<Contender<P>> = starts
             .into_par_iter()
             .map(|start| {
-                let fit = self.problem(&weights.training).solve(&start);
-                let training = self
-                    .problem(&weights.training)
-                    .window_costs(&fit.hypothesis);
+                let fit = self.problem(&weights.training).solve(&start, effort);
+                let training = self.problem(&weights.training).window_costs(&fit.hypothesis);
                 let holdout = self.judge(&weights.holdout).window_costs(&fit.hypothesis);
                 let effect = fit.hypothesis.effects.get(known).copied();
                 Contender {
@@ -195,7 +247,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         mut contenders: Vec<Contender<P>>,
         mut weights: Weights<N>,
     ) -> (Contender<P>, Vec<Contender<P>>, Weights<N>) {
-        for _ in 0..3 {
+        for _ in 0..MAX_REWEIGHTINGS {
             let Some(best) = contenders.first() else {
                 break;
             };
@@ -203,18 +255,34 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let shrunk = (0..N)
                 .map(|j| weights.training.scale[j] / scale[j])
                 .fold(0.0, f64::max);
-            if shrunk < 1.15 {
+            if shrunk > SHRUNK {
+                weights = self.weights(&best.fit.hypothesis, scale);
+            }
+            let starts = finalists(contenders);
+            contenders = self.contend(&weights, current, starts, Effort::FULL);
+            if shrunk <= SHRUNK {
                 break;
             }
-            weights = self.weights(&best.fit.hypothesis, scale);
-            contenders.truncate(FINALISTS);
-            let starts = contenders.into_iter().map(|c| c.fit.hypothesis).collect();
-            contenders = self.contend(&weights, current, starts);
         }
         let base = self
-            .contend(&weights, current, vec![current.clone()])
+            .contend(&weights, current, vec![current.clone()], Effort::FULL)
             .remove(0);
         (base, contenders, weights)
+    }
+
+    /// Cost of predicting that every joint stays where its window starts.
+    fn motion(&self, weights: &Weights<N>) -> f64 {
+        let data = &self.holdout.data;
+        let moved = data.windows.iter().map(|window| {
+            let rows = self.holdout.measured[window.range()].chunks_exact(N);
+            rows.map(|row| {
+                (0..N)
+                    .map(|j| ((row[j] - window.start.q[j]) / weights.holdout.scale[j]).powi(2))
+                    .sum::<f64>()
+            })
+            .sum::<f64>()
+        });
+        moved.sum()
     }
 
     /// Cost that measurement noise alone leaves on the holdout.
@@ -226,13 +294,26 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 }
 
-/// The best start of each of the best-scoring candidates.
+/// Hypotheses to be fitted to the end: the best by cost, and the best by closeness to trusted values.
+fn finalists<const P: usize>(contenders: Vec<Contender<P>>) -> Vec<Hypothesis<P>> {
+    let mut by_trust: Vec<usize> = (FINALISTS.min(contenders.len())..contenders.len()).collect();
+    let prior = |i: &usize| contenders[*i].fit.prior_cost;
+    by_trust.sort_by(|a, b| prior(a).total_cmp(&prior(b)));
+    by_trust.truncate(FINALISTS / 2);
+    let kept = contenders.iter().enumerate();
+    kept.filter(|(i, _)| *i < FINALISTS || by_trust.contains(i))
+        .map(|(_, c)| c.fit.hypothesis.clone())
+        .collect()
+}
+
+/// The best start of each of the best-scoring candidates, and of those that only trusted values can reveal.
 fn promising(screened: &[Scored]) -> Vec<Placed> {
     let mut order: Vec<&Scored> = screened.iter().filter(|s| s.gain > 0.0).collect();
     order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut chosen: Vec<Placed> = Vec::new();
     for scored in order {
-        if chosen.len() < FULL_FITS && !chosen.iter().any(|c| c.same_place(&scored.effect)) {
+        let wanted = chosen.len() < FULL_FITS || scored.distinct < ABSORBED;
+        if wanted && !chosen.iter().any(|c| c.same_place(&scored.effect)) {
             chosen.push(scored.effect);
         }
     }

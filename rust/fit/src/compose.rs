@@ -1,15 +1,14 @@
 //! From an attribution to the diagnosis as data.
 
 use crate::arm::ArmDescription;
-use crate::decide::{Attribution, Random};
+use crate::decide::{Attribution, CONSEQUENCE, Random};
 use crate::diagnose::Options;
 use crate::locate::{Lacks, lacking_torque, places, regimes};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
 use crate::report::{
-    ArmSummary, Bound, Cause, Diagnosis, EquivalentSummary, FreeRun, FreeRunSeries, Gap,
-    LogSummary, Named, Noise, OptionSummary, Parameters, Ranked, RuledOut, Series, StageSummary,
-    Value,
+    ArmSummary, Bound, Cause, Diagnosis, EquivalentSummary, FreeRun, FreeRunSeries, Gap, LogSummary, Named,
+    Noise, OptionSummary, Parameters, Ranked, RuledOut, Series, StageSummary, Value,
 };
 use crate::screen::{Scored, screen};
 use crate::solve::Fit;
@@ -71,11 +70,7 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         verdict,
         places: places(gap_of, &regimes, &study.scales.torque),
         gap,
-        causes: attribution
-            .causes
-            .iter()
-            .map(|c| cause(c, N, rotary))
-            .collect(),
+        causes: attribution.causes.iter().map(|c| cause(c, N, rotary)).collect(),
         ruled_out: ruled_out(study, &attribution, rotary),
         parameters: Parameters {
             nominal: nominal(study, description),
@@ -113,10 +108,7 @@ struct Errors<const N: usize> {
 }
 
 impl<const N: usize> Errors<N> {
-    fn new<A: Arm<f64, N, P>, const P: usize>(
-        study: &Study<A, N, P>,
-        compared: &Compared<P>,
-    ) -> Self {
+    fn new<A: Arm<f64, N, P>, const P: usize>(study: &Study<A, N, P>, compared: &Compared<P>) -> Self {
         let data = &study.holdout.data;
         let starts = data.measured_starts();
         let predict = |h: &Hypothesis<P>| data.predict(&study.arm, h, &starts);
@@ -169,8 +161,7 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     model: &Hypothesis<P>,
 ) -> [f64; N] {
     let data = &study.holdout.data;
-    let columns =
-        crate::metric::start_sensitivities(data, &study.arm, model, &data.measured_starts());
+    let columns = crate::metric::start_sensitivities(data, &study.arm, model, &data.measured_starts());
     let mut sum = [0.0; N];
     for window in &data.windows {
         for row in window.range().step_by(N) {
@@ -212,11 +203,7 @@ fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let after = rms::<N>(measured, &errors.after);
     Gap {
         horizon_s: options.horizon,
-        unit: if description.kind.rotary() {
-            "rad"
-        } else {
-            "m"
-        },
+        unit: if description.kind.rotary() { "rad" } else { "m" },
         closed: closed(&before, &after, &floor),
         closed_ci: closed_interval(study, errors, &floor, options.seed),
         refit: rms::<N>(measured, &errors.refit),
@@ -275,19 +262,14 @@ fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             let rows: usize = draw.iter().map(|&w| data.windows[w].rows()).sum();
             let pooled = |table: &[[f64; N]]| -> Vec<f64> {
                 (0..N)
-                    .map(|j| {
-                        (draw.iter().map(|&w| table[w][j]).sum::<f64>() / rows.max(1) as f64).sqrt()
-                    })
+                    .map(|j| (draw.iter().map(|&w| table[w][j]).sum::<f64>() / rows.max(1) as f64).sqrt())
                     .collect()
             };
             closed(&pooled(&before), &pooled(&after), floor)
         })
         .collect();
     shares.sort_by(f64::total_cmp);
-    [
-        shares[RESAMPLES / 40],
-        shares[RESAMPLES - 1 - RESAMPLES / 40],
-    ]
+    [shares[RESAMPLES / 40], shares[RESAMPLES - 1 - RESAMPLES / 40]]
 }
 
 /// The holdout as one window per log.
@@ -348,11 +330,7 @@ fn free_run_series<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             .step_by(window.rows().div_ceil(DRAWN))
             .collect();
         for j in 0..N {
-            let pick = |x: &[f64]| {
-                rows.iter()
-                    .map(|i| x[(window.offset + i) * N + j])
-                    .collect()
-            };
+            let pick = |x: &[f64]| rows.iter().map(|i| x[(window.offset + i) * N + j]).collect();
             all.push(FreeRunSeries {
                 log: track.name.clone(),
                 joint: j + 1,
@@ -381,15 +359,12 @@ fn lacks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 }
 
 /// What the figures amount to.
-fn verdict<const N: usize, const P: usize>(
-    attribution: &Attribution<N, P>,
-    gap: &Gap,
-) -> &'static str {
+fn verdict<const N: usize, const P: usize>(attribution: &Attribution<N, P>, gap: &Gap) -> &'static str {
     if !attribution.causes.is_empty() {
         return "effect";
     }
     let stage = &attribution.stages[attribution.stages.len() - 1];
-    if stage.excess() > UNEXPLAINED {
+    if stage.excess() > UNEXPLAINED && stage.relative_error() > CONSEQUENCE {
         return "unexplained";
     }
     let improved = gap
@@ -399,11 +374,7 @@ fn verdict<const N: usize, const P: usize>(
         .zip(&gap.floor)
         .any(|((b, r), f)| b - r > 0.1 * b && *b > 1.2 * f);
     let moved = attribution.refit.prior_cost > 1.0;
-    if improved && moved {
-        "parameters"
-    } else {
-        "none"
-    }
+    if improved && moved { "parameters" } else { "none" }
 }
 
 /// Cost above the floor, as a factor, beyond which a gap without a cause is called unexplained.
@@ -460,10 +431,7 @@ fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let mut list: Vec<(Placed, RuledOut)> = Vec::new();
     for test in &scored {
         let entry = status(study, test, rotary);
-        match list
-            .iter_mut()
-            .find(|(place, _)| place.same_place(&test.effect))
-        {
+        match list.iter_mut().find(|(place, _)| place.same_place(&test.effect)) {
             // The weakest statement over an effect's shapes holds for the effect.
             Some((_, known)) if weaker(&entry, known) => *known = entry,
             Some(_) => {}
@@ -495,10 +463,7 @@ fn status<A, const N: usize, const P: usize>(
     let sigma = test.sigma.max(test.information_sigma);
     let (effect, joint) = (spec.name, test.effect.joint_number());
     if !(sigma < PINNED * typical) {
-        let why = format!(
-            "these logs do not pin it down; it needs {}",
-            spec.excited_by
-        );
+        let why = format!("these logs do not pin it down; it needs {}", spec.excited_by);
         return RuledOut {
             effect,
             joint,
@@ -521,8 +486,7 @@ fn status<A, const N: usize, const P: usize>(
         status: if traced { "undecided" } else { "absent" },
         bound: Some(bound),
         why: traced.then(|| {
-            "it leaves a trace in the training logs, but does not reduce the gap on the holdout"
-                .to_owned()
+            "it leaves a trace in the training logs, but does not reduce the gap on the holdout".to_owned()
         }),
     }
 }
@@ -545,6 +509,7 @@ fn ranking<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             joint: effect.joint_number(),
             closed: stage.share(c),
             gain: stage.base.score() - c.score(),
+            trust: c.fit.prior_cost,
             z: c.z_over(&stage.base),
             rms: rms::<N>(
                 &study.holdout.measured,
@@ -583,6 +548,8 @@ fn stages<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             &data.predict(&study.arm, &stage.settled.hypothesis, &starts),
         ),
         excess: stage.excess(),
+        relative_error: stage.relative_error(),
+        trust: stage.base.fit.prior_cost,
     };
     attribution.stages.iter().enumerate().map(summary).collect()
 }
@@ -647,12 +614,7 @@ fn logs<const N: usize>(sample: &Sample<N>) -> Vec<LogSummary> {
 }
 
 fn noise<A, const N: usize, const P: usize>(study: &Study<A, N, P>) -> Noise {
-    let step = study
-        .training
-        .data
-        .tracks
-        .first()
-        .map_or([0.0; N], |t| t.step);
+    let step = study.training.data.tracks.first().map_or([0.0; N], |t| t.step);
     Noise {
         position_sigma: study.noise.to_vec(),
         encoder_step: step.to_vec(),
@@ -668,7 +630,7 @@ fn notes<const N: usize, const P: usize>(attribution: &Attribution<N, P>) -> Vec
         ));
     }
     let last = &attribution.stages[attribution.stages.len() - 1];
-    if !attribution.causes.is_empty() && last.excess() > UNEXPLAINED {
+    if !attribution.causes.is_empty() && last.excess() > UNEXPLAINED && last.relative_error() > CONSEQUENCE {
         notes.push("a gap remains that no further effect in the library explains".to_owned());
     }
     notes

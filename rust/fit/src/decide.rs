@@ -5,7 +5,7 @@
 
 use crate::attribute::{Contender, Stage};
 use crate::model::{Hypothesis, Placed};
-use crate::solve::Fit;
+use crate::solve::{Effort, Fit};
 use crate::study::Study;
 use armgap_core::arm::Arm;
 
@@ -16,13 +16,25 @@ const CERTAIN: f64 = 3.5;
 const HOLDOUT_CERTAIN: f64 = 1.0;
 
 /// Share of the gap above the floor below which an improvement does not matter.
-const MATTERS: f64 = 0.05;
+const MATTERS: f64 = 0.1;
+
+/// The same where the gap itself is of no consequence: only an effect that explains most of it counts.
+const MATTERS_IN_SMALL: f64 = 0.5;
 
 /// Cost above the floor, as a factor, below which there is nothing left to explain.
 const ABOVE_FLOOR: f64 = 1.25;
 
 /// Decrease of the distance from trusted values, in squared sigmas, that makes a cause on its own.
 const TRUST_GAIN: f64 = 16.0;
+
+/// Contenders whose distance from trusted values differs by less, in squared sigmas, are look-alikes.
+const ALIKE_TRUST: f64 = 6.0;
+
+/// Error relative to the motion within a window below which a gap is of no consequence, whatever the encoders resolve.
+pub const CONSEQUENCE: f64 = 3e-3;
+
+/// Improvement relative to the motion within a window below which an effect is of no consequence.
+const RELEVANT: f64 = 1e-4;
 
 /// Resamples of the windows.
 const RESAMPLES: usize = 400;
@@ -68,13 +80,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let (mut causes, mut stages): (Vec<Cause>, Vec<Stage<N, P>>) = (Vec::new(), Vec::new());
         let mut smoothed = false;
         while causes.len() < max_causes {
-            let Some(choice) = choose(&stage, smoothed) else {
+            let Some((choice, ground)) = choose(&stage, smoothed) else {
                 break;
             };
             let best = &stage.contenders[choice];
             model = best.fit.clone();
             match best.effect {
-                Some(_) => causes.push(name(&stage, choice, seed)),
+                Some(_) => causes.push(name(&stage, choice, ground, seed)),
                 None => smoothed = true,
             }
             scale = stage.weights.training.scale;
@@ -100,10 +112,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let full = self.judged(stage, model.clone(), None);
             let mut without = model.hypothesis.clone();
             without.effects.remove(i);
-            let fit = self.problem(&stage.weights.training).solve(&without);
+            let fit = self
+                .problem(&stage.weights.training)
+                .solve(&without, Effort::FULL);
             let reduced = self.judged(stage, fit, None);
-            let idle = full.z_over(&reduced) < CERTAIN
-                && reduced.fit.prior_cost - full.fit.prior_cost < TRUST_GAIN;
+            let idle =
+                full.z_over(&reduced) < CERTAIN && reduced.fit.prior_cost - full.fit.prior_cost < TRUST_GAIN;
             if idle {
                 *model = reduced.fit;
                 causes.remove(i);
@@ -118,9 +132,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let training = self
             .problem(&stage.weights.training)
             .window_costs(&fit.hypothesis);
-        let holdout = self
-            .judge(&stage.weights.holdout)
-            .window_costs(&fit.hypothesis);
+        let holdout = self.judge(&stage.weights.holdout).window_costs(&fit.hypothesis);
         Contender {
             effect,
             fit,
@@ -130,34 +142,72 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 }
 
-/// Index of the contender to adopt, if any deserves it; smoother friction is adopted once.
-fn choose<const N: usize, const P: usize>(stage: &Stage<N, P>, smoothed: bool) -> Option<usize> {
-    let (index, best) = stage
+/// Why a contender deserves to be adopted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ground {
+    /// It moves predictions closer to the measurement.
+    Motion,
+    /// It brings the parameters back to their trusted values.
+    Trust,
+}
+
+/// Index of the contender to adopt, and why, if any deserves it; smoother friction is adopted once.
+fn choose<const N: usize, const P: usize>(stage: &Stage<N, P>, smoothed: bool) -> Option<(usize, Ground)> {
+    let open = |c: &Contender<P>| c.effect.is_some() || !smoothed;
+    let by_motion = stage
         .contenders
         .iter()
-        .enumerate()
-        .find(|(_, c)| c.effect.is_some() || !smoothed)?;
-    let moves = stage.excess() > ABOVE_FLOOR
-        && stage.share(best) > MATTERS
-        && best.z_over(&stage.base) > CERTAIN
-        && best.holdout_z_over(&stage.base) > HOLDOUT_CERTAIN;
-    let trust = stage.base.fit.prior_cost - best.fit.prior_cost;
+        .position(|c| open(c))
+        .filter(|i| moves(stage, &stage.contenders[*i]));
+    if let Some(index) = by_motion {
+        return Some((index, Ground::Motion));
+    }
+    let trust = |i: &usize| stage.contenders[*i].fit.prior_cost;
+    (0..stage.contenders.len())
+        .filter(|i| restores(stage, &stage.contenders[*i]))
+        .min_by(|a, b| trust(a).total_cmp(&trust(b)))
+        .map(|index| (index, Ground::Trust))
+}
+
+/// Whether a contender closes a part of the gap that matters, on the holdout too.
+fn moves<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Contender<P>) -> bool {
+    let matters = if stage.relative_error() > CONSEQUENCE {
+        MATTERS
+    } else {
+        MATTERS_IN_SMALL
+    };
+    stage.excess() > ABOVE_FLOOR
+        && stage.share(contender) > matters
+        && stage.relevance(contender) > RELEVANT
+        && contender.z_over(&stage.base) > CERTAIN
+        && contender.holdout_z_over(&stage.base) > HOLDOUT_CERTAIN
+}
+
+/// Whether a contender explains implausible parameters by one effect.
+fn restores<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Contender<P>) -> bool {
+    let before = stage.base.fit.prior_cost;
     let plausible = (P as f64) + 3.0 * (2.0 * P as f64).sqrt();
-    let restores = best.effect.is_some()
-        && trust > TRUST_GAIN
-        && stage.base.fit.prior_cost > plausible
-        && best.fit.prior_cost < 0.4 * stage.base.fit.prior_cost
-        && best.score() < stage.base.score();
-    (moves || restores).then_some(index)
+    contender.effect.is_some()
+        && before > plausible
+        && before - contender.fit.prior_cost > TRUST_GAIN
+        && contender.fit.prior_cost < 0.4 * before
+        && contender.score() < stage.base.score()
 }
 
 /// The chosen contender as a cause, with its look-alikes and probability.
-fn name<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usize, seed: u64) -> Cause {
+fn name<const N: usize, const P: usize>(
+    stage: &Stage<N, P>,
+    choice: usize,
+    ground: Ground,
+    seed: u64,
+) -> Cause {
     let best = &stage.contenders[choice];
     let advantage = stage.base.score() - best.score();
-    let alike = |c: &&Contender<P>| {
-        let close = c.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0);
-        close || best.z_over(c) < 1.0
+    let alike = |c: &&Contender<P>| match ground {
+        Ground::Motion => {
+            c.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0) || best.z_over(c) < 1.0
+        }
+        Ground::Trust => restores(stage, c) && c.fit.prior_cost - best.fit.prior_cost < ALIKE_TRUST,
     };
     let others = stage
         .contenders
@@ -176,7 +226,10 @@ fn name<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usize, seed
     Cause {
         effect,
         sigma: Vec::new(),
-        probability: probability(stage, choice, &look_alikes, seed),
+        probability: match ground {
+            Ground::Motion => probability(stage, choice, &look_alikes, seed),
+            Ground::Trust => trust_probability(stage, choice, &look_alikes),
+        },
         share: stage.share(best).clamp(0.0, 1.0),
         look_alikes,
     }
@@ -219,6 +272,29 @@ fn probability<const N: usize, const P: usize>(
     (f64::from(wins) + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
+/// Probability of the chosen contender, or a look-alike, among all effects that would restore the trusted values, from their distances.
+fn trust_probability<const N: usize, const P: usize>(
+    stage: &Stage<N, P>,
+    choice: usize,
+    look_alikes: &[Placed],
+) -> f64 {
+    let best = stage.contenders[choice].fit.prior_cost;
+    let mass = |c: &Contender<P>| (-0.5 * (c.fit.prior_cost - best)).exp();
+    let (mut ours, mut all) = (0.0, 0.0);
+    for (i, contender) in stage.contenders.iter().enumerate() {
+        let Some(effect) = contender.effect else {
+            continue;
+        };
+        all += mass(contender);
+        if i == choice || look_alikes.iter().any(|l| l.same_place(&effect)) {
+            ours += mass(contender);
+        }
+    }
+    // What is left over by the best effect must itself be plausible, or the values are simply wrong.
+    let plausible = (-0.5 * (best - P as f64).max(0.0) / (2.0 * P as f64).sqrt()).exp();
+    (ours / all) * plausible
+}
+
 /// Values and standard deviations of the causes from the final model.
 fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
     for cause in causes.iter_mut() {
@@ -226,9 +302,7 @@ fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
         for effect in &model.hypothesis.effects {
             if effect.same_place(&cause.effect) {
                 cause.effect = *effect;
-                cause.sigma = (first..first + effect.len())
-                    .map(|i| model.sigma(i))
-                    .collect();
+                cause.sigma = (first..first + effect.len()).map(|i| model.sigma(i)).collect();
             }
             first += effect.len();
         }

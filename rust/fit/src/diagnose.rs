@@ -73,11 +73,7 @@ impl std::fmt::Display for DiagnoseError {
                 kind.name(),
                 kind.parameters().len()
             ),
-            Self::TooShort {
-                set,
-                windows,
-                needed,
-            } => write!(
+            Self::TooShort { set, windows, needed } => write!(
                 f,
                 "the {set} logs hold {windows} windows of the prediction horizon, {needed} are needed; give more data or a shorter horizon"
             ),
@@ -85,10 +81,7 @@ impl std::fmt::Display for DiagnoseError {
                 f,
                 "log `{name}` holds values that are not finite, or times that do not increase"
             ),
-            Self::Horizon(h) => write!(
-                f,
-                "the horizon must be a positive number of seconds, not {h}"
-            ),
+            Self::Horizon(h) => write!(f, "the horizon must be a positive number of seconds, not {h}"),
         }
     }
 }
@@ -109,12 +102,7 @@ pub fn diagnose(
         return Err(DiagnoseError::Horizon(options.horizon));
     }
     for log in training.iter().chain(holdout) {
-        let finite = log
-            .t
-            .iter()
-            .chain(log.q)
-            .chain(log.tau)
-            .all(|x| x.is_finite());
+        let finite = log.t.iter().chain(log.q).chain(log.tau).all(|x| x.is_finite());
         if !finite || log.t.windows(2).any(|w| w[1] <= w[0]) || log.t.len() < 2 {
             return Err(DiagnoseError::BadSamples(log.name.clone()));
         }
@@ -159,18 +147,8 @@ impl Request<'_> {
     ) -> Result<Study<A, N, P>, DiagnoseError> {
         let training = self.sample::<N>("training", self.training)?;
         let holdout = self.sample::<N>("holdout", self.holdout)?;
-        let length = self
-            .arm
-            .link_length
-            .as_ref()
-            .and_then(|l| l.last().copied());
-        let scales = Scales::new(
-            &arm,
-            &theta,
-            &training.data.tracks,
-            self.arm.gravity,
-            length,
-        );
+        let length = self.arm.link_length.as_ref().and_then(|l| l.last().copied());
+        let scales = Scales::new(&arm, &theta, &training.data.tracks, self.arm.gravity, length);
         let sigma = std::array::from_fn(|i| self.arm.sigma[i]);
         let prior = Prior {
             theta,

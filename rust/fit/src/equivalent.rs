@@ -24,24 +24,33 @@ pub fn known(effect: &Placed, joints: usize) -> Vec<Equivalent> {
         }]
     };
     match effect.law.spec().name {
-        "coulomb_asymmetry" => {
-            one("torque_offset", joint, "the same function of time while the joint moves; a reading at rest with the motor off separates them")
-        }
-        "torque_offset" => {
-            one("coulomb_asymmetry", joint, "the same function of time while the joint moves; a reading at rest with the motor off separates them")
-        }
-        "base_tilt" => {
-            one("encoder_offset", Some(1), "both turn gravity by one angle; a level on the base separates them")
-        }
-        "encoder_offset" if joint == Some(1) => {
-            one("base_tilt", None, "both turn gravity by one angle; a level on the base separates them")
-        }
+        "coulomb_asymmetry" => one(
+            "torque_offset",
+            joint,
+            "the same function of time while the joint moves; a reading at rest with the motor off separates them",
+        ),
+        "torque_offset" => one(
+            "coulomb_asymmetry",
+            joint,
+            "the same function of time while the joint moves; a reading at rest with the motor off separates them",
+        ),
+        "base_tilt" => one(
+            "encoder_offset",
+            Some(1),
+            "both turn gravity by one angle; a level on the base separates them",
+        ),
+        "encoder_offset" if joint == Some(1) => one(
+            "base_tilt",
+            None,
+            "both turn gravity by one angle; a level on the base separates them",
+        ),
         "torque_gain" => (1..=joints)
             .filter(|j| Some(*j) != joint)
             .map(|j| Equivalent {
                 effect: "torque_gain",
                 joint: Some(j),
-                why: "the inverse gain there with all parameters scaled; a known added mass separates them".to_owned(),
+                why: "the inverse gain there with all parameters scaled; a known added mass separates them"
+                    .to_owned(),
             })
             .collect(),
         _ => Vec::new(),
@@ -54,8 +63,7 @@ pub fn all(effect: &Placed, look_alikes: &[Placed], joints: usize) -> Vec<Equiva
     for other in look_alikes {
         let (name, joint) = (other.law.spec().name, other.joint_number());
         if !list.iter().any(|e| e.effect == name && e.joint == joint) {
-            let why =
-                "explains these logs about as well; other motions may separate them".to_owned();
+            let why = "explains these logs about as well; other motions may separate them".to_owned();
             list.push(Equivalent {
                 effect: name,
                 joint,

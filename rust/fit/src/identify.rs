@@ -70,10 +70,7 @@ impl WithArm for Identification<'_> {
 }
 
 impl Identification<'_> {
-    fn run<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
-        &self,
-        arm: A,
-    ) -> Course {
+    fn run<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(&self, arm: A) -> Course {
         let settings = Settings {
             scheme: self.scheme,
             variant: self.variant,

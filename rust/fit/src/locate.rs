@@ -278,13 +278,8 @@ fn binned<const N: usize>(
 /// Each joint's share of the gap and the regime that stands out in it, most of the gap first.
 ///
 /// `gap` are the lacking torques that shares are taken of, `torque` the joints' typical torques.
-pub fn places<const N: usize>(
-    gap: &[Lack<N>],
-    regimes: &[Regime],
-    torque: &[f64; N],
-) -> Vec<Place> {
-    let mean_square =
-        |j: usize| gap.iter().map(|x| x.lack[j].powi(2)).sum::<f64>() / gap.len().max(1) as f64;
+pub fn places<const N: usize>(gap: &[Lack<N>], regimes: &[Regime], torque: &[f64; N]) -> Vec<Place> {
+    let mean_square = |j: usize| gap.iter().map(|x| x.lack[j].powi(2)).sum::<f64>() / gap.len().max(1) as f64;
     let weight: Vec<f64> = (0..N)
         .map(|j| mean_square(j) / torque[j].powi(2).max(1e-300))
         .collect();
@@ -330,10 +325,7 @@ fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Place {
             j + 1
         )
     } else {
-        format!(
-            "{} from {from:.3} to {to:.3} {}",
-            regime.variable, regime.unit
-        )
+        format!("{} from {from:.3} to {to:.3} {}", regime.variable, regime.unit)
     };
     Place {
         joint: j + 1,
@@ -363,7 +355,5 @@ fn regime_name(regime: &Regime, b: usize) -> String {
     } else {
         1
     };
-    axis.map_or_else(String::new, |a| {
-        [a.low, a.middle, a.high][position].to_owned()
-    })
+    axis.map_or_else(String::new, |a| [a.low, a.middle, a.high][position].to_owned())
 }

@@ -125,21 +125,20 @@ impl<const N: usize> Metric<N> {
     /// Inner products of whitened `columns` and, last, a whitened `residual`.
     pub fn gram(&self, data: &Dataset<N>, columns: &[Vec<f64>], residual: &[f64]) -> Gram {
         let k = columns.len();
-        let one =
-            |((window, projection), trust): ((&crate::window::Window<N>, &Projection), &f64)| {
-                let range = window.range();
-                let mut a = DMatrix::zeros(range.len(), k + 1);
-                for (c, column) in columns.iter().enumerate() {
-                    a.column_mut(c).copy_from_slice(&column[range.clone()]);
-                }
-                a.column_mut(k).copy_from_slice(&residual[range]);
-                let mut coordinates = projection.samples.tr_mul(&a);
-                let pulled = projection.prior.tr_mul(&projection.pull);
-                coordinates.column_mut(k).axpy(1.0, &pulled, 1.0);
-                let mut gram = a.tr_mul(&a) - coordinates.tr_mul(&coordinates);
-                gram[(k, k)] += projection.pull.norm_squared();
-                gram * *trust
-            };
+        let one = |((window, projection), trust): ((&crate::window::Window<N>, &Projection), &f64)| {
+            let range = window.range();
+            let mut a = DMatrix::zeros(range.len(), k + 1);
+            for (c, column) in columns.iter().enumerate() {
+                a.column_mut(c).copy_from_slice(&column[range.clone()]);
+            }
+            a.column_mut(k).copy_from_slice(&residual[range]);
+            let mut coordinates = projection.samples.tr_mul(&a);
+            let pulled = projection.prior.tr_mul(&projection.pull);
+            coordinates.column_mut(k).axpy(1.0, &pulled, 1.0);
+            let mut gram = a.tr_mul(&a) - coordinates.tr_mul(&coordinates);
+            gram[(k, k)] += projection.pull.norm_squared();
+            gram * *trust
+        };
         let grams: Vec<DMatrix<f64>> = data
             .windows
             .par_iter()
@@ -159,16 +158,10 @@ impl<const N: usize> Metric<N> {
     pub fn costs(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
         let one = |(window, projection): (&crate::window::Window<N>, &Projection)| {
             let r = DVector::from_column_slice(&residual[window.range()]);
-            let coordinates =
-                projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.pull);
-            (r.norm_squared() + projection.pull.norm_squared() - coordinates.norm_squared())
-                .max(0.0)
+            let coordinates = projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.pull);
+            (r.norm_squared() + projection.pull.norm_squared() - coordinates.norm_squared()).max(0.0)
         };
-        data.windows
-            .iter()
-            .zip(&self.projections)
-            .map(one)
-            .collect()
+        data.windows.iter().zip(&self.projections).map(one).collect()
     }
 
     /// The residual that is left once the starts are fitted, whitened, in the order of the flat vector.
@@ -176,8 +169,7 @@ impl<const N: usize> Metric<N> {
         let mut left = residual.to_vec();
         for (window, projection) in data.windows.iter().zip(&self.projections) {
             let r = DVector::from_column_slice(&residual[window.range()]);
-            let coordinates =
-                projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.pull);
+            let coordinates = projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.pull);
             let fitted = &projection.samples * coordinates;
             for (value, part) in left[window.range()].iter_mut().zip(fitted.iter()) {
                 *value -= part;
@@ -192,8 +184,7 @@ impl<const N: usize> Metric<N> {
         windows
             .map(|((window, projection), shift)| {
                 let r = DVector::from_column_slice(&residual[window.range()]);
-                let coordinates =
-                    projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.pull);
+                let coordinates = projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.pull);
                 let change = &projection.back * coordinates;
                 Shift {
                     q: shift.q + SVector::from_fn(|j, _| change[j]),
@@ -253,10 +244,7 @@ fn projection<const N: usize>(
     }
     let root = start_precision_root(covariance);
     stacked.view_mut((rows, 0), (2 * N, 2 * N)).copy_from(&root);
-    let displacement = DVector::from_fn(
-        2 * N,
-        |i, _| if i < N { shift.q[i] } else { shift.dq[i - N] },
-    );
+    let displacement = DVector::from_fn(2 * N, |i, _| if i < N { shift.q[i] } else { shift.dq[i - N] });
     let pull = -(&root * displacement);
     let qr = stacked.qr();
     let q = qr.q();

@@ -79,10 +79,7 @@ impl<const P: usize> Hypothesis<P> {
 
     /// Free values: `theta`, then the effects' parameters.
     pub fn values(&self) -> Vec<f64> {
-        let effects = self
-            .effects
-            .iter()
-            .flat_map(|e| e.p[..e.len()].iter().copied());
+        let effects = self.effects.iter().flat_map(|e| e.p[..e.len()].iter().copied());
         self.theta.iter().copied().chain(effects).collect()
     }
 

@@ -208,6 +208,8 @@ pub struct Ranked {
     pub closed: f64,
     /// Decrease of the cost of all windows, in units of the residual's variance.
     pub gain: f64,
+    /// Squared distance of the arm's parameters from their trusted values, in sigmas, with it.
+    pub trust: f64,
     /// Mean decrease per window in standard errors.
     pub z: f64,
     /// RMS on the holdout per joint.
@@ -225,6 +227,10 @@ pub struct StageSummary {
     pub rms: Vec<f64>,
     /// Cost above the noise floor before the step, as a factor.
     pub excess: f64,
+    /// Squared distance of the arm's parameters from their trusted values, in sigmas, before the step.
+    pub trust: f64,
+    /// RMS error before the step relative to the motion within the windows.
+    pub relative_error: f64,
 }
 
 /// Measured and predicted positions of one joint.

@@ -37,14 +37,10 @@ impl<const N: usize> Scales<N> {
         let inertia = arm.inertia(theta, &SVector::zeros());
         Self {
             torque: std::array::from_fn(|j| {
-                rms(tracks
-                    .iter()
-                    .flat_map(|t| t.held.iter().map(move |p| p[j].start)))
+                rms(tracks.iter().flat_map(|t| t.held.iter().map(move |p| p[j].start)))
             }),
             speed: std::array::from_fn(|j| rms(tracks.iter().flat_map(|t| speeds(t, j)))),
-            position: std::array::from_fn(|j| {
-                spread(tracks.iter().flat_map(|t| t.column(j)).collect())
-            }),
+            position: std::array::from_fn(|j| spread(tracks.iter().flat_map(|t| t.column(j)).collect())),
             inertia: std::array::from_fn(|j| inertia[(j, j)]),
             period: tracks.first().map_or(1e-3, Track::period),
             length: length.unwrap_or(0.3),

@@ -59,10 +59,7 @@ impl std::fmt::Display for SimulationError {
                 "too many effects, or an effect on a joint the arm does not have"
             ),
             Self::Diverged(k) => write!(f, "the simulated motion diverges at sample {}", k + 1),
-            Self::Tolerance(e) => write!(
-                f,
-                "positions still change by {e:.1e} when the steps are halved"
-            ),
+            Self::Tolerance(e) => write!(f, "positions still change by {e:.1e} when the steps are halved"),
         }
     }
 }

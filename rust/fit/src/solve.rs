@@ -14,11 +14,27 @@ use rayon::prelude::*;
 /// Relative displacement for sensitivities; events are located to 1e-12, so a forward difference is good to 1e-6.
 const RELATIVE_STEP: f64 = 1e-6;
 
-/// Iterations at most.
-const MAX_ITERATIONS: usize = 15;
+/// How far a search is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// Iterations at most.
+    pub iterations: usize,
+    /// A decrease of the cost by less than this part of it ends the search.
+    pub enough: f64,
+}
 
-/// A decrease of the cost by less than this part of it ends the search.
-const ENOUGH: f64 = 1e-5;
+impl Effort {
+    /// Far enough to rank candidates.
+    pub const ROUGH: Self = Self {
+        iterations: 4,
+        enough: 1e-2,
+    };
+    /// To the minimum.
+    pub const FULL: Self = Self {
+        iterations: 15,
+        enough: 1e-5,
+    };
+}
 
 /// Trusted values of the arm's parameters.
 #[derive(Debug, Clone, Copy)]
@@ -80,12 +96,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
     /// Whitened residual, measured minus predicted.
     pub fn residual(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
         let predicted = self.data.predict(self.arm, hypothesis, &self.metric.starts);
-        let mut residual: Vec<f64> = self
-            .measured
-            .iter()
-            .zip(&predicted)
-            .map(|(y, p)| y - p)
-            .collect();
+        let mut residual: Vec<f64> = self.measured.iter().zip(&predicted).map(|(y, p)| y - p).collect();
         self.metric.whiten(&mut residual);
         residual
     }
@@ -93,10 +104,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
     /// Tempered cost of every window.
     pub fn window_costs(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
         let costs = self.metric.costs(self.data, &self.residual(hypothesis));
-        costs
-            .into_iter()
-            .map(|cost| self.metric.tempered(cost))
-            .collect()
+        costs.into_iter().map(|cost| self.metric.tempered(cost)).collect()
     }
 
     /// Whitened sensitivities of the prediction to the free values `which`, given the residual at `hypothesis`.
@@ -131,11 +139,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
         (0..values.len())
             .map(|i| {
                 let step = RELATIVE_STEP * sizes[i];
-                if values[i] + step > upper[i] {
-                    -step
-                } else {
-                    step
-                }
+                if values[i] + step > upper[i] { -step } else { step }
             })
             .collect()
     }
@@ -158,11 +162,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
         };
         let mut lower: Vec<f64> = (0..P).map(friction).collect();
         let mut upper = vec![f64::INFINITY; P];
-        for parameter in hypothesis
-            .effects
-            .iter()
-            .flat_map(|e| e.law.spec().parameters)
-        {
+        for parameter in hypothesis.effects.iter().flat_map(|e| e.law.spec().parameters) {
             lower.push(parameter.lower);
             upper.push(parameter.upper);
         }
@@ -170,13 +170,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
     }
 
     /// Minimises the cost from `start`, over all free values.
-    pub fn solve(&self, start: &Hypothesis<P>) -> Fit<P> {
+    pub fn solve(&self, start: &Hypothesis<P>, effort: Effort) -> Fit<P> {
         let all: Vec<usize> = (0..start.values().len()).collect();
         let (lower, upper) = self.bounds(start);
         let mut at = Point::new(self, start.clone());
         let mut damping = 1e-4;
         let mut gram = self.gram(&at, &all);
-        for _ in 0..MAX_ITERATIONS {
+        for _ in 0..effort.iterations {
             let (normal, gradient) = self.normal_equations(&gram, &at.hypothesis);
             let mut improved = false;
             for _ in 0..6 {
@@ -190,7 +190,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
                 );
                 let trial = Point::new(self, at.hypothesis.with_values(&values));
                 if trial.cost() < at.cost() {
-                    improved = at.cost() - trial.cost() > ENOUGH * at.cost();
+                    improved = at.cost() - trial.cost() > effort.enough * at.cost();
                     at = trial;
                     damping = (damping * 0.1).max(1e-9);
                     break;
@@ -217,11 +217,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
     }
 
     /// Normal matrix and right-hand side, the prior included.
-    fn normal_equations(
-        &self,
-        gram: &Gram,
-        hypothesis: &Hypothesis<P>,
-    ) -> (DMatrix<f64>, DVector<f64>) {
+    fn normal_equations(&self, gram: &Gram, hypothesis: &Hypothesis<P>) -> (DMatrix<f64>, DVector<f64>) {
         let k = gram.total.nrows() - 1;
         let mut normal = gram.total.view((0, 0), (k, k)).into_owned();
         let mut gradient = gram.total.column(k).rows(0, k).into_owned();
@@ -261,10 +257,7 @@ struct Point<const P: usize> {
 }
 
 impl<const P: usize> Point<P> {
-    fn new<A: Arm<f64, N, P>, const N: usize>(
-        problem: &Problem<A, N, P>,
-        hypothesis: Hypothesis<P>,
-    ) -> Self {
+    fn new<A: Arm<f64, N, P>, const N: usize>(problem: &Problem<A, N, P>, hypothesis: Hypothesis<P>) -> Self {
         let residual = problem.residual(&hypothesis);
         let data_cost = problem
             .metric

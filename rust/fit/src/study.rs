@@ -3,7 +3,7 @@
 use crate::metric::Metric;
 use crate::model::Hypothesis;
 use crate::scale::Scales;
-use crate::solve::{Fit, Prior, Problem};
+use crate::solve::{Effort, Fit, Prior, Problem};
 use crate::window::{Dataset, Shift};
 use armgap_core::arm::Arm;
 
@@ -105,7 +105,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let mut hypothesis = start.clone();
         loop_rounds(|round| {
             let metric = self.metric(&self.training, &hypothesis, scale);
-            let fit = self.problem(&metric).solve(&hypothesis);
+            let fit = self.problem(&metric).solve(&hypothesis, Effort::ROUGH);
             let next = self.residual_scale(&metric, &fit.hypothesis);
             hypothesis = fit.hypothesis.clone();
             let change = (0..N)
@@ -115,7 +115,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             change < SETTLED || round == MAX_ROUNDS
         });
         let weights = self.weights(&hypothesis, scale);
-        let fit = self.problem(&weights.training).solve(&hypothesis);
+        let fit = self.problem(&weights.training).solve(&hypothesis, Effort::FULL);
         (fit, weights)
     }
 
@@ -180,12 +180,7 @@ fn bounded<const N: usize>(data: &Dataset<N>, starts: Vec<Shift<N>>) -> Vec<Shif
 /// RMS of pooled windows by their trust, times the square root of the autocorrelation time in samples (at least one).
 fn correlated_rms(windows: &[Vec<f64>], trust: &[f64]) -> f64 {
     let moment = |lag: usize| -> f64 {
-        let product = |w: &Vec<f64>| {
-            w.iter()
-                .zip(w.iter().skip(lag))
-                .map(|(a, b)| a * b)
-                .sum::<f64>()
-        };
+        let product = |w: &Vec<f64>| w.iter().zip(w.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();
         windows
             .iter()
             .zip(trust)

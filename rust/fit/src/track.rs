@@ -50,10 +50,7 @@ impl<const N: usize> Track<N> {
             name: name.to_owned(),
             t: t.to_vec(),
             q: rows(q).into_iter().map(SVector::from).collect(),
-            held: rows(tau)
-                .into_iter()
-                .map(|row| row.map(Pulse::held))
-                .collect(),
+            held: rows(tau).into_iter().map(|row| row.map(Pulse::held)).collect(),
             noise: [0.0; N],
             step: [0.0; N],
         };
@@ -147,11 +144,7 @@ fn smallest_step(q: &[f64]) -> f64 {
         .iter()
         .filter(|d| ((*d / step).round() * step - *d).abs() < 0.05 * step)
         .count();
-    if on_grid * 10 > steps.len() * 9 {
-        step
-    } else {
-        0.0
-    }
+    if on_grid * 10 > steps.len() * 9 { step } else { 0.0 }
 }
 
 /// Standard deviation of the measurement: what a narrow local cubic leaves in most places, at least a uniform encoder's.

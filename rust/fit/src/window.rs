@@ -194,11 +194,7 @@ pub fn cut(t: &[f64], horizon: f64) -> Vec<(usize, usize)> {
                     .partition_point(|&x| x < time - 1e-9)
                     .min(stretch.len() - 1)
         };
-        found.extend(
-            (0..count)
-                .map(|i| (edge(i), edge(i + 1)))
-                .filter(|(a, b)| b > a),
-        );
+        found.extend((0..count).map(|i| (edge(i), edge(i + 1))).filter(|(a, b)| b > a));
         begin = k;
     }
     found

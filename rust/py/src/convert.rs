@@ -78,20 +78,12 @@ pub fn theta_from_links<'py>(
     inertia: Vec<f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let kind = kind_of(kind)?;
-    let wrong = || {
-        PyValueError::new_err(format!(
-            "links of a {} need one entry per joint",
-            kind.name()
-        ))
-    };
+    let wrong = || PyValueError::new_err(format!("links of a {} need one entry per joint", kind.name()));
     let theta = match kind {
         Kind::Axis => vec![one(&mass).ok_or_else(wrong)?, 0.0],
         Kind::Pendulum => {
             let (m, c) = (one(&mass).ok_or_else(wrong)?, one(&com).ok_or_else(wrong)?);
-            vec![
-                m * c * c + one(&inertia).ok_or_else(wrong)?,
-                m * gravity * c,
-            ]
+            vec![m * c * c + one(&inertia).ok_or_else(wrong)?, m * gravity * c]
         }
         Kind::TwoLink => {
             let two = |x: Vec<f64>| <[f64; 2]>::try_from(x).map_err(|_| wrong());
@@ -132,10 +124,7 @@ pub fn placed(
         .map(|(name, joint, values)| {
             let law = find::<f64>(&name).ok_or_else(|| {
                 let known: Vec<&str> = catalogue::<f64>().iter().map(|l| l.spec().name).collect();
-                PyValueError::new_err(format!(
-                    "unknown effect `{name}`; known: {}",
-                    known.join(", ")
-                ))
+                PyValueError::new_err(format!("unknown effect `{name}`; known: {}", known.join(", ")))
             })?;
             let spec = law.spec();
             let joint = match (spec.scope, joint) {
@@ -156,10 +145,7 @@ pub fn placed(
             let mut p = [0.0; 3];
             for (slot, parameter) in p.iter_mut().zip(spec.parameters) {
                 let value = *values.get(parameter.name).ok_or_else(|| {
-                    PyValueError::new_err(format!(
-                        "`{name}` needs its parameter `{}`",
-                        parameter.name
-                    ))
+                    PyValueError::new_err(format!("`{name}` needs its parameter `{}`", parameter.name))
                 })?;
                 if !(value >= parameter.lower && value <= parameter.upper) {
                     return Err(PyValueError::new_err(format!(
@@ -184,9 +170,8 @@ pub fn placed(
 
 /// A contiguous view of a vector.
 pub fn vector<'a>(x: &'a PyReadonlyArray1<'_, f64>, name: &str) -> PyResult<&'a [f64]> {
-    x.as_slice().map_err(|_| {
-        PyValueError::new_err(format!("`{name}` must be a contiguous array of float64"))
-    })
+    x.as_slice()
+        .map_err(|_| PyValueError::new_err(format!("`{name}` must be a contiguous array of float64")))
 }
 
 /// A contiguous view of a matrix with `rows` rows and `columns` columns.
@@ -202,9 +187,8 @@ pub fn matrix<'a>(
             "`{name}` has shape {shape:?}, expected [{rows}, {columns}]"
         )));
     }
-    x.as_slice().map_err(|_| {
-        PyValueError::new_err(format!("`{name}` must be a C-contiguous array of float64"))
-    })
+    x.as_slice()
+        .map_err(|_| PyValueError::new_err(format!("`{name}` must be a C-contiguous array of float64")))
 }
 
 /// The arm of an `arm` dict.
@@ -233,10 +217,7 @@ pub fn description(arm: &Bound<'_, PyDict>) -> PyResult<ArmDescription> {
         torque_limit: get(arm, "torque_limit")?,
         link_length: get(arm, "link_length")?,
     };
-    let (p, n) = (
-        description.kind.parameters().len(),
-        description.kind.joints(),
-    );
+    let (p, n) = (description.kind.parameters().len(), description.kind.joints());
     let lists = [
         ("theta", Some(&description.theta), p),
         ("sigma", Some(&description.sigma), p),

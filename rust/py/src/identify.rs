@@ -32,25 +32,12 @@ pub fn identify<'py>(
     let n = kind.joints();
     let known: Vec<&str> = Scheme::ALL.iter().map(|s| s.name()).collect();
     let scheme = Scheme::from_name(scheme).ok_or_else(|| {
-        PyValueError::new_err(format!(
-            "unknown scheme `{scheme}`; known: {}",
-            known.join(", ")
-        ))
+        PyValueError::new_err(format!("unknown scheme `{scheme}`; known: {}", known.join(", ")))
     })?;
     let t = vector(&t, "t")?;
-    let (q, tau) = (
-        matrix(&q, "q", t.len(), n)?,
-        matrix(&tau, "tau", t.len(), n)?,
-    );
-    let dq = dq
-        .as_ref()
-        .map(|dq| matrix(dq, "dq", t.len(), n))
-        .transpose()?;
-    let variant = if paper {
-        Variant::Paper
-    } else {
-        Variant::Exact
-    };
+    let (q, tau) = (matrix(&q, "q", t.len(), n)?, matrix(&tau, "tau", t.len(), n)?);
+    let dq = dq.as_ref().map(|dq| matrix(dq, "dq", t.len(), n)).transpose()?;
+    let variant = if paper { Variant::Paper } else { Variant::Exact };
     let sigma = vec![1.0; theta.len()];
     let arm = ArmDescription {
         kind,
@@ -73,9 +60,10 @@ pub fn identify<'py>(
         tau,
         dq,
     };
-    let course = py.detach(|| arm.dispatch(work)).flatten().ok_or_else(|| {
-        PyValueError::new_err("`theta` or `theta0` has the wrong length for this arm")
-    })?;
+    let course = py
+        .detach(|| arm.dispatch(work))
+        .flatten()
+        .ok_or_else(|| PyValueError::new_err("`theta` or `theta0` has the wrong length for this arm"))?;
     let result = PyDict::new(py);
     let r = course.parameters;
     result.set_item("theta", table(py, course.theta, t.len(), r)?)?;
@@ -86,12 +74,7 @@ pub fn identify<'py>(
     Ok(result)
 }
 
-fn table(
-    py: Python<'_>,
-    x: Vec<f64>,
-    rows: usize,
-    columns: usize,
-) -> PyResult<Bound<'_, PyArray2<f64>>> {
+fn table(py: Python<'_>, x: Vec<f64>, rows: usize, columns: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {
     PyArray1::from_vec(py, x).reshape([rows, columns])
 }
 
@@ -105,20 +88,15 @@ pub fn velocity<'py>(
     method: &str,
     half_width: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let method = Velocity::from_name(method).ok_or_else(|| {
-        PyValueError::new_err("`method` is one of backward, central, local-cubic")
-    })?;
+    let method = Velocity::from_name(method)
+        .ok_or_else(|| PyValueError::new_err("`method` is one of backward, central, local-cubic"))?;
     let t = vector(&t, "t")?;
     let n = numpy::PyUntypedArrayMethods::shape(&*q)[1];
     let q = matrix(&q, "q", t.len(), n)?;
     let mut dq = vec![0.0; q.len()];
     for j in 0..n {
         let column: Vec<f64> = q.iter().skip(j).step_by(n).copied().collect();
-        for (k, value) in method
-            .of(t, &column, half_width.max(2))
-            .into_iter()
-            .enumerate()
-        {
+        for (k, value) in method.of(t, &column, half_width.max(2)).into_iter().enumerate() {
             dq[k * n + j] = value;
         }
     }

@@ -31,9 +31,7 @@ pub fn simulate<'py>(
     let tau = matrix(&tau, "tau", t.len(), n)?;
     let (q0, dq0) = (vector(&q0, "q0")?, vector(&dq0, "dq0")?);
     if q0.len() != n || dq0.len() != n {
-        return Err(PyValueError::new_err(format!(
-            "`q0` and `dq0` need {n} values"
-        )));
+        return Err(PyValueError::new_err(format!("`q0` and `dq0` need {n} values")));
     }
     let effects = placed(kind, effects)?;
     let arm = ArmDescription {
@@ -56,9 +54,7 @@ pub fn simulate<'py>(
     };
     let trajectory = py
         .detach(|| arm.dispatch(work))
-        .ok_or_else(|| {
-            PyValueError::new_err(format!("`theta` needs {} values", kind.parameters().len()))
-        })?
+        .ok_or_else(|| PyValueError::new_err(format!("`theta` needs {} values", kind.parameters().len())))?
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
     let shape = |x: Vec<f64>| PyArray1::from_vec(py, x).reshape([t.len(), n]);
     Ok((shape(trajectory.q)?, shape(trajectory.dq)?))

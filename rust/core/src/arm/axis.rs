@@ -59,12 +59,7 @@ impl<T: Real> Arm<T, 1, 4> for Axis<T> {
         SMatrix::from([[T::zero()], [T::one()], [T::zero()], [T::zero()]])
     }
 
-    fn regressor(
-        &self,
-        _q: &SVector<T, 1>,
-        dq: &SVector<T, 1>,
-        ddq: &SVector<T, 1>,
-    ) -> SMatrix<T, 1, 4> {
+    fn regressor(&self, _q: &SVector<T, 1>, dq: &SVector<T, 1>, ddq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
         let mut y = self.friction_regressor(dq);
         y[(0, 0)] = ddq[0];
         y[(0, 1)] = T::one();

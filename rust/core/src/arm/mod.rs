@@ -133,12 +133,7 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     }
 
     /// Regressor of the whole equation of motion: `Y(q, dq, ddq) theta = tau`, equation (15).
-    fn regressor(
-        &self,
-        q: &SVector<T, N>,
-        dq: &SVector<T, N>,
-        ddq: &SVector<T, N>,
-    ) -> SMatrix<T, N, P>;
+    fn regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>, ddq: &SVector<T, N>) -> SMatrix<T, N, P>;
 
     /// Regressor of friction: `f(dq) = F theta`.
     #[inline]

@@ -48,12 +48,7 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
 
     fn energy_regressor(&self, q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SVector<T, 4> {
         let half: T = crate::real::lit(0.5);
-        SVector::from([
-            half * dq[0] * dq[0],
-            T::one() - q[0].cos(),
-            T::zero(),
-            T::zero(),
-        ])
+        SVector::from([half * dq[0] * dq[0], T::one() - q[0].cos(), T::zero(), T::zero()])
     }
 
     fn momentum_regressor(&self, _q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
@@ -64,12 +59,7 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
         SMatrix::from([[T::zero()], [q[0].sin()], [T::zero()], [T::zero()]])
     }
 
-    fn regressor(
-        &self,
-        q: &SVector<T, 1>,
-        dq: &SVector<T, 1>,
-        ddq: &SVector<T, 1>,
-    ) -> SMatrix<T, 1, 4> {
+    fn regressor(&self, q: &SVector<T, 1>, dq: &SVector<T, 1>, ddq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
         let mut y = self.friction_regressor(dq);
         y[(0, 0)] = ddq[0];
         y[(0, 1)] = q[0].sin();
@@ -78,11 +68,6 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
 
     fn payload(&self, _theta: &[T; 4], mass: T, distance: T) -> [T; 4] {
         let inertia = mass * distance * distance;
-        [
-            inertia,
-            mass * self.gravity * distance,
-            T::zero(),
-            T::zero(),
-        ]
+        [inertia, mass * self.gravity * distance, T::zero(), T::zero()]
     }
 }

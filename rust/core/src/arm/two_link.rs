@@ -127,13 +127,7 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
     }
 
     #[inline]
-    fn dynamics(
-        &self,
-        theta: &[T; 9],
-        q: &Vector2<T>,
-        dq: &Vector2<T>,
-        tilt: T,
-    ) -> (Matrix2<T>, Vector2<T>) {
+    fn dynamics(&self, theta: &[T; 9], q: &Vector2<T>, dq: &Vector2<T>, tilt: T) -> (Matrix2<T>, Vector2<T>) {
         let (s1, c1) = (q[0] + tilt).sin_cos();
         let (s2, c2) = q[1].sin_cos();
         let outer = theta[4] * (s1 * c2 + c1 * s2);

@@ -43,11 +43,7 @@ impl<T: Real> Effect<T> for ActuatorLag {
         for (k, pulse) in torque.iter_mut().enumerate() {
             let h = super::interval(t, k);
             let u = pulse.mean();
-            let ratio = if p[0] > T::zero() {
-                h / p[0]
-            } else {
-                T::zero()
-            };
+            let ratio = if p[0] > T::zero() { h / p[0] } else { T::zero() };
             let decay = if p[0] > T::zero() {
                 (-ratio).exp()
             } else {

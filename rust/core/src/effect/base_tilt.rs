@@ -14,12 +14,7 @@ static SPEC: Spec = Spec {
     source: "mounting error; Khalil and Dombre 2002, section 11",
     excited_by: "gravity torque at any pose",
     scope: Scope::Arm,
-    parameters: &[EffectParameter::bounded(
-        "angle",
-        Quantity::Angle,
-        -1.6,
-        1.6,
-    )],
+    parameters: &[EffectParameter::bounded("angle", Quantity::Angle, -1.6, 1.6)],
     starts: &[[0.02, 0.0, 0.0]],
     hooks: Hooks {
         force: false,

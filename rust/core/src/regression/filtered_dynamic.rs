@@ -52,10 +52,7 @@ impl<T: Real, const N: usize, const R: usize> FilteredDynamic<T, N, R> {
         tau: &SVector<T, N>,
     ) -> (SMatrix<T, N, R>, SVector<T, N>) {
         let step = cutoff.step(passage.h);
-        let parts = [
-            cutoff.step(passage.split),
-            cutoff.step(passage.h - passage.split),
-        ];
+        let parts = [cutoff.step(passage.split), cutoff.step(passage.h - passage.split)];
         let (momentum, rest) = dynamic_rows::<T, A, N, P, R>(arm, now);
         let (mut psi, mut y) = (SMatrix::zeros(), SVector::zeros());
         for i in 0..N {
@@ -63,12 +60,9 @@ impl<T: Real, const N: usize, const R: usize> FilteredDynamic<T, N, R> {
                 let (m, r) = (&mut self.momentum[(i, j)], &mut self.rest[(i, j)]);
                 psi[(i, j)] = match variant {
                     Variant::Paper => {
-                        m.paper_derivative(&step, momentum[(i, j)])
-                            + r.paper_low(&step, rest[(i, j)])
+                        m.paper_derivative(&step, momentum[(i, j)]) + r.paper_low(&step, rest[(i, j)])
                     }
-                    Variant::Exact => {
-                        m.derivative(&step, momentum[(i, j)]) + r.low(&step, rest[(i, j)])
-                    }
+                    Variant::Exact => m.derivative(&step, momentum[(i, j)]) + r.low(&step, rest[(i, j)]),
                 };
             }
             y[i] = match variant {

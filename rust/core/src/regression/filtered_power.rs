@@ -65,10 +65,7 @@ impl<T: Real, const N: usize, const R: usize> FilteredPower<T, N, R> {
         let y = match variant {
             Variant::Paper => self.supplied.paper_low(&step, tau.dot(&now.dq)),
             Variant::Exact => {
-                let parts = [
-                    cutoff.step(passage.split),
-                    cutoff.step(passage.h - passage.split),
-                ];
+                let parts = [cutoff.step(passage.split), cutoff.step(passage.h - passage.split)];
                 let middle = self.last_dq + (now.dq - self.last_dq) * (passage.split / passage.h);
                 self.supplied.low_ramp(
                     &parts[0],

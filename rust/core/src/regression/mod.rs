@@ -36,11 +36,7 @@ pub enum Scheme {
 
 impl Scheme {
     /// Every scheme.
-    pub const ALL: [Self; 3] = [
-        Self::FilteredDynamic,
-        Self::SuppliedEnergy,
-        Self::FilteredPower,
-    ];
+    pub const ALL: [Self; 3] = [Self::FilteredDynamic, Self::SuppliedEnergy, Self::FilteredPower];
 
     /// Name on the command line.
     pub const fn name(self) -> &'static str {
@@ -95,13 +91,7 @@ pub struct Passage<T, const N: usize> {
 
 /// Momentum and the remaining forces of the arm as rows over all `R` parameters.
 #[inline]
-pub(crate) fn dynamic_rows<
-    T: Real,
-    A: Arm<T, N, P>,
-    const N: usize,
-    const P: usize,
-    const R: usize,
->(
+pub(crate) fn dynamic_rows<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
     arm: &A,
     now: &Snapshot<T, N>,
 ) -> (SMatrix<T, N, R>, SMatrix<T, N, R>) {
@@ -118,13 +108,7 @@ pub(crate) fn dynamic_rows<
 
 /// Energy and dissipated power of the arm as rows over all `R` parameters.
 #[inline]
-pub(crate) fn energy_rows<
-    T: Real,
-    A: Arm<T, N, P>,
-    const N: usize,
-    const P: usize,
-    const R: usize,
->(
+pub(crate) fn energy_rows<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
     arm: &A,
     now: &Snapshot<T, N>,
 ) -> (SMatrix<T, 1, R>, SMatrix<T, 1, R>) {

@@ -21,11 +21,7 @@ pub struct SuppliedEnergy<T: Real, const N: usize, const R: usize> {
 
 impl<T: Real, const N: usize, const R: usize> SuppliedEnergy<T, N, R> {
     /// The scheme at its first state; `tau` is the torque that acts from then on.
-    pub fn new<A: Arm<T, N, P>, const P: usize>(
-        arm: &A,
-        now: &Snapshot<T, N>,
-        tau: &SVector<T, N>,
-    ) -> Self {
+    pub fn new<A: Arm<T, N, P>, const P: usize>(arm: &A, now: &Snapshot<T, N>, tau: &SVector<T, N>) -> Self {
         let (first, last_power) = energy_rows::<T, A, N, P, R>(arm, now);
         let last_supplied = tau.dot(&now.dq);
         Self {
