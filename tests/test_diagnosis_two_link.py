@@ -1,0 +1,175 @@
+"""The diagnosis of a two-link arm: its JSON in detail, and the verdict on three known arms."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armgap import Arm, Diagnosis, Log, diagnose, effects, seed_torque, simulate
+from armgap.simulation import Effect
+
+GAIN = 0.85
+
+
+@pytest.fixture(scope="module")
+def logs(arm: Arm) -> tuple[Log, Log]:
+    """Training and holdout under different torques, from an arm whose second motor gives less than it is told."""
+    t = np.arange(1600) * arm.sample_period
+    hidden = [Effect("torque_gain", 2, {"gain": GAIN})]
+    training = simulate(arm, t, seed_torque(t), effects=hidden, name="training")
+    other = np.column_stack([45 * np.sin(9 * t) + 20 * np.sin(17 * t), 6 * np.sin(15 * t + 1) + 4 * np.sin(31 * t)])
+    return training, simulate(arm, t, other, effects=hidden, name="holdout")
+
+
+@pytest.fixture(scope="module")
+def result(arm: Arm, logs: tuple[Log, Log]) -> Diagnosis:
+    return diagnose(logs[0], arm, holdout=logs[1])
+
+
+# The schema `armgap.diagnosis/1`, key by key.
+Check = Callable[[Any], bool]
+
+
+def number(x: Any) -> bool:
+    return isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x)
+
+
+def share(x: Any) -> bool:
+    return number(x) and 0 <= x <= 1
+
+
+def text(x: Any) -> bool:
+    return isinstance(x, str) and x != ""
+
+
+def joint(x: Any) -> bool:
+    return x is None or x in (1, 2)
+
+
+def per_joint(x: Any) -> bool:
+    return isinstance(x, list) and len(x) == 2 and all(number(v) and v >= 0 for v in x)
+
+
+def values(x: Any) -> bool:
+    return all(text(k) and number(v["value"]) and number(v["sigma"]) and text(v["unit"]) for k, v in x.items())
+
+
+GAP: dict[str, Check] = {
+    "horizon_s": number,
+    "before": per_joint,
+    "refit": per_joint,
+    "after": per_joint,
+    "floor": per_joint,
+    "closed": lambda x: number(x) and x <= 1,
+    "closed_ci": lambda x: len(x) == 2 and number(x[0]) and number(x[1]) and x[0] <= x[1] <= 1,
+    "free_run": lambda x: per_joint(x["before"]) and per_joint(x["after"]),
+}
+PLACE: dict[str, Check] = {
+    "joint": joint,
+    "share": share,
+    "regime": text,
+    "detail": text,
+    "range": lambda x: text(x["variable"]) and number(x["from"]) and number(x["to"]) and x["from"] < x["to"],
+}
+CAUSE: dict[str, Check] = {
+    "effect": text,
+    "joint": joint,
+    "probability": share,
+    "parameters": values,
+    "closed": number,
+    "equivalents": lambda x: all(text(e["effect"]) and joint(e["joint"]) and text(e["why"]) for e in x),
+}
+
+
+def follows(data: dict[str, Any], schema: dict[str, Check]) -> None:
+    for key, check in schema.items():
+        assert key in data, key
+        assert check(data[key]), (key, data[key])
+
+
+def test_json_follows_the_schema(result):
+    data = json.loads(result.to_json())
+    assert data["schema"] == "armgap.diagnosis/1"
+    assert data["verdict"] in ("none", "parameters", "effect", "unexplained")
+    follows(data["gap"], GAP)
+    for place in data["where"]:
+        follows(place, PLACE)
+    for cause in data["causes"]:
+        follows(cause, CAUSE)
+    for candidate in data["ruled_out"]:
+        assert text(candidate["effect"])
+        assert joint(candidate["joint"])
+        assert candidate["status"] in ("absent", "not excited", "undecided")
+        if "bound" in candidate:
+            bound = candidate["bound"]
+            assert text(bound["parameter"])
+            assert number(bound["value"])
+            assert text(bound["unit"])
+            assert bound["level"] == 0.95
+    assert set(data["parameters"]) >= {"nominal", "refit", "with_causes"}
+    assert all(values(v) for v in data["parameters"].values())
+
+
+def test_where_is_ordered_and_shares_add_up_to_no_more_than_all(result):
+    shares = [place.share for place in result.where]
+    assert shares == sorted(shares, reverse=True)
+    assert sum(shares) <= 1 + 1e-9
+
+
+def test_every_candidate_is_named_or_ruled_out_or_a_look_alike(result):
+    spoken = {(c.effect, c.joint) for c in result.causes}
+    spoken |= {(e.effect, e.joint) for c in result.causes for e in c.equivalents}
+    spoken |= {(r.effect, r.joint) for r in result.ruled_out}
+    for effect in effects():
+        places = [None] if effect["scope"] == "arm" else [1, 2]
+        for place in places:
+            assert (effect["name"], place) in spoken, (effect["name"], place)
+
+
+def test_the_hidden_effect_is_found_and_sized(result):
+    assert result.verdict == "effect"
+    cause = result.causes[0]
+    named = {(cause.effect, cause.joint), *((e.effect, e.joint) for e in cause.equivalents)}
+    assert ("torque_gain", 2) in named
+    assert result.gap.closed > 0.8
+    if cause.effect == "torque_gain":
+        gain = cause.parameters["gain"]
+        assert gain.value == pytest.approx(GAIN, abs=max(0.01, 4 * gain.sigma))
+
+
+def test_dataclasses_say_what_the_json_says(result):
+    data = result.to_dict()
+    assert result.verdict == data["verdict"]
+    assert list(result.gap.before) == data["gap"]["before"]
+    assert list(result.gap.free_run_after) == data["gap"]["free_run"]["after"]
+    assert [(c.effect, c.joint) for c in result.causes] == [(c["effect"], c["joint"]) for c in data["causes"]]
+    assert {k: v.value for k, v in result.parameters["refit"].items()} == {
+        k: v["value"] for k, v in data["parameters"]["refit"].items()
+    }
+    assert "series" in result.extra
+
+
+def test_an_arm_that_fits_gives_none(arm):
+    t = np.arange(1600) * arm.sample_period
+    other = np.column_stack([45 * np.sin(9 * t) + 20 * np.sin(17 * t), 6 * np.sin(15 * t + 1) + 4 * np.sin(31 * t)])
+    result = diagnose(simulate(arm, t, seed_torque(t)), arm, holdout=simulate(arm, t, other))
+    assert result.verdict == "none"
+    assert result.causes == ()
+
+
+def test_wrong_values_give_parameters(arm):
+    import dataclasses
+
+    theta = arm.theta.copy()
+    theta[3] *= 0.9
+    wrong = dataclasses.replace(arm, theta=theta)
+    t = np.arange(1600) * arm.sample_period
+    other = np.column_stack([45 * np.sin(9 * t) + 20 * np.sin(17 * t), 6 * np.sin(15 * t + 1) + 4 * np.sin(31 * t)])
+    result = diagnose(simulate(arm, t, seed_torque(t)), wrong, holdout=simulate(arm, t, other))
+    assert result.verdict == "parameters"
+    assert result.parameters["refit"]["theta4"].value == pytest.approx(arm.theta[3], rel=0.01)
