@@ -6,8 +6,8 @@ MuJoCo's ``frictionloss`` is a soft constraint, so its settings matter:
   within one step, and a joint held below its Coulomb level creeps at about ``1e-4 a dt``, with ``a`` the acceleration
   the load alone would give it (some 1e-7 rad/s);
 * fourth-order Runge-Kutta between reversals, Newton's method with a tolerance of 1e-14;
-* a step in which a joint reverses, stops or starts is undone and taken again in :data:`REFINE` parts, :data:`DEPTH`
-  times over, so that the instant of a reversal is known to about a tenth of a microsecond.
+* a step in which a joint reverses, stops, starts or meets an obstacle is undone and taken again in :data:`REFINE`
+  parts, :data:`DEPTH` times over, so that the instant is known to about a tenth of a microsecond.
 
 Friction that varies (with speed, load, position, time) is set on ``dof_frictionloss`` before each step, at the state
 half a step ahead. Torque laws go to ``qfrc_applied``, at the same half step. Elasticity and play are a separate
@@ -90,6 +90,8 @@ class Build:
         Torque ``-k (q - q0) - cubic (q - q0)^3``.
     drag : dict of joint to (quadratic, cubic)
         Torque ``-quadratic dq |dq| - cubic dq^3``.
+    edges : dict of joint to list of float
+        Positions at which a torque law jumps; a step across one is cut like a step with a reversal.
     coupling : (rotor inertia, gear), optional
         Rotor of joint 2 on link 1, kinetic energy ``inertia (dq1 + gear dq2)^2 / 2``.
     torque_laws, friction_laws : dict of joint to list
@@ -107,6 +109,7 @@ class Build:
     torque_laws: dict[int, list[TorqueLaw]] = field(default_factory=dict)
     friction_laws: dict[int, list[FrictionLaw]] = field(default_factory=dict)
     drag: dict[int, tuple[float, float]] = field(default_factory=dict)
+    edges: dict[int, list[float]] = field(default_factory=dict)
 
 
 class Plant:
@@ -182,7 +185,7 @@ class Plant:
         self.model.opt.timestep = dt
         self._drive(tau, dt)
         self._mj.mj_step(self.model, self.data)
-        if depth and self._reversed(before):
+        if depth and (self._reversed(before) or self._crossed(before)):
             self._restore(before)
             for _ in range(REFINE):
                 self._step(tau, dt / REFINE, depth - 1)
@@ -235,5 +238,12 @@ class Plant:
             small = min(abs(old), abs(new)) < max(STANDING, 2.0 * abs(new - old))
             moving = max(abs(old), abs(new)) > STANDING
             if moving and small and (old * new <= 0 or min(abs(old), abs(new)) < abs(new - old)):
+                return True
+        return False
+
+    def _crossed(self, before: tuple[Any, Any, float]) -> bool:
+        for j, positions in self._build.edges.items():
+            old, new = float(before[0][self.dof[j]]), float(self.data.qpos[self.dof[j]])
+            if any((old < x) != (new < x) for x in positions):
                 return True
         return False

@@ -6,7 +6,7 @@ import math
 
 from armgap.trial.effects.base import ROTARY, TWO_LINK, Draw, Parameters, effect
 from armgap.trial.effects.friction import torque_law
-from armgap.trial.plant import Flexure, Point
+from armgap.trial.plant import TIME_STEP, Flexure, Point
 from armgap.trial.rig import Rig
 
 
@@ -72,12 +72,15 @@ def contact(rig: Rig, joint: int, p: Parameters) -> None:
         return -side * max(force, 0.0) if depth > 0 else 0.0
 
     torque_law(rig, joint, push)
+    rig.build.edges.setdefault(joint, []).append(p["position"])
 
 
 def _draw_pulse(d: Draw) -> Parameters:
+    # Both edges on the grid of internal steps, so that the impulse is exact.
+    grid = 2 * TIME_STEP
     return {
-        "time": d.uniform(0.1, 0.9) * d.use.duration,
-        "duration": d.log_uniform(0.03, 0.3),
+        "time": grid * round(d.uniform(0.1, 0.9) * d.use.duration / grid),
+        "duration": grid * round(d.log_uniform(0.03, 0.3) / grid),
         "impulse": d.sign() * d.inertia * d.use.speed * d.between(0.05, 0.6),
     }
 
