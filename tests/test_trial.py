@@ -132,8 +132,9 @@ class Reference:
             now = t[k]
             while now < t[k + 1] - 1e-13:
                 mode = self.settle(q, dq, tau[k], mode)
+                frozen = mode.copy()
 
-                def rhs(_, y, mode=mode.copy(), u=tau[k]):
+                def rhs(_, y, mode=frozen, u=tau[k]):
                     return np.concatenate([y[2:], self.rates(y[:2], y[2:], u, mode)[0]])
 
                 out = solve_ivp(
@@ -199,7 +200,7 @@ def test_engine_has_the_stated_inertia_and_gravity(build, change):
         plant.place(q.tolist(), dq.tolist())
         M, bias = inertia_and_bias(theta, q, dq)
         tilt = change.get("tilt", 0.0)
-        bias += inertia_and_bias(theta, q + [tilt, 0], 0 * dq)[1] - inertia_and_bias(theta, q, 0 * dq)[1]
+        bias += inertia_and_bias(theta, q + np.array([tilt, 0.0]), 0 * dq)[1] - inertia_and_bias(theta, q, 0 * dq)[1]
         M[1, 1] += change.get("armature", 0.0)
         inertia, gear = change.get("coupling", (0.0, 0.0))
         M += inertia * np.outer([1, gear], [1, gear])
@@ -396,7 +397,7 @@ def test_trial_plan_keeps_its_shares_and_covers_every_effect():
 
 
 def test_case_folders_say_nothing(tmp_path):
-    folders = make_trial(5, 2, {"null": 1.0}, folder=tmp_path)
+    folders = make_trial(5, 2, {"null": 1.0}, folder=tmp_path, duration=2.0)
     assert [f.name for f in folders] == ["case-0000", "case-0001"]
     assert all(open_key(f).effects == () for f in folders)
 

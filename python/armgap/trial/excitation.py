@@ -18,6 +18,8 @@ from armgap.trial.rig import Array, Source, Trace
 STYLES = ("multisine", "paper", "tracked")
 #: Time over which torques and references fade in, s.
 FADE_IN = 0.4
+#: Fewest reversals of a useful motion, per joint, 1/s.
+REVERSAL_RATE = 0.6
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,8 @@ def acceptable(trace: Trace, arm: TrialArm) -> tuple[bool, float]:
     speed = np.quantile(np.abs(trace.dq_true), 0.95, axis=0)
     span = np.ptp(trace.q_true, axis=0)
     wild = bool(np.any(reach > limit)) or bool(np.any(speed > _fast(arm)))
-    dull = bool(np.any(span < 0.2 * limit)) or bool(np.any(reversals(trace.dq_true) < 6))
+    few = reversals(trace.dq_true) < REVERSAL_RATE * trace.t[-1]
+    dull = bool(np.any(span < 0.2 * limit)) or bool(np.any(few))
     return not (wild or dull), 0.8 if wild else 1.25
 
 

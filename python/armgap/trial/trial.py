@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +38,8 @@ class Plan:
         What to hide.
     nominal : {"exact", "off"}
         Whether the arm file's values are the true ones.
+    duration : float
+        Length of each log, s.
     """
 
     seed: tuple[int, ...]
@@ -45,6 +47,7 @@ class Plan:
     model: str
     effects: tuple[Wish, ...]
     nominal: str
+    duration: float = 10.0
 
     def make(self) -> Case:
         """Make the case; a seed without an acceptable motion is followed by the next.
@@ -56,10 +59,13 @@ class Plan:
         """
         for attempt in range(RETRIES):
             try:
-                return make_case((*self.seed, attempt), self.effects, model=self.model, nominal=self.nominal)
+                return self._make((*self.seed, attempt))
             except NoMotionError:
                 continue
         raise NoMotionError(f"no motion for case {self.seed} of {self.model} in {RETRIES} attempts")
+
+    def _make(self, seed: tuple[int, ...]) -> Case:
+        return make_case(seed, self.effects, model=self.model, nominal=self.nominal, duration=self.duration)
 
 
 def fresh_seed() -> int:
@@ -102,6 +108,7 @@ def make_trial(
     families: Mapping[str, float] | None = None,
     *,
     folder: str | Path,
+    duration: float = 10.0,
     workers: int = 1,
 ) -> list[Path]:
     """Make a trial on disk: one folder per case, named by number only.
@@ -112,6 +119,8 @@ def make_trial(
         See :func:`plan_trial`.
     folder : path
         Where the case folders go.
+    duration : float, default 10
+        Length of each log, s.
     workers : int, default 1
         Processes.
 
@@ -120,7 +129,7 @@ def make_trial(
     list of Path
         The case folders.
     """
-    plans = plan_trial(seed, n_cases, families)
+    plans = [replace(p, duration=duration) for p in plan_trial(seed, n_cases, families)]
     targets = [Path(folder) / f"case-{i:04d}" for i in range(n_cases)]
     if workers == 1:
         return [_make(p, t) for p, t in zip(plans, targets, strict=True)]

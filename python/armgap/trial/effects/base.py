@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armgap.trial.arms import TrialArm
-from armgap.trial.rig import Rig, Trace
+from armgap.trial.rig import Array, Rig, Trace
 
 Parameters = dict[str, float]
 
@@ -21,6 +21,8 @@ class Use:
     ----------
     torque, peak : float
         RMS and largest command, N m.
+    slew : float
+        98th percentile of the command's rate of change, N m/s.
     speed : float
         95th percentile of the speed, rad/s.
     low, high : float
@@ -31,6 +33,7 @@ class Use:
 
     torque: float
     peak: float
+    slew: float
     speed: float
     low: float
     high: float
@@ -49,11 +52,17 @@ def usage(traces: list[Trace], joint: int) -> Use:
     return Use(
         torque=float(np.sqrt(np.mean(tau**2))),
         peak=min(float(np.max(np.abs(x.tau[:, joint]))) for x in traces),
+        slew=float(np.quantile(np.concatenate([_rate(x, joint) for x in traces]), 0.98)),
         speed=float(np.quantile(np.abs(dq), 0.95)),
         low=max(float(np.min(x.q_true[:, joint])) for x in traces),
         high=min(float(np.max(x.q_true[:, joint])) for x in traces),
         duration=min(float(x.t[-1]) for x in traces),
     )
+
+
+def _rate(trace: Trace, joint: int) -> Array:
+    rate: Array = np.abs(np.diff(trace.tau[:, joint])) / (trace.t[1] - trace.t[0])
+    return rate
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,7 @@ def backlash(rig: Rig, joint: int, p: Parameters) -> None:
 
 @effect(
     "slew_limit",
-    lambda d: {"rate": d.use.torque * 2.0 * d.between(30.0, 6.0)},
+    lambda d: {"rate": d.use.slew * d.between(0.7, 0.15)},
     family="outside",
 )
 def slew_limit(rig: Rig, joint: int, p: Parameters) -> None:
