@@ -10,14 +10,13 @@ import pytest
 pytest.importorskip("mujoco", reason="making cases needs armgap[trial]")
 pytest.importorskip("scipy")
 
-from dry_friction import DryArm
-
 from armgap.trial.arms import DIRECT_DRIVE, GEARED, TrialArm
 from armgap.trial.case import build_rig
 from armgap.trial.effects import REGISTRY
 from armgap.trial.key import Hidden
 from armgap.trial.plant import Build
 from armgap.trial.rig import Rig, Source, Trace, run
+from dry_friction import DryArm
 
 TH = np.array(DIRECT_DRIVE.theta)
 PAYLOAD = np.array([0.45**2 + 0.2**2, 0.45 * 0.2, 0.2**2, 9.81 * 0.45, 9.81 * 0.2, 0, 0, 0, 0])  # per kg at 0.2 m
