@@ -35,8 +35,8 @@ demo: setup ## diagnose the sample log, or yours: make demo LOG="a.csv b.csv" AR
 	@$(BIN)/armgap demo $(LOG) $(if $(ARM),--arm $(ARM)) $(foreach h,$(HOLDOUT),--holdout $(h)) $(if $(COLUMNS),--columns "$(COLUMNS)") $(if $(UNITS),--units "$(UNITS)")
 
 lint: setup lint-tools ## formatting, types and stubs
-	$(BIN)/ruff format --check python tests
-	$(BIN)/ruff check python tests
+	$(BIN)/ruff format --check python tests examples
+	$(BIN)/ruff check python tests examples
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest armgap._native --mypy-config-file pyproject.toml
 	cargo fmt --check

@@ -70,9 +70,9 @@ class Log:
     def read(
         cls,
         path: str | Path,
-        *,
         columns: Mapping[str, str] | None = None,
         arm: Arm | None = None,
+        *,
         units: Mapping[str, str] | None = None,
     ) -> Log:
         """Read a log from Parquet or CSV and check it.
