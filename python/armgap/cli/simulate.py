@@ -13,6 +13,7 @@ from armgap.cli.common import (
     check_outputs,
     columns_option,
     console,
+    interruptible,
     parse_columns,
     parse_units,
     quiet_option,
@@ -89,7 +90,9 @@ def command(
         source = Log.read(torque, columns=parse_columns(columns), units=parse_units(units), arm=arm)
         keep = source.t <= (duration if duration is not None else source.duration)
         t, tau, start, name = source.t[keep], source.tau[keep], _start(source), source.name
-    log = simulate(arm, t, tau, q0=start[0], dq0=start[1], effects=effects, noise=noise, seed=seed, name=name)
+    log = interruptible(
+        lambda: simulate(arm, t, tau, q0=start[0], dq0=start[1], effects=effects, noise=noise, seed=seed, name=name)
+    )
     if output == "-":
         write(output, log.to_polars().write_csv().rstrip())
     else:
