@@ -1,4 +1,4 @@
-"""Trial cases: the engine against an independent integration, effects, seals, whole trials."""
+"""Trial cases: the engine's model, its friction, effects, seals, whole trials."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip("mujoco", reason="MuJoCo is missing: pip install 'armgap[trial]'")
-solve_ivp = pytest.importorskip("scipy.integrate").solve_ivp
 
-from armgap.trial import (  # noqa: E402
+from armgap.trial import (
     DEMO_SEED,
     SealError,
     TrialEngineMissingError,
@@ -25,15 +24,15 @@ from armgap.trial import (  # noqa: E402
     plan_trial,
     possible,
 )
-from armgap.trial.arms import AXIS, DIRECT_DRIVE, GEARED, PENDULUM, TrialArm, random_arm  # noqa: E402
-from armgap.trial.case import build_rig  # noqa: E402
-from armgap.trial.chain import Actuator, DeadZone, Delay, Encoder, Lag, Saturation  # noqa: E402
-from armgap.trial.effects import REGISTRY, Draw, usage  # noqa: E402
-from armgap.trial.excitation import draw_excitation  # noqa: E402
-from armgap.trial.key import Hidden, Key  # noqa: E402
-from armgap.trial.plant import Build, Flexure, Plant, Rotor  # noqa: E402
-from armgap.trial.rig import Rig, run  # noqa: E402
-from armgap.trial.verdict import equivalent  # noqa: E402
+from armgap.trial.arms import AXIS, DIRECT_DRIVE, GEARED, PENDULUM, TrialArm, random_arm
+from armgap.trial.case import build_rig
+from armgap.trial.chain import Actuator, DeadZone, Delay, Encoder, Lag, Saturation
+from armgap.trial.effects import REGISTRY, Draw, usage
+from armgap.trial.excitation import draw_excitation
+from armgap.trial.key import Hidden, Key
+from armgap.trial.plant import Build, Flexure, Plant, Rotor
+from armgap.trial.rig import Rig, run
+from armgap.trial.verdict import equivalent
 
 DEMO_CASE = Path(__file__).parents[1] / "demo" / "case"
 
@@ -83,86 +82,9 @@ def inertia_and_bias(theta, q, dq):
     return M, coriolis + np.array([theta[3] * math.sin(q[0]) + g2, g2])
 
 
-class Reference:
-    """The two-link arm with Coulomb friction that slides or holds, each phase integrated to 1e-10."""
-
-    def __init__(self, theta):
-        self.theta, self.fc = theta, np.array(theta[7:9])
-
-    def rates(self, q, dq, tau, mode):
-        M, bias = inertia_and_bias(self.theta, q, dq)
-        force = tau - bias - np.array(self.theta[5:7]) * dq - self.fc * mode
-        free = np.flatnonzero(mode)
-        ddq = np.zeros(2)
-        ddq[free] = np.linalg.solve(M[np.ix_(free, free)], force[free])
-        return ddq, force - M @ ddq
-
-    def settle(self, q, dq, tau, mode):
-        for _ in range(6):
-            ddq, hold = self.rates(q, dq, tau, mode)
-            for j in range(2):
-                if mode[j] == 0 and abs(hold[j]) > self.fc[j]:
-                    mode[j] = np.sign(hold[j])
-                    break
-                if mode[j] != 0 and dq[j] == 0 and ddq[j] * mode[j] < 0:
-                    mode[j] = 0
-                    break
-            else:
-                return mode
-        return mode
-
-    def events(self, tau, mode):
-        def stop(j):
-            return lambda _, y: y[2 + j]
-
-        def slip(j, frozen):
-            return lambda _, y: abs(self.rates(y[:2], y[2:], tau, frozen)[1][j]) - self.fc[j]
-
-        found = []
-        for j in range(2):
-            event = stop(j) if mode[j] else slip(j, mode.copy())
-            event.terminal, event.direction = True, (-mode[j] if mode[j] else 1)
-            found.append(event)
-        return found
-
-    def run(self, t, tau, q, dq):
-        q, dq, mode = q.copy(), np.where(np.abs(dq) < 2e-5, 0.0, dq), np.sign(np.where(np.abs(dq) < 2e-5, 0.0, dq))
-        path = [q]
-        for k in range(len(t) - 1):
-            now = t[k]
-            while now < t[k + 1] - 1e-13:
-                mode = self.settle(q, dq, tau[k], mode)
-                frozen = mode.copy()
-
-                def rhs(_, y, mode=frozen, u=tau[k]):
-                    return np.concatenate([y[2:], self.rates(y[:2], y[2:], u, mode)[0]])
-
-                out = solve_ivp(
-                    rhs, (now, t[k + 1]), np.concatenate([q, dq]), method="DOP853", rtol=1e-10, atol=1e-12,
-                    events=self.events(tau[k], mode),
-                )  # fmt: skip
-                now, q, dq = out.t[-1], out.y[:2, -1].copy(), out.y[2:, -1].copy()
-                for j in range(2):
-                    if mode[j] and out.t_events[j].size:
-                        dq[j], mode[j] = 0.0, 0
-            path.append(q)
-        return np.array(path)
-
-
 @pytest.fixture(scope="module")
 def paper_run():
     return run(Rig(Build(DIRECT_DRIVE)), paper_torques, 4.0)
-
-
-def test_motion_agrees_with_an_independent_integration_to_a_fraction_of_a_count(paper_run):
-    """Windows of 0.25 s with reversals of both joints: within half an encoder step at every sample."""
-    reference, x = Reference(DIRECT_DRIVE.theta), paper_run
-    worst = np.zeros(2)
-    for s in range(0, 1500, 100):
-        w = slice(s, s + 101)
-        q = reference.run(x.t[w], x.tau[w], x.q_true[s], x.dq_true[s])
-        worst = np.maximum(worst, np.max(np.abs(q - x.q_true[w]), axis=0))
-    assert np.all(worst < 0.5 * np.array(DIRECT_DRIVE.step)), worst
 
 
 def test_power_balance_without_friction():

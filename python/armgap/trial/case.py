@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from armgap.errors import ArmgapError
 from armgap.trial.armfile import arm_toml, draw_nominal
 from armgap.trial.arms import TrialArm, random_arm
 from armgap.trial.effects import REGISTRY, Draw, usage
@@ -28,7 +29,7 @@ GROWTHS = 8
 Wish = tuple[str, int | None]
 
 
-class NoMotionError(RuntimeError):
+class NoMotionError(ArmgapError, RuntimeError):
     """No acceptable motion was found for an arm; another seed will do."""
 
 
@@ -172,7 +173,7 @@ def _draw_motion(
         if good:
             return (chosen, motion), trace
         vigour = min(max(vigour * factor, 0.1), 4.0)
-    raise NoMotionError(f"no motion found in {ATTEMPTS} attempts for a {arm.kind} arm; take another seed")
+    raise NoMotionError(f"no motion found in {ATTEMPTS} attempts for a {arm.kind} arm", remedy="take another seed")
 
 
 def _hide(

@@ -105,10 +105,10 @@ def hardening_spring(rig: Rig, joint: int, p: Parameters) -> None:
 
 def _draw_coupling(d: Draw) -> Parameters:
     gear = d.sign() * float(d.rng.choice([4.0, 6.0, 8.0]))
-    return {"inertia": d.inertia * d.between(0.05, 0.5) / gear**2, "gear": gear}
+    return {"inertia": d.arm.joint_inertia[1] * d.between(0.05, 0.5) / gear**2, "gear": gear}
 
 
-@effect("rotor_coupling", _draw_coupling, family="further", kinds=TWO_LINK)
+@effect("rotor_coupling", _draw_coupling, per_joint=False, family="further", kinds=TWO_LINK)
 def rotor_coupling(rig: Rig, joint: int, p: Parameters) -> None:
     """Geared rotor of joint 2 on link 1: ``inertia (dq1 + gear dq2)^2 / 2``, MuJoCo's tendon armature."""
     rig.build.coupling = (p["inertia"], p["gear"])
