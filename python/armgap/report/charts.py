@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-__all__ = ["AFTER", "BEFORE", "FLOOR", "MEASURED", "REFIT", "bars", "heatmap", "lines"]
+__all__ = ["AFTER", "BEFORE", "FLOOR", "MEASURED", "REFIT", "bars", "lines"]
 
 # Okabe and Ito's colour-blind-safe palette; the greys are readable on white and on near-black.
 MEASURED = "#808080"
@@ -118,6 +118,8 @@ def bars(
     scale = {"y_axis_type": "log"} if log else {}
     f = figure(title, x_label, y_label, x_range=FactorRange(*factors), **(scale | options))
     positive = [v for _, values, _ in series for v in values if v > 0]
+    if positive:
+        f.y_range.end = max(positive) * (2.5 if log else 1.15)
     bottom = 0.5 * min(positive) if log and positive else 0.0
     for i, (label, values, colour) in enumerate(series):
         tops = [v if v > 0 or not log else bottom for v in values]
@@ -137,27 +139,4 @@ def bars(
     f.xaxis.group_text_color = _INK
     f.xgrid.grid_line_color = None
     _legend(f)
-    return f
-
-
-def heatmap(
-    title: str, rows: Sequence[str], columns: Sequence[str], values: Sequence[Sequence[float]], texts: Sequence[Sequence[str]], **options: Any
-) -> Any:
-    """A table of coloured cells, each with its text; values from 0 to 1 give the depth of the colour."""
-    from bokeh.models import ColumnDataSource
-
-    names = [f"{i}" for i in range(len(columns))]
-    f = figure(title, "", "", x_range=names, y_range=list(reversed(rows)), **({"height": 60 + 34 * len(rows), "tools": ""} | options))
-    cells: dict[str, list[Any]] = {"x": [], "y": [], "alpha": [], "text": []}
-    for row, depths, line in zip(rows, values, texts, strict=True):
-        for name, depth, text in zip(names, depths, line, strict=True):
-            cells["x"].append(name)
-            cells["y"].append(row)
-            cells["alpha"].append(0.06 + 0.8 * float(np.clip(depth, 0, 1)))
-            cells["text"].append(text)
-    source = ColumnDataSource(cells)
-    f.rect("x", "y", width=0.97, height=0.92, color=BEFORE, alpha="alpha", line_color=None, source=source)
-    f.text("x", "y", text="text", source=source, text_align="center", text_baseline="middle", text_font_size="11px", text_color=_INK)
-    f.xaxis.major_label_overrides = dict(zip(names, columns, strict=True))
-    f.grid.grid_line_color = None
     return f

@@ -24,6 +24,10 @@ class Section:
         Charts (bokeh models).
     tables : sequence of (header, rows)
         Tables of strings.
+    heat : sequence of (label, cells)
+        Rows of a map; each cell is a text and a depth from 0 to 1.
+    heat_title : str
+        Caption of the map.
     notes : sequence of str
         Paragraphs after the pictures.
     fold : bool
@@ -34,6 +38,8 @@ class Section:
     text: Sequence[str] = ()
     figures: Sequence[Any] = ()
     tables: Sequence[tuple[Sequence[str], Sequence[Sequence[str]]]] = ()
+    heat: Sequence[tuple[str, Sequence[tuple[str, float]]]] = ()
+    heat_title: str = ""
     notes: Sequence[str] = ()
     fold: bool = False
 

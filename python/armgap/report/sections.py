@@ -12,7 +12,11 @@ from armgap.report.words import figure, joint_text, title
 __all__ = ["SECTIONS"]
 
 Data = dict[str, Any]
-_STEPS = (("arm file", "before", charts.BEFORE), ("re-estimated", "refit", charts.REFIT), ("with causes", "after", charts.AFTER))
+_STEPS = (
+    ("arm file", "before", charts.BEFORE),
+    ("re-estimated", "refit", charts.REFIT),
+    ("with causes", "after", charts.AFTER),
+)
 
 
 def _unit(data: Data) -> str:
@@ -26,27 +30,31 @@ def first_picture(data: Data) -> Section:
     series = [(label, [1e3 * v for v in gap[key]], colour) for label, key, colour in _STEPS]
     series.append(("sensor floor", [1e3 * v for v in gap["floor"]], charts.FLOOR))
     how_far = charts.bars(
-        f"RMS error over {gap['horizon_s']:g} s on held-out motion [m{_unit(data)}]", "", joints, series, log=True, height=320
+        f"RMS error over {gap['horizon_s']:g} s on held-out motion [m{_unit(data)}]",
+        "",
+        joints,
+        series,
+        log=True,
+        height=320,
     )
-    return Section("The gap, and where it lies", figures=[how_far, *_map(data, height=320)])
+    caption = f"Torque the model lacks, by joint and regime, from low to high values [RMS, {_torque_unit(data)}]"
+    return Section("The gap, and where it lies", figures=[how_far], heat=_map(data), heat_title=caption)
 
 
-def _map(data: Data, **options: Any) -> list[Any]:
-    """The gap by joint and regime: one row per variable, one cell per bin, least to most."""
+def _torque_unit(data: Data) -> str:
+    return str(next((r["torque_unit"] for r in data.get("regimes") or []), "N m"))
+
+
+def _map(data: Data) -> list[tuple[str, list[tuple[str, float]]]]:
+    """The gap by joint and regime: one row per variable, one cell per bin, low values first."""
     regimes = data.get("regimes") or []
-    rows, depths, texts = [], [], []
+    key = "before" if data["verdict"] == "parameters" else "refit"
+    rows = []
     for regime in regimes:
-        values = regime["refit"] if data["verdict"] != "parameters" else regime["before"]
-        top = max(max((max(r["refit"]) for r in regimes if r["joint"] == regime["joint"]), default=0.0), 1e-300)
-        top = max(top, max(values, default=0.0))
-        padded = [*values] + [0.0] * (6 - len(values))
-        rows.append(f"joint {regime['joint']}: {regime['variable']}")
-        depths.append([v / top for v in padded])
-        texts.append([_cell(regime, i, v) if i < len(values) else "" for i, v in enumerate(padded)])
-    if not rows:
-        return []
-    columns = ["low", "", "", "", "", "high"]
-    return [charts.heatmap("Torque the model lacks, by joint and regime (RMS)", rows, columns, depths, texts, **options)]
+        top = max((v for r in regimes if r["joint"] == regime["joint"] for v in r[key]), default=0.0)
+        cells = [(_cell(regime, i, v), 0.75 * v / top if top > 0 else 0.0) for i, v in enumerate(regime[key])]
+        rows.append((f"joint {regime['joint']}: {regime['variable']}", cells))
+    return rows
 
 
 def _cell(regime: Data, i: int, value: float) -> str:
@@ -75,7 +83,11 @@ def predictions(data: Data) -> Section:
         "Each window starts from its measured state and runs under the logged torque. Zoom with the wheel, click a name in the legend to "
         "hide its curve."
     )
-    return Section("Predicted against measured, on held-out motion", text=[text] if figures else ["No curves were kept."], figures=figures)
+    return Section(
+        "Predicted against measured, on held-out motion",
+        text=[text] if figures else ["No curves were kept."],
+        figures=figures,
+    )
 
 
 def gap_map(data: Data) -> Section:
@@ -102,7 +114,15 @@ def gap_map(data: Data) -> Section:
 def ranking(data: Data) -> Section:
     """The candidates against each other."""
     ranked = data.get("ranking") or []
-    header = ("candidate", "where", "share of the gap removed", "z", f"RMS [m{_unit(data)}]", "size", "distance from trusted values")
+    header = (
+        "candidate",
+        "where",
+        "share of the gap removed",
+        "z",
+        f"RMS [m{_unit(data)}]",
+        "size",
+        "distance from trusted values",
+    )
     rows = [
         (
             title(r["effect"]),
@@ -126,13 +146,20 @@ def ranking(data: Data) -> Section:
         names = [f"{title(r['effect'])}, {joint_text(r['joint'])}" for r in ranked]
         shares = [max(100 * r["closed"], 0.0) for r in ranked]
         figures.append(
-            charts.bars("Share of the gap above the floor that each candidate removes alone [%]", "", names, [("share", shares, charts.AFTER)])
+            charts.bars(
+                "Share of the gap above the floor that each candidate removes alone [%]",
+                "",
+                names,
+                [("share", shares, charts.AFTER)],
+            )
         )
     text = [
         "Every candidate was tested to first order; those that passed were fitted together with the arm's parameters on the training logs and "
         "judged on held-out motion. The share counts all windows with their tails cut; z is the mean improvement per window in standard errors."
     ]
-    return Section("Ranking of causes", text=text, figures=figures, tables=[(header, rows)] if rows else [], notes=look_alikes)
+    return Section(
+        "Ranking of causes", text=text, figures=figures, tables=[(header, rows)] if rows else [], notes=look_alikes
+    )
 
 
 def parameters(data: Data) -> Section:
@@ -209,7 +236,9 @@ def quality(data: Data) -> Section:
     if noise:
         sigma = " / ".join(figure(1e3 * v) for v in noise["position_sigma"])
         step = " / ".join(figure(1e3 * v) if v else "none seen" for v in noise["encoder_step"])
-        text.append(f"Position noise (one sigma, per joint): {sigma} m{_unit(data)}; encoder step: {step} m{_unit(data)}.")
+        text.append(
+            f"Position noise (one sigma, per joint): {sigma} m{_unit(data)}; encoder step: {step} m{_unit(data)}."
+        )
     return Section("The logs", text=text, tables=[(header, rows)], notes=[*found, *remarks])
 
 

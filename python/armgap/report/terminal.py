@@ -29,7 +29,11 @@ def summary_table(diagnosis: Diagnosis | dict[str, Any]) -> RenderableType:
         table.add_row(Text(question), Text(answer))
     gap = data["gap"]
     unit = gap.get("unit", "rad")
-    figures = Table(box=box.SIMPLE, title=f"RMS error over {gap['horizon_s']:g} s on held-out motion [m{unit}]", title_justify="left")
+    figures = Table(
+        box=box.SIMPLE,
+        title=f"RMS error over {gap['horizon_s']:g} s on held-out motion [m{unit}]",
+        title_justify="left",
+    )
     figures.add_column("joint")
     for name in ("arm file", "re-estimated", "with causes", "sensor floor"):
         figures.add_column(name, justify="right")

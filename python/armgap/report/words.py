@@ -73,9 +73,12 @@ def which(data: Data) -> str:
     parts = []
     for cause in causes:
         values = ", ".join(
-            f"{name} {figure(p['value'])} ± {figure(p['sigma'], 2)} {p['unit']}" for name, p in cause["parameters"].items()
+            f"{name} {figure(p['value'])} ± {figure(p['sigma'], 2)} {p['unit']}"
+            for name, p in cause["parameters"].items()
         )
-        text = f"{title(cause['effect'])}, {joint_text(cause['joint'])}: {values} (probability {cause['probability']:.2f})"
+        text = (
+            f"{title(cause['effect'])}, {joint_text(cause['joint'])}: {values} (probability {cause['probability']:.2f})"
+        )
         others = cause.get("equivalents") or []
         if others:
             names = ", ".join(f"{title(e['effect'])} ({joint_text(e['joint'])})" for e in others)

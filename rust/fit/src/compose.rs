@@ -367,14 +367,11 @@ fn verdict<const N: usize, const P: usize>(attribution: &Attribution<N, P>, gap:
     if stage.excess() > UNEXPLAINED && stage.relative_error() > CONSEQUENCE {
         return "unexplained";
     }
-    let improved = gap
-        .before
-        .iter()
-        .zip(&gap.refit)
-        .zip(&gap.floor)
-        .any(|((b, r), f)| b - r > 0.1 * b && *b > 1.2 * f);
-    let moved = attribution.refit.prior_cost > 1.0;
-    if improved && moved { "parameters" } else { "none" }
+    let steps = gap.before.iter().zip(&gap.refit).zip(&gap.floor);
+    let improved = steps
+        .into_iter()
+        .any(|((before, refit), floor)| before - refit > 0.2 * before && *before > 2.0 * floor);
+    if improved { "parameters" } else { "none" }
 }
 
 /// Cost above the floor, as a factor, beyond which a gap without a cause is called unexplained.
