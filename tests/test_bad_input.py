@@ -395,5 +395,6 @@ def test_words_the_command_line_does_not_know(arguments, run):
 def test_every_error_has_its_case():
     cases = [case for table in (TABLES, FILES, ARMS, OPTIONS) for case, *_ in table]
     assert {case.error for case in cases} == set(CATALOGUE)
-    assert set(ArmgapError.__subclasses__()) == set(CATALOGUE)
+    ours = {error for error in ArmgapError.__subclasses__() if error.__module__ == "armgap.errors"}
+    assert ours == set(CATALOGUE)
     assert len({case.name for case in cases}) == len(cases) >= 30
