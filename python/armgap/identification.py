@@ -16,13 +16,10 @@ from armgap.log import Log
 
 __all__ = ["SCHEMES", "Identification", "identify", "velocity"]
 
-Scheme = Literal["filtered-dynamic", "supplied-energy", "filtered-power"]
-Method = Literal["backward", "central", "local-cubic", "sensor", "midpoint"]
-
-SCHEMES: tuple[Scheme, ...] = ("filtered-dynamic", "supplied-energy", "filtered-power")
+SCHEMES: tuple[str, ...] = ("filtered-dynamic", "supplied-energy", "filtered-power")
 """The regression models, in the paper's order."""
 
-VELOCITIES: tuple[Method, ...] = ("backward", "central", "local-cubic", "sensor", "midpoint")
+VELOCITIES: tuple[str, ...] = ("backward", "central", "local-cubic", "sensor", "midpoint")
 """Ways to get velocities."""
 
 
@@ -71,9 +68,7 @@ class Identification:
         """Return the result without its time series, ready for JSON."""
         parameters = {
             name: {"value": float(v), "sigma": float(s), "unit": unit}
-            for name, v, s, unit in zip(
-                self.parameter_names, self.theta, self.sigma, self.parameter_units, strict=True
-            )
+            for name, v, s, unit in zip(self.parameter_names, self.theta, self.sigma, self.parameter_units, strict=True)
         }
         return {
             "schema": "armgap.identification/1",
@@ -93,7 +88,10 @@ class Identification:
 
 
 def velocity(
-    t: ArrayLike, q: ArrayLike, method: Literal["backward", "central", "local-cubic"] = "local-cubic", half_width: int = 3
+    t: ArrayLike,
+    q: ArrayLike,
+    method: Literal["backward", "central", "local-cubic"] = "local-cubic",
+    half_width: int = 3,
 ) -> NDArray[np.float64]:
     """Velocities from positions.
 
@@ -235,7 +233,10 @@ def _velocities(log: Log, method: str) -> NDArray[np.float64] | None:
     if method == "sensor":
         if log.dq is None:
             raise ColumnError(
-                "has no velocity columns", remedy="map dq1, dq2 ... or choose another velocity", file=log.path or log.name, column="dq1"
+                "has no velocity columns",
+                remedy="map dq1, dq2 ... or choose another velocity",
+                file=log.path or log.name,
+                column="dq1",
             )
         return np.ascontiguousarray(log.dq)
     return _native.velocity(np.ascontiguousarray(log.t), np.ascontiguousarray(log.q), method)
