@@ -157,6 +157,14 @@ def test_a_clean_log_has_no_gap(clean):
     assert clean.causes == ()
 
 
+def test_summary_gives_the_three_answers(found, clean):
+    text = found.summary()
+    assert all(line.strip() for line in text.splitlines())
+    for words in ("Where", "Which", "How far", "tribeck", "joint 1"):
+        assert words in text
+    assert "tribeck" not in clean.summary()
+
+
 def test_results_cannot_be_changed(found):
     with pytest.raises(dataclasses.FrozenInstanceError):
         found.verdict = "none"

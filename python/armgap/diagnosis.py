@@ -190,6 +190,13 @@ class Diagnosis:
         """Return the diagnosis as JSON, schema ``armgap.diagnosis/1``."""
         return json.dumps(self._data, indent=indent, allow_nan=False)
 
+    def summary(self) -> str:
+        """Return the verdict and the three answers (where, which, how far) as text, one line each."""
+        from armgap.report import words
+
+        answers = (f"{question} {answer}" for question, answer in words.answers(self._data))
+        return "\n".join([words.verdict(self._data), *answers])
+
 
 def _take(kind: type[_Record], data: dict[str, Any]) -> _Record:
     """Build a record from the entries it knows."""
