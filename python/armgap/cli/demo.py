@@ -86,10 +86,10 @@ def _own_logs(
 
 
 def _sealed_case(folder: Path, outputs: tuple[str, str | None, bool]) -> None:
-    from armgap.trial.key import open_key, sealed_hash
+    from armgap.trial.key import check_seal, open_key
 
     say = _voice(outputs)
-    seal = sealed_hash(folder)
+    seal = check_seal(folder)
     say.print(f"what is hidden in these logs is sealed: the key's sha256 is {seal[:16]}…", highlight=False)
     training, held = (sorted(folder.glob(f"{part}-*.parquet")) for part in ("train", "holdout"))
     if not training:

@@ -129,16 +129,27 @@ def open_key(case: str | Path) -> Key:
     SealError
         A file is missing, the arm file has no seal, or the key is not the one that was sealed.
     """
+    check_seal(case)
+    return Key.from_json(_content(Path(case) / KEY_FILE).decode())
+
+
+def check_seal(case: str | Path) -> str:
+    """Check that the key of a case folder is the sealed one, without looking into it; return its sha256.
+
+    Raises
+    ------
+    SealError
+        As in `open_key`.
+    """
     folder = Path(case)
-    seal, content = sealed_hash(folder), _content(folder / KEY_FILE)
-    found = hashlib.sha256(content).hexdigest()
+    seal, found = sealed_hash(folder), hashlib.sha256(_content(folder / KEY_FILE)).hexdigest()
     if found != seal:
         raise SealError(
             f"is not the key that was sealed: its sha256 is {found[:12]}…, arm.toml states {seal[:12]}…",
             remedy="do not trust it; make the case again from its seed",
             file=folder / KEY_FILE,
         )
-    return Key.from_json(content.decode())
+    return seal
 
 
 def sealed_hash(case: str | Path) -> str:
