@@ -40,10 +40,11 @@ lint: setup lint-tools ## formatting, types and stubs
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest armgap._native --mypy-config-file pyproject.toml
 	cargo fmt --check
-	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy -q --all-targets --workspace -- -D warnings
+	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy -q --release --all-targets -p armgap-core -p armgap-fit -p armgap-py -- -D warnings
 
 test-rust: tools ## the Rust tests
-	cargo test -q --release --workspace --exclude armgap-py
+	cargo test -q --release
+	rust/embed/check.sh
 
 test-python: setup ## the Python tests
 	$(BIN)/python -m pytest

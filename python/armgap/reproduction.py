@@ -83,7 +83,7 @@ class Reproduction:
     def deviation(self, scheme: str, step: int) -> NDArray[np.float64]:
         """Relative deviation of the nine estimates from the truth at a step of the ladder."""
         estimate = self.steps[scheme][step].theta[: len(self.arm.theta)]
-        return estimate / self.arm.theta - 1.0
+        return np.asarray(estimate / self.arm.theta - 1.0)
 
     def decomposition(self, scheme: str) -> dict[str, list[float | None]]:
         """What explains Table II's deviations from "measured", in percent of the measured value, for one scheme."""
@@ -97,14 +97,14 @@ class Reproduction:
             "velocity": d[1] - d[2],
             "asymmetry": d[2] - d[3],
         }
-        explained = sum(parts.values())
+        explained = d[0] - d[3]
         left = [None if p is None else p - e for p, e in zip(paper, explained, strict=True)]
         return {"Table II": paper, **{k: list(v) for k, v in parts.items()}, "unexplained": left}
 
     def movement(self, result: Identification) -> NDArray[np.float64]:
         """Peak-to-peak movement of the estimates over the last half of the run, relative to the true values."""
         half = result.history[len(result.t) // 2 :, : len(self.arm.theta)]
-        return np.ptp(half, axis=0) / np.abs(self.arm.theta)
+        return np.asarray(np.ptp(half, axis=0) / np.abs(self.arm.theta))
 
     def findings(self) -> list[tuple[str, str]]:
         """Return the findings as (title, sentence with this run's figures)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 from armgap.report import charts
@@ -95,7 +96,7 @@ def gap_map(data: Data) -> Section:
     figures = []
     for regime in data.get("regimes") or []:
         edges = regime["edges"]
-        groups = [f"{a:.3g} … {b:.3g}" for a, b in zip(edges, edges[1:], strict=False)]
+        groups = [f"{a:.3g} … {b:.3g}" for a, b in pairwise(edges)]
         series = [(label, regime[key], colour) for label, key, colour in _STEPS]
         figures.append(
             charts.bars(

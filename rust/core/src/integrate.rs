@@ -40,7 +40,7 @@ impl<T: Real, const N: usize> State<T, N> {
 
     /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
-        self.q.iter().chain(self.dq.iter()).all(|x| x.is_finite())
+        self.q.iter().chain(self.dq.iter()).all(nalgebra::ComplexField::is_finite)
     }
 }
 

@@ -4,6 +4,7 @@
 //! Kelly (1997), *Experimental evaluation of identification schemes on a direct drive robot*, Robotica 15,
 //! 563-571. No standard library, no allocation, no panic; `f64` and `f32`.
 #![no_std]
+#![forbid(unsafe_code)]
 
 pub mod arm;
 pub mod effect;

@@ -126,7 +126,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
     /// A plant none of whose numbers is infinite or undefined.
     pub fn is_finite(&self) -> bool {
-        self.theta.iter().all(|x| x.is_finite())
+        self.theta.iter().all(nalgebra::ComplexField::is_finite)
     }
 
     /// Joint `j` at an instant.

@@ -3,6 +3,8 @@
 //! The way of the data: `track` (log) -> `window` (short rollouts) -> `metric` (what a residual weighs) -> `solve` (output error)
 //! -> `attribute` (which effect) and `locate` (where) -> `report` (the result as data).
 
+#![forbid(unsafe_code)]
+
 pub mod arm;
 pub mod attribute;
 pub mod compose;

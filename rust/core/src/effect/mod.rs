@@ -150,6 +150,7 @@ impl EffectParameter {
 
 /// Which hooks an effect uses, so that the integrator calls no other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "one flag per hook")]
 pub struct Hooks {
     /// [`Effect::force`].
     pub force: bool,

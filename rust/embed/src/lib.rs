@@ -1,0 +1,122 @@
+//! Proof that the core runs where there is nothing but a processor: `no_std`, no allocator, and no path that can panic.
+//!
+//! Any reachable panic would need `armgap_panicked`, which nobody defines; any allocation an allocator, which this library does not
+//! have. `check.sh` links the exported functions with everything unreachable removed and looks for such symbols.
+#![no_std]
+
+use armgap_core::arm::TwoLink;
+use armgap_core::effect::Pulse;
+use armgap_core::filter::Cutoff;
+use armgap_core::identify::{Estimator, Outcome, Sample, Settings};
+use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::plant::Plant;
+use armgap_core::regression::{Scheme, Variant};
+use nalgebra::{SVector, Vector2};
+
+unsafe extern "C" {
+    fn armgap_panicked() -> !;
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    unsafe { armgap_panicked() }
+}
+
+type Online<T> = Estimator<T, TwoLink<T>, 2, 9, 9>;
+
+macro_rules! controller {
+    ($real:ty, $start:ident, $update:ident) => {
+        /// Writes an estimator that has seen nothing into the caller's memory.
+        ///
+        /// # Safety
+        /// `at` points to writable memory of the estimator's size and alignment.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $start(at: *mut Online<$real>, scheme: u32, exact: bool) {
+            let settings = Settings {
+                scheme: match scheme {
+                    0 => Scheme::FilteredDynamic,
+                    1 => Scheme::SuppliedEnergy,
+                    _ => Scheme::FilteredPower,
+                },
+                variant: if exact {
+                    Variant::Exact
+                } else {
+                    Variant::Paper
+                },
+                cutoff: Cutoff { rad_per_s: 50.0 },
+                forgetting: 1.0,
+                theta0: SVector::zeros(),
+                p0: 1000.0,
+            };
+            unsafe {
+                at.write(Estimator::new(
+                    TwoLink {
+                        gravity: 9.81,
+                        length1: 0.45,
+                    },
+                    settings,
+                ))
+            };
+        }
+
+        /// Takes one sample and writes the estimate; the result is 1 if it was used.
+        ///
+        /// # Safety
+        /// `at` was written by the start function; `q` and `tau` hold two numbers, `theta` has room for nine.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $update(
+            at: *mut Online<$real>,
+            t: $real,
+            q: *const [$real; 2],
+            tau: *const [$real; 2],
+            theta: *mut [$real; 9],
+        ) -> u32 {
+            let estimator = unsafe { &mut *at };
+            let (q, tau) = unsafe { (*q, *tau) };
+            let sample = Sample {
+                t,
+                q: Vector2::from(q),
+                dq: None,
+                tau: Vector2::from(tau),
+            };
+            let outcome = estimator.update(&sample);
+            unsafe { theta.write((*estimator.rls().theta()).into()) };
+            u32::from(matches!(outcome, Outcome::Updated(_)))
+        }
+    };
+}
+
+controller!(f64, armgap_start_f64, armgap_update_f64);
+controller!(f32, armgap_start_f32, armgap_update_f32);
+
+/// One sample of simulated motion under held torques.
+///
+/// # Safety
+/// `q`, `dq` and `tau` point to two numbers each, `theta` to nine.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armgap_advance_f64(
+    q: *mut [f64; 2],
+    dq: *mut [f64; 2],
+    t: f64,
+    h: f64,
+    tau: *const [f64; 2],
+    theta: *const [f64; 9],
+) {
+    let (tau, theta) = unsafe { (*tau, *theta) };
+    let plant = Plant::new(TwoLink::new(9.81, None, &theta), theta);
+    let mut state = unsafe { State::new(Vector2::from(*q), Vector2::from(*dq)) };
+    advance(
+        &plant,
+        &mut state,
+        &Interval {
+            t,
+            h,
+            torque: &tau.map(Pulse::held),
+        },
+        1,
+    );
+    unsafe {
+        q.write(state.q.into());
+        dq.write(state.dq.into());
+    }
+}
