@@ -211,6 +211,7 @@ def test_findings_of_the_logs_are_in_the_result(pendulum):
     holed = Log.from_arrays(log.t[keep], log.q[keep], log.tau[keep], name="holed", arm=pendulum)
     result = diagnose(holed, pendulum, holdout=swing(pendulum, 2))
     assert any(f["log"] == "holed" and f["kind"] == "gap" for f in result.extra["log_findings"])
+    assert any(remark.startswith("holed: 1 gap of more than 3 sample periods") for remark in result.remarks)
 
 
 def test_the_same_input_gives_the_same_answer(pendulum):

@@ -190,12 +190,25 @@ class Diagnosis:
         """Return the diagnosis as JSON, schema ``armgap.diagnosis/1``."""
         return json.dumps(self._data, indent=indent, allow_nan=False)
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader should know: notes on the diagnosis, and what was noticed in the logs, one line per kind."""
+        found: dict[str, list[dict[str, str]]] = {}
+        for entry in self.extra.get("log_findings", ()):
+            found.setdefault(entry["kind"], []).append(entry)
+        return (*self.extra.get("notes", ()), *(_remark(entries) for entries in found.values()))
+
     def summary(self) -> str:
         """Return the verdict and the three answers (where, which, how far) as text, one line each."""
         from armgap.report import words
 
         answers = (f"{question} {answer}" for question, answer in words.answers(self._data))
         return "\n".join([words.verdict(self._data), *answers])
+
+
+def _remark(entries: list[dict[str, str]]) -> str:
+    more = f" (and {len(entries) - 1} more like it)" if len(entries) > 1 else ""
+    return f"{entries[0]['log']}: {entries[0]['message']}{more}"
 
 
 def _take(kind: type[_Record], data: dict[str, Any]) -> _Record:

@@ -73,6 +73,9 @@ def command(
     if not quiet and json_file != "-":
         from armgap.report import summary_table
 
-        console().print(summary_table(result))
+        say = console()
+        say.print(summary_table(result))
+        for remark in result.remarks:
+            say.print(f"note: {remark}", highlight=False, markup=False)
         if report_file is not None:
-            console().print(f"report: {report_file}")
+            say.print(f"report: {report_file}", highlight=False, markup=False)
