@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import csv
+import os
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import polars as pl
@@ -50,11 +53,30 @@ def _parquet(data: bytes, path: Path) -> pl.DataFrame:
     if data[-4:] != _PARQUET:
         raise LogReadError("is a Parquet file that was cut short", remedy="copy or write it again", file=path)
     try:
-        return pl.read_parquet(data)
-    except Exception as error:
+        with _silence():
+            return pl.read_parquet(data)
+    except (Exception, pl.exceptions.PanicException) as error:
         raise LogReadError(
             f"is a damaged Parquet file ({_first_line(error)})", remedy="copy or write it again", file=path
         ) from None
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Keep what the decoder writes to standard error by itself, when damaged data make it panic, from the user."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # standard error is closed
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(nowhere)
+        os.close(kept)
 
 
 def _csv(data: bytes, path: Path) -> pl.DataFrame:
