@@ -9,7 +9,7 @@ use crate::filter::Cutoff;
 use crate::real::{Real, lit};
 use crate::regression::{FilteredDynamic, FilteredPower, Passage, Scheme, Snapshot, SuppliedEnergy, Variant};
 use crate::rls::{Rls, Update};
-use nalgebra::SVector;
+use nalgebra::{ComplexField, SVector};
 
 /// Settings of an estimator of `R` parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,7 +78,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
             assert!(
                 R == P || R == P + N,
                 "R is the arm's parameters, or those and one asymmetry per joint"
-            )
+            );
         }
         let rls = Rls::new(settings.theta0, settings.p0, settings.forgetting);
         Self {
@@ -129,7 +129,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
             .iter()
             .chain(sample.tau.iter())
             .chain(sample.dq.iter().flatten());
-        let finite = sample.t.is_finite() && numbers.into_iter().all(|x| x.is_finite());
+        let finite = sample.t.is_finite() && numbers.into_iter().all(ComplexField::is_finite);
         finite && self.last.is_none_or(|last| sample.t > last.t)
     }
 

@@ -11,7 +11,7 @@
 
 use crate::linear::solve_positive_definite;
 use crate::real::Real;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{ComplexField, SMatrix, SVector};
 
 /// Estimate and covariance of `R` parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,7 +78,7 @@ impl<T: Real, const R: usize> Rls<T, R> {
     /// One sample with `M` errors: `psi` has one row per error.
     #[inline]
     pub fn update<const M: usize>(&mut self, psi: &SMatrix<T, M, R>, y: &SVector<T, M>) -> Update<T, M> {
-        let finite = psi.iter().chain(y.iter()).all(|x| x.is_finite());
+        let finite = psi.iter().chain(y.iter()).all(ComplexField::is_finite);
         if !finite {
             self.rejected += 1;
             return Update::Rejected;
@@ -98,7 +98,7 @@ impl<T: Real, const R: usize> Rls<T, R> {
         let weighted = solve_positive_definite(s, error);
         let theta = self.theta + g * weighted;
         let p = self.reduced(&g, &s);
-        if !theta.iter().chain(p.iter()).all(|x| x.is_finite()) {
+        if !theta.iter().chain(p.iter()).all(ComplexField::is_finite) {
             self.rejected += 1;
             return Update::Rejected;
         }
