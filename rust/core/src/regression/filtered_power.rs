@@ -1,9 +1,10 @@
 //! Filtered power model, equations (29) and (30): `F[tau.dq] = (D[E] + F[W]) theta`, the paper's own proposal.
 
-use super::{Passage, Snapshot, Variant, energy_rows};
+use super::reversal::Pieces;
+use super::{Passage, Snapshot, Variant, energy_row, power_row};
 use crate::arm::Arm;
 use crate::filter::{Cutoff, State};
-use crate::real::Real;
+use crate::real::{Real, lit};
 use nalgebra::{SMatrix, SVector};
 
 /// State of the scheme.
@@ -12,7 +13,7 @@ pub struct FilteredPower<T: Real, const N: usize, const R: usize> {
     energy: SMatrix<State<T>, 1, R>,
     dissipation: SMatrix<State<T>, 1, R>,
     supplied: State<T>,
-    last_dq: SVector<T, N>,
+    last: Snapshot<T, N>,
 }
 
 impl<T: Real, const N: usize, const R: usize> FilteredPower<T, N, R> {
@@ -23,19 +24,13 @@ impl<T: Real, const N: usize, const R: usize> FilteredPower<T, N, R> {
         now: &Snapshot<T, N>,
         tau: &SVector<T, N>,
     ) -> Self {
-        let (energy, power) = energy_rows::<T, A, N, P, R>(arm, now);
-        let derivative = |x| {
-            if variant == Variant::Paper {
-                State::from_zero(x)
-            } else {
-                State::steady(x)
-            }
-        };
+        let energy = energy_row::<T, A, N, P, R>(arm, now);
+        let power = power_row::<T, A, N, P, R>(arm, &now.dq);
         Self {
-            energy: energy.map(derivative),
+            energy: energy.map(|x| variant.derivative_state(x)),
             dissipation: power.map(State::from_zero),
             supplied: State::from_zero(tau.dot(&now.dq)),
-            last_dq: now.dq,
+            last: *now,
         }
     }
 
@@ -50,36 +45,72 @@ impl<T: Real, const N: usize, const R: usize> FilteredPower<T, N, R> {
         passage: &Passage<T, N>,
         tau: &SVector<T, N>,
     ) -> (SMatrix<T, 1, R>, SVector<T, 1>) {
-        let step = cutoff.step(passage.h);
-        let (energy, power) = energy_rows::<T, A, N, P, R>(arm, now);
-        let mut psi = SMatrix::zeros();
-        for j in 0..R {
-            let (e, w) = (&mut self.energy[(0, j)], &mut self.dissipation[(0, j)]);
-            psi[(0, j)] = match variant {
-                Variant::Paper => {
-                    e.paper_derivative(&step, energy[(0, j)]) + w.paper_low(&step, power[(0, j)])
-                }
-                Variant::Exact => e.derivative(&step, energy[(0, j)]) + w.low(&step, power[(0, j)]),
-            };
-        }
-        let y = match variant {
-            Variant::Paper => self.supplied.paper_low(&step, tau.dot(&now.dq)),
+        let result = match variant {
+            Variant::Paper => self.paper(arm, cutoff, now, passage.h, tau),
             Variant::Exact => {
-                let parts = [cutoff.step(passage.split), cutoff.step(passage.h - passage.split)];
-                let middle = self.last_dq + (now.dq - self.last_dq) * (passage.split / passage.h);
-                self.supplied.low_ramp(
-                    &parts[0],
-                    passage.first.dot(&self.last_dq),
-                    passage.first.dot(&middle),
-                );
-                self.supplied.low_ramp(
-                    &parts[1],
-                    passage.second.dot(&middle),
-                    passage.second.dot(&now.dq),
-                )
+                (self.exact(arm, cutoff, now, passage.h), self.exact_supply(cutoff, now, passage))
             }
         };
-        self.last_dq = now.dq;
-        (psi, SVector::<T, 1>::new(y))
+        self.last = *now;
+        (result.0, SVector::<T, 1>::new(result.1))
+    }
+
+    #[inline]
+    fn paper<A: Arm<T, N, P>, const P: usize>(
+        &mut self,
+        arm: &A,
+        cutoff: &Cutoff<T>,
+        now: &Snapshot<T, N>,
+        h: T,
+        tau: &SVector<T, N>,
+    ) -> (SMatrix<T, 1, R>, T) {
+        let step = cutoff.step(h);
+        let energy = energy_row::<T, A, N, P, R>(arm, now);
+        let power = power_row::<T, A, N, P, R>(arm, &now.dq);
+        let mut psi = SMatrix::zeros();
+        for j in 0..R {
+            psi[j] = self.energy[j].paper_derivative(&step, energy[j])
+                + self.dissipation[j].paper_low(&step, power[j]);
+        }
+        (psi, self.supplied.paper_low(&step, tau.dot(&now.dq)))
+    }
+
+    #[inline]
+    fn exact<A: Arm<T, N, P>, const P: usize>(
+        &mut self,
+        arm: &A,
+        cutoff: &Cutoff<T>,
+        now: &Snapshot<T, N>,
+        h: T,
+    ) -> SMatrix<T, 1, R> {
+        let step = cutoff.step(h);
+        let energy = energy_row::<T, A, N, P, R>(arm, now);
+        let middle = energy_row::<T, A, N, P, R>(arm, &self.last.half_way(now, h));
+        Pieces::of(&self.last.dq, &now.dq).each(
+            |dq| power_row::<T, A, N, P, R>(arm, dq),
+            |start, end, from, to| {
+                let part = step.part(cutoff, h, end - start);
+                for j in 0..R {
+                    self.dissipation[j].low_ramp(&part, from[j], to[j]);
+                }
+            },
+        );
+        let mut psi = SMatrix::zeros();
+        for j in 0..R {
+            let height = middle[j] - (energy[j] + self.energy[j].input) * lit(0.5);
+            psi[j] = self.energy[j].derivative_curved(&step, energy[j], height) + self.dissipation[j].y;
+        }
+        psi
+    }
+
+    /// `F` of the power of torques that are held in two parts, velocity linear over the whole.
+    #[inline]
+    fn exact_supply(&mut self, cutoff: &Cutoff<T>, now: &Snapshot<T, N>, passage: &Passage<T, N>) -> T {
+        let parts = passage.steps(cutoff);
+        let from = self.last.dq;
+        let middle = from + (now.dq - from) * (passage.split / passage.h);
+        let (first, second) = (&passage.first, &passage.second);
+        self.supplied.low_ramp(&parts[0], first.dot(&from), first.dot(&middle));
+        self.supplied.low_ramp(&parts[1], second.dot(&middle), second.dot(&now.dq))
     }
 }

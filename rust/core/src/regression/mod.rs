@@ -7,12 +7,14 @@
 //! Two variants differ in the filters and in when signals are taken to be valid:
 //!
 //! * [`Variant::Paper`]: the filters as printed, and `q(k), dq(k), tau(k)` all of one sample.
-//! * [`Variant::Exact`]: consistent filters, and the torque that really acted between two states ([`Passage`]).
+//! * [`Variant::Exact`]: consistent filters, the torque that really acted between two states ([`Passage`]), and Coulomb friction that
+//!   changes sign where the velocity does (`reversal`), not half-way to the next sample.
 //!
 //! Adding a scheme is one file here and one line in [`Scheme::ALL`].
 
 mod filtered_dynamic;
 mod filtered_power;
+mod reversal;
 mod supplied_energy;
 
 pub use filtered_dynamic::FilteredDynamic;
@@ -20,7 +22,8 @@ pub use filtered_power::FilteredPower;
 pub use supplied_energy::SuppliedEnergy;
 
 use crate::arm::Arm;
-use crate::real::Real;
+use crate::filter::{Cutoff, State, Step};
+use crate::real::{Real, lit};
 use nalgebra::{SMatrix, SVector};
 
 /// The schemes of the paper.
@@ -89,37 +92,88 @@ pub struct Passage<T, const N: usize> {
     pub middle: SVector<T, N>,
 }
 
-/// Momentum and the remaining forces of the arm as rows over all `R` parameters.
+impl Variant {
+    /// A `D` channel at its first input: the paper's starts at rest, the consistent one in the steady state.
+    #[inline]
+    fn derivative_state<T: Real>(self, input: T) -> State<T> {
+        match self {
+            Self::Paper => State::from_zero(input),
+            Self::Exact => State::steady(input),
+        }
+    }
+}
+
+impl<T: Real, const N: usize> Passage<T, N> {
+    /// Coefficients of the two parts.
+    #[inline]
+    fn steps(&self, cutoff: &Cutoff<T>) -> [Step<T>; 2] {
+        let first = cutoff.step(self.split);
+        let rest = self.h - self.split;
+        let second = if rest == self.split { first } else { cutoff.step(rest) };
+        [first, second]
+    }
+}
+
+impl<T: Real, const N: usize> Snapshot<T, N> {
+    /// The state half-way to another one `h` seconds later, velocity linear in between.
+    #[inline]
+    fn half_way(&self, to: &Self, h: T) -> Self {
+        let half: T = lit(0.5);
+        Self {
+            q: (self.q + to.q) * half - (to.dq - self.dq) * (h * lit(0.125)),
+            dq: (self.dq + to.dq) * half,
+        }
+    }
+}
+
+/// Momentum, and gravity with the rest of what is not friction, as rows over all `R` parameters.
 #[inline]
-pub(crate) fn dynamic_rows<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
+pub(crate) fn inertial_rows<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
     arm: &A,
     now: &Snapshot<T, N>,
 ) -> (SMatrix<T, N, R>, SMatrix<T, N, R>) {
     let momentum = arm.momentum_regressor(&now.q, &now.dq);
-    let force = arm.potential_regressor(&now.q, &now.dq) + arm.friction_regressor(&now.dq);
-    let mut rest = widened::<T, N, P, R>(&force);
-    for j in 0..N {
-        if P + j < R {
-            rest[(j, P + j)] = T::one();
-        }
-    }
-    (widened::<T, N, P, R>(&momentum), rest)
+    let potential = arm.potential_regressor(&now.q, &now.dq);
+    (widened::<T, N, P, R>(&momentum), widened::<T, N, P, R>(&potential))
 }
 
-/// Energy and dissipated power of the arm as rows over all `R` parameters.
+/// Friction as rows over all `R` parameters.
 #[inline]
-pub(crate) fn energy_rows<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
+pub(crate) fn friction_rows<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
     arm: &A,
-    now: &Snapshot<T, N>,
-) -> (SMatrix<T, 1, R>, SMatrix<T, 1, R>) {
-    let energy = widened::<T, 1, P, R>(&arm.energy_regressor(&now.q, &now.dq).transpose());
-    let mut power = widened::<T, 1, P, R>(&arm.dissipation_regressor(&now.dq).transpose());
+    dq: &SVector<T, N>,
+) -> SMatrix<T, N, R> {
+    let mut rows = widened::<T, N, P, R>(&arm.friction_regressor(dq));
     for j in 0..N {
         if P + j < R {
-            power[(0, P + j)] = now.dq[j];
+            rows[(j, P + j)] = T::one();
         }
     }
-    (energy, power)
+    rows
+}
+
+/// Energy as a row over all `R` parameters.
+#[inline]
+pub(crate) fn energy_row<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
+    arm: &A,
+    now: &Snapshot<T, N>,
+) -> SMatrix<T, 1, R> {
+    widened::<T, 1, P, R>(&arm.energy_regressor(&now.q, &now.dq).transpose())
+}
+
+/// Dissipated power as a row over all `R` parameters.
+#[inline]
+pub(crate) fn power_row<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
+    arm: &A,
+    dq: &SVector<T, N>,
+) -> SMatrix<T, 1, R> {
+    let mut power = widened::<T, 1, P, R>(&arm.dissipation_regressor(dq).transpose());
+    for j in 0..N {
+        if P + j < R {
+            power[(0, P + j)] = dq[j];
+        }
+    }
+    power
 }
 
 #[inline]

@@ -3,7 +3,8 @@
 //! A torque that is held does exactly the work `tau (q_end - q_begin)`; the paper's variant takes the trapezoidal rule for that integral
 //! as for the others. The integrals have infinite gain at zero frequency: any constant error grows without bound.
 
-use super::{Passage, Snapshot, Variant, energy_rows};
+use super::reversal::Pieces;
+use super::{Passage, Snapshot, Variant, energy_row, power_row};
 use crate::arm::Arm;
 use crate::real::{Real, lit};
 use nalgebra::{SMatrix, SVector};
@@ -13,24 +14,20 @@ use nalgebra::{SMatrix, SVector};
 pub struct SuppliedEnergy<T: Real, const N: usize, const R: usize> {
     first: SMatrix<T, 1, R>,
     dissipated: SMatrix<T, 1, R>,
-    last_power: SMatrix<T, 1, R>,
     work: T,
     last_supplied: T,
-    last_q: SVector<T, N>,
+    last: Snapshot<T, N>,
 }
 
 impl<T: Real, const N: usize, const R: usize> SuppliedEnergy<T, N, R> {
     /// The scheme at its first state; `tau` is the torque that acts from then on.
     pub fn new<A: Arm<T, N, P>, const P: usize>(arm: &A, now: &Snapshot<T, N>, tau: &SVector<T, N>) -> Self {
-        let (first, last_power) = energy_rows::<T, A, N, P, R>(arm, now);
-        let last_supplied = tau.dot(&now.dq);
         Self {
-            first,
+            first: energy_row::<T, A, N, P, R>(arm, now),
             dissipated: SMatrix::zeros(),
-            last_power,
             work: T::zero(),
-            last_supplied,
-            last_q: now.q,
+            last_supplied: tau.dot(&now.dq),
+            last: *now,
         }
     }
 
@@ -44,22 +41,24 @@ impl<T: Real, const N: usize, const R: usize> SuppliedEnergy<T, N, R> {
         passage: &Passage<T, N>,
         tau: &SVector<T, N>,
     ) -> (SMatrix<T, 1, R>, SVector<T, 1>) {
-        let (energy, power) = energy_rows::<T, A, N, P, R>(arm, now);
-        let half: T = lit::<T>(0.5) * passage.h;
-        self.dissipated += (power + self.last_power) * half;
-        self.work += match variant {
-            Variant::Paper => (tau.dot(&now.dq) + self.last_supplied) * half,
-            Variant::Exact => {
-                passage.first.dot(&(passage.middle - self.last_q))
-                    + passage.second.dot(&(now.q - passage.middle))
+        let half = passage.h * lit(0.5);
+        let power = |dq: &SVector<T, N>| power_row::<T, A, N, P, R>(arm, dq);
+        let supplied = tau.dot(&now.dq);
+        match variant {
+            Variant::Paper => {
+                self.dissipated += (power(&self.last.dq) + power(&now.dq)) * half;
+                self.work += (self.last_supplied + supplied) * half;
             }
-        };
-        self.last_power = power;
-        self.last_supplied = tau.dot(&now.dq);
-        self.last_q = now.q;
-        (
-            energy - self.first + self.dissipated,
-            SVector::<T, 1>::new(self.work),
-        )
+            Variant::Exact => {
+                Pieces::of(&self.last.dq, &now.dq).each(power, |start, end, from, to| {
+                    self.dissipated += (from + to) * (half * (end - start));
+                });
+                self.work += passage.first.dot(&(passage.middle - self.last.q))
+                    + passage.second.dot(&(now.q - passage.middle));
+            }
+        }
+        (self.last, self.last_supplied) = (*now, supplied);
+        let psi = energy_row::<T, A, N, P, R>(arm, now) - self.first + self.dissipated;
+        (psi, SVector::<T, 1>::new(self.work))
     }
 }
