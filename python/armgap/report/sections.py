@@ -119,7 +119,6 @@ def ranking(data: Data) -> Section:
         "candidate",
         "where",
         "share of the gap removed",
-        "z",
         f"RMS [m{_unit(data)}]",
         "size",
         "distance from trusted values",
@@ -129,7 +128,6 @@ def ranking(data: Data) -> Section:
             title(r["effect"]),
             joint_text(r["joint"]),
             f"{max(r['closed'], -9.99):.0%}",
-            figure(r["z"]),
             " / ".join(figure(1e3 * v) for v in r["rms"]),
             ", ".join(f"{name} {figure(p['value'])} {p['unit']}" for name, p in r["parameters"].items()),
             figure(r.get("trust", 0.0)),
@@ -156,7 +154,7 @@ def ranking(data: Data) -> Section:
         )
     text = [
         "Every candidate was tested to first order; those that passed were fitted together with the arm's parameters on the training logs and "
-        "judged on held-out motion. The share counts all windows with their tails cut; z is the mean improvement per window in standard errors."
+        "judged on held-out motion. The share counts held-out windows with their tails cut."
     ]
     return Section(
         "Ranking of causes", text=text, figures=figures, tables=[(header, rows)] if rows else [], notes=look_alikes

@@ -22,8 +22,17 @@ const SHRUNK: f64 = 1.15;
 /// A candidate that leaves less than this part of its trace unexplained by the arm's own parameters shows only against trusted values.
 const ABSORBED: f64 = 0.03;
 
+/// A candidate that to first order removes less than this part of the cost is not fitted.
+const TRACE: f64 = 0.01;
+
+/// Smoother friction is fitted only if it does not raise the cost by more than this factor as it stands.
+const WORTH_SMOOTHING: f64 = 2.0;
+
+/// Finalists by closeness to trusted values lie within this many squared sigmas of the closest.
+const TRUSTED: f64 = 10.0;
+
 /// Widths of smoothed friction that are tried as a nuisance, relative to the slowest joint's RMS speed.
-const SMOOTHING: [f64; 3] = [0.01, 0.03, 0.1];
+const SMOOTHING: [f64; 2] = [0.03, 0.1];
 
 /// One alternative to the current model, fitted on the training windows and judged on the holdout.
 #[derive(Debug, Clone)]
@@ -47,13 +56,7 @@ impl<const P: usize> Contender<P> {
     /// Advantage over `other` of every window, training first.
     pub fn advantages(&self, other: &Self) -> Vec<f64> {
         let here = self.training.iter().chain(&self.holdout);
-        other
-            .training
-            .iter()
-            .chain(&other.holdout)
-            .zip(here)
-            .map(|(b, a)| b - a)
-            .collect()
+        other.training.iter().chain(&other.holdout).zip(here).map(|(b, a)| b - a).collect()
     }
 
     /// Mean advantage over `other` per window, in units of its standard error.
@@ -83,6 +86,8 @@ pub struct Stage<const N: usize, const P: usize> {
     pub base: Contender<P>,
     /// Alternatives, best first.
     pub contenders: Vec<Contender<P>>,
+    /// Every candidate that was fitted, by the share of the gap it removes under the current model's own weights, best first.
+    pub field: Vec<(Contender<P>, f64)>,
     /// First-order tests of all candidates around the current model.
     pub screened: Vec<Scored>,
     /// Weights in force.
@@ -125,36 +130,24 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let (fit, weights) = self.settle(current, scale);
         let all = self.open_candidates(&fit.hypothesis);
         let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
-        let mut starts: Vec<Hypothesis<P>> = promising(&screened)
+        let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
+        let mut starts: Vec<Hypothesis<P>> = promising(&screened, TRACE * training)
             .into_iter()
-            .map(|effect| {
-                self.loaded(&fit.hypothesis, effect)
-                    .unwrap_or_else(|| fit.hypothesis.with(effect))
-            })
+            .map(|effect| self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| fit.hypothesis.with(effect)))
             .collect();
-        starts.extend(self.smoother(&fit.hypothesis));
+        starts.extend(self.smoother(&fit.hypothesis, &weights, training));
         let first = self.contend(&weights, &fit.hypothesis, starts, Effort::ROUGH);
+        let field = self.field(&weights, &fit, &first);
         let (base, contenders, weights) = self.final_round(&fit.hypothesis, first, weights);
         let floor = self.floor(&weights);
         let motion = self.motion(&weights);
-        Stage {
-            settled: fit,
-            base,
-            contenders,
-            screened,
-            weights,
-            floor,
-            motion,
-        }
+        Stage { settled: fit, base, contenders, field, screened, weights, floor, motion }
     }
 
     /// Candidates not yet in the model.
     pub fn open_candidates(&self, model: &Hypothesis<P>) -> Vec<Placed> {
         let taken = |c: &Placed| model.effects.iter().any(|e| e.same_place(c));
-        candidates(&self.scales)
-            .into_iter()
-            .filter(|c| !taken(c))
-            .collect()
+        candidates(&self.scales).into_iter().filter(|c| !taken(c)).collect()
     }
 
     /// The model with the load that brings its parameters closest to their trusted values, the motion staying the same; none for effects
@@ -163,9 +156,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// For a given distance the parameters' shift is linear in the mass, so one line of candidates over the distance suffices.
     fn loaded(&self, model: &Hypothesis<P>, effect: Placed) -> Option<Hypothesis<P>> {
         effect.law.payload(&effect.p)?;
-        let off: Vec<f64> = (0..P)
-            .map(|i| (model.theta[i] - self.prior.theta[i]) / self.prior.sigma[i])
-            .collect();
+        let off: Vec<f64> =
+            (0..P).map(|i| (model.theta[i] - self.prior.theta[i]) / self.prior.sigma[i]).collect();
         let attempt = |step: usize| {
             let distance = self.scales.length * 0.02 * step as f64;
             let unit = self.arm.payload(&model.theta, 1.0, distance);
@@ -177,27 +169,31 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         };
         let best = (1..=150).map(attempt).min_by(|a, b| a.0.total_cmp(&b.0))?;
         let (_, mass, distance, unit) = best;
-        let mut start = model.with(Placed {
-            p: [mass, distance, 0.0],
-            ..effect
-        });
+        let mut start = model.with(Placed { p: [mass, distance, 0.0], ..effect });
         for (value, shift) in start.theta.iter_mut().zip(unit) {
             *value -= mass * shift;
         }
         Some(start)
     }
 
-    /// The model with smoother friction, or with exact friction if it is smoothed now.
-    fn smoother(&self, model: &Hypothesis<P>) -> Vec<Hypothesis<P>> {
+    /// The model with smoother friction, or with exact friction if it is smoothed now, where that is not plainly worse.
+    fn smoother(&self, model: &Hypothesis<P>, weights: &Weights<N>, cost: f64) -> Vec<Hypothesis<P>> {
         let slowest = self.scales.speed.iter().copied().fold(f64::INFINITY, f64::min);
         let widths = SMOOTHING.iter().map(|w| w * slowest).chain([0.0]);
         let other = widths.filter(|w| *w != model.smoothing);
+        let problem = self.problem(&weights.training);
         other
-            .map(|smoothing| Hypothesis {
-                smoothing,
-                ..model.clone()
-            })
+            .map(|smoothing| Hypothesis { smoothing, ..model.clone() })
+            .filter(|h| problem.window_costs(h).iter().sum::<f64>() < WORTH_SMOOTHING * cost)
             .collect()
+    }
+
+    /// All fitted candidates with the share of the gap each removes.
+    fn field(&self, weights: &Weights<N>, fit: &Fit<P>, fitted: &[Contender<P>]) -> Vec<(Contender<P>, f64)> {
+        let base: f64 = self.judge(&weights.holdout).window_costs(&fit.hypothesis).iter().sum();
+        let above = (base - self.floor(weights)).max(1e-9 * base);
+        let share = |c: &Contender<P>| (base - c.holdout.iter().sum::<f64>()) / above;
+        fitted.iter().filter(|c| c.effect.is_some()).map(|c| (c.clone(), share(c))).collect()
     }
 
     /// Fits all starts and judges them, best first.
@@ -216,12 +212,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 let training = self.problem(&weights.training).window_costs(&fit.hypothesis);
                 let holdout = self.judge(&weights.holdout).window_costs(&fit.hypothesis);
                 let effect = fit.hypothesis.effects.get(known).copied();
-                Contender {
-                    effect,
-                    fit,
-                    training,
-                    holdout,
-                }
+                Contender { effect, fit, training, holdout }
             })
             .filter(|c| c.score().is_finite())
             .collect();
@@ -247,26 +238,26 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         mut contenders: Vec<Contender<P>>,
         mut weights: Weights<N>,
     ) -> (Contender<P>, Vec<Contender<P>>, Weights<N>) {
-        for _ in 0..MAX_REWEIGHTINGS {
-            let Some(best) = contenders.first() else {
-                break;
-            };
+        let mut hopeless = f64::INFINITY;
+        for round in 1..=MAX_REWEIGHTINGS {
+            let Some(best) = contenders.first() else { break };
             let scale = self.residual_scale(&weights.training, &best.fit.hypothesis);
-            let shrunk = (0..N)
-                .map(|j| weights.training.scale[j] / scale[j])
-                .fold(0.0, f64::max);
+            let shrunk = (0..N).map(|j| weights.training.scale[j] / scale[j]).fold(0.0, f64::max);
             if shrunk > SHRUNK {
                 weights = self.weights(&best.fit.hypothesis, scale);
             }
-            let starts = finalists(contenders);
-            contenders = self.contend(&weights, current, starts, Effort::FULL);
-            if shrunk <= SHRUNK {
+            let last = shrunk <= SHRUNK || round == MAX_REWEIGHTINGS;
+            let starts = finalists(contenders, hopeless);
+            contenders =
+                self.contend(&weights, current, starts, if last { Effort::FULL } else { Effort::ROUGH });
+            if last {
                 break;
             }
+            let base =
+                self.contend(&weights, current, vec![current.clone()], Effort::ROUGH).remove(0).score();
+            hopeless = contenders.first().map_or(base, |best| 0.5 * (base + best.score()));
         }
-        let base = self
-            .contend(&weights, current, vec![current.clone()], Effort::FULL)
-            .remove(0);
+        let base = self.contend(&weights, current, vec![current.clone()], Effort::FULL).remove(0);
         (base, contenders, weights)
     }
 
@@ -276,9 +267,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let moved = data.windows.iter().map(|window| {
             let rows = self.holdout.measured[window.range()].chunks_exact(N);
             rows.map(|row| {
-                (0..N)
-                    .map(|j| ((row[j] - window.start.q[j]) / weights.holdout.scale[j]).powi(2))
-                    .sum::<f64>()
+                (0..N).map(|j| ((row[j] - window.start.q[j]) / weights.holdout.scale[j]).powi(2)).sum::<f64>()
             })
             .sum::<f64>()
         });
@@ -287,32 +276,32 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
     /// Cost that measurement noise alone leaves on the holdout.
     fn floor(&self, weights: &Weights<N>) -> f64 {
-        let per_row: f64 = (0..N)
-            .map(|j| (self.noise[j] / weights.holdout.scale[j]).powi(2))
-            .sum();
+        let per_row: f64 = (0..N).map(|j| (self.noise[j] / weights.holdout.scale[j]).powi(2)).sum();
         per_row * self.holdout.data.rows as f64
     }
 }
 
-/// Hypotheses to be fitted to the end: the best by cost, and the best by closeness to trusted values.
-fn finalists<const P: usize>(contenders: Vec<Contender<P>>) -> Vec<Hypothesis<P>> {
-    let mut by_trust: Vec<usize> = (FINALISTS.min(contenders.len())..contenders.len()).collect();
+/// Hypotheses to be fitted to the end: the best by cost, of those that are not hopeless, and the best by closeness to trusted values.
+fn finalists<const P: usize>(contenders: Vec<Contender<P>>, hopeless: f64) -> Vec<Hypothesis<P>> {
+    let mut by_trust: Vec<usize> = (0..contenders.len()).collect();
     let prior = |i: &usize| contenders[*i].fit.prior_cost;
     by_trust.sort_by(|a, b| prior(a).total_cmp(&prior(b)));
     by_trust.truncate(FINALISTS / 2);
+    let least = contenders.iter().map(|c| c.fit.prior_cost).fold(f64::INFINITY, f64::min);
+    by_trust.retain(|i| contenders[*i].fit.prior_cost < least + TRUSTED);
     let kept = contenders.iter().enumerate();
-    kept.filter(|(i, _)| *i < FINALISTS || by_trust.contains(i))
+    kept.filter(|(i, c)| (*i < FINALISTS && c.score() < hopeless) || *i == 0 || by_trust.contains(i))
         .map(|(_, c)| c.fit.hypothesis.clone())
         .collect()
 }
 
 /// The best start of each of the best-scoring candidates, and of those that only trusted values can reveal.
-fn promising(screened: &[Scored]) -> Vec<Placed> {
+fn promising(screened: &[Scored], least: f64) -> Vec<Placed> {
     let mut order: Vec<&Scored> = screened.iter().filter(|s| s.gain > 0.0).collect();
     order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut chosen: Vec<Placed> = Vec::new();
     for scored in order {
-        let wanted = chosen.len() < FULL_FITS || scored.distinct < ABSORBED;
+        let wanted = (chosen.len() < FULL_FITS && scored.gain > least) || scored.distinct < ABSORBED;
         if wanted && !chosen.iter().any(|c| c.same_place(&scored.effect)) {
             chosen.push(scored.effect);
         }

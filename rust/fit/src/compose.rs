@@ -1,6 +1,7 @@
 //! From an attribution to the diagnosis as data.
 
 use crate::arm::ArmDescription;
+use crate::attribute::Contender;
 use crate::decide::{Attribution, CONSEQUENCE, Random};
 use crate::diagnose::Options;
 use crate::locate::{Lacks, lacking_torque, places, regimes};
@@ -60,11 +61,8 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let lacks = lacks(study, &compared, &last.weights.holdout);
     let regimes = regimes(&lacks, rotary);
     let verdict = verdict(&attribution, &gap);
-    let gap_of = if attribution.causes.is_empty() && verdict == "parameters" {
-        &lacks.before
-    } else {
-        &lacks.refit
-    };
+    let gap_of =
+        if attribution.causes.is_empty() && verdict == "parameters" { &lacks.before } else { &lacks.refit };
     Diagnosis {
         schema: "armgap.diagnosis/1",
         verdict,
@@ -179,13 +177,7 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 fn rms<const N: usize>(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
     let rows = (measured.len() / N).max(1) as f64;
     let squares = |j: usize| -> f64 {
-        measured
-            .iter()
-            .zip(predicted)
-            .skip(j)
-            .step_by(N)
-            .map(|(a, b)| (a - b).powi(2))
-            .sum()
+        measured.iter().zip(predicted).skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
     };
     (0..N).map(|j| (squares(j) / rows).sqrt()).collect()
 }
@@ -219,12 +211,8 @@ fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 
 /// Share of the gap above the floor that is closed, over all joints.
 fn closed(before: &[f64], after: &[f64], floor: &[f64]) -> f64 {
-    let above = |x: &[f64]| {
-        x.iter()
-            .zip(floor)
-            .map(|(x, f)| ((x - f) / before_scale(before)).max(0.0))
-            .sum::<f64>()
-    };
+    let above =
+        |x: &[f64]| x.iter().zip(floor).map(|(x, f)| ((x - f) / before_scale(before)).max(0.0)).sum::<f64>();
     let (b, a) = (above(before), above(after));
     if b > 0.0 { 1.0 - a / b } else { 0.0 }
 }
@@ -242,16 +230,11 @@ fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 ) -> [f64; 2] {
     let data = &study.holdout.data;
     let squares = |predicted: &[f64], w: &Window<N>, j: usize| -> f64 {
-        let pairs = study.holdout.measured[w.range()]
-            .iter()
-            .zip(&predicted[w.range()]);
+        let pairs = study.holdout.measured[w.range()].iter().zip(&predicted[w.range()]);
         pairs.skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
     };
     let table = |predicted: &[f64]| -> Vec<[f64; N]> {
-        data.windows
-            .iter()
-            .map(|w| std::array::from_fn(|j| squares(predicted, w, j)))
-            .collect()
+        data.windows.iter().map(|w| std::array::from_fn(|j| squares(predicted, w, j))).collect()
     };
     let (before, after) = (table(&errors.before), table(&errors.after));
     let mut random = Random(seed);
@@ -277,20 +260,10 @@ fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
     let (mut windows, mut rows) = (Vec::new(), 0);
     for (index, track) in data.tracks.iter().enumerate() {
         let last = track.len() - 1;
-        windows.push(Window {
-            track: index,
-            first: 0,
-            last,
-            offset: rows,
-            start: track.start(0),
-        });
+        windows.push(Window { track: index, first: 0, last, offset: rows, start: track.start(0) });
         rows += last;
     }
-    Dataset {
-        tracks: data.tracks.clone(),
-        windows,
-        rows,
-    }
+    Dataset { tracks: data.tracks.clone(), windows, rows }
 }
 
 fn free_run_rms<A: Arm<f64, N, P>, const N: usize, const P: usize>(
@@ -298,21 +271,14 @@ fn free_run_rms<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     model: &Hypothesis<P>,
 ) -> Vec<f64> {
     let data = whole(&study.holdout.data);
-    let predicted = limited(
-        &data,
-        data.predict(&study.arm, model, &vec![Shift::none(); data.windows.len()]),
-    );
+    let predicted = limited(&data, data.predict(&study.arm, model, &vec![Shift::none(); data.windows.len()]));
     rms::<N>(&data.measured(), &predicted)
 }
 
 /// Predictions kept within reach of the measurement, so that a diverged run stays a number.
 fn limited<const N: usize>(data: &Dataset<N>, predicted: Vec<f64>) -> Vec<f64> {
     let measured = data.measured();
-    predicted
-        .iter()
-        .zip(&measured)
-        .map(|(p, m)| m + (p - m).clamp(-FREE_RUN_LIMIT, FREE_RUN_LIMIT))
-        .collect()
+    predicted.iter().zip(&measured).map(|(p, m)| m + (p - m).clamp(-FREE_RUN_LIMIT, FREE_RUN_LIMIT)).collect()
 }
 
 fn free_run_series<A: Arm<f64, N, P>, const N: usize, const P: usize>(
@@ -326,9 +292,7 @@ fn free_run_series<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let mut all = Vec::new();
     for window in data.windows.iter().take(DRAWN_LOGS) {
         let track = &data.tracks[window.track];
-        let rows: Vec<usize> = (0..window.rows())
-            .step_by(window.rows().div_ceil(DRAWN))
-            .collect();
+        let rows: Vec<usize> = (0..window.rows()).step_by(window.rows().div_ceil(DRAWN)).collect();
         for j in 0..N {
             let pick = |x: &[f64]| rows.iter().map(|i| x[(window.offset + i) * N + j]).collect();
             all.push(FreeRunSeries {
@@ -351,11 +315,7 @@ fn lacks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 ) -> Lacks<N> {
     let data = &study.holdout.data;
     let of = |h: &Hypothesis<P>| lacking_torque(&study.arm, data, weights, h);
-    Lacks {
-        before: of(&compared.before),
-        refit: of(&compared.refit),
-        after: of(&compared.after),
-    }
+    Lacks { before: of(&compared.before), refit: of(&compared.refit), after: of(&compared.after) }
 }
 
 /// What the figures amount to.
@@ -389,11 +349,7 @@ fn cause(cause: &crate::decide::Cause, joints: usize, rotary: bool) -> Cause {
         closed: cause.share,
         equivalents: equivalents
             .into_iter()
-            .map(|e| EquivalentSummary {
-                effect: e.effect,
-                joint: e.joint,
-                why: e.why,
-            })
+            .map(|e| EquivalentSummary { effect: e.effect, joint: e.joint, why: e.why })
             .collect(),
     }
 }
@@ -403,14 +359,7 @@ fn effect_values(effect: &Placed, sigma: &[f64], rotary: bool) -> Named<Value> {
     parameters
         .map(|(i, p)| {
             let sigma = sigma.get(i).copied().unwrap_or(0.0);
-            (
-                p.name.to_owned(),
-                Value {
-                    value: effect.p[i],
-                    sigma,
-                    unit: p.quantity.unit(rotary),
-                },
-            )
+            (p.name.to_owned(), Value { value: effect.p[i], sigma, unit: p.quantity.unit(rotary) })
         })
         .collect()
 }
@@ -439,12 +388,7 @@ fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 }
 
 fn weaker(a: &RuledOut, b: &RuledOut) -> bool {
-    let rank = |s: &str| {
-        ["absent", "undecided", "not excited"]
-            .iter()
-            .position(|x| *x == s)
-            .unwrap_or(0)
-    };
+    let rank = |s: &str| ["absent", "undecided", "not excited"].iter().position(|x| *x == s).unwrap_or(0);
     let size = |r: &RuledOut| r.bound.as_ref().map_or(f64::INFINITY, |b| b.value);
     (rank(a.status), size(a)) > (rank(b.status), size(b))
 }
@@ -461,21 +405,11 @@ fn status<A, const N: usize, const P: usize>(
     let (effect, joint) = (spec.name, test.effect.joint_number());
     if !(sigma < PINNED * typical) {
         let why = format!("these logs do not pin it down; it needs {}", spec.excited_by);
-        return RuledOut {
-            effect,
-            joint,
-            status: "not excited",
-            bound: None,
-            why: Some(why),
-        };
+        return RuledOut { effect, joint, status: "not excited", bound: None, why: Some(why) };
     }
     let value = test.estimate.abs() + NORMAL_95 * sigma;
-    let bound = Bound {
-        parameter: parameter.name,
-        value,
-        unit: parameter.quantity.unit(rotary),
-        level: 0.95,
-    };
+    let bound =
+        Bound { parameter: parameter.name, value, unit: parameter.quantity.unit(rotary), level: 0.95 };
     let traced = test.estimate.abs() > 3.0 * sigma;
     RuledOut {
         effect,
@@ -496,26 +430,29 @@ fn ranking<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let stage = &attribution.stages[0];
     let data = &study.holdout.data;
     let starts = data.measured_starts();
-    let ranked = |c: &crate::attribute::Contender<P>| {
+    let ranked = |c: &Contender<P>, closed: f64| {
         let effect = c.effect?;
         let n = c.fit.hypothesis.values().len();
         let sigma: Vec<f64> = (n - effect.len()..n).map(|i| c.fit.sigma(i)).collect();
+        let predicted = data.predict(&study.arm, &c.fit.hypothesis, &starts);
         Some(Ranked {
             effect: effect.law.spec().name,
             title: effect.law.spec().title,
             joint: effect.joint_number(),
-            closed: stage.share(c),
-            gain: stage.base.score() - c.score(),
+            closed,
             trust: c.fit.prior_cost,
-            z: c.z_over(&stage.base),
-            rms: rms::<N>(
-                &study.holdout.measured,
-                &data.predict(&study.arm, &c.fit.hypothesis, &starts),
-            ),
+            rms: rms::<N>(&study.holdout.measured, &predicted),
             parameters: effect_values(&effect, &sigma, rotary),
         })
     };
-    stage.contenders.iter().filter_map(ranked).collect()
+    let final_of = |c: &Contender<P>| stage.contenders.iter().any(|f| same_effect(f, c));
+    let finalists = stage.contenders.iter().map(|c| (c, stage.share(c)));
+    let others = stage.field.iter().filter(|(c, _)| !final_of(c)).map(|(c, share)| (c, *share));
+    finalists.chain(others).filter_map(|(c, share)| ranked(c, share)).collect()
+}
+
+fn same_effect<const P: usize>(a: &Contender<P>, b: &Contender<P>) -> bool {
+    matches!((a.effect, b.effect), (Some(a), Some(b)) if a.same_place(&b))
 }
 
 fn stages<A: Arm<f64, N, P>, const N: usize, const P: usize>(
@@ -526,12 +463,8 @@ fn stages<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let starts = data.measured_starts();
     let added = |i: usize| {
         let next = attribution.stages.get(i + 1)?;
-        let effect = next
-            .base
-            .fit
-            .hypothesis
-            .effects
-            .get(attribution.stages[i].base.fit.hypothesis.effects.len())?;
+        let effect =
+            next.base.fit.hypothesis.effects.get(attribution.stages[i].base.fit.hypothesis.effects.len())?;
         Some(EquivalentSummary {
             effect: effect.law.spec().name,
             joint: effect.joint_number(),
@@ -540,10 +473,7 @@ fn stages<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     };
     let summary = |(i, stage): (usize, &crate::attribute::Stage<N, P>)| StageSummary {
         added: added(i),
-        rms: rms::<N>(
-            &study.holdout.measured,
-            &data.predict(&study.arm, &stage.settled.hypothesis, &starts),
-        ),
+        rms: rms::<N>(&study.holdout.measured, &data.predict(&study.arm, &stage.settled.hypothesis, &starts)),
         excess: stage.excess(),
         relative_error: stage.relative_error(),
         trust: stage.base.fit.prior_cost,
@@ -560,11 +490,7 @@ fn nominal<A, const N: usize, const P: usize>(
         .map(|(i, p)| {
             (
                 p.name.to_owned(),
-                Value {
-                    value: study.prior.theta[i],
-                    sigma: study.prior.sigma[i],
-                    unit: p.unit,
-                },
+                Value { value: study.prior.theta[i], sigma: study.prior.sigma[i], unit: p.unit },
             )
         })
         .collect()
@@ -574,14 +500,7 @@ fn values<const P: usize>(fit: &Fit<P>, description: &ArmDescription) -> Named<V
     let names = description.kind.parameters().iter().enumerate();
     names
         .map(|(i, p)| {
-            (
-                p.name.to_owned(),
-                Value {
-                    value: fit.hypothesis.theta[i],
-                    sigma: fit.sigma(i),
-                    unit: p.unit,
-                },
-            )
+            (p.name.to_owned(), Value { value: fit.hypothesis.theta[i], sigma: fit.sigma(i), unit: p.unit })
         })
         .collect()
 }
@@ -612,10 +531,7 @@ fn logs<const N: usize>(sample: &Sample<N>) -> Vec<LogSummary> {
 
 fn noise<A, const N: usize, const P: usize>(study: &Study<A, N, P>) -> Noise {
     let step = study.training.data.tracks.first().map_or([0.0; N], |t| t.step);
-    Noise {
-        position_sigma: study.noise.to_vec(),
-        encoder_step: step.to_vec(),
-    }
+    Noise { position_sigma: study.noise.to_vec(), encoder_step: step.to_vec() }
 }
 
 fn notes<const N: usize, const P: usize>(attribution: &Attribution<N, P>) -> Vec<String> {

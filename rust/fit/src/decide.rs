@@ -97,12 +97,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         self.prune(&mut model, &mut causes, &stage);
         stages.push(stage);
         refresh(&model, &mut causes);
-        Attribution {
-            refit,
-            model,
-            causes,
-            stages,
-        }
+        Attribution { refit, model, causes, stages }
     }
 
     /// Drops causes that the others have made idle.
@@ -112,9 +107,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let full = self.judged(stage, model.clone(), None);
             let mut without = model.hypothesis.clone();
             without.effects.remove(i);
-            let fit = self
-                .problem(&stage.weights.training)
-                .solve(&without, Effort::FULL);
+            let fit = self.problem(&stage.weights.training).solve(&without, Effort::FULL);
             let reduced = self.judged(stage, fit, None);
             let idle =
                 full.z_over(&reduced) < CERTAIN && reduced.fit.prior_cost - full.fit.prior_cost < TRUST_GAIN;
@@ -129,16 +122,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     fn judged(&self, stage: &Stage<N, P>, fit: Fit<P>, effect: Option<Placed>) -> Contender<P> {
-        let training = self
-            .problem(&stage.weights.training)
-            .window_costs(&fit.hypothesis);
+        let training = self.problem(&stage.weights.training).window_costs(&fit.hypothesis);
         let holdout = self.judge(&stage.weights.holdout).window_costs(&fit.hypothesis);
-        Contender {
-            effect,
-            fit,
-            training,
-            holdout,
-        }
+        Contender { effect, fit, training, holdout }
     }
 }
 
@@ -154,11 +140,8 @@ enum Ground {
 /// Index of the contender to adopt, and why, if any deserves it; smoother friction is adopted once.
 fn choose<const N: usize, const P: usize>(stage: &Stage<N, P>, smoothed: bool) -> Option<(usize, Ground)> {
     let open = |c: &Contender<P>| c.effect.is_some() || !smoothed;
-    let by_motion = stage
-        .contenders
-        .iter()
-        .position(|c| open(c))
-        .filter(|i| moves(stage, &stage.contenders[*i]));
+    let by_motion =
+        stage.contenders.iter().position(|c| open(c)).filter(|i| moves(stage, &stage.contenders[*i]));
     if let Some(index) = by_motion {
         return Some((index, Ground::Motion));
     }
@@ -171,11 +154,7 @@ fn choose<const N: usize, const P: usize>(stage: &Stage<N, P>, smoothed: bool) -
 
 /// Whether a contender closes a part of the gap that matters, on the holdout too.
 fn moves<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Contender<P>) -> bool {
-    let matters = if stage.relative_error() > CONSEQUENCE {
-        MATTERS
-    } else {
-        MATTERS_IN_SMALL
-    };
+    let matters = if stage.relative_error() > CONSEQUENCE { MATTERS } else { MATTERS_IN_SMALL };
     stage.excess() > ABOVE_FLOOR
         && stage.share(contender) > matters
         && stage.relevance(contender) > RELEVANT
@@ -209,20 +188,10 @@ fn name<const N: usize, const P: usize>(
         }
         Ground::Trust => restores(stage, c) && c.fit.prior_cost - best.fit.prior_cost < ALIKE_TRUST,
     };
-    let others = stage
-        .contenders
-        .iter()
-        .enumerate()
-        .filter(|(i, c)| *i != choice && c.effect.is_some());
-    let look_alikes: Vec<Placed> = others
-        .map(|(_, c)| c)
-        .filter(alike)
-        .filter_map(|c| c.effect)
-        .take(3)
-        .collect();
-    let effect = best
-        .effect
-        .unwrap_or_else(|| unreachable!("only effects are named"));
+    let others = stage.contenders.iter().enumerate().filter(|(i, c)| *i != choice && c.effect.is_some());
+    let look_alikes: Vec<Placed> =
+        others.map(|(_, c)| c).filter(alike).filter_map(|c| c.effect).take(3).collect();
+    let effect = best.effect.unwrap_or_else(|| unreachable!("only effects are named"));
     Cause {
         effect,
         sigma: Vec::new(),
@@ -242,21 +211,12 @@ fn probability<const N: usize, const P: usize>(
     look_alikes: &[Placed],
     seed: u64,
 ) -> f64 {
-    let advantages: Vec<Vec<f64>> = stage
-        .contenders
-        .iter()
-        .map(|c| c.advantages(&stage.base))
-        .collect();
-    let own: Vec<f64> = stage
-        .contenders
-        .iter()
-        .map(|c| stage.base.fit.prior_cost - c.fit.prior_cost)
-        .collect();
+    let advantages: Vec<Vec<f64>> = stage.contenders.iter().map(|c| c.advantages(&stage.base)).collect();
+    let own: Vec<f64> =
+        stage.contenders.iter().map(|c| stage.base.fit.prior_cost - c.fit.prior_cost).collect();
     let ours = |i: usize| {
         i == choice
-            || stage.contenders[i]
-                .effect
-                .is_some_and(|e| look_alikes.iter().any(|l| l.same_place(&e)))
+            || stage.contenders[i].effect.is_some_and(|e| look_alikes.iter().any(|l| l.same_place(&e)))
     };
     let windows = advantages[choice].len();
     let mut random = Random(seed);

@@ -36,11 +36,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            horizon: 0.25,
-            max_causes: 4,
-            seed: 1,
-        }
+        Self { horizon: 0.25, max_causes: 4, seed: 1 }
     }
 }
 
@@ -67,20 +63,16 @@ pub enum DiagnoseError {
 impl std::fmt::Display for DiagnoseError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Parameters(kind) => write!(
-                f,
-                "a {} needs {} parameters",
-                kind.name(),
-                kind.parameters().len()
-            ),
+            Self::Parameters(kind) => {
+                write!(f, "a {} needs {} parameters", kind.name(), kind.parameters().len())
+            }
             Self::TooShort { set, windows, needed } => write!(
                 f,
                 "the {set} logs hold {windows} windows of the prediction horizon, {needed} are needed; give more data or a shorter horizon"
             ),
-            Self::BadSamples(name) => write!(
-                f,
-                "log `{name}` holds values that are not finite, or times that do not increase"
-            ),
+            Self::BadSamples(name) => {
+                write!(f, "log `{name}` holds values that are not finite, or times that do not increase")
+            }
             Self::Horizon(h) => write!(f, "the horizon must be a positive number of seconds, not {h}"),
         }
     }
@@ -107,13 +99,7 @@ pub fn diagnose(
             return Err(DiagnoseError::BadSamples(log.name.clone()));
         }
     }
-    arm.dispatch(Request {
-        arm,
-        training,
-        holdout,
-        options,
-    })
-    .ok_or(DiagnoseError::Parameters(arm.kind))?
+    arm.dispatch(Request { arm, training, holdout, options }).ok_or(DiagnoseError::Parameters(arm.kind))?
 }
 
 struct Request<'a> {
@@ -150,22 +136,11 @@ impl Request<'_> {
         let length = self.arm.link_length.as_ref().and_then(|l| l.last().copied());
         let scales = Scales::new(&arm, &theta, &training.data.tracks, self.arm.gravity, length);
         let sigma = std::array::from_fn(|i| self.arm.sigma[i]);
-        let prior = Prior {
-            theta,
-            sigma,
-            inertial: A::INERTIAL,
-        };
+        let prior = Prior { theta, sigma, inertial: A::INERTIAL };
         let noise = std::array::from_fn(|j| {
             crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
         });
-        Ok(Study {
-            arm,
-            prior,
-            scales,
-            training,
-            holdout,
-            noise,
-        })
+        Ok(Study { arm, prior, scales, training, holdout, noise })
     }
 
     fn sample<const N: usize>(
@@ -175,24 +150,13 @@ impl Request<'_> {
     ) -> Result<Sample<N>, DiagnoseError> {
         let steps = self.arm.counts_per_rev.as_ref().map(|counts| {
             std::array::from_fn(|j| {
-                if self.arm.kind.rotary() {
-                    std::f64::consts::TAU / counts[j]
-                } else {
-                    1.0 / counts[j]
-                }
+                if self.arm.kind.rotary() { std::f64::consts::TAU / counts[j] } else { 1.0 / counts[j] }
             })
         });
-        let tracks = logs
-            .iter()
-            .map(|log| Track::new(&log.name, log.t, log.q, log.tau, steps))
-            .collect();
+        let tracks = logs.iter().map(|log| Track::new(&log.name, log.t, log.q, log.tau, steps)).collect();
         let data = Dataset::new(tracks, self.options.horizon);
         if data.windows.len() < FEWEST_WINDOWS {
-            return Err(DiagnoseError::TooShort {
-                set,
-                windows: data.windows.len(),
-                needed: FEWEST_WINDOWS,
-            });
+            return Err(DiagnoseError::TooShort { set, windows: data.windows.len(), needed: FEWEST_WINDOWS });
         }
         Ok(Sample::new(data))
     }

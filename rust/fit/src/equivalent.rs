@@ -16,13 +16,7 @@ pub struct Equivalent {
 /// Effects that are the same as this one on an arm with `joints` joints, whatever the motion.
 pub fn known(effect: &Placed, joints: usize) -> Vec<Equivalent> {
     let joint = effect.joint_number();
-    let one = |effect, joint, why: &str| {
-        vec![Equivalent {
-            effect,
-            joint,
-            why: why.to_owned(),
-        }]
-    };
+    let one = |effect, joint, why: &str| vec![Equivalent { effect, joint, why: why.to_owned() }];
     match effect.law.spec().name {
         "coulomb_asymmetry" => one(
             "torque_offset",
@@ -39,11 +33,9 @@ pub fn known(effect: &Placed, joints: usize) -> Vec<Equivalent> {
             Some(1),
             "both turn gravity by one angle; a level on the base separates them",
         ),
-        "encoder_offset" if joint == Some(1) => one(
-            "base_tilt",
-            None,
-            "both turn gravity by one angle; a level on the base separates them",
-        ),
+        "encoder_offset" if joint == Some(1) => {
+            one("base_tilt", None, "both turn gravity by one angle; a level on the base separates them")
+        }
         "torque_gain" => (1..=joints)
             .filter(|j| Some(*j) != joint)
             .map(|j| Equivalent {
@@ -64,11 +56,7 @@ pub fn all(effect: &Placed, look_alikes: &[Placed], joints: usize) -> Vec<Equiva
         let (name, joint) = (other.law.spec().name, other.joint_number());
         if !list.iter().any(|e| e.effect == name && e.joint == joint) {
             let why = "explains these logs about as well; other motions may separate them".to_owned();
-            list.push(Equivalent {
-                effect: name,
-                joint,
-                why,
-            });
+            list.push(Equivalent { effect: name, joint, why });
         }
     }
     list

@@ -74,33 +74,18 @@ impl Identification<'_> {
         let settings = Settings {
             scheme: self.scheme,
             variant: self.variant,
-            cutoff: Cutoff {
-                rad_per_s: self.cutoff,
-            },
+            cutoff: Cutoff { rad_per_s: self.cutoff },
             forgetting: self.forgetting,
             theta0: SVector::<f64, R>::from_fn(|i, _| self.theta0[i]),
             p0: self.p0,
         };
         let mut estimator = Estimator::<f64, A, N, P, R>::new(arm, settings);
         let row = |x: &[f64], k: usize| SVector::<f64, N>::from_fn(|j, _| x[k * N + j]);
-        let outputs = if self.scheme == Scheme::FilteredDynamic {
-            N
-        } else {
-            1
-        };
-        let mut course = Course {
-            parameters: R,
-            outputs,
-            ..Course::default()
-        };
+        let outputs = if self.scheme == Scheme::FilteredDynamic { N } else { 1 };
+        let mut course = Course { parameters: R, outputs, ..Course::default() };
         for k in 0..self.t.len() {
             let dq = self.dq.map(|dq| row(dq, k));
-            let sample = Sample {
-                t: self.t[k],
-                q: row(self.q, k),
-                dq,
-                tau: row(self.tau, k),
-            };
+            let sample = Sample { t: self.t[k], q: row(self.q, k), dq, tau: row(self.tau, k) };
             let error = match estimator.update(&sample) {
                 Outcome::Updated(error) => error,
                 Outcome::Starting | Outcome::Rejected => SVector::repeat(f64::NAN),

@@ -166,20 +166,13 @@ fn axes<const N: usize>(joint: usize, rotary: bool) -> Vec<Axis<N>> {
             ["low speed", "medium speed", "high speed"],
             |x, j| x.dq[j].abs(),
         ),
-        axis(
-            format!("reversal{j}"),
-            "1",
-            ["away from reversals", "", "reversals"],
-            |x, j| f64::from(u8::from(x.reversal[j])),
-        ),
+        axis(format!("reversal{j}"), "1", ["away from reversals", "", "reversals"], |x, j| {
+            f64::from(u8::from(x.reversal[j]))
+        }),
         axis(
             format!("q{j}"),
             pick("rad", "m"),
-            [
-                "one end of the travel",
-                "part of the travel",
-                "one end of the travel",
-            ],
+            ["one end of the travel", "part of the travel", "one end of the travel"],
             |x, j| x.q[j],
         ),
         axis(
@@ -188,12 +181,7 @@ fn axes<const N: usize>(joint: usize, rotary: bool) -> Vec<Axis<N>> {
             ["low torque", "medium torque", "high torque"],
             |x, j| x.tau[j].abs(),
         ),
-        axis(
-            "t".to_owned(),
-            "s",
-            ["start of the log", "part of the log", "end of the log"],
-            |x, _| x.t,
-        ),
+        axis("t".to_owned(), "s", ["start of the log", "part of the log", "end of the log"], |x, _| x.t),
     ]
 }
 
@@ -204,9 +192,7 @@ fn edges(mut values: Vec<f64>) -> Vec<f64> {
     if values.iter().all(|v| *v == 0.0 || *v == 1.0) {
         return vec![0.0, 0.5, 1.0];
     }
-    let mut edges: Vec<f64> = (0..=BINS)
-        .map(|i| values[i * (values.len() - 1) / BINS])
-        .collect();
+    let mut edges: Vec<f64> = (0..=BINS).map(|i| values[i * (values.len() - 1) / BINS]).collect();
     (edges[0], edges[BINS]) = (first, last);
     edges.dedup();
     edges
@@ -268,10 +254,7 @@ fn binned<const N: usize>(
         squares[b] += x.lack[joint].powi(2);
         count[b] += 1;
     }
-    let rms = squares
-        .iter()
-        .zip(&count)
-        .map(|(s, n)| if *n > 0 { (s / *n as f64).sqrt() } else { 0.0 });
+    let rms = squares.iter().zip(&count).map(|(s, n)| if *n > 0 { (s / *n as f64).sqrt() } else { 0.0 });
     (rms.collect(), count)
 }
 
@@ -280,9 +263,7 @@ fn binned<const N: usize>(
 /// `gap` are the lacking torques that shares are taken of, `torque` the joints' typical torques.
 pub fn places<const N: usize>(gap: &[Lack<N>], regimes: &[Regime], torque: &[f64; N]) -> Vec<Place> {
     let mean_square = |j: usize| gap.iter().map(|x| x.lack[j].powi(2)).sum::<f64>() / gap.len().max(1) as f64;
-    let weight: Vec<f64> = (0..N)
-        .map(|j| mean_square(j) / torque[j].powi(2).max(1e-300))
-        .collect();
+    let weight: Vec<f64> = (0..N).map(|j| mean_square(j) / torque[j].powi(2).max(1e-300)).collect();
     let whole: f64 = weight.iter().sum();
     let mut places: Vec<Place> = (0..N)
         .map(|j| {
@@ -320,10 +301,7 @@ fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Place {
     let (from, to) = (regime.edges[b], regime.edges[b + 1]);
     let name = regime_name(regime, b);
     let detail = if regime.variable.starts_with("reversal") {
-        format!(
-            "within {REVERSAL_S} s of a change of direction of joint {}",
-            j + 1
-        )
+        format!("within {REVERSAL_S} s of a change of direction of joint {}", j + 1)
     } else {
         format!("{} from {from:.3} to {to:.3} {}", regime.variable, regime.unit)
     };
@@ -332,21 +310,14 @@ fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Place {
         share,
         regime: name,
         detail,
-        range: Some(Range {
-            variable: regime.variable.clone(),
-            from,
-            to,
-        }),
+        range: Some(Range { variable: regime.variable.clone(), from, to }),
     }
 }
 
 fn regime_name(regime: &Regime, b: usize) -> String {
     let bins = regime.count.len();
     let all = axes::<1>(0, true);
-    let kind = |name: &str| {
-        name.trim_end_matches(|c: char| c.is_ascii_digit() || c == ')')
-            .to_owned()
-    };
+    let kind = |name: &str| name.trim_end_matches(|c: char| c.is_ascii_digit() || c == ')').to_owned();
     let axis = all.iter().find(|a| kind(&a.name) == kind(&regime.variable));
     let position = if b == 0 {
         0

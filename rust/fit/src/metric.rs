@@ -78,23 +78,14 @@ impl<const N: usize> Metric<N> {
         };
         let projections = starts.iter().enumerate().map(project).collect();
         let trust = vec![1.0; starts.len()];
-        Self {
-            scale,
-            starts,
-            trust,
-            typical: 1.0,
-            projections,
-        }
+        Self { scale, starts, trust, typical: 1.0, projections }
     }
 
     /// The same metric with windows trusted by how well a hypothesis of this residual explains them.
     pub fn robust(mut self, data: &Dataset<N>, residual: &[f64]) -> Self {
         let costs = self.costs(data, residual);
         self.typical = crate::track::median(costs.clone()).max(f64::MIN_POSITIVE);
-        self.trust = costs
-            .iter()
-            .map(|cost| (1.0 + TAIL) / (TAIL + cost / self.typical))
-            .collect();
+        self.trust = costs.iter().map(|cost| (1.0 + TAIL) / (TAIL + cost / self.typical)).collect();
         self
     }
 
@@ -106,11 +97,7 @@ impl<const N: usize> Metric<N> {
 
     /// Sum of the windows' costs, each by its trust.
     pub fn total(&self, costs: &[f64]) -> f64 {
-        costs
-            .iter()
-            .zip(&self.trust)
-            .map(|(cost, trust)| cost * trust)
-            .sum()
+        costs.iter().zip(&self.trust).map(|(cost, trust)| cost * trust).sum()
     }
 
     /// Divides a flat vector by the joints' scales.
@@ -139,13 +126,8 @@ impl<const N: usize> Metric<N> {
             gram[(k, k)] += projection.pull.norm_squared();
             gram * *trust
         };
-        let grams: Vec<DMatrix<f64>> = data
-            .windows
-            .par_iter()
-            .zip(&self.projections)
-            .zip(&self.trust)
-            .map(one)
-            .collect();
+        let grams: Vec<DMatrix<f64>> =
+            data.windows.par_iter().zip(&self.projections).zip(&self.trust).map(one).collect();
         let mut total = DMatrix::zeros(k + 1, k + 1);
         for gram in &grams {
             total += gram;
@@ -219,11 +201,7 @@ pub fn start_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: usize>(
                 })
                 .collect();
             let moved = data.predict(arm, hypothesis, &displaced);
-            moved
-                .iter()
-                .zip(&centre)
-                .map(|(a, b)| ((a - b) / START_STEP).clamp(-1e4, 1e4))
-                .collect()
+            moved.iter().zip(&centre).map(|(a, b)| ((a - b) / START_STEP).clamp(-1e4, 1e4)).collect()
         })
         .collect()
 }
@@ -248,16 +226,8 @@ fn projection<const N: usize>(
     let pull = -(&root * displacement);
     let qr = stacked.qr();
     let q = qr.q();
-    let back = qr
-        .r()
-        .try_inverse()
-        .unwrap_or_else(|| DMatrix::zeros(2 * N, 2 * N));
-    Projection {
-        samples: q.rows(0, rows).into_owned(),
-        prior: q.rows(rows, 2 * N).into_owned(),
-        pull,
-        back,
-    }
+    let back = qr.r().try_inverse().unwrap_or_else(|| DMatrix::zeros(2 * N, 2 * N));
+    Projection { samples: q.rows(0, rows).into_owned(), prior: q.rows(rows, 2 * N).into_owned(), pull, back }
 }
 
 /// `L'` with `L L'` the precision of a measured start, positions first, then velocities.

@@ -17,13 +17,7 @@ pub struct Placed {
 
 impl std::fmt::Debug for Placed {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "{}:{}:{:?}",
-            self.law.spec().name,
-            self.joint + 1,
-            &self.p[..self.len()]
-        )
+        write!(f, "{}:{}:{:?}", self.law.spec().name, self.joint + 1, &self.p[..self.len()])
     }
 }
 
@@ -63,11 +57,7 @@ pub struct Hypothesis<const P: usize> {
 impl<const P: usize> Hypothesis<P> {
     /// The arm without effects.
     pub fn rigid(theta: [f64; P]) -> Self {
-        Self {
-            theta,
-            smoothing: 0.0,
-            effects: Vec::new(),
-        }
+        Self { theta, smoothing: 0.0, effects: Vec::new() }
     }
 
     /// The same with one more effect.
@@ -102,13 +92,9 @@ impl<const P: usize> Hypothesis<P> {
     /// The simulator of this hypothesis; `None` if it names more effects than a plant carries.
     pub fn plant<A: Arm<f64, N, P>, const N: usize>(&self, arm: &A) -> Option<Plant<f64, A, N, P>> {
         let plant = Plant::new(arm.clone(), self.theta).with_smoothing(self.smoothing);
-        self.effects.iter().try_fold(plant, |plant, e| {
-            plant.with_effect(Active {
-                law: e.law,
-                joint: e.joint,
-                p: e.p,
-            })
-        })
+        self.effects
+            .iter()
+            .try_fold(plant, |plant, e| plant.with_effect(Active { law: e.law, joint: e.joint, p: e.p }))
     }
 
     /// Rewrites the held commands of a log into the torque that reaches the joints.
@@ -135,10 +121,7 @@ impl<const P: usize> Hypothesis<P> {
 
     /// Position that joint `j`'s encoder shows.
     pub fn measured(&self, j: usize, q: f64) -> f64 {
-        let on_joint = self
-            .effects
-            .iter()
-            .filter(|e| e.law.spec().hooks.measured && e.joint == j);
+        let on_joint = self.effects.iter().filter(|e| e.law.spec().hooks.measured && e.joint == j);
         on_joint.fold(q, |q, e| e.law.measured(&e.p, q))
     }
 

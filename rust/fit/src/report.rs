@@ -206,12 +206,8 @@ pub struct Ranked {
     pub joint: Option<usize>,
     /// Share of the holdout's gap above the floor it removes.
     pub closed: f64,
-    /// Decrease of the cost of all windows, in units of the residual's variance.
-    pub gain: f64,
     /// Squared distance of the arm's parameters from their trusted values, in sigmas, with it.
     pub trust: f64,
-    /// Mean decrease per window in standard errors.
-    pub z: f64,
     /// RMS on the holdout per joint.
     pub rms: Vec<f64>,
     /// Its parameters.

@@ -63,30 +63,17 @@ impl<const N: usize> Scales<N> {
             Quantity::Mass => self.torque[N - 1] / (self.gravity * self.length),
             Quantity::Length => self.length,
         };
-        if value.is_finite() && value > 0.0 {
-            value
-        } else {
-            1.0
-        }
+        if value.is_finite() && value > 0.0 { value } else { 1.0 }
     }
 
     /// Sizes of all parameters of an effect.
     pub fn of(&self, effect: &Placed) -> Vec<f64> {
-        effect
-            .law
-            .spec()
-            .parameters
-            .iter()
-            .map(|p| self.size(p.quantity, effect.joint))
-            .collect()
+        effect.law.spec().parameters.iter().map(|p| self.size(p.quantity, effect.joint)).collect()
     }
 }
 
 fn speeds<const N: usize>(track: &Track<N>, j: usize) -> Vec<f64> {
-    (0..track.len())
-        .step_by(5)
-        .map(|k| track.local(j, k).dq)
-        .collect()
+    (0..track.len()).step_by(5).map(|k| track.local(j, k).dq).collect()
 }
 
 fn rms(x: impl Iterator<Item = f64>) -> f64 {

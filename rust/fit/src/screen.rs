@@ -39,11 +39,7 @@ pub fn candidates<const N: usize>(scales: &Scales<N>) -> Vec<Placed> {
         let joints = if spec.scope == Scope::Joint { N } else { 1 };
         for joint in 0..joints {
             for start in spec.starts {
-                let mut effect = Placed {
-                    law: *law,
-                    joint,
-                    p: *start,
-                };
+                let mut effect = Placed { law: *law, joint, p: *start };
                 for (value, parameter) in effect.p.iter_mut().zip(spec.parameters) {
                     let size = if parameter.quantity == Quantity::Ratio {
                         1.0
@@ -69,10 +65,7 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let free: Vec<usize> = (0..base.values().len()).collect();
     let mut columns = problem.sensitivities(base, &residual, &free);
     let k = columns.len();
-    let traces: Vec<Vec<f64>> = candidates
-        .par_iter()
-        .map(|c| trace(problem, base, &residual, c))
-        .collect();
+    let traces: Vec<Vec<f64>> = candidates.par_iter().map(|c| trace(problem, base, &residual, c)).collect();
     columns.extend(traces);
     let gram = problem.metric.gram(problem.data, &columns, &residual);
     let last = gram.total.nrows() - 1;
@@ -91,11 +84,7 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         let raw = gram.total[(c, c)];
         let information = (raw - weights.dot(&cross)).max(1e-12 * raw);
         let slope = gram.total[(c, last)] - weights.dot(&own_score);
-        let scatter: f64 = gram
-            .scores
-            .iter()
-            .map(|s| (s[c] - weights.dot(&s.rows(0, k))).powi(2))
-            .sum();
+        let scatter: f64 = gram.scores.iter().map(|s| (s[c] - weights.dot(&s.rows(0, k))).powi(2)).sum();
         scored(effect, raw, information, slope, scatter)
     };
     candidates.iter().enumerate().map(score).collect()
@@ -112,11 +101,7 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let step = TRIAL * (candidate.p[0] - moved.p[0]);
     moved.p[0] += step;
     let there = problem.residual(&base.with(moved));
-    residual
-        .iter()
-        .zip(&there)
-        .map(|(here, there)| (here - there) / step)
-        .collect()
+    residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect()
 }
 
 /// The test of one candidate; a parameter that would have to cross its bound has nothing to gain.
@@ -128,11 +113,7 @@ fn scored(effect: &Placed, raw: f64, information: f64, slope: f64, scatter: f64)
         (parameter.neutral + estimate).clamp(parameter.lower, parameter.upper) - parameter.neutral;
     let mut suggested = *effect;
     suggested.p[0] = parameter.neutral + admissible.clamp(-20.0 * start, 20.0 * start);
-    let gain = if raw > 0.0 {
-        (2.0 * slope - information * admissible) * admissible
-    } else {
-        0.0
-    };
+    let gain = if raw > 0.0 { (2.0 * slope - information * admissible) * admissible } else { 0.0 };
     Scored {
         effect: suggested,
         gain: if gain.is_finite() { gain.max(0.0) } else { 0.0 },

@@ -54,10 +54,7 @@ pub enum SimulationError {
 impl std::fmt::Display for SimulationError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Effects => write!(
-                f,
-                "too many effects, or an effect on a joint the arm does not have"
-            ),
+            Self::Effects => write!(f, "too many effects, or an effect on a joint the arm does not have"),
             Self::Diverged(k) => write!(f, "the simulated motion diverges at sample {}", k + 1),
             Self::Tolerance(e) => write!(f, "positions still change by {e:.1e} when the steps are halved"),
         }
@@ -73,21 +70,12 @@ impl WithArm for Simulation<'_> {
         arm: A,
         theta: [f64; P],
     ) -> Self::Output {
-        let hypothesis = Hypothesis {
-            theta,
-            smoothing: self.smoothing,
-            effects: self.effects.to_vec(),
-        };
+        let hypothesis = Hypothesis { theta, smoothing: self.smoothing, effects: self.effects.to_vec() };
         let mut coarse = self.run::<A, N, P>(&arm, &hypothesis, 1)?;
         let mut substeps = 2;
         loop {
             let fine = self.run::<A, N, P>(&arm, &hypothesis, substeps)?;
-            let change = coarse
-                .q
-                .iter()
-                .zip(&fine.q)
-                .map(|(a, b)| (a - b).abs())
-                .fold(0.0, f64::max);
+            let change = coarse.q.iter().zip(&fine.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             if change <= self.tolerance {
                 return Ok(fine);
             }
@@ -108,11 +96,8 @@ impl Simulation<'_> {
         substeps: usize,
     ) -> Result<Trajectory, SimulationError> {
         let plant = hypothesis.plant(arm).ok_or(SimulationError::Effects)?;
-        let held: Vec<[Pulse<f64>; N]> = self
-            .tau
-            .chunks_exact(N)
-            .map(|row| std::array::from_fn(|j| Pulse::held(row[j])))
-            .collect();
+        let held: Vec<[Pulse<f64>; N]> =
+            self.tau.chunks_exact(N).map(|row| std::array::from_fn(|j| Pulse::held(row[j]))).collect();
         let torque = hypothesis.command(self.t, &held).unwrap_or(held);
         let start = |x: &[f64]| SVector::<f64, N>::from_fn(|j, _| x[j]);
         let mut state = State::new(start(self.q0), start(self.dq0));
@@ -124,11 +109,7 @@ impl Simulation<'_> {
             }
             q.extend((0..N).map(|j| hypothesis.measured(j, state.q[j])));
             dq.extend(state.dq.iter());
-            let step = Interval {
-                t: self.t[k],
-                h: interval(self.t, k),
-                torque: &torque[k],
-            };
+            let step = Interval { t: self.t[k], h: interval(self.t, k), torque: &torque[k] };
             advance(&plant, &mut state, &step, substeps);
         }
         Ok(Trajectory { q, dq, substeps })

@@ -25,15 +25,9 @@ pub struct Effort {
 
 impl Effort {
     /// Far enough to rank candidates.
-    pub const ROUGH: Self = Self {
-        iterations: 4,
-        enough: 1e-2,
-    };
+    pub const ROUGH: Self = Self { iterations: 4, enough: 1e-2 };
     /// To the minimum.
-    pub const FULL: Self = Self {
-        iterations: 15,
-        enough: 1e-5,
-    };
+    pub const FULL: Self = Self { iterations: 15, enough: 1e-5 };
 }
 
 /// Trusted values of the arm's parameters.
@@ -50,9 +44,7 @@ pub struct Prior<const P: usize> {
 impl<const P: usize> Prior<P> {
     /// Squared distance from the trusted values in units of sigma.
     pub fn cost(&self, theta: &[f64; P]) -> f64 {
-        (0..P)
-            .map(|i| ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2))
-            .sum()
+        (0..P).map(|i| ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2)).sum()
     }
 }
 
@@ -122,11 +114,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
                 let mut moved = values.clone();
                 moved[i] += steps[i];
                 let there = self.residual(&hypothesis.with_values(&moved));
-                residual
-                    .iter()
-                    .zip(&there)
-                    .map(|(here, there)| (here - there) / steps[i])
-                    .collect()
+                residual.iter().zip(&there).map(|(here, there)| (here - there) / steps[i]).collect()
             })
             .collect()
     }
@@ -154,11 +142,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
     /// Bounds of the free values.
     fn bounds(&self, hypothesis: &Hypothesis<P>) -> (Vec<f64>, Vec<f64>) {
         let friction = |i: usize| {
-            if i < self.prior.inertial {
-                f64::NEG_INFINITY
-            } else {
-                0.0
-            }
+            if i < self.prior.inertial { f64::NEG_INFINITY } else { 0.0 }
         };
         let mut lower: Vec<f64> = (0..P).map(friction).collect();
         let mut upper = vec![f64::INFINITY; P];
@@ -180,14 +164,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
             let (normal, gradient) = self.normal_equations(&gram, &at.hypothesis);
             let mut improved = false;
             for _ in 0..6 {
-                let values = step(
-                    &normal,
-                    &gradient,
-                    damping,
-                    &at.hypothesis.values(),
-                    &lower,
-                    &upper,
-                );
+                let values = step(&normal, &gradient, damping, &at.hypothesis.values(), &lower, &upper);
                 let trial = Point::new(self, at.hypothesis.with_values(&values));
                 if trial.cost() < at.cost() {
                     improved = at.cost() - trial.cost() > effort.enough * at.cost();
@@ -203,12 +180,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
             gram = self.gram(&at, &all);
         }
         let covariance = self.covariance(&gram, &at);
-        Fit {
-            hypothesis: at.hypothesis,
-            data_cost: at.data_cost,
-            prior_cost: at.prior_cost,
-            covariance,
-        }
+        Fit { hypothesis: at.hypothesis, data_cost: at.data_cost, prior_cost: at.prior_cost, covariance }
     }
 
     fn gram(&self, at: &Point<P>, which: &[usize]) -> Gram {
@@ -259,16 +231,9 @@ struct Point<const P: usize> {
 impl<const P: usize> Point<P> {
     fn new<A: Arm<f64, N, P>, const N: usize>(problem: &Problem<A, N, P>, hypothesis: Hypothesis<P>) -> Self {
         let residual = problem.residual(&hypothesis);
-        let data_cost = problem
-            .metric
-            .total(&problem.metric.costs(problem.data, &residual));
+        let data_cost = problem.metric.total(&problem.metric.costs(problem.data, &residual));
         let prior_cost = problem.prior.cost(&hypothesis.theta);
-        Self {
-            hypothesis,
-            residual,
-            data_cost,
-            prior_cost,
-        }
+        Self { hypothesis, residual, data_cost, prior_cost }
     }
 
     fn cost(&self) -> f64 {
@@ -313,9 +278,7 @@ pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         scaled[(i, i)] += 1e-12;
     }
     let inverse = scaled.cholesky()?.inverse();
-    Some(DMatrix::from_fn(k, k, |i, j| {
-        inverse[(i, j)] * scale[i] * scale[j]
-    }))
+    Some(DMatrix::from_fn(k, k, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
 /// The effect at its neutral value, other parameters as they are.

@@ -85,13 +85,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
     /// A metric whose starts have been fitted to the hypothesis once and relinearised there.
     fn metric(&self, sample: &Sample<N>, hypothesis: &Hypothesis<P>, scale: [f64; N]) -> Metric<N> {
-        let rough = Metric::new(
-            &sample.data,
-            &self.arm,
-            hypothesis,
-            scale,
-            sample.data.measured_starts(),
-        );
+        let rough = Metric::new(&sample.data, &self.arm, hypothesis, scale, sample.data.measured_starts());
         let residual = self.on(sample, &rough).residual(hypothesis);
         let starts = bounded(&sample.data, rough.refit_starts(&sample.data, &residual));
         let metric = Metric::new(&sample.data, &self.arm, hypothesis, scale, starts);
@@ -108,9 +102,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let fit = self.problem(&metric).solve(&hypothesis, Effort::ROUGH);
             let next = self.residual_scale(&metric, &fit.hypothesis);
             hypothesis = fit.hypothesis.clone();
-            let change = (0..N)
-                .map(|j| (next[j] / scale[j]).max(scale[j] / next[j]))
-                .fold(1.0, f64::max);
+            let change = (0..N).map(|j| (next[j] / scale[j]).max(scale[j] / next[j])).fold(1.0, f64::max);
             scale = next;
             change < SETTLED || round == MAX_ROUNDS
         });
@@ -127,12 +119,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let left = metric.remainder(&self.training.data, &residual);
         std::array::from_fn(|j| {
             let windows = self.training.data.windows.iter().map(|w| {
-                left[w.range()]
-                    .iter()
-                    .skip(j)
-                    .step_by(N)
-                    .map(|x| x * metric.scale[j])
-                    .collect::<Vec<f64>>()
+                left[w.range()].iter().skip(j).step_by(N).map(|x| x * metric.scale[j]).collect::<Vec<f64>>()
             });
             correlated_rms(&windows.collect::<Vec<_>>(), &metric.trust).max(self.noise[j])
         })
@@ -144,9 +131,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let predicted = data.predict(&self.arm, hypothesis, &data.measured_starts());
         std::array::from_fn(|j| {
             let window_rms = data.windows.iter().map(|w| {
-                let pairs = self.training.measured[w.range()]
-                    .iter()
-                    .zip(&predicted[w.range()]);
+                let pairs = self.training.measured[w.range()].iter().zip(&predicted[w.range()]);
                 let squares: f64 = pairs.skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum();
                 (squares / w.rows() as f64).sqrt()
             });
@@ -181,17 +166,9 @@ fn bounded<const N: usize>(data: &Dataset<N>, starts: Vec<Shift<N>>) -> Vec<Shif
 fn correlated_rms(windows: &[Vec<f64>], trust: &[f64]) -> f64 {
     let moment = |lag: usize| -> f64 {
         let product = |w: &Vec<f64>| w.iter().zip(w.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();
-        windows
-            .iter()
-            .zip(trust)
-            .map(|(w, trust)| trust * product(w))
-            .sum()
+        windows.iter().zip(trust).map(|(w, trust)| trust * product(w)).sum()
     };
-    let count: f64 = windows
-        .iter()
-        .zip(trust)
-        .map(|(w, trust)| trust * w.len() as f64)
-        .sum();
+    let count: f64 = windows.iter().zip(trust).map(|(w, trust)| trust * w.len() as f64).sum();
     let energy = moment(0);
     if energy <= 0.0 || count <= 0.0 {
         return 0.0;

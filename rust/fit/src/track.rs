@@ -42,9 +42,7 @@ impl<const N: usize> Track<N> {
     /// A track from columns; `counts_per_rev` gives encoder steps where the arm file knows them.
     pub fn new(name: &str, t: &[f64], q: &[f64], tau: &[f64], steps: Option<[f64; N]>) -> Self {
         let rows = |x: &[f64]| -> Vec<[f64; N]> {
-            x.chunks_exact(N)
-                .map(|row| std::array::from_fn(|j| row[j]))
-                .collect()
+            x.chunks_exact(N).map(|row| std::array::from_fn(|j| row[j])).collect()
         };
         let mut track = Self {
             name: name.to_owned(),
@@ -84,11 +82,7 @@ impl<const N: usize> Track<N> {
 
     /// The measured state at a sample, from a local cubic in each joint.
     pub fn start(&self, at: usize) -> Start<N> {
-        let mut start = Start {
-            q: self.q[at],
-            dq: SVector::zeros(),
-            covariance: [[0.0; 3]; N],
-        };
+        let mut start = Start { q: self.q[at], dq: SVector::zeros(), covariance: [[0.0; 3]; N] };
         for j in 0..N {
             let local = self.local(j, at);
             let variance = self.noise[j] * self.noise[j];
@@ -130,20 +124,13 @@ pub fn median(mut x: Vec<f64>) -> f64 {
 
 /// Smallest non-zero difference that repeats throughout a column, if the column sits on such a grid.
 fn smallest_step(q: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = q
-        .windows(2)
-        .map(|w| (w[1] - w[0]).abs())
-        .filter(|d| *d > 1e-12)
-        .collect();
+    let mut steps: Vec<f64> = q.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 1e-12).collect();
     if steps.len() < 20 {
         return 0.0;
     }
     steps.sort_by(f64::total_cmp);
     let step = steps[steps.len() / 200];
-    let on_grid = steps
-        .iter()
-        .filter(|d| ((*d / step).round() * step - *d).abs() < 0.05 * step)
-        .count();
+    let on_grid = steps.iter().filter(|d| ((*d / step).round() * step - *d).abs() < 0.05 * step).count();
     if on_grid * 10 > steps.len() * 9 { step } else { 0.0 }
 }
 
@@ -151,9 +138,7 @@ fn smallest_step(q: &[f64]) -> f64 {
 fn noise_level(t: &[f64], q: &[f64], step: f64) -> f64 {
     let half = 3;
     let residuals = (half..t.len().saturating_sub(half)).step_by(3);
-    let misfits: Vec<f64> = residuals
-        .map(|at| local_cubic(t, |k| q[k], at, half).misfit)
-        .collect();
+    let misfits: Vec<f64> = residuals.map(|at| local_cubic(t, |k| q[k], at, half).misfit).collect();
     // The median of a chi-squared variable with three degrees of freedom is 0.789 of its mean.
     let typical = (median(misfits) / 0.789).sqrt();
     typical.max(step / 12.0_f64.sqrt()).max(1e-9)

@@ -61,21 +61,11 @@ impl<const N: usize> Dataset<N> {
         let mut rows = 0;
         for (index, track) in tracks.iter().enumerate() {
             for (first, last) in cut(&track.t, horizon) {
-                windows.push(Window {
-                    track: index,
-                    first,
-                    last,
-                    offset: rows,
-                    start: track.start(first),
-                });
+                windows.push(Window { track: index, first, last, offset: rows, start: track.start(first) });
                 rows += last - first;
             }
         }
-        Self {
-            tracks,
-            windows,
-            rows,
-        }
+        Self { tracks, windows, rows }
     }
 
     /// Measured positions in the order of the flat vector.
@@ -107,42 +97,30 @@ impl<const N: usize> Dataset<N> {
         let Some(plant) = hypothesis.plant(arm) else {
             return predicted;
         };
-        let commands: Vec<_> = self
-            .tracks
-            .iter()
-            .map(|track| hypothesis.command(&track.t, &track.held))
-            .collect();
+        let commands: Vec<_> =
+            self.tracks.iter().map(|track| hypothesis.command(&track.t, &track.held)).collect();
         for (window, shift) in self.windows.iter().zip(starts) {
             let track = &self.tracks[window.track];
             let torque = commands[window.track].as_deref().unwrap_or(&track.held);
             let q = window.start.q + shift.q;
-            let q = SVector::from_fn(|j, _| {
-                if hypothesis.distorts() {
-                    hypothesis.actual(j, q[j])
-                } else {
-                    q[j]
-                }
-            });
+            let q = SVector::from_fn(
+                |j, _| {
+                    if hypothesis.distorts() { hypothesis.actual(j, q[j]) } else { q[j] }
+                },
+            );
             let mut state = State::new(q, window.start.dq + shift.dq);
             let out = &mut predicted[window.range()];
             for (k, row) in (window.first..window.last).zip(out.chunks_exact_mut(N)) {
                 let h = interval(&track.t, k);
                 let substeps = substeps(h * plant.friction_rate(&state.q));
-                let step = Interval {
-                    t: track.t[k],
-                    h,
-                    torque: &torque[k],
-                };
+                let step = Interval { t: track.t[k], h, torque: &torque[k] };
                 advance(&plant, &mut state, &step, substeps);
                 if !state.is_finite() || state.q.amax() > DIVERGED {
                     break;
                 }
                 for j in 0..N {
-                    row[j] = if hypothesis.distorts() {
-                        hypothesis.measured(j, state.q[j])
-                    } else {
-                        state.q[j]
-                    };
+                    row[j] =
+                        if hypothesis.distorts() { hypothesis.measured(j, state.q[j]) } else { state.q[j] };
                 }
             }
         }
@@ -162,10 +140,7 @@ pub struct Shift<const N: usize> {
 impl<const N: usize> Shift<N> {
     /// No displacement.
     pub fn none() -> Self {
-        Self {
-            q: SVector::zeros(),
-            dq: SVector::zeros(),
-        }
+        Self { q: SVector::zeros(), dq: SVector::zeros() }
     }
 }
 
@@ -189,10 +164,7 @@ pub fn cut(t: &[f64], horizon: f64) -> Vec<(usize, usize)> {
         let count = ((duration / horizon + 0.2).floor() as usize).min((stretch.len() - 1) / 4);
         let edge = |i: usize| {
             let time = stretch[0] + duration * i as f64 / count as f64;
-            begin
-                + stretch
-                    .partition_point(|&x| x < time - 1e-9)
-                    .min(stretch.len() - 1)
+            begin + stretch.partition_point(|&x| x < time - 1e-9).min(stretch.len() - 1)
         };
         found.extend((0..count).map(|i| (edge(i), edge(i + 1))).filter(|(a, b)| b > a));
         begin = k;
