@@ -11,8 +11,9 @@ pytest.importorskip("mujoco", reason="making cases needs armgap[trial]")
 pytest.importorskip("scipy")
 
 from armgap.trial.arms import DIRECT_DRIVE, GEARED, TrialArm
-from armgap.trial.case import build_rig
+from armgap.trial.case import build_rig, make_case
 from armgap.trial.effects import REGISTRY
+from armgap.trial.excitation import Tracked, rings
 from armgap.trial.key import Hidden
 from armgap.trial.plant import Build
 from armgap.trial.rig import Rig, Source, Trace, run
@@ -92,3 +93,22 @@ def test_an_effect_to_half_an_encoder_step(name: str) -> None:
     trace = run(build_rig(DIRECT_DRIVE, [hidden]), paper_torque(), 1.8)
     assert worst_deviation(DIRECT_DRIVE, trace, oracle) < 0.5
     assert worst_deviation(DIRECT_DRIVE, trace, DryArm(TH)) > 20  # the nominal arm would not do
+
+
+def test_a_loop_that_oscillates_on_an_elastic_joint_is_made_softer() -> None:
+    hidden = [("joint_elasticity", 2)]
+    made = make_case([9029, 1], hidden, model="geared", size=0.0, style="tracked", sample_period=0.0025, duration=3.0)
+    assert not any(rings(trace) for trace in made.logs.values())
+    stiff = Tracked(
+        centre=np.array([0.2, 0.4]),
+        amplitude=np.full((2, 1), 0.3),
+        omega=np.full((2, 1), 4.0),
+        phase=np.zeros((2, 1)),
+        stiffness=np.array(GEARED.joint_inertia) * 18.0**2,
+        damping=1.4 * np.array(GEARED.joint_inertia) * 18.0,
+        limit=np.array(GEARED.torque_limit),
+    )
+    spring = [Hidden("joint_elasticity", 2, {"stiffness": 127.0, "damping": 0.046, "rotor_inertia": 0.0021})]
+    before, after = (run(build_rig(GEARED, spring), m.source(GEARED), 2.0) for m in (stiff, stiff.softer().softer()))
+    assert rings(before)
+    assert not rings(after)

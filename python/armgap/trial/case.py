@@ -14,7 +14,7 @@ from armgap.trial.armfile import arm_toml, draw_nominal
 from armgap.trial.arms import TrialArm, random_arm
 from armgap.trial.effects import REGISTRY, Draw, usage
 from armgap.trial.engine import mujoco
-from armgap.trial.excitation import STYLES, Excitation, acceptable, draw_excitation
+from armgap.trial.excitation import STYLES, Excitation, Tracked, acceptable, draw_excitation, rings
 from armgap.trial.key import KEY_FILE, Hidden, Key
 from armgap.trial.plant import Build
 from armgap.trial.rig import Rig, Trace, run
@@ -25,6 +25,8 @@ ATTEMPTS = 30
 #: An effect below this many encoder steps (RMS over windows) is made larger.
 VISIBLE_STEPS = 3.0
 GROWTHS = 8
+#: Controllers tried on an altered arm, each half as stiff as the one before.
+DETUNINGS = 6
 
 Wish = tuple[str, int | None]
 
@@ -229,9 +231,17 @@ def _events(d: Draw, joint: int | None) -> list[Hidden]:
 def _measure(
     arm: TrialArm, hidden: Sequence[Hidden], motions: dict[str, tuple[str, Excitation]], duration: float
 ) -> dict[str, Trace]:
-    return {
-        name: run(build_rig(arm, hidden, name), motion.source(arm), duration) for name, (_, motion) in motions.items()
-    }
+    return {name: _log(arm, hidden, name, motion, duration) for name, (_, motion) in motions.items()}
+
+
+def _log(arm: TrialArm, hidden: Sequence[Hidden], name: str, motion: Excitation, duration: float) -> Trace:
+    """Run one log; a controller that oscillates on the altered arm is made softer first, as anyone would."""
+    for _ in range(DETUNINGS):
+        trace = run(build_rig(arm, hidden, name), motion.source(arm), duration)
+        if not (isinstance(motion, Tracked) and rings(trace)):
+            break
+        motion = motion.softer()
+    return trace
 
 
 def _sane(logs: dict[str, Trace]) -> bool:

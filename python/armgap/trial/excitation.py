@@ -8,7 +8,7 @@ what is logged is the controller's command.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from armgap.trial.arms import DIRECT_DRIVE, TrialArm
 from armgap.trial.rig import Array, Source, Trace
 
 STYLES = ("multisine", "paper", "tracked")
+#: A tracked motion holds nothing above this frequency, Hz.
+RINGING = 15.0
 #: Time over which torques and references fade in, s.
 FADE_IN = 0.4
 #: Fewest reversals of a useful motion, per joint, 1/s.
@@ -98,8 +100,20 @@ class Tracked:
 
         return command
 
+    def softer(self) -> Tracked:
+        """The same motion under a controller of half the stiffness."""
+        return replace(self, stiffness=0.5 * self.stiffness, damping=0.6 * self.damping)
+
 
 Excitation = Multisine | Tracked
+
+
+def rings(trace: Trace) -> bool:
+    """Whether a controller oscillates: most of the power of a command lies far above what it has to track."""
+    tau = trace.tau - np.mean(trace.tau, axis=0)
+    power = np.abs(np.fft.rfft(tau, axis=0)) ** 2
+    frequency = np.fft.rfftfreq(len(trace.t), trace.t[1] - trace.t[0])
+    return bool(np.any(np.sum(power[frequency > RINGING], axis=0) > 0.5 * np.sum(power, axis=0)))
 
 
 def fade(t: float, length: float = FADE_IN) -> float:
