@@ -9,6 +9,11 @@ MuJoCo's ``frictionloss`` is a soft constraint, so its settings matter:
 * a step in which a joint reverses, stops, starts or meets an obstacle is undone and taken again in :data:`REFINE`
   parts, :data:`DEPTH` times over, so that the instant is known to about a tenth of a microsecond.
 
+Measured on the arm of Table I (joint 1 / joint 2): held at 95 % of its Coulomb level it creeps 0.08 / 0.47 urad in 1 s;
+windows of 0.25 s under the paper's torques end 0.09 / 0.33 urad RMS from an exact integration (encoder steps are 6.1 /
+9.6 urad). Without the cut steps these are 193 / 839 urad; with MuJoCo's default settings 7.1 / 31 mrad, and 3.4 / 19 mrad
+of creep.
+
 Friction that varies (with speed, load, position, time) is set on ``dof_frictionloss`` before each step, at the state
 half a step ahead. Torque laws go to ``qfrc_applied``, at the same half step. Elasticity and play are a separate
 rotor body that a fixed tendon (spring and damper, or a limit) ties to the joint.
