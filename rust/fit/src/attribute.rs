@@ -39,6 +39,8 @@ const SMOOTHING: [f64; 2] = [0.03, 0.1];
 pub struct Contender<const P: usize> {
     /// The added effect; none for the current model, with or without smoother friction.
     pub effect: Option<Placed>,
+    /// Size of the added effect's first parameter relative to the largest possible.
+    pub size: f64,
     /// The fit.
     pub fit: Fit<P>,
     /// Tempered cost of every training window.
@@ -188,6 +190,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             .collect()
     }
 
+    /// Deviation of an effect's first parameter from neutral, relative to the largest possible.
+    fn relative_size(&self, effect: &Placed) -> f64 {
+        let parameter = &effect.law.spec().parameters[0];
+        (effect.p[0] - parameter.neutral).abs() / self.scales.largest(parameter.quantity, effect.joint)
+    }
+
     /// All fitted candidates with the share of the gap each removes.
     fn field(&self, weights: &Weights<N>, fit: &Fit<P>, fitted: &[Contender<P>]) -> Vec<(Contender<P>, f64)> {
         let base: f64 = self.judge(&weights.holdout).window_costs(&fit.hypothesis).iter().sum();
@@ -212,7 +220,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 let training = self.problem(&weights.training).window_costs(&fit.hypothesis);
                 let holdout = self.judge(&weights.holdout).window_costs(&fit.hypothesis);
                 let effect = fit.hypothesis.effects.get(known).copied();
-                Contender { effect, fit, training, holdout }
+                let size = effect.as_ref().map_or(0.0, |e| self.relative_size(e));
+                Contender { effect, size, fit, training, holdout }
             })
             .filter(|c| c.score().is_finite())
             .collect();

@@ -36,6 +36,12 @@ pub const CONSEQUENCE: f64 = 3e-3;
 /// Improvement relative to the motion within a window below which an effect is of no consequence.
 const RELEVANT: f64 = 1e-4;
 
+/// Probability left to a cause beside a remainder that it does not touch at all.
+const REMAINDER_DOUBT: f64 = 0.25;
+
+/// A fit that ends this close to the largest possible size has found no effect.
+const AT_BOUND: f64 = 0.98;
+
 /// Resamples of the windows.
 const RESAMPLES: usize = 400;
 
@@ -97,6 +103,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         self.prune(&mut model, &mut causes, &stage);
         stages.push(stage);
         refresh(&model, &mut causes);
+        temper(&stages, &mut causes);
         Attribution { refit, model, causes, stages }
     }
 
@@ -124,7 +131,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     fn judged(&self, stage: &Stage<N, P>, fit: Fit<P>, effect: Option<Placed>) -> Contender<P> {
         let training = self.problem(&stage.weights.training).window_costs(&fit.hypothesis);
         let holdout = self.judge(&stage.weights.holdout).window_costs(&fit.hypothesis);
-        Contender { effect, fit, training, holdout }
+        Contender { effect, size: 0.0, fit, training, holdout }
     }
 }
 
@@ -154,8 +161,10 @@ fn choose<const N: usize, const P: usize>(stage: &Stage<N, P>, smoothed: bool) -
 
 /// Whether a contender closes a part of the gap that matters, on the holdout too.
 fn moves<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Contender<P>) -> bool {
+    let possible = contender.size < AT_BOUND;
     let matters = if stage.relative_error() > CONSEQUENCE { MATTERS } else { MATTERS_IN_SMALL };
     stage.excess() > ABOVE_FLOOR
+        && possible
         && stage.share(contender) > matters
         && stage.relevance(contender) > RELEVANT
         && contender.z_over(&stage.base) > CERTAIN
@@ -253,6 +262,19 @@ fn trust_probability<const N: usize, const P: usize>(
     // What is left over by the best effect must itself be plausible, or the values are simply wrong.
     let plausible = (-0.5 * (best - P as f64).max(0.0) / (2.0 * P as f64).sqrt()).exp();
     (ours / all) * plausible
+}
+
+/// Lowers the probabilities where a gap of consequence remains that no candidate explains: what leaves it may also be what the named
+/// causes stand in for.
+fn temper<const N: usize, const P: usize>(stages: &[Stage<N, P>], causes: &mut [Cause]) {
+    let (Some(first), Some(last)) = (stages.first(), stages.last()) else { return };
+    if last.relative_error() <= CONSEQUENCE || last.excess() <= ABOVE_FLOOR {
+        return;
+    }
+    let explained = 1.0 - (last.relative_error() / first.relative_error()).min(1.0).powi(2);
+    for cause in causes {
+        cause.probability *= REMAINDER_DOUBT + (1.0 - REMAINDER_DOUBT) * explained * explained;
+    }
 }
 
 /// Values and standard deviations of the causes from the final model.

@@ -25,6 +25,12 @@ pub struct Scales<const N: usize> {
     pub gravity: f64,
 }
 
+/// A parameter this many times its typical size describes no arm; fits are kept below.
+const LARGEST: f64 = 50.0;
+
+/// Times are measured in sample periods; this many of them are one typical size when it comes to what is possible.
+const LONGEST_TIME: f64 = 20.0;
+
 impl<const N: usize> Scales<N> {
     /// Sizes seen in `tracks` on this arm.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
@@ -64,6 +70,12 @@ impl<const N: usize> Scales<N> {
             Quantity::Length => self.length,
         };
         if value.is_finite() && value > 0.0 { value } else { 1.0 }
+    }
+
+    /// Largest deviation from neutral that a parameter of joint `j` can have.
+    pub fn largest(&self, quantity: Quantity, j: usize) -> f64 {
+        let patience = if quantity == Quantity::Time { LONGEST_TIME } else { 1.0 };
+        LARGEST * patience * self.size(quantity, j)
     }
 
     /// Sizes of all parameters of an effect.

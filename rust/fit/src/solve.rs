@@ -146,9 +146,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
         };
         let mut lower: Vec<f64> = (0..P).map(friction).collect();
         let mut upper = vec![f64::INFINITY; P];
-        for parameter in hypothesis.effects.iter().flat_map(|e| e.law.spec().parameters) {
-            lower.push(parameter.lower);
-            upper.push(parameter.upper);
+        for effect in &hypothesis.effects {
+            for parameter in effect.law.spec().parameters {
+                let reach = self.scales.largest(parameter.quantity, effect.joint);
+                lower.push(parameter.lower.max(parameter.neutral - reach));
+                upper.push(parameter.upper.min(parameter.neutral + reach));
+            }
         }
         (lower, upper)
     }
