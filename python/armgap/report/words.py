@@ -11,6 +11,8 @@ __all__ = ["answers", "figure", "joint_text", "millis", "title"]
 
 Data = dict[str, Any]
 
+_DOUBTFUL = 0.5
+
 _VERDICTS = {
     "none": "The model predicts these logs as well as the sensors can tell.",
     "parameters": "The model has the right form but the wrong values.",
@@ -79,6 +81,8 @@ def which(data: Data) -> str:
         text = (
             f"{title(cause['effect'])}, {joint_text(cause['joint'])}: {values} (probability {cause['probability']:.2f})"
         )
+        if cause["probability"] < _DOUBTFUL:
+            text += ", the best candidate beside a gap that stays unexplained"
         others = cause.get("equivalents") or []
         if others:
             names = ", ".join(f"{title(e['effect'])} ({joint_text(e['joint'])})" for e in others)
