@@ -75,21 +75,10 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
     /// An estimator that has seen nothing yet.
     pub fn new(arm: A, settings: Settings<T, R>) -> Self {
         const {
-            assert!(
-                R == P || R == P + N,
-                "R is the arm's parameters, or those and one asymmetry per joint"
-            );
+            assert!(R == P || R == P + N, "R is the arm's parameters, or those and one asymmetry per joint");
         }
         let rls = Rls::new(settings.theta0, settings.p0, settings.forgetting);
-        Self {
-            arm,
-            settings,
-            rls,
-            last: None,
-            before: None,
-            regression: None,
-            rejected: 0,
-        }
+        Self { arm, settings, rls, last: None, before: None, regression: None, rejected: 0 }
     }
 
     /// Estimate and covariance.
@@ -124,11 +113,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
     }
 
     fn acceptable(&self, sample: &Sample<T, N>) -> bool {
-        let numbers = sample
-            .q
-            .iter()
-            .chain(sample.tau.iter())
-            .chain(sample.dq.iter().flatten());
+        let numbers = sample.q.iter().chain(sample.tau.iter()).chain(sample.dq.iter().flatten());
         let finite = sample.t.is_finite() && numbers.into_iter().all(ComplexField::is_finite);
         finite && self.last.is_none_or(|last| sample.t > last.t)
     }
@@ -151,38 +136,20 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         let between = (last.q + sample.q) * half;
         let at_samples = sample.dq.is_some() || self.settings.variant == Variant::Paper;
         if at_samples {
-            let now = Snapshot {
-                q: sample.q,
-                dq: sample.dq.unwrap_or(difference),
-            };
+            let now = Snapshot { q: sample.q, dq: sample.dq.unwrap_or(difference) };
             let h = sample.t - last.t;
-            let passage = Passage {
-                h,
-                split: h * half,
-                first: last.tau,
-                second: last.tau,
-                middle: between,
-            };
+            let passage = Passage { h, split: h * half, first: last.tau, second: last.tau, middle: between };
             return self.regress(&now, &passage, &sample.tau);
         }
         // The state half-way between the two samples; on the way there from the one before, the torque changed at `last`.
-        let now = Snapshot {
-            q: between,
-            dq: difference,
-        };
+        let now = Snapshot { q: between, dq: difference };
         let Some(before) = self.before else {
             self.start(&now, &last.tau);
             return Outcome::Starting;
         };
         let h = (sample.t - before.t) * half;
         let split = (last.t - before.t) * half;
-        let passage = Passage {
-            h,
-            split,
-            first: before.tau,
-            second: last.tau,
-            middle: last.q,
-        };
+        let passage = Passage { h, split, first: before.tau, second: last.tau, middle: last.q };
         self.regress(&now, &passage, &last.tau)
     }
 

@@ -31,11 +31,7 @@ pub struct State<T, const N: usize> {
 impl<T: Real, const N: usize> State<T, N> {
     /// A state whose modes follow from its velocities: a joint at rest starts stuck and is released if its torque demands it.
     pub fn new(q: SVector<T, N>, dq: SVector<T, N>) -> Self {
-        Self {
-            q,
-            dq,
-            modes: core::array::from_fn(|j| Mode::of(dq[j])),
-        }
+        Self { q, dq, modes: core::array::from_fn(|j| Mode::of(dq[j])) }
     }
 
     /// Whether every number is finite.
@@ -62,11 +58,7 @@ impl<T: Real, const N: usize> Interval<'_, T, N> {
         let s = x / self.h;
         SVector::from_fn(|j, _| {
             let pulse = &self.torque[j];
-            if pulse.start == pulse.end && pulse.start == pulse.middle {
-                pulse.start
-            } else {
-                pulse.at(s)
-            }
+            if pulse.start == pulse.end && pulse.start == pulse.middle { pulse.start } else { pulse.at(s) }
         })
     }
 }
@@ -190,8 +182,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
             } else if state.modes[j] == Mode::Stuck {
                 let tau = self.interval.torque_at(x);
                 let (excess, direction) =
-                    self.plant
-                        .excess(j, self.interval.t + x, &state.q, &tau, motion.holding[j]);
+                    self.plant.excess(j, self.interval.t + x, &state.q, &tau, motion.holding[j]);
                 if excess > worst && !tried[j] {
                     (found, worst) = (Some((j, Mode::of(direction))), excess);
                 }
@@ -223,11 +214,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         for j in 0..N {
             let event = if reverses(j) {
                 let s = hermite_root(state.dq[j], k1[j] * dt, trial.dq[j], end.ddq[j] * dt);
-                Some(Event {
-                    joint: j,
-                    s,
-                    change: Change::Stop,
-                })
+                Some(Event { joint: j, s, change: Change::Stop })
             } else if state.modes[j] == Mode::Stuck {
                 self.release(j, state, trial, x, dt, &end)
             } else {
@@ -254,25 +241,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
     ) -> Option<Event<T>> {
         let t = self.interval.t;
         let tau_end = self.interval.torque_at(x + dt);
-        let (after, direction) = self
-            .plant
-            .excess(j, t + x + dt, &trial.q, &tau_end, end.holding[j]);
+        let (after, direction) = self.plant.excess(j, t + x + dt, &trial.q, &tau_end, end.holding[j]);
         if after <= T::zero() {
             return None;
         }
         let start = self.motion(x, &state.q, &state.dq, &state.modes);
         let tau = self.interval.torque_at(x);
         let (before, _) = self.plant.excess(j, t + x, &state.q, &tau, start.holding[j]);
-        let s = if before < T::zero() {
-            before / (before - after)
-        } else {
-            T::zero()
-        };
-        Some(Event {
-            joint: j,
-            s,
-            change: Change::Release(Mode::of(direction)),
-        })
+        let s = if before < T::zero() { before / (before - after) } else { T::zero() };
+        Some(Event { joint: j, s, change: Change::Release(Mode::of(direction)) })
     }
 
     /// Integrates up to the event; the instant of a stop is corrected until the velocity vanishes to rounding.
@@ -288,10 +265,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         let mut reached = self.runge_kutta(state, x, s * dt, k1);
         if matches!(event.change, Change::Stop) {
             for _ in 0..MAX_REFINEMENTS {
-                let slope = self
-                    .motion(x + s * dt, &reached.q, &reached.dq, &reached.modes)
-                    .ddq[event.joint]
-                    * dt;
+                let slope =
+                    self.motion(x + s * dt, &reached.q, &reached.dq, &reached.modes).ddq[event.joint] * dt;
                 let correction = reached.dq[event.joint] / slope;
                 let next = s - correction;
                 if !(next > T::zero() && next <= T::one()) || correction.abs() < lit(1e-12) {
@@ -301,10 +276,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
                 reached = self.runge_kutta(state, x, s * dt, k1);
             }
         }
-        Located {
-            length: s * dt,
-            reached,
-        }
+        Located { length: s * dt, reached }
     }
 }
 
@@ -358,11 +330,7 @@ fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
             low = s;
         }
         let newton = s - f / slope(s);
-        let next = if newton > low && newton < high {
-            newton
-        } else {
-            (low + high) / two
-        };
+        let next = if newton > low && newton < high { newton } else { (low + high) / two };
         if (next - s).abs() < lit(1e-13) {
             return next;
         }

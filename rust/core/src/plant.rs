@@ -133,14 +133,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     #[inline]
     fn point(&self, j: usize, t: T, q: T, dq: T, tau: T, load: T) -> JointPoint<T> {
         let friction = self.viscous[j] * dq.abs() + self.coulomb[j];
-        JointPoint {
-            t,
-            q,
-            dq,
-            tau,
-            load,
-            friction,
-        }
+        JointPoint { t, q, dq, tau, load, friction }
     }
 
     /// Coulomb level of joint `j` in a direction, never negative.

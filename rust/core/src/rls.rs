@@ -46,13 +46,7 @@ impl<T: Real, const R: usize> Rls<T, R> {
                 p[(i, j)] = p[(j, i)];
             }
         }
-        Self {
-            theta: theta0,
-            p,
-            forgetting,
-            updates: 0,
-            rejected: 0,
-        }
+        Self { theta: theta0, p, forgetting, updates: 0, rejected: 0 }
     }
 
     /// Estimate.

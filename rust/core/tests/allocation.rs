@@ -49,13 +49,8 @@ fn the_counter_counts() {
 fn estimators_and_integrator_allocate_nothing() {
     let arm = TwoLink::new(9.81, Some(0.45), &THETA);
     let law = find::<f64>("stribeck").expect("in the catalogue");
-    let plant = Plant::new(arm, THETA)
-        .with_effect(Active {
-            law,
-            joint: 1,
-            p: [0.5, 0.3, 0.0],
-        })
-        .expect("room");
+    let plant =
+        Plant::new(arm, THETA).with_effect(Active { law, joint: 1, p: [0.5, 0.3, 0.0] }).expect("room");
     for scheme in Scheme::ALL {
         for variant in [Variant::Paper, Variant::Exact] {
             let settings = Settings {
@@ -72,23 +67,9 @@ fn estimators_and_integrator_allocate_nothing() {
                 for k in 0..2000 {
                     let t = f64::from(k) * 0.0025;
                     let tau = Vector2::new(40.0 * (9.0 * t).sin(), 8.0 * (13.0 * t).cos());
-                    estimator.update(&Sample {
-                        t,
-                        q: state.q,
-                        dq: None,
-                        tau,
-                    });
+                    estimator.update(&Sample { t, q: state.q, dq: None, tau });
                     let torque = [Pulse::held(tau[0]), Pulse::held(tau[1])];
-                    advance(
-                        &plant,
-                        &mut state,
-                        &Interval {
-                            t,
-                            h: 0.0025,
-                            torque: &torque,
-                        },
-                        1,
-                    );
+                    advance(&plant, &mut state, &Interval { t, h: 0.0025, torque: &torque }, 1);
                 }
                 assert!(estimator.rls().updates() > 1900);
             });

@@ -91,11 +91,7 @@ fn a_payload_moves_the_parameters_as_a_heavier_link_does() {
         ..bare
     };
     let [before, after] = [bare, loaded].map(|l| TwoLink::inertial_from_links(&l, 9.81));
-    let delta = TwoLink {
-        gravity: 9.81,
-        length1: 0.4,
-    }
-    .payload(&[0.0; 9], mass, distance);
+    let delta = TwoLink { gravity: 9.81, length1: 0.4 }.payload(&[0.0; 9], mass, distance);
     for i in 0..5 {
         assert!((after[i] - before[i] - delta[i]).abs() < 1e-12, "theta{}", i + 1);
     }

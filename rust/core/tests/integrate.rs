@@ -35,16 +35,7 @@ fn run(
     for k in 0..(duration / h).round() as usize {
         let t = k as f64 * h;
         let torque = tau(t).map(Pulse::held);
-        advance(
-            plant,
-            &mut state,
-            &Interval {
-                t,
-                h,
-                torque: &torque,
-            },
-            substeps,
-        );
+        advance(plant, &mut state, &Interval { t, h, torque: &torque }, substeps);
     }
     state
 }
@@ -57,9 +48,7 @@ fn at_rest() -> State<f64, 2> {
 fn an_arm_below_its_coulomb_level_does_not_creep() {
     let mut start = at_rest();
     start.q = Vector2::new(0.1, -0.05);
-    let end = run(&seed(THETA), start, 10.0, H, 1, |t| {
-        [2.0 + (7.0 * t).sin(), 0.8 * (3.0 * t).cos()]
-    });
+    let end = run(&seed(THETA), start, 10.0, H, 1, |t| [2.0 + (7.0 * t).sin(), 0.8 * (3.0 * t).cos()]);
     assert_eq!(end.q, start.q);
     assert_eq!(end.dq, Vector2::zeros());
 }
@@ -80,10 +69,7 @@ fn order_is_four_where_friction_is_smooth() {
     let reference = end(64);
     let errors = [1, 2, 4].map(|n| (end(n) - reference).norm());
     let orders = [errors[0] / errors[1], errors[1] / errors[2]].map(f64::log2);
-    assert!(
-        orders.iter().all(|p| (3.7..4.6).contains(p)),
-        "orders {orders:?} of errors {errors:?}"
-    );
+    assert!(orders.iter().all(|p| (3.7..4.6).contains(p)), "orders {orders:?} of errors {errors:?}");
 }
 
 #[test]
@@ -125,11 +111,7 @@ fn work_equals_stored_plus_dissipated_energy() {
         let torque = tau.map(Pulse::held);
         for i in 0..8 {
             let before = state;
-            let interval = Interval {
-                t: t + H / 8.0 * f64::from(i),
-                h: H / 8.0,
-                torque: &torque,
-            };
+            let interval = Interval { t: t + H / 8.0 * f64::from(i), h: H / 8.0, torque: &torque };
             advance(&plant, &mut state, &interval, 1);
             for j in 0..2 {
                 let path = state.q[j] - before.q[j];
@@ -138,9 +120,7 @@ fn work_equals_stored_plus_dissipated_energy() {
             }
         }
     }
-    let stored = arm
-        .energy_regressor(&state.q, &state.dq)
-        .dot(&SVector::from(theta));
+    let stored = arm.energy_regressor(&state.q, &state.dq).dot(&SVector::from(theta));
     let gap = (supplied - stored - dissipated).abs() / dissipated;
     assert!(gap < 1e-4, "relative gap {gap:e}");
 }
@@ -152,13 +132,7 @@ fn effects_leave_the_rigid_arm_at_their_neutral_value() {
         let spec = law.spec();
         let mut p = [1.0; 3];
         p[0] = spec.parameters[0].neutral;
-        let plant = seed(THETA)
-            .with_effect(Active {
-                law: *law,
-                joint: 1,
-                p,
-            })
-            .expect("room for one effect");
+        let plant = seed(THETA).with_effect(Active { law: *law, joint: 1, p }).expect("room for one effect");
         let end = run(&plant, at_rest(), 1.0, H, 1, seed_torque);
         assert!((end.q - reference.q).amax() < 1e-12, "{}", spec.name);
     }
@@ -168,16 +142,7 @@ fn effects_leave_the_rigid_arm_at_their_neutral_value() {
 fn a_smoothed_sign_tends_to_dry_friction() {
     let exact = run(&seed(THETA), at_rest(), 1.0, H, 4, seed_torque).q;
     let gap = |width| {
-        (run(
-            &seed(THETA).with_smoothing(width),
-            at_rest(),
-            1.0,
-            H,
-            16,
-            seed_torque,
-        )
-        .q - exact)
-            .amax()
+        (run(&seed(THETA).with_smoothing(width), at_rest(), 1.0, H, 16, seed_torque).q - exact).amax()
     };
     let gaps = [0.1, 0.01, 0.001].map(gap);
     assert!(gaps[0] > 4.0 * gaps[1] && gaps[1] > 4.0 * gaps[2], "{gaps:?}");
@@ -185,24 +150,13 @@ fn a_smoothed_sign_tends_to_dry_friction() {
 
 #[test]
 fn a_delayed_command_keeps_its_impulse() {
-    let t: Vec<f64> = (0..50)
-        .map(|k| f64::from(k) * H + 1e-4 * f64::from(k % 3))
-        .collect();
+    let t: Vec<f64> = (0..50).map(|k| f64::from(k) * H + 1e-4 * f64::from(k % 3)).collect();
     let u: Vec<f64> = t.iter().map(|&t| seed_torque(t)[0]).collect();
-    for (name, p) in [
-        ("actuator_delay", 0.0061),
-        ("actuator_lag", 0.004),
-        ("actuator_lag", 1e-5),
-    ] {
+    for (name, p) in [("actuator_delay", 0.0061), ("actuator_lag", 0.004), ("actuator_lag", 1e-5)] {
         let mut pulses: Vec<_> = u.iter().map(|&u| Pulse::held(u)).collect();
-        find::<f64>(name)
-            .expect("in the catalogue")
-            .command(&[p, 0.0, 0.0], &t, &mut pulses);
-        let shifted: f64 = pulses
-            .iter()
-            .zip(t.windows(2))
-            .map(|(pulse, t)| pulse.mean() * (t[1] - t[0]))
-            .sum();
+        find::<f64>(name).expect("in the catalogue").command(&[p, 0.0, 0.0], &t, &mut pulses);
+        let shifted: f64 =
+            pulses.iter().zip(t.windows(2)).map(|(pulse, t)| pulse.mean() * (t[1] - t[0])).sum();
         let fine = 20_000;
         let (span, mut y, mut exact) = (t[49] - t[0], u[0], 0.0);
         for i in 0..fine {

@@ -8,10 +8,7 @@ struct Noise(u64);
 
 impl Noise {
     fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 }
@@ -97,9 +94,6 @@ fn a_rejected_sample_leaves_no_trace() {
     let mut broken = psi;
     broken[(1, 4)] = f64::INFINITY;
     assert_eq!(rls.update(&broken, &y), Update::Rejected);
-    assert_eq!(
-        (rls.theta(), rls.covariance()),
-        (before.theta(), before.covariance())
-    );
+    assert_eq!((rls.theta(), rls.covariance()), (before.theta(), before.covariance()));
     assert_eq!((rls.updates(), rls.rejected()), (1, 1));
 }

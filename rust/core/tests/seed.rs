@@ -36,41 +36,20 @@ fn run(asymmetry: bool, counts: Option<[f64; 2]>) -> Vec<Sample<f64, 2>> {
     let mut plant = Plant::new(arm, theta);
     if asymmetry {
         let law = find::<f64>("coulomb_asymmetry").expect("in the catalogue");
-        plant = plant
-            .with_effect(Active {
-                law,
-                joint: 0,
-                p: [(7.17 - 8.049) / 2.0, 0.0, 0.0],
-            })
-            .expect("room");
+        plant =
+            plant.with_effect(Active { law, joint: 0, p: [(7.17 - 8.049) / 2.0, 0.0, 0.0] }).expect("room");
     }
     let mut state = State::new(Vector2::zeros(), Vector2::zeros());
     let round = |q: f64, j: usize| {
-        counts.map_or(q, |c| {
-            (q * c[j] / std::f64::consts::TAU).round() * std::f64::consts::TAU / c[j]
-        })
+        counts.map_or(q, |c| (q * c[j] / std::f64::consts::TAU).round() * std::f64::consts::TAU / c[j])
     };
     (0..4000)
         .map(|k| {
             let t = f64::from(k) * H;
             let tau = torque(t);
             let q = Vector2::new(round(state.q[0], 0), round(state.q[1], 1));
-            let sample = Sample {
-                t,
-                q,
-                dq: Some(state.dq),
-                tau: Vector2::from(tau),
-            };
-            advance(
-                &plant,
-                &mut state,
-                &Interval {
-                    t,
-                    h: H,
-                    torque: &tau.map(Pulse::held),
-                },
-                4,
-            );
+            let sample = Sample { t, q, dq: Some(state.dq), tau: Vector2::from(tau) };
+            advance(&plant, &mut state, &Interval { t, h: H, torque: &tau.map(Pulse::held) }, 4);
             sample
         })
         .collect()
@@ -119,13 +98,8 @@ fn table_1_gives_the_measured_column_of_table_2() {
     // m1 lc1 = 2.175, m2 l1 = 1.746 and m2 lc2 = 0.186 kg m. theta1 is cut, not rounded, after its third decimal.
     let [theta1, _, theta3, ..] = theta();
     let (m1_lc1, m2_l1, m2_lc2) = (moment(23.902, 0.091), moment(3.880, 0.45), moment(3.880, 0.048));
-    let derived = [
-        (theta1 * 1e3).floor() / 1e3,
-        0.45 * m2_lc2,
-        theta3,
-        9.81 * (m1_lc1 + m2_l1),
-        9.81 * m2_lc2,
-    ];
+    let derived =
+        [(theta1 * 1e3).floor() / 1e3, 0.45 * m2_lc2, theta3, 9.81 * (m1_lc1 + m2_l1), 9.81 * m2_lc2];
     for (ours, paper) in derived.iter().zip(["2.351", "0.084", "0.102", "38.465", "1.825"]) {
         assert_eq!(format!("{ours:.3}"), paper);
     }
@@ -223,18 +197,9 @@ fn a_sample_that_is_not_finite_changes_nothing() {
     for (k, sample) in samples.iter().enumerate().take(500) {
         clean.update(sample);
         if k % 50 == 7 {
-            let broken = Sample {
-                tau: Vector2::new(f64::NAN, 0.0),
-                ..*sample
-            };
+            let broken = Sample { tau: Vector2::new(f64::NAN, 0.0), ..*sample };
             assert_eq!(dirty.update(&broken), Outcome::Rejected);
-            assert_eq!(
-                dirty.update(&Sample {
-                    t: sample.t - 1.0,
-                    ..*sample
-                }),
-                Outcome::Rejected
-            );
+            assert_eq!(dirty.update(&Sample { t: sample.t - 1.0, ..*sample }), Outcome::Rejected);
         }
         dirty.update(sample);
     }

@@ -38,25 +38,13 @@ macro_rules! controller {
                     1 => Scheme::SuppliedEnergy,
                     _ => Scheme::FilteredPower,
                 },
-                variant: if exact {
-                    Variant::Exact
-                } else {
-                    Variant::Paper
-                },
+                variant: if exact { Variant::Exact } else { Variant::Paper },
                 cutoff: Cutoff { rad_per_s: 50.0 },
                 forgetting: 1.0,
                 theta0: SVector::zeros(),
                 p0: 1000.0,
             };
-            unsafe {
-                at.write(Estimator::new(
-                    TwoLink {
-                        gravity: 9.81,
-                        length1: 0.45,
-                    },
-                    settings,
-                ))
-            };
+            unsafe { at.write(Estimator::new(TwoLink { gravity: 9.81, length1: 0.45 }, settings)) };
         }
 
         /// Takes one sample and writes the estimate; the result is 1 if it was used.
@@ -73,12 +61,7 @@ macro_rules! controller {
         ) -> u32 {
             let estimator = unsafe { &mut *at };
             let (q, tau) = unsafe { (*q, *tau) };
-            let sample = Sample {
-                t,
-                q: Vector2::from(q),
-                dq: None,
-                tau: Vector2::from(tau),
-            };
+            let sample = Sample { t, q: Vector2::from(q), dq: None, tau: Vector2::from(tau) };
             let outcome = estimator.update(&sample);
             unsafe { theta.write((*estimator.rls().theta()).into()) };
             u32::from(matches!(outcome, Outcome::Updated(_)))
@@ -105,16 +88,7 @@ pub unsafe extern "C" fn armgap_advance_f64(
     let (tau, theta) = unsafe { (*tau, *theta) };
     let plant = Plant::new(TwoLink::new(9.81, None, &theta), theta);
     let mut state = unsafe { State::new(Vector2::from(*q), Vector2::from(*dq)) };
-    advance(
-        &plant,
-        &mut state,
-        &Interval {
-            t,
-            h,
-            torque: &tau.map(Pulse::held),
-        },
-        1,
-    );
+    advance(&plant, &mut state, &Interval { t, h, torque: &tau.map(Pulse::held) }, 1);
     unsafe {
         q.write(state.q.into());
         dq.write(state.dq.into());

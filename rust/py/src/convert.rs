@@ -41,14 +41,7 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         entry.set_item("equation", spec.equation)?;
         entry.set_item("source", spec.source)?;
         entry.set_item("excited_by", spec.excited_by)?;
-        entry.set_item(
-            "scope",
-            if spec.scope == Scope::Joint {
-                "joint"
-            } else {
-                "arm"
-            },
-        )?;
+        entry.set_item("scope", if spec.scope == Scope::Joint { "joint" } else { "arm" })?;
         let parameters = PyList::empty(py);
         for parameter in spec.parameters {
             let p = PyDict::new(py);
@@ -107,10 +100,7 @@ fn one(x: &[f64]) -> Option<f64> {
 pub fn kind_of(name: &str) -> PyResult<Kind> {
     let known: Vec<&str> = Kind::ALL.iter().map(|k| k.name()).collect();
     Kind::from_name(name).ok_or_else(|| {
-        PyValueError::new_err(format!(
-            "unknown kind of arm `{name}`; known: {}",
-            known.join(", ")
-        ))
+        PyValueError::new_err(format!("unknown kind of arm `{name}`; known: {}", known.join(", ")))
     })
 }
 
@@ -137,9 +127,7 @@ pub fn placed(
                 }
                 _ => {
                     let last = kind.joints();
-                    return Err(PyValueError::new_err(format!(
-                        "`{name}` needs a joint from 1 to {last}"
-                    )));
+                    return Err(PyValueError::new_err(format!("`{name}` needs a joint from 1 to {last}")));
                 }
             };
             let mut p = [0.0; 3];
@@ -155,13 +143,9 @@ pub fn placed(
                 }
                 *slot = value;
             }
-            if let Some(extra) = values
-                .keys()
-                .find(|k| !spec.parameters.iter().any(|p| p.name == k.as_str()))
+            if let Some(extra) = values.keys().find(|k| !spec.parameters.iter().any(|p| p.name == k.as_str()))
             {
-                return Err(PyValueError::new_err(format!(
-                    "`{name}` has no parameter `{extra}`"
-                )));
+                return Err(PyValueError::new_err(format!("`{name}` has no parameter `{extra}`")));
             }
             Ok(Placed { law, joint, p })
         })
@@ -170,8 +154,7 @@ pub fn placed(
 
 /// A contiguous view of a vector.
 pub fn vector<'a>(x: &'a PyReadonlyArray1<'_, f64>, name: &str) -> PyResult<&'a [f64]> {
-    x.as_slice()
-        .map_err(|_| PyValueError::new_err(format!("`{name}` must be a contiguous array of float64")))
+    x.as_slice().map_err(|_| PyValueError::new_err(format!("`{name}` must be a contiguous array of float64")))
 }
 
 /// A contiguous view of a matrix with `rows` rows and `columns` columns.
@@ -198,11 +181,11 @@ pub fn description(arm: &Bound<'_, PyDict>) -> PyResult<ArmDescription> {
         key: &str,
     ) -> PyResult<Option<T>> {
         match arm.get_item(key)? {
-            Some(value) if !value.is_none() => {
-                Ok(Some(value.extract().map_err(|_| {
-                    PyValueError::new_err(format!("arm: `{key}` has the wrong type"))
-                })?))
-            }
+            Some(value) if !value.is_none() => Ok(Some(
+                value
+                    .extract()
+                    .map_err(|_| PyValueError::new_err(format!("arm: `{key}` has the wrong type")))?,
+            )),
             _ => Ok(None),
         }
     }
@@ -227,9 +210,7 @@ pub fn description(arm: &Bound<'_, PyDict>) -> PyResult<ArmDescription> {
     ];
     for (key, list, length) in lists {
         if list.is_some_and(|l| l.len() != length) {
-            return Err(PyValueError::new_err(format!(
-                "arm: `{key}` needs {length} values"
-            )));
+            return Err(PyValueError::new_err(format!("arm: `{key}` needs {length} values")));
         }
     }
     Ok(description)

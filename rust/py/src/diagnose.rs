@@ -7,12 +7,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-type PyLog<'py> = (
-    String,
-    PyReadonlyArray1<'py, f64>,
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray2<'py, f64>,
-);
+type PyLog<'py> =
+    (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>);
 
 /// The diagnosis of training and holdout logs, as JSON.
 #[pyfunction]
@@ -25,14 +21,8 @@ pub fn diagnose(
 ) -> PyResult<String> {
     let arm = description(arm)?;
     let n = arm.kind.joints();
-    let training = training
-        .iter()
-        .map(|log| view(log, n))
-        .collect::<PyResult<Vec<_>>>()?;
-    let holdout = holdout
-        .iter()
-        .map(|log| view(log, n))
-        .collect::<PyResult<Vec<_>>>()?;
+    let training = training.iter().map(|log| view(log, n)).collect::<PyResult<Vec<_>>>()?;
+    let holdout = holdout.iter().map(|log| view(log, n)).collect::<PyResult<Vec<_>>>()?;
     let mut chosen = Options::default();
     if let Some(value) = options.get_item("horizon")? {
         chosen.horizon = value.extract()?;

@@ -43,15 +43,7 @@ pub fn simulate<'py>(
         torque_limit: None,
         link_length,
     };
-    let work = Simulation {
-        t,
-        tau,
-        q0,
-        dq0,
-        effects: &effects,
-        tolerance,
-        smoothing,
-    };
+    let work = Simulation { t, tau, q0, dq0, effects: &effects, tolerance, smoothing };
     let trajectory = py
         .detach(|| arm.dispatch(work))
         .ok_or_else(|| PyValueError::new_err(format!("`theta` needs {} values", kind.parameters().len())))?

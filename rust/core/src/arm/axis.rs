@@ -16,22 +16,10 @@ pub struct Axis<T> {
 impl<T: Real> Arm<T, 1, 4> for Axis<T> {
     const KIND: &'static str = "axis";
     const PARAMETERS: &'static [Parameter] = &[
-        Parameter {
-            name: "theta1",
-            unit: "kg",
-        },
-        Parameter {
-            name: "theta2",
-            unit: "N",
-        },
-        Parameter {
-            name: "viscous1",
-            unit: "N s/m",
-        },
-        Parameter {
-            name: "coulomb1",
-            unit: "N",
-        },
+        Parameter { name: "theta1", unit: "kg" },
+        Parameter { name: "theta2", unit: "N" },
+        Parameter { name: "viscous1", unit: "N s/m" },
+        Parameter { name: "coulomb1", unit: "N" },
     ];
 
     fn inertia(&self, theta: &[T; 4], _q: &SVector<T, 1>) -> SMatrix<T, 1, 1> {
@@ -67,11 +55,7 @@ impl<T: Real> Arm<T, 1, 4> for Axis<T> {
     }
 
     fn payload(&self, theta: &[T; 4], mass: T, _distance: T) -> [T; 4] {
-        let weight = if theta[0] > T::zero() {
-            mass * theta[1] / theta[0]
-        } else {
-            T::zero()
-        };
+        let weight = if theta[0] > T::zero() { mass * theta[1] / theta[0] } else { T::zero() };
         [mass, weight, T::zero(), T::zero()]
     }
 }

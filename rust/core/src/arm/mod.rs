@@ -182,7 +182,6 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
 
     /// Potential energy above `q = 0`.
     fn potential_energy(&self, theta: &[T; P], q: &SVector<T, N>) -> T {
-        self.energy_regressor(q, &SVector::zeros())
-            .dot(&SVector::from(*theta))
+        self.energy_regressor(q, &SVector::zeros()).dot(&SVector::from(*theta))
     }
 }

@@ -16,22 +16,10 @@ pub struct Pendulum<T> {
 impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
     const KIND: &'static str = "pendulum";
     const PARAMETERS: &'static [Parameter] = &[
-        Parameter {
-            name: "theta1",
-            unit: "kg m^2",
-        },
-        Parameter {
-            name: "theta2",
-            unit: "N m",
-        },
-        Parameter {
-            name: "viscous1",
-            unit: "N m s/rad",
-        },
-        Parameter {
-            name: "coulomb1",
-            unit: "N m",
-        },
+        Parameter { name: "theta1", unit: "kg m^2" },
+        Parameter { name: "theta2", unit: "N m" },
+        Parameter { name: "viscous1", unit: "N m s/rad" },
+        Parameter { name: "coulomb1", unit: "N m" },
     ];
 
     fn inertia(&self, theta: &[T; 4], _q: &SVector<T, 1>) -> SMatrix<T, 1, 1> {

@@ -40,25 +40,13 @@ pub struct LinkParameters<T> {
 impl<T: Real> TwoLink<T> {
     /// The arm under `gravity`; without `length1` it follows from `theta2 = l1 m2 lc2` and `theta5 = g m2 lc2`.
     pub fn new(gravity: T, length1: Option<T>, theta: &[T; 9]) -> Self {
-        let derived = if theta[4] > T::zero() {
-            gravity * theta[1] / theta[4]
-        } else {
-            T::zero()
-        };
-        Self {
-            gravity,
-            length1: length1.unwrap_or(derived),
-        }
+        let derived = if theta[4] > T::zero() { gravity * theta[1] / theta[4] } else { T::zero() };
+        Self { gravity, length1: length1.unwrap_or(derived) }
     }
 
     /// Base inertial parameters `theta1 ... theta5` from physical ones, the formulas of section 5.
     pub fn inertial_from_links(links: &LinkParameters<T>, gravity: T) -> [T; 5] {
-        let LinkParameters {
-            mass: [m1, m2],
-            length: [l1, _],
-            com: [c1, c2],
-            inertia: [i1, i2],
-        } = *links;
+        let LinkParameters { mass: [m1, m2], length: [l1, _], com: [c1, c2], inertia: [i1, i2] } = *links;
         [
             m1 * c1 * c1 + m2 * l1 * l1 + m2 * c2 * c2 + i1 + i2,
             l1 * m2 * c2,
@@ -72,42 +60,15 @@ impl<T: Real> TwoLink<T> {
 impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
     const KIND: &'static str = "two-link";
     const PARAMETERS: &'static [Parameter] = &[
-        Parameter {
-            name: "theta1",
-            unit: "kg m^2",
-        },
-        Parameter {
-            name: "theta2",
-            unit: "kg m^2",
-        },
-        Parameter {
-            name: "theta3",
-            unit: "kg m^2",
-        },
-        Parameter {
-            name: "theta4",
-            unit: "N m",
-        },
-        Parameter {
-            name: "theta5",
-            unit: "N m",
-        },
-        Parameter {
-            name: "viscous1",
-            unit: "N m s/rad",
-        },
-        Parameter {
-            name: "viscous2",
-            unit: "N m s/rad",
-        },
-        Parameter {
-            name: "coulomb1",
-            unit: "N m",
-        },
-        Parameter {
-            name: "coulomb2",
-            unit: "N m",
-        },
+        Parameter { name: "theta1", unit: "kg m^2" },
+        Parameter { name: "theta2", unit: "kg m^2" },
+        Parameter { name: "theta3", unit: "kg m^2" },
+        Parameter { name: "theta4", unit: "N m" },
+        Parameter { name: "theta5", unit: "N m" },
+        Parameter { name: "viscous1", unit: "N m s/rad" },
+        Parameter { name: "viscous2", unit: "N m s/rad" },
+        Parameter { name: "coulomb1", unit: "N m" },
+        Parameter { name: "coulomb2", unit: "N m" },
     ];
 
     #[inline]

@@ -19,12 +19,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     parameters: &[EffectParameter::bounded("delay", Quantity::Time, 0.0, 1.0)],
     starts: &[[0.5, 0.0, 0.0], [3.0, 0.0, 0.0]],
-    hooks: Hooks {
-        force: false,
-        coulomb: false,
-        command: true,
-        measured: false,
-    },
+    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
 };
 
 impl<T: Real> Effect<T> for ActuatorDelay {
@@ -58,11 +53,7 @@ fn held_mean<T: Real>(t: &[T], torque: &[Pulse<T>], last: usize, from: T, to: T)
             upper = lower;
         }
         if i == 0 || begin <= from {
-            return if length > T::zero() {
-                sum / length
-            } else {
-                pulse.mean()
-            };
+            return if length > T::zero() { sum / length } else { pulse.mean() };
         }
         i -= 1;
     }

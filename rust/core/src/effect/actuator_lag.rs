@@ -17,19 +17,9 @@ static SPEC: Spec = Spec {
     source: "current-loop bandwidth; filtered actuator of common simulators",
     excited_by: "torque that changes within a few time constants",
     scope: Scope::Joint,
-    parameters: &[EffectParameter::bounded(
-        "time_constant",
-        Quantity::Time,
-        0.0,
-        2.0,
-    )],
+    parameters: &[EffectParameter::bounded("time_constant", Quantity::Time, 0.0, 2.0)],
     starts: &[[0.5, 0.0, 0.0], [4.0, 0.0, 0.0]],
-    hooks: Hooks {
-        force: false,
-        coulomb: false,
-        command: true,
-        measured: false,
-    },
+    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
 };
 
 impl<T: Real> Effect<T> for ActuatorLag {
@@ -44,17 +34,9 @@ impl<T: Real> Effect<T> for ActuatorLag {
             let h = super::interval(t, k);
             let u = pulse.mean();
             let ratio = if p[0] > T::zero() { h / p[0] } else { T::zero() };
-            let decay = if p[0] > T::zero() {
-                (-ratio).exp()
-            } else {
-                T::zero()
-            };
+            let decay = if p[0] > T::zero() { (-ratio).exp() } else { T::zero() };
             let end = u + (y - u) * decay;
-            let held = if ratio > T::zero() {
-                (T::one() - decay) / ratio
-            } else {
-                T::zero()
-            };
+            let held = if ratio > T::zero() { (T::one() - decay) / ratio } else { T::zero() };
             *pulse = Pulse::with_mean(y, u + (y - u) * held, end);
             y = end;
         }

@@ -16,12 +16,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Arm,
     parameters: &[EffectParameter::bounded("angle", Quantity::Angle, -1.6, 1.6)],
     starts: &[[0.02, 0.0, 0.0]],
-    hooks: Hooks {
-        force: false,
-        coulomb: false,
-        command: false,
-        measured: false,
-    },
+    hooks: Hooks { force: false, coulomb: false, command: false, measured: false },
 };
 
 impl<T: Real> Effect<T> for BaseTilt {

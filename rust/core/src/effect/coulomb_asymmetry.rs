@@ -19,12 +19,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     parameters: &[EffectParameter::signed("delta", Quantity::Torque)],
     starts: &[[0.05, 0.0, 0.0]],
-    hooks: Hooks {
-        force: false,
-        coulomb: true,
-        command: false,
-        measured: false,
-    },
+    hooks: Hooks { force: false, coulomb: true, command: false, measured: false },
 };
 
 impl<T: Real> Effect<T> for CoulombAsymmetry {

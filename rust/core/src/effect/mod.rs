@@ -39,10 +39,7 @@ pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
 
 /// The effect with this name.
 pub fn find<T: Real>(name: &str) -> Option<&'static dyn Effect<T>> {
-    catalogue::<T>()
-        .iter()
-        .copied()
-        .find(|effect| effect.spec().name == name)
+    catalogue::<T>().iter().copied().find(|effect| effect.spec().name == name)
 }
 
 /// Where an effect can sit.
@@ -127,24 +124,12 @@ pub struct EffectParameter {
 impl EffectParameter {
     /// A parameter that may take any value and vanishes at zero.
     pub const fn signed(name: &'static str, quantity: Quantity) -> Self {
-        Self {
-            name,
-            quantity,
-            lower: f64::NEG_INFINITY,
-            upper: f64::INFINITY,
-            neutral: 0.0,
-        }
+        Self { name, quantity, lower: f64::NEG_INFINITY, upper: f64::INFINITY, neutral: 0.0 }
     }
 
     /// A parameter between bounds that vanishes at zero.
     pub const fn bounded(name: &'static str, quantity: Quantity, lower: f64, upper: f64) -> Self {
-        Self {
-            name,
-            quantity,
-            lower,
-            upper,
-            neutral: 0.0,
-        }
+        Self { name, quantity, lower, upper, neutral: 0.0 }
     }
 }
 
@@ -259,21 +244,13 @@ impl<T: Real> Pulse<T> {
     /// A torque held constant over the interval.
     #[inline]
     pub fn held(tau: T) -> Self {
-        Self {
-            start: tau,
-            middle: tau,
-            end: tau,
-        }
+        Self { start: tau, middle: tau, end: tau }
     }
 
     /// A torque from `start` to `end` with the given mean.
     pub fn with_mean(start: T, mean: T, end: T) -> Self {
         let (four, six) = (crate::real::lit::<T>(4.0), crate::real::lit::<T>(6.0));
-        Self {
-            start,
-            middle: (six * mean - start - end) / four,
-            end,
-        }
+        Self { start, middle: (six * mean - start - end) / four, end }
     }
 
     /// Mean over the interval (Simpson's rule, exact here).
@@ -288,21 +265,13 @@ impl<T: Real> Pulse<T> {
     pub fn at(&self, s: T) -> T {
         let two = crate::real::lit::<T>(2.0);
         let one = T::one();
-        let (l0, l1, l2) = (
-            (two * s - one) * (s - one),
-            two * two * s * (one - s),
-            s * (two * s - one),
-        );
+        let (l0, l1, l2) = ((two * s - one) * (s - one), two * two * s * (one - s), s * (two * s - one));
         l0 * self.start + l1 * self.middle + l2 * self.end
     }
 
     /// The same law applied to each of the three values.
     pub fn map(self, f: impl Fn(T) -> T) -> Self {
-        Self {
-            start: f(self.start),
-            middle: f(self.middle),
-            end: f(self.end),
-        }
+        Self { start: f(self.start), middle: f(self.middle), end: f(self.end) }
     }
 }
 

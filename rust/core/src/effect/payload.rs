@@ -22,12 +22,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("distance", Quantity::Length, 0.0, f64::INFINITY),
     ],
     starts: &[[0.05, 0.5, 0.0], [0.05, 1.0, 0.0]],
-    hooks: Hooks {
-        force: false,
-        coulomb: false,
-        command: false,
-        measured: false,
-    },
+    hooks: Hooks { force: false, coulomb: false, command: false, measured: false },
 };
 
 impl<T: Real> Effect<T> for Payload {

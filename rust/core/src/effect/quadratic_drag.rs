@@ -16,12 +16,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     parameters: &[EffectParameter::signed("c", Quantity::Drag)],
     starts: &[[0.05, 0.0, 0.0]],
-    hooks: Hooks {
-        force: true,
-        coulomb: false,
-        command: false,
-        measured: false,
-    },
+    hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
 };
 
 impl<T: Real> Effect<T> for QuadraticDrag {

@@ -17,19 +17,9 @@ static SPEC: Spec = Spec {
     source: "Featherstone 2008, section 9.6; `armature` of common simulators",
     excited_by: "acceleration of the joint",
     scope: Scope::Joint,
-    parameters: &[EffectParameter::bounded(
-        "inertia",
-        Quantity::Inertia,
-        0.0,
-        f64::INFINITY,
-    )],
+    parameters: &[EffectParameter::bounded("inertia", Quantity::Inertia, 0.0, f64::INFINITY)],
     starts: &[[0.05, 0.0, 0.0]],
-    hooks: Hooks {
-        force: false,
-        coulomb: false,
-        command: false,
-        measured: false,
-    },
+    hooks: Hooks { force: false, coulomb: false, command: false, measured: false },
 };
 
 impl<T: Real> Effect<T> for RotorInertia {

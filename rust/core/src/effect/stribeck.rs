@@ -20,18 +20,8 @@ static SPEC: Spec = Spec {
         EffectParameter::signed("amplitude", Quantity::Torque),
         EffectParameter::bounded("velocity", Quantity::Speed, 1e-3, f64::INFINITY),
     ],
-    starts: &[
-        [0.05, 0.03, 0.0],
-        [0.05, 0.1, 0.0],
-        [0.05, 0.3, 0.0],
-        [0.05, 0.8, 0.0],
-    ],
-    hooks: Hooks {
-        force: false,
-        coulomb: true,
-        command: false,
-        measured: false,
-    },
+    starts: &[[0.05, 0.03, 0.0], [0.05, 0.1, 0.0], [0.05, 0.3, 0.0], [0.05, 0.8, 0.0]],
+    hooks: Hooks { force: false, coulomb: true, command: false, measured: false },
 };
 
 impl<T: Real> Effect<T> for Stribeck {

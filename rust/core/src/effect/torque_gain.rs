@@ -22,12 +22,7 @@ static SPEC: Spec = Spec {
         neutral: 1.0,
     }],
     starts: &[[1.05, 0.0, 0.0]],
-    hooks: Hooks {
-        force: false,
-        coulomb: false,
-        command: true,
-        measured: false,
-    },
+    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
 };
 
 impl<T: Real> Effect<T> for TorqueGain {
