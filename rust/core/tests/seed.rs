@@ -19,7 +19,7 @@ fn theta() -> [f64; 9] {
         inertia: [1.266, 0.093],
     };
     let [a, b, c, d, e] = TwoLink::inertial_from_links(&links, 9.81);
-    [a, b, c, d, e, 2.288, 0.175, (7.17 + 8.049) / 2.0, 1.734]
+    [a, b, c, d, e, 2.288, 0.175, f64::midpoint(7.17, 8.049), 1.734]
 }
 
 fn torque(t: f64) -> [f64; 2] {

@@ -256,7 +256,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 weights = self.weights(&best.fit.hypothesis, scale);
             }
             let last = shrunk <= SHRUNK || round == MAX_REWEIGHTINGS;
-            let starts = finalists(contenders, hopeless);
+            let starts = finalists(&contenders, hopeless);
             contenders =
                 self.contend(&weights, current, starts, if last { Effort::FULL } else { Effort::ROUGH });
             if last {
@@ -291,7 +291,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 }
 
 /// Hypotheses to be fitted to the end: the best by cost, of those that are not hopeless, and the best by closeness to trusted values.
-fn finalists<const P: usize>(contenders: Vec<Contender<P>>, hopeless: f64) -> Vec<Hypothesis<P>> {
+fn finalists<const P: usize>(contenders: &[Contender<P>], hopeless: f64) -> Vec<Hypothesis<P>> {
     let mut by_trust: Vec<usize> = (0..contenders.len()).collect();
     let prior = |i: &usize| contenders[*i].fit.prior_cost;
     by_trust.sort_by(|a, b| prior(a).total_cmp(&prior(b)));

@@ -271,12 +271,13 @@ fn free_run_rms<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     model: &Hypothesis<P>,
 ) -> Vec<f64> {
     let data = whole(&study.holdout.data);
-    let predicted = limited(&data, data.predict(&study.arm, model, &vec![Shift::none(); data.windows.len()]));
+    let predicted =
+        limited(&data, &data.predict(&study.arm, model, &vec![Shift::none(); data.windows.len()]));
     rms::<N>(&data.measured(), &predicted)
 }
 
 /// Predictions kept within reach of the measurement, so that a diverged run stays a number.
-fn limited<const N: usize>(data: &Dataset<N>, predicted: Vec<f64>) -> Vec<f64> {
+fn limited<const N: usize>(data: &Dataset<N>, predicted: &[f64]) -> Vec<f64> {
     let measured = data.measured();
     predicted.iter().zip(&measured).map(|(p, m)| m + (p - m).clamp(-FREE_RUN_LIMIT, FREE_RUN_LIMIT)).collect()
 }
@@ -287,7 +288,7 @@ fn free_run_series<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 ) -> Vec<FreeRunSeries> {
     let data = whole(&study.holdout.data);
     let starts = vec![Shift::none(); data.windows.len()];
-    let run = |h: &Hypothesis<P>| limited(&data, data.predict(&study.arm, h, &starts));
+    let run = |h: &Hypothesis<P>| limited(&data, &data.predict(&study.arm, h, &starts));
     let (before, after, measured) = (run(&compared.before), run(&compared.after), data.measured());
     let mut all = Vec::new();
     for window in data.windows.iter().take(DRAWN_LOGS) {
@@ -403,7 +404,8 @@ fn status<A, const N: usize, const P: usize>(
     let typical = study.scales.size(parameter.quantity, test.effect.joint);
     let sigma = test.sigma.max(test.information_sigma);
     let (effect, joint) = (spec.name, test.effect.joint_number());
-    if !(sigma < PINNED * typical) {
+    let pinned = sigma < PINNED * typical;
+    if !pinned {
         let why = format!("these logs do not pin it down; it needs {}", spec.excited_by);
         return RuledOut { effect, joint, status: "not excited", bound: None, why: Some(why) };
     }

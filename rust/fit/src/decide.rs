@@ -147,8 +147,7 @@ enum Ground {
 /// Index of the contender to adopt, and why, if any deserves it; smoother friction is adopted once.
 fn choose<const N: usize, const P: usize>(stage: &Stage<N, P>, smoothed: bool) -> Option<(usize, Ground)> {
     let open = |c: &Contender<P>| c.effect.is_some() || !smoothed;
-    let by_motion =
-        stage.contenders.iter().position(|c| open(c)).filter(|i| moves(stage, &stage.contenders[*i]));
+    let by_motion = stage.contenders.iter().position(open).filter(|i| moves(stage, &stage.contenders[*i]));
     if let Some(index) = by_motion {
         return Some((index, Ground::Motion));
     }

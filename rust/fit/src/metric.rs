@@ -193,9 +193,9 @@ pub fn start_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: usize>(
                 .map(|shift| {
                     let mut moved = *shift;
                     if i < N {
-                        moved.q[i] += START_STEP
+                        moved.q[i] += START_STEP;
                     } else {
-                        moved.dq[i - N] += START_STEP
+                        moved.dq[i - N] += START_STEP;
                     }
                     moved
                 })
