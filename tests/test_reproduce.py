@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from armgap.identification import SCHEMES
-from armgap.reproduction import LADDER, PAPER_ESTIMATES, PAPER_MEASURED, Reproduction, render, reproduce, seed_arm
+from armgap.reproduction import LADDER, PAPER_ESTIMATES, PAPER_MEASURED, Reproduction, reproduce, seed_arm
+from armgap.reproduction.page import render
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -80,10 +81,18 @@ def test_the_decomposition_adds_up(result: Reproduction) -> None:
 
 
 def test_integrals_drift_under_slow_torque_noise_where_filters_hold(result: Reproduction) -> None:
-    moved = {s: np.mean([result.movement(r)[4:] for r in result.drifting[s]]) for s in SCHEMES}
-    error = {s: np.mean([np.abs(r.theta[4:] / result.arm.theta[4:] - 1) for r in result.drifting[s]]) for s in SCHEMES}
-    assert moved["supplied-energy"] > 1.3 * moved["filtered-power"]
-    assert error["supplied-energy"] > 2.0 * error["filtered-power"]
+    energy, power = (result.movement(result.wandering[s])[4:] for s in ("supplied-energy", "filtered-power"))
+    assert (energy / power).min() > 1.5
+    assert energy.min() > 0.3
+
+
+def test_open_loop_responses_of_estimates_stay_near_the_run(result: Reproduction) -> None:
+    # The paper's Figures 4 and 7 follow their runs in shape; Table I itself, but for the asymmetry, comes closest.
+    assert set(result.responses) == {"Table I", "filtered-dynamic", "filtered-power"}
+    swing = np.ptp(result.log.q, axis=0)
+    for label in result.responses:
+        assert (result.misfit(label) < 0.2 * swing).all(), label
+    assert result.misfit("Table I").sum() < result.misfit("filtered-power").sum()
 
 
 def test_the_report_is_one_offline_page_with_every_figure(result: Reproduction) -> None:
