@@ -9,7 +9,12 @@ use crate::filter::Cutoff;
 use crate::real::{Real, lit};
 use crate::regression::{FilteredDynamic, FilteredPower, Passage, Scheme, Snapshot, SuppliedEnergy, Variant};
 use crate::rls::{Rls, Update};
-use nalgebra::{ComplexField, SVector};
+use nalgebra::SVector;
+
+/// Positions, velocities, torques and intervals beyond this belong to no arm, and their squares would stay in filters and integrals for good.
+const LARGEST: f64 = 1e9;
+/// The same for times; seconds since any epoch stay below.
+const LATEST: f64 = 1e11;
 
 /// Settings of an estimator of `R` parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +53,7 @@ pub enum Outcome<T, const N: usize> {
     Starting,
     /// The estimate was updated; the prediction error, its first entry only for scalar schemes.
     Updated(SVector<T, N>),
-    /// The sample is not finite or its time does not advance; nothing but the count has changed.
+    /// The sample is not finite, of impossible size, or not later than the last; nothing but the count has changed.
     Rejected,
 }
 
@@ -112,10 +117,16 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         outcome
     }
 
+    /// Whether a sample can be used: finite, of possible size, later than the last and reachable from it.
     fn acceptable(&self, sample: &Sample<T, N>) -> bool {
         let numbers = sample.q.iter().chain(sample.tau.iter()).chain(sample.dq.iter().flatten());
-        let finite = sample.t.is_finite() && numbers.into_iter().all(ComplexField::is_finite);
-        finite && self.last.is_none_or(|last| sample.t > last.t)
+        let limit: T = lit(LARGEST);
+        let possible = sample.t.abs() <= lit(LATEST) && numbers.into_iter().all(|x| x.abs() <= limit);
+        possible
+            && self.last.is_none_or(|last| {
+                let h = sample.t - last.t;
+                h > T::zero() && h <= limit && (sample.q - last.q).amax() <= limit * h
+            })
     }
 
     fn start(&mut self, now: &Snapshot<T, N>, tau: &SVector<T, N>) {
