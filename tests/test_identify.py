@@ -226,6 +226,25 @@ def test_result_as_json(arm: Arm, real: Log) -> None:
     assert np.isfinite(found.sigma).all()
 
 
+@pytest.mark.parametrize("scheme", ["filtered-dynamic", "filtered-power"])
+def test_estimates_that_noise_biases_are_told(arm: Arm, real: Log, scheme: str) -> None:
+    good = identify(real, arm, scheme=scheme, asymmetry=True)
+    assert good.notes == ()
+    # Velocity noise of 0.1 rad/s, as the real arm's: inertias come out low by many times their sigma.
+    noise = np.random.default_rng(4).normal(0.0, 3.5e-4, real.q.shape)
+    noisy = identify(dataclasses.replace(real, q=real.q + noise), arm, scheme=scheme, asymmetry=True)
+    assert (noisy.theta[0] - arm.theta[0]) / noisy.sigma[0] < -5
+    assert "theta1" in noisy.notes[0]
+    assert json.loads(noisy.to_json())["notes"] == list(noisy.notes)
+
+
+def test_the_papers_filters_are_told_by_their_dependence_on_the_cutoff(arm: Arm, ideal: Log) -> None:
+    found = identify(ideal, arm, scheme="filtered-dynamic", filters="paper", velocity="sensor")
+    assert found.notes[0].startswith("theta1, theta2, theta3 depend on the cut-off")
+    energy = identify(ideal, arm, scheme="supplied-energy")
+    assert (energy.cutoff_drift, energy.notes) == (None, ())
+
+
 @pytest.mark.parametrize(
     "option",
     [

@@ -32,8 +32,8 @@ SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
 @click.option("--cutoff", default=50.0, show_default=True, help="Filter cut-off [rad/s].")
 @click.option(
     "--velocity",
-    type=click.Choice(["backward", "central", "local-cubic", "sensor"]),
-    help="Velocity estimate; backward for the paper's filters, central for the exact ones.",
+    type=click.Choice(["backward", "central", "local-cubic", "sensor", "midpoint"]),
+    help="Velocity estimate; backward for the paper's filters, central for the exact ones. midpoint: as online.",
 )
 @click.option("--asymmetry", is_flag=True, help="Estimate a torque offset per joint (asymmetric Coulomb friction) too.")
 @json_option
@@ -89,3 +89,6 @@ def command(
             cells = [f"{r.theta[i]:.4g} ± {r.sigma[i]:.2g}" for r in mine]
             table.add_row(name, nominal, *cells, mine[0].parameter_units[i])
         console().print(table)
+        for r in mine:
+            for note in r.notes:
+                console().print(f"[bold]{r.scheme}:[/bold] {note}.")
