@@ -1,7 +1,7 @@
 //! The integrator against what mechanics demands of it.
 
 use armgap_core::arm::{Arm, TwoLink};
-use armgap_core::effect::{Active, Pulse, find};
+use armgap_core::effect::{Active, Pulse, Trial, find};
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
 use nalgebra::{SVector, Vector2};
@@ -131,7 +131,10 @@ fn effects_leave_the_rigid_arm_at_their_neutral_value() {
     for law in armgap_core::effect::catalogue::<f64>() {
         let spec = law.spec();
         let mut p = [1.0; 3];
-        p[0] = spec.parameters[0].neutral;
+        let amplitudes = if let Trial::Amplitudes(count) = spec.trial { count } else { 1 };
+        for i in 0..amplitudes {
+            p[i] = spec.parameters[i].neutral;
+        }
         let plant = seed(THETA).with_effect(Active { law: *law, joint: 1, p }).expect("room for one effect");
         let end = run(&plant, at_rest(), 1.0, H, 1, seed_torque);
         assert!((end.q - reference.q).amax() < 1e-12, "{}", spec.name);

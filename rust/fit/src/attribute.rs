@@ -1,14 +1,16 @@
 //! Which effect: screening, full fits of what passes, and the holdout's decision, one cause after another.
 
+use crate::decide::CONSEQUENCE;
 use crate::model::{Hypothesis, Placed};
 use crate::screen::{Scored, candidates, screen};
 use crate::solve::{Effort, Fit};
 use crate::study::{Study, Weights};
 use armgap_core::arm::Arm;
+use armgap_core::effect::NEVER;
 use rayon::prelude::*;
 
 /// Candidates that get a full fit in each stage.
-const FULL_FITS: usize = 12;
+const FULL_FITS: usize = 18;
 
 /// Candidates that are fitted again under the weights of the best.
 const FINALISTS: usize = 4;
@@ -24,6 +26,9 @@ const ABSORBED: f64 = 0.03;
 
 /// A candidate that to first order removes less than this part of the cost is not fitted.
 const TRACE: f64 = 0.01;
+
+/// The same where the gap is of no consequence and only an effect that explains most of it would be named.
+const TRACE_IN_SMALL: f64 = 0.1;
 
 /// Smoother friction is fitted only if it does not raise the cost by more than this factor as it stands.
 const WORTH_SMOOTHING: f64 = 2.0;
@@ -133,10 +138,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let all = self.open_candidates(&fit.hypothesis);
         let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
         let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
-        let mut starts: Vec<Hypothesis<P>> = promising(&screened, TRACE * training)
-            .into_iter()
-            .map(|effect| self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| fit.hypothesis.with(effect)))
-            .collect();
+        let mut starts: Vec<Hypothesis<P>> =
+            promising(&screened, self.least_trace(&weights, &fit) * training)
+                .into_iter()
+                .map(|effect| {
+                    self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| fit.hypothesis.with(effect))
+                })
+                .collect();
         starts.extend(self.smoother(&fit.hypothesis, &weights, training));
         let first = self.contend(&weights, &fit.hypothesis, starts, Effort::ROUGH);
         let field = self.field(&weights, &fit, &first);
@@ -193,7 +201,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// Deviation of an effect's first parameter from neutral, relative to the largest possible.
     fn relative_size(&self, effect: &Placed) -> f64 {
         let parameter = &effect.law.spec().parameters[0];
-        (effect.p[0] - parameter.neutral).abs() / self.scales.largest(parameter.quantity, effect.joint)
+        let centre = if parameter.neutral < NEVER { parameter.neutral } else { 0.0 };
+        (effect.p[0] - centre).abs() / self.scales.largest(parameter.quantity, effect.joint)
+    }
+
+    /// Least part of the cost that a candidate must promise to remove.
+    fn least_trace(&self, weights: &Weights<N>, fit: &Fit<P>) -> f64 {
+        let cost: f64 = self.judge(&weights.holdout).window_costs(&fit.hypothesis).iter().sum();
+        let small = (cost / self.motion(weights)).sqrt() < CONSEQUENCE;
+        if small { TRACE_IN_SMALL } else { TRACE }
     }
 
     /// All fitted candidates with the share of the gap each removes.

@@ -16,6 +16,7 @@ use crate::solve::Fit;
 use crate::study::{Sample, Study};
 use crate::window::{Dataset, Shift, Window};
 use armgap_core::arm::Arm;
+use armgap_core::effect::Trial;
 
 /// Points of a drawn curve at most.
 const DRAWN: usize = 2500;
@@ -404,6 +405,9 @@ fn status<A, const N: usize, const P: usize>(
     let typical = study.scales.size(parameter.quantity, test.effect.joint);
     let sigma = test.sigma.max(test.information_sigma);
     let (effect, joint) = (spec.name, test.effect.joint_number());
+    if spec.trial == Trial::Whole {
+        return threshold_status(test);
+    }
     let pinned = sigma < PINNED * typical;
     if !pinned {
         let why = format!("these logs do not pin it down; it needs {}", spec.excited_by);
@@ -422,6 +426,20 @@ fn status<A, const N: usize, const P: usize>(
             "it leaves a trace in the training logs, but does not reduce the gap on the holdout".to_owned()
         }),
     }
+}
+
+/// Status of an effect that begins beyond a threshold: excited if any trial threshold was passed.
+fn threshold_status(test: &Scored) -> RuledOut {
+    let spec = test.effect.law.spec();
+    let (effect, joint) = (spec.name, test.effect.joint_number());
+    let reached = test.distinct > 0.0 && test.information_sigma < 0.5;
+    let why = if reached {
+        "at trial values it would leave a trace that these logs do not show".to_owned()
+    } else {
+        format!("these logs never reach it; it needs {}", spec.excited_by)
+    };
+    let status = if reached { "absent" } else { "not excited" };
+    RuledOut { effect, joint, status, bound: None, why: Some(why) }
 }
 
 fn ranking<A: Arm<f64, N, P>, const N: usize, const P: usize>(

@@ -45,6 +45,9 @@ const AT_BOUND: f64 = 0.98;
 /// Resamples of the windows.
 const RESAMPLES: usize = 400;
 
+/// A contender with fewer parameters is preferred if it reaches this part of the best one's advantage.
+const ALMOST: f64 = 0.95;
+
 /// A contender whose cost is within this part of the winner's advantage is a look-alike.
 const LOOK_ALIKE: f64 = 0.03;
 
@@ -148,14 +151,27 @@ enum Ground {
 fn choose<const N: usize, const P: usize>(stage: &Stage<N, P>, smoothed: bool) -> Option<(usize, Ground)> {
     let open = |c: &Contender<P>| c.effect.is_some() || !smoothed;
     let by_motion = stage.contenders.iter().position(open).filter(|i| moves(stage, &stage.contenders[*i]));
-    if let Some(index) = by_motion {
-        return Some((index, Ground::Motion));
+    if let Some(best) = by_motion {
+        return Some((simplest(stage, best), Ground::Motion));
     }
     let trust = |i: &usize| stage.contenders[*i].fit.prior_cost;
     (0..stage.contenders.len())
         .filter(|i| restores(stage, &stage.contenders[*i]))
         .min_by(|a, b| trust(a).total_cmp(&trust(b)))
         .map(|index| (index, Ground::Trust))
+}
+
+/// The contender with the fewest parameters among those that do almost as well as the best: a spring with a far-off rest position is
+/// an offset.
+fn simplest<const N: usize, const P: usize>(stage: &Stage<N, P>, best: usize) -> usize {
+    let advantage = |i: usize| stage.base.score() - stage.contenders[i].score();
+    let size = |i: usize| stage.contenders[i].effect.as_ref().map_or(0, Placed::len);
+    let enough = ALMOST * advantage(best);
+    let as_good = |i: &usize| advantage(*i) > enough && moves(stage, &stage.contenders[*i]) && size(*i) > 0;
+    if size(best) == 0 {
+        return best;
+    }
+    (0..stage.contenders.len()).filter(as_good).min_by_key(|i| (size(*i), *i)).unwrap_or(best)
 }
 
 /// Whether a contender closes a part of the gap that matters, on the holdout too.

@@ -134,6 +134,12 @@ impl<const P: usize> Hypothesis<P> {
         q
     }
 
+    /// How much faster joint `j`'s encoder moves than the joint itself at `q`, by central difference.
+    pub fn stretch(&self, j: usize, q: f64) -> f64 {
+        let step = 1e-5;
+        (self.measured(j, q + step) - self.measured(j, q - step)) / (2.0 * step)
+    }
+
     /// Whether any effect changes what the encoders show.
     pub fn distorts(&self) -> bool {
         self.effects.iter().any(|e| e.law.spec().hooks.measured)

@@ -64,7 +64,7 @@ impl<const N: usize> Scales<N> {
             Quantity::Stiffness => self.torque[j] / self.position[j],
             Quantity::Speed => self.speed[j],
             Quantity::Position => self.position[j],
-            Quantity::Angle | Quantity::Count | Quantity::Ratio => 1.0,
+            Quantity::Angle | Quantity::Count | Quantity::Ratio | Quantity::Duration => 1.0,
             Quantity::Time => self.period,
             Quantity::Mass => self.torque[N - 1] / (self.gravity * self.length),
             Quantity::Length => self.length,

@@ -7,7 +7,7 @@ use crate::model::{Hypothesis, Placed};
 use crate::scale::Scales;
 use crate::solve::{Problem, neutral, scaled_inverse};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Quantity, Scope, catalogue};
+use armgap_core::effect::{Quantity, Scope, Trial, catalogue};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -90,29 +90,50 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     candidates.iter().enumerate().map(score).collect()
 }
 
-/// Sensitivity of the whitened prediction to the candidate's first parameter at its neutral value.
+/// What the test moves: the first amplitude whose trial value is not neutral.
+fn tested(candidate: &Placed) -> usize {
+    let off = neutral(candidate);
+    (0..candidate.len()).find(|&i| candidate.p[i] != off.p[i]).unwrap_or(0)
+}
+
+/// Sensitivity of the whitened prediction to the tested parameter at neutral, or the whole difference that the effect makes.
 fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &Problem<A, N, P>,
     base: &Hypothesis<P>,
     residual: &[f64],
     candidate: &Placed,
 ) -> Vec<f64> {
-    let mut moved = neutral(candidate);
-    let step = TRIAL * (candidate.p[0] - moved.p[0]);
-    moved.p[0] += step;
+    let i = tested(candidate);
+    let (moved, step) = match candidate.law.spec().trial {
+        Trial::Amplitudes(_) => {
+            let mut moved = neutral(candidate);
+            let step = TRIAL * (candidate.p[i] - moved.p[i]);
+            moved.p[i] += step;
+            (moved, step)
+        }
+        Trial::Whole => (*candidate, 1.0),
+    };
     let there = problem.residual(&base.with(moved));
     residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect()
 }
 
 /// The test of one candidate; a parameter that would have to cross its bound has nothing to gain.
 fn scored(effect: &Placed, raw: f64, information: f64, slope: f64, scatter: f64) -> Scored {
-    let parameter = &effect.law.spec().parameters[0];
     let estimate = slope / information;
-    let start = (effect.p[0] - parameter.neutral).abs();
-    let admissible =
-        (parameter.neutral + estimate).clamp(parameter.lower, parameter.upper) - parameter.neutral;
     let mut suggested = *effect;
-    suggested.p[0] = parameter.neutral + admissible.clamp(-20.0 * start, 20.0 * start);
+    let admissible = match effect.law.spec().trial {
+        Trial::Amplitudes(_) => {
+            let i = tested(effect);
+            let parameter = &effect.law.spec().parameters[i];
+            let start = (effect.p[i] - parameter.neutral).abs();
+            let most =
+                (parameter.neutral + estimate).clamp(parameter.lower, parameter.upper) - parameter.neutral;
+            suggested.p[i] = parameter.neutral + most.clamp(-20.0 * start, 20.0 * start);
+            most
+        }
+        // A share of the whole difference, from none to all of it.
+        Trial::Whole => estimate.clamp(0.0, 1.0),
+    };
     let gain = if raw > 0.0 { (2.0 * slope - information * admissible) * admissible } else { 0.0 };
     Scored {
         effect: suggested,

@@ -8,6 +8,7 @@ use crate::model::{Hypothesis, Placed};
 use crate::scale::Scales;
 use crate::window::Dataset;
 use armgap_core::arm::Arm;
+use armgap_core::effect::{NEVER, Trial};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -149,8 +150,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
         for effect in &hypothesis.effects {
             for parameter in effect.law.spec().parameters {
                 let reach = self.scales.largest(parameter.quantity, effect.joint);
-                lower.push(parameter.lower.max(parameter.neutral - reach));
-                upper.push(parameter.upper.min(parameter.neutral + reach));
+                let centre = if parameter.neutral < NEVER { parameter.neutral } else { 0.0 };
+                lower.push(parameter.lower.max(centre - reach));
+                upper.push(parameter.upper.min(centre + reach));
             }
         }
         (lower, upper)
@@ -284,9 +286,16 @@ pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(k, k, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
-/// The effect at its neutral value, other parameters as they are.
+/// The effect switched off: its amplitudes at neutral, its shape as it is.
 pub fn neutral(effect: &Placed) -> Placed {
     let mut off = *effect;
-    off.p[0] = effect.law.spec().parameters[0].neutral;
+    let spec = effect.law.spec();
+    let amplitudes = match spec.trial {
+        Trial::Amplitudes(count) => count,
+        Trial::Whole => 1,
+    };
+    for (value, parameter) in off.p.iter_mut().zip(spec.parameters).take(amplitudes) {
+        *value = parameter.neutral;
+    }
     off
 }

@@ -102,13 +102,13 @@ impl<const N: usize> Dataset<N> {
         for (window, shift) in self.windows.iter().zip(starts) {
             let track = &self.tracks[window.track];
             let torque = commands[window.track].as_deref().unwrap_or(&track.held);
-            let q = window.start.q + shift.q;
-            let q = SVector::from_fn(
-                |j, _| {
-                    if hypothesis.distorts() { hypothesis.actual(j, q[j]) } else { q[j] }
-                },
-            );
-            let mut state = State::new(q, window.start.dq + shift.dq);
+            let (q, dq) = (window.start.q + shift.q, window.start.dq + shift.dq);
+            let mut state = if hypothesis.distorts() {
+                let q = SVector::from_fn(|j, _| hypothesis.actual(j, q[j]));
+                State::new(q, SVector::from_fn(|j, _| dq[j] / hypothesis.stretch(j, q[j])))
+            } else {
+                State::new(q, dq)
+            };
             let out = &mut predicted[window.range()];
             for (k, row) in (window.first..window.last).zip(out.chunks_exact_mut(N)) {
                 let h = interval(&track.t, k);

@@ -3,7 +3,7 @@
 //! A delay that is no whole number of samples puts a step of the held command inside an interval; the interval then
 //! carries its exact mean. Before the log begins, the first command is taken to have been held.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Transport delay of the command.
@@ -19,6 +19,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     parameters: &[EffectParameter::bounded("delay", Quantity::Time, 0.0, 1.0)],
     starts: &[[0.5, 0.0, 0.0], [3.0, 0.0, 0.0]],
+    trial: Trial::Amplitudes(1),
     hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
 };
 

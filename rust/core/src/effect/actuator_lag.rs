@@ -3,7 +3,7 @@
 //! With the command held over an interval of length `h`, the torque goes exponentially from its old value to the
 //! command. Start, end and mean of that are exact for every time constant down to zero.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// First-order actuator.
@@ -19,6 +19,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     parameters: &[EffectParameter::bounded("time_constant", Quantity::Time, 0.0, 2.0)],
     starts: &[[0.5, 0.0, 0.0], [4.0, 0.0, 0.0]],
+    trial: Trial::Amplitudes(1),
     hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
 };
 

@@ -1,6 +1,6 @@
 //! The base stands at an angle: gravity is turned by `angle` in the plane of motion, for all joints alike.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Base turned against gravity.
@@ -16,6 +16,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Arm,
     parameters: &[EffectParameter::bounded("angle", Quantity::Angle, -1.6, 1.6)],
     starts: &[[0.02, 0.0, 0.0]],
+    trial: Trial::Amplitudes(1),
     hooks: Hooks { force: false, coulomb: false, command: false, measured: false },
 };
 

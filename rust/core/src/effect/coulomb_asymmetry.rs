@@ -3,7 +3,7 @@
 //! While the joint moves this is the same function of time as a constant torque `-delta`; only at rest, where friction
 //! holds and a torque does not, do the two differ.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Coulomb friction that differs by direction.
@@ -19,6 +19,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     parameters: &[EffectParameter::signed("delta", Quantity::Torque)],
     starts: &[[0.05, 0.0, 0.0]],
+    trial: Trial::Amplitudes(1),
     hooks: Hooks { force: false, coulomb: true, command: false, measured: false },
 };
 

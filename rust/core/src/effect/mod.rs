@@ -8,13 +8,23 @@
 mod actuator_delay;
 mod actuator_lag;
 mod base_tilt;
+mod contact;
 mod coulomb_asymmetry;
+mod encoder_eccentricity;
+mod encoder_offset;
+mod friction_warmup;
+mod joint_spring;
+mod load_dependent_friction;
 mod payload;
+mod position_dependent_friction;
 mod quadratic_drag;
 mod rotor_inertia;
 mod stribeck;
+mod torque_dead_zone;
 mod torque_gain;
 mod torque_offset;
+mod torque_ripple;
+mod torque_saturation;
 
 use crate::real::Real;
 
@@ -28,12 +38,22 @@ pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
         &torque_offset::TorqueOffset,
         &stribeck::Stribeck,
         &quadratic_drag::QuadraticDrag,
+        &load_dependent_friction::LoadDependentFriction,
+        &position_dependent_friction::PositionDependentFriction,
+        &friction_warmup::FrictionWarmup,
         &torque_gain::TorqueGain,
         &actuator_lag::ActuatorLag,
         &actuator_delay::ActuatorDelay,
+        &torque_saturation::TorqueSaturation,
+        &torque_ripple::TorqueRipple,
+        &torque_dead_zone::TorqueDeadZone,
         &payload::Payload,
         &base_tilt::BaseTilt,
+        &joint_spring::JointSpring,
         &rotor_inertia::RotorInertia,
+        &encoder_offset::EncoderOffset,
+        &encoder_eccentricity::EncoderEccentricity,
+        &contact::Contact,
     ]
 }
 
@@ -80,6 +100,8 @@ pub enum Quantity {
     Mass,
     /// Length.
     Length,
+    /// Time, on the scale of seconds.
+    Duration,
 }
 
 impl Quantity {
@@ -101,7 +123,7 @@ impl Quantity {
             (Self::Position, true) | (Self::Angle, _) => "rad",
             (Self::Position, false) | (Self::Length, _) => "m",
             (Self::Count | Self::Ratio, _) => "1",
-            (Self::Time, _) => "s",
+            (Self::Time | Self::Duration, _) => "s",
         }
     }
 }
@@ -122,6 +144,16 @@ pub struct EffectParameter {
 }
 
 impl EffectParameter {
+    /// A parameter that is neutral at [`NEVER`].
+    pub const fn threshold(name: &'static str, quantity: Quantity, lower: f64) -> Self {
+        Self { name, quantity, lower, upper: f64::INFINITY, neutral: NEVER }
+    }
+
+    /// A shape: it may take any value and switches nothing off.
+    pub const fn shape(name: &'static str, quantity: Quantity, lower: f64, upper: f64) -> Self {
+        Self { name, quantity, lower, upper, neutral: 0.0 }
+    }
+
     /// A parameter that may take any value and vanishes at zero.
     pub const fn signed(name: &'static str, quantity: Quantity) -> Self {
         Self { name, quantity, lower: f64::NEG_INFINITY, upper: f64::INFINITY, neutral: 0.0 }
@@ -166,9 +198,23 @@ pub struct Spec {
     pub parameters: &'static [EffectParameter],
     /// Trial values, in units of the log's own scale of each quantity (see the fit's `scale`).
     pub starts: &'static [[f64; MAX_PARAMETERS]],
+    /// How it is tested before it is fitted.
+    pub trial: Trial,
     /// Hooks in use.
     pub hooks: Hooks,
 }
+
+/// How an effect is tested to first order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trial {
+    /// By the derivative at neutral; so many of its first parameters are amplitudes that all vanish there.
+    Amplitudes(usize),
+    /// By the whole difference it makes at a trial value: a threshold has no derivative where it is never reached.
+    Whole,
+}
+
+/// A threshold so far away that it is never reached: the neutral value of effects that begin beyond one.
+pub const NEVER: f64 = 1e9;
 
 /// A joint at one instant, as a torque law sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]

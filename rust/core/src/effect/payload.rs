@@ -3,7 +3,7 @@
 //! It moves the inertial base parameters along a known curve, so re-estimated parameters absorb it without a trace: it
 //! can be told only against values of the arm file that are trusted.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Unknown load.
@@ -22,6 +22,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("distance", Quantity::Length, 0.0, f64::INFINITY),
     ],
     starts: &[[0.05, 0.5, 0.0], [0.05, 1.0, 0.0]],
+    trial: Trial::Amplitudes(1),
     hooks: Hooks { force: false, coulomb: false, command: false, measured: false },
 };
 

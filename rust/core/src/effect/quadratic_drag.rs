@@ -1,6 +1,6 @@
 //! Drag that grows with the square of speed: `-c dq |dq|` (air, churning lubricant, a fan-like load).
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Drag quadratic in speed.
@@ -16,6 +16,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     parameters: &[EffectParameter::signed("c", Quantity::Drag)],
     starts: &[[0.05, 0.0, 0.0]],
+    trial: Trial::Amplitudes(1),
     hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
 };
 

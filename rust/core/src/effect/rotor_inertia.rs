@@ -3,7 +3,7 @@
 //! A motor that drives joint `j` from the previous link adds its inertia times the gear ratio squared to `M_jj` and to
 //! nothing else, unlike a link inertia, which also couples the joints.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Reflected rotor inertia (armature).
@@ -19,6 +19,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     parameters: &[EffectParameter::bounded("inertia", Quantity::Inertia, 0.0, f64::INFINITY)],
     starts: &[[0.05, 0.0, 0.0]],
+    trial: Trial::Amplitudes(1),
     hooks: Hooks { force: false, coulomb: false, command: false, measured: false },
 };
 

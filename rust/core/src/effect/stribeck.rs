@@ -2,7 +2,7 @@
 //!
 //! The level at rest is the break-away torque `fc + amplitude`; the surplus fades within about twice `velocity`.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::{Real, lit};
 
 /// Extra friction at low speed.
@@ -21,6 +21,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("velocity", Quantity::Speed, 1e-3, f64::INFINITY),
     ],
     starts: &[[0.05, 0.03, 0.0], [0.05, 0.1, 0.0], [0.05, 0.3, 0.0], [0.05, 0.8, 0.0]],
+    trial: Trial::Amplitudes(1),
     hooks: Hooks { force: false, coulomb: true, command: false, measured: false },
 };
 

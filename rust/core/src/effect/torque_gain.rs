@@ -1,6 +1,6 @@
 //! The joint receives `gain` times the commanded torque: a wrong torque constant, gear ratio or amplifier gain.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Wrong gain from command to torque.
@@ -22,6 +22,7 @@ static SPEC: Spec = Spec {
         neutral: 1.0,
     }],
     starts: &[[1.05, 0.0, 0.0]],
+    trial: Trial::Amplitudes(1),
     hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
 };
 

@@ -1,6 +1,6 @@
 //! A constant torque: amplifier or current-sensor bias, `tau + offset`.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Constant torque added to the command.
@@ -16,6 +16,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     parameters: &[EffectParameter::signed("offset", Quantity::Torque)],
     starts: &[[0.05, 0.0, 0.0]],
+    trial: Trial::Amplitudes(1),
     hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
 };
 

@@ -1,0 +1,47 @@
+//! A stop: beyond a position, on the side away from zero, a spring and damper push back and never pull.
+
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use crate::real::Real;
+
+/// Contact with a stop.
+#[derive(Debug)]
+pub struct Contact;
+
+static SPEC: Spec = Spec {
+    name: "contact",
+    title: "contact with a stop",
+    equation: "tau_joint = tau - max(stiffness depth + damping speed, 0) beyond position",
+    source: "soft limits of common simulators",
+    excited_by: "motion up to the stop",
+    scope: Scope::Joint,
+    parameters: &[
+        EffectParameter::threshold("position", Quantity::Position, f64::NEG_INFINITY),
+        EffectParameter::bounded("stiffness", Quantity::Stiffness, 0.0, f64::INFINITY),
+        EffectParameter::bounded("damping", Quantity::Damping, 0.0, f64::INFINITY),
+    ],
+    starts: &[
+        [1.0, 5.0, 0.05],
+        [-1.0, 5.0, 0.05],
+        [1.5, 10.0, 0.1],
+        [-1.5, 10.0, 0.1],
+        [2.0, 10.0, 0.1],
+        [-2.0, 10.0, 0.1],
+    ],
+    trial: Trial::Whole,
+    hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
+};
+
+impl<T: Real> Effect<T> for Contact {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn force(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>) -> T {
+        let side = if p[0] < T::zero() { -T::one() } else { T::one() };
+        let depth = side * (x.q - p[0]);
+        if depth <= T::zero() {
+            return T::zero();
+        }
+        -side * (p[1] * depth + p[2] * side * x.dq).max(T::zero())
+    }
+}

@@ -1,0 +1,31 @@
+//! The encoder's zero is off: it shows `q + offset`.
+
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use crate::real::Real;
+
+/// Encoder offset.
+#[derive(Debug)]
+pub struct EncoderOffset;
+
+static SPEC: Spec = Spec {
+    name: "encoder_offset",
+    title: "encoder offset",
+    equation: "q_measured = q + offset",
+    source: "zeroing error",
+    excited_by: "gravity or coupling that depends on the position",
+    scope: Scope::Joint,
+    parameters: &[EffectParameter::signed("offset", Quantity::Position)],
+    starts: &[[0.02, 0.0, 0.0]],
+    trial: Trial::Amplitudes(1),
+    hooks: Hooks { force: false, coulomb: false, command: false, measured: true },
+};
+
+impl<T: Real> Effect<T> for EncoderOffset {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn measured(&self, p: &[T; MAX_PARAMETERS], q: T) -> T {
+        q + p[0]
+    }
+}

@@ -1,0 +1,34 @@
+//! A spring at the joint: `-k (q - q0)`, a cable, a hose or a counterbalance.
+
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use crate::real::Real;
+
+/// Joint spring.
+#[derive(Debug)]
+pub struct JointSpring;
+
+static SPEC: Spec = Spec {
+    name: "joint_spring",
+    title: "joint spring",
+    equation: "tau_joint = tau - k (q - q0)",
+    source: "cable forces; `stiffness` of common simulators",
+    excited_by: "a wide range of positions",
+    scope: Scope::Joint,
+    parameters: &[
+        EffectParameter::signed("k", Quantity::Stiffness),
+        EffectParameter::shape("q0", Quantity::Position, f64::NEG_INFINITY, f64::INFINITY),
+    ],
+    starts: &[[0.05, 0.0, 0.0], [0.05, 1.5, 0.0], [0.05, -1.5, 0.0], [0.02, 6.0, 0.0], [0.02, -6.0, 0.0]],
+    trial: Trial::Amplitudes(1),
+    hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
+};
+
+impl<T: Real> Effect<T> for JointSpring {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn force(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>) -> T {
+        -p[0] * (x.q - p[1])
+    }
+}

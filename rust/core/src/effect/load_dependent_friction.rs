@@ -1,0 +1,31 @@
+//! Friction that grows with the load on the joint: `mu |load| sgn dq`, the load being the torque `C dq + g` that the links put on it.
+
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use crate::real::Real;
+
+/// Friction that grows with load.
+#[derive(Debug)]
+pub struct LoadDependentFriction;
+
+static SPEC: Spec = Spec {
+    name: "load_dependent_friction",
+    title: "friction that grows with load",
+    equation: "f = mu |C dq + g| sgn dq",
+    source: "Hamon, Gautier and Garrec 2010",
+    excited_by: "motion in both directions under different loads",
+    scope: Scope::Joint,
+    parameters: &[EffectParameter::signed("mu", Quantity::Ratio)],
+    starts: &[[0.05, 0.0, 0.0]],
+    trial: Trial::Amplitudes(1),
+    hooks: Hooks { force: false, coulomb: true, command: false, measured: false },
+};
+
+impl<T: Real> Effect<T> for LoadDependentFriction {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn coulomb(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>, _direction: T) -> T {
+        p[0] * x.load.abs()
+    }
+}

@@ -1,0 +1,33 @@
+//! Commands below a level give no torque; above it the excess acts: `sgn(tau) max(|tau| - level, 0)`.
+
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
+use crate::real::Real;
+
+/// Torque dead zone.
+#[derive(Debug)]
+pub struct TorqueDeadZone;
+
+static SPEC: Spec = Spec {
+    name: "torque_dead_zone",
+    title: "torque dead zone",
+    equation: "tau_joint = sgn(tau) max(|tau| - level, 0)",
+    source: "valves and amplifiers with overlap",
+    excited_by: "torque that changes sign",
+    scope: Scope::Joint,
+    parameters: &[EffectParameter::bounded("level", Quantity::Torque, 0.0, f64::INFINITY)],
+    starts: &[[0.05, 0.0, 0.0], [0.3, 0.0, 0.0]],
+    trial: Trial::Amplitudes(1),
+    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
+};
+
+impl<T: Real> Effect<T> for TorqueDeadZone {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn command(&self, p: &[T; MAX_PARAMETERS], _t: &[T], torque: &mut [Pulse<T>]) {
+        for pulse in torque {
+            *pulse = pulse.map(|tau| tau - tau.max(-p[0]).min(p[0]));
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! Torque ripple (cogging): `amplitude sin(n q + phase)`, a fixed number of cycles per turn.
+
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use crate::real::Real;
+
+/// Torque ripple (cogging).
+#[derive(Debug)]
+pub struct TorqueRipple;
+
+static SPEC: Spec = Spec {
+    name: "torque_ripple",
+    title: "torque ripple (cogging)",
+    equation: "tau_joint = tau + amplitude sin(n q + phase)",
+    source: "Holtz and Springob 1996; `cogging` of common simulators",
+    excited_by: "motion over several cycles of the ripple",
+    scope: Scope::Joint,
+    parameters: &[
+        EffectParameter::signed("amplitude", Quantity::Torque),
+        EffectParameter::shape("n", Quantity::Count, 1.0, 400.0),
+        EffectParameter::shape("phase", Quantity::Angle, f64::NEG_INFINITY, f64::INFINITY),
+    ],
+    starts: &[
+        [0.05, 1.0, 0.0],
+        [0.05, 1.0, 1.571],
+        [0.05, 2.0, 0.0],
+        [0.05, 2.0, 1.571],
+        [0.05, 3.0, 0.0],
+        [0.05, 3.0, 1.571],
+        [0.05, 4.0, 0.0],
+        [0.05, 4.0, 1.571],
+        [0.05, 5.0, 0.0],
+        [0.05, 5.0, 1.571],
+        [0.05, 6.0, 0.0],
+        [0.05, 6.0, 1.571],
+        [0.05, 7.0, 0.0],
+        [0.05, 7.0, 1.571],
+        [0.05, 8.0, 0.0],
+        [0.05, 8.0, 1.571],
+        [0.05, 10.0, 0.0],
+        [0.05, 10.0, 1.571],
+        [0.05, 12.0, 0.0],
+        [0.05, 12.0, 1.571],
+        [0.05, 14.0, 0.0],
+        [0.05, 14.0, 1.571],
+        [0.05, 16.0, 0.0],
+        [0.05, 16.0, 1.571],
+        [0.05, 18.0, 0.0],
+        [0.05, 18.0, 1.571],
+        [0.05, 20.0, 0.0],
+        [0.05, 20.0, 1.571],
+        [0.05, 22.0, 0.0],
+        [0.05, 22.0, 1.571],
+        [0.05, 24.0, 0.0],
+        [0.05, 24.0, 1.571],
+        [0.05, 27.0, 0.0],
+        [0.05, 27.0, 1.571],
+        [0.05, 30.0, 0.0],
+        [0.05, 30.0, 1.571],
+        [0.05, 33.0, 0.0],
+        [0.05, 33.0, 1.571],
+        [0.05, 36.0, 0.0],
+        [0.05, 36.0, 1.571],
+        [0.05, 40.0, 0.0],
+        [0.05, 40.0, 1.571],
+        [0.05, 44.0, 0.0],
+        [0.05, 44.0, 1.571],
+        [0.05, 48.0, 0.0],
+        [0.05, 48.0, 1.571],
+    ],
+    trial: Trial::Amplitudes(1),
+    hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
+};
+
+impl<T: Real> Effect<T> for TorqueRipple {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn force(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>) -> T {
+        p[0] * (p[1] * x.q + p[2]).sin()
+    }
+}

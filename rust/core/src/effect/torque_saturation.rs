@@ -1,0 +1,33 @@
+//! The torque never exceeds a level, whatever is commanded.
+
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
+use crate::real::Real;
+
+/// Torque saturation.
+#[derive(Debug)]
+pub struct TorqueSaturation;
+
+static SPEC: Spec = Spec {
+    name: "torque_saturation",
+    title: "torque saturation",
+    equation: "tau_joint = clip(tau, -level, level)",
+    source: "current limits; `forcerange` of common simulators",
+    excited_by: "torque above the level",
+    scope: Scope::Joint,
+    parameters: &[EffectParameter::threshold("level", Quantity::Torque, 0.0)],
+    starts: &[[2.2, 0.0, 0.0], [1.7, 0.0, 0.0], [1.3, 0.0, 0.0], [0.9, 0.0, 0.0], [0.6, 0.0, 0.0]],
+    trial: Trial::Whole,
+    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
+};
+
+impl<T: Real> Effect<T> for TorqueSaturation {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn command(&self, p: &[T; MAX_PARAMETERS], _t: &[T], torque: &mut [Pulse<T>]) {
+        for pulse in torque {
+            *pulse = pulse.map(|tau| tau.max(-p[0]).min(p[0]));
+        }
+    }
+}
