@@ -79,7 +79,7 @@ fn covariance_stays_positive_definite_over_a_million_updates() {
         rls.update(&psi, &y);
         if k % 50_000 == 0 || k == 999_999 {
             let p = rls.covariance();
-            assert_eq!(p, &p.transpose());
+            assert_eq!(p, p.transpose());
             assert!(p.cholesky().is_some(), "indefinite after {k} updates");
         }
     }

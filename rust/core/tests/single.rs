@@ -10,7 +10,7 @@ use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::Rls;
 use nalgebra::{SMatrix, SVector};
 
-/// Share by which single precision may differ from double on the seed's run; 2e-3 is the largest seen (supplied energy, whose integrals grow).
+/// Share by which single precision may differ from double on the seed's run; 1.1e-3 is the largest seen.
 const SINGLE_AGAINST_DOUBLE: f64 = 0.005;
 
 fn double<T: Real>(x: T) -> f64 {
@@ -44,7 +44,7 @@ fn seed_estimate<T: Real>(scheme: Scheme, variant: Variant) -> SVector<f64, 9> {
     for (k, sample) in run::samples::<T>().iter().enumerate() {
         estimator.update(sample);
         assert!(
-            is_positive_definite(estimator.rls().covariance()),
+            is_positive_definite(&estimator.rls().covariance()),
             "{} {variant:?} at sample {k}",
             scheme.name()
         );
@@ -81,7 +81,7 @@ fn life<T: Real>(p0: f64) -> (Vec<u32>, f64) {
     for k in 0..1_000_000 {
         let psi = SMatrix::<f64, 2, 6>::from_fn(|_, j| noise() * SIZES[j]);
         rls.update(&psi.map(lit::<T>), &(psi * SVector::from(TRUTH)).map(lit::<T>));
-        if (k < 1000 || k % 1000 == 0) && !is_positive_definite(rls.covariance()) {
+        if (k < 1000 || k % 1000 == 0) && !is_positive_definite(&rls.covariance()) {
             indefinite.push(k);
         }
     }
@@ -91,17 +91,12 @@ fn life<T: Real>(p0: f64) -> (Vec<u32>, f64) {
 
 #[test]
 fn a_million_random_updates() {
-    // Where P(0) |psi|^2 exceeds the reciprocal of the rounding unit, the first differences of (21) have no digits left.
+    // With P(0) = 10^6, P(0) |psi|^2 is ten times the reciprocal of single precision's rounding unit.
     for p0 in [1.0, 1e3, 1e6] {
-        let (indefinite, _) = life::<f64>(p0);
-        assert!(indefinite.is_empty(), "double, P(0) = {p0}: {indefinite:?}");
+        for (indefinite, off) in [life::<f64>(p0), life::<f32>(p0)] {
+            assert!(indefinite.is_empty(), "P(0) = {p0}: {indefinite:?}");
+            // P(0) itself pulls towards zero, by 1.5e-2 / P(0) for the smallest regressor; the rest is rounding times the ratio of the sizes.
+            assert!(off < 0.02 / p0 + 1e-3, "P(0) = {p0}: off by {off:e}");
+        }
     }
-    for p0 in [1.0, 1e3] {
-        let (indefinite, _) = life::<f32>(p0);
-        assert!(indefinite.is_empty(), "single, P(0) = {p0}: {indefinite:?}");
-    }
-    let (indefinite, off) = life::<f32>(1e6);
-    assert_eq!(indefinite.first(), Some(&0), "single precision has become better than documented");
-    assert!(indefinite.iter().all(|k| *k < 1000), "lost for good: {indefinite:?}");
-    assert!(off < 1e-3, "off by {off:e}");
 }
