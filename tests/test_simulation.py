@@ -117,7 +117,7 @@ def _typical(parameter: dict[str, float]) -> float:
     neutral, upper = parameter["neutral"], parameter["upper"]
     if neutral > 1e6:
         return 0.05
-    return neutral + min(0.05, 0.5 * (upper - neutral))
+    return max(parameter["lower"], neutral + min(0.05, 0.5 * (upper - neutral)))
 
 
 @pytest.mark.parametrize(
