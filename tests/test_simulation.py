@@ -108,7 +108,9 @@ def test_effects_of_the_format_exist_and_each_changes_the_motion(arm, seed_log):
     for name, effect in known.items():
         values = {p["name"]: _typical(p) for p in effect["parameters"]}
         joint = 1 if effect["scope"] == "joint" else None
-        changed = simulate(arm, seed_log.t, seed_log.tau, effects=[Effect(name, joint, values)], encoder=False).q
+        changed = simulate(
+            arm, seed_log.t, seed_log.tau, effects=[Effect(name, joint, values)], encoder=False, tolerance=1e-6
+        ).q
         assert np.abs(changed - plain).max() > 1e-5, name
 
 
