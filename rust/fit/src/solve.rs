@@ -28,7 +28,7 @@ impl Effort {
     /// Far enough to rank candidates.
     pub const ROUGH: Self = Self { iterations: 4, enough: 1e-2 };
     /// To the minimum.
-    pub const FULL: Self = Self { iterations: 15, enough: 1e-5 };
+    pub const FULL: Self = Self { iterations: 15, enough: 1e-4 };
 }
 
 /// Trusted values of the arm's parameters.

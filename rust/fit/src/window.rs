@@ -14,7 +14,7 @@ use nalgebra::SVector;
 const DIVERGED: f64 = 1e3;
 
 /// Sub-steps per sample are capped here; smoothing narrower than that allows is refused by its cost.
-const MAX_SUBSTEPS: usize = 16;
+const MAX_SUBSTEPS: usize = 4;
 
 /// Samples `first ..= last` of one track; row 0 is sample `first + 1`.
 #[derive(Debug, Clone, Copy)]
