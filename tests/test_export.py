@@ -1,0 +1,446 @@
+"""Exported models: links that could be built, dynamics that are armgap's, and every cause in a field or named as missing."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from armgap import Arm, Diagnosis, _native, correct, diagnose, effects, simulate
+from armgap.export import FIELDS, ExportError, physical
+from armgap.export.corrected import ON_JOINT
+from armgap.export.toml import LEAST_SIGMA, to_arm
+from armgap.simulation import Effect
+
+Run = Callable[..., tuple[int, str, str]]
+EXACT = 1e-9  # relative to the largest torque: rounding of decimal numbers and of two ways to sum
+STATES = 40
+
+THETA = {
+    "axis": [12.0, 31.0, 25.0, 18.0],
+    "pendulum": [0.31, 9.2, 0.2, 0.9],
+    "two-link": [2.351, 0.0838, 0.102, 38.465, 1.8266, 2.288, 0.175, 7.6, 1.734],
+}
+# One value per effect that some simulator has a field for, on the last joint; the names are the catalogue's.
+SIZES: dict[str, dict[str, float]] = {
+    "payload": {"mass": 0.7, "distance": 0.2},
+    "rotor_inertia": {"inertia": 0.05},
+    "joint_spring": {"k": 3.0, "q0": 0.4},
+    "quadratic_drag": {"c": 0.3},
+    "torque_offset": {"offset": 0.6},
+    "coulomb_asymmetry": {"delta": 0.2},
+    "torque_gain": {"gain": 1.2},
+    "torque_saturation": {"level": 2.5},
+    "actuator_lag": {"time_constant": 0.004},
+    "actuator_delay": {"delay": 0.005},
+    "base_tilt": {"angle": 0.12},
+    "encoder_offset": {"offset": 0.15},
+    "contact": {"position": 0.5, "stiffness": 60.0, "damping": 0.0},
+}
+
+
+def make_arm(kind: str, **more: Any) -> Arm:
+    theta = np.array(THETA[kind])
+    return Arm("an arm", kind, 9.81, 0.0025, theta, 0.1 * np.abs(theta), **more)
+
+
+def found(arm: Arm, *causes: tuple[str, int | None, dict[str, float]], verdict: str = "effect") -> Diagnosis:
+    """A diagnosis that found the arm's own values and these causes."""
+    values = {
+        n: {"value": float(v), "sigma": float(s), "unit": u}
+        for n, v, s, u in zip(arm.parameter_names, arm.theta, arm.sigma, arm.parameter_units, strict=True)
+    }
+    zeros = [0.0] * arm.n_joints
+    gap = {k: zeros for k in ("before", "refit", "after", "floor")}
+    return Diagnosis.from_dict(
+        {
+            "schema": "armgap.diagnosis/1",
+            "verdict": verdict,
+            "gap": {**gap, "horizon_s": 0.25, "closed": 1.0, "closed_ci": [1, 1], "free_run": gap},
+            "where": [],
+            "causes": [
+                {
+                    "effect": name,
+                    "joint": joint,
+                    "probability": 1.0,
+                    "parameters": {k: {"value": v, "sigma": 0.01, "unit": "1"} for k, v in p.items()},
+                    "closed": 1.0,
+                    "equivalents": [],
+                }
+                for name, joint, p in causes
+            ],
+            "ruled_out": [],
+            "parameters": {stage: deepcopy(values) for stage in ("nominal", "refit", "with_causes")},
+        }
+    )
+
+
+def place(name: str, arm: Arm) -> tuple[str, int | None, dict[str, float]]:
+    whole = name in ("payload", "base_tilt")
+    return name, None if whole else arm.n_joints, SIZES[name]
+
+
+def torque(
+    arm: Arm, theta: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, tilt: float = 0.0
+) -> np.ndarray:
+    """Equation of motion as docs/notation.md and Reyes and Kelly (1997) write it."""
+    n, b = arm.n_joints, arm.n_inertial
+    friction = theta[b : b + n] * dq + theta[b + n :] * np.sign(dq)
+    if arm.kind == "axis":
+        g = theta[1] * math.cos(tilt) + theta[0] * arm.gravity * math.sin(tilt)
+        return theta[0] * ddq + g + friction
+    if arm.kind == "pendulum":
+        return theta[0] * ddq + theta[1] * np.sin(q + tilt) + friction
+    t1, t2, t3, t4, t5 = theta[:5]
+    c, s = math.cos(q[1]), math.sin(q[1])
+    M = np.array([[t1 + 2 * t2 * c, t3 + t2 * c], [t3 + t2 * c, t3]])
+    C = np.array([[-t2 * s * dq[1], -t2 * s * (dq[0] + dq[1])], [t2 * s * dq[0], 0.0]])
+    outer = t5 * math.sin(q[0] + q[1] + tilt)
+    return M @ ddq + C @ dq + np.array([t4 * math.sin(q[0] + tilt) + outer, outer]) + friction
+
+
+def states(n: int, seed: int = 3) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Random states that slide: dry friction has its full level."""
+    rng = np.random.default_rng(seed)
+    speed = rng.uniform(0.5, 3.0, (STATES, n)) * rng.choice([-1, 1], (STATES, n))
+    return list(zip(rng.uniform(-3, 3, (STATES, n)), speed, rng.uniform(-5, 5, (STATES, n)), strict=True))
+
+
+def passive(
+    name: str, arm: Arm, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """What an effect does to the equation: base parameters, torque needed besides, tilt; by its equation in the catalogue."""
+    theta, extra, p = arm.theta.copy(), np.zeros(arm.n_joints), SIZES[name]
+    if name == "payload":
+        m, d = p["mass"], p["distance"]
+        l1 = 9.81 * theta[1] / theta[4] if arm.kind == "two-link" else 0.0
+        theta[: arm.n_inertial] += {
+            "axis": np.array([m, m * theta[1] / theta[0]]),
+            "pendulum": np.array([m * d * d, 9.81 * m * d]),
+            "two-link": m * np.array([l1 * l1 + d * d, l1 * d, d * d, 9.81 * l1, 9.81 * d]),
+        }[arm.kind]
+    elif name == "rotor_inertia":
+        extra[-1] = p["inertia"] * ddq[-1]
+    elif name == "joint_spring":
+        extra[-1] = p["k"] * (q[-1] - p["q0"])
+    elif name == "quadratic_drag":
+        extra[-1] = p["c"] * dq[-1] * abs(dq[-1])
+    elif name == "contact":
+        extra[-1] = p["stiffness"] * max(q[-1] - p["position"], 0.0)
+    return theta, extra, p.get("angle", 0.0)
+
+
+def worst(expected: list[np.ndarray], got: list[np.ndarray]) -> float:
+    a, b = np.array(expected), np.array(got)
+    return float(np.max(np.abs(a - b)) / np.max(np.abs(a)))
+
+
+@given(
+    st.tuples(*[st.floats(0.05, 50)] * 2),
+    st.floats(0.05, 2),
+    st.tuples(*[st.integers(-1000, 1000).map(lambda mm: mm / 1000)] * 2),
+    st.tuples(*[st.floats(1e-3, 5)] * 2),
+    st.booleans(),
+)
+@settings(max_examples=200, deadline=None)
+def test_links_of_any_arm_that_can_be_built_have_its_base_parameters(mass, l1, com, inertia, stated) -> None:
+    theta = _native.theta_from_links("two-link", 9.81, mass, [l1, 0.0], com, inertia)
+    links = physical("two-link", 9.81, theta, mass=mass if stated else None, length=[l1, 0.0])
+    assert min(*links.mass, *links.inertia) > 0
+    again = _native.theta_from_links("two-link", 9.81, links.mass, [links.length[0], 0.0], links.com, links.inertia)
+    assert again == pytest.approx(theta, rel=1e-9, abs=1e-9 * max(theta))
+
+
+def test_stated_masses_are_kept_where_they_are_possible() -> None:
+    theta = _native.theta_from_links("two-link", 9.81, [23.902, 3.88], [0.45, 0.3], [0.091, 0.048], [1.266, 0.093])
+    kept = physical("two-link", 9.81, theta, mass=[23.902, 3.88])
+    assert (kept.mass, kept.com) == ((23.902, 3.88), (pytest.approx(0.091), pytest.approx(0.048)))
+    assert kept.inertia == (pytest.approx(1.266), pytest.approx(0.093))
+    other = physical("two-link", 9.81, theta, mass=[23.902, 500.0])
+    assert 0.3 < other.mass[1] < 12
+    assert any("500 kg is impossible" in choice for choice in other.choices)
+
+
+@pytest.mark.parametrize(
+    ("kind", "theta", "says"),
+    [
+        ("axis", [-1.0, 0.0], "moving mass"),
+        ("pendulum", [0.0, 1.0], "inertia theta1"),
+        ("two-link", [0.1, 0.2, 0.1, 1.0, 1.0], "not positive definite"),
+        ("two-link", [2.0, 0.1, 0.1, 38.0, -1.8], "imply a link 1 of length -"),
+        ("two-link", [2.0, 0.1, 0.1, 38.0, 0.0], "length infinity"),
+        ("scara", [1.0], "cannot be exported"),
+    ],
+)
+def test_values_that_no_arm_can_have_are_refused(kind: str, theta: list[float], says: str) -> None:
+    with pytest.raises(ExportError, match=says) as caught:
+        physical(kind, 9.81, theta)
+    assert caught.value.remedy
+
+
+def test_what_cannot_be_built_can_still_be_written_as_values() -> None:
+    arm = make_arm("two-link")
+    arm = replace(arm, theta=arm.theta * np.array([1, 1, 1, 1, -1, 1, 1, 1, 1]))
+    model = correct(found(arm), arm)
+    with pytest.raises(ExportError, match="length -"):
+        model.render("mjcf")
+    data = json.loads(model.render("json"))
+    assert data["links"] is None
+    assert any("length -" in note for note in data["notes"])
+    assert data["parameters"]["theta5"]["value"] == arm.theta[4]
+
+
+@pytest.mark.parametrize("kind", THETA)
+@pytest.mark.parametrize(
+    "name",
+    ["none", "payload", "rotor_inertia", "joint_spring", "quadratic_drag", "base_tilt", "encoder_offset", "contact"],
+)
+def test_mjcf_has_the_dynamics_of_the_model(kind: str, name: str) -> None:
+    mj = pytest.importorskip("mujoco")
+    arm = make_arm(kind)
+    model = mj.MjModel.from_xml_string(
+        correct(found(arm, *([] if name == "none" else [place(name, arm)])), arm).render("mjcf")
+    )
+    data = mj.MjData(model)
+    shift = np.zeros(arm.n_joints)
+    shift[-1] = SIZES["encoder_offset"]["offset"] if name == "encoder_offset" else 0.0
+    expected, got = [], []
+    for q, dq, ddq in states(arm.n_joints):
+        theta, extra, tilt = (arm.theta, 0.0, 0.0) if name == "none" else passive(name, arm, q, dq, ddq)
+        expected.append(torque(arm, theta, q, dq, ddq, tilt) + extra)
+        data.qpos[:], data.qvel[:], data.qacc[:] = q + shift, dq, ddq
+        mj.mj_inverse(model, data)
+        got.append(data.qfrc_inverse.copy())
+    assert worst(expected, got) < EXACT
+
+
+@pytest.mark.parametrize(
+    "name", ["torque_offset", "torque_gain", "torque_saturation", "actuator_lag", "actuator_delay"]
+)
+def test_mjcf_drives_give_the_torque_of_the_effect(name: str) -> None:
+    mj = pytest.importorskip("mujoco")
+    arm = make_arm("two-link")
+    model = mj.MjModel.from_xml_string(correct(found(arm, place(name, arm)), arm).render("mjcf"))
+    data = mj.MjData(model)
+    command, got = 3.0, []
+    for _ in range(40):
+        data.ctrl[1] = command
+        mj.mj_step(model, data)
+        got.append(float(data.actuator_force[1]))
+    t = np.arange(40) * model.opt.timestep
+    expected = {
+        "torque_offset": np.full(40, command + SIZES["torque_offset"]["offset"]),
+        "torque_gain": np.full(40, command * SIZES["torque_gain"]["gain"]),
+        "torque_saturation": np.full(40, SIZES["torque_saturation"]["level"]),
+        "actuator_lag": command * (1 - np.exp(-t / SIZES["actuator_lag"]["time_constant"])),
+        "actuator_delay": np.where(t > SIZES["actuator_delay"]["delay"] - 1e-9, command, 0.0),
+    }[name]
+    assert got == pytest.approx(expected.tolist(), abs=1e-12)
+
+
+def test_mjcf_moves_as_armgap_simulates() -> None:
+    """All that both know at once, without dry friction, which MuJoCo softens."""
+    mj = pytest.importorskip("mujoco")
+    arm = make_arm("two-link")
+    arm = replace(arm, theta=np.r_[arm.theta[:7], 0.0, 0.0])
+    names = ["payload", "rotor_inertia", "joint_spring", "quadratic_drag", "torque_offset", "torque_gain", "base_tilt"]
+    causes = [place(name, arm) for name in names]
+    t = np.arange(101) * arm.sample_period
+    tau = np.column_stack([8 * np.sin(9 * t + 1), 1.5 * np.cos(14 * t)])
+    start = np.array([0.3, -0.2])
+    placed = [Effect(*cause) for cause in causes]
+    log = simulate(arm, t, tau, q0=start, effects=placed, encoder=False)
+    root = ET.fromstring(correct(found(arm, *causes), arm).render("mjcf"))
+    option = root.find("option")
+    assert option is not None
+    option.set("integrator", "RK4")
+    model = mj.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+    data = mj.MjData(model)
+    data.qpos[:], rows = start, []
+    steps = round(arm.sample_period / model.opt.timestep)
+    for k in range(len(t)):
+        rows.append(data.qpos.copy())
+        data.ctrl[:] = tau[k]
+        mj.mj_step(model, data, steps)
+    assert np.max(np.abs(np.array(rows) - log.q)) < 1e-6
+
+
+@pytest.mark.parametrize("kind", THETA)
+@pytest.mark.parametrize("name", ["none", "payload", "base_tilt", "encoder_offset", "rotor_inertia"])
+def test_urdf_has_the_rigid_dynamics_of_the_model(kind: str, name: str) -> None:
+    pin = pytest.importorskip("pinocchio")
+    arm = make_arm(kind)
+    cause = [] if name == "none" else [(name, 1 if name == "rotor_inertia" else place(name, arm)[1], SIZES[name])]
+    model = pin.buildModelFromXML(correct(found(arm, *cause), arm).render("urdf"))
+    data = model.createData()
+    shift = np.zeros(arm.n_joints)
+    shift[-1] = SIZES["encoder_offset"]["offset"] if name == "encoder_offset" else 0.0
+    expected, got = [], []
+    for q, dq, ddq in states(arm.n_joints):
+        theta, extra, tilt = (
+            passive(name, arm, q, dq, ddq) if cause and name != "rotor_inertia" else (arm.theta, 0.0, 0.0)
+        )
+        rigid = (
+            torque(arm, theta, q, dq, ddq, tilt)
+            + extra
+            - torque(arm, np.r_[0 * theta[: arm.n_inertial], theta[arm.n_inertial :]], q, dq, ddq)
+        )
+        if name == "rotor_inertia" and cause:
+            rigid[0] += SIZES[name]["inertia"] * ddq[0]
+        expected.append(rigid)
+        x = q + shift
+        turned = x if kind == "axis" else np.ravel(np.column_stack([np.cos(x), np.sin(x)]))
+        got.append(pin.rnea(model, data, turned, dq, ddq).copy())
+    assert worst(expected, got) < EXACT
+    n, b = arm.n_joints, arm.n_inertial
+    assert model.damping == pytest.approx(arm.theta[b : b + n])
+    assert model.friction == pytest.approx(arm.theta[b + n :])
+
+
+@pytest.mark.parametrize("kind", THETA)
+def test_an_arm_file_reads_back_as_the_corrected_arm(kind: str, tmp_path: Path) -> None:
+    arm = make_arm(kind, link_length=np.full(len(THETA[kind]) // 4, 0.4), link_mass=np.full(len(THETA[kind]) // 4, 3.0))
+    model = correct(
+        found(arm, ("payload", None, SIZES["payload"]), ("stribeck", 1, {"amplitude": 0.5, "velocity": 0.2})), arm
+    )
+    path = tmp_path / "corrected.toml"
+    path.write_text(model.render("toml"))
+    again = Arm.read(path)
+    assert again.theta.tolist() == to_arm(model).theta.tolist()
+    assert np.all(again.sigma >= LEAST_SIGMA * np.abs(again.theta) * (1 - 1e-12))
+    assert again.link_length is not None
+    assert again.link_mass is not None
+    assert (again.link_length.tolist(), again.link_mass.tolist()) == (arm.link_length.tolist(), arm.link_mass.tolist())
+    [option] = [line for line in path.read_text().splitlines() if line.startswith("# armgap simulate")]
+    assert Effect.parse(option.split()[-1]) == Effect("stribeck", 1, {"amplitude": 0.5, "velocity": 0.2})
+
+
+def test_what_was_diagnosed_and_exported_closes_the_gap(run: Run, tmp_path: Path) -> None:
+    """A pendulum with wrong values and a rotor: diagnosed, exported, and diagnosed again with the exported arm file."""
+    arm = replace(make_arm("pendulum"), sample_period=0.004)
+    true = replace(arm, theta=arm.theta * np.array([1.2, 0.9, 1.3, 0.8]))
+    (tmp_path / "arm.toml").write_text(arm.to_toml())
+    for seed in (1, 2):
+        t = np.arange(1000) * 0.004
+        draw = np.random.default_rng(seed).uniform(size=(3, 5))
+        tau = (0.5 + draw[0]) * np.sin(np.outer(t, 0.5 + 8 * draw[1]) + 6 * draw[2])
+        simulate(true, t, tau.sum(axis=1), noise=1e-4, seed=seed).write(tmp_path / f"{seed}.parquet")
+    logs = [str(tmp_path / "1.parquet"), "--holdout", str(tmp_path / "2.parquet"), "--quiet"]
+    assert run("diagnose", *logs, "--arm", tmp_path / "arm.toml", "--json", tmp_path / "d.json") == (0, "", "")
+    for ending in ("toml", "xml"):
+        status, out, _ = run(
+            "export", tmp_path / "d.json", "--arm", tmp_path / "arm.toml", "-o", tmp_path / f"new.{ending}"
+        )
+        assert (status, out) == (0, "")
+    new = Arm.read(tmp_path / "new.toml")
+    assert new.theta == pytest.approx(true.theta, rel=0.02)
+    again = diagnose(tmp_path / "1.parquet", new, holdout=tmp_path / "2.parquet")
+    first = Diagnosis.from_dict(json.loads((tmp_path / "d.json").read_text()))
+    assert again.verdict == "none"
+    assert again.gap.before[0] < 0.05 * first.gap.before[0]
+    moved = tmp_path / "moved.parquet"
+    assert run("simulate", "--arm", tmp_path / "new.toml", "--torque", logs[0], "-o", moved, "--quiet")[0] == 0
+
+
+@pytest.mark.parametrize("effect", [e["name"] for e in effects()])
+def test_every_effect_has_a_field_or_is_named_as_missing(effect: str) -> None:
+    arm = make_arm("two-link", torque_limit=np.array([200.0, 15.0]))
+    entry = next(e for e in effects() if e["name"] == effect)
+    p = SIZES.get(effect, {q["name"]: 0.1 for q in entry["parameters"]})
+    joint = 2 if entry["scope"] == "joint" else None
+    cause = (effect, joint, p)
+    bare, full = correct(found(arm), arm), correct(found(arm, cause), arm)
+    for form in ("mjcf", "urdf", "toml"):
+        named = any(effect in line and "no field for" in line for line in full.missing(form))
+        assert named == (full.field_of(full.causes[0], form) is None)
+        if form == "toml":
+            continue
+        assert (f"no field for {effect}" in full.render(form)) == named
+        written = [[(e.tag, e.attrib) for e in ET.fromstring(m.render(form)).iter()] for m in (bare, full)]
+        assert (written[0] == written[1]) == named, "an effect changes the model exactly if it has a field"
+    assert json.loads(full.render("json"))["effects"][0]["effect"] == effect
+
+
+def test_the_table_of_fields_and_what_is_written_agree() -> None:
+    assert {name for name, field in FIELDS.items() if field.mjcf} == {*ON_JOINT, "payload", "base_tilt"} == set(SIZES)
+
+
+def test_lengths_are_kept_on_request() -> None:
+    arm = make_arm("two-link", link_length=np.array([0.46, 0.3]))
+    as_found, kept = (correct(found(arm), arm, keep_lengths=k) for k in (False, True))
+    assert as_found.theta.tolist() == arm.theta.tolist()
+    assert as_found.links.length[0] == pytest.approx(9.81 * arm.theta[1] / arm.theta[4])  # type: ignore[union-attr]
+    assert any("the arm file states 0.46" in choice for choice in as_found.links.choices)  # type: ignore[union-attr]
+    assert kept.links.length == (pytest.approx(0.46), 0.3)  # type: ignore[union-attr]
+    cost = lambda k: ((k - arm.theta) / arm.sigma)[[1, 4]] @ ((k - arm.theta) / arm.sigma)[[1, 4]]  # noqa: E731
+    for other in (0.999, 1.001):  # nothing nearer keeps the length
+        moved = kept.theta.copy()
+        moved[[1, 4]] *= other
+        assert cost(moved) > cost(kept.theta)
+    with pytest.raises(ExportError, match="no length of link 1"):
+        correct(found(make_arm("pendulum")), make_arm("pendulum"), keep_lengths=True)
+
+
+def test_names_cannot_break_the_files() -> None:
+    arm = replace(make_arm("pendulum"), name='a -- "b" <c>&\n--->')
+    model = correct(found(arm, ("stribeck", 1, {"amplitude": 0.5, "velocity": 0.2})), arm)
+    for form in ("mjcf", "urdf"):
+        root = ET.fromstring(model.render(form))
+        assert root.get("model" if form == "mjcf" else "name") is not None
+    json.loads(model.render("json"))
+    import tomllib
+
+    assert tomllib.loads(model.render("toml"))["name"] == arm.name + ", corrected"
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "says"),
+    [
+        (None, [], "cannot be read"),
+        ("{", [], "is not JSON"),
+        ("[1]", [], "is not a diagnosis of schema"),
+        ('{"schema": "armgap.trial/1"}', [], "armgap.trial/1"),
+        ('{"schema": "armgap.diagnosis/1"}', [], "`gap` is missing"),
+        ("nan", [], "with_causes.theta1 is not a finite number"),
+        ("text", [], "with_causes.theta1 is not a finite number"),
+        ("other", [], "was made with 0.32"),
+        ("axis", [], "viscous1"),
+        ("good", ["-o", "out.obj"], "does not tell the format"),
+        ("good", ["--keep-lengths"], "no length of link 1"),
+        ("good", ["-o", "nowhere/out.xml"], "folder does not exist"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_written(
+    run: Run, tmp_path: Path, content, options, says, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arm = make_arm("pendulum")
+    Path("arm.toml").write_text((make_arm("two-link") if content == "axis" else arm).to_toml())
+    data = deepcopy(found(arm).to_dict())
+    if content in ("nan", "text"):
+        data["parameters"]["with_causes"]["theta1"] = {
+            "value": math.nan if content == "nan" else "x",
+            "sigma": 1,
+            "unit": "",
+        }
+    if content == "other":
+        data["parameters"]["nominal"]["theta1"]["value"] = 0.32
+    if content is not None:
+        Path("d.json").write_text(content if content[0] in "{[" else json.dumps(data))
+    before = sorted(tmp_path.rglob("*"))
+    status, out, err = run(
+        "export", "d.json", "--arm", "arm.toml", *(options if "-o" in options else ["-o", "out.xml", *options])
+    )
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert says in err
+    assert sorted(tmp_path.rglob("*")) == before
