@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint test-rust test-python reproduce bench wheel clean all tools lint-tools
+.PHONY: help setup demo test lint test-rust test-python reproduce bench wheel wheel-check docs clean all tools lint-tools
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
@@ -58,7 +58,11 @@ bench: ## cost per sample of the core
 	cargo bench -p armgap-benches
 
 wheel: $(VENV)/.tools ## a wheel in dist/
+	@rm -f dist/armgap-*.whl
 	$(BIN)/maturin build --release -o dist
+
+wheel-check: wheel ## the wheel, installed where there is no Rust: demo, diagnose, export, import time
+	$(PYTHON) tests/check_wheel.py dist/armgap-*.whl
 
 all: test demo ## what has to hold before a change lands
 

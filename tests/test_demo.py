@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from armgap.cli.demo import CASE_FOLDER as CASE
 from armgap.trial.key import Hidden, Key, open_key
 from armgap.trial.verdict import judge
 
-CASE = Path(__file__).resolve().parents[1] / "demo" / "case"
 Run = Callable[..., tuple[int, str, str]]
 
 
