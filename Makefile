@@ -35,8 +35,8 @@ demo: setup ## diagnose the sample log, or yours: make demo LOG="a.csv b.csv" AR
 	@$(BIN)/armgap demo $(LOG) $(if $(ARM),--arm $(ARM)) $(foreach h,$(HOLDOUT),--holdout $(h)) $(if $(COLUMNS),--columns "$(COLUMNS)") $(if $(UNITS),--units "$(UNITS)")
 
 lint: setup lint-tools ## formatting, types and stubs
-	$(BIN)/ruff format --check python tests examples
-	$(BIN)/ruff check python tests examples
+	$(BIN)/ruff format --check python tests examples tools
+	$(BIN)/ruff check python tests examples tools
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest armgap._native --mypy-config-file pyproject.toml
 	cargo fmt --check
@@ -63,6 +63,11 @@ wheel: $(VENV)/.tools ## a wheel in dist/
 
 wheel-check: wheel ## the wheel, installed where there is no Rust: demo, diagnose, export, import time
 	$(PYTHON) tests/check_wheel.py dist/armgap-*.whl
+
+docs: setup ## the documentation site in dist/site
+	@$(BIN)/python -c 'import mkdocs, matplotlib, mkdocstrings' 2>/dev/null || $(BIN)/python -m pip install -q --disable-pip-version-check "mkdocs-material>=9.6" "mkdocstrings[python]>=0.29" "matplotlib>=3.9"
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "the site is in dist/site: open dist/site/index.html"
 
 all: test demo ## what has to hold before a change lands
 

@@ -248,6 +248,18 @@ def test_mjcf_drives_give_the_torque_of_the_effect(name: str) -> None:
     assert got == pytest.approx(expected.tolist(), abs=1e-12)
 
 
+def test_mjcf_holds_a_joint_that_friction_holds() -> None:
+    """The figure of docs/how-to/export.md: one second at 95 % of the Coulomb level."""
+    mj = pytest.importorskip("mujoco")
+    arm = make_arm("two-link")
+    model = mj.MjModel.from_xml_string(correct(found(arm), arm).render("mjcf"))
+    data = mj.MjData(model)
+    data.ctrl[:] = 0.95 * arm.theta[7:]
+    while data.time < 1:
+        mj.mj_step(model, data)
+    assert np.all(np.abs(data.qpos) < 1e-6)
+
+
 def test_mjcf_moves_as_armgap_simulates() -> None:
     """All that both know at once, without dry friction, which MuJoCo softens."""
     mj = pytest.importorskip("mujoco")

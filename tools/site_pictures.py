@@ -42,16 +42,16 @@ class Signature:
 
     parameters: dict[str, float]
     against: str
-    drive: float = 1.0
+    drive: float = 0.8
 
 
 SIGNATURES: dict[str, Signature] = {
     "coulomb_asymmetry": Signature({"delta": 0.05}, "dq"),
     "torque_offset": Signature({"offset": 0.08}, "t"),
     "stribeck": Signature({"amplitude": 0.12, "velocity": 0.4}, "dq"),
-    "quadratic_drag": Signature({"c": 0.008}, "dq", 1.6),
+    "quadratic_drag": Signature({"c": 0.008}, "dq", 1.1),
     "load_dependent_friction": Signature({"mu": 0.25}, "gravity"),
-    "position_dependent_friction": Signature({"a": 0.06, "b": 0.05}, "q", 1.6),
+    "position_dependent_friction": Signature({"a": 0.06, "b": 0.05}, "q", 1.1),
     "friction_warmup": Signature({"amplitude": 1.2, "time_constant": 2.0}, "t"),
     "presliding": Signature({"amplitude": 0.1, "stiffness": 5.0}, "q"),
     "joint_elasticity": Signature({"stiffness": 40.0, "damping": 0.05, "rotor_inertia": 0.01}, "t"),
@@ -60,14 +60,14 @@ SIGNATURES: dict[str, Signature] = {
     "actuator_lag": Signature({"time_constant": 0.02}, "dtau"),
     "actuator_delay": Signature({"delay": 0.02}, "dtau"),
     "torque_saturation": Signature({"level": 0.5}, "tau"),
-    "torque_ripple": Signature({"amplitude": 0.06, "n": 8.0, "phase": 0.0}, "q", 1.6),
+    "torque_ripple": Signature({"amplitude": 0.06, "n": 8.0, "phase": 0.0}, "q", 1.1),
     "torque_dead_zone": Signature({"level": 0.15}, "tau"),
     "payload": Signature({"mass": 0.08, "distance": 0.4}, "ddq"),
-    "base_tilt": Signature({"angle": 0.15}, "q", 1.6),
-    "joint_spring": Signature({"k": 0.2, "q0": 0.2}, "q", 1.6),
+    "base_tilt": Signature({"angle": 0.15}, "q", 1.1),
+    "joint_spring": Signature({"k": 0.2, "q0": 0.2}, "q", 1.1),
     "rotor_inertia": Signature({"inertia": 0.01}, "ddq"),
-    "encoder_offset": Signature({"offset": 0.15}, "q", 1.6),
-    "encoder_eccentricity": Signature({"a": 0.05, "b": 0.03}, "q", 1.6),
+    "encoder_offset": Signature({"offset": 0.15}, "q", 1.1),
+    "encoder_eccentricity": Signature({"a": 0.05, "b": 0.03}, "q", 1.1),
     "contact": Signature({"position": 0.6, "stiffness": 8.0, "damping": 0.05}, "q"),
     "external_pulse": Signature({"time": 4.0, "duration": 0.1, "impulse": 0.05}, "t"),
 }
