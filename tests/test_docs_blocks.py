@@ -80,7 +80,7 @@ def two_links(tmp_path_factory: pytest.TempPathFactory) -> Path:
     arm = Arm.read(folder / "arm.toml")
     for seed, name in enumerate(("a", "b", "c", "run", "other-run"), start=1):
         log = record(
-            arm, arm.theta, Effect("stribeck", 2, {"amplitude": 0.8, "velocity": 0.5}), seed, 2.0, np.array([50.0, 6.0])
+            arm, arm.theta, Effect("stribeck", 2, {"amplitude": 0.8, "velocity": 0.5}), seed, 3.0, np.array([50.0, 6.0])
         )
         log.write(folder / f"{name}.parquet")
     table = Log.read(folder / "a.parquet").to_polars()
