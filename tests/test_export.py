@@ -36,6 +36,7 @@ SIZES: dict[str, dict[str, float]] = {
     "payload": {"mass": 0.7, "distance": 0.2},
     "rotor_inertia": {"inertia": 0.05},
     "joint_spring": {"k": 3.0, "q0": 0.4},
+    "hardening_spring": {"cubic": 0.8, "k": 2.0, "q0": -0.3},
     "quadratic_drag": {"c": 0.3},
     "torque_offset": {"offset": 0.6},
     "coulomb_asymmetry": {"delta": 0.2},
@@ -133,6 +134,9 @@ def passive(
         extra[-1] = p["inertia"] * ddq[-1]
     elif name == "joint_spring":
         extra[-1] = p["k"] * (q[-1] - p["q0"])
+    elif name == "hardening_spring":
+        x = q[-1] - p["q0"]
+        extra[-1] = p["k"] * x + p["cubic"] * x**3
     elif name == "quadratic_drag":
         extra[-1] = p["c"] * dq[-1] * abs(dq[-1])
     elif name == "contact":
@@ -203,7 +207,17 @@ def test_what_cannot_be_built_can_still_be_written_as_values() -> None:
 @pytest.mark.parametrize("kind", THETA)
 @pytest.mark.parametrize(
     "name",
-    ["none", "payload", "rotor_inertia", "joint_spring", "quadratic_drag", "base_tilt", "encoder_offset", "contact"],
+    [
+        "none",
+        "payload",
+        "rotor_inertia",
+        "joint_spring",
+        "hardening_spring",
+        "quadratic_drag",
+        "base_tilt",
+        "encoder_offset",
+        "contact",
+    ],
 )
 def test_mjcf_has_the_dynamics_of_the_model(kind: str, name: str) -> None:
     mj = pytest.importorskip("mujoco")
@@ -317,6 +331,15 @@ def test_urdf_has_the_rigid_dynamics_of_the_model(kind: str, name: str) -> None:
     n, b = arm.n_joints, arm.n_inertial
     assert model.damping == pytest.approx(arm.theta[b : b + n])
     assert model.friction == pytest.approx(arm.theta[b + n :])
+
+
+def test_two_springs_of_one_joint_add_up() -> None:
+    arm, q = make_arm("pendulum"), np.linspace(-2, 2, 9)
+    linear, hard = SIZES["joint_spring"], SIZES["hardening_spring"]
+    wanted = -linear["k"] * (q - linear["q0"]) - hard["k"] * (q - hard["q0"]) - hard["cubic"] * (q - hard["q0"]) ** 3
+    for order in (("joint_spring", "hardening_spring"), ("hardening_spring", "joint_spring")):
+        [j] = correct(found(arm, *(place(name, arm) for name in order)), arm).joints
+        assert j.offset - j.stiffness * (q - j.rest) - j.cubic * (q - j.rest) ** 3 == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("kind", THETA)

@@ -30,6 +30,9 @@ FAMILIES = {
         "position_dependent_friction",
         "friction_warmup",
         "presliding",
+        "viscous_asymmetry",
+        "cross_friction",
+        "gear_efficiency",
     ),
     "Drive": (
         "torque_offset",
@@ -40,7 +43,16 @@ FAMILIES = {
         "actuator_lag",
         "actuator_delay",
     ),
-    "Structure": ("payload", "rotor_inertia", "joint_spring", "joint_elasticity", "backlash", "base_tilt"),
+    "Structure": (
+        "payload",
+        "rotor_inertia",
+        "rotor_coupling",
+        "joint_spring",
+        "hardening_spring",
+        "joint_elasticity",
+        "backlash",
+        "base_tilt",
+    ),
     "Sensor": ("encoder_offset", "encoder_eccentricity"),
     "Surroundings": ("contact", "external_pulse"),
 }
@@ -178,7 +190,7 @@ def facts(name: str) -> str:
         "",
         f"![{_title(entry)}: position with and without it, and the torque the model lacks]({name}.svg)",
         "",
-        f"*A bench pendulum with {_sizes(name)}. {_reading(name)}*",
+        f"*{_bench(name)} with {_sizes(name)}. {_reading(name)}*",
         "",
         "| parameter | unit (linear joint) | bounds | without the effect |",
         "| --- | --- | --- | --- |",
@@ -191,6 +203,12 @@ def facts(name: str) -> str:
 
 def _code(text: str) -> str:
     return "`" + text.replace("|", "\\|") + "`"
+
+
+def _bench(name: str) -> str:
+    return (
+        "A bench pendulum" if site_pictures.SIGNATURES[name].kind == "pendulum" else "Joint 1 of a small two-link arm"
+    )
 
 
 def _sizes(name: str) -> str:

@@ -34,8 +34,8 @@ class Joint:
         Friction.
     armature : float
         Inertia on the joint's own acceleration only.
-    stiffness, rest : float
-        Spring ``-stiffness (q - rest)``.
+    stiffness, cubic, rest : float
+        Spring ``-stiffness (q - rest) - cubic (q - rest)^3``.
     drag : float
         Torque ``-drag dq |dq|``.
     offset, gain, delay, lag : float
@@ -52,6 +52,7 @@ class Joint:
     coulomb: float
     armature: float = 0.0
     stiffness: float = 0.0
+    cubic: float = 0.0
     rest: float = 0.0
     drag: float = 0.0
     offset: float = 0.0
@@ -308,9 +309,14 @@ def _joints(arm: Arm, theta: NDArray[np.float64], links: Links | None, causes: t
 
 
 def _spring(joint: Joint, p: Mapping[str, float]) -> Joint:
-    stiffness = joint.stiffness + p["k"]
-    torque = joint.stiffness * joint.rest + p["k"] * p["q0"]
-    return replace(joint, stiffness=stiffness, rest=torque / stiffness if stiffness else 0.0)
+    """One more spring; where one of them hardens, its rest position is kept and the others' preload becomes an offset."""
+    k, q0, cubic = p["k"], p["q0"], p.get("cubic", 0.0)
+    stiffness, preload = joint.stiffness + k, joint.stiffness * joint.rest + k * q0
+    if cubic or joint.cubic:
+        rest = q0 if cubic else joint.rest
+        offset = joint.offset + preload - stiffness * rest
+        return replace(joint, stiffness=stiffness, cubic=joint.cubic + cubic, rest=rest, offset=offset)
+    return replace(joint, stiffness=stiffness, rest=preload / stiffness if stiffness else 0.0)
 
 
 def _saturation(joint: Joint, p: Mapping[str, float]) -> Joint:
@@ -321,6 +327,7 @@ def _saturation(joint: Joint, p: Mapping[str, float]) -> Joint:
 ON_JOINT: dict[str, Callable[[Joint, Mapping[str, float]], Joint]] = {
     "rotor_inertia": lambda j, p: replace(j, armature=j.armature + p["inertia"]),
     "joint_spring": _spring,
+    "hardening_spring": _spring,
     "quadratic_drag": lambda j, p: replace(j, drag=j.drag + p["c"]),
     "torque_offset": lambda j, p: replace(j, offset=j.offset + p["offset"]),
     "coulomb_asymmetry": lambda j, p: replace(j, offset=j.offset - p["delta"]),

@@ -36,6 +36,7 @@ FIELDS: dict[str, Field] = {
     "payload": Field("inertial", "inertial", "inertial.theta"),
     "rotor_inertia": Field(mjcf="joint armature"),
     "joint_spring": Field(mjcf="joint stiffness, springref"),
+    "hardening_spring": Field(mjcf="joint stiffness, third coefficient, springref"),
     "quadratic_drag": Field(mjcf="joint damping, second coefficient"),
     "torque_offset": Field(mjcf="general biasprm"),
     "coulomb_asymmetry": Field(
@@ -50,6 +51,11 @@ FIELDS: dict[str, Field] = {
     "encoder_offset": Field(mjcf="joint ref", urdf="joint origin"),
     "contact": Field(
         mjcf="tendon springlength, stiffness", short="its damping, which acts in contact only, has no field"
+    ),
+    "joint_elasticity": Field(short="it needs a second body for the rotor, tied to the joint by a spring"),
+    "backlash": Field(short="it needs a second body for the rotor, tied to the joint by a limit"),
+    "rotor_coupling": Field(
+        short="add the inertia to M_12 and M_21; MuJoCo's tendon armature adds it with the rotor's own"
     ),
     "external_pulse": Field(short="an event of one log, no property of the arm"),
 }

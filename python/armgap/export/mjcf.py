@@ -86,8 +86,9 @@ def _joint(model: Corrected, joint: Joint, step: float) -> dict[str, str]:
     }
     if joint.coulomb:
         entries |= {"solreffriction": f"{number(2 * step)} 1", "solimpfriction": "0.9999 0.9999 0.001 0.5 2"}
-    if joint.stiffness:
-        entries |= {"stiffness": number(joint.stiffness), "springref": number(joint.rest + joint.reading)}
+    if joint.stiffness or joint.cubic:
+        hardening = f" 0 {number(joint.cubic)}" if joint.cubic else ""
+        entries |= {"stiffness": number(joint.stiffness) + hardening, "springref": number(joint.rest + joint.reading)}
     if joint.reading:
         entries["ref"] = number(joint.reading)
     return entries
