@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 
@@ -114,11 +115,22 @@ def test_commands_and_options_exist(document: Path) -> None:
         for words, _ in commands(block) if block.language in ("sh", "console") else ():
             assert words[1] in COMMANDS or words[1].startswith("-"), (document.name, words)
             command = cli.get_command(context, words[1])
+            if isinstance(command, click.Group) and words[2:] and words[2] in command.commands:
+                command = command.commands[words[2]]
             options = {o for p in command.params for o in p.opts} | {"--help", "-h"} if command else {"--version"}
             for word in words[2:]:
                 assert not word.startswith("--") or word.split("=")[0] in options, (document.name, words[1], word)
             placed = [words[i + 1] for i, word in enumerate(words) if word == "--effect"]
             assert {text.split(":")[0] for text in placed} <= known
+
+
+def test_rust_examples_are_those_that_the_documentation_tests_compile() -> None:
+    """The README is part of the core's documentation tests; other documents show the same block."""
+    [compiled] = [b.text for b in blocks(ROOT / "README.md") if b.language == "rust"]
+    shown = [
+        b.text for document in (ROOT / "docs" / "how-to").glob("*.md") for b in blocks(document) if b.language == "rust"
+    ]
+    assert shown == [compiled] * len(shown) != []
 
 
 def test_shown_and_real_output_are_compared_word_by_word() -> None:
