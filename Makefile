@@ -67,7 +67,7 @@ wheel-check: wheel ## the wheel, installed where there is no Rust: demo, diagnos
 docs: setup ## the documentation site in dist/site
 	@$(BIN)/python -c 'import mkdocs, matplotlib, mkdocstrings' 2>/dev/null || $(BIN)/python -m pip install -q --disable-pip-version-check "mkdocs-material>=9.6" "mkdocstrings[python]>=0.29" "matplotlib>=3.9"
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
-	@echo "the site is in dist/site: open dist/site/index.html"
+	@echo "the site is in dist/site; with search: $(BIN)/python -m http.server -d dist/site"
 
 all: test demo ## what has to hold before a change lands
 

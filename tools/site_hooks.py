@@ -168,11 +168,11 @@ def overview() -> str:
     parts = []
     for family, names in FAMILIES.items():
         rows = [
-            f"| [`{n}`]({n}.md) | {_title(known[n])} | {_code(known[n]['equation'])} | {known[n]['excited_by']} |"
+            f"| [{_title(known[n])}]({n}.md)<br>`{n}` | {_code(known[n]['equation'])} | {known[n]['excited_by']} |"
             for n in names
             if n in known
         ]
-        parts += [f"\n## {family}\n", "| name | effect | equation | excited by |", "| --- | --- | --- | --- |", *rows]
+        parts += [f"\n## {family}\n", "| effect | equation | excited by |", "| --- | --- | --- |", *rows]
     return "\n".join(parts)
 
 
@@ -181,9 +181,8 @@ def facts(name: str) -> str:
     entry = catalogue()[name]
     where = "one joint" if entry["scope"] == "joint" else "the arm as a whole"
     lines = [
-        "| | |",
-        "| --- | --- |",
         f"| name | `{name}` |",
+        "| --- | --- |",
         f"| sits on | {where} |",
         f"| equation | {_code(entry['equation'])} |",
         f"| source | {entry['source']} |",
@@ -203,7 +202,7 @@ def facts(name: str) -> str:
 
 
 def _code(text: str) -> str:
-    return "`" + text.replace("|", "\\|") + "`"
+    return f"`{text}`"
 
 
 def _bench(name: str) -> str:
