@@ -26,7 +26,7 @@ $(VENV)/.tools: pyproject.toml | tools
 
 $(VENV)/.built: $(VENV)/.tools pyproject.toml $(RUST_SOURCES)
 	@echo "building armgap (about a minute the first time)"
-	@PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --release --extras trial,dev
+	@PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --release --extras trial,dev,docs
 	@touch $@
 
 setup: $(VENV)/.built ## virtual environment and build, all that the other targets need
@@ -65,7 +65,6 @@ wheel-check: wheel ## the wheel, installed where there is no Rust: demo, diagnos
 	$(PYTHON) tests/check_wheel.py dist/armgap-*.whl
 
 docs: setup ## the documentation site in dist/site
-	@$(BIN)/python -c 'import mkdocs, matplotlib, mkdocstrings' 2>/dev/null || $(BIN)/python -m pip install -q --disable-pip-version-check "mkdocs-material>=9.6" "mkdocstrings[python]>=0.29" "matplotlib>=3.9"
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 	@echo "the site is in dist/site; with search: $(BIN)/python -m http.server -d dist/site"
 

@@ -67,7 +67,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     arm = Arm.read(folder / "arm.toml")
     secret = Effect("stribeck", 1, {"amplitude": 0.15, "velocity": 0.3})
     for seed, name in enumerate(("a", "b", "c", "d", "run"), start=1):
-        record(arm, arm.theta * np.array([1.04, 0.97, 0.9, 1.1]), secret, seed, 6.0, np.ones(1)).write(
+        record(arm, arm.theta * np.array([1.04, 0.97, 0.9, 1.1]), secret, seed, 4.0, np.ones(1)).write(
             folder / f"{name}.parquet"
         )
     return folder
