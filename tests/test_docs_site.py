@@ -18,7 +18,11 @@ PAGES = ROOT / "docs" / "effects"
 CATALOGUE = {e["name"]: e for e in effects()}
 HEADINGS = ("## Signature", "## What excites it", "## Look-alikes", "## Reading")
 #: Pairs that no log of motion tells apart; each page has to say so.
-INSEPARABLE = [("coulomb_asymmetry", "torque_offset"), ("base_tilt", "encoder_offset")]
+INSEPARABLE = [
+    ("coulomb_asymmetry", "torque_offset"),
+    ("base_tilt", "encoder_offset"),
+    ("rotor_inertia", "rotor_coupling"),
+]
 
 
 @pytest.fixture(scope="module")

@@ -35,6 +35,7 @@ THETA = {
 SIZES: dict[str, dict[str, float]] = {
     "payload": {"mass": 0.7, "distance": 0.2},
     "rotor_inertia": {"inertia": 0.05},
+    "rotor_coupling": {"inertia": -0.02},
     "joint_spring": {"k": 3.0, "q0": 0.4},
     "hardening_spring": {"cubic": 0.8, "k": 2.0, "q0": -0.3},
     "quadratic_drag": {"c": 0.3},
@@ -87,7 +88,7 @@ def found(arm: Arm, *causes: tuple[str, int | None, dict[str, float]], verdict: 
 
 
 def place(name: str, arm: Arm) -> tuple[str, int | None, dict[str, float]]:
-    whole = name in ("payload", "base_tilt")
+    whole = name in ("payload", "base_tilt", "rotor_coupling")
     return name, None if whole else arm.n_joints, SIZES[name]
 
 
@@ -236,6 +237,25 @@ def test_mjcf_has_the_dynamics_of_the_model(kind: str, name: str) -> None:
         mj.mj_inverse(model, data)
         got.append(data.qfrc_inverse.copy())
     assert worst(expected, got) < EXACT
+
+
+def test_a_coupling_of_a_remote_rotor_is_a_rotor_and_theta3() -> None:
+    mj = pytest.importorskip("mujoco")
+    arm, x = make_arm("two-link"), SIZES["rotor_coupling"]["inertia"]
+    with_rotor = correct(found(arm, place("rotor_coupling", arm), ("rotor_inertia", 2, {"inertia": 0.05})), arm)
+    model = mj.MjModel.from_xml_string(with_rotor.render("mjcf"))
+    data, M = mj.MjData(model), np.zeros((2, 2))
+    for q2 in (0.0, 1.0, 2.5):
+        data.qpos[:] = 0.3, q2
+        mj.mj_forward(model, data)
+        mj.mj_fullM(model, data, M)
+        t1, t2, t3 = arm.theta[:3]
+        coupled = t3 + t2 * math.cos(q2) + x
+        assert pytest.approx(np.array([[t1 + 2 * t2 * math.cos(q2), coupled], [coupled, t3 + 0.05]])) == M
+    for alone in ({"inertia": 0.02}, {"inertia": -0.2}):  # a negative rotor; a link 2 without inertia
+        model = correct(found(arm, ("rotor_coupling", None, alone)), arm)
+        assert "no field for rotor_coupling" in model.render("mjcf")
+        assert json.loads(model.render("json"))["effects"][0]["fields"]["mjcf"] is None
 
 
 @pytest.mark.parametrize(
@@ -407,7 +427,11 @@ def test_every_effect_has_a_field_or_is_named_as_missing(effect: str) -> None:
 
 
 def test_the_table_of_fields_and_what_is_written_agree() -> None:
-    assert {name for name, field in FIELDS.items() if field.mjcf} == {*ON_JOINT, "payload", "base_tilt"} == set(SIZES)
+    assert (
+        {name for name, field in FIELDS.items() if field.mjcf}
+        == {*ON_JOINT, "payload", "base_tilt", "rotor_coupling"}
+        == set(SIZES)
+    )
 
 
 def test_lengths_are_kept_on_request() -> None:

@@ -106,7 +106,25 @@ class Corrected:
 
     def field_of(self, cause: Cause, form: str) -> str | None:
         """Return where a cause goes in a format, None if it has no field there."""
+        if cause.effect == "rotor_coupling" and self.uncoupled() is None:
+            return field_of(cause.effect, cause.joint, form, self.arm.kind) if form == "json" else None
         return field_of(cause.effect, cause.joint, form, self.arm.kind)
+
+    def uncoupled(self) -> Corrected | None:
+        """Return a model of the same motion without inertial coupling of a remote rotor.
+
+        An inertia `x` that is added to ``M_12`` alone is theta3 larger by `x` with a rotor of joint 2 smaller by `x`. None if
+        that leaves no rotor that could be built, as for a positive coupling without a rotor inertia of joint 2.
+        """
+        x = sum(_value(cause, "inertia") for cause in self.causes if cause.effect == "rotor_coupling")
+        if not x:
+            return self
+        first, second = self.joints
+        theta = self.theta + x * (np.arange(len(self.theta)) == 2)
+        links, _ = _links(self.arm, theta)
+        if links is None or second.armature < x:
+            return None
+        return replace(self, theta=theta, links=links, joints=(first, replace(second, armature=second.armature - x)))
 
     def missing(self, form: str) -> tuple[str, ...]:
         """Return one line per cause that a format has no field for, or only in part."""
@@ -122,7 +140,8 @@ class Corrected:
 
     def remarks(self, form: str) -> tuple[str, ...]:
         """Return everything to know about the file of a format: what is missing in it, what was chosen, one line each."""
-        chosen = self.links.choices if self.links is not None and form != "toml" else ()
+        links = ((self.uncoupled() or self) if form == "mjcf" else self).links
+        chosen = links.choices if links is not None and form != "toml" else ()
         gone = (str(self.unbuildable),) if self.unbuildable is not None else ()
         force = self.links.surplus if self.links is not None and form == "urdf" else 0.0
         lost = (f"no field for the constant force of {force:.6g} N on the axis",) if force else ()

@@ -54,9 +54,7 @@ FIELDS: dict[str, Field] = {
     ),
     "joint_elasticity": Field(short="it needs a second body for the rotor, tied to the joint by a spring"),
     "backlash": Field(short="it needs a second body for the rotor, tied to the joint by a limit"),
-    "rotor_coupling": Field(
-        short="add the inertia to M_12 and M_21; MuJoCo's tendon armature adds it with the rotor's own"
-    ),
+    "rotor_coupling": Field(mjcf="joint armature of joint 2, inertial"),
     "external_pulse": Field(short="an event of one log, no property of the arm"),
 }
 """Every effect that some format has a field for, or that needs a word; any other effect has none."""

@@ -28,6 +28,7 @@ def render(model: Corrected) -> str:
     root = ET.Element("mujoco", model=model.arm.name)
     for line in header.lines(model, "mjcf"):
         root.append(header.comment(line))
+    model = model.uncoupled() or model
     step = model.arm.sample_period / math.ceil(model.arm.sample_period / _TIME_STEP - 1e-9)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     ET.SubElement(
