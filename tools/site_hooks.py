@@ -120,7 +120,8 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     if path.parent == Path("effects"):
         filled = overview() if path.stem == "index" else facts(path.stem)
         markdown = markdown.replace(MARKER, filled)
-    markdown = markdown.replace("<!-- thresholds -->", thresholds() if path.stem == "method" else "")
+    if path.stem == "method":
+        markdown = markdown.replace("<!-- thresholds -->", thresholds()).replace("<!-- figures -->", figures())
     return mended(markdown, str(path))
 
 
@@ -151,6 +152,12 @@ def mended(markdown: str, path: str) -> str:
         return f"[{text}]({up}{pages[name]})" if name in pages else text
 
     return re.sub(r"(?<!!)\[([^\]]+)\]\((?!https?:|#)([^)]+)\)", link, markdown)
+
+
+def figures() -> str:
+    """Links to pages of measured figures, as far as they are there."""
+    pages = {"trial-scores.md": "Scores of the blind trials, beside other methods", "benchmarks.md": "Costs, measured"}
+    return "\n".join(f"* [{title}]({page})." for page, title in pages.items() if (ROOT / "docs" / page).is_file())
 
 
 def thresholds() -> str:
