@@ -1,8 +1,10 @@
 """What was found goes back into a simulator: MJCF, URDF, an arm file, JSON."""
 
-from armgap.export.corrected import STAGES, Corrected, Joint, correct
+from armgap.export.corrected import Corrected
+from armgap.export.correction import STAGES, correct
 from armgap.export.errors import DiagnosisFileError, ExportError
 from armgap.export.fields import FIELDS, FORMATS, Field
+from armgap.export.joint import Joint
 from armgap.export.links import Links, physical
 from armgap.export.read import read_diagnosis
 

@@ -19,10 +19,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from armgap.export.errors import ExportError
 
-__all__ = ["Links", "physical"]
+if TYPE_CHECKING:
+    from armgap.arm import Arm
+
+__all__ = ["Links", "links_of", "physical"]
 
 #: Radius of gyration of a moving mass that never turns, m.
 _ANY_RADIUS = 0.1
@@ -94,6 +101,15 @@ def physical(
     if kind not in _KINDS:
         raise ExportError(f"arms of kind `{kind}` cannot be exported", remedy=f"kinds that can: {', '.join(_KINDS)}")
     return _KINDS[kind](gravity, [float(x) for x in theta], length, mass)
+
+
+def links_of(arm: Arm, theta: NDArray[np.float64]) -> tuple[Links | None, ExportError | None]:
+    """Return links with these base parameters and what the arm file states about links, or why there are none."""
+    length, mass = (None if x is None else x.tolist() for x in (arm.link_length, arm.link_mass))
+    try:
+        return physical(arm.kind, arm.gravity, theta[: arm.n_inertial].tolist(), length=length, mass=mass), None
+    except ExportError as error:
+        return None, error
 
 
 def _axis(gravity: float, theta: list[float], length: Sequence[float] | None, mass: Sequence[float] | None) -> Links:

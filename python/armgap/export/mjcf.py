@@ -9,7 +9,8 @@ from xml.etree import ElementTree as ET
 from armgap.export import header
 
 if TYPE_CHECKING:
-    from armgap.export.corrected import Corrected, Joint
+    from armgap.export.corrected import Corrected
+    from armgap.export.joint import Joint
 
 __all__ = ["render"]
 
