@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from armgap.arm import Arm
     from armgap.diagnosis import Diagnosis, diagnose
     from armgap.errors import ArmgapError
+    from armgap.export import Corrected, correct
     from armgap.identification import Identification, identify
     from armgap.log import Finding, Log
     from armgap.reproduction import Reproduction, reproduce
@@ -19,12 +20,14 @@ if TYPE_CHECKING:
 __all__ = [
     "Arm",
     "ArmgapError",
+    "Corrected",
     "Diagnosis",
     "Finding",
     "Identification",
     "Log",
     "Reproduction",
     "__version__",
+    "correct",
     "diagnose",
     "effects",
     "identify",
@@ -36,6 +39,8 @@ __all__ = [
 _HOMES = {
     "Arm": "armgap.arm",
     "ArmgapError": "armgap.errors",
+    "Corrected": "armgap.export",
+    "correct": "armgap.export",
     "Diagnosis": "armgap.diagnosis",
     "diagnose": "armgap.diagnosis",
     "Finding": "armgap.log",

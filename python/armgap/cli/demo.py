@@ -33,8 +33,8 @@ __all__ = ["command"]
 
 REPORT = "armgap-demo.html"
 PACKAGE = Path(__file__).resolve().parents[1]
-#: Where the sample case lies: in a checkout, or in an installed package.
-CASE_FOLDERS = (PACKAGE.parents[1] / "demo" / "case", PACKAGE / "demo_case")
+#: The sample case.
+CASE_FOLDER = PACKAGE / "demo_case"
 
 
 @click.command("demo", cls=ManyValues)
@@ -135,7 +135,7 @@ def _voice(outputs: tuple[str, str | None, bool]) -> Any:
 def _case(folder: str | None, fresh: int | None, *, quiet: bool) -> Iterator[Path]:
     """The case folder that was asked for; a fresh one lasts as long as the command."""
     if fresh is None:
-        yield Path(folder) if folder is not None else _sample_case()
+        yield Path(folder) if folder is not None else CASE_FOLDER
         return
     if folder is not None:
         raise OptionError("--case and --fresh were both given", remedy="give one of the two")
@@ -145,13 +145,6 @@ def _case(folder: str | None, fresh: int | None, *, quiet: bool) -> Iterator[Pat
         with working(f"making the case of seed {fresh}", quiet=quiet):
             made = make_demo_case(fresh).write(scratch)
         yield Path(made)
-
-
-def _sample_case() -> Path:
-    for folder in CASE_FOLDERS:
-        if (folder / "arm.toml").is_file():
-            return folder
-    raise OptionError("the sample case is not installed", remedy="run this in a checkout, or give --fresh SEED")
 
 
 def _opened(key: Key, result: Diagnosis) -> str:
