@@ -14,6 +14,7 @@ import numpy as np
 from armgap import _native
 from armgap.arm import Arm
 from armgap.errors import LogShapeError, OptionError
+from armgap.evidence import laws, plausibility
 from armgap.log import Log
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
@@ -202,7 +203,7 @@ class Diagnosis:
         """Return the verdict and the three answers (where, which, how far) as text, one line each."""
         from armgap.report import words
 
-        answers = (f"{question} {answer}" for question, answer in words.answers(self._data))
+        answers = (f"{answer.question} {answer.text}" for answer in words.answers(self._data))
         return "\n".join([words.verdict(self._data), *answers])
 
 
@@ -310,6 +311,7 @@ def diagnose(
     data = json.loads(text)
     data["arm"]["name"] = arm.name
     data["notes"] = notes + data["notes"]
+    data["laws"], data["plausibility"] = laws(data, arm, held), plausibility(data, arm)
     data["log_findings"] = [
         {"log": log.name, "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings
     ]

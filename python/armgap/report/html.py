@@ -26,8 +26,9 @@ def render_html(diagnosis: Diagnosis | dict[str, Any]) -> str:
 
     data = diagnosis if isinstance(diagnosis, dict) else diagnosis.to_dict()
     name = (data.get("arm") or {}).get("name") or "arm"
-    sections = [section(data) for section in SECTIONS]
-    return page.render(f"Diagnosis: {name}", words.verdict(data), words.answers(data), sections)
+    sections = [made for section in SECTIONS if (made := section(data)) is not None]
+    answers = [(a.question, a.headline, a.detail) for a in words.answers(data)]
+    return page.render(f"Diagnosis: {name}", words.verdict(data), answers, sections)
 
 
 def write_html(diagnosis: Diagnosis | dict[str, Any], path: str | Path) -> None:
