@@ -16,6 +16,7 @@ from armgap.arm import Arm
 from armgap.errors import LogShapeError, OptionError
 from armgap.evidence import laws, plausibility
 from armgap.log import Log
+from armgap.report.notebook import Shown
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
 
@@ -122,7 +123,7 @@ _Record = TypeVar("_Record", Value, Equivalent, Bound)
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Shown):
     """The result of `diagnose`.
 
     Attributes

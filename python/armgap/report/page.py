@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
+from armgap.report.words import Answer
+
 __all__ = ["Bar", "Cell", "Drawing", "Heat", "Section", "Table", "Tile", "Track", "render"]
 
 
@@ -52,10 +54,11 @@ class Table:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A chart (bokeh model) with a caption in the page's own text."""
+    """A chart (bokeh model) with a caption in the page's own text; where no chart can be drawn, a table says the same."""
 
     caption: str
     chart: Any
+    table: Table | None = None
 
 
 @dataclass(frozen=True)
@@ -116,14 +119,14 @@ class _Part:
     tables: Sequence[Table]
 
 
-def render(title: str, lead: str, answers: Sequence[tuple[str, ...]], sections: Sequence[Section]) -> str:
+def render(title: str, lead: str, answers: Sequence[Answer], sections: Sequence[Section]) -> str:
     """Return a page as HTML.
 
     Parameters
     ----------
     title, lead : str
         Heading and the sentence below it.
-    answers : sequence of (question, answer) or (question, headline, detail)
+    answers : sequence of Answer
         The first screen.
     sections : sequence of Section
         What follows; the first one's pictures belong to the first screen.

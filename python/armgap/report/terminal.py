@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from armgap.diagnosis import Diagnosis
 
-__all__ = ["gap_table", "summary_table"]
+__all__ = ["answer_lines", "gap_table", "summary_table"]
 
 Data = dict[str, Any]
 
@@ -28,15 +28,17 @@ def summary_table(diagnosis: Diagnosis | Data) -> RenderableType:
     data = diagnosis if isinstance(diagnosis, dict) else diagnosis.to_dict()
     parts: list[RenderableType] = [Text(words.verdict(data), style="bold reverse"), Text()]
     for answer in words.answers(data):
-        parts += _answer(answer)
+        parts += answer_lines(answer)
     return Group(*parts, gap_table(data))
 
 
-def _answer(answer: words.Answer) -> list[RenderableType]:
+def answer_lines(answer: words.Answer) -> list[RenderableType]:
+    """A question with its answer, and an empty line."""
     from rich.padding import Padding
     from rich.text import Text
 
-    lines: list[RenderableType] = [Text.assemble((answer.question, "dim"), " ", (answer.headline, "bold"))]
+    lines: list[RenderableType] = [Text(answer.question, style="dim")]
+    lines.append(Padding(Text(answer.headline, style="bold"), (0, 0, 0, 2)))
     if answer.detail:
         lines.append(Padding(Text(answer.detail), (0, 0, 0, 2)))
     return [*lines, Text()]
@@ -55,7 +57,7 @@ def gap_table(data: Data) -> Table:
         title_justify="left",
     )
     table.add_column("joint")
-    columns = [("arm file", "before"), ("re-estimated", "refit"), ("with causes", "after"), ("noise alone", "floor")]
+    columns = [("arm file", "before"), ("re-estimated", "refit"), ("with causes", "after"), ("noise", "floor")]
     shown = [(name, key) for name, key in columns if key != "after" or data.get("causes")]
     for name, _ in shown:
         table.add_column(name, justify="right")

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from armgap.identification import SCHEMES, Identification
-from armgap.report import charts, page
+from armgap.report import Document, charts
+from armgap.report.html import page_of
 from armgap.report.page import Section
+from armgap.report.words import Answer
 from armgap.reproduction.experiment import LADDER, PAPER_ESTIMATES, PAPER_MEASURED, Reproduction
 from armgap.reproduction.findings import percent
 
-__all__ = ["render", "table_two"]
+__all__ = ["document", "render", "table_two"]
 
 # An estimate's first samples are far off; the pictures show what lies within so many times the true value.
 SPAN = 1.6
@@ -149,7 +151,14 @@ def _sections(r: Reproduction) -> list[Section]:
     ]
 
 
+def document(r: Reproduction) -> Document:
+    """Return the report."""
+    lead = "Reyes and Kelly 1997 on a simulated arm of Table I: asymmetric Coulomb friction, encoder counts, backward differences."
+    return Document(
+        "The seed reproduced", lead, [Answer(title, "", text) for title, text in r.findings()], _sections(r)
+    )
+
+
 def render(r: Reproduction) -> str:
     """Return the report as one HTML page that loads nothing from elsewhere."""
-    lead = "Reyes and Kelly 1997 on a simulated arm of Table I: asymmetric Coulomb friction, encoder counts, backward differences."
-    return page.render("The seed reproduced", lead, r.findings(), _sections(r))
+    return page_of(document(r))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from armgap.report import charts
-from armgap.report.page import Drawing, Heat, Section, Table, Tile
+from armgap.report.page import Bar, Cell, Drawing, Heat, Section, Table, Tile
 from armgap.report.sections.steps import Data, length_unit, steps, torque_unit
 from armgap.report.words import figure, variable_text
 
@@ -29,7 +29,20 @@ def first_picture(data: Data) -> Section:
     key = "before" if data["verdict"] == "parameters" else "refit"
     name = {"before": "arm file's model", "refit": "re-estimated model"}[key]
     what = f"Where: torque the {name} lacks [RMS, {torque_unit(data)}], low values of each variable on the left"
-    return Section("", figures=[Drawing(caption, chart)], heats=_heats(data, [(what, key)]))
+    return Section("", figures=[Drawing(caption, chart, _bars(data))], heats=_heats(data, [(what, key)]))
+
+
+def _bars(data: Data) -> Table:
+    """The first chart as a table with bars of text, longest for the largest error."""
+    gap = data["gap"]
+    shown = [*((label, key) for label, key, _ in steps(data)), ("sensor noise alone", "floor")]
+    top = max((v for _, key in shown for v in gap[key]), default=0.0) or 1.0
+    rows: list[tuple[Cell, ...]] = [
+        (f"joint {j + 1}", label, Bar(gap[key][j] / top, figure(1e3 * gap[key][j]), charts.BEFORE))
+        for j in range(len(gap["before"]))
+        for label, key in shown
+    ]
+    return Table(("joint", "model", f"RMS error over {gap['horizon_s']:g} s [m{length_unit(data)}]"), rows)
 
 
 def _heats(data: Data, wanted: Sequence[tuple[str, str]]) -> list[Heat]:
