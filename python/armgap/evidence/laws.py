@@ -8,8 +8,9 @@ over ranges of the variable that the cause depends on: speed for friction, posit
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,7 @@ class Point:
     """Samples that evidence is taken from; arrays of shape (n, n_joints) unless noted."""
 
     t: Array  # (n,)
+    window: Array  # (n,), number of the window
     q: Array
     dq: Array
     ddq: Array
@@ -139,7 +141,7 @@ def _law(model: Hypothesis, cause: Placed, logs: Sequence[Log]) -> dict[str, Any
         "torque_unit": "N m" if rotary else "N",
         "folded": variable.folded,
         "at_rest": float(f"{1 - np.mean(moves):.3g}"),
-        "bins": (bins := _bins(x, y, law)),
+        "bins": (bins := _bins(x, y, law, points.window[moves])),
         "explained": _explained(bins),
     }
     pick = np.linspace(0, len(x) - 1, min(POINTS, len(x))).astype(int)
@@ -164,15 +166,21 @@ def _points(model: Hypothesis, cause: Placed, logs: Sequence[Log]) -> tuple[Poin
     failed = 0
     whole = sum(log.duration for log in logs)
     for log in logs:
-        scene = _Scene(model, cause, log)
-        for first in scene.starts(max(1, round(WINDOWS * log.duration / whole))):
+        wanted = max(1, round(WINDOWS * log.duration / whole))
+        try:
+            scene = _Scene(model, cause, log)
+        except ValueError:  # the simulator gives up
+            failed += wanted
+            continue
+        for first in scene.starts(wanted):
             try:
                 found.append(scene.window(first))
             except ValueError:
                 failed += 1
     if not found:
         return None, 0, failed
-    joined = {name: np.concatenate([getattr(p, name) for p in found]) for name in Point.__dataclass_fields__}
+    numbered = [replace(p, window=np.full(len(p.t), float(i))) for i, p in enumerate(found)]
+    joined = {f.name: np.concatenate([getattr(p, f.name) for p in numbered]) for f in fields(Point)}
     return Point(**joined), len(found), failed
 
 
@@ -189,9 +197,10 @@ class _Scene:
         self.rate = np.gradient(log.tau, log.t, axis=0)
 
     def starts(self, wanted: int) -> list[int]:
-        length = 6 * self.half
-        last = len(self.log) - length - 1
-        return sorted({int(k) for k in np.linspace(0, last, wanted)}) if last > 0 else []
+        """First rows of windows that do not overlap in the rows that evidence is taken from, spread over the log."""
+        last = len(self.log) - 6 * self.half - 1
+        fitting = last // (4 * self.half + 2) + 1
+        return [int(k) for k in np.linspace(0, last, min(wanted, fitting))] if last >= 0 else []
 
     def window(self, first: int) -> Point:
         rows = slice(first, first + 6 * self.half + 1)
@@ -204,7 +213,15 @@ class _Scene:
         n = log.n_joints
         lack, law = (np.einsum("kij,kj->ki", inertia, curvature[:, s : s + n]) for s in (0, n))
         return Point(
-            log.t[at] - log.t[0], log.q[at], self.dq[at], curvature[:, 2 * n :], log.tau[at], self.rate[at], lack, law
+            t=log.t[at] - log.t[0],
+            window=np.zeros(len(at)),
+            q=log.q[at],
+            dq=self.dq[at],
+            ddq=curvature[:, 2 * n :],
+            tau=log.tau[at],
+            rate=self.rate[at],
+            lack=lack,
+            law=law,
         )
 
 
@@ -236,7 +253,7 @@ def _curvature(t: Array, x: Array, at: NDArray[np.intp]) -> Array:
     return np.asarray(2.0 * np.einsum("kr,krc->kc", fit[:, 2, :], x[near]) / span**2)
 
 
-def _bins(x: Array, y: Array, law: Array) -> dict[str, list[float]]:
+def _bins(x: Array, y: Array, law: Array, window: Array) -> dict[str, list[float]]:
     """Means over ranges of the variable, with the 95 % half width of each mean.
 
     The ranges lie halfway between equally wide and equally full ones; sparse ones are left out, and their samples stay
@@ -246,10 +263,26 @@ def _bins(x: Array, y: Array, law: Array) -> dict[str, list[float]]:
     share = np.linspace(0.0, 1.0, BINS + 1)
     edges = (low + (high - low) * share + np.quantile(np.clip(x, low, high), share)) / 2
     owner = np.digitize(x, edges[1:-1])
-    parts = [p for b in range(BINS) if len(p := np.flatnonzero(owner == b)) >= FEWEST]
+    parts = [p for b in range(BINS) if _enough(p := np.flatnonzero(owner == b), window)]
     means = [_short(float(np.mean(v[p])) for p in parts) for v in (x, y, law)]
-    error = _short(float(NORMAL_95 * np.std(y[p], ddof=1) / np.sqrt(len(p))) for p in parts)
+    error = _short(_half_width(y[p] - law[p], window[p]) for p in parts)
     return {"x": means[0], "mean": means[1], "error": error, "law": means[2]}
+
+
+def _enough(part: NDArray[np.intp], window: Array) -> bool:
+    return len(part) >= FEWEST and len(np.unique(window[part])) > 1
+
+
+def _half_width(rest: Array, window: Array) -> float:
+    """95 % half width of a mean whose samples are independent from window to window only.
+
+    Neighbours within a window share the measurement noise, so each window counts once (the sandwich estimate for
+    clusters). What the law says varies within a range and is taken off first.
+    """
+    _, owner = np.unique(window, return_inverse=True)
+    sums = np.bincount(owner, rest - rest.mean())
+    groups = len(sums)
+    return float(NORMAL_95 * math.sqrt(groups / (groups - 1) * np.sum(sums**2)) / len(rest))
 
 
 def _explained(bins: dict[str, list[float]]) -> float:

@@ -240,7 +240,8 @@ def _how_far(data: Data) -> tuple[str, str]:
     joints = " per joint" if len(gap["before"]) > 1 else ""
     detail = (
         f"RMS error{joints} of predictions over {gap['horizon_s']:g} s on held-out motion. Re-estimating the arm file's own values alone leaves "
-        f"{millis(gap['refit'], unit)}, sensor noise {millis(gap['floor'], unit)}. "
-        f"Share closed: {percent(gap['closed'])}, 95\N{NO-BREAK SPACE}% interval {percent(low)} to {percent(high)}."
+        f"{millis(gap['refit'], unit)}, sensor noise {millis(gap['floor'], unit)}."
     )
+    if data["verdict"] != "none":
+        detail += f" Share closed: {percent(gap['closed'])}, 95\N{NO-BREAK SPACE}% interval {percent(low)} to {percent(high)}."
     return headline, detail
