@@ -185,7 +185,22 @@ def test_position_and_error_zoom_together(opened) -> None:
     page.wait_for_function(f"(n) => ({spans})() === n + 1", arg=narrow, timeout=PATIENCE_MS)
 
 
-def test_paper_takes_every_section(opened, tmp_path) -> None:
+def test_paper_takes_drawings_on_white_and_the_screen_its_charts_back(opened) -> None:
+    page = opened("effect", scheme="dark").page
+    ink = "() => getComputedStyle(document.documentElement).getPropertyValue('--ink').trim()"
+    dark, charts = page.evaluate(ink), page.locator("figure [data-root-id]").count()
+    page.evaluate("() => dispatchEvent(new Event('beforeprint'))")
+    drawings = page.locator("figure > svg.drawing")
+    assert drawings.count() == charts
+    light = page.evaluate(ink)
+    assert light != dark
+    assert light in drawings.first.inner_html(), "axes are drawn in the ink of paper"
+    page.evaluate("() => dispatchEvent(new Event('afterprint'))")
+    assert drawings.count() == 0
+    assert page.evaluate(ink) == dark
+
+
+def test_paper_takes_every_section(opened) -> None:
     page = opened("effect", scheme="dark").page
     page.emulate_media(media="print", color_scheme="dark")
     ground = page.evaluate("() => getComputedStyle(document.body).backgroundColor")

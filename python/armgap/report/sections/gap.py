@@ -15,6 +15,8 @@ __all__ = ["first_picture", "gap_map"]
 
 #: Below this a tile shows one digit, to fit on a phone.
 SMALL = 0.01
+#: Where there is no gap, the map shows noise, and is this many times paler.
+PALE = 5.0
 
 
 def first_picture(data: Data) -> Section:
@@ -53,6 +55,7 @@ def _heats(data: Data, wanted: Sequence[tuple[str, str]]) -> list[Heat]:
     weight = _weights(data)
     order = sorted(regimes, key=lambda r: -weight[r["joint"]][1])
     top = max(v * weight[r["joint"]][0] for r in regimes for _, key in wanted for v in r[key]) or 1.0
+    top *= PALE if data["verdict"] == "none" else 1.0
     return [
         Heat(
             caption,
