@@ -74,6 +74,19 @@ def test_a_look_alike_named_later_is_the_same_cause_under_another_name() -> None
     assert [(c.effect, c.status) for c in result.causes] == [("stribeck", "renamed"), ("backlash", "new")]
 
 
+def test_every_push_of_a_log_is_kept() -> None:
+    def pushed(data: dict) -> None:
+        push = data["causes"][0] | {"effect": "external_pulse", "log": "run"}
+        data["causes"] = [copy.deepcopy(push) for _ in range(3)]
+
+    def once(data: dict) -> None:
+        pushed(data)
+        del data["causes"][1:]
+
+    result = compare(changed(cases.named(), pushed), changed(cases.named(), once))
+    assert [c.status for c in result.causes] == ["unchanged", "undecided", "undecided"]
+
+
 @pytest.mark.parametrize(("factor", "status"), [(0.5, "smaller"), (2.0, "larger"), (1.001, "unchanged")])
 def test_sizes_are_compared_against_their_uncertainty(factor, status) -> None:
     def resized(data: dict) -> None:

@@ -8,11 +8,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from armgap.diagnosis import Diagnosis, RuledOut, Value
+from armgap.diagnosis import Cause, Diagnosis, RuledOut, Value
 from armgap.errors import OptionError
 
 __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare", "read_diagnosis"]
 
+_Key = tuple[str, int | None, str | None, int]
 SCHEMA = "armgap.diagnosis/1"
 #: Factors of the gap above the sensors' floor at which it counts as smaller or larger: other motions alone vary it by less.
 SMALLER, LARGER = 0.8, 1.25
@@ -230,22 +231,33 @@ def _outcome(factor: float | None, after: Diagnosis) -> str:
 
 
 def _causes(before: Diagnosis, after: Diagnosis) -> tuple[CauseChange, ...]:
-    old = {(c.effect, c.joint): c for c in before.causes}
-    new = {(c.effect, c.joint): c for c in after.causes}
+    old, new = _placed(before), _placed(after)
     changes = []
-    for place, cause in old.items():
-        if place in new:
-            status, why = _resized(cause.parameters, new[place].parameters)
-            changes.append(CauseChange(*place, status, cause.parameters, new[place].parameters, why))
+    for key, cause in old.items():
+        place = (cause.effect, cause.joint)
+        if key in new:
+            status, why = _resized(cause.parameters, new[key].parameters)
+            changes.append(CauseChange(*place, status, cause.parameters, new[key].parameters, why))
         else:
-            alike = next((p for p in new if p in {(e.effect, e.joint) for e in cause.equivalents}), None)
+            named = {(c.effect, c.joint) for c in after.causes}
+            alike = next(((e.effect, e.joint) for e in cause.equivalents if (e.effect, e.joint) in named), None)
             status, why = _vanished(place, after, alike)
             changes.append(CauseChange(*place, status, cause.parameters, None, why))
-    for place, cause in new.items():
-        if place not in old:
+    for key, cause in new.items():
+        if key not in old:
+            place = (cause.effect, cause.joint)
             earlier = next((r for r in before.ruled_out if (r.effect, r.joint) == place), None)
             changes.append(CauseChange(*place, "new", None, cause.parameters, _earlier(earlier)))
     return tuple(changes)
+
+
+def _placed(diagnosis: Diagnosis) -> dict[_Key, Cause]:
+    """Causes by effect, joint and log; of several pushes in one log, by their order."""
+    found: dict[_Key, Cause] = {}
+    for cause in diagnosis.causes:
+        number = sum(key[:3] == (cause.effect, cause.joint, cause.log) for key in found)
+        found[cause.effect, cause.joint, cause.log, number] = cause
+    return found
 
 
 def _vanished(place: tuple[str, int | None], after: Diagnosis, alike: tuple[str, int | None] | None) -> tuple[str, str]:

@@ -320,7 +320,7 @@ def diagnose(
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = notes + data["notes"]
-    data["laws"], data["plausibility"] = laws(data, arm, held), plausibility(data, arm)
+    data["laws"], data["plausibility"] = laws(data, arm, training, held), plausibility(data, arm)
     data["log_findings"] = [
         {"log": log.name, "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +15,28 @@ from armgap.arm import Arm
 __all__ = ["Hypothesis", "Placed"]
 
 Array = NDArray[np.float64]
-Placed = tuple[str, int | None, dict[str, float]]
 
 #: Largest change of a position when the simulator halves its steps, rad or m.
-TOLERANCE = 1e-7
+TOLERANCE = 3e-6
 #: A motion this short is as good as its first acceleration, s.
 INSTANT = 1e-6
 #: Effects that change the inertia matrix.
-ON_INERTIA = ("rotor_inertia", "payload")
+ON_INERTIA = ("rotor_inertia", "rotor_coupling", "payload")
 #: Points of the table that turns measured positions into true ones.
 TABLE = 4001
+
+
+class Placed(NamedTuple):
+    """An effect with its values; `log` names the only log that it acts in."""
+
+    effect: str
+    joint: int | None
+    parameters: dict[str, float]
+    log: str | None = None
+
+    def on(self, joint: int | None) -> tuple[str, int | None, dict[str, float]]:
+        """The effect as the compiled simulator takes it, on some joint."""
+        return self.effect, joint, self.parameters
 
 
 @dataclass(frozen=True)
@@ -37,7 +49,7 @@ class Hypothesis:
         Kind, gravity and lengths.
     theta : tuple of float
         Parameters [SI].
-    effects : tuple of (name, joint, parameters)
+    effects : tuple of Placed
         Effects with their values.
     smoothing : float
         Width of the smoothed sign of friction [rad/s]; 0 is dry friction.
@@ -53,7 +65,7 @@ class Hypothesis:
         """Return the model with causes of a diagnosis."""
         found = data["parameters"]["with_causes"]
         effects = tuple(
-            (c["effect"], c["joint"], {name: p["value"] for name, p in c["parameters"].items()})
+            Placed(c["effect"], c["joint"], {name: p["value"] for name, p in c["parameters"].items()}, c.get("log"))
             for c in data.get("causes") or []
         )
         smoothing = float((data.get("options") or {}).get("friction_smoothing") or 0.0)
@@ -74,7 +86,7 @@ class Hypothesis:
         arm = self.arm
         lengths = None if arm.link_length is None else arm.link_length.tolist()
         t, tau, q0, dq0 = (np.ascontiguousarray(x, dtype=np.float64) for x in (t, tau, q0, dq0))
-        effects, theta = list(self.effects), list(self.theta)
+        effects, theta = [e.on(e.joint) for e in self.effects], list(self.theta)
         return _native.simulate(
             arm.kind, arm.gravity, lengths, theta, t, tau, q0, dq0, effects, TOLERANCE, self.smoothing
         )
@@ -87,7 +99,7 @@ class Hypothesis:
     def frictionless(self) -> Hypothesis:
         """Return the same arm without friction, and with no effects but those on its inertia."""
         b = self.arm.n_inertial
-        inertial = tuple(e for e in self.effects if e[0] in ON_INERTIA)
+        inertial = tuple(e for e in self.effects if e.effect in ON_INERTIA)
         return replace(self, theta=self.theta[:b] + (0.0,) * (len(self.theta) - b), effects=inertial, smoothing=0.0)
 
     def compliance(self, q: Array) -> Array:
@@ -103,8 +115,8 @@ def delivered(t: Array, tau: Array, effects: Sequence[Placed]) -> Array:
     Each joint's command drives a unit mass that has these effects and no others: its acceleration is the torque.
     """
     found = np.array(tau, dtype=np.float64)
-    for joint in {e[1] for e in effects if e[1] is not None}:
-        mine = [(name, 1, values) for name, j, values in effects if j == joint]
+    for joint in {e.joint for e in effects if e.joint is not None}:
+        mine = [e.on(1) for e in effects if e.joint == joint]
         column = np.ascontiguousarray(tau[:, [joint - 1]])
         start = np.zeros(1)
         _, speed = _native.simulate("axis", 0.0, None, [1.0, 0.0, 0.0, 0.0], t, column, start, start, mine, 1e-3, 0.0)
@@ -118,8 +130,8 @@ def true_positions(q: Array, effects: Sequence[Placed]) -> Array:
     A free unit inertia sweeps the range at constant speed; what its encoder shows is the table to look up.
     """
     found = np.array(q, dtype=np.float64)
-    for joint in {e[1] for e in effects if e[1] is not None}:
-        mine = [(name, 1, values) for name, j, values in effects if j == joint]
+    for joint in {e.joint for e in effects if e.joint is not None}:
+        mine = [e.on(1) for e in effects if e.joint == joint]
         low, high = found[:, joint - 1].min() - 1.0, found[:, joint - 1].max() + 1.0
         t = np.linspace(0.0, 1.0, TABLE)
         shown, _ = _native.simulate(

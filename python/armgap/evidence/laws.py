@@ -27,10 +27,12 @@ __all__ = ["laws"]
 WINDOWS = 160
 #: Half width of the cubic whose curvature is taken: samples at least, and s at least.
 HALF_SAMPLES, HALF_S = 8, 0.016
-#: Ranges of the variable, samples in each at least, and points drawn.
-BINS, FEWEST, POINTS = 24, 4, 400
+#: Ranges of the variable, samples in each at least, samples altogether at least, and points drawn.
+BINS, FEWEST, ENOUGH, POINTS = 24, 4, 40, 400
 #: A joint slower than this part of its fast motion is taken to be at rest, where dry friction hides every torque.
 REST = 0.01
+#: An event is looked at for so many times its duration before and after it, and its duration taken for so many s at least.
+EVENT, EVENT_S = 4.0, 0.1
 #: Two-sided 95 % of the normal distribution.
 NORMAL_95 = 1.96
 
@@ -81,6 +83,8 @@ VARIABLES = {
     "torque_offset": _SPEED,
     "stribeck": _SPEED,
     "quadratic_drag": _SPEED,
+    "viscous_asymmetry": _SPEED,
+    "gear_efficiency": _TORQUE,
     "position_dependent_friction": _ALONG,
     "friction_warmup": Variable("t", ("s", "s"), lambda x, j, p: x.t, folded=True),
     "torque_gain": _TORQUE,
@@ -90,13 +94,15 @@ VARIABLES = {
     "torque_dead_zone": _TORQUE,
     "torque_ripple": _CYCLE,
     "joint_spring": _POSITION,
+    "hardening_spring": _POSITION,
+    "external_pulse": Variable("t", ("s", "s"), lambda x, j, p: x.t),
     "contact": _POSITION,
     "rotor_inertia": Variable("ddq{}", ("rad/s^2", "m/s^2"), lambda x, j, p: x.ddq[:, j]),
 }
 """The variable of each effect; others are drawn over the torque that their own law adds."""
 
 
-def laws(data: dict[str, Any], arm: Arm, logs: Sequence[Log]) -> list[dict[str, Any]]:
+def laws(data: dict[str, Any], arm: Arm, training: Sequence[Log], held: Sequence[Log]) -> list[dict[str, Any]]:
     """Return, for each cause of a diagnosis, its law and the data it is drawn through.
 
     Parameters
@@ -105,31 +111,47 @@ def laws(data: dict[str, Any], arm: Arm, logs: Sequence[Log]) -> list[dict[str, 
         JSON object of the diagnosis.
     arm : Arm
         Nominal model.
-    logs : sequence of Log
-        Held-out logs.
+    training, held : sequence of Log
+        Logs that were learnt from and judged on. Evidence is taken from the held-out ones; of a cause that belongs to one log,
+        from that log.
 
     Returns
     -------
     list of dict
-        One per cause: ``effect``, ``joint``, ``windows``, and ``failed``, windows that could not be simulated; where samples
+        One per cause: ``effect``, ``joint``, ``windows``, ``failed``, windows that could not be simulated, and ``why``; where samples
         remain, ``shown_joint``, ``variable``, ``unit``, ``torque_unit``, ``folded``, ``at_rest`` (share of samples left out),
         ``points`` (``x``, ``y``), ``bins`` (``x``, ``mean``, ``error`` at 95 %, ``law``) and ``explained``.
     """
     model = Hypothesis.of(data, arm)
-    return [_law(model, cause, logs) for cause in model.effects]
+    return [_law(model, cause, _witnesses(cause, training, held)) for cause in model.effects]
+
+
+def _witnesses(cause: Placed, training: Sequence[Log], held: Sequence[Log]) -> list[Log]:
+    return list(held) if cause.log is None else [log for log in (*training, *held) if _is_in(log, cause)]
+
+
+def _is_in(log: Log, effect: Placed) -> bool:
+    """Whether an effect acts in a log, or in the log that this one is a part of."""
+    return effect.log is None or log.name in (effect.log, f"{effect.log} (first part)", f"{effect.log} (last part)")
 
 
 def _law(model: Hypothesis, cause: Placed, logs: Sequence[Log]) -> dict[str, Any]:
-    effect, joint, values = cause
-    points, windows, failed = _points(model, cause, logs)
-    entry: dict[str, Any] = {"effect": effect, "joint": joint, "windows": windows, "failed": failed}
+    effect, joint, values = cause[:3]
+    points, windows, failures = _points(model, cause, logs)
+    entry: dict[str, Any] = {"effect": effect, "joint": joint, "windows": windows, "failed": len(failures)}
+    if failures:
+        entry["why"] = failures[0]
+    if cause.log is not None:
+        entry["log"] = cause.log
     if points is None:
         return entry
     shown = joint - 1 if joint is not None else _most_moved(points)
     moves = _moves(points.dq[:, shown])
-    if np.count_nonzero(moves) < BINS * FEWEST:
-        return entry
+    if np.count_nonzero(moves) < ENOUGH:
+        return entry  # too few samples to say anything
     variable = VARIABLES.get(effect, _OWN)
+    if not np.any(points.law[moves, shown]):
+        return entry  # the law adds nothing to these logs
     x = variable.value(points, shown, values)[moves]
     sign = np.sign(points.dq[moves, shown]) if variable.folded else np.ones(len(x))
     y, law = sign * points.lack[moves, shown], sign * points.law[moves, shown]
@@ -160,23 +182,23 @@ def _most_moved(points: Point) -> int:
     return int(np.argmax(np.sqrt(np.mean(points.law**2, axis=0)) / scale))
 
 
-def _points(model: Hypothesis, cause: Placed, logs: Sequence[Log]) -> tuple[Point | None, int, int]:
-    """Evidence from windows spread over all logs; how many, and how many could not be simulated."""
+def _points(model: Hypothesis, cause: Placed, logs: Sequence[Log]) -> tuple[Point | None, int, list[str]]:
+    """Evidence from windows spread over all logs; how many, and why others could not be simulated."""
     found: list[Point] = []
-    failed = 0
+    failed: list[str] = []
     whole = sum(log.duration for log in logs)
     for log in logs:
         wanted = max(1, round(WINDOWS * log.duration / whole))
         try:
             scene = _Scene(model, cause, log)
-        except ValueError:  # the simulator gives up
-            failed += wanted
+        except ValueError as error:
+            failed += wanted * [str(error)]
             continue
         for first in scene.starts(wanted):
             try:
                 found.append(scene.window(first))
-            except ValueError:
-                failed += 1
+            except ValueError as error:
+                failed.append(str(error))
     if not found:
         return None, 0, failed
     numbered = [replace(p, window=np.full(len(p.t), float(i))) for i, p in enumerate(found)]
@@ -188,32 +210,34 @@ class _Scene:
     """One log with and without one cause."""
 
     def __init__(self, model: Hypothesis, cause: Placed, log: Log) -> None:
-        rest = [e for e in model.effects if e is not cause]
+        rest = [e for e in model.effects if e is not cause and _is_in(log, e)]
         self.half = max(HALF_SAMPLES, round(HALF_S / log.sample_period))
         self.log = log
         self.without = _Side(model, rest, log, self.half)
         self.full = _Side(model, [*rest, cause], log, self.half)
         self.dq = self.full.dq
         self.rate = np.gradient(log.tau, log.t, axis=0)
+        self.around = _around(cause, log)
 
     def starts(self, wanted: int) -> list[int]:
         """First rows of windows that do not overlap in the rows that evidence is taken from, spread over the log."""
-        last = len(self.log) - 6 * self.half - 1
-        fitting = last // (4 * self.half + 2) + 1
-        return [int(k) for k in np.linspace(0, last, min(wanted, fitting))] if last >= 0 else []
+        first, last = self.around
+        last -= 6 * self.half + 1
+        fitting = (last - first) // (4 * self.half + 1) + 1
+        return [int(k) for k in np.linspace(first, last, min(wanted, fitting))] if last >= first else []
 
     def window(self, first: int) -> Point:
         rows = slice(first, first + 6 * self.half + 1)
         log = self.log
         without, full = self.without.predict(rows), self.full.predict(rows)
-        inner = np.arange(self.half, 5 * self.half + 1, 2)
+        inner = np.arange(self.half, 5 * self.half + 1)
         at = first + inner
         inertia = np.linalg.inv([self.without.model.compliance(q) for q in self.full.q[at]])
         curvature = _curvature(log.t[rows], np.hstack([log.q[rows] - without, full - without, log.q[rows]]), inner)
         n = log.n_joints
         lack, law = (np.einsum("kij,kj->ki", inertia, curvature[:, s : s + n]) for s in (0, n))
         return Point(
-            t=log.t[at] - log.t[0],
+            t=log.t[at],
             window=np.zeros(len(at)),
             q=log.q[at],
             dq=self.dq[at],
@@ -225,21 +249,29 @@ class _Scene:
         )
 
 
+def _around(cause: Placed, log: Log) -> tuple[int, int]:
+    """Rows to look at: all, or those around an event."""
+    if "time" not in cause.parameters:
+        return 0, len(log)
+    middle, reach = cause.parameters["time"], EVENT * max(cause.parameters["duration"], EVENT_S)
+    first, last = np.searchsorted(log.t, [middle - reach, middle + reach])
+    return int(first), int(last)
+
+
 class _Side:
     """A log as one model sees it: the torque that arrives, and true positions and velocities."""
 
     def __init__(self, model: Hypothesis, effects: Sequence[Placed], log: Log, half: int) -> None:
-        commanded = [e for e in effects if e[0] in ON_COMMAND]
-        self.model = model.only([e for e in effects if e[0] not in ON_COMMAND])
+        commanded = [e for e in effects if e.effect in ON_COMMAND]
+        self.model = model.only([e for e in effects if e.effect not in ON_COMMAND])
         self.t = log.t
         self.tau = delivered(log.t, log.tau, commanded)
-        self.q = true_positions(log.q, [e for e in effects if e[0] in ON_ENCODER])
+        self.q = true_positions(log.q, [e for e in effects if e.effect in ON_ENCODER])
         self.dq = _native.velocity(np.ascontiguousarray(log.t), np.ascontiguousarray(self.q), "local-cubic", half)
 
     def predict(self, rows: slice) -> Array:
         """Positions as the encoders show them, shape (n_rows, n_joints)."""
         t = self.t[rows]
-        # Effects that know the time count it from the log's start.
         return self.model.run(t, self.tau[rows], self.q[rows.start], self.dq[rows.start])[0]
 
 
@@ -260,21 +292,20 @@ def _bins(x: Array, y: Array, law: Array, window: Array) -> dict[str, list[float
     in the cloud of points.
     """
     low, high = np.quantile(x, [0.005, 0.995])
-    share = np.linspace(0.0, 1.0, BINS + 1)
+    bins = min(BINS, len(x) // FEWEST)
+    share = np.linspace(0.0, 1.0, bins + 1)
     edges = (low + (high - low) * share + np.quantile(np.clip(x, low, high), share)) / 2
     owner = np.digitize(x, edges[1:-1])
-    parts = [p for b in range(BINS) if _enough(p := np.flatnonzero(owner == b), window)]
+    parts = [p for b in range(bins) if len(p := np.flatnonzero(owner == b)) >= FEWEST]
     means = [_short(float(np.mean(v[p])) for p in parts) for v in (x, y, law)]
-    error = _short(_half_width(y[p] - law[p], window[p]) for p in parts)
+    rest = y - law
+    alone = float(np.std(rest))
+    error = _short(NORMAL_95 * (_cluster_sigma(rest[p], window[p]) or alone) for p in parts)
     return {"x": means[0], "mean": means[1], "error": error, "law": means[2]}
 
 
-def _enough(part: NDArray[np.intp], window: Array) -> bool:
-    return len(part) >= FEWEST and len(np.unique(window[part])) > 1
-
-
-def _half_width(rest: Array, window: Array) -> float:
-    """95 % half width of a mean whose samples are independent from window to window only.
+def _cluster_sigma(rest: Array, window: Array) -> float | None:
+    """Standard deviation of a mean whose samples are independent from window to window only; None from one window.
 
     Neighbours within a window share the measurement noise, so each window counts once (the sandwich estimate for
     clusters). What the law says varies within a range and is taken off first.
@@ -282,7 +313,9 @@ def _half_width(rest: Array, window: Array) -> float:
     _, owner = np.unique(window, return_inverse=True)
     sums = np.bincount(owner, rest - rest.mean())
     groups = len(sums)
-    return float(NORMAL_95 * math.sqrt(groups / (groups - 1) * np.sum(sums**2)) / len(rest))
+    if groups < 2:
+        return None
+    return math.sqrt(groups / (groups - 1) * float(np.sum(sums**2))) / len(rest)
 
 
 def _explained(bins: dict[str, list[float]]) -> float:

@@ -189,8 +189,9 @@ def _ranking(data: Data, ax: Axes) -> Axes:
 
 
 def _law(data: Data, cause: _Finding, ax: Axes) -> Axes:
-    place = (cause.effect, cause.joint)
-    law = next((x for x in data.get("laws") or [] if (x["effect"], x["joint"]) == place and x.get("bins")), None)
+    place = (cause.effect, cause.joint, getattr(cause, "log", None))
+    drawn = [x for x in data.get("laws") or [] if x.get("bins")]
+    law = next((x for x in drawn if (x["effect"], x["joint"], x.get("log")) == place), None)
     if law is None:
         raise OptionError(f"there is no evidence on `{cause.effect}` to draw", remedy="give one of the named causes")
     bins, points = law["bins"], law["points"]

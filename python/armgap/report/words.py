@@ -135,8 +135,9 @@ def millis(values: Sequence[float], unit: str) -> str:
 
 
 def named(effect: Data) -> str:
-    """An effect with its place."""
-    return f"{title(effect['effect'])}, {joint_text(effect['joint'])}"
+    """An effect with its place, and its log if it belongs to one."""
+    place = f"{title(effect['effect'])}, {joint_text(effect['joint'])}"
+    return f"{place}, in {effect['log']}" if effect.get("log") else place
 
 
 def doubtful(data: Data) -> bool:

@@ -48,7 +48,7 @@ def _caption(law: Data) -> str:
 
 def _verdict(law: Data) -> str:
     share = law["explained"]
-    failed = f"; {law['failed']} windows could not be simulated" if law["failed"] else ""
+    failed = f"; {law['failed']} windows could not be simulated ({law.get('why', '')})" if law["failed"] else ""
     if share > ALL:
         return f"the law explains all of what the ranges' means show{failed}."
     if share <= 0:
