@@ -116,7 +116,15 @@ def test_an_impossible_arm_is_pointed_out() -> None:
 
 @pytest.mark.parametrize(
     ("share", "text"),
-    [(0.5, "50 %"), (0.994, "99.40 %"), (0.99999, "99.99 %"), (1.0, "100 %"), (-0.001, "0 %"), (-0.12, "-12 %")],
+    [
+        (0.5, "50 %"),
+        (0.994, "99.4 %"),
+        (0.9988, "99.88 %"),
+        (0.99999, "99.99 %"),
+        (1.0, "100 %"),
+        (-0.001, "0 %"),
+        (-0.12, "-12 %"),
+    ],
 )
 def test_a_share_is_never_rounded_up_to_all(share, text) -> None:
     assert percent(share).replace("\N{NO-BREAK SPACE}", " ") == text

@@ -33,6 +33,8 @@ Data = dict[str, Any]
 DOUBTFUL = 0.5
 #: A joint's share of the gap is worth naming from here on.
 MINOR_JOINT = 0.02
+#: Shares beyond which percentages have one and two decimals.
+NEARLY, ALMOST = 0.99, 0.995
 #: Decimal places, and size, beyond which a number is written with an exponent.
 MOST_PLACES, MOST = 6, 1e5
 
@@ -99,7 +101,8 @@ def figure(number: float | None, digits: int = 3) -> str:
 
 def percent(share: float) -> str:
     """A share in percent, with more digits where it nears 100 and never rounded up to it."""
-    number = f"{min(100 * share, 99.99):.2f}" if 0.99 < share < 1.0 else f"{100 * share:.0f}"
+    places = 0 if share <= NEARLY or share >= 1.0 else 1 if share <= ALMOST else 2
+    number = f"{min(100 * share, 99.99):.{places}f}" if places else f"{100 * share:.0f}"
     return f"{'0' if number == '-0' else number}\N{NO-BREAK SPACE}%"
 
 
