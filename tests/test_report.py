@@ -13,6 +13,7 @@ import report_cases as cases
 from armgap.errors import OptionError
 from armgap.report import check_report, diagnosis_document, diagnosis_report, render_html, summary_table
 from armgap.report.sections import SECTIONS
+from armgap.report.sections.motion import _whole_run
 from armgap.report.words import answers, percent, value, verdict
 
 LARGEST_REPORT = 5_000_000  # bytes
@@ -33,6 +34,24 @@ def test_the_page_is_one_offline_file_with_the_three_answers(case) -> None:
     for answer in answers(case().to_dict()):
         assert html.escape(answer.question) in page
         assert answer.headline in html.unescape(page)
+
+
+def test_six_joints_and_three_long_logs_stay_below_the_limit() -> None:
+    data = copy.deepcopy(cases.named().to_dict())
+    length, logs, joints = 2500, 3, 6  # what a diagnosis keeps of a log at most
+    for key in ("series", "free_run_series"):
+        first = data[key][0]
+        stretched = {
+            k: (v * length)[:length] if isinstance(v, list) and k != "window_start" else v for k, v in first.items()
+        }
+        data[key] = [stretched | {"log": f"log {i}", "joint": j + 1} for i in range(logs) for j in range(joints)]
+    assert len(render_html(data).encode()) < LARGEST_REPORT
+
+
+def test_a_free_run_that_runs_away_leaves_the_picture_not_the_scale() -> None:
+    series = {"t": [0.0, 1.0, 2.0], "measured": [0.0, 1.0, 0.5], "before": [0.0, 2.0, 90.0], "after": [0.0, 1.0, None]}
+    chart = _whole_run(series, "with the causes")
+    assert (chart.y_range.start, chart.y_range.end) == (-1.0, 2.0)
 
 
 @EVERY_CASE

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armgap.report.words import unit_text
 
@@ -79,7 +79,6 @@ def lines(
     *,
     breaks: Sequence[int] = (),
     levels: Sequence[tuple[str, float, str]] = (),
-    share: Any = None,
     **options: Any,
 ) -> Any:
     """Curves over a common abscissa.
@@ -96,22 +95,26 @@ def lines(
         Indices before which a line is lifted.
     levels : sequence of (label, value, colour)
         Horizontal lines.
-    share : figure, optional
-        Figure whose x range is shared.
     """
     f = figure(title, x_label, y_label, **options)
-    if share is not None:
-        f.x_range = share.x_range
+    from bokeh.models import ColumnDataSource
+
     gaps = [b for b in breaks if b > 0]
-    abscissa = np.insert(np.asarray(x, dtype=float), gaps, np.nan)
-    for label, values, colour in curves:
-        y = np.insert(np.asarray(values, dtype=float), gaps, np.nan)
+    columns = {"x": x} | {f"y{i}": values for i, (_, values, _) in enumerate(curves)}
+    source = ColumnDataSource({name: _lifted(values, gaps) for name, values in columns.items()})
+    for i, (label, _, colour) in enumerate(curves):
         width = 2.5 if colour == MEASURED else 1.3
-        f.line(abscissa, y, legend_label=label, color=colour, line_width=width)
+        f.line("x", f"y{i}", source=source, legend_label=label, color=colour, line_width=width)
+    ends = [float(np.min(np.asarray(x))), float(np.max(np.asarray(x)))]
     for label, value, colour in levels:
-        f.line([abscissa[0], abscissa[-1]], [value, value], legend_label=label, color=colour, line_dash="dashed")
+        f.line(ends, [value, value], legend_label=label, color=colour, line_dash="dashed")
     _legend(f)
     return f
+
+
+def _lifted(values: ArrayLike, gaps: Sequence[int]) -> NDArray[np.float32]:
+    """A column with gaps, in the precision that a screen can show."""
+    return np.insert(np.asarray(values, dtype=np.float32), gaps, np.nan)
 
 
 def bars(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,8 +13,8 @@ from armgap.report.words import millis
 
 __all__ = ["free_run", "predictions"]
 
-#: Digits kept of a drawn curve: below a pixel at any zoom that shows more than noise.
-DIGITS = 6
+#: How far beyond the measured positions a free run is drawn, in their range.
+REACH = 1.0
 
 
 def predictions(data: Data) -> Section | None:
@@ -39,19 +38,18 @@ def predictions(data: Data) -> Section | None:
 
 
 def _position(data: Data, s: Data) -> Any:
-    curves = [("measured", _rounded(s["measured"]), charts.MEASURED)]
-    curves += [(label, _rounded(s[key]), colour) for label, key, colour in steps(data)]
+    curves = [("measured", s["measured"], charts.MEASURED)]
+    curves += [(label, s[key], colour) for label, key, colour in steps(data)]
     return charts.lines("", "time [s]", "", s["t"], curves, breaks=s["window_start"])
 
 
 def _error(data: Data, s: Data) -> Any:
-    measured = np.asarray(s["measured"])
-    curves = [(label, _rounded(1e3 * (measured - np.asarray(s[key]))), colour) for label, key, colour in steps(data)]
+    measured, *predicted = (np.asarray(s[key], dtype=float) for key in ("measured", *(k for _, k, _ in steps(data))))
+    curves = [
+        (label, 1e3 * (measured - values), colour)
+        for (label, _, colour), values in zip(steps(data), predicted, strict=True)
+    ]
     return charts.lines("", "time [s]", "", s["t"], curves, breaks=s["window_start"])
-
-
-def _rounded(values: Sequence[float] | np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    return np.round(np.asarray(values, dtype=float), DIGITS)
 
 
 def free_run(data: Data) -> Section:
@@ -65,20 +63,24 @@ def free_run(data: Data) -> Section:
         f"{millis(run['before'], unit)} with the arm file, {millis(run['after'], unit)} {last}."
     )
     drawn = [
-        Drawing(
-            f"{s['log']}, joint {s['joint']} [{unit}]",
-            charts.lines(
-                "",
-                "time [s]",
-                "",
-                s["t"],
-                [
-                    ("measured", _rounded(s["measured"]), charts.MEASURED),
-                    ("arm file", _rounded(s["before"]), charts.BEFORE),
-                    (last, _rounded(s["after"]), charts.AFTER),
-                ],
-            ),
-        )
+        Drawing(f"{s['log']}, joint {s['joint']} [{unit}]", _whole_run(s, last))
         for s in data.get("free_run_series") or []
     ]
     return Section("Free run", text=[text], figures=drawn, columns=2)
+
+
+def _whole_run(s: Data, last: str) -> Any:
+    """A free run; one that runs away leaves the picture, not the scale."""
+    curves = [
+        ("measured", s["measured"], charts.MEASURED),
+        ("arm file", s["before"], charts.BEFORE),
+        (last, s["after"], charts.AFTER),
+    ]
+    low, high = min(s["measured"]), max(s["measured"])
+    reach = (high - low) or 1.0
+    chart = charts.lines("", "time [s]", "", s["t"], curves)
+    chart.y_range.bounds = (low - REACH * reach, high + REACH * reach)
+    values = [v for key in ("before", "after") for v in s[key] if v is not None]
+    if min(values) < low - REACH * reach or max(values) > high + REACH * reach:
+        chart.y_range.start, chart.y_range.end = chart.y_range.bounds
+    return chart
