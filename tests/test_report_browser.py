@@ -32,7 +32,8 @@ PAINTED = """(canvas) => {
 CONTRAST = """(element) => {
   const linear = (c) => (c <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
   const luminance = (text) => {
-    const [r, g, b] = text.match(/[0-9.]+/g).map((c) => linear(c / 255));
+    const full = text.startsWith("color(srgb") ? 1 : 255;
+    const [r, g, b] = text.match(/[0-9.]+/g).map((c) => linear(c / full));
     return 0.2126 * r + 0.7152 * g + 0.0722 * b;
   };
   let ground = element;
@@ -154,6 +155,8 @@ def test_texts_are_readable_in_light_and_dark(opened, scheme) -> None:
         "nav a >> nth=0",
     ):
         assert page.locator(place).first.evaluate(CONTRAST) >= READABLE, place
+    tiles = page.locator(".heat td").evaluate_all(f"(all) => all.map({CONTRAST})")
+    assert min(tiles) >= READABLE
     ink = page.evaluate("() => getComputedStyle(document.documentElement).getPropertyValue('--ink').trim()")
     legends = "() => Bokeh.documents.flatMap((d) => [...d.all_models]).filter((m) => m.type === 'Legend').map((m) => m.label_text_color)"
     assert set(page.evaluate(legends)) == {ink}

@@ -133,8 +133,9 @@ def sizes(parameters: Data) -> str:
 
 
 def millis(values: Sequence[float], unit: str) -> str:
-    """RMS errors per joint in thousandths."""
-    return f"{' / '.join(figure(1e3 * v) for v in values)} m{unit}"
+    """RMS errors per joint in thousandths, or in whole units where one is that large."""
+    scale, prefix = (1.0, "") if max(values) >= 1.0 else (1e3, "m")
+    return f"{' / '.join(figure(scale * v) for v in values)} {prefix}{unit}"
 
 
 def named(effect: Data) -> str:
