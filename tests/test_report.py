@@ -7,14 +7,17 @@ import html
 import json
 import re
 
+import numpy as np
 import pytest
 
 import report_cases as cases
+from armgap import Arm, diagnose, simulate
 from armgap.errors import OptionError
 from armgap.report import check_report, diagnosis_document, diagnosis_report, render_html, summary_table
 from armgap.report.sections import SECTIONS
 from armgap.report.sections.motion import _whole_run
-from armgap.report.words import answers, percent, value, verdict
+from armgap.report.words import answers, figure, percent, value, verdict
+from armgap.simulation import Effect
 
 LARGEST_REPORT = 5_000_000  # bytes
 EVERY_CASE = pytest.mark.parametrize("case", cases.CASES.values(), ids=cases.CASES)
@@ -81,6 +84,38 @@ def test_a_doubtful_cause_is_called_so() -> None:
     data["causes"][0]["probability"] = 0.3
     assert "(doubtful)" in texts(data)
     assert "stays unexplained" in verdict(data)
+
+
+def test_several_pushes_are_counted_in_the_headline_and_told_apart_in_the_text() -> None:
+    data = copy.deepcopy(cases.named().to_dict())
+    push = data["causes"][0] | {"effect": "external_pulse"}
+    data["causes"] = [push | {"log": "first run"}, push | {"log": "second run"}]
+    which = answers(data)[1]
+    assert which.headline == "External push, joint 1 (2 times)"
+    assert "in first run" in which.detail
+    assert "in second run" in which.detail
+
+
+def test_an_axis_has_forces_in_newtons_and_errors_in_millimetres() -> None:
+    arm = Arm("slide", "axis", 0.0, 0.004, np.array([2.0, 0.0, 3.0, 4.0]), sigma=np.array([0.2, 0.1, 1.0, 1.0]))
+    t = np.arange(1000) * arm.sample_period
+    hidden = Effect("stribeck", 1, {"amplitude": 5.0, "velocity": 0.1})
+    logs = [
+        simulate(arm, t, 25 * np.sin((3 + k) * t) + 10 * np.sin(11 * t + k), effects=[hidden], noise=1e-5)
+        for k in (0, 1)
+    ]
+    diagnosis = diagnose(logs[0], arm, holdout=logs[1])
+    text = diagnosis_report(diagnosis, "x.md")
+    assert "force the" in text
+    assert "torque the" not in text
+    assert " mm" in answers(diagnosis.to_dict())[2].headline
+
+
+@pytest.mark.parametrize(
+    ("number", "text"), [(136.2, "136"), (99.7, "100"), (1.36, "1.4"), (0.0136, "0.014"), (2.5e7, "2.5e+07")]
+)
+def test_numbers_are_written_out_unless_they_are_huge(number, text) -> None:
+    assert figure(number, 2) == text
 
 
 @EVERY_CASE

@@ -96,7 +96,10 @@ def joint_text(joint: int | None) -> str:
 
 def figure(number: float | None, digits: int = 3) -> str:
     """A number with a few significant digits; a dash where there is none."""
-    return "–" if number is None else f"{number:.{digits}g}"
+    if number is None:
+        return "–"
+    text = f"{number:.{digits}g}"
+    return f"{number:.0f}" if "e+" in text and abs(number) < MOST else text
 
 
 def percent(share: float) -> str:
@@ -209,12 +212,18 @@ def _which(data: Data) -> tuple[str, str]:
     causes = data.get("causes") or []
     if not causes:
         return _NO_CAUSE.get(data["verdict"], ("No cause was named", ""))
-    headline = _capital(" and ".join(named(c) for c in causes))
+    headline = _capital(" and ".join(_counted([f"{title(c['effect'])}, {joint_text(c['joint'])}" for c in causes])))
     text = " ".join(_about(cause, alone=len(causes) == 1) for cause in causes)
     if doubtful(data):
         headline += " (doubtful)"
         text += " Best candidates only: what they leave is explained by no effect in the library."
     return headline, text
+
+
+def _counted(names: list[str]) -> list[str]:
+    """Names in their order, each once, with how often it occurs."""
+    times = {name: names.count(name) for name in names}
+    return [name if n == 1 else f"{name} ({n} times)" for name, n in times.items()]
 
 
 def _about(cause: Data, *, alone: bool) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
-from armgap.report.sections.steps import Data, length_unit
+from armgap.report.sections.steps import Data, length_unit, load_text
 from armgap.report.words import figure, joint_text, named, percent, sizes, title
 
 __all__ = ["evidence", "look_alikes", "ranking"]
@@ -24,10 +24,11 @@ def evidence(data: Data) -> Section | None:
     laws = [law for law in data.get("laws") or [] if law.get("bins")]
     if not laws:
         return None
+    what = load_text(data)
     text = (
-        "Dots: the torque that the model without this cause lacks, on held-out motion. Rings: its mean over a range, with the 95 % interval. "
+        f"Dots: the {what} that the model without this cause lacks, on held-out motion. Rings: its mean over a range, with the 95 % interval. "
         "Line: what the fitted law adds in the same samples. A law that is right runs through the rings. Samples at rest are left out, "
-        "where dry friction hides every other torque."
+        f"where dry friction hides every other {what}."
     )
     notes = [f"{_name(law)}: {_verdict(law)}" for law in laws]
     drawn = [Drawing(_caption(law), charts.law(law)) for law in laws]
@@ -43,7 +44,8 @@ def _name(law: Data) -> str:
 
 def _caption(law: Data) -> str:
     along = " along the motion" if law["folded"] else ""
-    return f"{_name(law)}: torque on joint {law['shown_joint']}{along} [{law['torque_unit']}] over {law['variable']}"
+    what = "force" if law["torque_unit"] == "N" else "torque"
+    return f"{_name(law)}: {what} on joint {law['shown_joint']}{along} [{law['torque_unit']}] over {law['variable']}"
 
 
 def _verdict(law: Data) -> str:

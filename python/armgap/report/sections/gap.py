@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Heat, Section, Table, Tile
-from armgap.report.sections.steps import Data, length_unit, steps, torque_unit
+from armgap.report.sections.steps import Data, length_unit, load_text, steps, torque_unit
 from armgap.report.words import figure, variable_text
 
 __all__ = ["first_picture", "gap_map"]
@@ -30,7 +30,9 @@ def first_picture(data: Data) -> Section:
     chart = charts.bars("", "", joints, series, log=True, height=280)
     key = "before" if data["verdict"] == "parameters" else "refit"
     name = {"before": "arm file's model", "refit": "re-estimated model"}[key]
-    what = f"Where: torque the {name} lacks [RMS, {torque_unit(data)}], low values of each variable on the left"
+    what = (
+        f"Where: {load_text(data)} the {name} lacks [RMS, {torque_unit(data)}], low values of each variable on the left"
+    )
     return Section("", figures=[Drawing(caption, chart, _bars(data))], heats=_heats(data, [(what, key)]))
 
 
@@ -109,9 +111,10 @@ def gap_map(data: Data) -> Section | None:
     """The gap by joint and regime, before and after, on one scale; the same in figures."""
     if not data.get("regimes"):
         return None
+    what = load_text(data)
     text = (
-        "The torque that each model lacks: the curvature of the prediction error within each window, times the inertia. All maps share one "
-        "scale, on which each joint's torque counts against what is typical of that joint. A right cause empties the map where it acts."
+        f"The {what} that each model lacks: the curvature of the prediction error within each window, times the inertia. All maps share "
+        f"one scale, on which each joint's {what} counts against what is typical of that joint. A right cause empties the map where it acts."
     )
     wanted = [(f"{label[:1].upper()}{label[1:]} [RMS, {torque_unit(data)}]", key) for label, key, _ in steps(data)]
     return Section(

@@ -6,7 +6,7 @@ from typing import Any
 
 from armgap.report import charts
 
-__all__ = ["Data", "Step", "length_unit", "steps", "torque_unit"]
+__all__ = ["Data", "Step", "length_unit", "load_text", "steps", "torque_unit"]
 
 Data = dict[str, Any]
 Step = tuple[str, str, str]
@@ -24,6 +24,11 @@ def steps(data: Data) -> tuple[Step, ...]:
 def length_unit(data: Data) -> str:
     """Unit of positions."""
     return str(data["gap"].get("unit", "rad"))
+
+
+def load_text(data: Data) -> str:
+    """What drives a joint of this arm."""
+    return "force" if length_unit(data) == "m" else "torque"
 
 
 def torque_unit(data: Data) -> str:
