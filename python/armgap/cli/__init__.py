@@ -18,6 +18,7 @@ COMMANDS = {
     "identify": ("armgap.cli.identify", "Estimate the arm's parameters from logs."),
     "simulate": ("armgap.cli.simulate", "Simulate an arm, with effects on request."),
     "demo": ("armgap.cli.demo", "Diagnose the sample log and open its sealed key."),
+    "replay": ("armgap.cli.replay", "Measured and predicted arm side by side, for the Rerun viewer."),
     "reproduce": ("armgap.cli.reproduce", "The seed paper's tables and figures beside our own."),
     "trial": ("armgap.cli.trial", "Blind trials: sealed cases, diagnosed and scored."),
 }
