@@ -58,8 +58,9 @@ def test_the_command_writes_a_recording(run, tmp_path) -> None:
     assert "out.rrd" in out
     recording = (tmp_path / "out.rrd").read_bytes()
     assert recording.startswith(b"RRF")
-    for name in ("measured", "arm file", "with causes"):
-        assert name.encode() in recording or name.replace(" ", "\\ ").encode() in recording
+    for name in ("measured", "arm_file", "with_causes"):
+        assert f"/arms/{name}".encode() in recording
+        assert f"/q1/{name}".encode() in recording
 
 
 def test_without_the_sdk_a_replay_says_what_to_install(monkeypatch, tmp_path) -> None:

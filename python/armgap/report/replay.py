@@ -125,7 +125,7 @@ def write_replay(curves: Mapping[str, Array], log: Log, arm: Arm, path: str | Pa
     for place, (name, q) in enumerate(shown.items()):
         _log_arm(rr, recording, times, name, _picture(drawn[name], place))
         for j in range(arm.n_joints):
-            recording.send_columns(f"q{j + 1}/{name}", times, rr.Scalars.columns(scalars=q[:, j]), strict=True)
+            recording.send_columns(f"q{j + 1}/{_entity(name)}", times, rr.Scalars.columns(scalars=q[:, j]), strict=True)
     recording.flush()
     recording.disconnect()
 
@@ -136,13 +136,18 @@ def _picture(strips: Array, place: int) -> Array:
     return np.asarray(strips * [1.0, -1.0] + [APART * reach * place, 0.0], dtype=np.float64)
 
 
+def _entity(name: str) -> str:
+    """A name as part of a path in the recording."""
+    return name.replace(" ", "_")
+
+
 def _log_arm(rr: Any, recording: Any, times: Any, name: str, strips: Array) -> None:
     colour = int(COLOURS[name][1:] + "ff", 16)
     radius = THICKNESS * float(np.ptp(strips, axis=(0, 1)).max() or 1.0)
     style = rr.LineStrips2D.from_fields(colors=[colour], radii=[radius], labels=[name])
-    recording.log(f"arms/{name}", style, static=True, strict=True)
+    recording.log(f"arms/{_entity(name)}", style, static=True, strict=True)
     columns = rr.LineStrips2D.columns(strips=list(strips.astype(np.float32)))
-    recording.send_columns(f"arms/{name}", times, columns, strict=True)
+    recording.send_columns(f"arms/{_entity(name)}", times, columns, strict=True)
 
 
 def _rerun() -> tuple[Any, Any]:
