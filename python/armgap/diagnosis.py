@@ -15,7 +15,9 @@ import numpy as np
 from armgap import _native
 from armgap.arm import Arm
 from armgap.errors import LogShapeError, OptionError
+from armgap.evidence import laws, plausibility
 from armgap.log import Log
+from armgap.report.notebook import Shown
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
 
@@ -125,7 +127,7 @@ _Record = TypeVar("_Record", Value, Equivalent, Bound)
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Shown):
     """The result of `diagnose`.
 
     Attributes
@@ -206,7 +208,7 @@ class Diagnosis:
         """Return the verdict and the three answers (where, which, how far) as text, one line each."""
         from armgap.report import words
 
-        answers = (f"{question} {answer}" for question, answer in words.answers(self._data))
+        answers = (f"{answer.question} {answer.text}" for answer in words.answers(self._data))
         return "\n".join([words.verdict(self._data), *answers])
 
 
@@ -318,6 +320,7 @@ def diagnose(
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = notes + data["notes"]
+    data["laws"], data["plausibility"] = laws(data, arm, training, held), plausibility(data, arm)
     data["log_findings"] = [
         {"log": log.name, "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings
     ]

@@ -43,7 +43,14 @@ CASE_FOLDER = PACKAGE / "demo_case"
 @click.option("--holdout", multiple=True, metavar="LOG…", help="Logs of your own to judge on.")
 @click.option("--case", "case_folder", metavar="DIR", help="Folder of another sealed case.")
 @click.option("--fresh", type=click.IntRange(min=0), metavar="SEED", help="Make a new sealed case (needs MuJoCo).")
-@click.option("--report", "report_file", default=REPORT, show_default=True, metavar="OUT.html", help="Report to write.")
+@click.option(
+    "--report",
+    "report_file",
+    default=REPORT,
+    show_default=True,
+    metavar="OUT",
+    help="Report to write: .html, .md or .json.",
+)
 @json_option
 @columns_option
 @units_option
@@ -61,7 +68,10 @@ def command(
     quiet: bool,
 ) -> None:
     """Diagnose a sample log whose hidden cause is sealed, then open the key; or diagnose LOGs of your own."""
+    from armgap.report import check_report
+
     check_outputs(report_file, json_file)
+    check_report(report_file)
     outputs = (report_file, json_file, quiet)
     if logs or arm_file or holdout:
         if case_folder is not None or fresh is not None:
@@ -108,14 +118,14 @@ def _diagnose(
     from armgap.arm import Arm
     from armgap.diagnosis import diagnose
     from armgap.log import Log
-    from armgap.report import summary_table, write_html
+    from armgap.report import diagnosis_report, summary_table
 
     report_file, json_file, quiet = outputs
     arm = Arm.read(arm_file)
     training, held = ([Log.read(p, arm=arm, **naming) for p in paths] for paths in (logs, holdout))
     with working("diagnosing", quiet=quiet):
         result = diagnose(training, arm, holdout=held or None)
-    write(report_file, lambda path: write_html(result, path))
+    write(report_file, diagnosis_report(result, report_file))
     if json_file is not None:
         write(json_file, result.to_json(indent=2))
     say = _voice(outputs)
