@@ -107,12 +107,12 @@ def _diagnose(
 ) -> Diagnosis:
     from armgap.arm import Arm
     from armgap.diagnosis import diagnose
-    from armgap.log import Log
+    from armgap.log import gather
     from armgap.report import summary_table, write_html
 
     report_file, json_file, quiet = outputs
     arm = Arm.read(arm_file)
-    training, held = ([Log.read(p, arm=arm, **naming) for p in paths] for paths in (logs, holdout))
+    training, held = (gather(paths, arm, **naming) for paths in (logs, holdout))
     with working("diagnosing", quiet=quiet):
         result = diagnose(training, arm, holdout=held or None)
     write(report_file, lambda path: write_html(result, path))
