@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from armgap.diagnosis import Diagnosis, diagnose
     from armgap.errors import ArmgapError
     from armgap.identification import Identification, identify
+    from armgap.inspection import Inspection, inspect
     from armgap.log import Finding, Log
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
@@ -22,12 +23,14 @@ __all__ = [
     "Diagnosis",
     "Finding",
     "Identification",
+    "Inspection",
     "Log",
     "Reproduction",
     "__version__",
     "diagnose",
     "effects",
     "identify",
+    "inspect",
     "reproduce",
     "seed_torque",
     "simulate",
@@ -43,6 +46,8 @@ _HOMES = {
     "Identification": "armgap.identification",
     "identify": "armgap.identification",
     "Reproduction": "armgap.reproduction",
+    "Inspection": "armgap.inspection",
+    "inspect": "armgap.inspection",
     "reproduce": "armgap.reproduction",
     "effects": "armgap.simulation",
     "seed_torque": "armgap.simulation",

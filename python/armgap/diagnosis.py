@@ -16,6 +16,7 @@ from armgap.arm import Arm
 from armgap.errors import LogShapeError, OptionError
 from armgap.log import Log, gather
 from armgap.log.findings import remarks
+from armgap.log.stretches import choose
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
 
@@ -287,7 +288,7 @@ def diagnose(
     else:
         held = _logs(holdout, arm)
         notes += _overlap(training, held)
-    training, held = _tell_apart(training, held)
+    training, held = (choose(group, horizon=horizon) for group in _tell_apart(training, held))
     for log in (*training, *held):
         if log.duration < horizon:
             raise LogShapeError(

@@ -14,6 +14,7 @@ __all__ = ["main"]
 
 COMMANDS = {
     "diagnose": ("armgap.cli.diagnose", "Where the gap lies, what causes it, how far it shrinks."),
+    "inspect": ("armgap.cli.inspect", "What logs hold, and what they tell about an arm."),
     "identify": ("armgap.cli.identify", "Estimate the arm's parameters from logs."),
     "simulate": ("armgap.cli.simulate", "Simulate an arm, with effects on request."),
     "demo": ("armgap.cli.demo", "Diagnose the sample log and open its sealed key."),

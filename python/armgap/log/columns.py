@@ -40,9 +40,16 @@ class Names:
     units: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def all(self) -> tuple[str, ...]:
-        """Every column in use."""
-        return (self.t, *self.q, *self.tau, *(self.dq or ()), *((self.t_tau,) if self.t_tau else ()))
+    def pairs(self) -> list[tuple[str, str]]:
+        """Standard name and column of everything in use."""
+        groups = (("q", self.q), ("tau", self.tau), ("dq", self.dq or ()))
+        joints = [(f"{prefix}{j}", name) for prefix, group in groups for j, name in enumerate(group, start=1)]
+        return [("t", self.t), *joints, *([("t_tau", self.t_tau)] if self.t_tau else [])]
+
+    @property
+    def by_key(self) -> dict[str, str]:
+        """Column by standard name."""
+        return dict(self.pairs)
 
 
 @dataclass(frozen=True)
@@ -121,7 +128,7 @@ def _pick_all(index: Index, names: Mapping[str, str], mapping: Mapping[str, str]
         dq = None
     found = Names(t, q, tau, dq, t_tau)
     _check_once(index, found)
-    return replace(found, units={c: unit for c in found.all if (unit := index.unit(c)) is not None})
+    return replace(found, units={c: unit for _, c in found.pairs if (unit := index.unit(c)) is not None})
 
 
 def _time(index: Index, names: Mapping[str, str], first: str | None) -> str:
@@ -138,10 +145,8 @@ def _time(index: Index, names: Mapping[str, str], first: str | None) -> str:
 
 def _check_once(index: Index, found: Names) -> None:
     """Raise if a column stands for two things."""
-    n = range(1, len(found.q) + 1)
-    keys = ["t", *(f"q{j}" for j in n), *(f"tau{j}" for j in n), *(f"dq{j}" for j in n if found.dq), "t_tau"]
     seen: dict[str, str] = {}
-    for key, column in zip(keys, found.all, strict=False):
+    for key, column in found.pairs:
         if column in seen:
             raise ColumnError(
                 f"is mapped to both `{seen[column]}` and `{key}`",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +45,8 @@ class Log:
         What was noticed while reading.
     path : Path, optional
         File it was read from.
+    columns : mapping
+        The file's own name of each column in use, by standard name.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Log:
     dq: NDArray[np.float64] | None = None
     findings: tuple[Finding, ...] = ()
     path: Path | None = None
+    columns: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def read(
@@ -184,7 +187,7 @@ class Log:
             *checks.notice(arrays, names, arm), *checks.unused(recording, names),
         ]  # fmt: skip
         arrays.t.__isub__(arrays.t[0])
-        return cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source)
+        return cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key)
 
     def __post_init__(self) -> None:
         """Put times on whole nanoseconds, so that a log is the same log in every format, and make the arrays read-only."""
@@ -215,12 +218,22 @@ class Log:
         """Return the number of samples."""
         return len(self.t)
 
-    def part(self, first: int, last: int, name: str) -> Log:
-        """Return the samples `first` up to, not including, `last` as a log of its own."""
+    def part(
+        self, first: int, last: int, name: str, *, keep_time: bool = False, findings: tuple[Finding, ...] | None = None
+    ) -> Log:
+        """Return the samples `first` up to, not including, `last` as a log of its own.
+
+        Its times start from 0 unless `keep_time` is set; it inherits the findings unless others are given.
+        """
         rows = slice(first, last)
         dq = None if self.dq is None else self.dq[rows]
-        t = self.t[rows] - self.t[first]
-        return Log(name, t, self.q[rows], self.tau[rows], dq, self.findings, self.path)
+        t = self.t[rows] if keep_time else self.t[rows] - self.t[first]
+        found = self.findings if findings is None else findings
+        return Log(name, t, self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
+
+    def with_findings(self, findings: tuple[Finding, ...]) -> Log:
+        """Return the log with other findings."""
+        return replace(self, findings=findings)
 
     def to_polars(self) -> pl.DataFrame:
         """Return the log as a table with the columns ``t, q1 …, tau1 …`` and, where there are any, ``dq1 …``."""
