@@ -28,6 +28,8 @@ _CUTOFF = 50.0  # rad/s
 _BUDGET = 200_000  # samples
 # What an error of this part of the RMS torque, white, would do to a parameter.
 _ERROR = 0.01
+# Information below this part of the largest is none, within rounding.
+_NOTHING = 1e-14
 _WELL, _HARDLY = 0.05, 0.5
 
 
@@ -42,7 +44,7 @@ class Parameter:
     value : float
         The arm file's value [SI].
     sigma : float
-        Standard deviation, as part of the value, that a white error of 1 % of the RMS torque leaves; infinite if nothing is told.
+        Standard deviation, as part of the value, that a white error of 1 % of the RMS torque leaves.
     alone : float
         The same if all other parameters were known.
     excited : str
@@ -63,7 +65,7 @@ class Excitation:
     Attributes
     ----------
     condition : float
-        Condition number of the regressor with parameters in units of the arm file's values.
+        Condition number of the regressor with parameters in units of the arm file's values; infinite if it lacks a direction.
     parameters : tuple of Parameter
         In the arm's order.
     weakest : str
@@ -85,12 +87,12 @@ def excitation(log: Log, arm: Arm) -> Excitation:
     information = sum((_information(part, arm) for part in parts), np.zeros((len(scale), len(scale))))
     scaled = information * np.outer(scale, scale)
     values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
-    values = np.maximum(values, 0.0)
+    floor = _NOTHING * values[-1]
     torque = float(np.sqrt(np.mean([np.mean(part.tau**2) for part in parts])))
     with np.errstate(divide="ignore"):
-        spread = np.sqrt((vectors**2) @ np.where(values > 1e-14 * values[-1], 1.0 / values, np.inf))
+        spread = np.sqrt((vectors**2) @ (1.0 / np.maximum(values, floor)))
         alone = 1.0 / np.sqrt(np.diag(scaled))
-        condition = float(np.sqrt(values[-1] / values[0])) if values[0] > 0 else float("inf")
+    condition = float(np.sqrt(values[-1] / values[0])) if values[0] > floor else float("inf")
     parameters = tuple(
         Parameter(name, float(value), float(s), float(a), _word(float(s)))
         for name, value, s, a in zip(

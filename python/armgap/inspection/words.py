@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["grids", "overview"]
 
 Grid = tuple[list[str], list[list[str]]]
+_UNKNOWN = 10.0  # ten times the value
 _RECOMMENDED = 100.0  # condition number up to which a motion counts as a good one
 
 
@@ -90,7 +91,7 @@ def _flat(j: Joint) -> str:
 
 def _parameters(e: Excitation) -> Grid:
     def percent(x: float) -> str:
-        return f"{100 * x:.3g} %" if math.isfinite(x) else "unknown"
+        return f"{100 * x:.3g} %" if math.isfinite(x) and x < _UNKNOWN else "all of it"
 
     rows = [[p.name, f"{p.value:.4g}", percent(p.alone), percent(p.sigma), p.excited] for p in e.parameters]
     return ["parameter", "arm file", "alone", "with all others", "excited"], rows
