@@ -133,7 +133,7 @@ def test_a_unit_of_something_else_is_refused(frame):
 def test_rows_that_repeat_are_left_out_and_counted(seed_log, frame):
     log = Log.from_frame(pl.concat([frame[:400], frame[399:]]))
     same(log, seed_log, 0)
-    assert said(log, "cleaned") == "1 row that repeat the row before were left out, the first of them row 401"
+    assert said(log, "cleaned") == "left out: 1 row like the row before in every value, the first of them row 401"
     other = frame[399:].with_columns(pl.col("q1") + 1e-3)
     with pytest.raises(TimeError, match="repeats"):
         Log.from_frame(pl.concat([frame[:400], other]))

@@ -120,6 +120,8 @@ def _diagnose(
         write(json_file, result.to_json(indent=2))
     say = _voice(outputs)
     say.print(summary_table(result))
+    for remark in result.remarks:
+        say.print(f"note: {remark}", highlight=False, markup=False)
     say.print(f"report: {report_file}", highlight=False)
     return result
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armgap.errors import LogShapeError, TimeError
 from armgap.log.columns import Arrays, Names, unused_velocities
-from armgap.log.findings import Finding
+from armgap.log.findings import Finding, counted
 from armgap.log.recording import Recording
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def without_repeats(arrays: Arrays) -> tuple[Arrays, list[Finding]]:
     keep = np.ones(len(arrays.t), dtype=bool)
     keep[again] = False
     dq = None if arrays.dq is None else arrays.dq[keep]
-    said = f"{len(again)} row{'s' if len(again) > 1 else ''} that repeat the row before were left out, the first of them row {again[0] + 1}"
+    said = f"left out: {counted(len(again), 'row')} like the row before in every value, the first of them row {again[0] + 1}"
     return Arrays(arrays.t[keep], arrays.q[keep], arrays.tau[keep], dq), [Finding("cleaned", said)]
 
 

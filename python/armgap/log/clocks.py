@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from armgap.errors import TimeError, UnitError
 from armgap.log.columns import Arrays, Names, Raw
-from armgap.log.findings import Finding
+from armgap.log.findings import Finding, counted
 from armgap.log.units import FACTORS, Scales
 
 if TYPE_CHECKING:
@@ -189,4 +189,4 @@ def _report(
     early, late = int(np.sum(held < 0)), int(np.sum(~keep & (held >= 0)))
     for count, where in ((early, "before the first torque"), (late, "after the last torque")):
         if count:
-            findings.append(Finding("cleaned", f"{count} rows {where} were left out"))
+            findings.append(Finding("cleaned", f"left out {where}: {counted(count, 'row')}"))

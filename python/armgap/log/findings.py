@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-__all__ = ["Finding", "remarks"]
+__all__ = ["Finding", "counted", "remarks"]
 
 # What was changed about a log, or how it was understood, is told of each log; the rest once per kind.
 _TOLD_EACH = frozenset({"units", "format", "joints", "torque", "clock", "cleaned", "stretches"})
@@ -27,6 +27,17 @@ class Finding:
 
     kind: str
     message: str
+
+
+def counted(count: int, thing: str) -> str:
+    """Return a number of things.
+
+    Examples
+    --------
+    >>> counted(1, "row"), counted(3, "row")
+    ('1 row', '3 rows')
+    """
+    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
 
 
 def remarks(entries: Iterable[Mapping[str, str]]) -> list[str]:

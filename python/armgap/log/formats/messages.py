@@ -16,14 +16,13 @@ import polars as pl
 from numpy.typing import NDArray
 
 from armgap.errors import ColumnError, LogReadError
-from armgap.log.findings import Finding
+from armgap.log.findings import Finding, counted
 from armgap.log.recording import Recording, Stream, Suggestion
 
 __all__ = ["KINDS", "Message", "record"]
 
 _QUANTITIES = ("position", "velocity", "effort")
 _TORQUE_WORDS = ("effort", "torque", "tau")
-Row = tuple[int, list[float]]
 # A time (none if the message has no stamp), names of columns, names of joints, values.
 Rows = list[tuple[int | None, tuple[str, ...], tuple[str, ...], list[float]]]
 
@@ -46,9 +45,19 @@ class _Topic:
     kind: str
     names: tuple[str, ...]  # of the columns
     joints: tuple[str, ...]  # of the joints, where messages name them
-    stamped: bool
-    rows: list[Row] = field(default_factory=list)
-    lags: list[int] = field(default_factory=list)
+    stamps: list[int | None] = field(default_factory=list)
+    recorded: list[int] = field(default_factory=list)
+    rows: list[list[float]] = field(default_factory=list)
+
+    @property
+    def stamped(self) -> bool:
+        """Whether every message has a time of its own."""
+        return all(self.stamps)
+
+    @property
+    def times(self) -> NDArray[np.int64]:
+        """Times of the rows [ns]: their own, or the recorder's for all if one has none."""
+        return np.array(self.stamps if self.stamped else self.recorded, dtype=np.int64)
 
 
 def _stamp(header: Any) -> int:
@@ -119,6 +128,7 @@ def record(messages: Iterable[Message], path: Path, seen: Mapping[str, str]) -> 
         Every topic of the file and its type, for errors.
     """
     topics: dict[tuple[str, tuple[str, ...]], _Topic] = {}
+    empty: dict[str, int] = {}
     for number, message in enumerate(messages, start=1):
         try:
             rows = KINDS[message.kind](message)
@@ -129,12 +139,13 @@ def record(messages: Iterable[Message], path: Path, seen: Mapping[str, str]) -> 
                 file=path,
             ) from None
         for stamp, names, joints, values in rows:
-            topic = topics.setdefault(
-                (message.topic, names), _Topic(message.topic, message.kind, names, joints, bool(stamp))
-            )
-            topic.stamped = topic.stamped and bool(stamp)
-            topic.rows.append((stamp or message.recorded, values))
-            topic.lags.append(message.recorded - (stamp or message.recorded))
+            if not names:
+                empty[message.topic] = empty.get(message.topic, 0) + 1
+                continue
+            topic = topics.setdefault((message.topic, names), _Topic(message.topic, message.kind, names, joints))
+            topic.stamps.append(stamp)
+            topic.recorded.append(message.recorded)
+            topic.rows.append(values)
     if not topics:
         listed = ", ".join(f"{topic} ({kind})" for topic, kind in list(seen.items())[:12])
         raise LogReadError(
@@ -142,38 +153,52 @@ def record(messages: Iterable[Message], path: Path, seen: Mapping[str, str]) -> 
             remedy=f"record topics of the types {', '.join(KINDS)}",
             file=path,
         )
-    return _recording(list(topics.values()), path)
+    findings = [
+        Finding("cleaned", f"{topic}: left out {counted(count, 'message')} without values")
+        for topic, count in empty.items()
+    ]
+    return _recording(list(topics.values()), findings, path)
 
 
-def _recording(topics: list[_Topic], path: Path) -> Recording:
-    findings: list[Finding] = []
+def _recording(topics: list[_Topic], findings: list[Finding], path: Path) -> Recording:
     streams = []
     shared = [t.topic for t in topics]
     for i, topic in enumerate(topics):
         name = topic.topic if shared.count(topic.topic) == 1 else f"{topic.topic}#{i + 1}"
         streams.append(_stream(topic, name, findings))
+    findings += _lags(topics)
     known = list(zip(topics, streams, strict=True))
     return Recording(tuple(streams), tuple(findings), lambda n, mapped: _suggest(known, n, mapped, path))
 
 
 def _stream(topic: _Topic, name: str, findings: list[Finding]) -> Stream:
     """Sort a topic's rows by time, leave out those that repeat, and say so."""
-    times = np.array([row[0] for row in topic.rows], dtype=np.int64)
-    values = np.array([row[1] for row in topic.rows], dtype=np.float64).reshape(len(times), -1)
+    times, values = topic.times, np.array(topic.rows, dtype=np.float64)
     if not topic.stamped:
         findings.append(Finding("clock", f"{name} carries no time of its own; it goes by the recorder's time"))
     order = np.argsort(times, kind="stable")
     late = int(np.sum(np.diff(times) < 0))
     if late:
-        findings.append(Finding("cleaned", f"{name}: {late} messages came late; all were sorted by their stamps"))
+        findings.append(Finding("cleaned", f"{name}: {counted(late, 'message')} came late; all were sorted by time"))
         times, values = times[order], values[order]
     again = np.r_[False, (np.diff(times) == 0) & np.all(values[1:] == values[:-1], axis=1)]
     if again.any():
         findings.append(
-            Finding("cleaned", f"{name}: {int(again.sum())} messages repeat the one before and were left out")
+            Finding("cleaned", f"{name}: left out {counted(int(again.sum()), 'message')} like the one before")
         )
         times, values = times[~again], values[~again]
     return _columns(name, topic, times, values)
+
+
+def _lags(topics: list[_Topic]) -> list[Finding]:
+    """Say how far the recorder's time lies behind the stamps, where topics go by one and the other."""
+    if all(topic.stamped for topic in topics):
+        return []
+    return [
+        Finding("clock", f"{topic.topic} was recorded {lag * 1e-6:.3g} ms after its stamps (median); not corrected")
+        for topic in topics
+        if topic.stamped and (lag := float(np.median(np.array(topic.recorded) - topic.times))) != 0
+    ]
 
 
 def _columns(name: str, topic: _Topic, times: NDArray[np.int64], values: NDArray[np.float64]) -> Stream:
