@@ -150,6 +150,20 @@ FILES: list[tuple[Case, str, Callable[[pl.DataFrame], bytes | str | None]]] = [
     (Case("text as Parquet", LogReadError, ("not a Parquet",)), "log.parquet", lambda f: f.write_csv()),
     (Case("cut Parquet", LogReadError, ("cut short",)), "log.parquet", lambda f: _parquet(f)[:5000]),
     (Case("damaged Parquet", LogReadError, ("damaged",)), "log.parquet", lambda f: _damaged(f)),
+    (
+        Case("cut archive", LogReadError, ("not a readable NumPy archive",)),
+        "log.npz",
+        lambda f: b"PK\x03\x04" + bytes(99),
+    ),
+    (Case("text as HDF5", LogReadError, ("not a readable HDF5 file",)), "log.h5", lambda f: f.write_csv()),
+    (Case("text as MATLAB", LogReadError, ("not a readable MATLAB file",)), "log.mat", lambda f: f.write_csv()),
+    (Case("cut MCAP", LogReadError, ("not a readable MCAP file",)), "log.mcap", lambda f: b"\x89MCAP0\r\n" + bytes(99)),
+    (Case("cut bag", LogReadError, ("not a readable ROS bag",)), "log.db3", lambda f: b"SQLite format 3\0" + bytes(99)),
+    (
+        Case("a unit of something else", UnitError, ("is in ms", "no unit of positions"), "q1 [ms]"),
+        "log.csv",
+        lambda f: f.write_csv().replace("q1", "q1 [ms]", 1),
+    ),
     (Case("only comments", LogReadError, ("comments",)), "log.csv", lambda f: "# t,q1\n# none\n"),
     (Case("only a header", LogReadError, ("no samples",)), "log.csv", lambda f: csv_lines(f)[0] + "\n"),
     (
