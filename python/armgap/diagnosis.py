@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -20,6 +21,8 @@ from armgap.log.stretches import choose
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
 
+#: What a part of a log is called after the log's own name.
+_WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
 _HELD_OUT = 0.4
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
@@ -87,7 +90,7 @@ class Equivalent:
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause."""
+    """A named cause; a push belongs to one log."""
 
     effect: str
     title: str
@@ -96,6 +99,7 @@ class Cause:
     parameters: dict[str, Value]
     closed: float
     equivalents: tuple[Equivalent, ...]
+    log: str | None = None
 
 
 @dataclass(frozen=True)
@@ -227,6 +231,7 @@ def _cause(data: dict[str, Any]) -> Cause:
         {name: _take(Value, value) for name, value in data["parameters"].items()},
         data["closed"],
         tuple(_take(Equivalent, e) for e in data["equivalents"]),
+        data.get("log"),
     )
 
 
@@ -303,6 +308,9 @@ def diagnose(
         raise _refused(str(error), training, held) from None
     data = json.loads(text)
     data["arm"]["name"] = arm.name
+    for cause in data["causes"]:
+        if "log" in cause:
+            cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = notes + data["notes"]
     data["log_findings"] = [
         {"log": log.name, "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings
@@ -359,7 +367,7 @@ def _with_number(log: Log, number: int) -> Log:
 def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
     training, held = [], []
     for log in logs:
-        cut = int(np.searchsorted(log.t, (1 - _HELD_OUT) * log.duration))
+        cut = int(np.searchsorted(log.t, log.t[0] + (1 - _HELD_OUT) * log.duration))
         training.append(log.part(0, cut, f"{log.name} (first part)"))
         held.append(log.part(cut, len(log), f"{log.name} (last part)"))
     return training, held

@@ -34,7 +34,7 @@ class Log:
     name : str
         Name in results, usually the file's.
     t : ndarray, shape (n_samples,)
-        Sample times [s], increasing, from 0, to the nanosecond.
+        Sample times [s], increasing, to the nanosecond; from 0, in a part of a log from where it begins.
     q : ndarray, shape (n_samples, n_joints)
         Positions as measured [rad or m].
     tau : ndarray, shape (n_samples, n_joints)
@@ -218,18 +218,15 @@ class Log:
         """Return the number of samples."""
         return len(self.t)
 
-    def part(
-        self, first: int, last: int, name: str, *, keep_time: bool = False, findings: tuple[Finding, ...] | None = None
-    ) -> Log:
-        """Return the samples `first` up to, not including, `last` as a log of its own.
+    def part(self, first: int, last: int, name: str, *, findings: tuple[Finding, ...] | None = None) -> Log:
+        """Return the samples `first` up to, not including, `last` as a log of its own, with the times of this one.
 
-        Its times start from 0 unless `keep_time` is set; it inherits the findings unless others are given.
+        It inherits the findings unless others are given.
         """
         rows = slice(first, last)
         dq = None if self.dq is None else self.dq[rows]
-        t = self.t[rows] if keep_time else self.t[rows] - self.t[first]
         found = self.findings if findings is None else findings
-        return Log(name, t, self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
+        return Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
         """Return the log with other findings."""

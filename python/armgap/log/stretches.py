@@ -199,7 +199,7 @@ def _parts(whole: Log, spans: list[tuple[int, ...]]) -> list[Log]:
     parts = []
     for first, last in _merged(spans):
         name = f"{whole.name} ({whole.t[first]:.6g} to {whole.t[last - 1]:.6g} s)"
-        parts.append(whole.part(first, last, name, keep_time=True, findings=()))
+        parts.append(whole.part(first, last, name, findings=()))
     if not parts:
         return []
     rows = sum(len(part) for part in parts)

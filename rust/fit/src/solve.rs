@@ -292,7 +292,8 @@ pub fn neutral(effect: &Placed) -> Placed {
     let spec = effect.law.spec();
     let amplitudes = match spec.trial {
         Trial::Amplitudes(count) => count,
-        Trial::Whole => 1,
+        Trial::Ray => off.len(),
+        Trial::Whole | Trial::Event => 1,
     };
     for (value, parameter) in off.p.iter_mut().zip(spec.parameters).take(amplitudes) {
         *value = parameter.neutral;
