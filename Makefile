@@ -26,7 +26,7 @@ $(VENV)/.tools: pyproject.toml | tools
 
 $(VENV)/.built: $(VENV)/.tools pyproject.toml $(RUST_SOURCES)
 	@echo "building armgap (about a minute the first time)"
-	@PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --release --extras trial,dev,docs
+	@PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --release --extras trial,formats,ros,dev,docs
 	@touch $@
 
 setup: $(VENV)/.built ## virtual environment and build, all that the other targets need

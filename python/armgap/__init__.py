@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from armgap.errors import ArmgapError
     from armgap.export import Corrected, correct
     from armgap.identification import Identification, identify
+    from armgap.inspection import Inspection, inspect
     from armgap.log import Finding, Log
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
@@ -24,6 +25,7 @@ __all__ = [
     "Diagnosis",
     "Finding",
     "Identification",
+    "Inspection",
     "Log",
     "Reproduction",
     "__version__",
@@ -31,6 +33,7 @@ __all__ = [
     "diagnose",
     "effects",
     "identify",
+    "inspect",
     "reproduce",
     "seed_torque",
     "simulate",
@@ -48,6 +51,8 @@ _HOMES = {
     "Identification": "armgap.identification",
     "identify": "armgap.identification",
     "Reproduction": "armgap.reproduction",
+    "Inspection": "armgap.inspection",
+    "inspect": "armgap.inspection",
     "reproduce": "armgap.reproduction",
     "effects": "armgap.simulation",
     "seed_torque": "armgap.simulation",

@@ -117,12 +117,12 @@ def _diagnose(
 ) -> Diagnosis:
     from armgap.arm import Arm
     from armgap.diagnosis import diagnose
-    from armgap.log import Log
+    from armgap.log import gather
     from armgap.report import diagnosis_report, summary_table
 
     report_file, json_file, quiet = outputs
     arm = Arm.read(arm_file)
-    training, held = ([Log.read(p, arm=arm, **naming) for p in paths] for paths in (logs, holdout))
+    training, held = (gather(paths, arm, **naming) for paths in (logs, holdout))
     with working("diagnosing", quiet=quiet):
         result = diagnose(training, arm, holdout=held or None)
     write(report_file, diagnosis_report(result, report_file))
@@ -130,6 +130,8 @@ def _diagnose(
         write(json_file, result.to_json(indent=2))
     say = _voice(outputs)
     say.print(summary_table(result))
+    for remark in result.remarks:
+        say.print(f"note: {remark}", highlight=False, markup=False)
     say.print(f"report: {report_file}", highlight=False)
     return result
 

@@ -54,15 +54,15 @@ def command(
     """Say where the gap between LOGs and the nominal arm lies, what causes it, and how far it shrinks."""
     from armgap.arm import Arm
     from armgap.diagnosis import diagnose
-    from armgap.log import Log
+    from armgap.log import gather
     from armgap.report import check_report, diagnosis_report
 
     check_outputs(json_file, report_file)
     check_report(report_file)
-    naming = {"columns": parse_columns(columns), "units": parse_units(units)}
     arm = Arm.read(Path(arm_file))
-    training = [Log.read(path, arm=arm, **naming) for path in logs]
-    held = [Log.read(path, arm=arm, **naming) for path in holdout] or None
+    mapping, declared = parse_columns(columns), parse_units(units)
+    training = gather(logs, arm, columns=mapping, units=declared)
+    held = gather(holdout, arm, columns=mapping, units=declared) or None
     with working("diagnosing", quiet=quiet):
         result = interruptible(
             lambda: diagnose(training, arm, holdout=held, horizon=horizon, max_causes=max_causes, seed=seed)
