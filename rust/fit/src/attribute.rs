@@ -100,8 +100,6 @@ pub struct Stage<const N: usize, const P: usize> {
     pub contenders: Vec<Contender<P>>,
     /// Every candidate that was fitted, by the share of the gap it removes under the current model's own weights, best first.
     pub field: Vec<(Contender<P>, f64)>,
-    /// First-order tests of all candidates around the current model.
-    pub screened: Vec<Scored>,
     /// Weights in force.
     pub weights: Weights<N>,
     /// Cost the measurement noise alone would leave on the holdout, under these weights.
@@ -135,26 +133,42 @@ impl<const N: usize, const P: usize> Stage<N, P> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// One stage around the current model.
-    pub fn stage(&self, current: &Hypothesis<P>, scale: [f64; N]) -> Stage<N, P> {
+    /// One stage around the current model; improvements below `noticeable`, relative to the motion, are not looked for.
+    pub fn stage(&self, current: &Hypothesis<P>, scale: [f64; N], noticeable: f64) -> Stage<N, P> {
         let (fit, weights) = self.settle(current, scale);
-        let all = self.open_candidates(&fit.hypothesis);
-        let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
-        let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
-        let mut starts: Vec<Hypothesis<P>> =
-            promising(&screened, self.least_trace(&weights, &fit) * training)
-                .into_iter()
-                .map(|effect| {
-                    self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| fit.hypothesis.with(effect))
-                })
-                .collect();
-        starts.extend(self.smoother(&fit.hypothesis, &weights, training));
+        let starts = self.starts(&fit, &weights, noticeable);
         let first = self.contend(&weights, &fit.hypothesis, starts, Effort::ROUGH);
         let field = self.field(&weights, &fit, &first);
         let (base, contenders, weights) = self.final_round(&fit.hypothesis, first, weights);
         let floor = self.floor(&weights);
         let motion = self.motion(&weights);
-        Stage { settled: fit, base, contenders, field, screened, weights, floor, motion }
+        Stage { settled: fit, base, contenders, field, weights, floor, motion }
+    }
+
+    /// Hypotheses that are worth a full fit: one candidate more than the fitted model, or smoother friction.
+    fn starts(&self, fit: &Fit<P>, weights: &Weights<N>, noticeable: f64) -> Vec<Hypothesis<P>> {
+        let gap = self.relative_gap(weights, fit) > noticeable;
+        if !gap && is_plausible::<P>(fit.prior_cost) {
+            return Vec::new();
+        }
+        let all = self.open_candidates(&fit.hypothesis);
+        let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
+        let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
+        let least = if gap { self.least_trace(weights, fit) * training } else { f64::INFINITY };
+        let more = promising(&screened, least).into_iter().map(|effect| {
+            self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| fit.hypothesis.with(effect))
+        });
+        let mut starts: Vec<Hypothesis<P>> = more.collect();
+        if gap {
+            starts.extend(self.smoother(&fit.hypothesis, weights, training));
+        }
+        starts
+    }
+
+    /// RMS error of a fit on the holdout relative to the motion.
+    fn relative_gap(&self, weights: &Weights<N>, fit: &Fit<P>) -> f64 {
+        let costs = self.judge(&weights.holdout).raw_costs(&fit.hypothesis);
+        (without_worst(costs) / self.motion(weights)).sqrt()
     }
 
     /// Candidates not yet in the model.
@@ -210,8 +224,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
     /// Least part of the cost that a candidate must promise to remove.
     fn least_trace(&self, weights: &Weights<N>, fit: &Fit<P>) -> f64 {
-        let costs = self.judge(&weights.holdout).raw_costs(&fit.hypothesis);
-        let small = (without_worst(costs) / self.motion(weights)).sqrt() < CONSEQUENCE;
+        let small = self.relative_gap(weights, fit) < CONSEQUENCE;
         if small { TRACE_IN_SMALL } else { TRACE }
     }
 
@@ -327,6 +340,11 @@ fn finalists<const P: usize>(contenders: &[Contender<P>], hopeless: f64) -> Vec<
     kept.filter(|(i, c)| (*i < FINALISTS && c.score() < hopeless) || *i == 0 || by_trust.contains(i))
         .map(|(_, c)| c.fit.hypothesis.clone())
         .collect()
+}
+
+/// Whether parameters may lie that far from their trusted values, in squared sigmas, by chance.
+pub fn is_plausible<const P: usize>(prior_cost: f64) -> bool {
+    prior_cost <= P as f64 + 3.0 * (2.0 * P as f64).sqrt()
 }
 
 /// Sum of all costs but the worst few, which a bad start may have spoilt.

@@ -3,7 +3,7 @@
 //! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the
 //! windows' own scatter. After every addition all causes are fitted together again, and one that has become idle is dropped.
 
-use crate::attribute::{Contender, Stage};
+use crate::attribute::{Contender, Stage, is_plausible};
 use crate::model::{Hypothesis, Placed};
 use crate::solve::{Effort, Fit};
 use crate::study::Study;
@@ -31,7 +31,7 @@ const TRUST_GAIN: f64 = 16.0;
 const ALIKE_TRUST: f64 = 6.0;
 
 /// Error relative to the motion within a window below which a gap is of no consequence, whatever the encoders resolve.
-pub const CONSEQUENCE: f64 = 6e-4;
+pub const CONSEQUENCE: f64 = 1e-3;
 
 /// Improvement relative to the motion within a window below which an effect is of no consequence.
 const RELEVANT: f64 = 1e-4;
@@ -40,7 +40,7 @@ const RELEVANT: f64 = 1e-4;
 const REMAINDER_DOUBT: f64 = 0.25;
 
 /// The same relative to the first gap: what lies below it is no cause of that gap.
-const NOTICEABLE: f64 = 0.01;
+const NOTICEABLE: f64 = 0.02;
 
 /// A fit that ends this close to the largest possible size has found no effect.
 const AT_BOUND: f64 = 0.98;
@@ -86,7 +86,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     pub fn attribute(&self, max_causes: usize, seed: u64) -> Attribution<N, P> {
         let nominal = Hypothesis::rigid(self.prior.theta);
         let mut scale = self.rough_scale(&nominal);
-        let mut stage = self.stage(&nominal, scale);
+        let mut stage = self.stage(&nominal, scale, RELEVANT);
         let refit = stage.settled.clone();
         let mut model = refit.clone();
         let (mut causes, mut stages): (Vec<Cause>, Vec<Stage<N, P>>) = (Vec::new(), Vec::new());
@@ -103,7 +103,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 None => smoothed = true,
             }
             scale = stage.weights.training.scale;
-            let next = self.stage(&model.hypothesis, scale);
+            let next = self.stage(&model.hypothesis, scale, noticeable);
             stages.push(std::mem::replace(&mut stage, next));
             model = stage.settled.clone();
         }
@@ -205,9 +205,8 @@ fn moves<const N: usize, const P: usize>(
 /// Whether a contender explains implausible parameters by one effect.
 fn restores<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Contender<P>) -> bool {
     let before = stage.base.fit.prior_cost;
-    let plausible = (P as f64) + 3.0 * (2.0 * P as f64).sqrt();
     contender.effect.is_some()
-        && before > plausible
+        && !is_plausible::<P>(before)
         && before - contender.fit.prior_cost > TRUST_GAIN
         && contender.fit.prior_cost < 0.4 * before
         && contender.score() < stage.base.score()
