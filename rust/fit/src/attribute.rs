@@ -36,8 +36,11 @@ const WORTH_SMOOTHING: f64 = 2.0;
 /// Finalists by closeness to trusted values lie within this many squared sigmas of the closest.
 const TRUSTED: f64 = 10.0;
 
+/// Size relative to the largest possible below which nothing is left of an effect.
+const IDLE: f64 = 2e-5;
+
 /// Share of windows that are left out where only the size of a gap is in question.
-const SPOILT: f64 = 0.05;
+const SPOILT: f64 = 0.02;
 
 /// Widths of smoothed friction that are tried as a nuisance, relative to the slowest joint's RMS speed.
 const SMOOTHING: [f64; 2] = [0.03, 0.1];
@@ -63,6 +66,11 @@ impl<const P: usize> Contender<P> {
     /// Cost on all windows, and of leaving the trusted values.
     pub fn score(&self) -> f64 {
         self.training.iter().chain(&self.holdout).sum::<f64>() + self.fit.prior_cost
+    }
+
+    /// Whether an effect that changes the arm wherever it sits has come down to nothing: its other parameters then stand for something else.
+    pub fn is_idle(&self) -> bool {
+        self.effect.is_some_and(|e| e.law.spec().trial == Trial::Whole) && self.size < IDLE
     }
 
     /// Advantage over `other` of every window, training first.
@@ -155,8 +163,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
         let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
         let least = if gap { self.least_trace(weights, fit) * training } else { f64::INFINITY };
-        let more = promising(&screened, least).into_iter().map(|effect| {
-            self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| fit.hypothesis.with(effect))
+        let more = promising(&screened, least).into_iter().map(|found| {
+            let effect = found.effect;
+            self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| compensated(&fit.hypothesis, found))
         });
         let mut starts: Vec<Hypothesis<P>> = more.collect();
         if gap {
@@ -310,15 +319,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
     /// Cost of predicting that every joint stays where its window starts.
     fn motion(&self, weights: &Weights<N>) -> f64 {
-        let data = &self.holdout.data;
-        let moved = data.windows.iter().map(|window| {
-            let rows = self.holdout.measured[window.range()].chunks_exact(N);
-            rows.map(|row| {
-                (0..N).map(|j| ((row[j] - window.start.q[j]) / weights.holdout.scale[j]).powi(2)).sum::<f64>()
-            })
-            .sum::<f64>()
-        });
-        moved.sum()
+        self.holdout.motion(&weights.holdout.scale)
     }
 
     /// Cost that measurement noise alone leaves on the holdout.
@@ -354,17 +355,26 @@ fn without_worst(mut costs: Vec<f64>) -> f64 {
     costs.iter().take(kept).sum()
 }
 
+/// The model with a candidate; where the arm's parameters can imitate it, they make room for it at once.
+fn compensated<const P: usize>(model: &Hypothesis<P>, found: &Scored) -> Hypothesis<P> {
+    if found.distinct >= ABSORBED {
+        return model.with(found.effect);
+    }
+    let room: Vec<f64> = model.values().iter().zip(&found.room).map(|(value, shift)| value + shift).collect();
+    model.with_values(&room).with(found.effect)
+}
+
 /// The best start of each of the best-scoring candidates, and of those that only trusted values can reveal.
-fn promising(screened: &[Scored], least: f64) -> Vec<Placed> {
+fn promising(screened: &[Scored], least: f64) -> Vec<&Scored> {
     let mut order: Vec<&Scored> = screened.iter().filter(|s| s.gain > 0.0).collect();
     order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let mut chosen: Vec<Placed> = Vec::new();
+    let mut chosen: Vec<&Scored> = Vec::new();
     for scored in order {
         let wanted = (chosen.len() < FULL_FITS && scored.gain > least) || scored.distinct < ABSORBED;
         // A test at a trial value says little of where to start, so two of them may.
         let starts = if scored.effect.law.spec().trial == Trial::Whole { 2 } else { 1 };
-        if wanted && chosen.iter().filter(|c| c.same_place(&scored.effect)).count() < starts {
-            chosen.push(scored.effect);
+        if wanted && chosen.iter().filter(|c| c.effect.same_place(&scored.effect)).count() < starts {
+            chosen.push(scored);
         }
     }
     chosen

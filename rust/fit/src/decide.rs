@@ -91,7 +91,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let mut model = refit.clone();
         let (mut causes, mut stages): (Vec<Cause>, Vec<Stage<N, P>>) = (Vec::new(), Vec::new());
         let mut smoothed = false;
-        let noticeable = RELEVANT.max(NOTICEABLE * stage.relative_error());
+        let noticeable = noticeable(stage.relative_error());
         while causes.len() < max_causes {
             let Some((choice, ground)) = choose(&stage, smoothed, noticeable) else {
                 break;
@@ -140,6 +140,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let (holdout, error) = self.judged_on_holdout(&stage.weights, &fit);
         Contender { effect, size: 0.0, fit, training, holdout, error }
     }
+}
+
+/// Improvement relative to the motion below which a cause is not worth a name, given the first gap.
+pub fn noticeable(first_gap: f64) -> f64 {
+    RELEVANT.max(NOTICEABLE * first_gap)
 }
 
 /// Why a contender deserves to be adopted.
@@ -192,7 +197,7 @@ fn moves<const N: usize, const P: usize>(
     contender: &Contender<P>,
     noticeable: f64,
 ) -> bool {
-    let possible = contender.size < AT_BOUND;
+    let possible = contender.size < AT_BOUND && !contender.is_idle();
     let matters = if stage.relative_error() > CONSEQUENCE { MATTERS } else { MATTERS_IN_SMALL };
     stage.excess() > ABOVE_FLOOR
         && possible

@@ -4,7 +4,7 @@
 //! same joint lacks over stretches of the same length anywhere else. What is found is fitted by output error over the windows it
 //! touches, and kept if it explains most of what those windows lack.
 
-use crate::decide::Attribution;
+use crate::decide::{Attribution, noticeable};
 use crate::locate::{Lack, lacking_torque};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
@@ -64,6 +64,8 @@ pub struct Event {
     pub sigma: [f64; 3],
     /// Share of the cost of the windows it touches that it explains.
     pub share: f64,
+    /// By how much it lowers the cost of those windows.
+    pub gain: f64,
     /// Probability that it is a push rather than the tail of something else.
     pub probability: f64,
 }
@@ -81,8 +83,8 @@ struct Stretch {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// Pushes that a model leaves unexplained; pushes already known are looked for again.
-    pub fn events(&self, model: &Hypothesis<P>, scale: [f64; N]) -> Vec<Event> {
+    /// Pushes that a model leaves unexplained; those that lower the error by less than `noticeable`, relative to the motion, do not count.
+    pub fn events(&self, model: &Hypothesis<P>, scale: [f64; N], noticeable: f64) -> Vec<Event> {
         let bare = [without_pushes(&self.training), without_pushes(&self.holdout)];
         let metrics = bare.each_ref().map(|sample| self.metric(sample, model, scale));
         let peaks = self.peaks(&bare, model);
@@ -93,7 +95,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let known: Vec<Placed> =
                 found.iter().filter(|e| e.is_in(stretch.set, stretch.track)).map(|e| e.push).collect();
             let fitted = self.fit_push(&bare[stretch.set], model, scale, stretch, &known, typical);
-            if let Some(mut event) = fitted.filter(|e| e.share > EXPLAINS) {
+            let least = noticeable.powi(2) * bare[stretch.set].motion(&scale);
+            if let Some(mut event) = fitted.filter(|e| e.share > EXPLAINS && e.gain > least) {
                 event.probability = 1.0 - 0.5 * (rest / stretch.z.abs()).powi(2);
                 found.push(event);
             }
@@ -120,7 +123,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     fn events_of(&self, attribution: &Attribution<N, P>) -> Vec<Event> {
-        self.events(&attribution.model.hypothesis, settled_scale(attribution))
+        let first = attribution.stages[0].relative_error();
+        self.events(&attribution.model.hypothesis, settled_scale(attribution), noticeable(first))
     }
 
     /// Pushes fitted again to another model.
@@ -272,6 +276,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             push: Placed { law, joint: stretch.joint, p },
             sigma: std::array::from_fn(|i| (inverse[(i, i)] * noise).sqrt()),
             share: (bare - left) / (bare - (count * typical).min(0.5 * bare)).max(1e-300),
+            gain: bare - left,
             probability: 0.0,
         })
     }

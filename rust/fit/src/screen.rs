@@ -27,6 +27,8 @@ pub struct Scored {
     pub sigma: f64,
     /// Standard deviation if the residual were white with the metric's scale: what the log could tell at best.
     pub information_sigma: f64,
+    /// Changes of the model's own values that make room for the candidate, to first order.
+    pub room: Vec<f64>,
     /// Share of the candidate's trace that the arm's own parameters cannot imitate.
     pub distinct: f64,
 }
@@ -66,7 +68,10 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let free: Vec<usize> = (0..base.values().len()).collect();
     let mut columns = problem.sensitivities(base, &residual, &free);
     let k = columns.len();
-    let traces: Vec<Vec<f64>> = candidates.par_iter().map(|c| trace(problem, base, &residual, c)).collect();
+    let before: f64 = tempered(problem, &residual);
+    let traced: Vec<(Vec<f64>, Option<f64>)> =
+        candidates.par_iter().map(|c| trace(problem, base, &residual, before, c)).collect();
+    let (traces, direct): (Vec<Vec<f64>>, Vec<Option<f64>>) = traced.into_iter().unzip();
     columns.extend(traces);
     let gram = problem.metric.gram(problem.data, &columns, &residual);
     let last = gram.total.nrows() - 1;
@@ -86,7 +91,15 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         let information = (raw - weights.dot(&cross)).max(1e-12 * raw);
         let slope = gram.total[(c, last)] - weights.dot(&own_score);
         let scatter: f64 = gram.scores.iter().map(|s| (s[c] - weights.dot(&s.rows(0, k))).powi(2)).sum();
-        scored(effect, raw, information, slope, scatter)
+        let mut test = scored(effect, raw, information, slope, scatter);
+        // What the others take back, and what they gain of themselves.
+        let own_step = &inverse * &own_score;
+        let taken = test.admissible(effect);
+        test.room = (0..k).map(|i| own_step[i] - weights[i] * taken).collect();
+        if let Some(direct) = direct[i] {
+            test.gain = test.gain.max(direct);
+        }
+        test
     };
     candidates.iter().enumerate().map(score).collect()
 }
@@ -102,8 +115,9 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &Problem<A, N, P>,
     base: &Hypothesis<P>,
     residual: &[f64],
+    before: f64,
     candidate: &Placed,
-) -> Vec<f64> {
+) -> (Vec<f64>, Option<f64>) {
     let i = tested(candidate);
     let (moved, step) = match candidate.law.spec().trial {
         Trial::Amplitudes(_) => {
@@ -116,7 +130,17 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         Trial::Whole | Trial::Event => (*candidate, 1.0),
     };
     let there = problem.residual(&base.with(moved));
-    residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect()
+    // What begins beyond a threshold may show in few windows, which weigh next to nothing until it explains them.
+    let direct = (candidate.law.spec().trial == Trial::Whole).then(|| before - tempered(problem, &there));
+    (residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect(), direct)
+}
+
+/// Tempered cost of a residual.
+fn tempered<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    problem: &Problem<A, N, P>,
+    residual: &[f64],
+) -> f64 {
+    problem.metric.costs(problem.data, residual).into_iter().map(|c| problem.metric.tempered(c)).sum()
 }
 
 /// The test of one candidate; a parameter that would have to cross its bound has nothing to gain.
@@ -148,6 +172,19 @@ fn scored(effect: &Placed, raw: f64, information: f64, slope: f64, scatter: f64)
         estimate,
         sigma: scatter.sqrt() / information,
         information_sigma: 1.0 / information.sqrt(),
+        room: Vec::new(),
         distinct: if raw > 0.0 { information / raw } else { 0.0 },
+    }
+}
+
+impl Scored {
+    /// By how much the tested parameter of the suggestion differs from neutral, in the units of the test.
+    fn admissible(&self, candidate: &Placed) -> f64 {
+        let i = tested(candidate);
+        match candidate.law.spec().trial {
+            Trial::Amplitudes(_) => self.effect.p[i] - candidate.law.spec().parameters[i].neutral,
+            Trial::Ray => self.effect.p[i] / candidate.p[i],
+            Trial::Whole | Trial::Event => 1.0,
+        }
     }
 }

@@ -173,7 +173,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
             let (normal, gradient) = self.normal_equations(&gram, &at.hypothesis);
             let mut improved = false;
             for _ in 0..6 {
-                let values = step(&normal, &gradient, damping, &at.hypothesis.values(), &lower, &upper);
+                let now = at.hypothesis.values();
+                let values = inside(&now, step(&normal, &gradient, damping, &now, &lower, &upper), &lower, P);
                 let trial = Point::new(self, at.hypothesis.with_values(&values));
                 if trial.cost() < at.cost() {
                     improved = at.cost() - trial.cost() > effort.enough * at.cost();
@@ -248,6 +249,17 @@ impl<const P: usize> Point<P> {
     fn cost(&self) -> f64 {
         self.data_cost + self.prior_cost
     }
+}
+
+/// A step that takes no value after the first `free` more than nine tenths of the way to its lower bound: an effect that is switched
+/// off has no derivative to come back by.
+fn inside(now: &[f64], mut next: Vec<f64>, lower: &[f64], free: usize) -> Vec<f64> {
+    for i in free..next.len() {
+        if lower[i].is_finite() {
+            next[i] = next[i].max(lower[i] + 0.1 * (now[i] - lower[i]));
+        }
+    }
+    next
 }
 
 /// One damped step; values at a bound that the step would leave stay there.

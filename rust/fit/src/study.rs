@@ -43,6 +43,18 @@ impl<const N: usize> Sample<N> {
         let measured = data.measured();
         Self { data, measured }
     }
+
+    /// Cost, in these scales, of predicting that every joint stays where its window starts.
+    pub fn motion(&self, scale: &[f64; N]) -> f64 {
+        let moved = self.data.windows.iter().map(|window| {
+            let rows = self.measured[window.range()].chunks_exact(N);
+            let apart = |row: &[f64]| -> f64 {
+                (0..N).map(|j| ((row[j] - window.start.q[j]) / scale[j]).powi(2)).sum()
+            };
+            rows.map(apart).sum::<f64>()
+        });
+        moved.sum()
+    }
 }
 
 /// Weights for training and holdout windows, taken around one hypothesis.
