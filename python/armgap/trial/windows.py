@@ -21,7 +21,8 @@ Placed = tuple[str, int | None, dict[str, float]]
 WINDOW = 0.2
 #: Start states come from a cubic through the samples within this time, s, and through this many at least.
 AROUND, FEWEST = 0.012, 4
-TOLERANCE = 1e-8
+#: Tolerances of the simulation, rad (m), the next where one is not reached.
+TOLERANCES = (1e-8, 1e-6, 1e-4)
 STEPS, STEP = 8, 1e-4
 
 
@@ -84,10 +85,13 @@ def misses(m: Mechanism, theta: Array, windows: Sequence[Window], effects: Seque
 
 
 def _predict(m: Mechanism, theta: Array, w: Window, effects: Sequence[Placed]) -> Array:
-    q, _ = _native.simulate(
-        m.kind, m.gravity, list(m.link_length), theta.tolist(), w.t, w.tau, w.q0, w.dq0, list(effects), TOLERANCE, 0.0
-    )
-    return q[1:]
+    arm = (m.kind, m.gravity, list(m.link_length), theta.tolist())
+    for tolerance in TOLERANCES:
+        try:
+            return _native.simulate(*arm, w.t, w.tau, w.q0, w.dq0, list(effects), tolerance, 0.0)[0][1:]
+        except ValueError as error:
+            problem = error
+    raise problem
 
 
 def refit(
