@@ -9,6 +9,7 @@ use crate::arm::Arm;
 use crate::effect::Pulse;
 use crate::plant::{Mode, Motion, Plant};
 use crate::real::{Real, lit};
+use crate::transmission::Hidden;
 use nalgebra::SVector;
 
 /// Mode changes located within one sub-step before the rest of it is taken with all crossing joints held.
@@ -26,12 +27,14 @@ pub struct State<T, const N: usize> {
     pub dq: SVector<T, N>,
     /// Friction modes.
     pub modes: [Mode; N],
+    /// States that no encoder shows.
+    pub hidden: Hidden<T, N>,
 }
 
 impl<T: Real, const N: usize> State<T, N> {
     /// A state whose modes follow from its velocities: a joint at rest starts stuck and is released if its torque demands it.
     pub fn new(q: SVector<T, N>, dq: SVector<T, N>) -> Self {
-        Self { q, dq, modes: core::array::from_fn(|j| Mode::of(dq[j])) }
+        Self { q, dq, modes: core::array::from_fn(|j| Mode::of(dq[j])), hidden: Hidden::none(q) }
     }
 
     /// Whether every number is finite.
@@ -94,32 +97,53 @@ struct Step<'a, T: Real, A, const N: usize, const P: usize> {
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N, P> {
     #[inline]
-    fn motion(&self, x: T, q: &SVector<T, N>, dq: &SVector<T, N>, modes: &[Mode; N]) -> Motion<T, N> {
+    fn motion(&self, x: T, state: &State<T, N>) -> Motion<T, N> {
         let tau = self.interval.torque_at(x);
-        self.plant.acceleration(self.interval.t + x, q, dq, &tau, modes)
+        let State { q, dq, modes, hidden } = state;
+        self.plant.acceleration(self.interval.t + x, q, dq, &tau, modes, hidden)
+    }
+
+    /// `state` moved on by `dt` with the rates `(dq, motion)` of some stage.
+    #[inline]
+    fn moved(&self, state: &State<T, N>, dt: T, at: &State<T, N>, slope: &Motion<T, N>) -> State<T, N> {
+        let mut next = *state;
+        next.q = state.q + at.dq * dt;
+        next.dq = state.dq + slope.ddq * dt;
+        if self.plant.is_driven() {
+            next.hidden.twist = state.hidden.twist + at.hidden.dtwist * dt;
+            next.hidden.dtwist = state.hidden.dtwist + slope.ddtwist * dt;
+        }
+        next
     }
 
     /// One Runge-Kutta step whose first stage is known.
     #[inline]
-    fn runge_kutta(&self, state: &State<T, N>, x: T, dt: T, k1: &SVector<T, N>) -> State<T, N> {
+    fn runge_kutta(&self, state: &State<T, N>, x: T, dt: T, k1: &Motion<T, N>) -> State<T, N> {
         let (half, sixth, two) = (dt * lit(0.5), dt / lit(6.0), lit::<T>(2.0));
-        let State { q, dq, modes } = state;
-        let v2 = dq + k1 * half;
-        let k2 = self.motion(x + half, &(q + dq * half), &v2, modes).ddq;
-        let v3 = dq + k2 * half;
-        let k3 = self.motion(x + half, &(q + v2 * half), &v3, modes).ddq;
-        let v4 = dq + k3 * dt;
-        let k4 = self.motion(x + dt, &(q + v3 * dt), &v4, modes).ddq;
-        State {
-            q: q + (dq + (v2 + v3) * two + v4) * sixth,
-            dq: dq + (k1 + (k2 + k3) * two + k4) * sixth,
-            modes: *modes,
+        let s2 = self.moved(state, half, state, k1);
+        let k2 = self.motion(x + half, &s2);
+        let s3 = self.moved(state, half, &s2, &k2);
+        let k3 = self.motion(x + half, &s3);
+        let s4 = self.moved(state, dt, &s3, &k3);
+        let k4 = self.motion(x + dt, &s4);
+        let mut next = *state;
+        next.q = state.q + (state.dq + (s2.dq + s3.dq) * two + s4.dq) * sixth;
+        next.dq = state.dq + (k1.ddq + (k2.ddq + k3.ddq) * two + k4.ddq) * sixth;
+        if self.plant.is_driven() {
+            let rates = [&state.hidden.dtwist, &s2.hidden.dtwist, &s3.hidden.dtwist, &s4.hidden.dtwist];
+            next.hidden.twist += (rates[0] + (rates[1] + rates[2]) * two + rates[3]) * sixth;
+            next.hidden.dtwist += (k1.ddtwist + (k2.ddtwist + k3.ddtwist) * two + k4.ddtwist) * sixth;
         }
+        if self.plant.remembers() {
+            next.hidden.memory = self.plant.memory(&next.q, &state.hidden);
+            next.hidden.anchor = next.q;
+        }
+        next
     }
 
     /// A step with smoothed friction: no events.
     fn smooth(&self, state: &State<T, N>, x: T, dt: T) -> State<T, N> {
-        let k1 = self.motion(x, &state.q, &state.dq, &state.modes).ddq;
+        let k1 = self.motion(x, state);
         self.runge_kutta(state, x, dt, &k1)
     }
 
@@ -148,10 +172,10 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         *state = last;
     }
 
-    /// Releases stuck joints that friction cannot hold, and sticks joints that were released to no avail; returns `ddq`.
+    /// Releases stuck joints that friction cannot hold, and sticks joints that were released to no avail; returns the motion.
     #[inline]
-    fn settle(&self, state: &mut State<T, N>, x: T) -> SVector<T, N> {
-        let mut motion = self.motion(x, &state.q, &state.dq, &state.modes);
+    fn settle(&self, state: &mut State<T, N>, x: T) -> Motion<T, N> {
+        let mut motion = self.motion(x, state);
         let mut tried = [false; N];
         for _ in 0..2 * N {
             let Some((j, mode)) = self.unsettled(state, &motion, x, &tried) else {
@@ -159,9 +183,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
             };
             tried[j] = mode == Mode::Stuck;
             state.modes[j] = mode;
-            motion = self.motion(x, &state.q, &state.dq, &state.modes);
+            motion = self.motion(x, state);
         }
-        motion.ddq
+        motion
+    }
+
+    /// Torque that reaches the joints.
+    #[inline]
+    fn joint_torque(&self, x: T, state: &State<T, N>) -> SVector<T, N> {
+        self.plant.transmitted(&self.interval.torque_at(x), &state.hidden)
     }
 
     /// The joint whose mode contradicts the motion most, and the mode it should have.
@@ -180,7 +210,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
                     return Some((j, Mode::of(state.dq[j])));
                 }
             } else if state.modes[j] == Mode::Stuck {
-                let tau = self.interval.torque_at(x);
+                let tau = self.joint_torque(x, state);
                 let (excess, direction) =
                     self.plant.excess(j, self.interval.t + x, &state.q, &tau, motion.holding[j]);
                 if excess > worst && !tried[j] {
@@ -201,7 +231,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         trial: &State<T, N>,
         x: T,
         dt: T,
-        k1: &SVector<T, N>,
+        k1: &Motion<T, N>,
     ) -> Option<Event<T>> {
         let reverses =
             |j: usize| state.modes[j] != Mode::Stuck && trial.dq[j] * state.modes[j].direction() < T::zero();
@@ -209,11 +239,11 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         if !any_stuck && !(0..N).any(reverses) {
             return None;
         }
-        let end = self.motion(x + dt, &trial.q, &trial.dq, &trial.modes);
+        let end = self.motion(x + dt, trial);
         let mut first: Option<Event<T>> = None;
         for j in 0..N {
             let event = if reverses(j) {
-                let s = hermite_root(state.dq[j], k1[j] * dt, trial.dq[j], end.ddq[j] * dt);
+                let s = hermite_root(state.dq[j], k1.ddq[j] * dt, trial.dq[j], end.ddq[j] * dt);
                 Some(Event { joint: j, s, change: Change::Stop })
             } else if state.modes[j] == Mode::Stuck {
                 self.release(j, state, trial, x, dt, &end)
@@ -240,33 +270,25 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         end: &Motion<T, N>,
     ) -> Option<Event<T>> {
         let t = self.interval.t;
-        let tau_end = self.interval.torque_at(x + dt);
+        let tau_end = self.joint_torque(x + dt, trial);
         let (after, direction) = self.plant.excess(j, t + x + dt, &trial.q, &tau_end, end.holding[j]);
         if after <= T::zero() {
             return None;
         }
-        let start = self.motion(x, &state.q, &state.dq, &state.modes);
-        let tau = self.interval.torque_at(x);
+        let start = self.motion(x, state);
+        let tau = self.joint_torque(x, state);
         let (before, _) = self.plant.excess(j, t + x, &state.q, &tau, start.holding[j]);
         let s = if before < T::zero() { before / (before - after) } else { T::zero() };
         Some(Event { joint: j, s, change: Change::Release(Mode::of(direction)) })
     }
 
     /// Integrates up to the event; the instant of a stop is corrected until the velocity vanishes to rounding.
-    fn locate(
-        &self,
-        state: &State<T, N>,
-        event: &Event<T>,
-        x: T,
-        dt: T,
-        k1: &SVector<T, N>,
-    ) -> Located<T, N> {
+    fn locate(&self, state: &State<T, N>, event: &Event<T>, x: T, dt: T, k1: &Motion<T, N>) -> Located<T, N> {
         let mut s = event.s;
         let mut reached = self.runge_kutta(state, x, s * dt, k1);
         if matches!(event.change, Change::Stop) {
             for _ in 0..MAX_REFINEMENTS {
-                let slope =
-                    self.motion(x + s * dt, &reached.q, &reached.dq, &reached.modes).ddq[event.joint] * dt;
+                let slope = self.motion(x + s * dt, &reached).ddq[event.joint] * dt;
                 let correction = reached.dq[event.joint] / slope;
                 let next = s - correction;
                 if !(next > T::zero() && next <= T::one()) || correction.abs() < lit(1e-12) {

@@ -8,6 +8,7 @@ use crate::arm::Arm;
 use crate::effect::{Active, JointPoint};
 use crate::linear::solve_positive_definite;
 use crate::real::{Real, lit};
+use crate::transmission::{Drive, Hidden};
 use nalgebra::{SMatrix, SVector};
 
 /// Most effects one plant can carry.
@@ -55,6 +56,8 @@ pub struct Motion<T, const N: usize> {
     pub ddq: SVector<T, N>,
     /// Friction torque of stuck joints; zero for sliding ones.
     pub holding: SVector<T, N>,
+    /// Acceleration of the twist of driven joints; zero for rigid ones.
+    pub ddtwist: SVector<T, N>,
 }
 
 /// An arm with parameter values, effects and a friction model.
@@ -64,12 +67,14 @@ pub struct Plant<T: Real, A, const N: usize, const P: usize> {
     theta: [T; P],
     viscous: SVector<T, N>,
     coulomb: SVector<T, N>,
-    armature: SVector<T, N>,
+    added: SMatrix<T, N, N>,
+    drives: [Option<Drive<T>>; N],
     tilt: T,
     smoothing: T,
     effects: [Option<Active<T>>; MAX_EFFECTS],
     forces: bool,
     levels: bool,
+    remembers: bool,
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
@@ -81,12 +86,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             theta,
             viscous,
             coulomb,
-            armature: SVector::zeros(),
+            added: SMatrix::zeros(),
+            drives: [None; N],
             tilt: T::zero(),
             smoothing: T::zero(),
             effects: [None; MAX_EFFECTS],
             forces: false,
             levels: false,
+            remembers: false,
         }
     }
 
@@ -103,7 +110,17 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         let hooks = effect.law.spec().hooks;
         self.forces |= hooks.force;
         self.levels |= hooks.coulomb;
-        *self.armature.get_mut(effect.joint)? += effect.law.inertia(&effect.p);
+        self.remembers |= hooks.memory;
+        let joint = effect.joint;
+        let own = *self.arm.inertia(&self.theta, &SVector::zeros()).get((joint, joint))?;
+        *self.added.get_mut((joint, joint))? += effect.law.inertia(&effect.p);
+        if let Some(drive) = effect.law.drive(&effect.p, own) {
+            *self.drives.get_mut(joint)? = Some(drive);
+            if drive.inside {
+                *self.added.get_mut((joint, joint))? -= drive.inertia;
+            }
+        }
+        self.couple(effect.law.coupling(&effect.p));
         self.tilt += effect.law.tilt(&effect.p);
         if let Some((mass, distance)) = effect.law.payload(&effect.p) {
             let delta = self.arm.payload(&self.theta, mass, distance);
@@ -112,6 +129,56 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             }
         }
         Some(self)
+    }
+
+    /// Adds to the inertia between the first two joints.
+    fn couple(&mut self, inertia: T) {
+        for at in [(0, 1), (1, 0)] {
+            if let Some(entry) = self.added.get_mut(at) {
+                *entry += inertia;
+            }
+        }
+    }
+
+    /// Whether a joint has a motor side of its own.
+    #[inline]
+    pub fn is_driven(&self) -> bool {
+        self.drives.iter().any(Option::is_some)
+    }
+
+    /// Whether a joint remembers its path.
+    #[inline]
+    pub fn remembers(&self) -> bool {
+        self.remembers
+    }
+
+    /// The motor side of joint `j`.
+    pub fn drive(&self, j: usize) -> Option<&Drive<T>> {
+        self.drives.get(j)?.as_ref()
+    }
+
+    /// What reaches the joints of the motors' torque `tau`.
+    #[inline]
+    pub fn transmitted(&self, tau: &SVector<T, N>, hidden: &Hidden<T, N>) -> SVector<T, N> {
+        SVector::from_fn(|j, _| match &self.drives[j] {
+            Some(drive) => drive.transmitted(hidden.twist[j], hidden.dtwist[j]),
+            None => tau[j],
+        })
+    }
+
+    /// What the joints remember at `q`.
+    #[inline]
+    pub fn memory(&self, q: &SVector<T, N>, hidden: &Hidden<T, N>) -> SVector<T, N> {
+        let mut memory = hidden.memory;
+        if self.remembers {
+            for effect in self.effects.iter().flatten().filter(|e| e.law.spec().hooks.memory) {
+                let j = effect.joint;
+                if let (Some(z), Some(to), Some(from)) = (memory.get_mut(j), q.get(j), hidden.anchor.get(j)) {
+                    *z = effect.law.remember(&effect.p, *z, *to - *from);
+                }
+            }
+        }
+        memory
     }
 
     /// Parameter values, payloads included.
@@ -133,7 +200,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     #[inline]
     fn point(&self, j: usize, t: T, q: T, dq: T, tau: T, load: T) -> JointPoint<T> {
         let friction = self.viscous[j] * dq.abs() + self.coulomb[j];
-        JointPoint { t, q, dq, tau, load, friction }
+        JointPoint { t, q, dq, tau, load, friction, other: T::zero(), memory: T::zero() }
+    }
+
+    /// Direction in which joint `j` slides, between -1 and 1 where friction is smoothed.
+    #[inline]
+    fn sliding(&self, j: usize, dq: &SVector<T, N>, modes: &[Mode; N]) -> T {
+        if self.smoothing > T::zero() { (dq[j] / self.smoothing).tanh() } else { modes[j].direction() }
     }
 
     /// Coulomb level of joint `j` in a direction, never negative.
@@ -177,7 +250,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         }
     }
 
-    /// Equation (1) solved for `ddq`, with stuck joints held at rest.
+    /// Equation (1) solved for `ddq` under the motors' torque `tau`, with stuck joints held at rest.
     #[inline]
     pub fn acceleration(
         &self,
@@ -186,12 +259,42 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         dq: &SVector<T, N>,
         tau: &SVector<T, N>,
         modes: &[Mode; N],
+        hidden: &Hidden<T, N>,
+    ) -> Motion<T, N> {
+        if !self.is_driven() {
+            return self.rigid(t, q, dq, tau, modes, hidden);
+        }
+        let transmitted = self.transmitted(tau, hidden);
+        let mut motion = self.rigid(t, q, dq, &transmitted, modes, hidden);
+        for j in 0..N {
+            if let Some(drive) = &self.drives[j] {
+                motion.ddtwist[j] = (tau[j] - transmitted[j]) / drive.inertia - motion.ddq[j];
+            }
+        }
+        motion
+    }
+
+    /// The same for given torques at the joints.
+    #[inline]
+    fn rigid(
+        &self,
+        t: T,
+        q: &SVector<T, N>,
+        dq: &SVector<T, N>,
+        tau: &SVector<T, N>,
+        modes: &[Mode; N],
+        hidden: &Hidden<T, N>,
     ) -> Motion<T, N> {
         let (mut inertia, bias) = self.arm.dynamics(&self.theta, q, dq, self.tilt);
+        inertia += self.added;
+        let memory = self.memory(q, hidden);
         let mut rhs = SVector::<T, N>::zeros();
         for j in 0..N {
-            let x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
-            inertia[(j, j)] += self.armature[j];
+            let mut x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
+            if self.forces {
+                x.other = self.sliding((j + 1) % N, dq, modes);
+                x.memory = memory[j];
+            }
             rhs[j] = tau[j] - bias[j] - self.viscous[j] * dq[j] - self.dry_friction(j, &x, modes[j])
                 + self.force(j, &x);
         }
@@ -223,7 +326,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
                 }
             }
         }
-        Motion { ddq, holding }
+        Motion { ddq, holding, ddtwist: SVector::zeros() }
     }
 
     /// Which joints are held; none with smoothed friction.
@@ -243,24 +346,34 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         (holding.abs() - self.level(j, &x, direction), direction)
     }
 
-    /// Fastest rate at which smoothed friction pulls a velocity to zero, 1/s; zero for exact friction.
-    pub fn friction_rate(&self, q: &SVector<T, N>) -> T {
-        if self.smoothing == T::zero() {
-            return T::zero();
-        }
-        let (inertia, _) = self.arm.dynamics(&self.theta, q, &SVector::zeros(), self.tilt);
-        let mut fastest = T::zero();
-        for j in 0..N {
-            let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
-            let mut least = inertia[(j, j)] + self.armature[j];
-            for k in 0..N {
-                if k != j {
-                    let coupling = inertia[(j, k)];
-                    least -= coupling * coupling / (inertia[(k, k)] + self.armature[k]);
-                }
+    /// Inertia of joint `j` at `q` with all other joints free to move.
+    fn free_inertia(&self, j: usize, inertia: &SMatrix<T, N, N>) -> T {
+        let mut least = inertia[(j, j)];
+        for k in 0..N {
+            if k != j {
+                least -= inertia[(j, k)] * inertia[(j, k)] / inertia[(k, k)];
             }
-            let rate = self.level(j, &x, T::one()) / (self.smoothing * least.max(lit(1e-9)));
-            fastest = fastest.max(rate);
+        }
+        least.max(lit(1e-9))
+    }
+
+    /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, or a motor swings against its link. Zero for
+    /// a rigid arm with exact friction.
+    pub fn fastest(&self, q: &SVector<T, N>) -> T {
+        let mut fastest = T::zero();
+        if self.smoothing == T::zero() && !self.is_driven() {
+            return fastest;
+        }
+        let inertia = self.arm.dynamics(&self.theta, q, &SVector::zeros(), self.tilt).0 + self.added;
+        for j in 0..N {
+            let free = self.free_inertia(j, &inertia);
+            if self.smoothing > T::zero() {
+                let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
+                fastest = fastest.max(self.level(j, &x, T::one()) / (self.smoothing * free));
+            }
+            if let Some(drive) = &self.drives[j] {
+                fastest = fastest.max(drive.rate(free));
+            }
         }
         fastest
     }

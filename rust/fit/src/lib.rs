@@ -15,6 +15,7 @@ pub mod identify;
 pub mod locate;
 pub mod metric;
 pub mod model;
+mod observe;
 pub mod report;
 pub mod scale;
 pub mod screen;

@@ -31,6 +31,11 @@ const LARGEST: f64 = 50.0;
 /// Times are measured in sample periods; this many of them are one typical size when it comes to what is possible.
 const LONGEST_TIME: f64 = 20.0;
 
+/// Natural frequency, 1/s, damping ratio, and the motor's share of the joint's inertia, of a typical elastic joint.
+const SHAFT_RATE: f64 = 100.0;
+const SHAFT_DAMPING: f64 = 0.2;
+const MOTOR_SHARE: f64 = 0.1;
+
 impl<const N: usize> Scales<N> {
     /// Sizes seen in `tracks` on this arm.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
@@ -62,6 +67,9 @@ impl<const N: usize> Scales<N> {
             Quantity::Drag => self.torque[j] / (self.speed[j] * self.speed[j]),
             Quantity::Damping => self.torque[j] / self.speed[j],
             Quantity::Stiffness => self.torque[j] / self.position[j],
+            Quantity::Hardening => self.torque[j] / self.position[j].powi(3),
+            Quantity::ShaftStiffness => self.inertia[j] * SHAFT_RATE * SHAFT_RATE * MOTOR_SHARE,
+            Quantity::ShaftDamping => self.inertia[j] * SHAFT_RATE * MOTOR_SHARE * SHAFT_DAMPING,
             Quantity::Speed => self.speed[j],
             Quantity::Position => self.position[j],
             Quantity::Angle | Quantity::Count | Quantity::Ratio | Quantity::Duration => 1.0,

@@ -34,7 +34,7 @@ pub struct Scored {
 /// Every effect on every joint it can sit on, at each of its start values.
 pub fn candidates<const N: usize>(scales: &Scales<N>) -> Vec<Placed> {
     let mut all = Vec::new();
-    for law in catalogue::<f64>() {
+    for law in catalogue::<f64>().iter().filter(|law| law.spec().least_joints <= N) {
         let spec = law.spec();
         let joints = if spec.scope == Scope::Joint { N } else { 1 };
         for joint in 0..joints {
@@ -111,6 +111,7 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             moved.p[i] += step;
             (moved, step)
         }
+        Trial::Ray => (Placed { p: candidate.p.map(|x| TRIAL * x), ..*candidate }, TRIAL),
         Trial::Whole => (*candidate, 1.0),
     };
     let there = problem.residual(&base.with(moved));
@@ -130,6 +131,11 @@ fn scored(effect: &Placed, raw: f64, information: f64, slope: f64, scatter: f64)
                 (parameter.neutral + estimate).clamp(parameter.lower, parameter.upper) - parameter.neutral;
             suggested.p[i] = parameter.neutral + most.clamp(-20.0 * start, 20.0 * start);
             most
+        }
+        Trial::Ray => {
+            let share = estimate.clamp(0.0, 20.0);
+            suggested.p = effect.p.map(|x| x * share);
+            share
         }
         // A share of the whole difference, from none to all of it.
         Trial::Whole => estimate.clamp(0.0, 1.0),

@@ -71,8 +71,9 @@ impl WithArm for Simulation<'_> {
         theta: [f64; P],
     ) -> Self::Output {
         let hypothesis = Hypothesis { theta, smoothing: self.smoothing, effects: self.effects.to_vec() };
-        let mut coarse = self.run::<A, N, P>(&arm, &hypothesis, 1)?;
-        let mut substeps = 2;
+        let first = self.first_substeps::<A, N, P>(&arm, &hypothesis)?;
+        let mut coarse = self.run::<A, N, P>(&arm, &hypothesis, first)?;
+        let mut substeps = 2 * first;
         loop {
             let fine = self.run::<A, N, P>(&arm, &hypothesis, substeps)?;
             let change = coarse.q.iter().zip(&fine.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -89,6 +90,18 @@ impl WithArm for Simulation<'_> {
 }
 
 impl Simulation<'_> {
+    /// Sub-steps that keep the stiffest part of the arm stable.
+    fn first_substeps<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        &self,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+    ) -> Result<usize, SimulationError> {
+        let plant = hypothesis.plant(arm).ok_or(SimulationError::Effects)?;
+        let longest = self.t.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        let rate = plant.fastest(&SVector::from_fn(|j, _| self.q0[j]));
+        Ok(((rate * longest).ceil() as usize).clamp(1, MAX_SUBSTEPS / 2))
+    }
+
     fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         arm: &A,

@@ -292,6 +292,7 @@ pub fn neutral(effect: &Placed) -> Placed {
     let spec = effect.law.spec();
     let amplitudes = match spec.trial {
         Trial::Amplitudes(count) => count,
+        Trial::Ray => off.len(),
         Trial::Whole => 1,
     };
     for (value, parameter) in off.p.iter_mut().zip(spec.parameters).take(amplitudes) {

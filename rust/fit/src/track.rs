@@ -1,8 +1,10 @@
 //! One log, ready to be simulated against: times, positions, held torques, and what its noise looks like.
 
+use crate::observe::Moving;
 use crate::smooth::{Local, local_cubic};
 use armgap_core::effect::Pulse;
 use nalgebra::SVector;
+use std::sync::OnceLock;
 
 /// Half widths, in samples, that a local cubic may have.
 const HALF_WIDTHS: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 27];
@@ -25,6 +27,8 @@ pub struct Track<const N: usize> {
     pub noise: [f64; N],
     /// Smallest step of the position measurement, per joint; zero where none is seen.
     pub step: [f64; N],
+    /// Smoothed motion, once it is asked for.
+    path: OnceLock<Vec<Moving<N>>>,
 }
 
 /// A measured start: position and velocity of each joint with their covariance.
@@ -51,6 +55,7 @@ impl<const N: usize> Track<N> {
             held: rows(tau).into_iter().map(|row| row.map(Pulse::held)).collect(),
             noise: [0.0; N],
             step: [0.0; N],
+            path: OnceLock::new(),
         };
         for j in 0..N {
             let column = track.column(j);
@@ -90,6 +95,20 @@ impl<const N: usize> Track<N> {
             start.covariance[j] = local.covariance.map(|c| c * variance);
         }
         start
+    }
+
+    /// Smoothed motion at every sample.
+    pub fn path(&self) -> &[Moving<N>] {
+        self.path.get_or_init(|| {
+            let moving = |k: usize| {
+                let locals: [Local; N] = std::array::from_fn(|j| self.local(j, k));
+                Moving {
+                    q: SVector::from_fn(|j, _| locals[j].q),
+                    ddq: SVector::from_fn(|j, _| locals[j].ddq),
+                }
+            };
+            (0..self.len()).map(moving).collect()
+        })
     }
 
     /// The local cubic of joint `j` around a sample, as wide as the motion there allows.

@@ -4,17 +4,23 @@
 //! flat vector, row by row and joint by joint.
 
 use crate::model::Hypothesis;
+use crate::observe::hidden_states;
 use crate::track::{Start, Track};
 use armgap_core::arm::Arm;
-use armgap_core::effect::interval;
+use armgap_core::effect::{Pulse, interval};
 use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::plant::Plant;
+use armgap_core::transmission::Hidden;
 use nalgebra::SVector;
 
 /// A prediction that left this range [rad or m] has diverged; it is kept there so that its cost stays finite.
 const DIVERGED: f64 = 1e3;
 
-/// Sub-steps per sample are capped here; smoothing narrower than that allows is refused by its cost.
+/// Sub-steps per sample are capped here; what is too stiff for them is refused by its cost.
 const MAX_SUBSTEPS: usize = 4;
+
+/// The same for motors that swing against their links.
+const MAX_SUBSTEPS_DRIVEN: usize = 8;
 
 /// Samples `first ..= last` of one track; row 0 is sample `first + 1`.
 #[derive(Debug, Clone, Copy)]
@@ -99,6 +105,8 @@ impl<const N: usize> Dataset<N> {
         };
         let commands: Vec<_> =
             self.tracks.iter().map(|track| hypothesis.command(&track.t, &track.held)).collect();
+        let hidden = self.hidden(&plant, &commands);
+        let most = if plant.is_driven() { MAX_SUBSTEPS_DRIVEN } else { MAX_SUBSTEPS };
         for (window, shift) in self.windows.iter().zip(starts) {
             let track = &self.tracks[window.track];
             let torque = commands[window.track].as_deref().unwrap_or(&track.held);
@@ -109,10 +117,13 @@ impl<const N: usize> Dataset<N> {
             } else {
                 State::new(q, dq)
             };
+            if let Some(states) = &hidden[window.track] {
+                state.hidden = Hidden { anchor: state.q, ..states[window.first] };
+            }
             let out = &mut predicted[window.range()];
             for (k, row) in (window.first..window.last).zip(out.chunks_exact_mut(N)) {
                 let h = interval(&track.t, k);
-                let substeps = substeps(h * plant.friction_rate(&state.q));
+                let substeps = substeps(h * plant.fastest(&state.q)).min(most);
                 let step = Interval { t: track.t[k], h, torque: &torque[k] };
                 advance(&plant, &mut state, &step, substeps);
                 if !state.is_finite() || state.q.amax() > DIVERGED {
@@ -125,6 +136,23 @@ impl<const N: usize> Dataset<N> {
             }
         }
         predicted
+    }
+
+    /// Hidden states of every track's samples, up to the start of its last window; none for a plant without any.
+    fn hidden<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        plant: &Plant<f64, A, N, P>,
+        commands: &[Option<Vec<[Pulse<f64>; N]>>],
+    ) -> Vec<Option<Vec<Hidden<f64, N>>>> {
+        let of = |(index, track): (usize, &Track<N>)| {
+            let last = self.windows.iter().filter(|w| w.track == index).map(|w| w.first).max()?;
+            if !plant.is_driven() && !plant.remembers() {
+                return None;
+            }
+            let torque = commands[index].as_deref().unwrap_or(&track.held);
+            Some(hidden_states(track, plant, torque, last))
+        };
+        self.tracks.iter().enumerate().map(of).collect()
     }
 }
 
@@ -146,7 +174,7 @@ impl<const N: usize> Shift<N> {
 
 /// Steps per sample that keep Runge-Kutta stable against smoothed friction of this rate times the sample period.
 fn substeps(stiffness: f64) -> usize {
-    ((stiffness / 1.5).ceil() as usize).clamp(1, MAX_SUBSTEPS)
+    ((stiffness / 1.5).ceil() as usize).max(1)
 }
 
 /// Index pairs `(first, last)` of consecutive windows of about `horizon` seconds, of equal length within a stretch without gaps.

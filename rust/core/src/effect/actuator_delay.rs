@@ -17,10 +17,11 @@ static SPEC: Spec = Spec {
     source: "bus and firmware latency",
     excited_by: "torque that changes from sample to sample",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[EffectParameter::bounded("delay", Quantity::Time, 0.0, 1.0)],
     starts: &[[0.5, 0.0, 0.0], [3.0, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
+    hooks: Hooks::COMMAND,
 };
 
 impl<T: Real> Effect<T> for ActuatorDelay {

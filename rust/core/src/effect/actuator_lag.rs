@@ -17,10 +17,11 @@ static SPEC: Spec = Spec {
     source: "current-loop bandwidth; filtered actuator of common simulators",
     excited_by: "torque that changes within a few time constants",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[EffectParameter::bounded("time_constant", Quantity::Time, 0.0, 2.0)],
     starts: &[[0.5, 0.0, 0.0], [4.0, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
+    hooks: Hooks::COMMAND,
 };
 
 impl<T: Real> Effect<T> for ActuatorLag {

@@ -14,10 +14,11 @@ static SPEC: Spec = Spec {
     source: "mounting error; Khalil and Dombre 2002, section 11",
     excited_by: "gravity torque at any pose",
     scope: Scope::Arm,
+    least_joints: 1,
     parameters: &[EffectParameter::bounded("angle", Quantity::Angle, -1.6, 1.6)],
     starts: &[[0.02, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: false, command: false, measured: false },
+    hooks: Hooks::NONE,
 };
 
 impl<T: Real> Effect<T> for BaseTilt {

@@ -14,6 +14,7 @@ static SPEC: Spec = Spec {
     source: "soft limits of common simulators",
     excited_by: "motion up to the stop",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[
         EffectParameter::threshold("position", Quantity::Position, f64::NEG_INFINITY),
         EffectParameter::bounded("stiffness", Quantity::Stiffness, 0.0, f64::INFINITY),
@@ -28,7 +29,7 @@ static SPEC: Spec = Spec {
         [-2.0, 10.0, 0.1],
     ],
     trial: Trial::Whole,
-    hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
+    hooks: Hooks::FORCE,
 };
 
 impl<T: Real> Effect<T> for Contact {

@@ -17,10 +17,11 @@ static SPEC: Spec = Spec {
     source: "Elhami and Brookfield 1996; Reyes and Kelly 1997, Table I",
     excited_by: "motion in both directions",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[EffectParameter::signed("delta", Quantity::Torque)],
     starts: &[[0.05, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: true, command: false, measured: false },
+    hooks: Hooks::COULOMB,
 };
 
 impl<T: Real> Effect<T> for CoulombAsymmetry {

@@ -14,13 +14,14 @@ static SPEC: Spec = Spec {
     source: "Gawronski 2008, angle encoder errors",
     excited_by: "fast motion over a good part of a turn",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[
         EffectParameter::bounded("a", Quantity::Angle, -0.5, 0.5),
         EffectParameter::bounded("b", Quantity::Angle, -0.5, 0.5),
     ],
     starts: &[[0.01, 0.0, 0.0], [0.0, 0.01, 0.0]],
     trial: Trial::Amplitudes(2),
-    hooks: Hooks { force: false, coulomb: false, command: false, measured: true },
+    hooks: Hooks::MEASURED,
 };
 
 impl<T: Real> Effect<T> for EncoderEccentricity {

@@ -14,10 +14,11 @@ static SPEC: Spec = Spec {
     source: "zeroing error",
     excited_by: "gravity or coupling that depends on the position",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[EffectParameter::signed("offset", Quantity::Position)],
     starts: &[[0.02, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: false, command: false, measured: true },
+    hooks: Hooks::MEASURED,
 };
 
 impl<T: Real> Effect<T> for EncoderOffset {

@@ -14,13 +14,14 @@ static SPEC: Spec = Spec {
     source: "Bittencourt and Gunnarsson 2012; Simoni et al. 2017",
     excited_by: "motion over more than the time constant",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[
         EffectParameter::bounded("amplitude", Quantity::Ratio, -0.95, 20.0),
         EffectParameter::shape("time_constant", Quantity::Duration, 0.05, 5000.0),
     ],
     starts: &[[0.05, 1.0, 0.0], [0.05, 3.0, 0.0], [0.05, 10.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: true, command: false, measured: false },
+    hooks: Hooks::COULOMB,
 };
 
 impl<T: Real> Effect<T> for FrictionWarmup {

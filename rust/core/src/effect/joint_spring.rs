@@ -14,13 +14,14 @@ static SPEC: Spec = Spec {
     source: "cable forces; `stiffness` of common simulators",
     excited_by: "a wide range of positions",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[
         EffectParameter::signed("k", Quantity::Stiffness),
         EffectParameter::shape("q0", Quantity::Position, f64::NEG_INFINITY, f64::INFINITY),
     ],
     starts: &[[0.05, 0.0, 0.0], [0.05, 1.5, 0.0], [0.05, -1.5, 0.0], [0.02, 6.0, 0.0], [0.02, -6.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
+    hooks: Hooks::FORCE,
 };
 
 impl<T: Real> Effect<T> for JointSpring {

@@ -14,10 +14,11 @@ static SPEC: Spec = Spec {
     source: "Hamon, Gautier and Garrec 2010",
     excited_by: "motion in both directions under different loads",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[EffectParameter::signed("mu", Quantity::Ratio)],
     starts: &[[0.05, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: true, command: false, measured: false },
+    hooks: Hooks::COULOMB,
 };
 
 impl<T: Real> Effect<T> for LoadDependentFriction {

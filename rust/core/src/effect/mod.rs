@@ -7,17 +7,24 @@
 
 mod actuator_delay;
 mod actuator_lag;
+mod backlash;
 mod base_tilt;
 mod contact;
 mod coulomb_asymmetry;
+mod cross_friction;
 mod encoder_eccentricity;
 mod encoder_offset;
 mod friction_warmup;
+mod gear_efficiency;
+mod hardening_spring;
+mod joint_elasticity;
 mod joint_spring;
 mod load_dependent_friction;
 mod payload;
 mod position_dependent_friction;
+mod presliding;
 mod quadratic_drag;
+mod rotor_coupling;
 mod rotor_inertia;
 mod stribeck;
 mod torque_dead_zone;
@@ -25,8 +32,10 @@ mod torque_gain;
 mod torque_offset;
 mod torque_ripple;
 mod torque_saturation;
+mod viscous_asymmetry;
 
 use crate::real::Real;
+use crate::transmission::Drive;
 
 /// Most parameters an effect may have.
 pub const MAX_PARAMETERS: usize = 3;
@@ -41,6 +50,12 @@ pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
         &load_dependent_friction::LoadDependentFriction,
         &position_dependent_friction::PositionDependentFriction,
         &friction_warmup::FrictionWarmup,
+        &presliding::Presliding,
+        &viscous_asymmetry::ViscousAsymmetry,
+        &cross_friction::CrossFriction,
+        &gear_efficiency::GearEfficiency,
+        &joint_elasticity::JointElasticity,
+        &backlash::Backlash,
         &torque_gain::TorqueGain,
         &actuator_lag::ActuatorLag,
         &actuator_delay::ActuatorDelay,
@@ -50,7 +65,9 @@ pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
         &payload::Payload,
         &base_tilt::BaseTilt,
         &joint_spring::JointSpring,
+        &hardening_spring::HardeningSpring,
         &rotor_inertia::RotorInertia,
+        &rotor_coupling::RotorCoupling,
         &encoder_offset::EncoderOffset,
         &encoder_eccentricity::EncoderEccentricity,
         &contact::Contact,
@@ -82,6 +99,12 @@ pub enum Quantity {
     Drag,
     /// Torque per position.
     Stiffness,
+    /// Torque per twist of a shaft.
+    ShaftStiffness,
+    /// Torque per rate of twist of a shaft.
+    ShaftDamping,
+    /// Torque per cubed position.
+    Hardening,
     /// Torque per speed.
     Damping,
     /// Joint speed.
@@ -114,10 +137,12 @@ impl Quantity {
             (Self::Inertia, false) | (Self::Mass, _) => "kg",
             (Self::Drag, true) => "N m s^2/rad^2",
             (Self::Drag, false) => "N s^2/m^2",
-            (Self::Stiffness, true) => "N m/rad",
-            (Self::Stiffness, false) => "N/m",
-            (Self::Damping, true) => "N m s/rad",
-            (Self::Damping, false) => "N s/m",
+            (Self::Stiffness | Self::ShaftStiffness, true) => "N m/rad",
+            (Self::Stiffness | Self::ShaftStiffness, false) => "N/m",
+            (Self::Damping | Self::ShaftDamping, true) => "N m s/rad",
+            (Self::Damping | Self::ShaftDamping, false) => "N s/m",
+            (Self::Hardening, true) => "N m/rad^3",
+            (Self::Hardening, false) => "N/m^3",
             (Self::Speed, true) => "rad/s",
             (Self::Speed, false) => "m/s",
             (Self::Position, true) | (Self::Angle, _) => "rad",
@@ -177,6 +202,22 @@ pub struct Hooks {
     pub command: bool,
     /// [`Effect::measured`].
     pub measured: bool,
+    /// [`Effect::remember`].
+    pub memory: bool,
+}
+
+impl Hooks {
+    /// No hook that is called during a step: the effect changes the arm itself.
+    pub const NONE: Self =
+        Self { force: false, coulomb: false, command: false, measured: false, memory: false };
+    /// A torque at the joint.
+    pub const FORCE: Self = Self { force: true, ..Self::NONE };
+    /// A part of the Coulomb level.
+    pub const COULOMB: Self = Self { coulomb: true, ..Self::NONE };
+    /// A change of the command.
+    pub const COMMAND: Self = Self { command: true, ..Self::NONE };
+    /// A change of the measured position.
+    pub const MEASURED: Self = Self { measured: true, ..Self::NONE };
 }
 
 /// What an effect is: the part that does not depend on the scalar type.
@@ -194,6 +235,8 @@ pub struct Spec {
     pub excited_by: &'static str,
     /// One joint or the whole arm.
     pub scope: Scope,
+    /// Fewest joints of an arm that it can sit on.
+    pub least_joints: usize,
     /// Its parameters; the first one switches it off at its neutral value.
     pub parameters: &'static [EffectParameter],
     /// Trial values, in units of the log's own scale of each quantity (see the fit's `scale`).
@@ -209,6 +252,8 @@ pub struct Spec {
 pub enum Trial {
     /// By the derivative at neutral; so many of its first parameters are amplitudes that all vanish there.
     Amplitudes(usize),
+    /// By the derivative at neutral along a ray on which all parameters grow together.
+    Ray,
     /// By the whole difference it makes at a trial value: a threshold has no derivative where it is never reached.
     Whole,
 }
@@ -231,6 +276,10 @@ pub struct JointPoint<T> {
     pub load: T,
     /// Nominal friction `b |dq| + fc` at this speed.
     pub friction: T,
+    /// Direction in which the next joint (after the last, the first) slides: -1, 0 or 1.
+    pub other: T,
+    /// What the joint remembers of its path (see [`Effect::remember`]).
+    pub memory: T,
 }
 
 /// One unmodelled effect: a law with up to [`MAX_PARAMETERS`] parameters `p`.
@@ -260,6 +309,21 @@ pub trait Effect<T: Real>: Sync {
 
     /// Angle by which the base is turned against gravity.
     fn tilt(&self, _p: &[T; MAX_PARAMETERS]) -> T {
+        T::zero()
+    }
+
+    /// What the joint remembers after moving by `distance`, if it remembered `memory` before.
+    fn remember(&self, _p: &[T; MAX_PARAMETERS], memory: T, _distance: T) -> T {
+        memory
+    }
+
+    /// The motor side of a joint whose own inertia at `q = 0` is `inertia`; none for a rigid joint.
+    fn drive(&self, _p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Drive<T>> {
+        None
+    }
+
+    /// Inertia added to `M_12`, between the first two joints.
+    fn coupling(&self, _p: &[T; MAX_PARAMETERS]) -> T {
         T::zero()
     }
 

@@ -17,13 +17,14 @@ static SPEC: Spec = Spec {
     source: "Swevers et al. 2002; Gautier and Briot 2014",
     excited_by: "any motion; seen only against trusted parameters",
     scope: Scope::Arm,
+    least_joints: 1,
     parameters: &[
         EffectParameter::bounded("mass", Quantity::Mass, 0.0, f64::INFINITY),
         EffectParameter::bounded("distance", Quantity::Length, 0.0, f64::INFINITY),
     ],
     starts: &[[0.05, 0.5, 0.0], [0.05, 1.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: false, command: false, measured: false },
+    hooks: Hooks::NONE,
 };
 
 impl<T: Real> Effect<T> for Payload {

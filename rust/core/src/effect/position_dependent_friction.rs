@@ -14,13 +14,14 @@ static SPEC: Spec = Spec {
     source: "Bittencourt and Gunnarsson 2012",
     excited_by: "motion in both directions through different positions",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[
         EffectParameter::signed("a", Quantity::Torque),
         EffectParameter::signed("b", Quantity::Torque),
     ],
     starts: &[[0.05, 0.0, 0.0], [0.0, 0.05, 0.0]],
     trial: Trial::Amplitudes(2),
-    hooks: Hooks { force: false, coulomb: true, command: false, measured: false },
+    hooks: Hooks::COULOMB,
 };
 
 impl<T: Real> Effect<T> for PositionDependentFriction {

@@ -14,10 +14,11 @@ static SPEC: Spec = Spec {
     source: "Bittencourt and Gunnarsson 2012; polynomial damping of common simulators",
     excited_by: "a wide range of speeds",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[EffectParameter::signed("c", Quantity::Drag)],
     starts: &[[0.05, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
+    hooks: Hooks::FORCE,
 };
 
 impl<T: Real> Effect<T> for QuadraticDrag {

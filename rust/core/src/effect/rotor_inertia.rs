@@ -17,10 +17,11 @@ static SPEC: Spec = Spec {
     source: "Featherstone 2008, section 9.6; `armature` of common simulators",
     excited_by: "acceleration of the joint",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[EffectParameter::bounded("inertia", Quantity::Inertia, 0.0, f64::INFINITY)],
     starts: &[[0.05, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: false, command: false, measured: false },
+    hooks: Hooks::NONE,
 };
 
 impl<T: Real> Effect<T> for RotorInertia {

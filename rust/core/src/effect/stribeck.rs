@@ -16,13 +16,14 @@ static SPEC: Spec = Spec {
     source: "Armstrong-Helouvry, Dupont and Canudas de Wit 1994, eq. (4)",
     excited_by: "reversals and slow motion, below twice the Stribeck velocity",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[
         EffectParameter::signed("amplitude", Quantity::Torque),
         EffectParameter::bounded("velocity", Quantity::Speed, 1e-3, f64::INFINITY),
     ],
     starts: &[[0.05, 0.03, 0.0], [0.05, 0.1, 0.0], [0.05, 0.3, 0.0], [0.05, 0.8, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: true, command: false, measured: false },
+    hooks: Hooks::COULOMB,
 };
 
 impl<T: Real> Effect<T> for Stribeck {

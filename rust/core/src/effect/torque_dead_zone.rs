@@ -14,10 +14,11 @@ static SPEC: Spec = Spec {
     source: "valves and amplifiers with overlap",
     excited_by: "torque that changes sign",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[EffectParameter::bounded("level", Quantity::Torque, 0.0, f64::INFINITY)],
     starts: &[[0.05, 0.0, 0.0], [0.3, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
+    hooks: Hooks::COMMAND,
 };
 
 impl<T: Real> Effect<T> for TorqueDeadZone {

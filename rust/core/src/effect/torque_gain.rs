@@ -14,6 +14,7 @@ static SPEC: Spec = Spec {
     source: "Gautier and Briot 2014, drive gains",
     excited_by: "any torque; seen only against trusted parameters or the other joints",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[EffectParameter {
         name: "gain",
         quantity: Quantity::Ratio,
@@ -23,7 +24,7 @@ static SPEC: Spec = Spec {
     }],
     starts: &[[1.05, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
+    hooks: Hooks::COMMAND,
 };
 
 impl<T: Real> Effect<T> for TorqueGain {

@@ -14,10 +14,11 @@ static SPEC: Spec = Spec {
     source: "amplifier and current-sensor bias; Swevers et al. 2007",
     excited_by: "any motion",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[EffectParameter::signed("offset", Quantity::Torque)],
     starts: &[[0.05, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
+    hooks: Hooks::FORCE,
 };
 
 impl<T: Real> Effect<T> for TorqueOffset {

@@ -14,6 +14,7 @@ static SPEC: Spec = Spec {
     source: "Holtz and Springob 1996; `cogging` of common simulators",
     excited_by: "motion over several cycles of the ripple",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[
         EffectParameter::signed("amplitude", Quantity::Torque),
         EffectParameter::shape("n", Quantity::Count, 1.0, 400.0),
@@ -68,7 +69,7 @@ static SPEC: Spec = Spec {
         [0.05, 48.0, 1.571],
     ],
     trial: Trial::Amplitudes(1),
-    hooks: Hooks { force: true, coulomb: false, command: false, measured: false },
+    hooks: Hooks::FORCE,
 };
 
 impl<T: Real> Effect<T> for TorqueRipple {

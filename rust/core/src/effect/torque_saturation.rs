@@ -14,10 +14,11 @@ static SPEC: Spec = Spec {
     source: "current limits; `forcerange` of common simulators",
     excited_by: "torque above the level",
     scope: Scope::Joint,
+    least_joints: 1,
     parameters: &[EffectParameter::threshold("level", Quantity::Torque, 0.0)],
     starts: &[[2.2, 0.0, 0.0], [1.7, 0.0, 0.0], [1.3, 0.0, 0.0], [0.9, 0.0, 0.0], [0.6, 0.0, 0.0]],
     trial: Trial::Whole,
-    hooks: Hooks { force: false, coulomb: false, command: true, measured: false },
+    hooks: Hooks::COMMAND,
 };
 
 impl<T: Real> Effect<T> for TorqueSaturation {

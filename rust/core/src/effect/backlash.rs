@@ -1,0 +1,53 @@
+//! Backlash: play between motor and link. While it is crossed the motor turns alone and the link is not driven.
+//!
+//! The motor side carries a share of the joint's nominal inertia, so with the play closed the arm is the nominal one. The flanks
+//! are springs just stiff enough, and damped, to take up the motor within about a millisecond without a rebound.
+
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use crate::real::{Real, lit};
+use crate::transmission::Drive;
+
+/// Natural frequency of the motor side on its flanks, 1/s.
+const FLANK_RATE: f64 = 800.0;
+
+/// Damping ratio of the flanks: no rebound.
+const FLANK_DAMPING: f64 = 0.8;
+
+/// Play in the transmission.
+#[derive(Debug)]
+pub struct Backlash;
+
+static SPEC: Spec = Spec {
+    name: "backlash",
+    title: "backlash",
+    equation: "rotor d2(q + twist)/dt2 = tau - T, T = 0 while |twist| < gap/2",
+    source: "Nordin and Gutman 2002",
+    excited_by: "a transmitted torque that changes sign",
+    scope: Scope::Joint,
+    least_joints: 1,
+    parameters: &[
+        EffectParameter::bounded("gap", Quantity::Position, 0.0, f64::INFINITY),
+        EffectParameter::shape("rotor_share", Quantity::Ratio, 0.02, 0.35),
+    ],
+    starts: &[[0.01, 0.1, 0.0], [0.03, 0.1, 0.0], [0.1, 0.1, 0.0]],
+    trial: Trial::Whole,
+    hooks: Hooks::NONE,
+};
+
+impl<T: Real> Effect<T> for Backlash {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn drive(&self, p: &[T; MAX_PARAMETERS], inertia: T) -> Option<Drive<T>> {
+        let rotor = p[1] * inertia;
+        let rate = lit::<T>(FLANK_RATE);
+        (p[0] > T::zero()).then_some(Drive {
+            inertia: rotor,
+            stiffness: rotor * rate * rate,
+            damping: lit::<T>(2.0 * FLANK_DAMPING) * rotor * rate,
+            gap: p[0],
+            inside: true,
+        })
+    }
+}

@@ -1,0 +1,62 @@
+//! Joint elasticity: the motor drives the link through a spring and damper (Spong 1987),
+//!
+//! ```text
+//! rotor_inertia d2(q + twist)/dt2 = tau - stiffness twist - damping dtwist
+//! ```
+//!
+//! The rotor comes in addition to the rigid arm; encoder and friction are on the link's side. A shaft of infinite stiffness is a
+//! rigid joint whose rotor is part of the arm's own inertia.
+
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, NEVER, Quantity, Scope, Spec, Trial};
+use crate::real::{Real, lit};
+use crate::transmission::Drive;
+
+/// Elastic transmission.
+#[derive(Debug)]
+pub struct JointElasticity;
+
+static SPEC: Spec = Spec {
+    name: "joint_elasticity",
+    title: "joint elasticity",
+    equation: "rotor_inertia d2(q + twist)/dt2 = tau - T, tau_joint = T = stiffness twist + damping dtwist",
+    source: "Spong 1987",
+    excited_by: "torque that changes within the period of the motor's oscillation",
+    scope: Scope::Joint,
+    least_joints: 1,
+    parameters: &[
+        EffectParameter::threshold("stiffness", Quantity::ShaftStiffness, 0.0),
+        EffectParameter::bounded("damping", Quantity::ShaftDamping, 0.0, f64::INFINITY),
+        EffectParameter::bounded("rotor_inertia", Quantity::Inertia, 1e-6, f64::INFINITY),
+    ],
+    // Motors of 3, 8 and 30 % of the link's inertia that swing at 8 to 40 Hz against it.
+    starts: &[
+        [0.15, 0.3, 0.03],
+        [0.5, 0.5, 0.03],
+        [1.8, 1.0, 0.03],
+        [0.3, 0.5, 0.08],
+        [1.2, 1.0, 0.08],
+        [4.5, 2.0, 0.08],
+        [1.5, 2.0, 0.3],
+        [6.0, 4.0, 0.3],
+        [25.0, 8.0, 0.3],
+    ],
+    trial: Trial::Whole,
+    hooks: Hooks::NONE,
+};
+
+impl<T: Real> Effect<T> for JointElasticity {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn drive(&self, p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Drive<T>> {
+        let rigid = p[0] >= lit(NEVER);
+        (!rigid).then_some(Drive {
+            inertia: p[2],
+            stiffness: p[0],
+            damping: p[1],
+            gap: T::zero(),
+            inside: false,
+        })
+    }
+}

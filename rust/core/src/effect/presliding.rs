@@ -1,0 +1,51 @@
+//! Presliding friction: before it slides, a contact gives like a spring, and after a reversal friction builds up again over a distance
+//! (Dahl 1968),
+//!
+//! ```text
+//! dz/dq = stiffness (1 - sgn(dq) z / amplitude),      tau_joint = tau - z
+//! ```
+//!
+//! It depends on the path alone, so between reversals `z` has a closed form in the distance travelled.
+
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use crate::real::Real;
+
+/// Dahl's hysteresis beside the Coulomb friction.
+#[derive(Debug)]
+pub struct Presliding;
+
+static SPEC: Spec = Spec {
+    name: "presliding",
+    title: "presliding hysteresis",
+    equation: "tau_joint = tau - z, dz/dq = stiffness (1 - sgn(dq) z / amplitude)",
+    source: "Dahl 1968; Canudas de Wit et al. 1995 (LuGre)",
+    excited_by: "many reversals, with little travel between some of them",
+    scope: Scope::Joint,
+    least_joints: 1,
+    parameters: &[
+        EffectParameter::bounded("amplitude", Quantity::Torque, 0.0, f64::INFINITY),
+        EffectParameter::bounded("stiffness", Quantity::Stiffness, 0.0, f64::INFINITY),
+    ],
+    // Travelled distances of 0.3 to 10 % of the joint's RMS travel.
+    starts: &[[0.1, 30.0, 0.0], [0.1, 10.0, 0.0], [0.1, 3.0, 0.0], [0.1, 1.0, 0.0]],
+    trial: Trial::Ray,
+    hooks: Hooks { force: true, memory: true, ..Hooks::NONE },
+};
+
+impl<T: Real> Effect<T> for Presliding {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn force(&self, _p: &[T; MAX_PARAMETERS], x: &JointPoint<T>) -> T {
+        -x.memory
+    }
+
+    fn remember(&self, p: &[T; MAX_PARAMETERS], memory: T, distance: T) -> T {
+        if p[0] <= T::zero() {
+            return T::zero();
+        }
+        let goal = if distance < T::zero() { -p[0] } else { p[0] };
+        goal + (memory - goal) * (-distance.abs() * p[1] / p[0]).exp()
+    }
+}

@@ -1,0 +1,71 @@
+//! What lies between the motor and the link, and what a joint remembers of its path: states that no encoder shows.
+//!
+//! A rigid joint has neither. A joint driven through a spring, or through play, has a motor side of its own,
+//!
+//! ```text
+//! inertia d2(q + twist)/dt2 = tau - transmitted,      transmitted = stiffness twist + damping dtwist
+//! ```
+//!
+//! (Spong 1987), where within a play of width `gap` nothing is transmitted and outside it the flanks push and never pull. A joint
+//! with hysteresis remembers a quantity that changes with the distance travelled and with nothing else.
+
+use crate::real::{Real, lit};
+use nalgebra::SVector;
+
+/// The motor side of a joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive<T> {
+    /// Inertia of the motor side, seen from the joint.
+    pub inertia: T,
+    /// Stiffness of the shaft or of the flanks.
+    pub stiffness: T,
+    /// Damping of the shaft or of the flanks.
+    pub damping: T,
+    /// Play, both sides together; zero for a shaft without play.
+    pub gap: T,
+    /// Whether the inertia is a part of the link's nominal inertia rather than an addition to it.
+    pub inside: bool,
+}
+
+impl<T: Real> Drive<T> {
+    /// Torque passed on to the link.
+    #[inline]
+    pub fn transmitted(&self, twist: T, dtwist: T) -> T {
+        if self.gap <= T::zero() {
+            return self.stiffness * twist + self.damping * dtwist;
+        }
+        let depth = twist.abs() - self.gap * lit(0.5);
+        if depth <= T::zero() {
+            return T::zero();
+        }
+        let side = if twist < T::zero() { -T::one() } else { T::one() };
+        side * (self.stiffness * depth + self.damping * side * dtwist).max(T::zero())
+    }
+
+    /// Natural frequency against a link of this inertia, 1/s.
+    pub fn rate(&self, link: T) -> T {
+        let spread = T::one() / self.inertia + T::one() / link;
+        (self.stiffness * spread).sqrt().max(self.damping * spread)
+    }
+}
+
+/// States of the joints that no encoder shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hidden<T, const N: usize> {
+    /// What each joint remembers of its path, as it was at `anchor`.
+    pub memory: SVector<T, N>,
+    /// Position at which `memory` holds.
+    pub anchor: SVector<T, N>,
+    /// Motor position less joint position.
+    pub twist: SVector<T, N>,
+    /// Its rate.
+    pub dtwist: SVector<T, N>,
+}
+
+impl<T: Real, const N: usize> Hidden<T, N> {
+    /// Nothing remembered and nothing twisted at `q`.
+    pub fn none(q: SVector<T, N>) -> Self {
+        let zero = SVector::zeros();
+        Self { memory: zero, anchor: q, twist: zero, dtwist: zero }
+    }
+}

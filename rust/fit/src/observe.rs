@@ -1,0 +1,91 @@
+//! States that no encoder shows, at the start of every window: driven along the measured motion from the start of the log.
+//!
+//! What a joint remembers depends on its path, and a motor behind a shaft or play swings under the logged torque against the
+//! measured acceleration of its link; neither needs a guess.
+
+use crate::track::Track;
+use armgap_core::arm::Arm;
+use armgap_core::effect::{Pulse, interval};
+use armgap_core::plant::Plant;
+use armgap_core::transmission::{Drive, Hidden};
+use nalgebra::SVector;
+
+/// Measured motion of one sample.
+#[derive(Debug, Clone, Copy)]
+pub struct Moving<const N: usize> {
+    /// Positions.
+    pub q: SVector<f64, N>,
+    /// Accelerations.
+    pub ddq: SVector<f64, N>,
+}
+
+/// Steps per sample of a motor that swings at this rate times the sample period.
+const STEP: f64 = 1.0;
+
+/// Steps per sample at most.
+const MAX_STEPS: usize = 8;
+
+/// A twist or its rate beyond this [SI] is cut: the hypothesis is wrong, and its cost will say so.
+const LIMIT: f64 = 1e3;
+
+/// Hidden states of a plant at every sample of a track up to `last`, under these torques.
+pub fn hidden_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    track: &Track<N>,
+    plant: &Plant<f64, A, N, P>,
+    torque: &[[Pulse<f64>; N]],
+    last: usize,
+) -> Vec<Hidden<f64, N>> {
+    let path = track.path();
+    let mut now = Hidden::none(path[0].q);
+    let mut all = Vec::with_capacity(last + 1);
+    for k in 0..=last {
+        now.memory = plant.memory(&path[k].q, &now);
+        now.anchor = path[k].q;
+        all.push(now);
+        let next = path.get(k + 1).unwrap_or(&path[k]);
+        for j in 0..N {
+            if let Some(drive) = plant.drive(j) {
+                let h = interval(&track.t, k);
+                let swing = Swing { drive, torque: &torque[k][j], h, link: [path[k].ddq[j], next.ddq[j]] };
+                (now.twist[j], now.dtwist[j]) = swing.advance(now.twist[j], now.dtwist[j]);
+            }
+        }
+    }
+    all
+}
+
+/// One motor over one sample interval.
+struct Swing<'a> {
+    drive: &'a Drive<f64>,
+    torque: &'a Pulse<f64>,
+    h: f64,
+    /// Acceleration of the link at both ends.
+    link: [f64; 2],
+}
+
+impl Swing<'_> {
+    /// Acceleration of the twist at the fraction `s` of the interval.
+    fn slope(&self, s: f64, twist: f64, rate: f64) -> f64 {
+        let link = self.link[0] + s * (self.link[1] - self.link[0]);
+        (self.torque.at(s) - self.drive.transmitted(twist, rate)) / self.drive.inertia - link
+    }
+
+    /// Twist and rate at the end of the interval, by Runge-Kutta.
+    fn advance(&self, mut e: f64, mut v: f64) -> (f64, f64) {
+        let count = ((self.h * self.drive.rate(f64::MAX) / STEP).ceil() as usize).clamp(1, MAX_STEPS);
+        let (dt, ds) = (self.h / count as f64, 1.0 / count as f64);
+        for i in 0..count {
+            let s = i as f64 * ds;
+            let a1 = self.slope(s, e, v);
+            let (v2, half) = (v + 0.5 * dt * a1, s + 0.5 * ds);
+            let a2 = self.slope(half, e + 0.5 * dt * v, v2);
+            let v3 = v + 0.5 * dt * a2;
+            let a3 = self.slope(half, e + 0.5 * dt * v2, v3);
+            let v4 = v + dt * a3;
+            let a4 = self.slope(s + ds, e + dt * v3, v4);
+            e += dt / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4);
+            v += dt / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
+        }
+        (e.clamp(-LIMIT, LIMIT), v.clamp(-LIMIT, LIMIT))
+    }
+}
