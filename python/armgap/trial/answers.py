@@ -90,6 +90,8 @@ class Answer:
         Effects called absent, with bounds.
     reach : Reach, optional
         How far predictions miss, where the method predicts.
+    theta : tuple of float
+        The arm's parameters beside the causes, in the arm file's order, where the method gives them.
     error : str, optional
         Why there is no answer.
     remark : str
@@ -105,6 +107,7 @@ class Answer:
     causes: tuple[Named, ...] = ()
     limits: tuple[Limit, ...] = ()
     reach: Reach | None = None
+    theta: tuple[float, ...] = ()
     error: str | None = None
     remark: str = ""
     seconds: float = 0.0
@@ -135,6 +138,7 @@ class Answer:
             data["causes"] = tuple(_named(c) for c in data["causes"])
             data["limits"] = tuple(Limit(**x) for x in data["limits"])
             data["reach"] = _reach(data["reach"])
+            data["theta"] = tuple(data["theta"])
             return cls(**data)
         except (KeyError, TypeError) as error:
             raise ValueError(f"not a whole answer: {error}") from error

@@ -27,6 +27,8 @@ ATTEMPTS = 30
 GROWTHS, GROWTH = 8, 0.15
 #: One effect in this many is made as small as can still be seen, in at most so many steps of that size.
 FAINT, SHRINKS, SHRINK = 5, 6, 0.4
+#: An arm that goes farther or faster with its effects has run away, rad and rad/s (m and m/s).
+REACH, SPEED = 10.0, 30.0
 #: Controllers tried on an altered arm, each half as stiff as the one before.
 DETUNINGS = 6
 
@@ -287,7 +289,8 @@ def _log(arm: TrialArm, hidden: Sequence[Hidden], name: str, motion: Excitation,
 
 
 def _sane(logs: dict[str, Trace]) -> bool:
-    return all(bool(np.all(np.isfinite(x.q)) and np.max(np.abs(x.q)) < 100.0) for x in logs.values())
+    """Whether no log runs away."""
+    return all(bool(np.max(np.abs(x.q)) < REACH and np.max(np.abs(x.dq_true)) < SPEED) for x in logs.values())
 
 
 def _styles(motions: dict[str, tuple[str, Excitation]]) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -66,12 +66,14 @@ def answer_with_armgap(case: SealedCase) -> Answer:
     """Diagnose a case with default settings."""
     from armgap.diagnosis import diagnose
 
-    return from_diagnosis(diagnose(case.training, case.arm, holdout=case.holdout, horizon=HORIZON))
+    result = diagnose(case.training, case.arm, holdout=case.holdout, horizon=HORIZON)
+    return from_diagnosis(result, case.arm.parameter_names)
 
 
-def from_diagnosis(result: Diagnosis) -> Answer:
-    """A diagnosis as an answer."""
+def from_diagnosis(result: Diagnosis, names: Sequence[str]) -> Answer:
+    """A diagnosis as an answer; `names` are the arm's parameters in its order."""
     gap = result.gap
+    final = result.parameters["with_causes"]
     absent = [r for r in result.ruled_out if r.status == "absent" and r.bound is not None]
     return Answer(
         method="armgap",
@@ -79,6 +81,7 @@ def from_diagnosis(result: Diagnosis) -> Answer:
         causes=tuple(_named(c) for c in result.causes) if result.verdict == "effect" else (),
         limits=tuple(Limit(r.effect, r.joint, r.bound.parameter, r.bound.value) for r in absent if r.bound),
         reach=Reach(gap.horizon_s, gap.before, gap.refit, gap.after, gap.floor),
+        theta=tuple(final[name].value for name in names),
         remark=_first_ranks(result),
     )
 

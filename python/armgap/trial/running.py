@@ -87,9 +87,10 @@ def _result(result: Callable[[], Answer], case: Path, method: Method, limit_s: f
 def _answer(case: str, name: str) -> Answer:
     """One case in a process of its own; complaints of armgap and failures of a peer become answers."""
     method = methods()[name]
-    sealed = SealedCase.read(case)
     start = time.process_time()
     try:
+        sealed = SealedCase.read(case)
+        start = time.process_time()
         answer = method.answer(sealed)
     except (ArmgapError, ArithmeticError, ValueError, RuntimeError, LookupError) as error:
         answer = Answer(name, "none", error=f"{type(error).__name__}: {error}")

@@ -97,8 +97,8 @@ def plan_trial(seed: int, n_cases: int, families: Mapping[str, float] | None = N
     rng = np.random.default_rng([seed, n_cases])
     names = _deal(shares, n_cases)
     rng.shuffle(names)
-    singles = {model: _endless(rng, model, "library") for model in MODELS}
-    others = {model: _endless(rng, model, "outside") for model in MODELS}
+    singles = {model: _endless(rng, model, ("library", "further")) for model in MODELS}
+    others = {model: _endless(rng, model, ("outside",)) for model in MODELS}
     return [_plan(rng, (seed, i), name, singles, others) for i, name in enumerate(names)]
 
 
@@ -150,10 +150,10 @@ def _deal(shares: Mapping[str, float], n: int) -> list[str]:
     return names + rest[: n - len(names)]
 
 
-def _endless(rng: np.random.Generator, model: str, family: str) -> Iterator[Wish]:
+def _endless(rng: np.random.Generator, model: str, families: tuple[str, ...]) -> Iterator[Wish]:
     """Every effect and joint of a machine in random order, again and again."""
     arm = MODELS[model]
-    wishes = possible(arm.kind, arm.n_joints, (family,))
+    wishes = possible(arm.kind, arm.n_joints, families)
     while True:
         for i in rng.permutation(len(wishes)):
             yield wishes[int(i)]

@@ -10,6 +10,7 @@ taken from them leave.
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -72,10 +73,12 @@ def visibility(arm: TrialArm, plain: dict[str, Trace], logs: dict[str, Trace], e
     theta = np.array(arm.theta)
     sigma = np.array(spread(arm, arm.theta))
     without = misses(m, theta, _windows(plain, ""))
-    noise = np.median(np.sqrt(np.mean(without**2, axis=1)), axis=0)
+    rounding = np.array(arm.step) / math.sqrt(12.0)  # standard deviation of what rounding to whole steps does
+    noise = np.maximum(np.median(np.sqrt(np.mean(without**2, axis=1)), axis=0), rounding)
     found = refit(m, theta, sigma, _windows(logs, "train"), noise)
     judged = ("train", "holdout") if everywhere else ("train",)
-    with_it = min((_worst(misses(m, found, _windows(logs, part))) / _worst(without)).max() for part in judged)
+    floor = np.maximum(_worst(without), rounding)
+    with_it = min((_worst(misses(m, found, _windows(logs, part))) / floor).max() for part in judged)
     moved = float(np.sqrt(np.sum(((found - theta) / sigma) ** 2)))
     return Visibility(float(f"{with_it:.4g}"), float(f"{moved:.4g}"))
 

@@ -25,14 +25,17 @@ def answer(case: SealedCase) -> Answer:
     """Name the best correlated signature; the squared correlation stands for its probability."""
     made = data(case)
     residual = refit_residual(case.arm, made)
-    best, share = None, LEAST
-    for s in signatures(case.arm, made, made.motions[0]):
-        explained = _explained(s, residual)
-        if explained > share:
-            best, share = s, explained
-    if best is None:
+    shares = [(s, _explained(s, residual)) for s in signatures(case.arm, made, made.motions[0])]
+    best, share = min(shares, key=lambda x: _bic(*x))
+    if share < LEAST:
         return Answer("correlation", "none")
     return Answer("correlation", "effect", (Named(best.effect, best.joint, min(share, 1.0)),))
+
+
+def _bic(s: Signature, share: float) -> float:
+    """BIC, so that signatures of several columns have no start on those of one."""
+    rows, columns = s.columns.shape
+    return float(rows * np.log(max(1.0 - share, 1e-12)) + columns * np.log(rows))
 
 
 def refit_residual(arm: Arm, made: Data) -> Array:

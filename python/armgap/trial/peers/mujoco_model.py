@@ -14,7 +14,7 @@ from armgap.arm import Arm
 from armgap.trial.engine import mujoco
 from armgap.trial.peers.regression import Array
 
-__all__ = ["build_spec", "set_coulomb", "set_gravity", "set_inertial"]
+__all__ = ["build_spec", "set_coulomb", "set_inertial"]
 
 #: Longest internal step, s. Friction is as stiff as the step allows, as in the making of the logs.
 STEP, IMPEDANCE = 1e-3, 0.9999
@@ -39,7 +39,7 @@ def build_spec(arm: Arm) -> Any:
         parent.explicitinertial = True
         _add_motor(mj, spec, j)
     set_inertial(spec, arm, arm.theta[: arm.n_inertial])
-    set_gravity(spec, arm, 0.0)
+    spec.option.gravity = [0.0, 0.0, -arm.gravity]
     return spec
 
 
@@ -50,28 +50,23 @@ def _add_motor(mj: Any, spec: Any, j: int) -> None:
     spec.add_sensor(name=f"q{j}", type=mj.mjtSensor.mjSENS_JOINTPOS, objtype=mj.mjtObj.mjOBJ_JOINT, objname=f"joint{j}")
 
 
-def set_gravity(spec: Any, arm: Arm, tilt: float) -> None:
-    """Turn gravity in the plane of motion; along an axis it is part of the inertial parameters."""
-    g = arm.gravity
-    spec.option.gravity = [-g * np.sin(tilt), 0.0, -g * np.cos(tilt)] if arm.rotary else [0.0, 0.0, -g]
-
-
 def set_coulomb(spec: Any, j: int, level: float) -> None:
     """Dry friction of a joint."""
     spec.joint(f"joint{j}").frictionloss = max(level, TINY)
 
 
 def set_inertial(spec: Any, arm: Arm, theta: Array) -> None:
-    """Masses, lengths and inertias of some arm with these base parameters.
+    """Masses, lengths and inertias of some arm with these base parameters, and actuators without offset.
 
     Raises
     ------
     ValueError
         No arm has them.
     """
+    for j in range(arm.n_joints):
+        spec.actuator(f"motor{j}").biasprm[0] = 0.0
     if arm.kind == "axis":
         _set_link(spec, 0, theta[0], 0.0, 1.0)
-        spec.joint("joint0").stiffness = 0.0
         spec.actuator("motor0").biasprm[0] = -theta[1]
     elif arm.kind == "pendulum":
         _set_pendulum(spec, theta[0], theta[1] / arm.gravity)

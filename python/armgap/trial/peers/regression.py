@@ -4,13 +4,13 @@ A peer sees ``residual = tau - Y theta``: the torque the arm file's model cannot
 re-estimated or not. Each effect of the library leaves a known signature there, linear in its size once its shape
 (a velocity, a period, a level, ...) is fixed; shapes come from a grid. Velocities and accelerations are those of a cubic
 through the samples within 15 ms (Savitzky-Golay); torques go through the same cubic, and both sides are averaged over
-blocks of 10 ms, so that no side carries a phase the other lacks.
+blocks of 10 ms, so that no side carries a phase the other lacks. Blocks in which a joint is slow, or turns round within
+the cubic, are left out of its rows, as usual: dry friction takes any value there.
 
 References
 ----------
 Savitzky and Golay (1964), Anal. Chem. 36, 1627-1639. Swevers, Verdonck and De Schutter (2007), IEEE Control Systems
-Magazine 27(5), 58-71: smoothing and averaging in robot identification. Blocks in which a joint is slow or turns round are
-left out of its rows, as usual: dry friction takes any value there.
+Magazine 27(5), 58-71: smoothing and averaging in robot identification.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 HALF_WIDTH, BLOCK = 0.015, 0.010
 #: Slow is below this share of a joint's usual top speed.
 SLOW = 0.02
+#: Torques are not trusted below this share of a joint's own.
+TRUST = 0.005
 
 
 @dataclass(frozen=True)
@@ -120,15 +122,18 @@ def data(case: SealedCase, scale: Array | None = None, held_out: bool = False) -
     joint = np.repeat(np.arange(one.size), len(tau) // one.size)
     if scale is None:
         error = tau - base @ np.linalg.lstsq(base[keep], tau[keep], rcond=None)[0]
-        scale = np.array([max(float(np.std(error[keep & (joint == j)])), 1e-12) for j in range(one.size)])
+        rows = [keep & (joint == j) for j in range(one.size)]
+        scale = np.array([max(float(np.std(error[r])), TRUST * float(np.std(tau[r])), 1e-12) for r in rows])
     weight = scale[joint]
     return Data(motions, scale, keep, (base / weight[:, None])[keep], (tau / weight)[keep])
 
 
 def _moving(x: Motion) -> Array:
-    """One where a joint moves, zero where it is slow."""
+    """One where a joint moves over the whole smoothing cubic, zero where it is slow or turns round in it."""
+    from scipy.ndimage import minimum_filter1d
+
     fast = np.quantile(np.abs(x.dq), 0.95, axis=0)
-    moving: Array = (np.abs(x.dq) > SLOW * fast).astype(np.float64)
+    moving: Array = minimum_filter1d((np.abs(x.dq) > SLOW * fast).astype(np.float64), 2 * x.half + 1, axis=0)
     return moving
 
 

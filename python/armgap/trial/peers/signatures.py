@@ -54,10 +54,12 @@ def signatures(arm: Arm, made: Data, ref: Motion) -> list[Signature]:
     found: list[Signature] = []
     for j in range(arm.n_joints):
         for effect, shapes in OWN.items():
-            if arm.rotary or effect not in ROTARY:
+            if (arm.rotary or effect not in ROTARY) and (arm.n_joints > 1 or effect not in COUPLED):
                 found += _built(effect, j, made, lambda x, j=j, f=shapes: f(arm, x, j, ref))  # type: ignore[misc]
     if arm.rotary:
         for effect, shapes in WHOLE.items():
+            if effect in COUPLED and arm.n_joints == 1:
+                continue
             found += _built(effect, None, made, lambda x, f=shapes: f(arm, x, 0, ref))  # type: ignore[misc]
     return found
 
@@ -241,6 +243,28 @@ def _tilt(arm: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
     yield change[..., None] / NUDGE
 
 
+def _one_sided(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
+    yield _one(np.abs(x.dq[:, j]))
+
+
+def _gear(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
+    tau = x.tau[:, j]
+    yield _one(np.where(tau * x.dq[:, j] > 0, tau, 0.0))
+
+
+def _crossed(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
+    yield _one(np.sign(x.dq[:, 1 - j]))
+
+
+def _hardening(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
+    q = x.q[:, j]
+    yield _one(q**3, q**2, q, np.ones_like(q))
+
+
+def _coupling(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
+    yield x.ddq[:, ::-1, None]
+
+
 Own = Callable[[Arm, Motion, int, Motion], Shapes]
 OWN: dict[str, Own] = {
     "torque_offset": _offset,
@@ -264,8 +288,14 @@ OWN: dict[str, Own] = {
     "encoder_eccentricity": _eccentricity,
     "contact": _contact,
     "external_pulse": _pulse,
+    "viscous_asymmetry": _one_sided,
+    "gear_efficiency": _gear,
+    "hardening_spring": _hardening,
+    "cross_friction": _crossed,
 }
-WHOLE: dict[str, Own] = {"payload": _payload, "base_tilt": _tilt}
+WHOLE: dict[str, Own] = {"payload": _payload, "base_tilt": _tilt, "rotor_coupling": _coupling}
+#: Effects between two joints.
+COUPLED = {"cross_friction", "rotor_coupling"}
 #: Effects that make no sense on a linear axis.
 ROTARY = {
     "load_dependent_friction",

@@ -43,7 +43,7 @@ class _Problem:
     def fit(self, extra: Array) -> tuple[float, Array]:
         """Residual power, and coefficients, with more columns."""
         all_columns = np.hstack([self.columns, extra])
-        coefficients: Array = np.linalg.lstsq(all_columns, self.target, rcond=None)[0]
+        coefficients = np.asarray(np.linalg.lstsq(all_columns, self.target, rcond=None)[0], dtype=np.float64)
         left = self.target - all_columns @ coefficients
         return float(left @ left), coefficients
 
@@ -72,11 +72,11 @@ def answer(case: SealedCase) -> Answer:
             for s, held in candidates
             if s.effect + str(s.joint) not in taken
         ]
-        taken_now = _best(problem, sorted(scored, key=lambda x: x[0]), now - EVIDENCE)
-        if taken_now is None:
+        left = _confirmed(problem, sorted(scored, key=lambda x: x[0]), now - EVIDENCE)
+        if not left:
             break
-        s, held = taken_now
-        chosen.append(Named(s.effect, s.joint, _weight(scored, s)))
+        _, s, held = left[0]
+        chosen.append(Named(s.effect, s.joint, _weight(left, s)))
         problem.columns = np.hstack([problem.columns, _padded(s, problem)])
         problem.held = np.hstack([problem.held, held.columns])
         terms += s.columns.shape[1]
@@ -87,14 +87,14 @@ def answer(case: SealedCase) -> Answer:
 Scored = tuple[float, Signature, Signature]
 
 
-def _best(problem: _Problem, scored: list[Scored], limit: float) -> tuple[Signature, Signature] | None:
-    """The effect of the least BIC below a limit that the holdout confirms."""
-    for value, s, held in scored:
+def _confirmed(problem: _Problem, scored: list[Scored], limit: float) -> list[Scored]:
+    """What is left once candidates before the first that the holdout confirms are gone; empty if none below the limit is."""
+    for i, (value, s, held) in enumerate(scored):
         if value > limit:
             break
         if _holds(problem, s, held):
-            return s, held
-    return None
+            return scored[i:]
+    return []
 
 
 def _problem(case: SealedCase) -> tuple[_Problem, list[tuple[Signature, Signature]]]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
+from armgap.simulation import effects
 from armgap.trial.answers import Answer, Name, Named
 from armgap.trial.key import Key
 from armgap.trial.verdict import describe, equivalent
@@ -113,9 +115,15 @@ def _group(key: Key, hidden: Sequence[Name]) -> str:
         return "no effect" if key.nominal == "exact" else "parameters only"
     if not key.details.get("visible", True):
         return "not visible"
-    if any(e.family != "library" for e in key.effects):
+    if any(e.effect not in _library() for e in key.effects):
         return "outside the library"
     return "one effect" if len(hidden) == 1 else "two effects"
+
+
+@cache
+def _library() -> frozenset[str]:
+    """Effects that armgap knows."""
+    return frozenset(e["name"] for e in effects())
 
 
 def _visible(key: Key) -> float:

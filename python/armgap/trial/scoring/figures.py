@@ -13,6 +13,7 @@ from armgap.trial.key import Key, open_key
 from armgap.trial.running import answer_file
 from armgap.trial.scoring.calibration import Calibration, calibrate, wilson
 from armgap.trial.scoring.case_score import GROUPS, CaseScore, score_case
+from armgap.trial.scoring.closing import Closing, closing
 from armgap.trial.scoring.sizes import BoundScore, SizeScore, bound_scores, size_scores
 
 __all__ = ["BANDS", "CONFIDENT", "Figures", "Share", "figures", "opened_keys"]
@@ -55,12 +56,15 @@ class Figures:
         Sizes of rightly named causes.
     bounds : tuple of BoundScore
         Hidden effects that were called absent.
+    closings : tuple of Closing
+        The gap before and after, against the truth, of visible cases where that can be simulated.
     """
 
     method: str
     cases: tuple[CaseScore, ...]
     sizes: tuple[SizeScore, ...]
     bounds: tuple[BoundScore, ...]
+    closings: tuple[Closing, ...] = ()
 
     @property
     def visible(self) -> tuple[CaseScore, ...]:
@@ -115,6 +119,14 @@ class Figures:
         return Share(sum(b.holds for b in self.bounds), len(self.bounds))
 
     @property
+    def closed(self) -> tuple[float, float] | None:
+        """Share of the gap that is closed against the best possible: median, and lower decile."""
+        if not self.closings:
+            return None
+        shares = sorted(c.closed for c in self.closings)
+        return statistics.median(shares), shares[len(shares) // 10]
+
+    @property
     def seconds(self) -> tuple[float, float]:
         """Median and largest CPU time per case, s."""
         times = [c.seconds for c in self.cases]
@@ -153,6 +165,9 @@ class Figures:
             "calibration": asdict(self.calibration),
             "extra_per_case": self.extra,
             "look_alikes_per_case": self.alike,
+            "closed": None
+            if self.closed is None
+            else {"median": self.closed[0], "lower_decile": self.closed[1], "of": len(self.closings)},
             "size_error": self.size_error,
             "intervals_hold": _share_dict(self.coverage),
             "bounds_hold": _share_dict(self.bounds_hold),
@@ -182,11 +197,14 @@ def figures(cases: Sequence[Path], keys: dict[str, Key], method: str) -> Figures
     """
     answers: dict[str, Answer] = {case.name: read_answer(answer_file(case, method)) for case in cases}
     pairs = [(name, answer, keys[name]) for name, answer in answers.items()]
+    scores = tuple(score_case(name, answer, key) for name, answer, key in pairs)
+    asking = {c.case for c in scores if c.group in ("one effect", "two effects")}
     return Figures(
         method,
-        tuple(score_case(name, answer, key) for name, answer, key in pairs),
+        scores,
         tuple(s for _, answer, key in pairs for s in size_scores(answer, key)),
         tuple(b for _, answer, key in pairs for b in bound_scores(answer, key)),
+        tuple(c for x in cases if x.name in asking if (c := closing(x, answers[x.name], keys[x.name])) is not None),
     )
 
 

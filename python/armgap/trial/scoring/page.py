@@ -167,7 +167,19 @@ def _sizes(first: Figures) -> str:
         if first.size_error is None
         else [("median error of sizes, of causes rightly named", f"{first.size_error:.1%}")]
     )
+    shut = first.closed
+    closed = (
+        []
+        if shut is None
+        else [
+            (
+                f"held-out gap closed, of what the true form with its true sizes closes: median, lower decile ({len(first.closings)} cases)",
+                f"{shut[0]:.1%}, {shut[1]:.0%}",
+            )
+        ]
+    )
     rows = [
+        *closed,
         *told,
         ("95 % intervals of sizes that hold the hidden size", _percent(first.coverage)),
         ("hidden effects called absent whose 95 % bound holds", _plain(first.bounds_hold)),
