@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -18,6 +19,8 @@ from armgap.log import Log
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
 
+#: What a part of a log is called after the log's own name.
+_WHOLE = re.compile(r" \((first|last) part\)$")
 _HELD_OUT = 0.4
 LogLike = Log | str | os.PathLike[str]
 
@@ -85,7 +88,7 @@ class Equivalent:
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause."""
+    """A named cause; a push belongs to one log."""
 
     effect: str
     title: str
@@ -94,6 +97,7 @@ class Cause:
     parameters: dict[str, Value]
     closed: float
     equivalents: tuple[Equivalent, ...]
+    log: str | None = None
 
 
 @dataclass(frozen=True)
@@ -233,6 +237,7 @@ def _cause(data: dict[str, Any]) -> Cause:
         {name: _take(Value, value) for name, value in data["parameters"].items()},
         data["closed"],
         tuple(_take(Equivalent, e) for e in data["equivalents"]),
+        data.get("log"),
     )
 
 
@@ -309,6 +314,9 @@ def diagnose(
         raise _refused(str(error), training, held) from None
     data = json.loads(text)
     data["arm"]["name"] = arm.name
+    for cause in data["causes"]:
+        if "log" in cause:
+            cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = notes + data["notes"]
     data["log_findings"] = [
         {"log": log.name, "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings

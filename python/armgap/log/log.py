@@ -209,11 +209,10 @@ class Log:
         return len(self.t)
 
     def part(self, first: int, last: int, name: str) -> Log:
-        """Return the samples `first` up to, not including, `last` as a log of its own."""
+        """Return the samples `first` up to, not including, `last` as a log of its own, with the times of this one."""
         rows = slice(first, last)
         dq = None if self.dq is None else self.dq[rows]
-        t = self.t[rows] - self.t[first]
-        return Log(name, t, self.q[rows], self.tau[rows], dq, self.findings, self.path)
+        return Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, self.findings, self.path)
 
     def to_polars(self) -> pl.DataFrame:
         """Return the log as a table with the columns ``t, q1 …, tau1 …`` and, where there are any, ``dq1 …``."""

@@ -4,6 +4,7 @@ use crate::arm::ArmDescription;
 use crate::attribute::Contender;
 use crate::decide::{Attribution, CONSEQUENCE, Random};
 use crate::diagnose::Options;
+use crate::event::{Event, without_pushes};
 use crate::locate::{Lacks, lacking_torque, places, regimes};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
@@ -36,6 +37,9 @@ const NORMAL_95: f64 = 1.96;
 /// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
 const FREE_RUN_LIMIT: f64 = 100.0;
 
+/// A window's variance from its measured start counts up to this many times the typical one.
+const WORST_START: f64 = 10.0;
+
 /// The three hypotheses a report compares.
 struct Compared<const P: usize> {
     before: Hypothesis<P>,
@@ -46,10 +50,10 @@ struct Compared<const P: usize> {
 /// The diagnosis of a study.
 pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     study: &Study<A, N, P>,
+    (attribution, events): &(Attribution<N, P>, Vec<Event>),
     description: &ArmDescription,
     options: &Options,
 ) -> Diagnosis {
-    let attribution = study.attribute(options.max_causes, options.seed);
     let compared = Compared {
         before: Hypothesis::rigid(study.prior.theta),
         refit: attribution.refit.hypothesis.clone(),
@@ -61,7 +65,7 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let last = &attribution.stages[attribution.stages.len() - 1];
     let lacks = lacks(study, &compared, &last.weights.holdout);
     let regimes = regimes(&lacks, rotary);
-    let verdict = verdict(&attribution, &gap);
+    let verdict = if events.is_empty() { verdict(attribution, &gap) } else { "effect" };
     let gap_of =
         if attribution.causes.is_empty() && verdict == "parameters" { &lacks.before } else { &lacks.refit };
     Diagnosis {
@@ -69,8 +73,13 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         verdict,
         places: places(gap_of, &regimes, &study.scales.torque),
         gap,
-        causes: attribution.causes.iter().map(|c| cause(c, N, rotary)).collect(),
-        ruled_out: ruled_out(study, &attribution, rotary),
+        causes: attribution
+            .causes
+            .iter()
+            .map(|c| cause(c, N, rotary))
+            .chain(events.iter().map(|e| push(study, e, rotary)))
+            .collect(),
+        ruled_out: ruled_out(study, attribution, rotary),
         parameters: Parameters {
             nominal: nominal(study, description),
             refit: values(&attribution.refit, description),
@@ -79,8 +88,8 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         arm: arm_summary(description),
         training: logs(&study.training),
         holdout: logs(&study.holdout),
-        ranking: ranking(study, &attribution, rotary),
-        stages: stages(study, &attribution),
+        ranking: ranking(study, attribution, rotary),
+        stages: stages(study, attribution),
         regimes,
         series: errors.series(study),
         free_run_series: free_run_series(study, &compared),
@@ -93,7 +102,7 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         },
         version: env!("CARGO_PKG_VERSION"),
         seconds: 0.0,
-        notes: notes(&attribution),
+        notes: notes(attribution),
     }
 }
 
@@ -110,11 +119,11 @@ impl<const N: usize> Errors<N> {
     fn new<A: Arm<f64, N, P>, const P: usize>(study: &Study<A, N, P>, compared: &Compared<P>) -> Self {
         let data = &study.holdout.data;
         let starts = data.measured_starts();
-        let predict = |h: &Hypothesis<P>| data.predict(&study.arm, h, &starts);
+        let bare = without_pushes(&study.holdout).data;
         Self {
-            before: predict(&compared.before),
-            refit: predict(&compared.refit),
-            after: predict(&compared.after),
+            before: bare.predict(&study.arm, &compared.before, &starts),
+            refit: bare.predict(&study.arm, &compared.refit, &starts),
+            after: data.predict(&study.arm, &compared.after, &starts),
             floor: floor(study, &compared.after),
         }
     }
@@ -161,8 +170,8 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 ) -> [f64; N] {
     let data = &study.holdout.data;
     let columns = crate::metric::start_sensitivities(data, &study.arm, model, &data.measured_starts());
-    let mut sum = [0.0; N];
-    for window in &data.windows {
+    let carried = |window: &Window<N>| -> [f64; N] {
+        let mut sum = [0.0; N];
         for row in window.range().step_by(N) {
             for (j, total) in sum.iter_mut().enumerate() {
                 for (k, [vq, cov, vdq]) in window.start.covariance.iter().enumerate() {
@@ -171,8 +180,16 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
                 }
             }
         }
-    }
-    std::array::from_fn(|j| study.noise[j].powi(2) + sum[j] / data.rows.max(1) as f64)
+        sum.map(|x| x / window.rows() as f64)
+    };
+    let windows: Vec<[f64; N]> = data.windows.iter().map(carried).collect();
+    std::array::from_fn(|j| {
+        // A window whose start decides whether a joint sticks has no meaningful derivative; it counts as a bad one, not as infinite.
+        let typical = crate::track::median(windows.iter().map(|w| w[j]).collect());
+        let mean =
+            windows.iter().map(|w| w[j].min(WORST_START * typical)).sum::<f64>() / windows.len() as f64;
+        study.noise[j].powi(2) + mean
+    })
 }
 
 fn rms<const N: usize>(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
@@ -201,8 +218,8 @@ fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         closed_ci: closed_interval(study, errors, &floor, options.seed),
         refit: rms::<N>(measured, &errors.refit),
         free_run: FreeRun {
-            before: free_run_rms(study, &compared.before),
-            after: free_run_rms(study, &compared.after),
+            before: free_run_rms(study, &without_pushes(&study.holdout).data, &compared.before),
+            after: free_run_rms(study, &study.holdout.data, &compared.after),
         },
         before,
         after,
@@ -269,9 +286,10 @@ fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
 
 fn free_run_rms<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     study: &Study<A, N, P>,
+    data: &Dataset<N>,
     model: &Hypothesis<P>,
 ) -> Vec<f64> {
-    let data = whole(&study.holdout.data);
+    let data = whole(data);
     let predicted =
         limited(&data, &data.predict(&study.arm, model, &vec![Shift::none(); data.windows.len()]));
     rms::<N>(&data.measured(), &predicted)
@@ -289,8 +307,10 @@ fn free_run_series<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 ) -> Vec<FreeRunSeries> {
     let data = whole(&study.holdout.data);
     let starts = vec![Shift::none(); data.windows.len()];
-    let run = |h: &Hypothesis<P>| limited(&data, &data.predict(&study.arm, h, &starts));
-    let (before, after, measured) = (run(&compared.before), run(&compared.after), data.measured());
+    let run = |data: &Dataset<N>, h: &Hypothesis<P>| limited(data, &data.predict(&study.arm, h, &starts));
+    let bare = whole(&without_pushes(&study.holdout).data);
+    let (before, after, measured) =
+        (run(&bare, &compared.before), run(&data, &compared.after), data.measured());
     let mut all = Vec::new();
     for window in data.windows.iter().take(DRAWN_LOGS) {
         let track = &data.tracks[window.track];
@@ -316,7 +336,7 @@ fn lacks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     weights: &Metric<N>,
 ) -> Lacks<N> {
     let data = &study.holdout.data;
-    let of = |h: &Hypothesis<P>| lacking_torque(&study.arm, data, weights, h);
+    let of = |h: &Hypothesis<P>| lacking_torque(&study.arm, data, &weights.starts, h);
     Lacks { before: of(&compared.before), refit: of(&compared.refit), after: of(&compared.after) }
 }
 
@@ -353,6 +373,23 @@ fn cause(cause: &crate::decide::Cause, joints: usize, rotary: bool) -> Cause {
             .into_iter()
             .map(|e| EquivalentSummary { effect: e.effect, joint: e.joint, why: e.why })
             .collect(),
+        log: None,
+    }
+}
+
+/// A push as a cause.
+fn push<A, const N: usize, const P: usize>(study: &Study<A, N, P>, event: &Event, rotary: bool) -> Cause {
+    let spec = event.push.law.spec();
+    let sample = if event.holdout { &study.holdout } else { &study.training };
+    Cause {
+        effect: spec.name,
+        title: spec.title,
+        joint: event.push.joint_number(),
+        probability: event.probability,
+        parameters: effect_values(&event.push, &event.sigma, rotary),
+        closed: event.share.clamp(0.0, 1.0),
+        equivalents: Vec::new(),
+        log: Some(sample.data.tracks[event.track].name.clone()),
     }
 }
 

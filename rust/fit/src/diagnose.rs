@@ -118,8 +118,9 @@ impl WithArm for Request<'_> {
         theta: [f64; P],
     ) -> Self::Output {
         let started = Instant::now();
-        let study = self.study::<A, N, P>(arm, theta)?;
-        let mut diagnosis = crate::compose::compose(&study, self.arm, self.options);
+        let mut study = self.study::<A, N, P>(arm, theta)?;
+        let conclusion = study.conclude(self.options.max_causes, self.options.seed);
+        let mut diagnosis = crate::compose::compose(&study, &conclusion, self.arm, self.options);
         diagnosis.seconds = started.elapsed().as_secs_f64();
         Ok(diagnosis)
     }

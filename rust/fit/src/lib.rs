@@ -11,6 +11,7 @@ pub mod compose;
 pub mod decide;
 pub mod diagnose;
 pub mod equivalent;
+pub mod event;
 pub mod identify;
 pub mod locate;
 pub mod metric;

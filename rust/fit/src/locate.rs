@@ -3,10 +3,9 @@
 //! The prediction of a window and the measurement run under the same torque, so their difference is smooth; its second derivative
 //! is the acceleration the model lacks, and `M(q)` times that the torque it lacks.
 
-use crate::metric::Metric;
 use crate::model::Hypothesis;
 use crate::smooth::local_cubic;
-use crate::window::Dataset;
+use crate::window::{Dataset, Shift};
 use armgap_core::arm::Arm;
 use nalgebra::SVector;
 use serde::Serialize;
@@ -26,6 +25,8 @@ const STANDS_OUT: f64 = 1.6;
 /// One sample's state and lacking torque, per joint.
 #[derive(Debug, Clone, Copy)]
 pub struct Lack<const N: usize> {
+    /// Index of the log.
+    pub track: usize,
     /// Time within the log, s.
     pub t: f64,
     /// Positions.
@@ -44,10 +45,10 @@ pub struct Lack<const N: usize> {
 pub fn lacking_torque<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     data: &Dataset<N>,
-    metric: &Metric<N>,
+    starts: &[Shift<N>],
     hypothesis: &Hypothesis<P>,
 ) -> Vec<Lack<N>> {
-    let predicted = data.predict(arm, hypothesis, &metric.starts);
+    let predicted = data.predict(arm, hypothesis, starts);
     let mut found = Vec::new();
     for window in &data.windows {
         let track = &data.tracks[window.track];
@@ -65,6 +66,7 @@ pub fn lacking_torque<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             let dq = SVector::from_fn(|j, _| velocity(&track.t, |s| track.q[s][j], k));
             let inertia = arm.inertia(&hypothesis.theta, &track.q[k]);
             found.push(Lack {
+                track: window.track,
                 t: track.t[k] - track.t[0],
                 q: track.q[k],
                 dq,

@@ -11,13 +11,18 @@
 //! projection, Golub and Pereyra 1973).
 
 use crate::model::Hypothesis;
+use crate::track::Start;
 use crate::window::{Dataset, Shift};
 use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, SVector};
 use rayon::prelude::*;
 
-/// How much less a measured start is trusted than its own noise says: a local cubic also errs where the acceleration jumps.
+/// How much less a measured start is trusted than its own noise says.
 const START_INFLATION: f64 = 2.0;
+
+/// A local cubic errs by more where the acceleration jumps: trust in a start is lowered to the displacement it turned out to need, up to
+/// this many of its standard deviations.
+const LARGEST_INFLATION: f64 = 20.0;
 
 /// Heaviness of the tail of windows' costs: a window this many times worse than typical has about half its weight.
 const TAIL: f64 = 3.0;
@@ -74,7 +79,7 @@ impl<const N: usize> Metric<N> {
         let project = |(index, shift): (usize, &Shift<N>)| {
             let window = &data.windows[index];
             let columns: Vec<&[f64]> = sensitivities.iter().map(|c| &c[window.range()]).collect();
-            projection(&columns, &scale, &window.start.covariance, shift)
+            projection(&columns, &scale, &window.start, shift)
         };
         let projections = starts.iter().enumerate().map(project).collect();
         let trust = vec![1.0; starts.len()];
@@ -210,7 +215,7 @@ pub fn start_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 fn projection<const N: usize>(
     columns: &[&[f64]],
     scale: &[f64; N],
-    covariance: &[[f64; 3]; N],
+    start: &Start<N>,
     shift: &Shift<N>,
 ) -> Projection {
     let rows = columns[0].len();
@@ -220,7 +225,7 @@ fn projection<const N: usize>(
             stacked[(r, c)] = value / scale[r % N];
         }
     }
-    let root = start_precision_root(covariance);
+    let root = start_precision_root(start, shift);
     stacked.view_mut((rows, 0), (2 * N, 2 * N)).copy_from(&root);
     let displacement = DVector::from_fn(2 * N, |i, _| if i < N { shift.q[i] } else { shift.dq[i - N] });
     let pull = -(&root * displacement);
@@ -231,10 +236,11 @@ fn projection<const N: usize>(
 }
 
 /// `L'` with `L L'` the precision of a measured start, positions first, then velocities.
-fn start_precision_root<const N: usize>(covariance: &[[f64; 3]; N]) -> DMatrix<f64> {
+fn start_precision_root<const N: usize>(start: &Start<N>, shift: &Shift<N>) -> DMatrix<f64> {
     let mut root = DMatrix::zeros(2 * N, 2 * N);
-    let inflation = START_INFLATION * START_INFLATION;
-    for (j, &[vq, cov, vdq]) in covariance.iter().enumerate() {
+    for (j, &[vq, cov, vdq]) in start.covariance.iter().enumerate() {
+        let needed = (shift.dq[j].powi(2) / vdq).min(LARGEST_INFLATION.powi(2));
+        let inflation = START_INFLATION.powi(2) + needed;
         let (vq, cov, vdq) = (vq * inflation, cov * inflation, vdq * inflation);
         // Cholesky of the inverse of [[vq, cov], [cov, vdq]].
         let given_q = (vdq - cov * cov / vq).max(1e-300);

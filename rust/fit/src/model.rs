@@ -97,18 +97,18 @@ impl<const P: usize> Hypothesis<P> {
             .try_fold(plant, |plant, e| plant.with_effect(Active { law: e.law, joint: e.joint, p: e.p }))
     }
 
-    /// Rewrites the held commands of a log into the torque that reaches the joints.
+    /// Rewrites the held commands of a log into the torque that reaches the joints; `pushes` are added last.
     pub fn command<const N: usize>(
         &self,
         t: &[f64],
         held: &[[Pulse<f64>; N]],
+        pushes: &[Placed],
     ) -> Option<Vec<[Pulse<f64>; N]>> {
-        if !self.effects.iter().any(|e| e.law.spec().hooks.command) {
-            return None;
-        }
+        let laws = || self.effects.iter().chain(pushes).filter(|e| e.law.spec().hooks.command);
+        laws().next()?;
         let mut torque = held.to_vec();
         let mut column = Vec::with_capacity(torque.len());
-        for effect in self.effects.iter().filter(|e| e.law.spec().hooks.command) {
+        for effect in laws() {
             column.clear();
             column.extend(torque.iter().map(|row| row[effect.joint]));
             effect.law.command(&effect.p, t, &mut column);

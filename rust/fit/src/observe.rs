@@ -1,7 +1,7 @@
 //! States that no encoder shows, at the start of every window: driven along the measured motion from the start of the log.
 //!
-//! What a joint remembers depends on its path, and a motor behind a shaft or play swings under the logged torque against the
-//! measured acceleration of its link; neither needs a guess.
+//! What a joint remembers depends on its path, and a motor behind a shaft or play swings under the logged torque about the measured
+//! position of its link; neither needs a guess.
 
 use crate::track::Track;
 use armgap_core::arm::Arm;
@@ -15,8 +15,8 @@ use nalgebra::SVector;
 pub struct Moving<const N: usize> {
     /// Positions.
     pub q: SVector<f64, N>,
-    /// Accelerations.
-    pub ddq: SVector<f64, N>,
+    /// Velocities.
+    pub dq: SVector<f64, N>,
 }
 
 /// Steps per sample of a motor that swings at this rate times the sample period.
@@ -25,7 +25,7 @@ const STEP: f64 = 1.0;
 /// Steps per sample at most.
 const MAX_STEPS: usize = 8;
 
-/// A twist or its rate beyond this [SI] is cut: the hypothesis is wrong, and its cost will say so.
+/// A position or its rate beyond this [SI] is cut: the hypothesis is wrong, and its cost will say so.
 const LIMIT: f64 = 1e3;
 
 /// Hidden states of a plant at every sample of a track up to `last`, under these torques.
@@ -46,8 +46,10 @@ pub fn hidden_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         for j in 0..N {
             if let Some(drive) = plant.drive(j) {
                 let h = interval(&track.t, k);
-                let swing = Swing { drive, torque: &torque[k][j], h, link: [path[k].ddq[j], next.ddq[j]] };
-                (now.twist[j], now.dtwist[j]) = swing.advance(now.twist[j], now.dtwist[j]);
+                let ends = [(path[k].q[j], path[k].dq[j]), (next.q[j], next.dq[j])];
+                let swing = Swing { drive, torque: &torque[k][j], h, ends };
+                let (at, rate) = swing.advance(ends[0].0 + now.twist[j], ends[0].1 + now.dtwist[j]);
+                (now.twist[j], now.dtwist[j]) = (at - ends[1].0, rate - ends[1].1);
             }
         }
     }
@@ -59,18 +61,26 @@ struct Swing<'a> {
     drive: &'a Drive<f64>,
     torque: &'a Pulse<f64>,
     h: f64,
-    /// Acceleration of the link at both ends.
-    link: [f64; 2],
+    /// Position and velocity of the link at both ends.
+    ends: [(f64, f64); 2],
 }
 
 impl Swing<'_> {
-    /// Acceleration of the twist at the fraction `s` of the interval.
-    fn slope(&self, s: f64, twist: f64, rate: f64) -> f64 {
-        let link = self.link[0] + s * (self.link[1] - self.link[0]);
-        (self.torque.at(s) - self.drive.transmitted(twist, rate)) / self.drive.inertia - link
+    /// Position and velocity of the link at the fraction `s` of the interval, by Hermite's cubic.
+    fn link(&self, s: f64) -> (f64, f64) {
+        let [(q0, v0), (q1, v1)] = self.ends;
+        let (d0, d1) = (v0 * self.h, v1 * self.h);
+        let (c2, c3) = (3.0 * (q1 - q0) - 2.0 * d0 - d1, 2.0 * (q0 - q1) + d0 + d1);
+        (q0 + s * (d0 + s * (c2 + s * c3)), (d0 + s * (2.0 * c2 + 3.0 * s * c3)) / self.h)
     }
 
-    /// Twist and rate at the end of the interval, by Runge-Kutta.
+    /// Acceleration of the motor at the fraction `s` of the interval.
+    fn slope(&self, s: f64, at: f64, rate: f64) -> f64 {
+        let (q, dq) = self.link(s);
+        (self.torque.at(s) - self.drive.transmitted(at - q, rate - dq)) / self.drive.inertia
+    }
+
+    /// Position and velocity of the motor at the end of the interval, by Runge-Kutta.
     fn advance(&self, mut e: f64, mut v: f64) -> (f64, f64) {
         let count = ((self.h * self.drive.rate(f64::MAX) / STEP).ceil() as usize).clamp(1, MAX_STEPS);
         let (dt, ds) = (self.h / count as f64, 1.0 / count as f64);

@@ -113,6 +113,9 @@ pub struct Cause {
     pub closed: f64,
     /// What this log does not tell from it.
     pub equivalents: Vec<EquivalentSummary>,
+    /// The log that a push belongs to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub log: Option<String>,
 }
 
 /// A look-alike.

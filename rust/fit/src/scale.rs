@@ -67,6 +67,7 @@ impl<const N: usize> Scales<N> {
             Quantity::Drag => self.torque[j] / (self.speed[j] * self.speed[j]),
             Quantity::Damping => self.torque[j] / self.speed[j],
             Quantity::Stiffness => self.torque[j] / self.position[j],
+            Quantity::Impulse => self.inertia[j] * self.speed[j],
             Quantity::Hardening => self.torque[j] / self.position[j].powi(3),
             Quantity::ShaftStiffness => self.inertia[j] * SHAFT_RATE * SHAFT_RATE * MOTOR_SHARE,
             Quantity::ShaftDamping => self.inertia[j] * SHAFT_RATE * MOTOR_SHARE * SHAFT_DAMPING,

@@ -112,7 +112,7 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             (moved, step)
         }
         Trial::Ray => (Placed { p: candidate.p.map(|x| TRIAL * x), ..*candidate }, TRIAL),
-        Trial::Whole => (*candidate, 1.0),
+        Trial::Whole | Trial::Event => (*candidate, 1.0),
     };
     let there = problem.residual(&base.with(moved));
     residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect()
@@ -138,7 +138,7 @@ fn scored(effect: &Placed, raw: f64, information: f64, slope: f64, scatter: f64)
             share
         }
         // A share of the whole difference, from none to all of it.
-        Trial::Whole => estimate.clamp(0.0, 1.0),
+        Trial::Whole | Trial::Event => estimate.clamp(0.0, 1.0),
     };
     let gain = if raw > 0.0 { (2.0 * slope - information * admissible) * admissible } else { 0.0 };
     Scored {

@@ -293,7 +293,7 @@ pub fn neutral(effect: &Placed) -> Placed {
     let amplitudes = match spec.trial {
         Trial::Amplitudes(count) => count,
         Trial::Ray => off.len(),
-        Trial::Whole => 1,
+        Trial::Whole | Trial::Event => 1,
     };
     for (value, parameter) in off.p.iter_mut().zip(spec.parameters).take(amplitudes) {
         *value = parameter.neutral;

@@ -84,7 +84,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     /// A metric whose starts have been fitted to the hypothesis once and relinearised there.
-    fn metric(&self, sample: &Sample<N>, hypothesis: &Hypothesis<P>, scale: [f64; N]) -> Metric<N> {
+    pub fn metric(&self, sample: &Sample<N>, hypothesis: &Hypothesis<P>, scale: [f64; N]) -> Metric<N> {
         let rough = Metric::new(&sample.data, &self.arm, hypothesis, scale, sample.data.measured_starts());
         let residual = self.on(sample, &rough).residual(hypothesis);
         let starts = bounded(&sample.data, rough.refit_starts(&sample.data, &residual));

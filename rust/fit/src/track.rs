@@ -1,5 +1,6 @@
 //! One log, ready to be simulated against: times, positions, held torques, and what its noise looks like.
 
+use crate::model::Placed;
 use crate::observe::Moving;
 use crate::smooth::{Local, local_cubic};
 use armgap_core::effect::Pulse;
@@ -27,6 +28,8 @@ pub struct Track<const N: usize> {
     pub noise: [f64; N],
     /// Smallest step of the position measurement, per joint; zero where none is seen.
     pub step: [f64; N],
+    /// Pushes from outside that are known.
+    pub pushes: Vec<Placed>,
     /// Smoothed motion, once it is asked for.
     path: OnceLock<Vec<Moving<N>>>,
 }
@@ -55,6 +58,7 @@ impl<const N: usize> Track<N> {
             held: rows(tau).into_iter().map(|row| row.map(Pulse::held)).collect(),
             noise: [0.0; N],
             step: [0.0; N],
+            pushes: Vec::new(),
             path: OnceLock::new(),
         };
         for j in 0..N {
@@ -102,10 +106,7 @@ impl<const N: usize> Track<N> {
         self.path.get_or_init(|| {
             let moving = |k: usize| {
                 let locals: [Local; N] = std::array::from_fn(|j| self.local(j, k));
-                Moving {
-                    q: SVector::from_fn(|j, _| locals[j].q),
-                    ddq: SVector::from_fn(|j, _| locals[j].ddq),
-                }
+                Moving { q: SVector::from_fn(|j, _| locals[j].q), dq: SVector::from_fn(|j, _| locals[j].dq) }
             };
             (0..self.len()).map(moving).collect()
         })

@@ -103,8 +103,11 @@ impl<const N: usize> Dataset<N> {
         let Some(plant) = hypothesis.plant(arm) else {
             return predicted;
         };
-        let commands: Vec<_> =
-            self.tracks.iter().map(|track| hypothesis.command(&track.t, &track.held)).collect();
+        let commands: Vec<_> = self
+            .tracks
+            .iter()
+            .map(|track| hypothesis.command(&track.t, &track.held, &track.pushes))
+            .collect();
         let hidden = self.hidden(&plant, &commands);
         let most = if plant.is_driven() { MAX_SUBSTEPS_DRIVEN } else { MAX_SUBSTEPS };
         for (window, shift) in self.windows.iter().zip(starts) {

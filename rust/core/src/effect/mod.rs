@@ -14,6 +14,7 @@ mod coulomb_asymmetry;
 mod cross_friction;
 mod encoder_eccentricity;
 mod encoder_offset;
+mod external_pulse;
 mod friction_warmup;
 mod gear_efficiency;
 mod hardening_spring;
@@ -71,6 +72,7 @@ pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
         &encoder_offset::EncoderOffset,
         &encoder_eccentricity::EncoderEccentricity,
         &contact::Contact,
+        &external_pulse::ExternalPulse,
     ]
 }
 
@@ -105,6 +107,8 @@ pub enum Quantity {
     ShaftDamping,
     /// Torque per cubed position.
     Hardening,
+    /// Torque times time.
+    Impulse,
     /// Torque per speed.
     Damping,
     /// Joint speed.
@@ -141,6 +145,8 @@ impl Quantity {
             (Self::Stiffness | Self::ShaftStiffness, false) => "N/m",
             (Self::Damping | Self::ShaftDamping, true) => "N m s/rad",
             (Self::Damping | Self::ShaftDamping, false) => "N s/m",
+            (Self::Impulse, true) => "N m s",
+            (Self::Impulse, false) => "N s",
             (Self::Hardening, true) => "N m/rad^3",
             (Self::Hardening, false) => "N/m^3",
             (Self::Speed, true) => "rad/s",
@@ -254,6 +260,8 @@ pub enum Trial {
     Amplitudes(usize),
     /// By the derivative at neutral along a ray on which all parameters grow together.
     Ray,
+    /// Not at all: it belongs to one log and is looked for there.
+    Event,
     /// By the whole difference it makes at a trial value: a threshold has no derivative where it is never reached.
     Whole,
 }

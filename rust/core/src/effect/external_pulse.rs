@@ -1,0 +1,47 @@
+//! A push from outside: a constant torque of the given impulse for `duration` around `time`. It belongs to one log.
+//!
+//! Each interval carries the exact mean of the push over it, so the impulse is exact whatever the sample times.
+
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
+use crate::real::{Real, lit};
+
+/// A push at one time.
+#[derive(Debug)]
+pub struct ExternalPulse;
+
+static SPEC: Spec = Spec {
+    name: "external_pulse",
+    title: "external push",
+    equation: "tau_joint = tau + impulse / duration while |t - time| < duration / 2",
+    source: "collision detection by momentum observers, De Luca and Mattone 2003",
+    excited_by: "a push during the log",
+    scope: Scope::Joint,
+    least_joints: 1,
+    parameters: &[
+        EffectParameter::signed("impulse", Quantity::Impulse),
+        EffectParameter::shape("time", Quantity::Duration, f64::NEG_INFINITY, f64::INFINITY),
+        EffectParameter::shape("duration", Quantity::Duration, 1e-4, f64::INFINITY),
+    ],
+    starts: &[],
+    trial: Trial::Event,
+    hooks: Hooks::COMMAND,
+};
+
+impl<T: Real> Effect<T> for ExternalPulse {
+    fn spec(&self) -> &'static Spec {
+        &SPEC
+    }
+
+    fn command(&self, p: &[T; MAX_PARAMETERS], t: &[T], torque: &mut [Pulse<T>]) {
+        let half = p[2] * lit(0.5);
+        let (from, to) = (p[1] - half, p[1] + half);
+        for (k, (&start, pulse)) in t.iter().zip(torque.iter_mut()).enumerate() {
+            let h = super::interval(t, k);
+            let overlap = (start + h).min(to) - start.max(from);
+            if overlap > T::zero() && h > T::zero() && p[2] > T::zero() {
+                let push = p[0] / p[2] * overlap / h;
+                *pulse = pulse.map(|tau| tau + push);
+            }
+        }
+    }
+}
