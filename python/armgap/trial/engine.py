@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
 from multiprocessing import get_context
 from typing import Any
 
@@ -45,7 +44,7 @@ def mujoco() -> Any:
         raise TrialEngineMissingError from error
 
 
-def worker_pool(workers: int, initializer: Callable[[], None]) -> Any:
+def worker_pool(workers: int) -> Any:
     """Return a pool of fresh processes whose tasks can be given a time limit, `pebble.ProcessPool`.
 
     Raises
@@ -57,4 +56,4 @@ def worker_pool(workers: int, initializer: Callable[[], None]) -> Any:
         pebble = importlib.import_module("pebble")
     except ImportError as error:
         raise TrialEngineMissingError("pebble", "answering cases") from error
-    return pebble.ProcessPool(max_workers=workers, initializer=initializer, context=get_context("spawn"))
+    return pebble.ProcessPool(max_workers=workers, context=get_context("spawn"))

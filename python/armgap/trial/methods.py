@@ -45,6 +45,8 @@ class Method:
         Version of the software behind it; answers of another version are given again.
     check : callable
         Raises before any work is done if the method cannot run.
+    expresses : frozenset of str, optional
+        Effects it can name, or their equivalents, where these are not all.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Method:
     answer: Callable[[SealedCase], Answer]
     version: Callable[[], str] = _build
     check: Callable[[], None] = lambda: None
+    expresses: frozenset[str] | None = None
 
 
 def methods() -> dict[str, Method]:

@@ -1,7 +1,7 @@
 """Many cases answered by one method, in parallel processes; what is already answered stays.
 
 The answer to ``DIR/case-0007`` by method M is ``DIR/answers/M/case-0007.json``. An answer is kept when it belongs to
-the case (its seal) and to the software (its version). Keys stay closed: a method is given what `SealedCase` holds.
+the case (its seal) and to the software (its version), and is no failure. Keys stay closed: a method is given what `SealedCase` holds.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import TimeoutError as TookTooLong
+from contextlib import contextmanager
 from pathlib import Path
 
 from armgap.errors import ArmgapError
@@ -23,7 +24,8 @@ __all__ = ["ANSWERS", "LIMIT_S", "answer_cases", "answer_file", "open_cases"]
 
 ANSWERS = "answers"
 #: Longest time for one case, s.
-LIMIT_S = 120.0
+LIMIT_S = 300.0
+THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS")
 
 
 def answer_file(case: Path, method: str) -> Path:
@@ -49,7 +51,7 @@ def answer_cases(
         One of `methods`.
     workers : int, default 1
         Processes.
-    limit_s : float, default 120
+    limit_s : float, default 300
         Longest time for one case [s]; a case that takes longer has an answer with an error.
 
     Yields
@@ -59,7 +61,7 @@ def answer_cases(
     """
     if not cases:
         return
-    with worker_pool(min(workers, len(cases)), _one_thread) as pool:
+    with _one_thread(), worker_pool(min(workers, len(cases))) as pool:
         futures = [pool.schedule(_answer, args=[str(c), method.name], timeout=limit_s) for c in cases]
         try:
             for case, future in zip(cases, futures, strict=True):
@@ -97,9 +99,18 @@ def _answer(case: str, name: str) -> Answer:
     return answer.stamped(sealed_hash(case), method.version(), time.process_time() - start)
 
 
-def _one_thread() -> None:
-    for variable in ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS"):
-        os.environ[variable] = "1"
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let processes started meanwhile use one thread each; libraries read this when they are loaded."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name, None)
+            if value is not None:
+                os.environ[name] = value
 
 
 def _answered(case: Path, method: Method) -> bool:
@@ -107,7 +118,7 @@ def _answered(case: Path, method: Method) -> bool:
         answer = Answer.from_json(answer_file(case, method.name).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    return answer.seal == sealed_hash(case) and answer.version == method.version()
+    return answer.error is None and answer.seal == sealed_hash(case) and answer.version == method.version()
 
 
 def _write(path: Path, answer: Answer) -> None:

@@ -44,7 +44,10 @@ def all_of_it(
     from armgap.trial.methods import methods
 
     check_outputs(json_file, md_file)
+    names = list(methods()) if with_peers else ["armgap"]
+    for name in names:
+        methods()[name].check()  # what is not installed is missed now, not after the cases are made
     silent = quiet or "-" in (json_file, md_file)
     make_them(folder, cases, seed, duration, workers, silent)
-    answer_all(folder, list(methods()) if with_peers else ["armgap"], workers, limit_s, False, silent)
+    answer_all(folder, names, workers, limit_s, False, silent)
     score_all(folder, json_file, md_file, silent)

@@ -15,7 +15,7 @@ __all__ = ["answer_all", "limit_option", "peers", "run"]
 limit_option = click.option(
     "--limit",
     "limit_s",
-    default=120.0,
+    default=300.0,
     show_default=True,
     type=click.FloatRange(min=1.0),
     help="Longest time for one case [s].",

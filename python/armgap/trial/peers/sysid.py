@@ -36,6 +36,21 @@ __all__ = ["SYSID"]
 
 #: Windows it is fitted to, iterations at most, causes named at most, and trust in the arm file, in sigmas, as bounds.
 WINDOWS, ITERATIONS, MOST, TRUST = 10, 8, 4, 4.0
+#: Effects among its parameters, and their equivalents.
+EXPRESSED = frozenset(
+    {
+        "torque_offset",
+        "coulomb_asymmetry",
+        "actuator_lag",
+        "actuator_delay",
+        "torque_saturation",
+        "joint_spring",
+        "quadratic_drag",
+        "rotor_inertia",
+        "encoder_offset",
+        "base_tilt",
+    }
+)
 #: Step of finite differences, as a share of the scales: above what the contact solver's tolerance leaves.
 NUDGE = 1e-4
 Set = Callable[[Any, float], None]
@@ -270,4 +285,5 @@ SYSID = Method(
     "freed at once; names those whose 95 % interval excludes no effect, unless the report warns of them",
     answer,
     check=_check,
+    expresses=EXPRESSED,
 )

@@ -8,7 +8,7 @@ from armgap.trial.effects import REGISTRY
 from armgap.trial.making import Manifest
 from armgap.trial.methods import methods
 from armgap.trial.scoring.case_score import GROUPS
-from armgap.trial.scoring.figures import CONFIDENT, Figures, Share
+from armgap.trial.scoring.figures import CONFIDENT, Figures, Share, share
 from armgap.trial.visibility import MULTIPLE, SIGMAS
 
 __all__ = ["page"]
@@ -82,8 +82,25 @@ def _summary(all_figures: Sequence[Figures]) -> str:
 *Cause and joint right*: of the cases with visible effects of the library, the first cause named is a hidden one on its
 joint, or an equivalent that no log of motion tells from it; in brackets the 95 % interval. *False alarms*: any cause named
 where there is none, with the arm file's values right or wrong. *Named wrongly*: of all causes named with a probability of
-{CONFIDENT} or more, in all cases, those that are not there. *Extra*: causes named that are not there, per case."""
+{CONFIDENT} or more, in all cases, those that are not there. *Extra*: causes named that are not there, per case.{_partial(all_figures)}"""
     )
+
+
+def _partial(all_figures: Sequence[Figures]) -> str:
+    """On the cases a method can express, for those that do not express all."""
+    lines = []
+    for f in all_figures:
+        can = methods()[f.method].expresses
+        if can is None:
+            continue
+        asked = {c.case for c in f.visible if all(effect in can for effect, _ in c.hidden)}
+        own, ours = (share([c for c in x.visible if c.case in asked]) for x in (f, all_figures[0]))
+        title = methods()[f.method].title
+        lines.append(
+            f"\n\n{title} has parameters for {len(can)} of the effects only. In the cases that hide nothing else it is right in "
+            f"{_plain(own)}, armgap in {_plain(ours)}."
+        )
+    return "".join(lines)
 
 
 def _summary_row(f: Figures) -> tuple[str, ...]:
@@ -95,7 +112,7 @@ def _summary_row(f: Figures) -> tuple[str, ...]:
         f"{quiet} of {len(f.quiet)}",
         f"{sure.of - sure.right} of {sure.of}",
         f"{f.extra:.2f}",
-        f"{f.seconds[0]:.2g}",
+        f"{f.seconds[0]:.2f}",
     )
 
 
@@ -188,7 +205,7 @@ def _sizes(first: Figures) -> str:
             "hidden effect named, or listed as a look-alike of the first cause",
             _percent(Share(sum(c.right or c.listed for c in first.visible), len(first.visible))),
         ),
-        ("CPU time per case, median and largest", f"{first.seconds[0]:.2g} s, {first.seconds[1]:.2g} s"),
+        ("CPU time per case, median and largest", f"{first.seconds[0]:.1f} s, {first.seconds[1]:.1f} s"),
     ]
     return "## Sizes, bounds, time\n\narmgap.\n\n" + table(("what", "figure"), rows)
 
