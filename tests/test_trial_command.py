@@ -131,6 +131,31 @@ def test_a_case_that_takes_too_long_has_an_answer_that_says_so(trial):
     assert answer.error is None
 
 
+def test_an_answer_to_another_case_is_refused(trial, run, tmp_path):
+    import shutil
+
+    copy = tmp_path / "cases"
+    shutil.copytree(trial[0], copy)
+    answers = copy / "answers" / "armgap"
+    shutil.copy(answers / "case-0000.json", answers / "case-0001.json")
+    status, out, err = run("trial", "score", copy)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "case-0001.json" in err
+    assert "another case" in err
+
+
+def test_a_method_that_answered_some_cases_is_not_scored_and_said_so(trial, run, tmp_path):
+    import shutil
+
+    copy = tmp_path / "cases"
+    shutil.copytree(trial[0], copy)
+    (copy / "answers" / "constant").mkdir()
+    shutil.copy(copy / "answers" / "armgap" / "case-0000.json", copy / "answers" / "constant")
+    status, out, _ = run("trial", "score", copy)
+    assert status == 0
+    assert "constant guess has answered 1 of 2 cases" in out
+
+
 def test_another_trial_is_not_mixed_in(trial, run):
     status, out, err = run("trial", "make", "-n", "2", "--seed", "7", "--duration", "2", "-o", trial[0])
     assert (status, out, err.count("\n")) == (2, "", 1)

@@ -42,7 +42,7 @@ def score_all(folder: Path, json_file: str | None, md_file: str | None, quiet: b
     from armgap.trial.sealed import case_folders
 
     cases = case_folders(folder)
-    names = _answered(cases)
+    names, partly = _answered(cases)
     keys = opened_keys(cases)
     found = [figures(cases, keys, name) for name in names]
     manifest = read_manifest(folder)
@@ -54,10 +54,12 @@ def score_all(folder: Path, json_file: str | None, md_file: str | None, quiet: b
         write(md_file, page(found, manifest, seal_of_all(cases)))
     if not quiet and "-" not in (json_file, md_file):
         console().print(_table(found))
+        for note in partly:
+            console().print(note, highlight=False)
 
 
-def _answered(cases: list[Path]) -> list[str]:
-    """Methods that have answered every case, armgap first."""
+def _answered(cases: list[Path]) -> tuple[list[str], list[str]]:
+    """Methods that have answered every case, armgap first, and a note on each that has answered some."""
     from armgap.errors import OptionError
     from armgap.trial.methods import methods
     from armgap.trial.running import answer_file
@@ -66,7 +68,12 @@ def _answered(cases: list[Path]) -> list[str]:
     if missing["armgap"]:
         text = f"{missing['armgap']} of {len(cases)} cases are not answered"
         raise OptionError(text, remedy="run armgap trial run DIR first", file=cases[0].parent)
-    return [name for name, count in missing.items() if not count]
+    partly = [
+        f"not scored: {methods()[name].title} has answered {len(cases) - count} of {len(cases)} cases"
+        for name, count in missing.items()
+        if 0 < count < len(cases)
+    ]
+    return [name for name, count in missing.items() if not count], partly
 
 
 def _table(found: list[Figures]) -> Table:

@@ -8,8 +8,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from armgap.errors import OptionError
 from armgap.trial.answers import Answer, read_answer
-from armgap.trial.key import Key, open_key
+from armgap.trial.key import Key, open_key, sealed_hash
 from armgap.trial.running import answer_file
 from armgap.trial.scoring.calibration import Calibration, calibrate, wilson
 from armgap.trial.scoring.case_score import GROUPS, CaseScore, score_case
@@ -193,9 +194,9 @@ def figures(cases: Sequence[Path], keys: dict[str, Key], method: str) -> Figures
     Raises
     ------
     OptionError
-        An answer is missing or cannot be read.
+        An answer is missing, cannot be read, or belongs to another case.
     """
-    answers: dict[str, Answer] = {case.name: read_answer(answer_file(case, method)) for case in cases}
+    answers = {case.name: _answer_to(case, method) for case in cases}
     pairs = [(name, answer, keys[name]) for name, answer in answers.items()]
     scores = tuple(score_case(name, answer, key) for name, answer, key in pairs)
     asking = {c.case for c in scores if c.group in ("one effect", "two effects")}
@@ -206,6 +207,14 @@ def figures(cases: Sequence[Path], keys: dict[str, Key], method: str) -> Figures
         tuple(b for _, answer, key in pairs for b in bound_scores(answer, key)),
         tuple(c for x in cases if x.name in asking if (c := closing(x, answers[x.name], keys[x.name])) is not None),
     )
+
+
+def _answer_to(case: Path, method: str) -> Answer:
+    path = answer_file(case, method)
+    answer = read_answer(path)
+    if answer.seal != sealed_hash(case):
+        raise OptionError("answers another case of this name", remedy="delete it and run again", file=path)
+    return answer
 
 
 def share(cases: Sequence[CaseScore]) -> Share:
