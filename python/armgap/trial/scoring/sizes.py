@@ -37,6 +37,11 @@ MAIN: dict[str, str] = {
     "encoder_offset": "offset",
     "contact": "position",
     "external_pulse": "impulse",
+    "viscous_asymmetry": "delta",
+    "gear_efficiency": "loss",
+    "cross_friction": "level",
+    "hardening_spring": "cubic",
+    "rotor_coupling": "inertia",
 }
 #: Effects whose size is the length of a vector.
 VECTOR = {"position_dependent_friction": ("a", "b"), "encoder_eccentricity": ("a", "b")}
@@ -104,11 +109,18 @@ def _size(cause: Named, hidden: Hidden) -> SizeScore:
     if cause.effect in VECTOR:
         return _vector(cause, hidden, VECTOR[cause.effect])
     key = MAIN[cause.effect]
-    truth = hidden.parameters[key] - NEUTRAL.get(cause.effect, 0.0)
+    truth = _truth(hidden, key)
     told, sigma = cause.sizes[key].value - NEUTRAL.get(cause.effect, 0.0), cause.sizes[key].sigma
     if key == "amplitude" and cause.effect == "torque_ripple":
         told, truth = abs(told), abs(truth)  # the sign is in the phase
     return SizeScore(cause.effect, abs(told - truth) / abs(truth), _covers(told - truth, sigma))
+
+
+def _truth(hidden: Hidden, key: str) -> float:
+    """Hidden size in the library's terms, from its neutral value."""
+    if hidden.effect == "rotor_coupling":  # the library states what the rotor adds off the diagonal
+        return hidden.parameters["inertia"] * hidden.parameters["gear"]
+    return hidden.parameters[key] - NEUTRAL.get(hidden.effect, 0.0)
 
 
 def _vector(cause: Named, hidden: Hidden, keys: tuple[str, ...]) -> SizeScore:
@@ -124,5 +136,4 @@ def _covers(difference: float, sigma: float | None) -> bool | None:
 
 
 def _bound(limit: Limit, hidden: Hidden) -> BoundScore:
-    truth = hidden.parameters[limit.parameter] - NEUTRAL.get(hidden.effect, 0.0)
-    return BoundScore(hidden.effect, hidden.joint, limit.value, truth)
+    return BoundScore(hidden.effect, hidden.joint, limit.value, _truth(hidden, limit.parameter))
