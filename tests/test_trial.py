@@ -333,6 +333,8 @@ def test_case_folders_say_nothing(tmp_path):
     (("encoder_offset", 2), ("base_tilt", None), False),
     (("torque_gain", 1), ("torque_gain", 2), True),
     (("actuator_lag", 1), ("actuator_delay", 1), False),
+    (("rotor_inertia", 2), ("rotor_coupling", None), True),
+    (("rotor_coupling", None), ("rotor_inertia", 2), False),
 ])  # fmt: skip
 def test_look_alikes(named, hidden, same):
     assert equivalent(named, hidden) is same
