@@ -17,7 +17,7 @@ from armgap.trial.peers.regression import Array
 __all__ = ["build_spec", "set_coulomb", "set_inertial"]
 
 #: Longest internal step, s. Friction is as stiff as the step allows, as in the making of the logs.
-STEP, IMPEDANCE = 1e-3, 0.9999
+STEP, IMPEDANCE = 2.5e-3, 0.9999
 TINY = 1e-9
 
 
@@ -26,7 +26,7 @@ def build_spec(arm: Arm) -> Any:
     mj = mujoco()
     spec = mj.MjSpec()
     spec.option.timestep = arm.sample_period / np.ceil(arm.sample_period / STEP - TINY)
-    spec.option.integrator = mj.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.integrator = mj.mjtIntegrator.mjINT_RK4
     spec.option.disableflags |= mj.mjtDisableBit.mjDSBL_CONTACT
     spec.compiler.degree = False
     parent = spec.worldbody
@@ -46,7 +46,6 @@ def build_spec(arm: Arm) -> Any:
 def _add_motor(mj: Any, spec: Any, j: int) -> None:
     motor = spec.add_actuator(name=f"motor{j}", trntype=mj.mjtTrn.mjTRN_JOINT, target=f"joint{j}")
     motor.gaintype, motor.biastype = mj.mjtGain.mjGAIN_FIXED, mj.mjtBias.mjBIAS_AFFINE
-    motor.dyntype = mj.mjtDyn.mjDYN_FILTEREXACT
     spec.add_sensor(name=f"q{j}", type=mj.mjtSensor.mjSENS_JOINTPOS, objtype=mj.mjtObj.mjOBJ_JOINT, objname=f"joint{j}")
 
 

@@ -35,7 +35,7 @@ from armgap.trial.windows import Window, cut
 __all__ = ["SYSID"]
 
 #: Windows it is fitted to, iterations at most, causes named at most, and trust in the arm file, in sigmas, as bounds.
-WINDOWS, ITERATIONS, MOST, TRUST = 10, 8, 4, 4.0
+WINDOWS, ITERATIONS, MOST, TRUST = 10, 10, 4, 4.0
 #: Effects among its parameters, and their equivalents.
 EXPRESSED = frozenset(
     {
@@ -92,9 +92,11 @@ def answer(case: SealedCase) -> Answer:
     with contextlib.redirect_stdout(io.StringIO()):
         found, result = sysid.optimize(parameters, residual, optimizer="mujoco", verbose=False, **settings)
     left, _, _ = residual(result.x, found)
-    _, intervals = sysid.calculate_intervals(left, np.asarray(result.jac))
+    # In units of the scales, so that no direction is taken for a null one because of its units.
+    scale = _scale(parameters)
+    intervals = np.asarray(sysid.calculate_intervals(left, np.asarray(result.jac) * scale)[1]).ravel() * scale
     insights = importlib.import_module("mujoco.sysid.report.sections.insights").AutomatedInsights("", found)
-    return _named(knobs, np.asarray(result.x), np.asarray(intervals).ravel(), _at_bounds(insights))
+    return _named(knobs, np.asarray(result.x), intervals, _at_bounds(insights))
 
 
 def _scale(parameters: Any) -> Array:
@@ -142,7 +144,7 @@ def _sequences(sysid: Any, arm: Arm, windows: list[Window]) -> Any:
         held = np.repeat(w.tau[:-1], parts, axis=0)  # commands are held from sample to sample
         control.append(sysid.TimeSeries(model.opt.timestep * np.arange(len(held) + 1), np.vstack([held, held[-1:]])))
         sensors.append(sysid.TimeSeries.from_names(w.t[1:] - w.t[0], w.q, model))
-        starts.append(sysid.create_initial_state(model, w.q0, w.dq0, w.tau[0]))
+        starts.append(sysid.create_initial_state(model, w.q0, w.dq0))
     names = [f"window {i}" for i in range(len(windows))]
     return sysid.ModelSequences("arm", spec, names, starts, control, sensors)
 
@@ -151,9 +153,10 @@ def _compare(sysid: Any, arm: Arm, windows: list[Window]) -> Callable[..., Any]:
     """Predicted minus measured positions at the log's samples, in multiples of their scatter."""
     scale = np.std(np.concatenate([w.q - w.q0 for w in windows]), axis=0)
 
-    def compare(params: Any, predicted: Any, measured: Any, model: Any, return_all: bool, **_: Any) -> Any:
+    def compare(params: Any, predicted: Any, measured: Any, model: Any, return_all: bool, *, state: Array) -> Any:
         parts = round(arm.sample_period / model.opt.timestep)
-        shown = predicted.data[parts - 1 :: parts][: len(measured.data)]
+        # Positions from the state: the sensors of a step are those of its start.
+        shown = state[parts - 1 :: parts, 1 : 1 + arm.n_joints][: len(measured.data)]
         series = sysid.TimeSeries(measured.times, shown, measured.signal_mapping)
         return ((shown - measured.data) / scale).ravel(), series, measured
 
@@ -161,25 +164,40 @@ def _compare(sysid: Any, arm: Arm, windows: list[Window]) -> Callable[..., Any]:
 
 
 def _delayed(sysid: Any, knobs: list[Knob]) -> Callable[..., Any]:
-    """Rollouts whose commands come later by the delays among the parameters."""
-    delays = {k.joint: k.name for k in knobs if k.effect == "actuator_delay"}
+    """Rollouts whose commands come late by the delays and lags among the parameters, as a user's own rollout would do it."""
+    late = [k for k in knobs if k.effect in ("actuator_delay", "actuator_lag")]
 
     def rollout(*, control_signal: Any, param_dicts: Any, **rest: Any) -> Any:
         chunks = len(control_signal) // len(param_dicts)
-        shifted = [_shift(sysid, c, param_dicts[i // chunks], delays) for i, c in enumerate(control_signal)]
+        shifted = [_late(sysid, c, param_dicts[i // chunks], late) for i, c in enumerate(control_signal)]
         return sysid.sysid_rollout(control_signal=shifted, **rest)
 
     return rollout
 
 
-def _shift(sysid: Any, control: Any, params: Any, delays: dict[int | None, str]) -> Any:
-    data = control.data.copy()
-    for joint, name in delays.items():
-        column = (joint or 1) - 1
-        data[:, column] = np.interp(
-            control.times - float(params[name].value[0]), control.times, control.data[:, column]
+def _late(sysid: Any, control: Any, params: Any, late: list[Knob]) -> Any:
+    data, t = control.data.copy(), control.times
+    for knob in late:
+        column, value = (knob.joint or 1) - 1, float(params[knob.name].value[0])
+        change = (
+            np.interp(t - value, t, data[:, column])
+            if knob.effect == "actuator_delay"
+            else _lagged(data[:, column], t, value)
         )
-    return sysid.TimeSeries(control.times, data, control.signal_mapping)
+        data[:, column] = change
+    return sysid.TimeSeries(t, data, control.signal_mapping)
+
+
+def _lagged(u: Array, t: Array, constant: float) -> Array:
+    """First-order lag of commands held from step to step: its mean over each step."""
+    from scipy.signal import lfilter
+
+    dt = float(t[1] - t[0])
+    decay = math.exp(-dt / constant)
+    after, _ = lfilter([1.0 - decay], [1.0, -decay], u, zi=[u[0] * decay])
+    state = np.concatenate([u[:1], after[:-1]])
+    mean: Array = u + (state - u) * constant / dt * (1.0 - decay)
+    return mean
 
 
 def _parameters(sysid: Any, arm: Arm, knobs: list[Knob]) -> Any:
@@ -228,9 +246,6 @@ def _joint_knobs(arm: Arm, j: int, tau: Array, speed: float, travel: float) -> l
     def offset(spec: Any, v: float) -> None:
         spec.actuator(f"motor{j}").biasprm[0] += v
 
-    def lag(spec: Any, v: float) -> None:
-        spec.actuator(f"motor{j}").dynprm[0] = v
-
     def level(spec: Any, v: float) -> None:
         spec.actuator(f"motor{j}").forcelimited = 1
         spec.actuator(f"motor{j}").forcerange = [-v, v]
@@ -249,13 +264,14 @@ def _joint_knobs(arm: Arm, j: int, tau: Array, speed: float, travel: float) -> l
         spec.joint(f"joint{j}").ref = v
 
     knobs = [
-        knob("torque_offset", "offset", 0.0, 0.0, -usual, usual, offset),
-        knob("actuator_lag", "time_constant", 0.0, 5e-4, 1e-6, 0.05, lag),
+        knob("actuator_lag", "time_constant", 0.0, 5e-4, 1e-6, 0.05, lambda s, v: None),
         knob("actuator_delay", "delay", 0.0, 5e-4, 0.0, 0.05, lambda s, v: None),
         knob("torque_saturation", "level", 1.1 * top, 0.98 * top, 0.2 * top, 1.1 * top, level),
         knob("joint_spring", "k", 0.0, 0.01 * usual / travel, 0.0, 3.0 * usual / travel, spring),
         knob("quadratic_drag", "c", 0.0, 0.01 * usual / speed**2, 0.0, 3.0 * usual / speed**2, drag),
     ]
+    if arm.rotary:  # on an axis an offset is the weight along it
+        knobs.append(knob("torque_offset", "offset", 0.0, 0.0, -usual, usual, offset))
     if j > 0:
         knobs.append(knob("rotor_inertia", "inertia", 0.0, 0.01 * inertia, 0.0, 1.5 * inertia, armature))
     if arm.rotary:
