@@ -17,8 +17,9 @@ from armgap.trial.case import Case, NoMotionError, Wish, make_case, possible
 FAMILIES = {"single": 0.65, "null": 0.08, "parameters": 0.07, "pair": 0.12, "outside": 0.08}
 #: Kinds of machine and how often each is drawn.
 MACHINES = {"direct-drive": 0.45, "geared": 0.35, "pendulum": 0.12, "axis": 0.08}
-#: Seed of the cases that the diagnosis may be developed on; reported scores use fresh ones.
+#: Seeds of the cases that the diagnosis may be developed on; reported scores use fresh ones.
 DEVELOPMENT_SEED = 1997
+DEVELOPMENT_SEEDS = (11, DEVELOPMENT_SEED)
 RETRIES = 10
 
 

@@ -9,6 +9,7 @@ from armgap.trial.making import Manifest
 from armgap.trial.methods import methods
 from armgap.trial.scoring.case_score import GROUPS
 from armgap.trial.scoring.figures import CONFIDENT, Figures, Share, share
+from armgap.trial.trial import DEVELOPMENT_SEEDS
 from armgap.trial.visibility import MULTIPLE, SIGMAS
 
 __all__ = ["page"]
@@ -55,6 +56,8 @@ def _head(first: Figures, manifest: Manifest | None, seal: str) -> str:
             f"It is the output of `armgap trial all -n {manifest.cases} --seed {manifest.seed} -o DIR --md` "
             f"with armgap {manifest.version} and {manifest.engine}; logs of {manifest.duration:g} s."
         )
+        if manifest.seed in DEVELOPMENT_SEEDS:
+            made += " armgap was developed on cases of this seed: its scores flatter; a fresh seed is the test."
     return f"""# Scores of a blind trial
 
 {n} cases made by MuJoCo, an engine that is not armgap's. Each hides something in an arm with other values than its arm
@@ -182,7 +185,7 @@ def _sizes(first: Figures) -> str:
     told = (
         []
         if first.size_error is None
-        else [("median error of sizes, of causes rightly named", f"{first.size_error:.1%}")]
+        else [("median error of sizes, of causes rightly named", f"{first.size_error:.2%}")]
     )
     shut = first.closed
     closed = (
