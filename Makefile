@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint test-rust test-python reproduce bench wheel clean all tools lint-tools
+.PHONY: help setup demo test lint test-rust test-python reproduce bench wheel wheel-check docs clean all tools lint-tools
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
@@ -26,7 +26,7 @@ $(VENV)/.tools: pyproject.toml | tools
 
 $(VENV)/.built: $(VENV)/.tools pyproject.toml $(RUST_SOURCES)
 	@echo "building armgap (about a minute the first time)"
-	@PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --release --extras trial,dev
+	@PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --release --extras trial,formats,ros,dev,docs
 	@touch $@
 
 setup: $(VENV)/.built ## virtual environment and build, all that the other targets need
@@ -35,8 +35,8 @@ demo: setup ## diagnose the sample log, or yours: make demo LOG="a.csv b.csv" AR
 	@$(BIN)/armgap demo $(LOG) $(if $(ARM),--arm $(ARM)) $(foreach h,$(HOLDOUT),--holdout $(h)) $(if $(COLUMNS),--columns "$(COLUMNS)") $(if $(UNITS),--units "$(UNITS)")
 
 lint: setup lint-tools ## formatting, types and stubs
-	$(BIN)/ruff format --check python tests examples
-	$(BIN)/ruff check python tests examples
+	$(BIN)/ruff format --check python tests examples tools
+	$(BIN)/ruff check python tests examples tools
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest armgap._native --mypy-config-file pyproject.toml
 	cargo fmt --check
@@ -58,7 +58,15 @@ bench: ## cost per sample of the core
 	cargo bench -p armgap-benches
 
 wheel: $(VENV)/.tools ## a wheel in dist/
+	@rm -f dist/armgap-*.whl
 	$(BIN)/maturin build --release -o dist
+
+wheel-check: wheel ## the wheel, installed where there is no Rust: demo, diagnose, export, import time
+	$(PYTHON) tests/check_wheel.py dist/armgap-*.whl
+
+docs: setup ## the documentation site in dist/site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "the site is in dist/site; with search: $(BIN)/python -m http.server -d dist/site"
 
 all: test demo ## what has to hold before a change lands
 

@@ -99,9 +99,9 @@ TABLES: list[tuple[Case, Callable[[pl.DataFrame], pl.DataFrame]]] = [
     (Case("velocity missing", SampleError, ("missing",), "dq2", 412), at("dq2", None)),
     (Case("time repeats", TimeError, ("repeats", "drop"), "t", 412), repeated_time),
     (Case("time runs backwards", TimeError, ("goes back", "sort"), "t", 412), swapped_times),
-    (Case("time in ms", UnitError, ("0.0025 s", "--units t=ms"), "t"), times("t", 1e3)),
-    (Case("time in us", UnitError, ("--units t=us",), "t"), times("t", 1e6)),
-    (Case("time in ns", UnitError, ("--units t=ns",), "t"), times("t", 1e9)),
+    (Case("time in ms, but not the arm's period", UnitError, ("0.0025 s", "--units t=ms"), "t"), times("t", 4e2)),
+    (Case("time in us, but not the arm's period", UnitError, ("--units t=us",), "t"), times("t", 4e5)),
+    (Case("time in ns, but not the arm's period", UnitError, ("--units t=ns",), "t"), times("t", 4e8)),
     (Case("time in minutes", UnitError, ("give times in s",), "t"), times("t", 1 / 60)),
     (
         Case("degrees", UnitError, ("--units q=deg",), "q1"),
@@ -134,6 +134,10 @@ def csv_lines(frame: pl.DataFrame) -> list[str]:
     return frame.write_csv().splitlines()
 
 
+def tsv(frame: pl.DataFrame) -> list[str]:
+    return frame.write_csv(separator="\t").splitlines()
+
+
 def put(lines: list[str], row: int, text: str) -> str:
     return "\n".join([*lines[:row], text, *lines[row + 1 :]]) + "\n"
 
@@ -146,6 +150,20 @@ FILES: list[tuple[Case, str, Callable[[pl.DataFrame], bytes | str | None]]] = [
     (Case("text as Parquet", LogReadError, ("not a Parquet",)), "log.parquet", lambda f: f.write_csv()),
     (Case("cut Parquet", LogReadError, ("cut short",)), "log.parquet", lambda f: _parquet(f)[:5000]),
     (Case("damaged Parquet", LogReadError, ("damaged",)), "log.parquet", lambda f: _damaged(f)),
+    (
+        Case("cut archive", LogReadError, ("not a readable NumPy archive",)),
+        "log.npz",
+        lambda f: b"PK\x03\x04" + bytes(99),
+    ),
+    (Case("text as HDF5", LogReadError, ("not a readable HDF5 file",)), "log.h5", lambda f: f.write_csv()),
+    (Case("text as MATLAB", LogReadError, ("not a readable MATLAB file",)), "log.mat", lambda f: f.write_csv()),
+    (Case("cut MCAP", LogReadError, ("not a readable MCAP file",)), "log.mcap", lambda f: b"\x89MCAP0\r\n" + bytes(99)),
+    (Case("cut bag", LogReadError, ("not a readable ROS bag",)), "log.db3", lambda f: b"SQLite format 3\0" + bytes(99)),
+    (
+        Case("a unit of something else", UnitError, ("is in ms", "no unit of positions"), "q1 [ms]"),
+        "log.csv",
+        lambda f: f.write_csv().replace("q1", "q1 [ms]", 1),
+    ),
     (Case("only comments", LogReadError, ("comments",)), "log.csv", lambda f: "# t,q1\n# none\n"),
     (Case("only a header", LogReadError, ("no samples",)), "log.csv", lambda f: csv_lines(f)[0] + "\n"),
     (
@@ -179,9 +197,9 @@ FILES: list[tuple[Case, str, Callable[[pl.DataFrame], bytes | str | None]]] = [
         lambda f: put(csv_lines(f), 412, ",".join(["1.0275", "", *csv_lines(f)[412].split(",")[2:]])),
     ),
     (
-        Case("decimal commas", ColumnError, ("decimal points",), "t", 1),
+        Case("a decimal comma among points", ColumnError, ("`0,5` is not a number", "decimal points"), "q1", 412),
         "log.tsv",
-        lambda f: f.write_csv(separator="\t").replace(".", ","),
+        lambda f: put(tsv(f), 412, "\t".join(["1.0275", "0,5", *tsv(f)[412].split("\t")[2:]])),
     ),
 ]
 

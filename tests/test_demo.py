@@ -9,10 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from armgap.cli.demo import CASE_FOLDER as CASE
 from armgap.trial.key import Hidden, Key, open_key
 from armgap.trial.verdict import judge
+from doc_blocks import agrees, blocks
 
-CASE = Path(__file__).resolve().parents[1] / "demo" / "case"
+README = Path(__file__).resolve().parents[1] / "README.md"
+
 Run = Callable[..., tuple[int, str, str]]
 
 
@@ -62,6 +65,8 @@ def test_the_sample_case_is_diagnosed_before_its_key_is_opened(run: Run, tmp_pat
     for name, value in hidden.parameters.items():
         assert found["parameters"][name]["value"] == pytest.approx(value, rel=0.05)
     assert (tmp_path / "demo.html").read_text().startswith("<!")
+    [shown] = [b.text for b in blocks(README) if b.language == "text"]
+    assert agrees(shown, out)
 
 
 def test_a_key_changed_after_sealing_ends_the_demo(run: Run, tmp_path: Path) -> None:

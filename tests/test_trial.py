@@ -34,7 +34,7 @@ from armgap.trial.plant import Build, Flexure, Plant, Rotor
 from armgap.trial.rig import Rig, run
 from armgap.trial.verdict import equivalent
 
-DEMO_CASE = Path(__file__).parents[1] / "demo" / "case"
+DEMO_CASE = Path(__file__).parents[1] / "python" / "armgap" / "demo_case"
 
 #: Names and parameters of the standard effects.
 STANDARD = {

@@ -11,7 +11,9 @@ if TYPE_CHECKING:
     from armgap.arm import Arm
     from armgap.diagnosis import Diagnosis, diagnose
     from armgap.errors import ArmgapError
+    from armgap.export import Corrected, correct
     from armgap.identification import Identification, identify
+    from armgap.inspection import Inspection, inspect
     from armgap.log import Finding, Log
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
@@ -19,15 +21,19 @@ if TYPE_CHECKING:
 __all__ = [
     "Arm",
     "ArmgapError",
+    "Corrected",
     "Diagnosis",
     "Finding",
     "Identification",
+    "Inspection",
     "Log",
     "Reproduction",
     "__version__",
+    "correct",
     "diagnose",
     "effects",
     "identify",
+    "inspect",
     "reproduce",
     "seed_torque",
     "simulate",
@@ -36,6 +42,8 @@ __all__ = [
 _HOMES = {
     "Arm": "armgap.arm",
     "ArmgapError": "armgap.errors",
+    "Corrected": "armgap.export",
+    "correct": "armgap.export",
     "Diagnosis": "armgap.diagnosis",
     "diagnose": "armgap.diagnosis",
     "Finding": "armgap.log",
@@ -43,6 +51,8 @@ _HOMES = {
     "Identification": "armgap.identification",
     "identify": "armgap.identification",
     "Reproduction": "armgap.reproduction",
+    "Inspection": "armgap.inspection",
+    "inspect": "armgap.inspection",
     "reproduce": "armgap.reproduction",
     "effects": "armgap.simulation",
     "seed_torque": "armgap.simulation",

@@ -36,6 +36,8 @@ class Arm:
         Torque limit [N m].
     link_length : ndarray, shape (n_joints,), optional
         Link lengths [m].
+    link_mass : ndarray, shape (n_joints,), optional
+        Link masses [kg]; motion does not tell them, an export to a simulator wants them.
     columns : dict of str to str
         Names that the arm's logs use for ``t``, ``q1``, ``tau1`` and so on.
     sealed : str, optional
@@ -56,6 +58,7 @@ class Arm:
     columns: dict[str, str] = field(default_factory=dict)
     sealed: str | None = None
     path: Path | None = None
+    link_mass: NDArray[np.float64] | None = None
 
     @classmethod
     def read(cls, path: str | Path) -> Arm:
@@ -150,9 +153,11 @@ class Arm:
             ("encoder", "counts_per_rev", self.counts_per_rev),
             ("actuator", "torque_limit", self.torque_limit),
             ("geometry", "link_length", self.link_length),
+            ("geometry", "link_mass", self.link_mass),
         ):
             if value is not None:
-                lines += ["", f"[{table}]", f"{key} = {_listed(value)}"]
+                opened = f"[{table}]" in lines
+                lines += [*(() if opened else ("", f"[{table}]")), f"{key} = {_listed(value)}"]
         if self.columns:
             lines += ["", "[columns]", *(f"{k} = {_quoted(v)}" for k, v in self.columns.items())]
         if self.sealed is not None:

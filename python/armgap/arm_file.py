@@ -24,7 +24,7 @@ _TABLES: dict[str, tuple[str, ...]] = {
     "friction": ("viscous", "coulomb", "sigma_viscous", "sigma_coulomb"),
     "encoder": ("counts_per_rev",),
     "actuator": ("torque_limit",),
-    "geometry": ("link_length",),
+    "geometry": ("link_length", "link_mass"),
     "columns": (),
     "sealed": ("sha256",),
 }
@@ -90,6 +90,7 @@ class ArmFile:
             counts_per_rev=self._optional("encoder.counts_per_rev", n),
             torque_limit=self._optional("actuator.torque_limit", n),
             link_length=self._lengths(n),
+            link_mass=self._masses(n),
             columns=columns,
             sealed=self._sealed(),
             path=self.path,
@@ -186,6 +187,11 @@ class ArmFile:
         if "links" in self.data and "geometry" not in self.data:
             return self._vector(self.data["links"], "links.length", n, minimum=0.0)
         return self._optional("geometry.link_length", n)
+
+    def _masses(self, n: int) -> NDArray[np.float64] | None:
+        if "links" in self.data and "link_mass" not in self.data.get("geometry", {}):
+            return self._vector(self.data["links"], "links.mass", n, above=0.0)
+        return self._optional("geometry.link_mass", n)
 
     def _columns(self, n: int) -> dict[str, str]:
         known = ["t", *(f"{kind}{j}" for kind in ("q", "tau", "dq") for j in range(1, n + 1))]

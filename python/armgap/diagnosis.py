@@ -15,14 +15,18 @@ import numpy as np
 from armgap import _native
 from armgap.arm import Arm
 from armgap.errors import LogShapeError, OptionError
-from armgap.log import Log
+from armgap.evidence import laws, plausibility
+from armgap.log import Log, gather
+from armgap.log.findings import remarks
+from armgap.log.stretches import choose
+from armgap.report.notebook import Shown
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
 
 #: What a part of a log is called after the log's own name.
-_WHOLE = re.compile(r" \((first|last) part\)$")
+_WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
 _HELD_OUT = 0.4
-LogLike = Log | str | os.PathLike[str]
+LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
 
 @dataclass(frozen=True)
@@ -125,7 +129,7 @@ _Record = TypeVar("_Record", Value, Equivalent, Bound)
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Shown):
     """The result of `diagnose`.
 
     Attributes
@@ -197,22 +201,14 @@ class Diagnosis:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a reader should know: notes on the diagnosis, and what was noticed in the logs, one line per kind."""
-        found: dict[str, list[dict[str, str]]] = {}
-        for entry in self.extra.get("log_findings", ()):
-            found.setdefault(entry["kind"], []).append(entry)
-        return (*self.extra.get("notes", ()), *(_remark(entries) for entries in found.values()))
+        return (*self.extra.get("notes", ()), *remarks(self.extra.get("log_findings", ())))
 
     def summary(self) -> str:
         """Return the verdict and the three answers (where, which, how far) as text, one line each."""
         from armgap.report import words
 
-        answers = (f"{question} {answer}" for question, answer in words.answers(self._data))
+        answers = (f"{answer.question} {answer.text}" for answer in words.answers(self._data))
         return "\n".join([words.verdict(self._data), *answers])
-
-
-def _remark(entries: list[dict[str, str]]) -> str:
-    more = f" (and {len(entries) - 1} more like it)" if len(entries) > 1 else ""
-    return f"{entries[0]['log']}: {entries[0]['message']}{more}"
 
 
 def _take(kind: type[_Record], data: dict[str, Any]) -> _Record:
@@ -264,11 +260,11 @@ def diagnose(
 
     Parameters
     ----------
-    logs : Log, path, or sequence of these
-        Training logs.
+    logs : Log, path, pattern, table, or sequence of these
+        Training logs: anything that `Log.read` or `Log.from_frame` takes, and patterns such as ``"logs/*.parquet"``.
     arm : Arm or path
         Nominal model.
-    holdout : Log, path, or sequence of these, optional
+    holdout : the same, optional
         Logs to judge on. Without it the last 40 % of every training log are held out.
     horizon : float, default 0.25
         Prediction horizon [s].
@@ -299,7 +295,7 @@ def diagnose(
     else:
         held = _logs(holdout, arm)
         notes += _overlap(training, held)
-    training, held = _tell_apart(training, held)
+    training, held = (choose(group, horizon=horizon) for group in _tell_apart(training, held))
     for log in (*training, *held):
         if log.duration < horizon:
             raise LogShapeError(
@@ -318,6 +314,7 @@ def diagnose(
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = notes + data["notes"]
+    data["laws"], data["plausibility"] = laws(data, arm, training, held), plausibility(data, arm)
     data["log_findings"] = [
         {"log": log.name, "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings
     ]
@@ -325,10 +322,9 @@ def diagnose(
 
 
 def _logs(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:
-    several = [logs] if isinstance(logs, Log | str | os.PathLike) else list(logs)
-    if not several:
+    read = gather(logs, arm)
+    if not read:
         raise OptionError("no log was given", remedy="give at least one")
-    read = [log if isinstance(log, Log) else Log.read(Path(log), arm=arm) for log in several]
     for log in read:
         if log.n_joints != arm.n_joints:
             raise LogShapeError(
@@ -374,7 +370,7 @@ def _with_number(log: Log, number: int) -> Log:
 def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
     training, held = [], []
     for log in logs:
-        cut = int(np.searchsorted(log.t, (1 - _HELD_OUT) * log.duration))
+        cut = int(np.searchsorted(log.t, log.t[0] + (1 - _HELD_OUT) * log.duration))
         training.append(log.part(0, cut, f"{log.name} (first part)"))
         held.append(log.part(cut, len(log), f"{log.name} (last part)"))
     return training, held

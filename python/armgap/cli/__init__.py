@@ -14,9 +14,13 @@ __all__ = ["main"]
 
 COMMANDS = {
     "diagnose": ("armgap.cli.diagnose", "Where the gap lies, what causes it, how far it shrinks."),
+    "compare": ("armgap.cli.compare", "Two diagnoses of one arm, as before and after a repair."),
+    "inspect": ("armgap.cli.inspect", "What logs hold, and what they tell about an arm."),
     "identify": ("armgap.cli.identify", "Estimate the arm's parameters from logs."),
     "simulate": ("armgap.cli.simulate", "Simulate an arm, with effects on request."),
+    "export": ("armgap.cli.export", "What was found, as a model for a simulator."),
     "demo": ("armgap.cli.demo", "Diagnose the sample log and open its sealed key."),
+    "replay": ("armgap.cli.replay", "Measured and predicted arm side by side, for the Rerun viewer."),
     "reproduce": ("armgap.cli.reproduce", "The seed paper's tables and figures beside our own."),
     "trial": ("armgap.cli.trial", "Blind trials: sealed cases, diagnosed and scored."),
 }

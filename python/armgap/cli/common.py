@@ -27,6 +27,7 @@ __all__ = [
     "parse_columns",
     "parse_units",
     "quiet_option",
+    "report_option",
     "units_option",
     "working",
     "write",
@@ -48,6 +49,9 @@ units_option = click.option(
     help="Units of the log where they are not SI; also settles what looks like another unit.",
 )
 json_option = click.option("--json", "json_file", metavar="OUT", help="Write the result as JSON; - is standard output.")
+report_option = click.option(
+    "--report", "report_file", metavar="OUT", help="Write the report: .html, .md for pull requests, or .json."
+)
 quiet_option = click.option("--quiet", is_flag=True, help="No progress and no summary.")
 
 
@@ -119,11 +123,15 @@ def check_outputs(*paths: str | None) -> None:
 
 @contextmanager
 def working(message: str, *, quiet: bool) -> Iterator[None]:
-    """Show that work goes on, on standard error, unless quiet or not at a terminal."""
+    """Show that work goes on, and for how long, on standard error, unless quiet or not at a terminal."""
     if quiet or not sys.stderr.isatty():
         yield
         return
-    with console(error=True).status(message):
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=console(error=True), transient=True) as progress:
+        progress.add_task(message, total=None)
         yield
 
 

@@ -33,8 +33,8 @@ __all__ = ["command"]
 
 REPORT = "armgap-demo.html"
 PACKAGE = Path(__file__).resolve().parents[1]
-#: Where the sample case lies: in a checkout, or in an installed package.
-CASE_FOLDERS = (PACKAGE.parents[1] / "demo" / "case", PACKAGE / "demo_case")
+#: The sample case.
+CASE_FOLDER = PACKAGE / "demo_case"
 
 
 @click.command("demo", cls=ManyValues)
@@ -43,7 +43,14 @@ CASE_FOLDERS = (PACKAGE.parents[1] / "demo" / "case", PACKAGE / "demo_case")
 @click.option("--holdout", multiple=True, metavar="LOG…", help="Logs of your own to judge on.")
 @click.option("--case", "case_folder", metavar="DIR", help="Folder of another sealed case.")
 @click.option("--fresh", type=click.IntRange(min=0), metavar="SEED", help="Make a new sealed case (needs MuJoCo).")
-@click.option("--report", "report_file", default=REPORT, show_default=True, metavar="OUT.html", help="Report to write.")
+@click.option(
+    "--report",
+    "report_file",
+    default=REPORT,
+    show_default=True,
+    metavar="OUT",
+    help="Report to write: .html, .md or .json.",
+)
 @json_option
 @columns_option
 @units_option
@@ -61,7 +68,10 @@ def command(
     quiet: bool,
 ) -> None:
     """Diagnose a sample log whose hidden cause is sealed, then open the key; or diagnose LOGs of your own."""
+    from armgap.report import check_report
+
     check_outputs(report_file, json_file)
+    check_report(report_file)
     outputs = (report_file, json_file, quiet)
     if logs or arm_file or holdout:
         if case_folder is not None or fresh is not None:
@@ -107,19 +117,21 @@ def _diagnose(
 ) -> Diagnosis:
     from armgap.arm import Arm
     from armgap.diagnosis import diagnose
-    from armgap.log import Log
-    from armgap.report import summary_table, write_html
+    from armgap.log import gather
+    from armgap.report import diagnosis_report, summary_table
 
     report_file, json_file, quiet = outputs
     arm = Arm.read(arm_file)
-    training, held = ([Log.read(p, arm=arm, **naming) for p in paths] for paths in (logs, holdout))
+    training, held = (gather(paths, arm, **naming) for paths in (logs, holdout))
     with working("diagnosing", quiet=quiet):
         result = diagnose(training, arm, holdout=held or None)
-    write(report_file, lambda path: write_html(result, path))
+    write(report_file, diagnosis_report(result, report_file))
     if json_file is not None:
         write(json_file, result.to_json(indent=2))
     say = _voice(outputs)
     say.print(summary_table(result))
+    for remark in result.remarks:
+        say.print(f"note: {remark}", highlight=False, markup=False)
     say.print(f"report: {report_file}", highlight=False)
     return result
 
@@ -135,7 +147,7 @@ def _voice(outputs: tuple[str, str | None, bool]) -> Any:
 def _case(folder: str | None, fresh: int | None, *, quiet: bool) -> Iterator[Path]:
     """The case folder that was asked for; a fresh one lasts as long as the command."""
     if fresh is None:
-        yield Path(folder) if folder is not None else _sample_case()
+        yield Path(folder) if folder is not None else CASE_FOLDER
         return
     if folder is not None:
         raise OptionError("--case and --fresh were both given", remedy="give one of the two")
@@ -145,13 +157,6 @@ def _case(folder: str | None, fresh: int | None, *, quiet: bool) -> Iterator[Pat
         with working(f"making the case of seed {fresh}", quiet=quiet):
             made = make_demo_case(fresh).write(scratch)
         yield Path(made)
-
-
-def _sample_case() -> Path:
-    for folder in CASE_FOLDERS:
-        if (folder / "arm.toml").is_file():
-            return folder
-    raise OptionError("the sample case is not installed", remedy="run this in a checkout, or give --fresh SEED")
 
 
 def _opened(key: Key, result: Diagnosis) -> str:

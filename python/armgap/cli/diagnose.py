@@ -17,6 +17,7 @@ from armgap.cli.common import (
     parse_columns,
     parse_units,
     quiet_option,
+    report_option,
     units_option,
     working,
     write,
@@ -32,7 +33,7 @@ __all__ = ["command"]
 @click.option("--horizon", default=0.25, show_default=True, help="Prediction horizon [s].")
 @click.option("--max-causes", default=4, show_default=True, help="Causes named at most.")
 @click.option("--seed", default=1, show_default=True, help="Seed of the resampling.")
-@click.option("--report", "report_file", metavar="OUT.html", help="Write the report.")
+@report_option
 @json_option
 @columns_option
 @units_option
@@ -53,21 +54,21 @@ def command(
     """Say where the gap between LOGs and the nominal arm lies, what causes it, and how far it shrinks."""
     from armgap.arm import Arm
     from armgap.diagnosis import diagnose
-    from armgap.log import Log
+    from armgap.log import gather
+    from armgap.report import check_report, diagnosis_report
 
     check_outputs(json_file, report_file)
-    naming = {"columns": parse_columns(columns), "units": parse_units(units)}
+    check_report(report_file)
     arm = Arm.read(Path(arm_file))
-    training = [Log.read(path, arm=arm, **naming) for path in logs]
-    held = [Log.read(path, arm=arm, **naming) for path in holdout] or None
+    mapping, declared = parse_columns(columns), parse_units(units)
+    training = gather(logs, arm, columns=mapping, units=declared)
+    held = gather(holdout, arm, columns=mapping, units=declared) or None
     with working("diagnosing", quiet=quiet):
         result = interruptible(
             lambda: diagnose(training, arm, holdout=held, horizon=horizon, max_causes=max_causes, seed=seed)
         )
     if report_file is not None:
-        from armgap.report import write_html
-
-        write(report_file, lambda path: write_html(result, path))
+        write(report_file, diagnosis_report(result, report_file))
     if json_file is not None:
         write(json_file, result.to_json(indent=2))
     if not quiet and json_file != "-":

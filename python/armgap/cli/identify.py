@@ -60,12 +60,12 @@ def command(
 
     from armgap.arm import Arm
     from armgap.identification import identify
-    from armgap.log import Log
+    from armgap.log import gather
+    from armgap.log.findings import remarks
 
     check_outputs(json_file)
     arm = Arm.read(Path(arm_file))
-    naming = {"columns": parse_columns(columns), "units": parse_units(units)}
-    read = [Log.read(path, arm=arm, **naming) for path in logs]
+    read = gather(logs, arm, columns=parse_columns(columns), units=parse_units(units))
     schemes = SCHEMES if scheme == "all" else (scheme,)
     results = [
         identify(log, arm, scheme=s, filters=filters, cutoff=cutoff, velocity=velocity, asymmetry=asymmetry)
@@ -76,6 +76,9 @@ def command(
         write(json_file, json.dumps([r.to_dict() for r in results], indent=2))
     if quiet or json_file == "-":
         return
+    noticed = [{"log": log.name, "kind": f.kind, "message": f.message} for log in read for f in log.findings]
+    for remark in remarks(noticed):
+        console().print(f"note: {remark}", highlight=False, markup=False)
     for log in read:
         mine = [r for r in results if r.log == log.name]
         table = Table(title=f"{log.name}: {filters} filters, {cutoff:g} rad/s")

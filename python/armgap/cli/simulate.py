@@ -88,6 +88,8 @@ def command(
         tau, start, name = seed_torque(t), (None, None), "seed"
     else:
         source = Log.read(torque, columns=parse_columns(columns), units=parse_units(units), arm=arm)
+        for finding in () if quiet else source.findings:
+            console(error=True).print(f"note: {source.name}: {finding.message}", highlight=False, markup=False)
         keep = source.t <= (duration if duration is not None else source.duration)
         t, tau, start, name = source.t[keep], source.tau[keep], _start(source), source.name
     log = interruptible(

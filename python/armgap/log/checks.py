@@ -6,14 +6,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armgap.errors import LogShapeError, TimeError
-from armgap.log.columns import Arrays, Names
+from armgap.log.columns import Arrays, Names, unused_velocities
+from armgap.log.findings import Finding, counted
+from armgap.log.recording import Recording
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["motion", "notice", "order"]
+__all__ = ["motion", "notice", "order", "unused", "without_repeats"]
 
 _FEWEST_SAMPLES = 20
 # A hole longer than this many periods is a gap worth naming.
@@ -36,6 +39,7 @@ def order(arrays: Arrays, place: Path | str, names: Names) -> None:
         )
     steps = np.diff(arrays.t)
     bad = np.flatnonzero(steps <= 0)
+    bad = bad[~_repeat(arrays, bad)]
     if len(bad):
         row = int(bad[0]) + 2
         before, after = arrays.t[row - 2], arrays.t[row - 1]
@@ -48,6 +52,27 @@ def order(arrays: Arrays, place: Path | str, names: Names) -> None:
             column=names.t,
             row=row,
         )
+
+
+def without_repeats(arrays: Arrays) -> tuple[Arrays, list[Finding]]:
+    """Leave out rows that repeat the row before in time and every value, and say how many."""
+    again = np.flatnonzero(np.diff(arrays.t) == 0) + 1
+    if not len(again):
+        return arrays, []
+    keep = np.ones(len(arrays.t), dtype=bool)
+    keep[again] = False
+    dq = None if arrays.dq is None else arrays.dq[keep]
+    said = f"left out: {counted(len(again), 'row')} like the row before in every value, the first of them row {again[0] + 1}"
+    return Arrays(arrays.t[keep], arrays.q[keep], arrays.tau[keep], dq), [Finding("cleaned", said)]
+
+
+def _repeat(arrays: Arrays, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Whether the row after each of `rows` is the same in every value."""
+    same: NDArray[np.bool_] = arrays.t[rows + 1] == arrays.t[rows]
+    for values in (arrays.q, arrays.tau, arrays.dq):
+        if values is not None:
+            same &= np.all(values[rows + 1] == values[rows], axis=1)
+    return same
 
 
 def motion(arrays: Arrays, place: Path | str, names: Names) -> None:
@@ -68,9 +93,17 @@ def motion(arrays: Arrays, place: Path | str, names: Names) -> None:
         )
 
 
-def notice(arrays: Arrays, names: Names, arm: Arm | None) -> list[tuple[str, str]]:
-    """Return ``(kind, message)`` of what a reader should know although it does not stop the work."""
-    return [*_sampling(arrays, arm), *_constants(arrays, names), *_limits(arrays, names, arm)]
+def notice(arrays: Arrays, names: Names, arm: Arm | None) -> list[Finding]:
+    """Return what a reader should know although it does not stop the work."""
+    found = [*_sampling(arrays, arm), *_constants(arrays, names), *_limits(arrays, names, arm)]
+    return [Finding(kind, message) for kind, message in found]
+
+
+def unused(recording: Recording, names: Names) -> list[Finding]:
+    """Say which velocity columns are left out."""
+    left_out = unused_velocities(recording, names)
+    listed = f"`{'`, `'.join(left_out)}` not used: velocities of other joints are missing, or on another clock"
+    return [Finding("columns", listed)] if left_out else []
 
 
 def _sampling(arrays: Arrays, arm: Arm | None) -> list[tuple[str, str]]:

@@ -1,10 +1,10 @@
-"""From a table's own columns to ``t, q, tau, dq``."""
+"""From a recording's own columns to ``t, q, tau, dq``."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,25 +13,43 @@ import polars as pl
 from numpy.typing import NDArray
 
 from armgap.errors import ColumnError, LogShapeError, SampleError
+from armgap.log.findings import Finding
+from armgap.log.index import Index
+from armgap.log.recording import Recording
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["Arrays", "Names", "extract", "resolve", "unused_velocities"]
+__all__ = ["Arrays", "Names", "Raw", "extract", "resolve", "unused_velocities"]
 
-_CANONICAL = re.compile(r"^(t|(q|tau|dq)(?P<joint>[1-9][0-9]*))$")
+_CANONICAL = re.compile(r"^(t|t_tau|(q|tau|dq)(?P<joint>[1-9][0-9]*))$")
+_TIMES = ("t", "t_tau")
 _LISTED = 24
 _TICKS_S = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}
 
 
 @dataclass(frozen=True)
 class Names:
-    """The table's names of the columns in use."""
+    """The recording's names of the columns in use, and the units it states for them."""
 
     t: str
     q: tuple[str, ...]
     tau: tuple[str, ...]
     dq: tuple[str, ...] | None
+    t_tau: str | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def pairs(self) -> list[tuple[str, str]]:
+        """Standard name and column of everything in use."""
+        groups = (("q", self.q), ("tau", self.tau), ("dq", self.dq or ()))
+        joints = [(f"{prefix}{j}", name) for prefix, group in groups for j, name in enumerate(group, start=1)]
+        return [("t", self.t), *joints, *([("t_tau", self.t_tau)] if self.t_tau else [])]
+
+    @property
+    def by_key(self) -> dict[str, str]:
+        """Column by standard name."""
+        return dict(self.pairs)
 
 
 @dataclass(frozen=True)
@@ -44,47 +62,154 @@ class Arrays:
     dq: NDArray[np.float64] | None
 
 
-def resolve(frame: pl.DataFrame, place: Path | str, mapping: Mapping[str, str], arm: Arm | None) -> Names:
+@dataclass(frozen=True)
+class Raw:
+    """Columns as they stand in the file: times as numbers of any kind, torques on their own clock if they have one.
+
+    Attributes
+    ----------
+    tick_s : float, optional
+        Seconds per unit of `t`, where the type of the column says so.
+    """
+
+    t: NDArray[np.float64] | NDArray[np.int64]
+    q: NDArray[np.float64]
+    tau: NDArray[np.float64]
+    dq: NDArray[np.float64] | None
+    t_tau: NDArray[np.float64] | NDArray[np.int64] | None
+    tick_s: float | None
+    tau_tick_s: float | None
+
+
+def resolve(
+    recording: Recording, place: Path | str, mapping: Mapping[str, str], arm: Arm | None
+) -> tuple[Names, list[Finding]]:
     """Find the columns in use.
 
     A name given in `mapping` must exist. The arm file's names come next; a log that has the standard name instead,
-    such as one that armgap wrote, is read by that.
+    such as one that armgap wrote, is read by that. What neither names is taken from what the file itself says.
     """
-    names = {**_from_arm(frame, arm), **mapping}
-    n = arm.n_joints if arm is not None else _count(frame, names)
+    index = Index(recording, place)
+    names = {**_from_arm(index, arm), **mapping}
+    n = arm.n_joints if arm is not None else None
+    findings: list[Finding] = []
+    if recording.suggest is not None:
+        suggestion = recording.suggest(n, names)
+        findings += suggestion.findings
+        names = {**suggestion.names, **names}
+    n = n if n is not None else _count(index, names)
     _check_mapping(names, place, n)
-    if arm is not None and f"q{n + 1}" in frame.columns:
+    if arm is not None and f"q{n + 1}" in recording.columns:
         raise LogShapeError(
             f"there is a joint {n + 1}, but a {arm.kind} has {n} joint{'s' if n > 1 else ''}",
             remedy="use the arm file that belongs to this log",
             file=place,
             column=f"q{n + 1}",
         )
+    return _pick_all(index, names, mapping, n), findings
 
-    def several(prefix: str) -> tuple[str, ...]:
-        return tuple(_pick(frame, place, names, f"{prefix}{j}") for j in range(1, n + 1))
 
+def _pick_all(index: Index, names: Mapping[str, str], mapping: Mapping[str, str], n: int) -> Names:
+    first = index.find(names.get("q1", "q1"), "q1")
     wanted = [f"dq{j}" for j in range(1, n + 1)]
-    has_dq = any(key in mapping for key in wanted) or all(names.get(key, key) in frame.columns for key in wanted)
-    return Names(_pick(frame, place, names, "t"), several("q"), several("tau"), several("dq") if has_dq else None)
+    t = _time(index, names, first)
+    q = tuple(_pick(index, names, f"q{j}", t) for j in range(1, n + 1))
+    tau = tuple(_pick(index, names, f"tau{j}", t) for j in range(1, n + 1))
+    t_tau = _torque_clock(index, names, t, tau)
+    _one_clock(index, t, q, "positions")
+    _one_clock(index, t_tau or t, tau, "torques")
+    needed = any(key in mapping for key in wanted)
+    dq = None
+    if needed or all(index.find(names.get(key, key), key, within=t) for key in wanted):
+        dq = tuple(_pick(index, names, key, t) for key in wanted)
+    if dq is not None and (needed or all(c in index.recording.stream_of(t).columns for c in dq)):
+        _one_clock(index, t, dq, "velocities")
+    else:
+        dq = None
+    found = Names(t, q, tau, dq, t_tau)
+    _check_once(index, found)
+    return replace(found, units={c: unit for _, c in found.pairs if (unit := index.unit(c)) is not None})
 
 
-def unused_velocities(frame: pl.DataFrame, names: Names) -> list[str]:
+def _time(index: Index, names: Mapping[str, str], first: str | None) -> str:
+    """Return the time column of the positions; that of their own clock where a recording has several."""
+    t = index.find(names.get("t", "t"), "t", within=first)
+    alone = len(index.recording.streams) == 1 and index.recording.suggest is None
+    if "t" in names or first is None or alone:
+        return t or _pick(index, names, "t", first)
+    stream = index.recording.stream_of(first)
+    if t is not None and t in stream.columns:
+        return t
+    return stream.time or _pick(index, names, "t", first)
+
+
+def _check_once(index: Index, found: Names) -> None:
+    """Raise if a column stands for two things."""
+    seen: dict[str, str] = {}
+    for key, column in found.pairs:
+        if column in seen:
+            raise ColumnError(
+                f"is mapped to both `{seen[column]}` and `{key}`",
+                remedy="map each column once",
+                file=index.place,
+                column=column,
+            )
+        seen[column] = key
+
+
+def _torque_clock(index: Index, names: Mapping[str, str], t: str, tau: tuple[str, ...]) -> str | None:
+    """Return the time column of the torques if it is another one than that of the positions."""
+    given = index.find(names.get("t_tau", "t_tau"), "t_tau", within=tau[0])
+    if given is None and "t_tau" in names:
+        return _pick(index, names, "t_tau", tau[0])
+    if given is not None and given != t:
+        return given
+    stream = index.recording.stream_of(tau[0])
+    if t in stream.columns:
+        return None
+    if stream.time is None:
+        raise ColumnError(
+            "is not on the positions' clock, and its own times are not known",
+            remedy="name them with --columns t_tau=NAME",
+            file=index.place,
+            column=tau[0],
+        )
+    return stream.time
+
+
+def _one_clock(index: Index, t: str, columns: tuple[str, ...], what: str) -> None:
+    """Raise unless columns go by the clock of `t`."""
+    stream = index.recording.stream_of(t)
+    for column in columns:
+        if column not in stream.columns:
+            raise ColumnError(
+                f"is not on the clock of `{t}`, as the other {what} are",
+                remedy="store the joints with common times, or map other columns",
+                file=index.place,
+                column=column,
+            )
+
+
+def unused_velocities(recording: Recording, names: Names) -> list[str]:
     """Return the velocity columns that are left out because others are missing."""
     if names.dq is not None:
         return []
-    return [name for name in frame.columns if re.fullmatch(r"dq[1-9][0-9]*", name)]
+    return [name for name in recording.columns if re.fullmatch(r"dq[1-9][0-9]*", name)]
 
 
-def _from_arm(frame: pl.DataFrame, arm: Arm | None) -> dict[str, str]:
+def _from_arm(index: Index, arm: Arm | None) -> dict[str, str]:
     if arm is None:
         return {}
-    return {key: name for key, name in arm.columns.items() if name in frame.columns or key not in frame.columns}
+    columns = index.recording.columns
+    return {
+        key: name
+        for key, name in arm.columns.items()
+        if key not in columns or name in columns or index.find(name, key) is not None
+    }
 
 
 def _check_mapping(names: Mapping[str, str], place: Path | str, n: int) -> None:
-    by_source: dict[str, str] = {}
-    for key, source in names.items():
+    for key in names:
         match = _CANONICAL.match(key)
         if match is None:
             raise ColumnError(
@@ -93,70 +218,77 @@ def _check_mapping(names: Mapping[str, str], place: Path | str, n: int) -> None:
                 file=place,
                 column=key,
             )
-        if key != "t" and int(match["joint"]) > n:
+        if key not in _TIMES and int(match["joint"]) > n:
             raise ColumnError(
                 f"is mapped, but there {'are' if n > 1 else 'is'} {n} joint{'s' if n > 1 else ''}",
                 remedy="map the joints from 1 on, without holes",
                 file=place,
                 column=key,
             )
-        if source in by_source:
-            raise ColumnError(
-                f"is mapped to both `{by_source[source]}` and `{key}`",
-                remedy="map each column once",
-                file=place,
-                column=source,
-            )
-        by_source[source] = key
 
 
-def _count(frame: pl.DataFrame, names: Mapping[str, str]) -> int:
+def _count(index: Index, names: Mapping[str, str]) -> int:
     n = 0
-    while names.get(f"q{n + 1}", f"q{n + 1}") in frame.columns:
+    while index.find(names.get(f"q{n + 1}", f"q{n + 1}"), f"q{n + 1}") is not None:
         n += 1
-    mapped = [int(match["joint"]) for key in names if (match := _CANONICAL.match(key)) and key != "t"]
+    mapped = [int(match["joint"]) for key in names if (match := _CANONICAL.match(key)) and key not in _TIMES]
     return max(n, 1, *mapped)
 
 
-def _pick(frame: pl.DataFrame, place: Path | str, names: Mapping[str, str], key: str) -> str:
+def _pick(index: Index, names: Mapping[str, str], key: str, within: str | None) -> str:
     source = names.get(key, key)
-    if source not in frame.columns:
-        available = ", ".join(frame.columns[:_LISTED]) + (", ..." if frame.width > _LISTED else "")
+    found = index.find(source, key, within=within)
+    if found is None:
+        columns = index.recording.columns
+        available = ", ".join(columns[:_LISTED]) + (", ..." if len(columns) > _LISTED else "")
         mapped = f"it is mapped to {key}, but" if key in names else "it"
         raise ColumnError(
             f"{mapped} is missing",
             remedy=f"map it with --columns {key}=NAME or [columns] in the arm file; the log has {available}",
-            file=place,
+            file=index.place,
             column=source,
         )
-    return source
+    return found
 
 
-def extract(frame: pl.DataFrame, place: Path | str, names: Names) -> Arrays:
+def extract(recording: Recording, place: Path | str, names: Names) -> Raw:
     """Return the columns in use as finite arrays."""
-    if frame.height == 0:
-        raise LogShapeError("holds no samples", remedy="give a log with samples", file=place)
 
     def several(group: tuple[str, ...]) -> NDArray[np.float64]:
-        return np.ascontiguousarray(np.column_stack([_column(frame, place, name) for name in group]))
+        values: NDArray[np.float64] | None = None
+        for j, name in enumerate(group):
+            column = _column(recording.stream_of(name).fetch(name), place, name)
+            values = np.empty((len(column), len(group))) if values is None else values
+            values[:, j] = column
+        assert values is not None
+        return values
 
-    t, q, tau = _times(frame, place, names.t), several(names.q), several(names.tau)
-    return Arrays(t, q, tau, None if names.dq is None else several(names.dq))
+    t, tick_s = _times(recording, place, names.t)
+    if len(t) == 0:
+        raise LogShapeError("holds no samples", remedy="give a log with samples", file=place)
+    t_tau, tau_tick_s = (None, None) if names.t_tau is None else _times(recording, place, names.t_tau)
+    dq = None if names.dq is None else several(names.dq)
+    return Raw(t, several(names.q), several(names.tau), dq, t_tau, tick_s, tau_tick_s)
 
 
-def _times(frame: pl.DataFrame, place: Path | str, name: str) -> NDArray[np.float64]:
-    series = frame[name]
+def _times(
+    recording: Recording, place: Path | str, name: str
+) -> tuple[NDArray[np.float64] | NDArray[np.int64], float | None]:
+    """Return times as they stand, whole numbers exactly, and the seconds per unit if the type says so."""
+    series = recording.stream_of(name).fetch(name)
     if isinstance(series.dtype, pl.Datetime | pl.Duration) and series.null_count() == 0:
         # The type says its own unit, so the conversion guesses nothing.
-        ticks = series.to_physical()
-        seconds = (ticks - ticks[0]).cast(pl.Float64) * _TICKS_S[series.dtype.time_unit or "us"]
-        return np.array(seconds.to_numpy(), dtype=np.float64)
-    return _column(frame, place, name)
+        return series.to_physical().to_numpy().astype(np.int64), _TICKS_S[series.dtype.time_unit or "us"]
+    if series.dtype.is_integer() and series.null_count() == 0:
+        return series.cast(pl.Int64, wrap_numerical=True).to_numpy(), None
+    return _column(series, place, name), None
 
 
-def _column(frame: pl.DataFrame, place: Path | str, name: str) -> NDArray[np.float64]:
-    series = _numbers(frame[name], place, name)
-    values = np.array(series.cast(pl.Float64).to_numpy(), dtype=np.float64)
+def _column(series: pl.Series, place: Path | str, name: str) -> NDArray[np.float64]:
+    series = _numbers(series, place, name)
+    values = series.cast(pl.Float64).to_numpy()
+    if series.null_count() == 0 and np.isfinite(values.sum()):
+        return values
     bad = np.flatnonzero(~np.isfinite(values))
     if len(bad):
         row = int(bad[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,28 +12,17 @@ import polars as pl
 from numpy.typing import ArrayLike, NDArray
 
 from armgap.errors import OptionError, ResultError
-from armgap.log import checks, columns, read, units
+from armgap.log import checks, clocks, columns, frames, units
+from armgap.log.findings import Finding
+from armgap.log.formats import record
+from armgap.log.recording import Recording
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["Finding", "Log"]
+__all__ = ["Log"]
 
-
-@dataclass(frozen=True)
-class Finding:
-    """Something about a log that its reader should know but that does not stop the work.
-
-    Attributes
-    ----------
-    kind : str
-        ``"sampling"``, ``"period"``, ``"gap"``, ``"constant"``, ``"limit"`` or ``"columns"``.
-    message : str
-        In words.
-    """
-
-    kind: str
-    message: str
+_NS = 1e9
 
 
 @dataclass(frozen=True)
@@ -45,7 +34,7 @@ class Log:
     name : str
         Name in results, usually the file's.
     t : ndarray, shape (n_samples,)
-        Sample times [s], increasing, from 0.
+        Sample times [s], increasing, to the nanosecond; from 0, in a part of a log from where it begins.
     q : ndarray, shape (n_samples, n_joints)
         Positions as measured [rad or m].
     tau : ndarray, shape (n_samples, n_joints)
@@ -56,6 +45,8 @@ class Log:
         What was noticed while reading.
     path : Path, optional
         File it was read from.
+    columns : mapping
+        The file's own name of each column in use, by standard name.
     """
 
     name: str
@@ -65,6 +56,7 @@ class Log:
     dq: NDArray[np.float64] | None = None
     findings: tuple[Finding, ...] = ()
     path: Path | None = None
+    columns: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def read(
@@ -75,12 +67,12 @@ class Log:
         *,
         units: Mapping[str, str] | None = None,
     ) -> Log:
-        """Read a log from Parquet or CSV and check it.
+        """Read a log from any of the formats in `armgap.log.formats` and check it.
 
         Parameters
         ----------
         path : path-like
-            File; ``-`` reads standard input.
+            File, or the folder of a ROS 2 bag; ``-`` reads Parquet or text from standard input.
         columns : mapping, optional
             The file's own names of columns: ``{"q1": "shoulder_position"}``. Adds to the arm file's mapping and wins
             over it.
@@ -95,8 +87,8 @@ class Log:
         LogReadError, ColumnError, SampleError, TimeError, UnitError, LogShapeError
             Each names the file, column and row, and what to do.
         """
-        frame, name, source = read.table(path)
-        return cls._build(frame, name, source, columns, arm, units)
+        recording, name, source = record(path)
+        return cls._build(recording, name, source, columns, arm, units)
 
     @classmethod
     def from_frame(
@@ -108,9 +100,23 @@ class Log:
         arm: Arm | None = None,
         units: Mapping[str, str] | None = None,
     ) -> Log:
-        """Take a log from a data frame (polars, or anything polars can convert, such as pandas or pyarrow)."""
-        table = frame if isinstance(frame, pl.DataFrame) else pl.DataFrame(frame)
-        return cls._build(table, name, None, columns, arm, units)
+        """Take a log from a table in memory.
+
+        Parameters
+        ----------
+        frame : polars.DataFrame, polars.LazyFrame, pandas.DataFrame, pyarrow.Table or mapping
+            Table, or a mapping from names to arrays; an array ``q`` of shape (n_samples, n_joints) stands for ``q1``, ``q2`` and so on.
+        name : str
+            Name of the log in results and errors.
+        columns, arm, units
+            As in `read`.
+
+        Raises
+        ------
+        OptionError
+            If it is nothing of these; otherwise as `read`.
+        """
+        return cls._build(frames.record(frame, name), name, None, columns, arm, units)
 
     @classmethod
     def from_arrays(
@@ -153,12 +159,12 @@ class Log:
                     remedy="give one row per sample and one column per joint",
                 )
             data |= {f"{prefix}{j + 1}": array[:, j] for j in range(array.shape[1])}
-        return cls._build(pl.DataFrame(data), name, None, None, arm, None)
+        return cls._build(frames.record(pl.DataFrame(data), name), name, None, None, arm, None)
 
     @classmethod
     def _build(
         cls,
-        frame: pl.DataFrame,
+        recording: Recording,
         name: str,
         source: Path | None,
         mapping: Mapping[str, str] | None,
@@ -166,22 +172,26 @@ class Log:
         declared: Mapping[str, str] | None,
     ) -> Log:
         place = source if source is not None else name
-        names = columns.resolve(frame, place, mapping or {}, arm)
-        arrays = columns.extract(frame, place, names)
+        names, said = columns.resolve(recording, place, mapping or {}, arm)
+        scales = units.stated(names, declared or {}, arm, place)
+        raw = columns.extract(recording, place, names)
+        arrays, timed = clocks.in_seconds(raw, scales, names, arm, place)
+        arrays = units.scaled(arrays, scales)
         checks.order(arrays, place, names)
-        arrays = units.convert(arrays, declared or {}, arm)
+        arrays, cleaned = checks.without_repeats(arrays)
         checks.motion(arrays, place, names)
-        units.check(arrays, place, names, arm, declared or {})
-        noticed = checks.notice(arrays, names, arm)
-        unused = columns.unused_velocities(frame, names)
-        if unused:
-            noticed.append(("columns", f"`{'`, `'.join(unused)}` not used: velocities of other joints are missing"))
-        findings = tuple(Finding(kind, message) for kind, message in noticed)
-        t = arrays.t - arrays.t[0]
-        return cls(name, t, arrays.q, arrays.tau, arrays.dq, findings, source)
+        arrays, converted = units.recognised(arrays, names, arm, scales.settled)
+        units.check(arrays, place, names, arm, scales.settled)
+        noticed = [
+            *recording.findings, *said, *scales.findings, *timed, *cleaned, *converted,
+            *checks.notice(arrays, names, arm), *checks.unused(recording, names),
+        ]  # fmt: skip
+        arrays.t.__isub__(arrays.t[0])
+        return cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key)
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only views."""
+        """Put times on whole nanoseconds, so that a log is the same log in every format, and make the arrays read-only."""
+        object.__setattr__(self, "t", np.rint(self.t * _NS) / _NS)
         for name in ("t", "q", "tau", "dq"):
             values = getattr(self, name)
             if values is not None:
@@ -208,11 +218,19 @@ class Log:
         """Return the number of samples."""
         return len(self.t)
 
-    def part(self, first: int, last: int, name: str) -> Log:
-        """Return the samples `first` up to, not including, `last` as a log of its own, with the times of this one."""
+    def part(self, first: int, last: int, name: str, *, findings: tuple[Finding, ...] | None = None) -> Log:
+        """Return the samples `first` up to, not including, `last` as a log of its own, with the times of this one.
+
+        It inherits the findings unless others are given.
+        """
         rows = slice(first, last)
         dq = None if self.dq is None else self.dq[rows]
-        return Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, self.findings, self.path)
+        found = self.findings if findings is None else findings
+        return Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
+
+    def with_findings(self, findings: tuple[Finding, ...]) -> Log:
+        """Return the log with other findings."""
+        return replace(self, findings=findings)
 
     def to_polars(self) -> pl.DataFrame:
         """Return the log as a table with the columns ``t, q1 …, tau1 …`` and, where there are any, ``dq1 …``."""

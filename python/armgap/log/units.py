@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from armgap.errors import OptionError, UnitError
 from armgap.log.columns import Arrays, Names
+from armgap.log.findings import Finding
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["FACTORS", "check", "convert"]
+__all__ = ["FACTORS", "Scales", "check", "recognised", "scaled", "stated"]
 
 _DEGREE = math.pi / 180
 
@@ -29,10 +30,8 @@ FACTORS: dict[str, dict[str, float]] = {
 }
 """Units that can be declared for a group of columns, as factors to SI."""
 
-# A sample period off by more than this factor from the arm file's is another unit of time.
-_PERIOD_FACTOR = 30.0
-_LONGEST_PERIOD_S = 0.2
-_SHORTEST_PERIOD_S = 2e-5
+WORDS = {"t": "times", "q": "positions", "dq": "velocities", "tau": "torques"}
+
 # Six turns back and forth, and a joint speed beyond that of any arm: degrees taken for radians look like this.
 _FARTHEST_RAD = 12 * math.pi
 _FASTEST_RAD_S = 60.0
@@ -41,35 +40,99 @@ _FARTHEST_M = 40.0
 _SPEED_SPAN_S = 0.02
 # Positions and velocities in different units disagree by 57.3 (degrees) or 1000 (mm), give or take noise.
 _DEGREE_RATIO = (40.0, 80.0)
+# So many samples tell whether positions move in whole encoder counts.
+_ENOUGH = 100_000
+_SURE_RATIO = (52.0, 63.0)
 _MILLI_RATIO = (700.0, 1400.0)
 # An arm's commanded torque does not exceed its limit by this factor, except in another unit.
 _TORQUE_FACTOR = 20.0
 
 
-def convert(arrays: Arrays, units: Mapping[str, str], arm: Arm | None) -> Arrays:
-    """Convert declared units to SI.
+@dataclass(frozen=True)
+class Scales:
+    """Factors to SI by column group, and why they are not 1.
 
-    Parameters
+    Attributes
     ----------
-    arrays : Arrays
-        Columns as they stand in the file.
-    units : mapping
-        Unit per group of columns, ``{"t": "ms", "q": "deg"}``; groups that are not named are in SI units.
-    arm : Arm, optional
-        Tells whether positions are angles.
+    t, t_tau : float, optional
+        Of the times; None where nothing says it.
+    q, tau, dq : ndarray, shape (n_joints,)
+        Of each column.
+    settled : frozenset of str
+        Groups whose unit is stated by the user or by the file.
+    """
+
+    t: float | None
+    t_tau: float | None
+    q: NDArray[np.float64]
+    tau: NDArray[np.float64]
+    dq: NDArray[np.float64] | None
+    settled: frozenset[str]
+    findings: tuple[Finding, ...]
+
+
+def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Path | str) -> Scales:
+    """Return the factors to SI that the user declares (`declared`, by group), or that the file states, by column.
 
     Raises
     ------
     OptionError
-        If a group or its unit is unknown, or does not suit the arm.
+        If a declared group or its unit is unknown, or does not suit the arm.
+    UnitError
+        If the file states a unit that does not suit the column.
     """
-    scale = {group: _factor(group, unit, arm) for group, unit in units.items()}
+    by_user = {group: _factor(group, unit, arm) for group, unit in declared.items()}
+    groups = {"t": (names.t,), "q": names.q, "tau": names.tau, "dq": names.dq or ()}
+    findings: list[Finding] = []
+    settled = set(by_user)
 
-    def scaled(group: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return values * scale.get(group, 1.0)
+    def of(group: str, columns: tuple[str, ...]) -> NDArray[np.float64]:
+        if group in by_user:
+            return np.full(len(columns), by_user[group])
+        factors = [_by_file(group, column, names.units.get(column), arm, place) for column in columns]
+        units = {unit for column in columns if (unit := names.units.get(column)) is not None}
+        if columns and all(column in names.units for column in columns):
+            settled.add(group)
+        if any(factor != 1.0 for factor in factors):
+            findings.append(
+                Finding("units", f"{WORDS[group]} are in {', '.join(sorted(units))}, as the file says; converted")
+            )
+        return np.array(factors, dtype=np.float64)
 
-    dq = None if arrays.dq is None else scaled("dq", arrays.dq)
-    return replace(arrays, t=scaled("t", arrays.t), q=scaled("q", arrays.q), tau=scaled("tau", arrays.tau), dq=dq)
+    q, tau, dq, t = (of(group, groups[group]) for group in ("q", "tau", "dq", "t"))
+    t_tau = names.units.get(names.t_tau or "")
+    return Scales(
+        t=float(t[0]) if "t" in settled else None,
+        t_tau=by_user.get("t", FACTORS["t"].get(t_tau or "")),
+        q=q,
+        tau=tau,
+        dq=dq if names.dq is not None else None,
+        settled=frozenset(settled),
+        findings=tuple(findings),
+    )
+
+
+def scaled(arrays: Arrays, scales: Scales) -> Arrays:
+    """Return positions, torques and velocities in SI units."""
+
+    def by(values: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
+        return values if np.all(factors == 1.0) else values * factors
+
+    dq = None if arrays.dq is None or scales.dq is None else by(arrays.dq, scales.dq)
+    return replace(arrays, q=by(arrays.q, scales.q), tau=by(arrays.tau, scales.tau), dq=dq)
+
+
+def _by_file(group: str, column: str, unit: str | None, arm: Arm | None, place: Path | str) -> float:
+    if unit is None:
+        return 1.0
+    if unit not in FACTORS[group] or not _suits(group, unit, arm):
+        raise UnitError(
+            f"is in {unit}, which is no unit of {WORDS[group]}" + (f" of a {arm.kind}" if arm is not None else ""),
+            remedy=f"correct the file, or declare the unit with --units {group}=…",
+            file=place,
+            column=column,
+        )
+    return FACTORS[group][unit]
 
 
 def _factor(group: str, unit: str, arm: Arm | None) -> float:
@@ -78,38 +141,61 @@ def _factor(group: str, unit: str, arm: Arm | None) -> float:
     if unit not in FACTORS[group]:
         known = ", ".join(FACTORS[group])
         raise OptionError(f"`{unit}` is not a unit of {group}", remedy=f"known: {known}")
-    angular = unit.startswith(("rad", "deg")) or unit.endswith("Nm")
-    if arm is not None and group != "t" and angular != arm.rotary:
+    if not _suits(group, unit, arm):
+        assert arm is not None
         motion = "turns" if arm.rotary else "slides"
         raise OptionError(f"{group} in {unit} does not suit an arm that {motion}", remedy="declare another unit")
     return FACTORS[group][unit]
 
 
-def check(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None, declared: Mapping[str, str]) -> None:
-    """Raise `UnitError` where an undeclared group of columns has the magnitude of another unit."""
-    if "t" not in declared:
-        _time(arrays, place, names, arm)
+def _suits(group: str, unit: str, arm: Arm | None) -> bool:
+    angular = unit.startswith(("rad", "deg")) or unit.endswith("Nm")
+    return arm is None or group == "t" or angular == arm.rotary
+
+
+def recognised(arrays: Arrays, names: Names, arm: Arm | None, settled: frozenset[str]) -> tuple[Arrays, list[Finding]]:
+    """Convert degrees that give themselves away: by whole encoder counts, or by a velocity column in radians.
+
+    Nothing is converted where another joint speaks against it, or where the unit is stated; what merely looks large is left to `check`.
+    """
+    findings: list[Finding] = []
+    if "q" not in settled and not _slides(arm) and (why := _degrees(arrays, names, arm)):
+        arrays = replace(arrays, q=arrays.q * _DEGREE)
+        findings.append(Finding("units", f"positions are in degrees: {why}; converted"))
+    if "dq" not in settled and arrays.dq is not None and names.dq is not None and not _slides(arm):
+        ratios = [_speed_ratio(arrays, j) for j in range(arrays.q.shape[1])]
+        slow = [r for r in ratios if r > 0]
+        if slow and all(_SURE_RATIO[0] < 1 / r < _SURE_RATIO[1] for r in slow):
+            arrays = replace(arrays, dq=arrays.dq * _DEGREE)
+            said = f"`{names.dq[ratios.index(slow[0])]}` is {1 / slow[0]:.3g} times faster than the positions move"
+            findings.append(Finding("units", f"velocities are in deg/s: {said}; converted"))
+    return arrays, findings
+
+
+def _degrees(arrays: Arrays, names: Names, arm: Arm | None) -> str:
+    """Return the reason why positions must be in degrees; empty if there is none, or one against it."""
+    reasons = []
+    for j, name in enumerate(names.q):
+        ratio = _speed_ratio(arrays, j) if arrays.dq is not None else 0.0
+        if ratio > 0 and not _SURE_RATIO[0] < ratio < _SURE_RATIO[1]:
+            return ""
+        if _moves_in_counts(arrays, arm, j, 1.0):
+            return ""
+        if _moves_in_counts(arrays, arm, j, _DEGREE):
+            reasons.append(f"`{name}` moves in whole encoder counts only if read so")
+        elif ratio > 0 and names.dq is not None:
+            reasons.append(f"`{name}` moves {ratio:.3g} times faster than `{names.dq[j]}` says")
+    return reasons[0] if reasons else ""
+
+
+def check(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None, declared: frozenset[str]) -> None:
+    """Raise `UnitError` where an unstated group of columns has the magnitude of another unit."""
     if "dq" not in declared:
         _velocity(arrays, place, names, arm)
     if "q" not in declared:
         _position(arrays, place, names, arm)
     if "tau" not in declared:
         _torque(arrays, place, names, arm)
-
-
-def _time(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
-    period = float(np.median(np.diff(arrays.t)))
-    low, high, against = _SHORTEST_PERIOD_S, _LONGEST_PERIOD_S, "no arm is sampled so"
-    if arm is not None:
-        low, high = arm.sample_period / _PERIOD_FACTOR, arm.sample_period * _PERIOD_FACTOR
-        against = f"the arm file says {arm.sample_period:g} s"
-    if low <= period <= high:
-        return
-    # Without an arm several units may be possible; the one nearest to a millisecond is named.
-    likely = [u for u, factor in FACTORS["t"].items() if u != "s" and low <= period * factor <= high]
-    likely.sort(key=lambda u: abs(math.log(period * FACTORS["t"][u] / 1e-3)))
-    remedy = f"it looks like {likely[0]}: add --units t={likely[0]}" if likely else "give times in s"
-    raise UnitError(f"the median sample period is {period:g} s, {against}", remedy=remedy, file=place, column=names.t)
 
 
 def _velocity(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
@@ -150,7 +236,7 @@ def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
         farthest, fastest, unit = _FARTHEST_M, math.inf, "mm"
     for j, name in enumerate(names.q):
         travel, speed = float(np.ptp(arrays.q[:, j])), _peak_speed(arrays, j)
-        counts = not _slides(arm) and _counts_degrees(arrays, arm, j)
+        counts = not _slides(arm) and _moves_in_counts(arrays, arm, j, _DEGREE)
         if travel > farthest or speed > fastest or counts:
             si = "m" if _slides(arm) else "rad"
             why = f"moves over {travel:.4g} {si} at up to {speed:.4g} {si}/s"
@@ -170,17 +256,17 @@ def _peak_speed(arrays: Arrays, j: int) -> float:
     return float(np.quantile(np.abs(np.diff(q) / np.diff(t)), 0.99)) if len(t) > 1 else 0.0
 
 
-def _counts_degrees(arrays: Arrays, arm: Arm | None, j: int) -> bool:
-    """Whether positions change in whole encoder counts when they are read as degrees, and not otherwise."""
+def _moves_in_counts(arrays: Arrays, arm: Arm | None, j: int, factor: float) -> bool:
+    """Whether positions times `factor` change in whole encoder counts."""
     if arm is None or arm.encoder_step is None:
         return False
-    moved = np.diff(arrays.q[:, j])
+    moved = np.diff(arrays.q[:_ENOUGH, j])
     moved = moved[moved != 0]
     if len(moved) < 20:
         return False
-    in_degrees = moved * _DEGREE / arm.encoder_step[j]
-    whole = np.abs(in_degrees - np.round(in_degrees)) < 0.01
-    return bool(np.mean(whole & (np.round(in_degrees) != 0)) > 0.95)
+    counts = moved * factor / arm.encoder_step[j]
+    whole = np.abs(counts - np.round(counts)) < 0.01
+    return bool(np.mean(whole & (np.round(counts) != 0)) > 0.95)
 
 
 def _torque(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:

@@ -1,6 +1,17 @@
-"""Reports: results, then sections, then HTML or a terminal."""
+"""Reports: results, then documents of sections, then HTML, Markdown or a terminal."""
 
+from armgap.report.document import Document, diagnosis_document
 from armgap.report.html import render_html, write_html
+from armgap.report.output import check_report, diagnosis_report, render_report
 from armgap.report.terminal import summary_table
 
-__all__ = ["render_html", "summary_table", "write_html"]
+__all__ = [
+    "Document",
+    "check_report",
+    "diagnosis_document",
+    "diagnosis_report",
+    "render_html",
+    "render_report",
+    "summary_table",
+    "write_html",
+]

@@ -1,4 +1,7 @@
-"""Charts: one look for all of them, one meaning per colour, drawn on a transparent ground for light and dark pages."""
+"""Charts: one look for all of them, one meaning per colour, drawn on a transparent ground for light and dark pages.
+
+Texts, axes and grids take their colour from the page's style sheet (``--bk-…`` variables), so they follow it into the dark.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["AFTER", "BEFORE", "FLOOR", "MEASURED", "REFIT", "bars", "lines"]
+from armgap.report.words import unit_text
+
+__all__ = ["AFTER", "BEFORE", "FLOOR", "MEASURED", "REFIT", "bars", "law", "lines"]
 
 # Okabe and Ito's colour-blind-safe palette; the greys are readable on white and on near-black.
 MEASURED = "#808080"
@@ -16,7 +21,6 @@ BEFORE = "#D55E00"
 REFIT = "#E69F00"
 AFTER = "#0072B2"
 FLOOR = "#009E73"
-_INK = "#808890"
 
 
 def figure(title: str, x_label: str, y_label: str, **options: Any) -> Any:
@@ -24,36 +28,45 @@ def figure(title: str, x_label: str, y_label: str, **options: Any) -> Any:
     from bokeh.plotting import figure as make
 
     settings: dict[str, Any] = {
-        "height": 260,
+        "height": 240,
         "sizing_mode": "stretch_width",
-        "tools": "pan,xwheel_zoom,box_zoom,reset,save",
+        "tools": "",
         "toolbar_location": "above",
         "output_backend": "canvas",
     }
-    f = make(title=title, **(settings | options))
+    settings |= options
+    f = make(title=title or None, **settings)
     f.background_fill_color = f.border_fill_color = None
     f.outline_line_color = None
-    f.title.text_color = _INK
-    f.title.text_font_size = "14px"
     f.toolbar.logo = None
+    if settings["toolbar_location"] is not None:
+        _tools(f)
+    f.toolbar.autohide = f.toolbar_inner = True
     for axis, label in ((f.xaxis[0], x_label), (f.yaxis[0], y_label)):
-        axis.axis_label = label
-        axis.axis_label_text_color = axis.major_label_text_color = _INK
-        axis.axis_line_color = axis.major_tick_line_color = _INK
+        axis.axis_label = label or None
         axis.axis_label_text_font_style = "normal"
         axis.minor_tick_line_color = None
-    f.grid.grid_line_color = _INK
-    f.grid.grid_line_alpha = 0.2
     return f
+
+
+def _tools(f: Any) -> None:
+    """Drag over a stretch to zoom in; the wheel alone goes on scrolling the page."""
+    from bokeh.models import BoxZoomTool, PanTool, ResetTool, SaveTool, WheelZoomTool
+
+    wheel, box = WheelZoomTool(dimensions="width", modifiers="ctrl"), BoxZoomTool(dimensions="width")
+    f.add_tools(box, PanTool(dimensions="width"), wheel, ResetTool(), SaveTool())
+    f.toolbar.active_drag, f.toolbar.active_scroll = box, wheel
 
 
 def _legend(f: Any) -> None:
     legend = f.legend[0]
     legend.background_fill_alpha = 0.0
     legend.border_line_color = None
-    legend.label_text_color = _INK
+    legend.padding = legend.margin = 0
+    legend.spacing = 12
     legend.click_policy = "hide"
     legend.orientation = "horizontal"
+    legend.location = "center"
     f.add_layout(legend, "below")
 
 
@@ -66,7 +79,6 @@ def lines(
     *,
     breaks: Sequence[int] = (),
     levels: Sequence[tuple[str, float, str]] = (),
-    share: Any = None,
     **options: Any,
 ) -> Any:
     """Curves over a common abscissa.
@@ -83,22 +95,26 @@ def lines(
         Indices before which a line is lifted.
     levels : sequence of (label, value, colour)
         Horizontal lines.
-    share : figure, optional
-        Figure whose x range is shared.
     """
     f = figure(title, x_label, y_label, **options)
-    if share is not None:
-        f.x_range = share.x_range
+    from bokeh.models import ColumnDataSource
+
     gaps = [b for b in breaks if b > 0]
-    abscissa = np.insert(np.asarray(x, dtype=float), gaps, np.nan)
-    for label, values, colour in curves:
-        y = np.insert(np.asarray(values, dtype=float), gaps, np.nan)
+    columns = {"x": x} | {f"y{i}": values for i, (_, values, _) in enumerate(curves)}
+    source = ColumnDataSource({name: _lifted(values, gaps) for name, values in columns.items()})
+    for i, (label, _, colour) in enumerate(curves):
         width = 2.5 if colour == MEASURED else 1.3
-        f.line(abscissa, y, legend_label=label, color=colour, line_width=width)
+        f.line("x", f"y{i}", source=source, legend_label=label, color=colour, line_width=width)
+    ends = [float(np.min(np.asarray(x))), float(np.max(np.asarray(x)))]
     for label, value, colour in levels:
-        f.line([abscissa[0], abscissa[-1]], [value, value], legend_label=label, color=colour, line_dash="dashed")
+        f.line(ends, [value, value], legend_label=label, color=colour, line_dash="dashed")
     _legend(f)
     return f
+
+
+def _lifted(values: ArrayLike, gaps: Sequence[int]) -> NDArray[np.float32]:
+    """A column with gaps, in the precision that a screen can show."""
+    return np.insert(np.asarray(values, dtype=np.float32), gaps, np.nan)
 
 
 def bars(
@@ -108,15 +124,17 @@ def bars(
     series: Sequence[tuple[str, Sequence[float], str]],
     *,
     log: bool = False,
+    labels: bool = True,
     x_label: str = "",
     **options: Any,
 ) -> Any:
-    """Grouped bars; with `log` the axis is logarithmic and values of zero are left out."""
+    """Grouped bars; with `log` the axis is logarithmic and values of zero are left out, with `labels` each bar has its value."""
     from bokeh.models import ColumnDataSource, FactorRange, LabelSet
 
     factors = [(group, label) for group in groups for label, _, _ in series]
     scale = {"y_axis_type": "log"} if log else {}
-    f = figure(title, x_label, y_label, x_range=FactorRange(*factors), **(scale | options))
+    fixed = {"tools": "", "toolbar_location": None}
+    f = figure(title, x_label, y_label, x_range=FactorRange(*factors), **(fixed | scale | options))
     positive = [v for _, values, _ in series for v in values if v > 0]
     if positive:
         f.y_range.end = max(positive) * (2.5 if log else 1.15)
@@ -130,13 +148,48 @@ def bars(
         }
         source = ColumnDataSource(data)
         f.vbar("x", top="top", bottom=bottom, width=0.9, color=colour, source=source, legend_label=label)
-        labels = LabelSet(x="x", y="top", text="text", source=source, text_align="center", y_offset=2)
-        labels.text_color, labels.text_font_size = _INK, "11px"
-        f.add_layout(labels)
+        if labels:
+            mark = LabelSet(x="x", y="top", text="text", source=source, text_align="center", y_offset=2)
+            mark.text_font_size = "12px"
+            f.add_layout(mark)
     f.xaxis.major_label_text_alpha = 0
     f.xaxis.major_label_text_font_size = "0px"
-    f.xaxis.major_tick_line_color = None
-    f.xaxis.group_text_color = _INK
-    f.xgrid.grid_line_color = None
+    f.xaxis.major_tick_in = f.xaxis.major_tick_out = 0
+    f.xaxis.separator_line_alpha = 0
+    f.xgrid.visible = False
     _legend(f)
     return f
+
+
+def law(entry: dict[str, Any]) -> Any:
+    """A cause against its own variable: samples, means over ranges with their intervals, and the fitted law.
+
+    Parameters
+    ----------
+    entry : dict
+        One entry of a diagnosis' ``laws``.
+    """
+    from bokeh.models import ColumnDataSource, Whisker
+
+    bins, points = entry["bins"], entry["points"]
+    f = figure("", f"{entry['variable']} [{unit_text(entry['unit'])}]", "", height=300)
+    f.scatter(points["x"], points["y"], size=4, color=MEASURED, alpha=0.45, line_color=None, legend_label="samples")
+    ends = {
+        "x": bins["x"],
+        "low": [m - e for m, e in zip(bins["mean"], bins["error"], strict=True)],
+        "high": [m + e for m, e in zip(bins["mean"], bins["error"], strict=True)],
+    }
+    f.add_layout(Whisker(base="x", lower="low", upper="high", source=ColumnDataSource(ends), line_color=BEFORE))
+    f.line(bins["x"], bins["law"], color=AFTER, line_width=2.5, legend_label="fitted law")
+    rings = {"size": 8, "color": BEFORE, "fill_color": None, "line_width": 2}
+    f.scatter(bins["x"], bins["mean"], legend_label="mean lacking torque", **rings)
+    _reach(f, [*ends["low"], *ends["high"], *bins["law"]])
+    _legend(f)
+    return f
+
+
+def _reach(f: Any, values: Sequence[float]) -> None:
+    """Show the means and the law, and so much of the cloud as twice their span holds."""
+    low, high = min(values), max(values)
+    margin = 0.5 * (high - low or 1.0)
+    f.y_range.start, f.y_range.end = low - margin, high + margin

@@ -1,33 +1,34 @@
-"""A diagnosis as one self-contained HTML file."""
+"""A report as one self-contained HTML file."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armgap.report import words
+from armgap.report.document import Document, diagnosis_document
 
 if TYPE_CHECKING:
     from armgap.diagnosis import Diagnosis
 
-__all__ = ["render_html", "write_html"]
+__all__ = ["page_of", "render_html", "write_html"]
+
+
+def page_of(document: Document) -> str:
+    """Return a report as one HTML page that loads nothing from elsewhere."""
+    from armgap.report import page
+
+    return page.render(document.title, document.lead, document.answers, document.sections)
 
 
 def render_html(diagnosis: Diagnosis | dict[str, Any]) -> str:
-    """Return the report of a diagnosis: one HTML page that loads nothing from elsewhere.
+    """Return the report of a diagnosis as HTML.
 
     Parameters
     ----------
     diagnosis : Diagnosis or dict
         The diagnosis, or its JSON object.
     """
-    from armgap.report import page
-    from armgap.report.sections import SECTIONS
-
-    data = diagnosis if isinstance(diagnosis, dict) else diagnosis.to_dict()
-    name = (data.get("arm") or {}).get("name") or "arm"
-    sections = [section(data) for section in SECTIONS]
-    return page.render(f"Diagnosis: {name}", words.verdict(data), words.answers(data), sections)
+    return page_of(diagnosis_document(diagnosis))
 
 
 def write_html(diagnosis: Diagnosis | dict[str, Any], path: str | Path) -> None:

@@ -3,11 +3,80 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
-__all__ = ["Section", "render"]
+from armgap.report.words import Answer
+
+__all__ = ["Bar", "Cell", "Drawing", "Heat", "Section", "Table", "Tile", "Track", "render"]
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A cell that holds a bar: a share from 0 to 1, its text and its colour."""
+
+    share: float
+    text: str
+    colour: str
+
+
+@dataclass(frozen=True)
+class Track:
+    """A cell that holds dots on a line from -1 to 1 around a shaded middle.
+
+    Attributes
+    ----------
+    dots : sequence of (position, colour)
+        Positions from -1 to 1.
+    middle : float
+        Half width of the shaded middle.
+    text : str
+        The same in words, for a reader without the picture.
+    """
+
+    dots: Sequence[tuple[float, str]]
+    middle: float
+    text: str
+
+
+Cell = str | Bar | Track
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of cells; with a `fold` text it starts closed under that text."""
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+    fold: str = ""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A chart (bokeh model) with a caption in the page's own text; where no chart can be drawn, a table says the same."""
+
+    caption: str
+    chart: Any
+    table: Table | None = None
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One field of a map: its text, its depth from 0 to 1, what it stands for, and whether it is outlined."""
+
+    text: str
+    depth: float
+    tip: str = ""
+    marked: bool = False
+
+
+@dataclass(frozen=True)
+class Heat:
+    """A map in rows of tiles."""
+
+    caption: str
+    rows: Sequence[tuple[str, Sequence[Tile]]]
 
 
 @dataclass(frozen=True)
@@ -21,61 +90,83 @@ class Section:
     text : sequence of str
         Paragraphs.
     figures : sequence
-        Charts (bokeh models).
-    tables : sequence of (header, rows)
-        Tables of strings.
-    heat : sequence of (label, cells)
-        Rows of a map; each cell is a text and a depth from 0 to 1.
-    heat_title : str
-        Caption of the map.
+        Charts: bokeh models, or `Drawing`.
+    heats : sequence of Heat
+        Maps beside the charts.
+    tables : sequence of Table or (header, rows)
+        Tables.
     notes : sequence of str
         Paragraphs after the pictures.
-    fold : bool
-        Whether the section starts closed.
+    columns : int
+        Charts side by side where the page is wide.
     """
 
     title: str
     text: Sequence[str] = ()
     figures: Sequence[Any] = ()
-    tables: Sequence[tuple[Sequence[str], Sequence[Sequence[str]]]] = ()
-    heat: Sequence[tuple[str, Sequence[tuple[str, float]]]] = ()
-    heat_title: str = ""
+    heats: Sequence[Heat] = ()
+    tables: Sequence[Table | tuple[Sequence[str], Sequence[Sequence[Cell]]]] = ()
     notes: Sequence[str] = ()
-    fold: bool = False
+    columns: int = 1
 
 
 @dataclass(frozen=True)
-class _Drawn:
+class _Part:
+    """A section with its charts turned into HTML."""
+
     section: Section
-    divs: list[str] = field(default_factory=list)
+    charts: Sequence[tuple[str, str]]
+    tables: Sequence[Table]
 
 
-def render(title: str, lead: str, answers: Sequence[tuple[str, str]], sections: Sequence[Section]) -> str:
+def render(title: str, lead: str, answers: Sequence[Answer], sections: Sequence[Section]) -> str:
     """Return a page as HTML.
 
     Parameters
     ----------
     title, lead : str
         Heading and the sentence below it.
-    answers : sequence of (question, answer)
+    answers : sequence of Answer
         The first screen.
     sections : sequence of Section
         What follows; the first one's pictures belong to the first screen.
     """
+    drawings = [[_drawing(f) for f in section.figures] for section in sections]
+    script, library, divs = _embedded([d.chart for several in drawings for d in several])
+    remaining = iter(divs)
+    parts = [
+        _Part(s, [(d.caption, next(remaining)) for d in several], [_table(t) for t in s.tables])
+        for s, several in zip(sections, drawings, strict=True)
+    ]
+    return str(_template().render(title=title, lead=lead, answers=answers, parts=parts, script=script, library=library))
+
+
+def _drawing(figure: Any) -> Drawing:
+    return figure if isinstance(figure, Drawing) else Drawing("", figure)
+
+
+def _table(table: Table | tuple[Sequence[str], Sequence[Sequence[Cell]]]) -> Table:
+    return table if isinstance(table, Table) else Table(*table)
+
+
+def _embedded(charts: Sequence[Any]) -> tuple[str, str, Sequence[str]]:
+    """Charts as (script, library, elements); without charts the page needs neither script nor library."""
+    if not charts:
+        return "", "", ()
     from bokeh.embed import components
     from bokeh.resources import Resources
-    from jinja2 import Environment, select_autoescape
 
-    figures = [f for section in sections for f in section.figures]
-    script, divs = components(figures) if figures else ("", ())
-    remaining = list(divs)
-    drawn = []
-    for section in sections:
-        mine = [remaining.pop(0) for _ in section.figures]
-        drawn.append(_Drawn(section, mine))
-    library = Resources(mode="inline", components=["bokeh"]).render_js() if figures else ""
-    template = resources.files("armgap.report").joinpath("templates/page.html").read_text(encoding="utf-8")
-    environment = Environment(autoescape=select_autoescape(default=True, default_for_string=True))
-    return environment.from_string(template).render(
-        title=title, lead=lead, answers=answers, drawn=drawn, script=script, library=library
+    script, divs = components(tuple(charts))
+    return script, Resources(mode="inline", components=["bokeh"]).render_js(), divs
+
+
+def _template() -> Any:
+    from jinja2 import DictLoader, Environment, StrictUndefined
+
+    folder = resources.files("armgap.report").joinpath("templates")
+    names = ("page.html", "parts.html", "page.css", "page.js")
+    files = {name: folder.joinpath(name).read_text(encoding="utf-8") for name in names}
+    environment = Environment(
+        autoescape=True, loader=DictLoader(files), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    return environment.get_template("page.html")

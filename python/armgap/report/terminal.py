@@ -1,4 +1,4 @@
-"""The three answers in a terminal."""
+"""The three answers in a terminal, narrow or wide."""
 
 from __future__ import annotations
 
@@ -8,36 +8,59 @@ from armgap.report import words
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+    from rich.table import Table
 
     from armgap.diagnosis import Diagnosis
 
-__all__ = ["summary_table"]
+__all__ = ["answer_lines", "gap_table", "summary_table"]
+
+Data = dict[str, Any]
 
 
-def summary_table(diagnosis: Diagnosis | dict[str, Any]) -> RenderableType:
-    """Return what `rich` prints: verdict, the three answers, and the gap per joint."""
-    from rich import box
+def summary_table(diagnosis: Diagnosis | Data) -> RenderableType:
+    """Return what `rich` prints: verdict, the three answers, and the gap per joint.
+
+    Questions stand above their answers, so that a terminal of 60 columns holds them as well as a wide one.
+    """
     from rich.console import Group
-    from rich.table import Table
     from rich.text import Text
 
     data = diagnosis if isinstance(diagnosis, dict) else diagnosis.to_dict()
-    table = Table(box=box.SIMPLE, show_header=False, pad_edge=False)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column()
-    for question, answer in words.answers(data):
-        table.add_row(Text(question), Text(answer))
+    parts: list[RenderableType] = [Text(words.verdict(data), style="bold reverse"), Text()]
+    for answer in words.answers(data):
+        parts += answer_lines(answer)
+    return Group(*parts, gap_table(data))
+
+
+def answer_lines(answer: words.Answer) -> list[RenderableType]:
+    """A question with its answer, and an empty line."""
+    from rich.padding import Padding
+    from rich.text import Text
+
+    lines: list[RenderableType] = [Text(answer.question, style="dim")]
+    lines.append(Padding(Text(answer.headline, style="bold"), (0, 0, 0, 2)))
+    if answer.detail:
+        lines.append(Padding(Text(answer.detail), (0, 0, 0, 2)))
+    return [*lines, Text()]
+
+
+def gap_table(data: Data) -> Table:
+    """The gap per joint: a row per joint, a column per model."""
+    from rich import box
+    from rich.table import Table
+
     gap = data["gap"]
-    unit = gap.get("unit", "rad")
-    figures = Table(
-        box=box.SIMPLE,
-        title=f"RMS error over {gap['horizon_s']:g} s on held-out motion [m{unit}]",
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        title=f"RMS error over {gap['horizon_s']:g} s on held-out motion [m{gap.get('unit', 'rad')}]",
         title_justify="left",
     )
-    figures.add_column("joint")
-    for name in ("arm file", "re-estimated", "with causes", "sensor floor"):
-        figures.add_column(name, justify="right")
-    rows = zip(gap["before"], gap["refit"], gap["after"], gap["floor"], strict=True)
-    for j, row in enumerate(rows, start=1):
-        figures.add_row(str(j), *(f"{1e3 * v:.3g}" for v in row))
-    return Group(Text(words.verdict(data), style="bold"), table, figures)
+    table.add_column("joint")
+    columns = [("arm file", "before"), ("re-estimated", "refit"), ("with causes", "after"), ("noise", "floor")]
+    shown = [(name, key) for name, key in columns if key != "after" or data.get("causes")]
+    for name, _ in shown:
+        table.add_column(name, justify="right")
+    for j in range(len(gap["before"])):
+        table.add_row(str(j + 1), *(words.figure(1e3 * gap[key][j]) for _, key in shown))
+    return table

@@ -1,24 +1,82 @@
-"""A diagnosis in plain sentences, the same in the terminal and in the report."""
+"""A diagnosis in plain sentences, the same in the terminal, in Markdown and in the report."""
 
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from armgap import _native
 
-__all__ = ["answers", "figure", "joint_text", "millis", "title"]
+__all__ = [
+    "Answer",
+    "answers",
+    "doubtful",
+    "figure",
+    "joint_text",
+    "millis",
+    "named",
+    "percent",
+    "sizes",
+    "title",
+    "unit_text",
+    "value",
+    "variable_text",
+    "verdict",
+]
 
 Data = dict[str, Any]
 
-_DOUBTFUL = 0.5
+#: Causes less probable than this are called the best candidate, not the cause.
+DOUBTFUL = 0.5
+#: A joint's share of the gap is worth naming from here on.
+MINOR_JOINT = 0.02
+#: Shares beyond which percentages have one and two decimals.
+NEARLY, ALMOST = 0.99, 0.995
+#: Decimal places, and size, beyond which a number is written with an exponent.
+MOST_PLACES, MOST = 6, 1e5
 
 _VERDICTS = {
-    "none": "The model predicts these logs as well as the sensors can tell.",
+    "none": "The model predicts this arm as well as the logs can tell.",
     "parameters": "The model has the right form but the wrong values.",
     "effect": "The arm does something that its model leaves out.",
-    "unexplained": "There is a gap that no effect in the library explains.",
+    "unexplained": "There is a gap, and no effect in the library explains it.",
 }
+_NO_CAUSE = {
+    "none": ("No cause", "Nothing is left to explain."),
+    "parameters": ("Wrong values, no missing effect", "The arm file's values, re-estimated, suffice."),
+    "unexplained": (
+        "None that the library knows",
+        "Every known effect was tried and none explains the gap; naming one would mislead.",
+    ),
+}
+_VARIABLES = {"dq": "speed", "reversal": "near a reversal", "q": "position", "tau": "torque", "t": "time"}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One of the three questions.
+
+    Attributes
+    ----------
+    question : str
+        The question.
+    headline : str
+        The answer in a few words.
+    detail : str
+        What is to be said besides, in whole sentences.
+    """
+
+    question: str
+    headline: str
+    detail: str
+
+    @property
+    def text(self) -> str:
+        """Headline and detail as running text."""
+        return f"{self.headline}. {self.detail}" if self.detail else f"{self.headline}."
 
 
 @functools.cache
@@ -36,77 +94,168 @@ def joint_text(joint: int | None) -> str:
     return "whole arm" if joint is None else f"joint {joint}"
 
 
-def figure(value: float, digits: int = 3) -> str:
-    """A number with a few significant digits."""
-    return f"{value:.{digits}g}"
+def figure(number: float | None, digits: int = 3) -> str:
+    """A number with a few significant digits; a dash where there is none."""
+    if number is None:
+        return "–"
+    text = f"{number:.{digits}g}"
+    return f"{number:.0f}" if "e+" in text and abs(number) < MOST else text
 
 
-def millis(values: list[float], unit: str) -> str:
-    """RMS errors per joint in thousandths."""
-    return " / ".join(f"{1e3 * v:.3g}" for v in values) + f" m{unit}"
+def percent(share: float) -> str:
+    """A share in percent, with more digits where it nears 100 and never rounded up to it."""
+    places = 0 if share <= NEARLY or share >= 1.0 else 1 if share <= ALMOST else 2
+    number = f"{min(100 * share, 99.99):.{places}f}" if places else f"{100 * share:.0f}"
+    return f"{'0' if number == '-0' else number}\N{NO-BREAK SPACE}%"
+
+
+def unit_text(unit: str) -> str:
+    """A unit for people: powers raised, and none for ratios."""
+    return "" if unit == "1" else unit.replace("^2", "²")
+
+
+def value(entry: Any, digits: int = 4) -> str:
+    """A value with its uncertainty and unit, both to the same place; or a bare number."""
+    if not isinstance(entry, dict):
+        return "" if entry is None else figure(float(entry), digits)
+    return f"{_spread(entry['value'], entry['sigma'], digits)} {unit_text(str(entry.get('unit', '')))}".strip()
+
+
+def _spread(number: float | None, sigma: float | None, digits: int) -> str:
+    if number is None or not sigma:
+        return figure(number, digits)
+    places = 1 - math.floor(math.log10(sigma))
+    if not 0 <= places <= MOST_PLACES or abs(number) >= MOST:
+        return f"{figure(number, digits)} ± {figure(sigma, 2)}"
+    return f"{number:.{places}f} ± {sigma:.{places}f}"
+
+
+def sizes(parameters: Data) -> str:
+    """The parameters of an effect in one line."""
+    return ", ".join(f"{name} {value(p, 3)}" for name, p in parameters.items())
+
+
+def millis(values: Sequence[float], unit: str) -> str:
+    """RMS errors per joint in thousandths, or in whole units where one is that large."""
+    scale, prefix = (1.0, "") if max(values) >= 1.0 else (1e3, "m")
+    return f"{' / '.join(figure(scale * v) for v in values)} {prefix}{unit}"
+
+
+def named(effect: Data) -> str:
+    """An effect with its place, and its log if it belongs to one."""
+    place = f"{title(effect['effect'])}, {joint_text(effect['joint'])}"
+    return f"{place}, in {effect['log']}" if effect.get("log") else place
+
+
+def doubtful(data: Data) -> bool:
+    """Whether causes were named beside a gap that stays unexplained."""
+    causes = data.get("causes") or []
+    return bool(causes) and causes[0]["probability"] < DOUBTFUL
 
 
 def verdict(data: Data) -> str:
     """The verdict as a sentence."""
+    if doubtful(data):
+        return "The arm does something that its model leaves out, and part of the gap stays unexplained."
     return _VERDICTS.get(data["verdict"], str(data["verdict"]))
 
 
-def where(data: Data) -> str:
-    """Answer to the first question."""
+def answers(data: Data) -> list[Answer]:
+    """The three questions with their answers."""
+    return [
+        Answer("Where is the gap?", *_where(data)),
+        Answer("Which effect causes it?", *_which(data)),
+        Answer("How far does it shrink?", *_how_far(data)),
+    ]
+
+
+def _where(data: Data) -> tuple[str, str]:
     places = data.get("where") or []
     if data["verdict"] == "none" or not places:
-        return "No part of the motion stands out."
+        return "No part of the motion stands out", ""
     first = places[0]
-    text = f"Joint {first['joint']} bears {first['share']:.0%} of the gap"
-    if first.get("range"):
-        text += f", most of all at {first['regime']} ({first['detail']})"
+    ranged = bool(first.get("range"))
+    headline = f"Joint {first['joint']}, {_regime(first)}"
+    model = "arm file's model" if data["verdict"] == "parameters" else "re-estimated model"
+    text = f"It bears {percent(first['share'])} of what the {model} lacks"
+    if ranged:
+        text += f", most of it {_inside(first)}"
+    others = [f"joint {p['joint']} {percent(p['share'])}" for p in places[1:] if p["share"] >= MINOR_JOINT]
+    return headline, text + (f"; {', '.join(others)}." if others else ".")
+
+
+def _regime(place: Data) -> str:
+    """The regime of a place, as it follows the joint."""
+    if not place.get("range"):
+        return "in every regime"
+    return f"{'in' if place['regime'].startswith('part') else 'at'} {place['regime']}"
+
+
+def _inside(place: Data) -> str:
+    """The regime of a place in figures."""
+    span = place["range"]
+    if span["variable"].startswith("reversal"):
+        return str(place["detail"])
+    unit = str(place["detail"]).rpartition(f"{span['to']:.3f}")[2].strip()
+    name = variable_text(span["variable"])
+    what = "t" if name == "time" else f"the {name} of joint {place['joint']}"
+    return f"where {what} is {figure(span['from'])} to {figure(span['to'])} {unit}".strip()
+
+
+def variable_text(variable: str) -> str:
+    """A regime variable in a word."""
+    bare = variable.replace("abs(", "").rstrip(")").rstrip("0123456789")
+    return _VARIABLES.get(bare, variable)
+
+
+def _which(data: Data) -> tuple[str, str]:
+    causes = data.get("causes") or []
+    if not causes:
+        return _NO_CAUSE.get(data["verdict"], ("No cause was named", ""))
+    headline = _capital(" and ".join(_counted([f"{title(c['effect'])}, {joint_text(c['joint'])}" for c in causes])))
+    text = " ".join(_about(cause, alone=len(causes) == 1) for cause in causes)
+    if doubtful(data):
+        headline += " (doubtful)"
+        text += " Best candidates only: what they leave is explained by no effect in the library."
+    return headline, text
+
+
+def _counted(names: list[str]) -> list[str]:
+    """Names in their order, each once, with how often it occurs."""
+    times = {name: names.count(name) for name in names}
+    return [name if n == 1 else f"{name} ({n} times)" for name, n in times.items()]
+
+
+def _about(cause: Data, *, alone: bool) -> str:
+    """Sizes, probability and look-alikes of one cause."""
+    lead = "" if alone else f"{named(cause)}: "
+    text = _capital(f"{lead}{sizes(cause['parameters'])}; probability {cause['probability']:.2f}")
+    others = cause.get("equivalents") or []
+    if others:
+        text += f". These logs do not tell it from {' or '.join(named(e) for e in others)}"
     return text + "."
 
 
-def which(data: Data) -> str:
-    """Answer to the second question."""
-    causes = data.get("causes") or []
-    if not causes:
-        return {
-            "none": "No cause: nothing is left to explain.",
-            "parameters": "No missing effect: the arm file's values, re-estimated, suffice.",
-            "unexplained": "No effect in the library explains it; a wrong name would not help.",
-        }.get(data["verdict"], "No cause was named.")
-    parts = []
-    for cause in causes:
-        values = ", ".join(
-            f"{name} {figure(p['value'])} ± {figure(p['sigma'], 2)} {p['unit']}"
-            for name, p in cause["parameters"].items()
-        )
-        text = (
-            f"{title(cause['effect'])}, {joint_text(cause['joint'])}: {values} (probability {cause['probability']:.2f})"
-        )
-        if cause["probability"] < _DOUBTFUL:
-            text += ", the best candidate beside a gap that stays unexplained"
-        others = cause.get("equivalents") or []
-        if others:
-            names = ", ".join(f"{title(e['effect'])} ({joint_text(e['joint'])})" for e in others)
-            text += f"; these logs do not tell it from {names}"
-        parts.append(text)
-    return ". Then: ".join(parts) + "."
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
-def how_far(data: Data) -> str:
-    """Answer to the third question."""
+def _how_far(data: Data) -> tuple[str, str]:
     gap = data["gap"]
     unit = gap.get("unit", "rad")
     low, high = gap["closed_ci"]
-    return (
-        f"On held-out motion, predictions over {gap['horizon_s']:g} s miss by {millis(gap['before'], unit)} (RMS per joint) with the "
-        f"arm file, {millis(gap['refit'], unit)} with its values re-estimated, {millis(gap['after'], unit)} with the causes; sensor noise "
-        f"alone leaves {millis(gap['floor'], unit)}. Closed: {gap['closed']:.0%} [{low:.0%}, {high:.0%}]."
+    before, after = (" / ".join(figure(1e3 * v, 2) for v in gap[key]) for key in ("before", "after"))
+    if data["verdict"] == "none":
+        headline = f"Nothing to shrink: it is {after} m{unit}"
+    elif data["verdict"] == "unexplained":
+        headline = f"It stays: {after} m{unit}"
+    else:
+        headline = f"By {percent(gap['closed'])}: {before} → {after} m{unit}"
+    joints = " per joint" if len(gap["before"]) > 1 else ""
+    detail = (
+        f"RMS error{joints} of predictions over {gap['horizon_s']:g} s on held-out motion. Re-estimating the arm file's own values alone leaves "
+        f"{millis(gap['refit'], unit)}, sensor noise {millis(gap['floor'], unit)}."
     )
-
-
-def answers(data: Data) -> list[tuple[str, str]]:
-    """The three questions with their answers."""
-    return [
-        ("Where is the gap?", where(data)),
-        ("Which effect causes it?", which(data)),
-        ("How far does it shrink?", how_far(data)),
-    ]
+    if data["verdict"] != "none":
+        detail += f" Share closed: {percent(gap['closed'])}, 95\N{NO-BREAK SPACE}% interval {percent(low)} to {percent(high)}."
+    return headline, detail

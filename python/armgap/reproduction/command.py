@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
+import json
+from typing import TYPE_CHECKING
+
 import click
 
 from armgap.reproduction.experiment import Reproduction, reproduce
 
+if TYPE_CHECKING:
+    from rich.table import Table
+
 __all__ = ["command"]
+
+#: Columns of a terminal below which Table II is shown scheme by scheme.
+NARROW = 100
 
 
 @click.command("reproduce")
-@click.option("--report", "report_file", default="armgap-reproduction.html", show_default=True, metavar="OUT.html")
+@click.option("--report", "report_file", default="armgap-reproduction.html", show_default=True, metavar="OUT")
 @click.option("--json", "json_file", metavar="OUT", help="Write estimates and findings as JSON; - is standard output.")
 @click.option("--quiet", is_flag=True, help="No summary.")
 def command(report_file: str, json_file: str | None, quiet: bool) -> None:
     """Repeat the seed paper's experiment: Table II, Figures 2 to 7, and what explains their deviations."""
-    from armgap.cli.common import check_outputs, write
-    from armgap.reproduction.page import render
+    from armgap.cli.common import check_outputs, interruptible, working, write
+    from armgap.report import check_report, render_report
+    from armgap.reproduction.page import document
 
     check_outputs(report_file, json_file)
-    result = reproduce()
-    write(report_file, render(result))
+    check_report(report_file)
+    with working("simulating and identifying", quiet=quiet):
+        result = interruptible(reproduce)
+    write(report_file, render_report(document(result), json.loads(result.to_json()), report_file))
     if json_file is not None:
         write(json_file, result.to_json(indent=2))
     if not quiet and json_file != "-":
@@ -28,18 +40,40 @@ def command(report_file: str, json_file: str | None, quiet: bool) -> None:
 
 
 def _summarise(result: Reproduction, report_file: str) -> None:
-    from rich.table import Table
+    from rich.text import Text
 
     from armgap.cli.common import console
+
+    say = console()
+    for table in _tables(result, narrow=say.width < NARROW):
+        say.print(table)
+    for title, text in result.findings():
+        say.print(Text.assemble((f"{title}. ", "bold"), text, "\n"))
+    say.print(f"report: {report_file}", highlight=False, markup=False)
+
+
+def _tables(result: Reproduction, *, narrow: bool) -> list[Table]:
+    """Table II as one wide table, or one table per scheme."""
     from armgap.reproduction.page import table_two
 
     header, rows = table_two(result)
-    table = Table(title="Table II, beside a simulated run with everything as in the paper")
+    title = "Table II, beside a simulated run with everything as in the paper"
+    if not narrow:
+        return [_table(title, [name.replace(": ", "\n") for name in header], rows)]
+    return [
+        _table(
+            header[c].removeprefix("paper: "), [*header[:3], "paper", "here"], [[*r[:3], r[c], r[c + 1]] for r in rows]
+        )
+        for c in range(3, len(header), 2)
+    ]
+
+
+def _table(title: str, header: list[str], rows: list[list[str]]) -> Table:
+    from rich.table import Table
+
+    table = Table(title=title)
     for name in header:
-        table.add_column(name.replace(": ", "\n"), justify="left" if name == "parameter" else "right")
+        table.add_column(name.replace("paper: ", ""), justify="left" if name == "parameter" else "right")
     for row in rows:
         table.add_row(*("-" if cell == "no convergence" else cell for cell in row))
-    console().print(table)
-    for title, text in result.findings():
-        console().print(f"[bold]{title}.[/bold] {text}\n")
-    console().print(f"report: {report_file}")
+    return table

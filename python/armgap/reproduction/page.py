@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from armgap.identification import SCHEMES, Identification
-from armgap.report import charts, page
-from armgap.report.page import Section
+from armgap.report import Document, charts
+from armgap.report.html import page_of
+from armgap.report.page import Drawing, Section
+from armgap.report.words import Answer, unit_text
 from armgap.reproduction.experiment import LADDER, PAPER_ESTIMATES, PAPER_MEASURED, Reproduction
 from armgap.reproduction.findings import percent
 
-__all__ = ["render", "table_two"]
+__all__ = ["document", "render", "table_two"]
 
 # An estimate's first samples are far off; the pictures show what lies within so many times the true value.
 SPAN = 1.6
@@ -54,16 +56,11 @@ def _parts(r: Reproduction) -> list[list[str]]:
     ]
 
 
-def _grid(figures: list[Any]) -> Any:
-    from bokeh.layouts import gridplot
-
-    return gridplot(figures, ncols=3, sizing_mode="stretch_width", toolbar_location=None, merge_tools=False)
-
-
-def _estimates(r: Reproduction, curves: Sequence[Curve], first: int = 0) -> Any:
+def _estimates(r: Reproduction, curves: Sequence[Curve], first: int = 0) -> list[Any]:
     """Estimates over time, one small picture per parameter."""
     thin = slice(None, None, 8)
-    figures, names = [], _names(r)
+    figures: list[Any] = []
+    names = _names(r)
     for i in range(first, len(r.arm.theta)):
         truth = float(r.arm.theta[i])
         reach = SPAN * abs(truth)
@@ -71,33 +68,28 @@ def _estimates(r: Reproduction, curves: Sequence[Curve], first: int = 0) -> Any:
             (label, np.clip(result.history[thin, i], truth - reach, truth + reach), colour)
             for label, result, colour in curves
         ]
-        figures.append(
-            charts.lines(
-                f"{names[i]} [{r.arm.parameter_units[i]}]",
-                "time [s]",
-                "",
-                r.log.t[thin],
-                shown,
-                levels=[("true", truth, charts.MEASURED)],
-                height=210,
-            )
-        )
-    return _grid(figures)
+        levels = [("true", truth, charts.MEASURED)]
+        chart = charts.lines("", "time [s]", "", r.log.t[thin], shown, levels=levels, height=210)
+        figures.append(Drawing(f"{names[i]} [{unit_text(r.arm.parameter_units[i])}]", chart))
+    return figures
 
 
 def _response(r: Reproduction, label: str) -> list[Any]:
     thin = slice(None, None, 4)
     return [
-        charts.lines(
-            f"joint {j + 1}, open loop",
-            "time [s]",
-            "position [rad]",
-            r.log.t[thin],
-            [
-                ("run", r.log.q[thin, j], charts.MEASURED),
-                (label, r.responses[label].q[thin, j], charts.AFTER),
-            ],
-            height=220,
+        Drawing(
+            f"joint {j + 1}, open loop [rad]",
+            charts.lines(
+                "",
+                "time [s]",
+                "",
+                r.log.t[thin],
+                [
+                    ("run", r.log.q[thin, j], charts.MEASURED),
+                    (label, r.responses[label].q[thin, j], charts.AFTER),
+                ],
+                height=220,
+            ),
         )
         for j in range(r.arm.n_joints)
     ]
@@ -109,11 +101,11 @@ def _distance(r: Reproduction, label: str) -> str:
 
 
 def _responses(r: Reproduction, title: str, label: str) -> Section:
-    return Section(title, text=[_distance(r, label)], figures=_response(r, label))
+    return Section(title, text=[_distance(r, label)], figures=_response(r, label), columns=2)
 
 
 def _course(r: Reproduction, title: str, scheme: str) -> Section:
-    return Section(title, figures=[_estimates(r, [("estimate", r.steps[scheme][0], charts.AFTER)])])
+    return Section(title, figures=_estimates(r, [("estimate", r.steps[scheme][0], charts.AFTER)]), columns=3)
 
 
 def _drift(r: Reproduction) -> Section:
@@ -122,7 +114,7 @@ def _drift(r: Reproduction) -> Section:
         ("filtered power", r.wandering["filtered-power"][0], charts.AFTER),
     ]
     title = "Figure 5 against Figure 6 under torques that wander slowly: theta5 to theta9"
-    return Section(title, figures=[_estimates(r, curves, first=4)])
+    return Section(title, figures=_estimates(r, curves, first=4), columns=3)
 
 
 def _sections(r: Reproduction) -> list[Section]:
@@ -149,7 +141,14 @@ def _sections(r: Reproduction) -> list[Section]:
     ]
 
 
+def document(r: Reproduction) -> Document:
+    """Return the report."""
+    lead = "Reyes and Kelly 1997 on a simulated arm of Table I: asymmetric Coulomb friction, encoder counts, backward differences."
+    return Document(
+        "The seed reproduced", lead, [Answer(title, "", text) for title, text in r.findings()], _sections(r)
+    )
+
+
 def render(r: Reproduction) -> str:
     """Return the report as one HTML page that loads nothing from elsewhere."""
-    lead = "Reyes and Kelly 1997 on a simulated arm of Table I: asymmetric Coulomb friction, encoder counts, backward differences."
-    return page.render("The seed reproduced", lead, r.findings(), _sections(r))
+    return page_of(document(r))

@@ -6,6 +6,11 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+// The README's example is compiled and run with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+mod readme {}
+
 pub mod arm;
 pub mod effect;
 pub mod filter;

@@ -6,7 +6,7 @@ use crate::screen::{Scored, candidates, screen};
 use crate::solve::{Effort, Fit};
 use crate::study::{Study, Weights};
 use armgap_core::arm::Arm;
-use armgap_core::effect::NEVER;
+use armgap_core::effect::{NEVER, Trial};
 use rayon::prelude::*;
 
 /// Candidates that get a full fit in each stage.
@@ -36,6 +36,9 @@ const WORTH_SMOOTHING: f64 = 2.0;
 /// Finalists by closeness to trusted values lie within this many squared sigmas of the closest.
 const TRUSTED: f64 = 10.0;
 
+/// Share of windows that are left out where only the size of a gap is in question.
+const SPOILT: f64 = 0.05;
+
 /// Widths of smoothed friction that are tried as a nuisance, relative to the slowest joint's RMS speed.
 const SMOOTHING: [f64; 2] = [0.03, 0.1];
 
@@ -52,6 +55,8 @@ pub struct Contender<const P: usize> {
     pub training: Vec<f64>,
     /// Tempered cost of every holdout window.
     pub holdout: Vec<f64>,
+    /// Cost of the holdout windows as they are, but for the worst few.
+    pub error: f64,
 }
 
 impl<const P: usize> Contender<P> {
@@ -95,8 +100,6 @@ pub struct Stage<const N: usize, const P: usize> {
     pub contenders: Vec<Contender<P>>,
     /// Every candidate that was fitted, by the share of the gap it removes under the current model's own weights, best first.
     pub field: Vec<(Contender<P>, f64)>,
-    /// First-order tests of all candidates around the current model.
-    pub screened: Vec<Scored>,
     /// Weights in force.
     pub weights: Weights<N>,
     /// Cost the measurement noise alone would leave on the holdout, under these weights.
@@ -115,14 +118,12 @@ impl<const N: usize, const P: usize> Stage<N, P> {
 
     /// RMS improvement of a contender on the holdout, relative to the motion within the windows.
     pub fn relevance(&self, contender: &Contender<P>) -> f64 {
-        let base: f64 = self.base.holdout.iter().sum();
-        let here: f64 = contender.holdout.iter().sum();
-        ((base - here).max(0.0) / self.motion).sqrt()
+        ((self.base.error - contender.error).max(0.0) / self.motion).sqrt()
     }
 
     /// RMS error of the current model on the holdout, relative to the motion within the windows.
     pub fn relative_error(&self) -> f64 {
-        (self.base.holdout.iter().sum::<f64>() / self.motion).sqrt()
+        (self.base.error / self.motion).sqrt()
     }
 
     /// How far the current model's cost lies above the floor, as a factor.
@@ -132,26 +133,42 @@ impl<const N: usize, const P: usize> Stage<N, P> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// One stage around the current model.
-    pub fn stage(&self, current: &Hypothesis<P>, scale: [f64; N]) -> Stage<N, P> {
+    /// One stage around the current model; improvements below `noticeable`, relative to the motion, are not looked for.
+    pub fn stage(&self, current: &Hypothesis<P>, scale: [f64; N], noticeable: f64) -> Stage<N, P> {
         let (fit, weights) = self.settle(current, scale);
-        let all = self.open_candidates(&fit.hypothesis);
-        let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
-        let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
-        let mut starts: Vec<Hypothesis<P>> =
-            promising(&screened, self.least_trace(&weights, &fit) * training)
-                .into_iter()
-                .map(|effect| {
-                    self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| fit.hypothesis.with(effect))
-                })
-                .collect();
-        starts.extend(self.smoother(&fit.hypothesis, &weights, training));
+        let starts = self.starts(&fit, &weights, noticeable);
         let first = self.contend(&weights, &fit.hypothesis, starts, Effort::ROUGH);
         let field = self.field(&weights, &fit, &first);
         let (base, contenders, weights) = self.final_round(&fit.hypothesis, first, weights);
         let floor = self.floor(&weights);
         let motion = self.motion(&weights);
-        Stage { settled: fit, base, contenders, field, screened, weights, floor, motion }
+        Stage { settled: fit, base, contenders, field, weights, floor, motion }
+    }
+
+    /// Hypotheses that are worth a full fit: one candidate more than the fitted model, or smoother friction.
+    fn starts(&self, fit: &Fit<P>, weights: &Weights<N>, noticeable: f64) -> Vec<Hypothesis<P>> {
+        let gap = self.relative_gap(weights, fit) > noticeable;
+        if !gap && is_plausible::<P>(fit.prior_cost) {
+            return Vec::new();
+        }
+        let all = self.open_candidates(&fit.hypothesis);
+        let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
+        let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
+        let least = if gap { self.least_trace(weights, fit) * training } else { f64::INFINITY };
+        let more = promising(&screened, least).into_iter().map(|effect| {
+            self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| fit.hypothesis.with(effect))
+        });
+        let mut starts: Vec<Hypothesis<P>> = more.collect();
+        if gap {
+            starts.extend(self.smoother(&fit.hypothesis, weights, training));
+        }
+        starts
+    }
+
+    /// RMS error of a fit on the holdout relative to the motion.
+    fn relative_gap(&self, weights: &Weights<N>, fit: &Fit<P>) -> f64 {
+        let costs = self.judge(&weights.holdout).raw_costs(&fit.hypothesis);
+        (without_worst(costs) / self.motion(weights)).sqrt()
     }
 
     /// Candidates not yet in the model.
@@ -207,8 +224,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
     /// Least part of the cost that a candidate must promise to remove.
     fn least_trace(&self, weights: &Weights<N>, fit: &Fit<P>) -> f64 {
-        let cost: f64 = self.judge(&weights.holdout).window_costs(&fit.hypothesis).iter().sum();
-        let small = (cost / self.motion(weights)).sqrt() < CONSEQUENCE;
+        let small = self.relative_gap(weights, fit) < CONSEQUENCE;
         if small { TRACE_IN_SMALL } else { TRACE }
     }
 
@@ -234,10 +250,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             .map(|start| {
                 let fit = self.problem(&weights.training).solve(&start, effort);
                 let training = self.problem(&weights.training).window_costs(&fit.hypothesis);
-                let holdout = self.judge(&weights.holdout).window_costs(&fit.hypothesis);
+                let (holdout, error) = self.judged_on_holdout(weights, &fit);
                 let effect = fit.hypothesis.effects.get(known).copied();
                 let size = effect.as_ref().map_or(0.0, |e| self.relative_size(e));
-                Contender { effect, size, fit, training, holdout }
+                Contender { effect, size, fit, training, holdout, error }
             })
             .filter(|c| c.score().is_finite())
             .collect();
@@ -254,6 +270,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             }
         }
         best
+    }
+
+    /// Tempered costs of the holdout windows, and their cost as they are.
+    pub fn judged_on_holdout(&self, weights: &Weights<N>, fit: &Fit<P>) -> (Vec<f64>, f64) {
+        let raw = self.judge(&weights.holdout).raw_costs(&fit.hypothesis);
+        (raw.iter().map(|cost| weights.holdout.tempered(*cost)).collect(), without_worst(raw))
     }
 
     /// Re-weights by the best contender's residual and fits the finalists and the current model again.
@@ -320,6 +342,18 @@ fn finalists<const P: usize>(contenders: &[Contender<P>], hopeless: f64) -> Vec<
         .collect()
 }
 
+/// Whether parameters may lie that far from their trusted values, in squared sigmas, by chance.
+pub fn is_plausible<const P: usize>(prior_cost: f64) -> bool {
+    prior_cost <= P as f64 + 3.0 * (2.0 * P as f64).sqrt()
+}
+
+/// Sum of all costs but the worst few, which a bad start may have spoilt.
+fn without_worst(mut costs: Vec<f64>) -> f64 {
+    costs.sort_by(f64::total_cmp);
+    let kept = costs.len() - (costs.len() as f64 * SPOILT) as usize;
+    costs.iter().take(kept).sum()
+}
+
 /// The best start of each of the best-scoring candidates, and of those that only trusted values can reveal.
 fn promising(screened: &[Scored], least: f64) -> Vec<Placed> {
     let mut order: Vec<&Scored> = screened.iter().filter(|s| s.gain > 0.0).collect();
@@ -327,7 +361,9 @@ fn promising(screened: &[Scored], least: f64) -> Vec<Placed> {
     let mut chosen: Vec<Placed> = Vec::new();
     for scored in order {
         let wanted = (chosen.len() < FULL_FITS && scored.gain > least) || scored.distinct < ABSORBED;
-        if wanted && !chosen.iter().any(|c| c.same_place(&scored.effect)) {
+        // A test at a trial value says little of where to start, so two of them may.
+        let starts = if scored.effect.law.spec().trial == Trial::Whole { 2 } else { 1 };
+        if wanted && chosen.iter().filter(|c| c.same_place(&scored.effect)).count() < starts {
             chosen.push(scored.effect);
         }
     }

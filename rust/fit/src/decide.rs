@@ -3,7 +3,7 @@
 //! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the
 //! windows' own scatter. After every addition all causes are fitted together again, and one that has become idle is dropped.
 
-use crate::attribute::{Contender, Stage};
+use crate::attribute::{Contender, Stage, is_plausible};
 use crate::model::{Hypothesis, Placed};
 use crate::solve::{Effort, Fit};
 use crate::study::Study;
@@ -31,13 +31,16 @@ const TRUST_GAIN: f64 = 16.0;
 const ALIKE_TRUST: f64 = 6.0;
 
 /// Error relative to the motion within a window below which a gap is of no consequence, whatever the encoders resolve.
-pub const CONSEQUENCE: f64 = 3e-3;
+pub const CONSEQUENCE: f64 = 1e-3;
 
 /// Improvement relative to the motion within a window below which an effect is of no consequence.
 const RELEVANT: f64 = 1e-4;
 
 /// Probability left to a cause beside a remainder that it does not touch at all.
 const REMAINDER_DOUBT: f64 = 0.25;
+
+/// The same relative to the first gap: what lies below it is no cause of that gap.
+const NOTICEABLE: f64 = 0.02;
 
 /// A fit that ends this close to the largest possible size has found no effect.
 const AT_BOUND: f64 = 0.98;
@@ -83,13 +86,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     pub fn attribute(&self, max_causes: usize, seed: u64) -> Attribution<N, P> {
         let nominal = Hypothesis::rigid(self.prior.theta);
         let mut scale = self.rough_scale(&nominal);
-        let mut stage = self.stage(&nominal, scale);
+        let mut stage = self.stage(&nominal, scale, RELEVANT);
         let refit = stage.settled.clone();
         let mut model = refit.clone();
         let (mut causes, mut stages): (Vec<Cause>, Vec<Stage<N, P>>) = (Vec::new(), Vec::new());
         let mut smoothed = false;
+        let noticeable = RELEVANT.max(NOTICEABLE * stage.relative_error());
         while causes.len() < max_causes {
-            let Some((choice, ground)) = choose(&stage, smoothed) else {
+            let Some((choice, ground)) = choose(&stage, smoothed, noticeable) else {
                 break;
             };
             let best = &stage.contenders[choice];
@@ -99,7 +103,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 None => smoothed = true,
             }
             scale = stage.weights.training.scale;
-            let next = self.stage(&model.hypothesis, scale);
+            let next = self.stage(&model.hypothesis, scale, noticeable);
             stages.push(std::mem::replace(&mut stage, next));
             model = stage.settled.clone();
         }
@@ -133,8 +137,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
     fn judged(&self, stage: &Stage<N, P>, fit: Fit<P>, effect: Option<Placed>) -> Contender<P> {
         let training = self.problem(&stage.weights.training).window_costs(&fit.hypothesis);
-        let holdout = self.judge(&stage.weights.holdout).window_costs(&fit.hypothesis);
-        Contender { effect, size: 0.0, fit, training, holdout }
+        let (holdout, error) = self.judged_on_holdout(&stage.weights, &fit);
+        Contender { effect, size: 0.0, fit, training, holdout, error }
     }
 }
 
@@ -148,11 +152,18 @@ enum Ground {
 }
 
 /// Index of the contender to adopt, and why, if any deserves it; smoother friction is adopted once.
-fn choose<const N: usize, const P: usize>(stage: &Stage<N, P>, smoothed: bool) -> Option<(usize, Ground)> {
+///
+/// Improvements below `noticeable`, relative to the motion, do not count.
+fn choose<const N: usize, const P: usize>(
+    stage: &Stage<N, P>,
+    smoothed: bool,
+    noticeable: f64,
+) -> Option<(usize, Ground)> {
     let open = |c: &Contender<P>| c.effect.is_some() || !smoothed;
-    let by_motion = stage.contenders.iter().position(open).filter(|i| moves(stage, &stage.contenders[*i]));
+    let by_motion =
+        stage.contenders.iter().position(open).filter(|i| moves(stage, &stage.contenders[*i], noticeable));
     if let Some(best) = by_motion {
-        return Some((simplest(stage, best), Ground::Motion));
+        return Some((simplest(stage, best, noticeable), Ground::Motion));
     }
     let trust = |i: &usize| stage.contenders[*i].fit.prior_cost;
     (0..stage.contenders.len())
@@ -163,11 +174,12 @@ fn choose<const N: usize, const P: usize>(stage: &Stage<N, P>, smoothed: bool) -
 
 /// The contender with the fewest parameters among those that do almost as well as the best: a spring with a far-off rest position is
 /// an offset.
-fn simplest<const N: usize, const P: usize>(stage: &Stage<N, P>, best: usize) -> usize {
+fn simplest<const N: usize, const P: usize>(stage: &Stage<N, P>, best: usize, noticeable: f64) -> usize {
     let advantage = |i: usize| stage.base.score() - stage.contenders[i].score();
     let size = |i: usize| stage.contenders[i].effect.as_ref().map_or(0, Placed::len);
     let enough = ALMOST * advantage(best);
-    let as_good = |i: &usize| advantage(*i) > enough && moves(stage, &stage.contenders[*i]) && size(*i) > 0;
+    let as_good =
+        |i: &usize| advantage(*i) > enough && moves(stage, &stage.contenders[*i], noticeable) && size(*i) > 0;
     if size(best) == 0 {
         return best;
     }
@@ -175,13 +187,17 @@ fn simplest<const N: usize, const P: usize>(stage: &Stage<N, P>, best: usize) ->
 }
 
 /// Whether a contender closes a part of the gap that matters, on the holdout too.
-fn moves<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Contender<P>) -> bool {
+fn moves<const N: usize, const P: usize>(
+    stage: &Stage<N, P>,
+    contender: &Contender<P>,
+    noticeable: f64,
+) -> bool {
     let possible = contender.size < AT_BOUND;
     let matters = if stage.relative_error() > CONSEQUENCE { MATTERS } else { MATTERS_IN_SMALL };
     stage.excess() > ABOVE_FLOOR
         && possible
         && stage.share(contender) > matters
-        && stage.relevance(contender) > RELEVANT
+        && stage.relevance(contender) > noticeable
         && contender.z_over(&stage.base) > CERTAIN
         && contender.holdout_z_over(&stage.base) > HOLDOUT_CERTAIN
 }
@@ -189,9 +205,8 @@ fn moves<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Conten
 /// Whether a contender explains implausible parameters by one effect.
 fn restores<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Contender<P>) -> bool {
     let before = stage.base.fit.prior_cost;
-    let plausible = (P as f64) + 3.0 * (2.0 * P as f64).sqrt();
     contender.effect.is_some()
-        && before > plausible
+        && !is_plausible::<P>(before)
         && before - contender.fit.prior_cost > TRUST_GAIN
         && contender.fit.prior_cost < 0.4 * before
         && contender.score() < stage.base.score()

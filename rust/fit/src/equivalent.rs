@@ -36,6 +36,11 @@ pub fn known(effect: &Placed, joints: usize) -> Vec<Equivalent> {
         "encoder_offset" if joint == Some(1) => {
             one("base_tilt", None, "both turn gravity by one angle; a level on the base separates them")
         }
+        "rotor_inertia" if joint == Some(2) => one(
+            "rotor_coupling",
+            None,
+            "the same motion with theta3 moved by as much; the rotor's own inertia separates them",
+        ),
         "torque_gain" => (1..=joints)
             .filter(|j| Some(*j) != joint)
             .map(|j| Equivalent {

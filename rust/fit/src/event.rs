@@ -20,13 +20,16 @@ use nalgebra::{DMatrix, DVector};
 const DURATIONS: [f64; 6] = [0.03, 0.06, 0.12, 0.25, 0.5, 1.0];
 
 /// Pushes looked for in all logs together.
-const MOST: usize = 10;
+const MOST: usize = 12;
+
+/// More pushes than this in one log are no rare events, but something that the arm does again and again.
+const RARE: usize = 4;
 
 /// Least size of a push in robust standard deviations of all stretches of its length.
-const STANDS_OUT: f64 = 8.0;
+const STANDS_OUT: f64 = 10.0;
 
 /// Least size of a push relative to the largest stretch that is not called one.
-const STANDS_ALONE: f64 = 2.0;
+const STANDS_ALONE: f64 = 2.5;
 
 /// Least share of the cost of the windows it touches that a push must explain.
 const EXPLAINS: f64 = 0.5;
@@ -94,6 +97,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 event.probability = 1.0 - 0.5 * (rest / stretch.z.abs()).powi(2);
                 found.push(event);
             }
+        }
+        let in_log =
+            |e: &Event| found.iter().filter(|o| o.holdout == e.holdout && o.track == e.track).count();
+        if found.iter().any(|e| in_log(e) > RARE) {
+            return Vec::new();
         }
         found
     }

@@ -15,6 +15,8 @@ pub struct Scales<const N: usize> {
     pub speed: [f64; N],
     /// RMS deviation of position from its mean.
     pub position: [f64; N],
+    /// Smallest and largest position.
+    pub travel: [[f64; 2]; N],
     /// Own inertia at `q = 0`.
     pub inertia: [f64; N],
     /// Median sample period, s.
@@ -28,8 +30,11 @@ pub struct Scales<const N: usize> {
 /// A parameter this many times its typical size describes no arm; fits are kept below.
 const LARGEST: f64 = 50.0;
 
-/// Times are measured in sample periods; this many of them are one typical size when it comes to what is possible.
-const LONGEST_TIME: f64 = 20.0;
+/// Times are measured in sample periods; this many of them are possible.
+const LONGEST_TIME: f64 = 1000.0;
+
+/// Laws that change with speed do so below this many times the RMS speed, or they are other laws.
+const FASTEST: f64 = 1.0;
 
 /// Natural frequency, 1/s, damping ratio, and the motor's share of the joint's inertia, of a typical elastic joint.
 const SHAFT_RATE: f64 = 100.0;
@@ -52,6 +57,10 @@ impl<const N: usize> Scales<N> {
             }),
             speed: std::array::from_fn(|j| rms(tracks.iter().flat_map(|t| speeds(t, j)))),
             position: std::array::from_fn(|j| spread(tracks.iter().flat_map(|t| t.column(j)).collect())),
+            travel: std::array::from_fn(|j| {
+                let q = || tracks.iter().flat_map(move |t| t.q.iter().map(move |q| q[j]));
+                [q().fold(f64::INFINITY, f64::min), q().fold(f64::NEG_INFINITY, f64::max)]
+            }),
             inertia: std::array::from_fn(|j| inertia[(j, j)]),
             period: tracks.first().map_or(1e-3, Track::period),
             length: length.unwrap_or(0.3),
@@ -65,6 +74,7 @@ impl<const N: usize> Scales<N> {
             Quantity::Torque => self.torque[j],
             Quantity::Inertia => self.inertia[j],
             Quantity::Drag => self.torque[j] / (self.speed[j] * self.speed[j]),
+            Quantity::CubicDrag => self.torque[j] / self.speed[j].powi(3),
             Quantity::Damping => self.torque[j] / self.speed[j],
             Quantity::Stiffness => self.torque[j] / self.position[j],
             Quantity::Impulse => self.inertia[j] * self.speed[j],
@@ -73,6 +83,8 @@ impl<const N: usize> Scales<N> {
             Quantity::ShaftDamping => self.inertia[j] * SHAFT_RATE * MOTOR_SHARE * SHAFT_DAMPING,
             Quantity::Speed => self.speed[j],
             Quantity::Position => self.position[j],
+            Quantity::Reach => self.travel[j][0].abs().max(self.travel[j][1].abs()),
+            Quantity::Cycles => std::f64::consts::TAU / (self.travel[j][1] - self.travel[j][0]),
             Quantity::Angle | Quantity::Count | Quantity::Ratio | Quantity::Duration => 1.0,
             Quantity::Time => self.period,
             Quantity::Mass => self.torque[N - 1] / (self.gravity * self.length),
@@ -81,10 +93,26 @@ impl<const N: usize> Scales<N> {
         if value.is_finite() && value > 0.0 { value } else { 1.0 }
     }
 
+    /// Start value of a parameter of joint `j`, given in units of its size; none where the joint never gets there.
+    pub fn start(&self, quantity: Quantity, j: usize, value: f64) -> Option<f64> {
+        match quantity {
+            Quantity::Ratio => Some(value),
+            Quantity::Reach => {
+                let side = self.travel[j][usize::from(value > 0.0)];
+                (side * value > 0.0).then_some(value.abs() * side)
+            }
+            _ => Some(value * self.size(quantity, j)),
+        }
+    }
+
     /// Largest deviation from neutral that a parameter of joint `j` can have.
     pub fn largest(&self, quantity: Quantity, j: usize) -> f64 {
-        let patience = if quantity == Quantity::Time { LONGEST_TIME } else { 1.0 };
-        LARGEST * patience * self.size(quantity, j)
+        let most = match quantity {
+            Quantity::Time => LONGEST_TIME,
+            Quantity::Speed => FASTEST,
+            _ => LARGEST,
+        };
+        most * self.size(quantity, j)
     }
 
     /// Sizes of all parameters of an effect.

@@ -7,7 +7,7 @@ use crate::model::{Hypothesis, Placed};
 use crate::scale::Scales;
 use crate::solve::{Problem, neutral, scaled_inverse};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Quantity, Scope, Trial, catalogue};
+use armgap_core::effect::{Scope, Trial, catalogue};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -40,15 +40,16 @@ pub fn candidates<const N: usize>(scales: &Scales<N>) -> Vec<Placed> {
         for joint in 0..joints {
             for start in spec.starts {
                 let mut effect = Placed { law: *law, joint, p: *start };
+                let mut reached = true;
                 for (value, parameter) in effect.p.iter_mut().zip(spec.parameters) {
-                    let size = if parameter.quantity == Quantity::Ratio {
-                        1.0
-                    } else {
-                        scales.size(parameter.quantity, joint)
-                    };
-                    *value = (*value * size).clamp(parameter.lower, parameter.upper);
+                    match scales.start(parameter.quantity, joint, *value) {
+                        Some(start) => *value = start.clamp(parameter.lower, parameter.upper),
+                        None => reached = false,
+                    }
                 }
-                all.push(effect);
+                if reached {
+                    all.push(effect);
+                }
             }
         }
     }

@@ -96,8 +96,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
 
     /// Tempered cost of every window.
     pub fn window_costs(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
-        let costs = self.metric.costs(self.data, &self.residual(hypothesis));
-        costs.into_iter().map(|cost| self.metric.tempered(cost)).collect()
+        self.raw_costs(hypothesis).into_iter().map(|cost| self.metric.tempered(cost)).collect()
+    }
+
+    /// Cost of every window as it is.
+    pub fn raw_costs(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        self.metric.costs(self.data, &self.residual(hypothesis))
     }
 
     /// Whitened sensitivities of the prediction to the free values `which`, given the residual at `hypothesis`.
@@ -258,7 +262,9 @@ fn step(
     let at_bound = |i: usize| {
         (values[i] <= lower[i] && gradient[i] < 0.0) || (values[i] >= upper[i] && gradient[i] > 0.0)
     };
-    let free: Vec<usize> = (0..values.len()).filter(|&i| !at_bound(i)).collect();
+    // A value that changes no prediction stays where it is.
+    let seen = |i: usize| normal[(i, i)] > 0.0;
+    let free: Vec<usize> = (0..values.len()).filter(|&i| seen(i) && !at_bound(i)).collect();
     let mut reduced = DMatrix::from_fn(free.len(), free.len(), |a, b| normal[(free[a], free[b])]);
     for a in 0..free.len() {
         reduced[(a, a)] *= 1.0 + damping;
@@ -267,7 +273,7 @@ fn step(
     let mut next = values.to_vec();
     if let Some(inverse) = scaled_inverse(&reduced) {
         let change = inverse * right;
-        for (a, &i) in free.iter().enumerate() {
+        for (a, &i) in free.iter().enumerate().filter(|(a, _)| change[*a].is_finite()) {
             next[i] = (values[i] + change[a]).clamp(lower[i], upper[i]);
         }
     }

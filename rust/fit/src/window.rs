@@ -20,7 +20,7 @@ const DIVERGED: f64 = 1e3;
 const MAX_SUBSTEPS: usize = 4;
 
 /// The same for motors that swing against their links.
-const MAX_SUBSTEPS_DRIVEN: usize = 8;
+const MAX_SUBSTEPS_DRIVEN: usize = 5;
 
 /// Samples `first ..= last` of one track; row 0 is sample `first + 1`.
 #[derive(Debug, Clone, Copy)]

@@ -3,7 +3,7 @@
 //! `theta1` is the inertia about the joint, `theta2 = m g l` the largest gravity torque.
 
 use super::{Arm, Parameter};
-use crate::real::Real;
+use crate::real::{Real, sin_cos};
 use nalgebra::{SMatrix, SVector};
 
 /// A physical pendulum with a motor in its pivot.
@@ -31,7 +31,7 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
     }
 
     fn gravity(&self, theta: &[T; 4], q: &SVector<T, 1>, tilt: T) -> SVector<T, 1> {
-        SVector::<T, 1>::new(theta[1] * (q[0] + tilt).sin())
+        SVector::<T, 1>::new(theta[1] * sin_cos(q[0] + tilt).0)
     }
 
     fn energy_regressor(&self, q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SVector<T, 4> {

@@ -12,7 +12,7 @@
 //! `C dq`; for that one only `dq' (dM/dt - 2 C) dq = 0` holds.
 
 use super::{Arm, Parameter};
-use crate::real::{Real, lit};
+use crate::real::{Real, lit, sin_cos};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// The two-link vertical arm.
@@ -89,8 +89,8 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
 
     #[inline]
     fn dynamics(&self, theta: &[T; 9], q: &Vector2<T>, dq: &Vector2<T>, tilt: T) -> (Matrix2<T>, Vector2<T>) {
-        let (s1, c1) = (q[0] + tilt).sin_cos();
-        let (s2, c2) = q[1].sin_cos();
+        let (s1, c1) = sin_cos(q[0] + tilt);
+        let (s2, c2) = sin_cos(q[1]);
         let outer = theta[4] * (s1 * c2 + c1 * s2);
         let (kc, ks) = (theta[1] * c2, theta[1] * s2);
         let inertia = Matrix2::new(theta[0] + kc + kc, theta[2] + kc, theta[2] + kc, theta[2]);

@@ -27,9 +27,16 @@ static SPEC: Spec = Spec {
     least_joints: 1,
     parameters: &[
         EffectParameter::bounded("gap", Quantity::Position, 0.0, f64::INFINITY),
-        EffectParameter::shape("rotor_share", Quantity::Ratio, 0.02, 0.35),
+        EffectParameter::shape("rotor_share", Quantity::Ratio, 0.005, 0.35),
     ],
-    starts: &[[0.01, 0.1, 0.0], [0.03, 0.1, 0.0], [0.1, 0.1, 0.0]],
+    starts: &[
+        [0.005, 0.03, 0.0],
+        [0.01, 0.1, 0.0],
+        [0.02, 0.03, 0.0],
+        [0.04, 0.1, 0.0],
+        [0.08, 0.03, 0.0],
+        [0.16, 0.1, 0.0],
+    ],
     trial: Trial::Whole,
     hooks: Hooks::NONE,
 };

@@ -12,6 +12,7 @@ mod base_tilt;
 mod contact;
 mod coulomb_asymmetry;
 mod cross_friction;
+mod cubic_drag;
 mod encoder_eccentricity;
 mod encoder_offset;
 mod external_pulse;
@@ -48,6 +49,7 @@ pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
         &torque_offset::TorqueOffset,
         &stribeck::Stribeck,
         &quadratic_drag::QuadraticDrag,
+        &cubic_drag::CubicDrag,
         &load_dependent_friction::LoadDependentFriction,
         &position_dependent_friction::PositionDependentFriction,
         &friction_warmup::FrictionWarmup,
@@ -99,6 +101,8 @@ pub enum Quantity {
     Inertia,
     /// Torque per squared speed.
     Drag,
+    /// Torque per cubed speed.
+    CubicDrag,
     /// Torque per position.
     Stiffness,
     /// Torque per twist of a shaft.
@@ -115,6 +119,10 @@ pub enum Quantity {
     Speed,
     /// Joint position.
     Position,
+    /// Joint position, measured in the farthest position reached on either side of zero.
+    Reach,
+    /// Cycles per revolution (per metre on a linear joint, times 2 pi), measured in cycles over the joint's travel.
+    Cycles,
     /// Phase or direction, always an angle.
     Angle,
     /// Cycles per revolution, or any other count.
@@ -145,15 +153,17 @@ impl Quantity {
             (Self::Stiffness | Self::ShaftStiffness, false) => "N/m",
             (Self::Damping | Self::ShaftDamping, true) => "N m s/rad",
             (Self::Damping | Self::ShaftDamping, false) => "N s/m",
+            (Self::CubicDrag, true) => "N m s^3/rad^3",
+            (Self::CubicDrag, false) => "N s^3/m^3",
             (Self::Impulse, true) => "N m s",
             (Self::Impulse, false) => "N s",
             (Self::Hardening, true) => "N m/rad^3",
             (Self::Hardening, false) => "N/m^3",
             (Self::Speed, true) => "rad/s",
             (Self::Speed, false) => "m/s",
-            (Self::Position, true) | (Self::Angle, _) => "rad",
-            (Self::Position, false) | (Self::Length, _) => "m",
-            (Self::Count | Self::Ratio, _) => "1",
+            (Self::Position | Self::Reach, true) | (Self::Angle, _) => "rad",
+            (Self::Position | Self::Reach, false) | (Self::Length, _) => "m",
+            (Self::Count | Self::Cycles | Self::Ratio, _) => "1",
             (Self::Time | Self::Duration, _) => "s",
         }
     }

@@ -18,7 +18,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     least_joints: 1,
     parameters: &[
-        EffectParameter::signed("amplitude", Quantity::Torque),
+        EffectParameter::bounded("amplitude", Quantity::Torque, 0.0, f64::INFINITY),
         EffectParameter::bounded("velocity", Quantity::Speed, 1e-3, f64::INFINITY),
     ],
     starts: &[[0.05, 0.03, 0.0], [0.05, 0.1, 0.0], [0.05, 0.3, 0.0], [0.05, 0.8, 0.0]],

@@ -1,0 +1,65 @@
+"""``armgap replay``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armgap.cli.common import (
+    arm_option,
+    check_outputs,
+    columns_option,
+    console,
+    parse_columns,
+    parse_units,
+    quiet_option,
+    units_option,
+    working,
+    write,
+)
+from armgap.errors import OptionError
+
+__all__ = ["command"]
+
+SUFFIX = ".rrd"
+
+
+@click.command("replay")
+@click.argument("log_file", metavar="LOG")
+@arm_option
+@click.option("--diagnosis", "diagnosis_file", metavar="D.json", help="Diagnosis whose causes are predicted with too.")
+@click.option("--horizon", default=0.25, show_default=True, help="Length of a predicted window [s].")
+@click.option("-o", "--output", default="replay.rrd", show_default=True, metavar="OUT.rrd", help="Recording to write.")
+@columns_option
+@units_option
+@quiet_option
+def command(
+    log_file: str,
+    arm_file: str,
+    diagnosis_file: str | None,
+    horizon: float,
+    output: str,
+    columns: str | None,
+    units: str | None,
+    quiet: bool,
+) -> None:
+    """Write measured and predicted arm side by side as a recording for the Rerun viewer."""
+    from armgap.arm import Arm
+    from armgap.comparison import read_diagnosis
+    from armgap.log import Log
+    from armgap.report.replay import models, predicted, write_replay
+
+    check_outputs(output)
+    if Path(output).suffix != SUFFIX:
+        raise OptionError("a recording has another extension", remedy=f"name it {SUFFIX}", file=output)
+    if not horizon > 0:
+        raise OptionError(f"the horizon is {horizon}", remedy="give a positive number of seconds")
+    arm = Arm.read(Path(arm_file))
+    log = Log.read(log_file, arm=arm, columns=parse_columns(columns), units=parse_units(units))
+    diagnosis = None if diagnosis_file is None else read_diagnosis(diagnosis_file)
+    with working("predicting", quiet=quiet):
+        curves = {name: predicted(model, log, horizon) for name, model in models(arm, diagnosis).items()}
+    write(output, lambda path: write_replay(curves, log, arm, path))
+    if not quiet:
+        console().print(f"recording: {output} (open it with: rerun {output})", highlight=False, markup=False)

@@ -1,0 +1,142 @@
+"""A fitted model as the compiled simulator takes it: parameters, effects, friction smoothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap import _native
+from armgap.arm import Arm
+
+__all__ = ["Hypothesis", "Placed"]
+
+Array = NDArray[np.float64]
+
+#: Largest change of a position when the simulator halves its steps, rad or m.
+TOLERANCE = 3e-6
+#: A motion this short is as good as its first acceleration, s.
+INSTANT = 1e-6
+#: Effects that change the inertia matrix.
+ON_INERTIA = ("rotor_inertia", "rotor_coupling", "payload")
+#: Points of the table that turns measured positions into true ones.
+TABLE = 4001
+
+
+class Placed(NamedTuple):
+    """An effect with its values; `log` names the only log that it acts in."""
+
+    effect: str
+    joint: int | None
+    parameters: dict[str, float]
+    log: str | None = None
+
+    def on(self, joint: int | None) -> tuple[str, int | None, dict[str, float]]:
+        """The effect as the compiled simulator takes it, on some joint."""
+        return self.effect, joint, self.parameters
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A model of an arm.
+
+    Attributes
+    ----------
+    arm : Arm
+        Kind, gravity and lengths.
+    theta : tuple of float
+        Parameters [SI].
+    effects : tuple of Placed
+        Effects with their values.
+    smoothing : float
+        Width of the smoothed sign of friction [rad/s]; 0 is dry friction.
+    """
+
+    arm: Arm
+    theta: tuple[float, ...]
+    effects: tuple[Placed, ...] = ()
+    smoothing: float = 0.0
+
+    @classmethod
+    def of(cls, data: dict[str, Any], arm: Arm) -> Hypothesis:
+        """Return the model with causes of a diagnosis."""
+        found = data["parameters"]["with_causes"]
+        effects = tuple(
+            Placed(c["effect"], c["joint"], {name: p["value"] for name, p in c["parameters"].items()}, c.get("log"))
+            for c in data.get("causes") or []
+        )
+        smoothing = float((data.get("options") or {}).get("friction_smoothing") or 0.0)
+        return cls(arm, tuple(float(found[name]["value"]) for name in arm.parameter_names), effects, smoothing)
+
+    def only(self, effects: Sequence[Placed]) -> Hypothesis:
+        """Return the same model with other effects."""
+        return replace(self, effects=tuple(effects))
+
+    def run(self, t: Array, tau: Array, q0: Array, dq0: Array) -> tuple[Array, Array]:
+        """Positions and velocities under held torques, each of shape (n_samples, n_joints).
+
+        Raises
+        ------
+        ValueError
+            If the motion diverges or cannot be computed within the tolerance.
+        """
+        arm = self.arm
+        lengths = None if arm.link_length is None else arm.link_length.tolist()
+        t, tau, q0, dq0 = (np.ascontiguousarray(x, dtype=np.float64) for x in (t, tau, q0, dq0))
+        effects, theta = [e.on(e.joint) for e in self.effects], list(self.theta)
+        return _native.simulate(
+            arm.kind, arm.gravity, lengths, theta, t, tau, q0, dq0, effects, TOLERANCE, self.smoothing
+        )
+
+    def acceleration(self, q: Array, dq: Array, tau: Array) -> Array:
+        """Acceleration of one state under one torque, shape (n_joints,)."""
+        _, speed = self.run(np.array([0.0, INSTANT]), np.vstack([tau, tau]), q, dq)
+        return np.asarray((speed[1] - speed[0]) / INSTANT)
+
+    def frictionless(self) -> Hypothesis:
+        """Return the same arm without friction, and with no effects but those on its inertia."""
+        b = self.arm.n_inertial
+        inertial = tuple(e for e in self.effects if e.effect in ON_INERTIA)
+        return replace(self, theta=self.theta[:b] + (0.0,) * (len(self.theta) - b), effects=inertial, smoothing=0.0)
+
+    def compliance(self, q: Array) -> Array:
+        """Inverse of the inertia matrix, shape (n_joints, n_joints): what each unit torque accelerates, friction aside."""
+        free, rest = self.frictionless(), np.zeros(self.arm.n_joints)
+        idle = free.acceleration(q, rest, rest)
+        return np.column_stack([free.acceleration(q, rest, unit) - idle for unit in np.eye(len(rest))])
+
+
+def delivered(t: Array, tau: Array, effects: Sequence[Placed]) -> Array:
+    """Torque at the joints when effects act on the command, mean of each sample; shape of `tau`.
+
+    Each joint's command drives a unit mass that has these effects and no others: its acceleration is the torque.
+    """
+    found = np.array(tau, dtype=np.float64)
+    for joint in {e.joint for e in effects if e.joint is not None}:
+        mine = [e.on(1) for e in effects if e.joint == joint]
+        column = np.ascontiguousarray(tau[:, [joint - 1]])
+        start = np.zeros(1)
+        _, speed = _native.simulate("axis", 0.0, None, [1.0, 0.0, 0.0, 0.0], t, column, start, start, mine, 1e-3, 0.0)
+        found[:-1, joint - 1] = np.diff(speed[:, 0]) / np.diff(t)
+    return found
+
+
+def true_positions(q: Array, effects: Sequence[Placed]) -> Array:
+    """Positions behind measured ones when effects act on the encoders; shape of `q`.
+
+    A free unit inertia sweeps the range at constant speed; what its encoder shows is the table to look up.
+    """
+    found = np.array(q, dtype=np.float64)
+    for joint in {e.joint for e in effects if e.joint is not None}:
+        mine = [e.on(1) for e in effects if e.joint == joint]
+        low, high = found[:, joint - 1].min() - 1.0, found[:, joint - 1].max() + 1.0
+        t = np.linspace(0.0, 1.0, TABLE)
+        shown, _ = _native.simulate(
+            "pendulum", 0.0, None, [1.0, 0.0, 0.0, 0.0], t, np.zeros((TABLE, 1)),
+            np.array([low]), np.array([high - low]), mine, 1e-9, 0.0,
+        )  # fmt: skip
+        found[:, joint - 1] = np.interp(q[:, joint - 1], shown[:, 0], low + (high - low) * t)
+    return found

@@ -1,0 +1,329 @@
+"""A cause against its own variable: the torque that the model without it lacks, and the fitted law through it.
+
+Short windows of the held-out logs are predicted twice under the logged torque, without the cause and with it. The second
+derivative of "measured minus predicted without" times the inertia matrix is the torque that the model without the cause
+lacks; the same of "predicted with minus predicted without" is the law, seen through the same filter. Both are averaged
+over ranges of the variable that the cause depends on: speed for friction, position for ripple, and so on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap import _native
+from armgap.arm import Arm
+from armgap.evidence.hypothesis import Array, Hypothesis, Placed, delivered, true_positions
+from armgap.log import Log
+
+__all__ = ["laws"]
+
+#: Windows looked at, over all logs.
+WINDOWS = 160
+#: Half width of the cubic whose curvature is taken: samples at least, and s at least.
+HALF_SAMPLES, HALF_S = 8, 0.016
+#: Ranges of the variable, samples in each at least, samples altogether at least, and points drawn.
+BINS, FEWEST, ENOUGH, POINTS = 24, 4, 40, 400
+#: A joint slower than this part of its fast motion is taken to be at rest, where dry friction hides every torque.
+REST = 0.01
+#: An event is looked at for so many times its duration before and after it, and its duration taken for so many s at least.
+EVENT, EVENT_S = 4.0, 0.1
+#: Two-sided 95 % of the normal distribution.
+NORMAL_95 = 1.96
+
+ON_COMMAND = ("actuator_lag", "actuator_delay", "torque_saturation", "torque_dead_zone", "torque_gain")
+ON_ENCODER = ("encoder_offset", "encoder_eccentricity")
+
+
+@dataclass(frozen=True)
+class Point:
+    """Samples that evidence is taken from; arrays of shape (n, n_joints) unless noted."""
+
+    t: Array  # (n,)
+    window: Array  # (n,), number of the window
+    q: Array
+    dq: Array
+    ddq: Array
+    tau: Array
+    rate: Array
+    lack: Array
+    law: Array
+
+
+@dataclass(frozen=True)
+class Variable:
+    """What a cause depends on: its name with a place for the joint, unit of a rotary and of a linear joint, and value.
+
+    `folded` causes change sign with the direction of motion; their torque is drawn along it.
+    """
+
+    name: str
+    units: tuple[str, str]
+    value: Callable[[Point, int, dict[str, float]], Array]
+    folded: bool = False
+
+
+_SPEED = Variable("dq{}", ("rad/s", "m/s"), lambda x, j, p: x.dq[:, j])
+_TORQUE = Variable("tau{}", ("N m", "N"), lambda x, j, p: x.tau[:, j])
+_RATE = Variable("rate of change of tau{}", ("N m/s", "N/s"), lambda x, j, p: x.rate[:, j])
+_POSITION = Variable("q{}", ("rad", "m"), lambda x, j, p: x.q[:, j])
+_ALONG = Variable("q{}", ("rad", "m"), lambda x, j, p: x.q[:, j], folded=True)
+_CYCLE = Variable(
+    "q{} within one cycle", ("rad", "m"), lambda x, j, p: np.mod(x.q[:, j], 2 * np.pi / max(abs(p["n"]), 1e-9))
+)
+_OWN = Variable("torque that the law adds on joint {}", ("N m", "N"), lambda x, j, p: x.law[:, j])
+
+VARIABLES = {
+    "coulomb_asymmetry": _SPEED,
+    "torque_offset": _SPEED,
+    "stribeck": _SPEED,
+    "quadratic_drag": _SPEED,
+    "viscous_asymmetry": _SPEED,
+    "gear_efficiency": _TORQUE,
+    "position_dependent_friction": _ALONG,
+    "friction_warmup": Variable("t", ("s", "s"), lambda x, j, p: x.t, folded=True),
+    "torque_gain": _TORQUE,
+    "actuator_lag": _RATE,
+    "actuator_delay": _RATE,
+    "torque_saturation": _TORQUE,
+    "torque_dead_zone": _TORQUE,
+    "torque_ripple": _CYCLE,
+    "joint_spring": _POSITION,
+    "hardening_spring": _POSITION,
+    "external_pulse": Variable("t", ("s", "s"), lambda x, j, p: x.t),
+    "contact": _POSITION,
+    "rotor_inertia": Variable("ddq{}", ("rad/s^2", "m/s^2"), lambda x, j, p: x.ddq[:, j]),
+}
+"""The variable of each effect; others are drawn over the torque that their own law adds."""
+
+
+def laws(data: dict[str, Any], arm: Arm, training: Sequence[Log], held: Sequence[Log]) -> list[dict[str, Any]]:
+    """Return, for each cause of a diagnosis, its law and the data it is drawn through.
+
+    Parameters
+    ----------
+    data : dict
+        JSON object of the diagnosis.
+    arm : Arm
+        Nominal model.
+    training, held : sequence of Log
+        Logs that were learnt from and judged on. Evidence is taken from the held-out ones; of a cause that belongs to one log,
+        from that log.
+
+    Returns
+    -------
+    list of dict
+        One per cause: ``effect``, ``joint``, ``windows``, ``failed``, windows that could not be simulated, and ``why``; where samples
+        remain, ``shown_joint``, ``variable``, ``unit``, ``torque_unit``, ``folded``, ``at_rest`` (share of samples left out),
+        ``points`` (``x``, ``y``), ``bins`` (``x``, ``mean``, ``error`` at 95 %, ``law``) and ``explained``.
+    """
+    model = Hypothesis.of(data, arm)
+    return [_law(model, cause, _witnesses(cause, training, held)) for cause in model.effects]
+
+
+def _witnesses(cause: Placed, training: Sequence[Log], held: Sequence[Log]) -> list[Log]:
+    return list(held) if cause.log is None else [log for log in (*training, *held) if _is_in(log, cause)]
+
+
+def _is_in(log: Log, effect: Placed) -> bool:
+    """Whether an effect acts in a log, or in the log that this one is a part of."""
+    return effect.log is None or log.name in (effect.log, f"{effect.log} (first part)", f"{effect.log} (last part)")
+
+
+def _law(model: Hypothesis, cause: Placed, logs: Sequence[Log]) -> dict[str, Any]:
+    effect, joint, values = cause[:3]
+    points, windows, failures = _points(model, cause, logs)
+    entry: dict[str, Any] = {"effect": effect, "joint": joint, "windows": windows, "failed": len(failures)}
+    if failures:
+        entry["why"] = failures[0]
+    if cause.log is not None:
+        entry["log"] = cause.log
+    if points is None:
+        return entry
+    shown = joint - 1 if joint is not None else _most_moved(points)
+    moves = _moves(points.dq[:, shown])
+    if np.count_nonzero(moves) < ENOUGH:
+        return entry  # too few samples to say anything
+    variable = VARIABLES.get(effect, _OWN)
+    if not np.any(points.law[moves, shown]):
+        return entry  # the law adds nothing to these logs
+    x = variable.value(points, shown, values)[moves]
+    sign = np.sign(points.dq[moves, shown]) if variable.folded else np.ones(len(x))
+    y, law = sign * points.lack[moves, shown], sign * points.law[moves, shown]
+    rotary = model.arm.rotary
+    entry |= {
+        "shown_joint": shown + 1,
+        "variable": variable.name.format(shown + 1),
+        "unit": variable.units[not rotary],
+        "torque_unit": "N m" if rotary else "N",
+        "folded": variable.folded,
+        "at_rest": float(f"{1 - np.mean(moves):.3g}"),
+        "bins": (bins := _bins(x, y, law, points.window[moves])),
+        "explained": _explained(bins),
+    }
+    pick = np.linspace(0, len(x) - 1, min(POINTS, len(x))).astype(int)
+    return entry | {"points": {"x": _short(x[pick]), "y": _short(y[pick])}}
+
+
+def _moves(dq: Array) -> NDArray[np.bool_]:
+    """Samples in which a joint moves."""
+    speed = np.abs(dq)
+    return np.asarray(speed > REST * np.quantile(speed, 0.99))
+
+
+def _most_moved(points: Point) -> int:
+    """The joint whose torque the law changes most, against what it lacks at random."""
+    scale = np.sqrt(np.mean((points.lack - points.law) ** 2, axis=0)) + 1e-300
+    return int(np.argmax(np.sqrt(np.mean(points.law**2, axis=0)) / scale))
+
+
+def _points(model: Hypothesis, cause: Placed, logs: Sequence[Log]) -> tuple[Point | None, int, list[str]]:
+    """Evidence from windows spread over all logs; how many, and why others could not be simulated."""
+    found: list[Point] = []
+    failed: list[str] = []
+    whole = sum(log.duration for log in logs)
+    for log in logs:
+        wanted = max(1, round(WINDOWS * log.duration / whole))
+        try:
+            scene = _Scene(model, cause, log)
+        except ValueError as error:
+            failed += wanted * [str(error)]
+            continue
+        for first in scene.starts(wanted):
+            try:
+                found.append(scene.window(first))
+            except ValueError as error:
+                failed.append(str(error))
+    if not found:
+        return None, 0, failed
+    numbered = [replace(p, window=np.full(len(p.t), float(i))) for i, p in enumerate(found)]
+    joined = {f.name: np.concatenate([getattr(p, f.name) for p in numbered]) for f in fields(Point)}
+    return Point(**joined), len(found), failed
+
+
+class _Scene:
+    """One log with and without one cause."""
+
+    def __init__(self, model: Hypothesis, cause: Placed, log: Log) -> None:
+        rest = [e for e in model.effects if e is not cause and _is_in(log, e)]
+        self.half = max(HALF_SAMPLES, round(HALF_S / log.sample_period))
+        self.log = log
+        self.without = _Side(model, rest, log, self.half)
+        self.full = _Side(model, [*rest, cause], log, self.half)
+        self.dq = self.full.dq
+        self.rate = np.gradient(log.tau, log.t, axis=0)
+        self.around = _around(cause, log)
+
+    def starts(self, wanted: int) -> list[int]:
+        """First rows of windows that do not overlap in the rows that evidence is taken from, spread over the log."""
+        first, last = self.around
+        last -= 6 * self.half + 1
+        fitting = (last - first) // (4 * self.half + 1) + 1
+        return [int(k) for k in np.linspace(first, last, min(wanted, fitting))] if last >= first else []
+
+    def window(self, first: int) -> Point:
+        rows = slice(first, first + 6 * self.half + 1)
+        log = self.log
+        without, full = self.without.predict(rows), self.full.predict(rows)
+        inner = np.arange(self.half, 5 * self.half + 1)
+        at = first + inner
+        inertia = np.linalg.inv([self.without.model.compliance(q) for q in self.full.q[at]])
+        curvature = _curvature(log.t[rows], np.hstack([log.q[rows] - without, full - without, log.q[rows]]), inner)
+        n = log.n_joints
+        lack, law = (np.einsum("kij,kj->ki", inertia, curvature[:, s : s + n]) for s in (0, n))
+        return Point(
+            t=log.t[at],
+            window=np.zeros(len(at)),
+            q=log.q[at],
+            dq=self.dq[at],
+            ddq=curvature[:, 2 * n :],
+            tau=log.tau[at],
+            rate=self.rate[at],
+            lack=lack,
+            law=law,
+        )
+
+
+def _around(cause: Placed, log: Log) -> tuple[int, int]:
+    """Rows to look at: all, or those around an event."""
+    if "time" not in cause.parameters:
+        return 0, len(log)
+    middle, reach = cause.parameters["time"], EVENT * max(cause.parameters["duration"], EVENT_S)
+    first, last = np.searchsorted(log.t, [middle - reach, middle + reach])
+    return int(first), int(last)
+
+
+class _Side:
+    """A log as one model sees it: the torque that arrives, and true positions and velocities."""
+
+    def __init__(self, model: Hypothesis, effects: Sequence[Placed], log: Log, half: int) -> None:
+        commanded = [e for e in effects if e.effect in ON_COMMAND]
+        self.model = model.only([e for e in effects if e.effect not in ON_COMMAND])
+        self.t = log.t
+        self.tau = delivered(log.t, log.tau, commanded)
+        self.q = true_positions(log.q, [e for e in effects if e.effect in ON_ENCODER])
+        self.dq = _native.velocity(np.ascontiguousarray(log.t), np.ascontiguousarray(self.q), "local-cubic", half)
+
+    def predict(self, rows: slice) -> Array:
+        """Positions as the encoders show them, shape (n_rows, n_joints)."""
+        t = self.t[rows]
+        return self.model.run(t, self.tau[rows], self.q[rows.start], self.dq[rows.start])[0]
+
+
+def _curvature(t: Array, x: Array, at: NDArray[np.intp]) -> Array:
+    """Second derivatives of columns at some rows, from cubics over the neighbourhood; shape (n_at, n_columns)."""
+    half = int(at[0])
+    near = at[:, None] + np.arange(-half, half + 1)
+    span = t[-1] - t[0]
+    s = (t[near] - t[at][:, None]) / span
+    fit = np.linalg.pinv(s[..., None] ** np.arange(4))
+    return np.asarray(2.0 * np.einsum("kr,krc->kc", fit[:, 2, :], x[near]) / span**2)
+
+
+def _bins(x: Array, y: Array, law: Array, window: Array) -> dict[str, list[float]]:
+    """Means over ranges of the variable, with the 95 % half width of each mean.
+
+    The ranges lie halfway between equally wide and equally full ones; sparse ones are left out, and their samples stay
+    in the cloud of points.
+    """
+    low, high = np.quantile(x, [0.005, 0.995])
+    bins = min(BINS, len(x) // FEWEST)
+    share = np.linspace(0.0, 1.0, bins + 1)
+    edges = (low + (high - low) * share + np.quantile(np.clip(x, low, high), share)) / 2
+    owner = np.digitize(x, edges[1:-1])
+    parts = [p for b in range(bins) if len(p := np.flatnonzero(owner == b)) >= FEWEST]
+    means = [_short(float(np.mean(v[p])) for p in parts) for v in (x, y, law)]
+    rest = y - law
+    alone = float(np.std(rest))
+    error = _short(NORMAL_95 * (_cluster_sigma(rest[p], window[p]) or alone) for p in parts)
+    return {"x": means[0], "mean": means[1], "error": error, "law": means[2]}
+
+
+def _cluster_sigma(rest: Array, window: Array) -> float | None:
+    """Standard deviation of a mean whose samples are independent from window to window only; None from one window.
+
+    Neighbours within a window share the measurement noise, so each window counts once (the sandwich estimate for
+    clusters). What the law says varies within a range and is taken off first.
+    """
+    _, owner = np.unique(window, return_inverse=True)
+    sums = np.bincount(owner, rest - rest.mean())
+    groups = len(sums)
+    if groups < 2:
+        return None
+    return math.sqrt(groups / (groups - 1) * float(np.sum(sums**2))) / len(rest)
+
+
+def _explained(bins: dict[str, list[float]]) -> float:
+    """Share of the mean square of the binned data that the law explains."""
+    mean, law = np.array(bins["mean"]), np.array(bins["law"])
+    whole = float(np.sum(mean**2))
+    return float(f"{1.0 - float(np.sum((mean - law) ** 2)) / whole:.4g}") if whole > 0 else 0.0
+
+
+def _short(values: Iterable[float]) -> list[float]:
+    return [float(f"{v:.5g}") for v in values]

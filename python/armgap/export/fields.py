@@ -1,0 +1,83 @@
+"""Where each effect goes in each simulator, and where it has no field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["FIELDS", "FORMATS", "Field", "field_of"]
+
+#: Formats and the endings of their files.
+FORMATS = {"mjcf": ".xml", "urdf": ".urdf", "toml": ".toml", "json": ".json"}
+
+
+@dataclass(frozen=True)
+class Field:
+    """The field an effect goes into; None where the format has none.
+
+    Attributes
+    ----------
+    mjcf, urdf, toml : str, optional
+        Names of the fields.
+    short : str
+        What the field falls short of, or why no format has one.
+    """
+
+    mjcf: str | None = None
+    urdf: str | None = None
+    toml: str | None = None
+    short: str = ""
+
+    def of(self, form: str) -> str | None:
+        """Return the field in a format; JSON holds every effect."""
+        return "effects" if form == "json" else {"mjcf": self.mjcf, "urdf": self.urdf, "toml": self.toml}[form]
+
+
+FIELDS: dict[str, Field] = {
+    "payload": Field("inertial", "inertial", "inertial.theta"),
+    "rotor_inertia": Field(mjcf="joint armature"),
+    "joint_spring": Field(mjcf="joint stiffness, springref"),
+    "hardening_spring": Field(mjcf="joint stiffness, third coefficient, springref"),
+    "quadratic_drag": Field(mjcf="joint damping, second coefficient"),
+    "torque_offset": Field(mjcf="general biasprm"),
+    "coulomb_asymmetry": Field(
+        mjcf="general biasprm",
+        short="as a constant torque, which is the same while the joint moves but not while it stands",
+    ),
+    "torque_gain": Field(mjcf="general gainprm"),
+    "torque_saturation": Field(mjcf="general ctrlrange", urdf="limit effort", short="clipped before any lag"),
+    "actuator_lag": Field(mjcf="general dyntype filterexact, dynprm"),
+    "actuator_delay": Field(mjcf="general delay, nsample", short="in whole time steps"),
+    "base_tilt": Field(mjcf="body euler", urdf="joint origin rpy"),
+    "encoder_offset": Field(mjcf="joint ref", urdf="joint origin"),
+    "contact": Field(
+        mjcf="tendon springlength, stiffness", short="its damping, which acts in contact only, has no field"
+    ),
+    "joint_elasticity": Field(short="it needs a second body for the rotor, tied to the joint by a spring"),
+    "backlash": Field(short="it needs a second body for the rotor, tied to the joint by a limit"),
+    "rotor_coupling": Field(mjcf="joint armature of joint 2, inertial"),
+    "external_pulse": Field(short="an event of one log, no property of the arm"),
+}
+"""Every effect that some format has a field for, or that needs a word; any other effect has none."""
+
+_SAME_AS_LINK = "inertial of link 1, whose inertia it adds to without a difference"
+
+
+def field_of(effect: str, joint: int | None, form: str, kind: str) -> str | None:
+    """Return where an effect goes in a format, None if it has no field there.
+
+    Parameters
+    ----------
+    effect : str
+        Name of the effect.
+    joint : int or None
+        1-based joint.
+    form : str
+        Key of `FORMATS`.
+    kind : str
+        Kind of arm.
+    """
+    if effect == "rotor_inertia" and joint == 1 and form in ("urdf", "toml"):
+        return _SAME_AS_LINK if form == "urdf" else "inertial.theta"
+    if effect == "base_tilt" and kind == "axis":
+        return {"mjcf": "joint axis", "urdf": "joint axis", "toml": "inertial.theta"}.get(form, "effects")
+    return FIELDS.get(effect, Field()).of(form)

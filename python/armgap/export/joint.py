@@ -1,0 +1,81 @@
+"""What sits at a joint of a corrected model, and what effects change in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+__all__ = ["ON_JOINT", "Joint"]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One corrected joint, SI.
+
+    Attributes
+    ----------
+    viscous, coulomb : float
+        Friction.
+    armature : float
+        Inertia on the joint's own acceleration only.
+    stiffness, cubic, rest : float
+        Spring ``-stiffness (q - rest) - cubic (q - rest)^3``.
+    drag : float
+        Torque ``-drag dq |dq|``.
+    offset, gain, delay, lag : float
+        Drive: torque ``gain u + offset`` with the command `u` delayed [s] and lagged [s].
+    limit : float, optional
+        Largest command that gives more torque.
+    reading : float
+        What the encoder shows at ``q = 0``.
+    stop : (position, stiffness), optional
+        Spring beyond a position, on the side away from zero.
+    """
+
+    viscous: float
+    coulomb: float
+    armature: float = 0.0
+    stiffness: float = 0.0
+    cubic: float = 0.0
+    rest: float = 0.0
+    drag: float = 0.0
+    offset: float = 0.0
+    gain: float = 1.0
+    delay: float = 0.0
+    lag: float = 0.0
+    limit: float | None = None
+    reading: float = 0.0
+    stop: tuple[float, float] | None = None
+
+
+def _spring(joint: Joint, p: Mapping[str, float]) -> Joint:
+    """One more spring; where one of them hardens, its rest position is kept and the others' preload becomes an offset."""
+    k, q0, cubic = p["k"], p["q0"], p.get("cubic", 0.0)
+    stiffness, preload = joint.stiffness + k, joint.stiffness * joint.rest + k * q0
+    if cubic or joint.cubic:
+        rest = q0 if cubic else joint.rest
+        offset = joint.offset + preload - stiffness * rest
+        return replace(joint, stiffness=stiffness, cubic=joint.cubic + cubic, rest=rest, offset=offset)
+    return replace(joint, stiffness=stiffness, rest=preload / stiffness if stiffness else 0.0)
+
+
+def _saturation(joint: Joint, p: Mapping[str, float]) -> Joint:
+    level = p["level"] / joint.gain
+    return replace(joint, limit=level if joint.limit is None else min(level, joint.limit))
+
+
+ON_JOINT: dict[str, Callable[[Joint, Mapping[str, float]], Joint]] = {
+    "rotor_inertia": lambda j, p: replace(j, armature=j.armature + p["inertia"]),
+    "joint_spring": _spring,
+    "hardening_spring": _spring,
+    "quadratic_drag": lambda j, p: replace(j, drag=j.drag + p["c"]),
+    "torque_offset": lambda j, p: replace(j, offset=j.offset + p["offset"]),
+    "coulomb_asymmetry": lambda j, p: replace(j, offset=j.offset - p["delta"]),
+    "torque_gain": lambda j, p: replace(j, gain=j.gain * p["gain"]),
+    "torque_saturation": _saturation,
+    "actuator_lag": lambda j, p: replace(j, lag=j.lag + p["time_constant"]),
+    "actuator_delay": lambda j, p: replace(j, delay=j.delay + p["delay"]),
+    "encoder_offset": lambda j, p: replace(j, reading=j.reading + p["offset"]),
+    "contact": lambda j, p: replace(j, stop=(p["position"], p["stiffness"])),
+}
+"""What an effect of a joint changes in it; payload and tilt concern the whole arm."""

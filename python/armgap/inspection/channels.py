@@ -1,0 +1,150 @@
+"""What each joint's position and torque look like: steps, saturation, rest and motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm import Arm
+from armgap.log import Log
+
+__all__ = ["FlatTop", "Joint", "joint", "step_of"]
+
+# So many changes between samples tell the step of a channel.
+_ENOUGH = 200_000
+_SMALLEST = 2000
+# Changes are whole multiples of a step if most lie this close to one, in steps.
+_CLOSE, _MOST = 0.05, 0.97
+# A torque stays at its extreme for at least this many samples where it is cut off.
+_FLAT_SAMPLES = 5
+_FLAT_MARGIN = 1e-6
+# A joint rests where it moves, over the time below, by no more than two steps, and slower than this part of its top speed.
+_SPAN_S = 0.02
+_REST_STEPS = 2.0
+_REST_SHARE = 1e-3
+
+
+@dataclass(frozen=True)
+class FlatTop:
+    """A level at which a torque is cut off: share of the samples there, and the longest time in one go."""
+
+    level: float
+    share: float
+    longest_s: float
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint's channels.
+
+    Attributes
+    ----------
+    joint : int
+        Counted from 1.
+    q_range, tau_range : tuple of float
+        Smallest and largest position [rad or m] and torque [N m or N].
+    q_step, tau_step : float, optional
+        Step in whole multiples of which values change; None if they change by any amount.
+    q_step_arm : float, optional
+        Encoder step of the arm file.
+    top_speed : float
+        Speed exceeded for 1 % of the time [rad/s or m/s].
+    rest, motion : float
+        Shares of the time.
+    reversals : int
+        Changes of direction.
+    flat_tops : tuple of FlatTop
+        Levels at which the torque is cut off.
+    """
+
+    joint: int
+    q_range: tuple[float, float]
+    q_step: float | None
+    q_step_arm: float | None
+    tau_range: tuple[float, float]
+    tau_step: float | None
+    top_speed: float
+    rest: float
+    motion: float
+    reversals: int
+    flat_tops: tuple[FlatTop, ...]
+
+
+def joint(log: Log, j: int, arm: Arm | None) -> Joint:
+    """Return what the channels of joint `j` (from 0) look like."""
+    q, tau = np.ascontiguousarray(log.q[:, j]), np.ascontiguousarray(log.tau[:, j])
+    step = step_of(q)
+    dq = _speeds(log.t, q, log.sample_period)
+    top = float(np.quantile(np.abs(dq), 0.99)) if len(dq) else 0.0
+    still = np.abs(dq) <= max(_REST_STEPS * (step or _smallest(q)) / _SPAN_S, _REST_SHARE * top)
+    moving = np.sign(dq[~still])
+    return Joint(
+        joint=j + 1,
+        q_range=(float(q.min()), float(q.max())),
+        q_step=step,
+        q_step_arm=None if arm is None or arm.encoder_step is None else float(arm.encoder_step[j]),
+        tau_range=(float(tau.min()), float(tau.max())),
+        tau_step=step_of(tau),
+        top_speed=top,
+        rest=float(still.mean()) if len(still) else 1.0,
+        motion=float(1.0 - still.mean()) if len(still) else 0.0,
+        reversals=int(np.sum(moving[1:] != moving[:-1])),
+        flat_tops=_flat_tops(tau, log.sample_period),
+    )
+
+
+def step_of(values: NDArray[np.float64]) -> float | None:
+    """Return the step in whole multiples of which values change, None if there is none.
+
+    Examples
+    --------
+    >>> q = np.round(np.sin(np.arange(4000) / 50.0) / 2e-3) * 2e-3
+    >>> round(step_of(q), 9), step_of(np.sin(np.arange(400) / 5.0))
+    (0.002, None)
+    """
+    moved = np.abs(np.diff(values[:_ENOUGH]))
+    moved = np.sort(moved[moved > 1e-12 * max(float(np.abs(values[:_ENOUGH]).max()), 1e-300)])[:_SMALLEST]
+    if len(moved) < 20:
+        return None
+    # The smallest change seen may itself be several steps; the largest step that fits is the one.
+    return next((step for parts in (1, 2, 3) if (step := _fitted(moved, float(moved[0]) / parts)) is not None), None)
+
+
+def _fitted(moved: NDArray[np.float64], step: float) -> float | None:
+    """Return the step nearest to a guess, None if changes are not whole multiples of it."""
+    for most in (5, 50, 500):  # small multiples first, so that the guess's error does not add up
+        multiples = np.round(moved / step)
+        near = (multiples >= 1) & (multiples <= most)
+        if near.any():
+            step = float(np.sum(moved[near]) / np.sum(multiples[near]))
+    off = np.abs(moved / step - np.round(moved / step))
+    return step if float(np.mean(off < _CLOSE)) > _MOST else None
+
+
+def _smallest(values: NDArray[np.float64]) -> float:
+    """Return what changes between samples amount to at rest, for a channel without steps."""
+    moved = np.abs(np.diff(values[:_ENOUGH]))
+    moved = moved[moved > 0]
+    return float(np.quantile(moved, 0.05)) if len(moved) else 0.0
+
+
+def _speeds(t: NDArray[np.float64], q: NDArray[np.float64], period: float) -> NDArray[np.float64]:
+    stride = max(1, round(_SPAN_S / period))
+    return np.asarray(np.diff(q[::stride]) / np.diff(t[::stride]))
+
+
+def _flat_tops(tau: NDArray[np.float64], period: float) -> tuple[FlatTop, ...]:
+    """Return the extremes at which a torque stays for several samples in a row, and more than once or long."""
+    low, high = float(tau.min()), float(tau.max())
+    margin = _FLAT_MARGIN * max(abs(low), abs(high))
+    found = []
+    for level in (high, low):
+        there = np.abs(tau - level) <= margin
+        edges = np.flatnonzero(np.diff(np.r_[False, there, False].astype(np.int8)))
+        lengths = edges[1::2] - edges[::2]
+        lengths = lengths[lengths >= _FLAT_SAMPLES]
+        if len(lengths) and level != 0.0 and low != high:
+            found.append(FlatTop(level, float(lengths.sum() / len(tau)), float(lengths.max() * period)))
+    return tuple(found)

@@ -1,0 +1,128 @@
+"""Whether a motion tells the arm's parameters.
+
+The filtered dynamic regression ``y = psi theta`` of the arm is run over the log; the information ``A = sum psi' psi`` follows from the
+covariance of recursive least squares, ``A = P^-1 - P(0)^-1``, and adds up over stretches. Parameters are measured in units of the arm
+file's values, so that the condition number of the regressor, ``sqrt(cond(A))``, does not depend on units.
+
+References
+----------
+J. Swevers et al., Optimal robot excitation and identification, IEEE Trans. Robotics and Automation 13 (1997) 730-740.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap import _native
+from armgap.arm import Arm
+from armgap.log import Log
+from armgap.log.stretches import choose
+
+__all__ = ["Excitation", "Parameter", "excitation"]
+
+_P0 = 1e9
+_CUTOFF = 50.0  # rad/s
+_BUDGET = 200_000  # samples
+# What an error of this part of the RMS torque, white, would do to a parameter.
+_ERROR = 0.01
+# Information below this part of the largest is none, within rounding.
+_NOTHING = 1e-14
+_WELL, _HARDLY = 0.05, 0.5
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What a log tells about one parameter.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    value : float
+        The arm file's value [SI].
+    sigma : float
+        Standard deviation, as part of the value, that a white error of 1 % of the RMS torque leaves.
+    alone : float
+        The same if all other parameters were known.
+    excited : str
+        ``"well"`` (sigma below 5 %), ``"weakly"`` or ``"not"`` (above 50 %).
+    """
+
+    name: str
+    value: float
+    sigma: float
+    alone: float
+    excited: str
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What a log tells about the parameters of an arm.
+
+    Attributes
+    ----------
+    condition : float
+        Condition number of the regressor with parameters in units of the arm file's values; infinite if it lacks a direction.
+    parameters : tuple of Parameter
+        In the arm's order.
+    weakest : str
+        The combination of parameters that the log tells least about.
+    samples : int
+        Samples used.
+    """
+
+    condition: float
+    parameters: tuple[Parameter, ...]
+    weakest: str
+    samples: int
+
+
+def excitation(log: Log, arm: Arm) -> Excitation:
+    """Return what a log tells about the parameters of an arm; of a long log, its informative stretches are used."""
+    parts = choose([log], _BUDGET)
+    scale = np.where(arm.theta != 0.0, np.abs(arm.theta), arm.sigma)
+    information = sum((_information(part, arm) for part in parts), np.zeros((len(scale), len(scale))))
+    scaled = information * np.outer(scale, scale)
+    values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
+    floor = _NOTHING * values[-1]
+    torque = float(np.sqrt(np.mean([np.mean(part.tau**2) for part in parts])))
+    with np.errstate(divide="ignore"):
+        spread = np.sqrt((vectors**2) @ (1.0 / np.maximum(values, floor)))
+        alone = 1.0 / np.sqrt(np.diag(scaled))
+    condition = float(np.sqrt(values[-1] / values[0])) if values[0] > floor else float("inf")
+    parameters = tuple(
+        Parameter(name, float(value), float(s), float(a), _word(float(s)))
+        for name, value, s, a in zip(
+            arm.parameter_names, arm.theta, _ERROR * torque * spread, _ERROR * torque * alone, strict=True
+        )
+    )
+    return Excitation(condition, parameters, _combination(vectors[:, 0], arm), sum(len(part) for part in parts))
+
+
+def _information(log: Log, arm: Arm) -> NDArray[np.float64]:
+    """Return ``sum psi' psi`` over a log."""
+    t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.tau))
+    lengths = None if arm.link_length is None else arm.link_length.tolist()
+    zero = [0.0] * len(arm.theta)
+    settings = ("filtered-dynamic", False, _CUTOFF, 1.0, _P0)
+    dq = _native.velocity(t, q, "local-cubic", 3)
+    course = _native.identify(arm.kind, arm.gravity, lengths, arm.theta.tolist(), *settings, zero, t, q, tau, dq)
+    values, vectors = np.linalg.eigh(course["covariance"])
+    told = np.maximum(1.0 / np.maximum(values, np.finfo(float).tiny) - 1.0 / _P0, 0.0)
+    return np.asarray((vectors * told) @ vectors.T)
+
+
+def _word(sigma: float) -> str:
+    return "well" if sigma < _WELL else "weakly" if sigma < _HARDLY else "not"
+
+
+def _combination(direction: NDArray[np.float64], arm: Arm) -> str:
+    """Name the parameters that make up a direction, those that matter."""
+    direction = direction / direction[np.argmax(np.abs(direction))]
+    terms = [
+        (abs(c), f"{c:+.2g} {name}") for c, name in zip(direction, arm.parameter_names, strict=True) if abs(c) > 0.2
+    ]
+    return " ".join(text for _, text in sorted(terms, reverse=True))

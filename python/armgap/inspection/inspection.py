@@ -1,0 +1,117 @@
+"""The inspection of one log."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from armgap.arm import Arm
+from armgap.errors import LogShapeError, OptionError
+from armgap.inspection.channels import Joint, joint
+from armgap.inspection.excitation import Excitation, excitation
+from armgap.inspection.sampling import Sampling, sampling
+from armgap.log import Finding, Log, gather
+
+__all__ = ["Inspection", "inspect"]
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """The result of `inspect`.
+
+    Attributes
+    ----------
+    log : str
+        Name of the log.
+    columns : dict
+        The file's own names by standard name.
+    sampling : Sampling
+        When samples were taken.
+    joints : tuple of Joint
+        Positions and torques of each joint.
+    excitation : Excitation, optional
+        What the log tells about the arm's parameters; None without an arm.
+    findings : tuple of Finding
+        What was noticed, recognised or changed while reading.
+    """
+
+    log: str
+    columns: dict[str, str]
+    sampling: Sampling
+    joints: tuple[Joint, ...]
+    excitation: Excitation | None
+    findings: tuple[Finding, ...]
+    source: Log = field(repr=False, compare=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result, ready for JSON, without the log itself; what is infinite becomes null."""
+        found: dict[str, Any] = {"schema": "armgap.inspection/1", "log": self.log, "columns": self.columns}
+        found["sampling"] = asdict(self.sampling)
+        found["joints"] = [asdict(j) for j in self.joints]
+        found["excitation"] = None if self.excitation is None else asdict(self.excitation)
+        found["findings"] = [asdict(f) for f in self.findings]
+        plain: dict[str, Any] = _finite(found)
+        return plain
+
+    def to_json(self, indent: int | None = None) -> str:
+        """Return the result as JSON."""
+        return json.dumps(self.to_dict(), indent=indent, allow_nan=False)
+
+
+def inspect(log: Any, arm: Arm | None = None) -> Inspection:
+    """Say what a log holds.
+
+    Parameters
+    ----------
+    log : Log, path or table
+        The log, or anything that `Log.read` and `Log.from_frame` take.
+    arm : Arm, optional
+        The arm it belongs to; needed for what the log tells about parameters.
+
+    Returns
+    -------
+    Inspection
+
+    Raises
+    ------
+    OptionError
+        If a pattern stands for several logs.
+    LogShapeError
+        If the arm has another number of joints.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) * 1e-3
+    >>> found = inspect({"t": t, "q1": np.sin(6 * t), "tau1": np.clip(9 * np.cos(6 * t), -8, 8)})
+    >>> round(found.sampling.rate_hz), found.joints[0].flat_tops[0].level
+    (1000, 8.0)
+    """
+    logs = gather(log, arm)
+    if len(logs) != 1:
+        raise OptionError(f"{len(logs)} logs were given", remedy="inspect one at a time")
+    [log] = logs
+    if arm is not None and log.n_joints != arm.n_joints:
+        raise LogShapeError(
+            f"has {log.n_joints} joints, the arm has {arm.n_joints}",
+            remedy="use the arm file that belongs to this log",
+            file=log.path or log.name,
+        )
+    return Inspection(
+        log=log.name,
+        columns=dict(log.columns),
+        sampling=sampling(log),
+        joints=tuple(joint(log, j, arm) for j in range(log.n_joints)),
+        excitation=None if arm is None else excitation(log, arm),
+        findings=log.findings,
+        source=log,
+    )
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _finite(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,99 @@
+"""An inspection as one HTML page that loads nothing from elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.inspection import words
+from armgap.inspection.inspection import Inspection
+from armgap.report import charts, page
+from armgap.report.page import Section
+from armgap.report.words import Answer
+
+__all__ = ["render"]
+
+_POINTS = 1500
+_BINS = 60
+
+
+def render(inspections: Sequence[Inspection]) -> str:
+    """Return the page for one inspection or several."""
+    single = len(inspections) == 1
+    title = f"Log: {inspections[0].log}" if single else f"{len(inspections)} logs"
+    lead = "What the log holds, how it was sampled, and what its motion tells."
+    pairs = words.overview(inspections[0]) if single else [(found.log, _brief(found)) for found in inspections]
+    answers = [Answer(question, *_headline(answer)) for question, answer in pairs]
+    sections = [section for found in inspections for section in _sections(found, single=single)]
+    return page.render(title, lead, answers, sections)
+
+
+def _headline(answer: str) -> tuple[str, str]:
+    """Split an answer into its first statement and the rest."""
+    first, _, rest = answer.partition("; ")
+    return first, rest
+
+
+def _brief(found: Inspection) -> str:
+    return "; ".join(f"{question} {answer}" for question, answer in words.overview(found)[1:3])
+
+
+def _sections(found: Inspection, *, single: bool) -> list[Section]:
+    before = "" if single else f"{found.log}: "
+    notes = [f"{f.message}." for f in found.findings]
+    tables = [grid for _, grid in words.grids(found)]
+    text = [] if single else [f"{question}: {answer}" for question, answer in words.overview(found)]
+    return [
+        Section(f"{before}over time", figures=_over_time(found)),
+        Section(f"{before}channels and parameters", text=text, tables=tables, notes=notes),
+        Section(f"{before}sampling and coverage", figures=[_periods(found), *_coverage(found)]),
+    ]
+
+
+def _over_time(found: Inspection) -> list[Any]:
+    log = found.source
+    figures: list[Any] = []
+    for j in range(log.n_joints):
+        for name, values in ((f"q{j + 1}", log.q[:, j]), (f"tau{j + 1}", log.tau[:, j])):
+            t, shown = _envelope(log.t, values)
+            share = figures[0] if figures else None
+            curve = [(name, shown, charts.MEASURED)]
+            figures.append(charts.lines(name, "time [s]", "", t, curve, share=share, height=180))
+    return figures
+
+
+def _envelope(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the smallest and largest value of each part of a curve, so that nothing sticks out unseen."""
+    rows = len(t) // _POINTS
+    if rows < 3:
+        return t, values
+    cut = rows * (len(t) // rows)
+    blocks = values[:cut].reshape(-1, rows)
+    shown = np.column_stack([blocks.min(axis=1), blocks.max(axis=1)]).reshape(-1)
+    return np.repeat(t[:cut:rows], 2), shown
+
+
+def _periods(found: Inspection) -> Any:
+    steps = np.diff(found.source.t) * 1e3
+    low, high = float(steps.min()), float(np.quantile(steps, 0.999))
+    edges = np.linspace(low - 1e-6, max(high, low) + 1e-6, _BINS + 1)
+    counts, _ = np.histogram(steps, edges)
+    middle = (edges[1:] + edges[:-1]) / 2
+    return charts.lines(
+        "sample periods", "period [ms]", "samples", middle, [("samples", counts, charts.MEASURED)], height=200
+    )
+
+
+def _coverage(found: Inspection) -> list[Any]:
+    log = found.source
+    stride = max(1, len(log) // (4 * _POINTS))
+    figures = []
+    for j in range(log.n_joints):
+        speed = np.gradient(log.q[::stride, j], log.t[::stride])
+        f = charts.figure(f"joint {j + 1}: positions and speeds visited", "position", "speed", height=220)
+        f.scatter(log.q[::stride, j], speed, size=2, color=charts.AFTER, alpha=0.4)
+        figures.append(f)
+    return figures

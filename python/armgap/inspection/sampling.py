@@ -1,0 +1,67 @@
+"""When samples were taken: rate, jitter, gaps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from armgap.log import Log
+
+__all__ = ["Sampling", "sampling"]
+
+GAP_PERIODS = 3.0
+"""A hole longer than this many periods is a gap."""
+
+_LISTED = 5
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """When samples were taken.
+
+    Attributes
+    ----------
+    samples : int
+        Number of samples.
+    duration_s, period_s, rate_hz : float
+        Duration, median period, and its inverse.
+    jitter_s, jitter_max_s : float
+        Standard deviation of the periods without gaps, and the largest difference from the median among them.
+    gaps : int
+        Holes longer than three periods.
+    gap_s : float
+        Sum of their lengths.
+    widest : tuple of (float, float)
+        Time and length of the widest gaps, widest first [s].
+    """
+
+    samples: int
+    duration_s: float
+    period_s: float
+    rate_hz: float
+    jitter_s: float
+    jitter_max_s: float
+    gaps: int
+    gap_s: float
+    widest: tuple[tuple[float, float], ...]
+
+
+def sampling(log: Log) -> Sampling:
+    """Return when a log's samples were taken."""
+    steps = np.diff(log.t)
+    period = float(np.median(steps))
+    gaps = np.flatnonzero(steps > GAP_PERIODS * period)
+    even = steps if not len(gaps) else np.delete(steps, gaps)
+    widest = gaps[np.argsort(steps[gaps])[::-1][:_LISTED]]
+    return Sampling(
+        samples=len(log),
+        duration_s=log.duration,
+        period_s=period,
+        rate_hz=1.0 / period,
+        jitter_s=float(np.std(even)),
+        jitter_max_s=float(max(even.max() - period, period - even.min())),
+        gaps=len(gaps),
+        gap_s=float(steps[gaps].sum()),
+        widest=tuple((float(log.t[k]), float(steps[k])) for k in widest),
+    )

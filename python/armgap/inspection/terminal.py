@@ -1,0 +1,38 @@
+"""An inspection in a terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from armgap.inspection import words
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from armgap.inspection.inspection import Inspection
+
+__all__ = ["tables"]
+
+
+def tables(found: Inspection) -> RenderableType:
+    """Return what `rich` prints: what the log is, its joints, and what it tells about the arm's parameters."""
+    from rich import box
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    overview = Table(box=box.SIMPLE, show_header=False, pad_edge=False)
+    overview.add_column(style="bold", no_wrap=True)
+    overview.add_column()
+    for question, answer in words.overview(found):
+        overview.add_row(Text(question), Text(answer))
+    parts: list[RenderableType] = [Text(found.log, style="bold"), overview]
+    for title, (header, rows) in words.grids(found):
+        grid = Table(box=box.SIMPLE, title=title, title_justify="left")
+        grid.add_column(header[0])
+        for name in header[1:]:
+            grid.add_column(name, justify="right")
+        for row in rows:
+            grid.add_row(*(Text(cell) for cell in row))
+        parts.append(grid)
+    return Group(*parts)

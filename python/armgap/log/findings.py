@@ -1,0 +1,63 @@
+"""What is noticed about a log without stopping the work."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+__all__ = ["Finding", "counted", "remarks"]
+
+# What was changed about a log, or how it was understood, is told of each log; the rest once per kind.
+_TOLD_EACH = frozenset({"units", "format", "joints", "torque", "clock", "cleaned", "stretches"})
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something about a log that its reader should know but that does not stop the work.
+
+    Attributes
+    ----------
+    kind : str
+        How the log was understood: ``"format"``, ``"units"``, ``"joints"``, ``"torque"``, ``"clock"``, ``"columns"``. What
+        was changed: ``"cleaned"``, ``"stretches"``. What is worth knowing: ``"sampling"``, ``"period"``, ``"gap"``,
+        ``"constant"``, ``"limit"``.
+    message : str
+        In words.
+    """
+
+    kind: str
+    message: str
+
+
+def counted(count: int, thing: str) -> str:
+    """Return a number of things.
+
+    Examples
+    --------
+    >>> counted(1, "row"), counted(3, "row")
+    ('1 row', '3 rows')
+    """
+    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
+
+
+def remarks(entries: Iterable[Mapping[str, str]]) -> list[str]:
+    """Return findings (``log``, ``kind``, ``message``) as lines; the same thing seen in many logs takes one line.
+
+    Examples
+    --------
+    >>> seen = [{"log": name, "kind": "units", "message": "times are in ms"} for name in ("a", "b")]
+    >>> remarks([*seen, {"log": "c", "kind": "gap", "message": "1 gap"}, {"log": "d", "kind": "gap", "message": "2 gaps"}])
+    ['a, b: times are in ms', 'c: 1 gap (and 1 more like it)']
+    """
+    groups: dict[tuple[str, str], list[Mapping[str, str]]] = {}
+    for entry in entries:
+        told_each = entry["message"] if entry["kind"] in _TOLD_EACH else ""
+        groups.setdefault((entry["kind"], told_each), []).append(entry)
+    return [_line(group, same=bool(told_each)) for (_, told_each), group in groups.items()]
+
+
+def _line(group: list[Mapping[str, str]], *, same: bool) -> str:
+    if same:
+        return f"{', '.join(dict.fromkeys(entry['log'] for entry in group))}: {group[0]['message']}"
+    more = f" (and {len(group) - 1} more like it)" if len(group) > 1 else ""
+    return f"{group[0]['log']}: {group[0]['message']}{more}"

@@ -1,0 +1,135 @@
+"""Reading in a process apart.
+
+The C libraries behind HDF5 and MATLAB files can crash on damaged ones (about 1 in 1500 to 3000 with a few bytes overwritten), or never
+come back. They run in a child, which hands over what it read; if the child dies, that is an error of the file and not the end of the
+program. One child serves all files that are read, and ends with the program.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from importlib import import_module
+from typing import Any
+
+from armgap.log.recording import Source
+
+__all__ = ["call"]
+
+_PATIENCE_S = 60.0
+_SLOWEST_BYTES_PER_S = 5e6
+_LENGTH = 8
+
+
+class CrashedError(Exception):
+    """The child died or did not come back."""
+
+
+class _Child:
+    """A child that answers requests until its input ends."""
+
+    def __init__(self) -> None:
+        path = os.pathsep.join(p for p in sys.path if p)
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "armgap.log.guard"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": path},
+        )
+
+    def ask(self, request: Any, patience_s: float) -> Any:
+        """Return the answer to a request; whatever the child raised is raised here."""
+        timer = threading.Timer(patience_s, self.process.kill)
+        timer.start()
+        try:
+            assert self.process.stdin is not None
+            assert self.process.stdout is not None
+            _send(self.process.stdin, request)
+            fine, answer = _receive(self.process.stdout)
+        except (OSError, EOFError, pickle.UnpicklingError):
+            slow = not timer.is_alive()
+            self.close()
+            raise CrashedError("reading it took too long" if slow else "the reader crashed over it") from None
+        finally:
+            timer.cancel()
+        if fine:
+            return answer
+        raise answer
+
+    def close(self) -> None:
+        """End the child."""
+        self.process.kill()
+        self.process.wait()
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe is not None:
+                try:
+                    pipe.close()
+                except OSError:
+                    continue
+
+
+_child: _Child | None = None
+_lock = threading.Lock()
+
+
+def call(module: str, function: str, source: Source) -> Any:
+    """Return ``module.function(source)``, run in a child.
+
+    Raises
+    ------
+    CrashedError
+        If the child dies over it, or does not come back in time.
+    Exception
+        Whatever the function raises.
+    """
+    global _child
+    with _lock:
+        if _child is None or _child.process.poll() is not None:
+            _child = _Child()
+            atexit.register(_child.close)
+        return _child.ask((module, function, source), _PATIENCE_S + source.size / _SLOWEST_BYTES_PER_S)
+
+
+def _send(stream: Any, thing: Any) -> None:
+    data = pickle.dumps(thing, protocol=5)
+    stream.write(len(data).to_bytes(_LENGTH, "little"))
+    stream.write(data)
+    stream.flush()
+
+
+def _receive(stream: Any) -> Any:
+    head = stream.read(_LENGTH)
+    if len(head) < _LENGTH:
+        raise EOFError
+    return pickle.loads(stream.read(int.from_bytes(head, "little")))
+
+
+def _serve() -> None:
+    """Answer requests from standard input until it ends."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever a library prints must not come between answers
+    requests = sys.stdin.buffer
+    while True:
+        try:
+            module, function, source = _receive(requests)
+        except EOFError:
+            return
+        try:
+            answer = (True, getattr(import_module(module), function)(source))
+        except Exception as error:
+            answer = (False, _portable(error))
+        _send(answers, answer)
+
+
+def _portable(error: Exception) -> Exception:
+    """Return an error that any process can load."""
+    return ValueError(str(error) or type(error).__name__)
+
+
+if __name__ == "__main__":
+    _serve()

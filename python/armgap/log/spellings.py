@@ -1,0 +1,67 @@
+"""Units as files spell them: ``q1 [deg]``, ``tau1 (N·m)``, ``t_ms``."""
+
+from __future__ import annotations
+
+import re
+
+__all__ = ["stripped", "suffixed", "unit_of"]
+
+_SPELLINGS = {
+    "s": ("s", "sec", "second", "seconds"),
+    "ms": ("ms", "msec", "millisecond", "milliseconds"),
+    "us": ("us", "µs", "μs", "usec", "microsecond", "microseconds"),
+    "ns": ("ns", "nsec", "nanosecond", "nanoseconds"),
+    "rad": ("rad", "radian", "radians"),
+    "deg": ("deg", "°", "º", "degree", "degrees"),
+    "m": ("m", "meter", "meters", "metre", "metres"),
+    "mm": ("mm",),
+    "rad/s": ("rad/s", "rad/sec", "rads^-1", "rads-1", "rad_s"),
+    "deg/s": ("deg/s", "deg/sec", "°/s", "º/s", "degs^-1", "degs-1", "deg_s"),
+    "m/s": ("m/s", "ms^-1", "m_s"),
+    "mm/s": ("mm/s", "mms^-1", "mm_s"),
+    "Nm": ("Nm", "N-m", "newtonmeter", "newton-meter"),
+    "mNm": ("mNm", "mN-m"),
+    "N": ("N", "newton"),
+    "kN": ("kN",),
+}
+_UNITS = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings}
+_BRACKET = re.compile(r"^(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]+)\]|\((?P<round>[^()]+)\))$")
+_SUFFIX = re.compile(r"^(?P<name>t|t_tau|(?:q|tau|dq)[1-9][0-9]*)_(?P<unit>[A-Za-z_]+)$")
+
+
+def unit_of(text: str) -> str | None:
+    """Return the unit that a text spells, None if it spells none.
+
+    Examples
+    --------
+    >>> unit_of("N·m"), unit_of("Degrees"), unit_of("counts")
+    ('Nm', 'deg', None)
+    """
+    bare = re.sub(r"[\s·⋅*.]", "", text)
+    return _UNITS.get(bare) or _UNITS.get(bare.lower())
+
+
+def stripped(column: str) -> tuple[str, str | None]:
+    """Return a column's name without its unit, and the unit.
+
+    Examples
+    --------
+    >>> stripped("q1 [deg]"), stripped("position[0]")
+    (('q1', 'deg'), ('position[0]', None))
+    """
+    match = _BRACKET.match(column.strip())
+    unit = unit_of(match["square"] or match["round"]) if match else None
+    return (match["name"], unit) if match and unit else (column.strip(), None)
+
+
+def suffixed(column: str) -> tuple[str, str | None]:
+    """Return a standard name and the unit behind its underscore, as in ``t_ms``.
+
+    Examples
+    --------
+    >>> suffixed("q1_deg"), suffixed("t_start")
+    (('q1', 'deg'), ('t_start', None))
+    """
+    match = _SUFFIX.match(column)
+    unit = _UNITS.get(match["unit"]) if match else None
+    return (match["name"], unit) if match and unit else (column, None)

@@ -1,0 +1,223 @@
+"""Stretches of long logs that are worth diagnosing.
+
+A diagnosis costs time per sample, and hours of a log mostly repeat each other or rest. Logs beyond a budget are cut into stretches of
+equal length; each is described by what it visits, and stretches are taken one by one, always the one that adds most to what is covered
+already. Covered are cells per joint: position by direction of motion, speed on a logarithmic scale, torque, and reversals at each
+level of torque; and parts of the log's time, for what changes while an arm warms up. What a cell adds shrinks with what is in it
+already, so that what was seen often is left for what was not; what a sensor's noise alone would do counts as rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.log.findings import Finding
+from armgap.log.log import Log
+
+__all__ = ["BUDGET", "STRETCH_S", "choose"]
+
+BUDGET = 48_000
+"""Samples of all training logs, or of all holdout logs, that are diagnosed whole; of more, stretches are chosen."""
+
+STRETCH_S = 3.0
+"""Length of a stretch [s]."""
+
+_FEWEST = 4  # stretches, however long
+_POSITIONS = 12
+_SPEEDS = 6  # decades below the top speed, in halves
+_TORQUES = 8
+_TIMES = 8
+# A stretch needs at least this share of its samples in motion of some joint.
+_MOTION = 0.02
+# Slower than this part of the log's top speed, and by fewer position steps than this, a joint is at rest.
+_REST_SHARE = 1e-3
+_REST_STEPS = 2.0
+
+
+@dataclass(frozen=True)
+class _Ranges:
+    """What the cells span, over all logs, per joint."""
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    torque: NDArray[np.float64]
+
+
+def choose(logs: Sequence[Log], budget: int = BUDGET, *, horizon: float = 0.25) -> list[Log]:
+    """Return the logs, or stretches of them that together hold at most about `budget` samples.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Logs of one arm.
+    budget : int, default `BUDGET`
+        Samples of all logs together.
+    horizon : float, default 0.25
+        Prediction horizon [s]; a stretch lasts four horizons at least.
+
+    Returns
+    -------
+    list of Log
+        The logs themselves if they fit. Otherwise stretches, each a log on the clock of the one it was cut from and with its place in
+        its name; the first of each log says how much was chosen.
+    """
+    if sum(len(log) for log in logs) <= budget:
+        return list(logs)
+    pieces = [piece for i, log in enumerate(logs) for piece in _cut(i, log, max(STRETCH_S, 4 * horizon), budget)]
+    visits = _visits(logs, pieces)
+    if not visits.any():
+        visits = np.ones_like(visits)  # nothing stands out from rest
+    chosen = _greedy(visits, [last - first for _, first, last in pieces], budget)
+    return [
+        log
+        for i, whole in enumerate(logs)
+        for log in _parts(whole, [pieces[k][1:] for k in chosen if pieces[k][0] == i])
+    ]
+
+
+def _cut(index: int, log: Log, length_s: float, budget: int) -> list[tuple[int, int, int]]:
+    """Return stretches as ``(log, first, last)``, each within a share of the budget and without gaps in time."""
+    period = log.sample_period
+    rows = max(2, min(round(length_s / period), budget // _FEWEST))
+    gaps = np.flatnonzero(np.diff(log.t) > 3 * period) + 1
+    edges = [0, *gaps.tolist(), len(log)]
+    return [
+        (index, first, min(first + rows, end))
+        for start, end in pairwise(edges)
+        for first in range(start, end, rows)
+        if min(first + rows, end) - first >= rows // 2
+    ]
+
+
+def _visits(logs: Sequence[Log], pieces: list[tuple[int, int, int]]) -> NDArray[np.float64]:
+    """Return how much of each piece lies in each cell, shape (n_pieces, n_cells); nothing for pieces at rest."""
+    speeds = [_Speeds(log) for log in logs]
+    ranges = _ranges(logs, speeds)
+    cells = np.array([_cells(logs[i], speeds[i], slice(first, last), ranges) for i, first, last in pieces])
+    times = np.zeros((len(pieces), len(logs) * _TIMES))
+    for row, (i, first, _) in enumerate(pieces):
+        times[row, i * _TIMES + min(int(_TIMES * first / len(logs[i])), _TIMES - 1)] = float(cells[row].any())
+    return np.hstack([cells, times])
+
+
+class _Speeds:
+    """Speeds of a log over spans long enough that position steps and noise do not count as motion."""
+
+    def __init__(self, log: Log) -> None:
+        self.log = log
+        self.stride = max(1, round(0.01 / log.sample_period))
+        step = [_step(log.q[:, j]) for j in range(log.n_joints)]
+        self.rest = _REST_STEPS * np.array(step) / (self.stride * log.sample_period)
+
+    def of(self, rows: slice) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """Return speeds (n, n_joints) in a range of rows, and the rows they belong to."""
+        at = np.arange(rows.start, rows.stop, self.stride)
+        moved, passed = np.diff(self.log.q[at], axis=0), np.diff(self.log.t[at])
+        return moved / passed[:, None], at[:-1]
+
+
+def _step(values: NDArray[np.float64]) -> float:
+    """Return the typical change between samples while at rest: the lower quartile of the changes there are."""
+    moved = np.abs(np.diff(values[: 1 << 20]))
+    moved = moved[moved > 0]
+    return float(np.quantile(moved, 0.05)) if len(moved) else 0.0
+
+
+def _ranges(logs: Sequence[Log], speeds: Sequence[_Speeds]) -> _Ranges:
+    tops = [np.quantile(np.abs(s.of(slice(0, len(s.log)))[0]), 0.999, axis=0) for s in speeds]
+    return _Ranges(
+        np.min([log.q.min(axis=0) for log in logs], axis=0),
+        np.max([log.q.max(axis=0) for log in logs], axis=0),
+        np.max(tops, axis=0),
+        np.max([np.abs(log.tau).max(axis=0) for log in logs], axis=0),
+    )
+
+
+def _cells(log: Log, speeds: _Speeds, rows: slice, ranges: _Ranges) -> NDArray[np.float64]:
+    """Return the share of a piece's samples in each cell, all joints."""
+    dq, at = speeds.of(rows)
+    rest = np.maximum(speeds.rest, _REST_SHARE * ranges.speed)
+    moving = np.abs(dq) > rest
+    if not len(at) or moving.any(axis=1).mean() < _MOTION:
+        return np.zeros(log.n_joints * _width())
+    return np.concatenate([_joint_cells(log, at, dq, moving, j, ranges) for j in range(log.n_joints)])
+
+
+def _width() -> int:
+    return 2 * _POSITIONS + _SPEEDS + 2 * _TORQUES
+
+
+def _joint_cells(
+    log: Log, at: NDArray[np.intp], dq: NDArray[np.float64], moving: NDArray[np.bool_], j: int, ranges: _Ranges
+) -> NDArray[np.float64]:
+    go = moving[:, j]
+    span = max(float(ranges.high[j] - ranges.low[j]), 1e-12)
+    place = np.minimum((_POSITIONS * (log.q[at, j] - ranges.low[j]) / span).astype(int), _POSITIONS - 1)
+    ratio = np.abs(dq[:, j]) / max(float(ranges.speed[j]), 1e-12)
+    slow = np.clip((-2 * np.log10(np.maximum(ratio, 1e-12))).astype(int), 0, _SPEEDS - 1)
+    load = np.abs(log.tau[at, j]) / max(float(ranges.torque[j]), 1e-12)
+    level = np.minimum((_TORQUES * load).astype(int), _TORQUES - 1)
+    turned = np.flatnonzero((np.sign(dq[1:, j]) != np.sign(dq[:-1, j])) & (go[1:] | go[:-1]))
+    counts = [
+        np.bincount((place + _POSITIONS * (dq[:, j] > 0))[go], minlength=2 * _POSITIONS),
+        np.bincount(slow[go], minlength=_SPEEDS),
+        np.bincount(level[go], minlength=_TORQUES),
+        np.bincount(level[turned], minlength=_TORQUES),
+    ]
+    # A cell counts by the square root of the time in it: a little of everything beats much of one thing.
+    return np.sqrt(np.concatenate(counts) / len(at))
+
+
+def _greedy(visits: NDArray[np.float64], rows: list[int], budget: int) -> list[int]:
+    """Return pieces, in order, that cover most within the budget: sums of logarithms, gained most first."""
+    covered = np.full(visits.shape[1], 0.1)
+    left = set(np.flatnonzero(visits.any(axis=1)).tolist())
+    chosen: list[int] = []
+    spent = 0
+    while left:
+        order = np.array(sorted(left))
+        gain = np.sum(np.log1p(visits[order] / covered), axis=1)
+        best = int(order[np.argmax(gain)])
+        left.discard(best)
+        if spent + rows[best] <= budget:
+            chosen.append(best)
+            spent += rows[best]
+            covered += visits[best]
+        elif spent + min(rows) > budget:
+            break
+    return sorted(chosen)
+
+
+def _parts(whole: Log, spans: list[tuple[int, ...]]) -> list[Log]:
+    """Return stretches of a log as logs; the first carries the log's findings and what was chosen."""
+    parts = []
+    for first, last in _merged(spans):
+        name = f"{whole.name} ({whole.t[first]:.6g} to {whole.t[last - 1]:.6g} s)"
+        parts.append(whole.part(first, last, name, findings=()))
+    if not parts:
+        return []
+    rows = sum(len(part) for part in parts)
+    listed = ", ".join(f"{part.t[0]:.6g} to {part.t[-1]:.6g} s" for part in parts)
+    said = Finding(
+        "stretches",
+        f"of {len(whole)} samples over {whole.duration:.4g} s, {rows} in {len(parts)} stretches are used, chosen for the "
+        f"positions, speeds, torques and reversals they cover: {listed}",
+    )
+    return [parts[0].with_findings((*whole.findings, said)), *parts[1:]]
+
+
+def _merged(spans: list[tuple[int, ...]]) -> list[tuple[int, int]]:
+    """Join stretches that follow each other."""
+    merged: list[tuple[int, int]] = []
+    for first, last in sorted(spans):
+        if merged and merged[-1][1] == first:
+            merged[-1] = (merged[-1][0], last)
+        else:
+            merged.append((first, last))
+    return merged

@@ -1,0 +1,159 @@
+"""The report of a comparison: what became of the gap, the causes and the parameters."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from armgap.comparison import SHARE, SIGMAS, CauseChange, Comparison
+from armgap.diagnosis import Value
+from armgap.report import charts
+from armgap.report.document import Document
+from armgap.report.page import Bar, Cell, Drawing, Section, Table
+from armgap.report.words import Answer, figure, joint_text, millis, percent, sizes, title, value
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+__all__ = ["comparison_document", "comparison_summary"]
+
+_MODELS = {"before": "arm file", "refit": "re-estimated", "after": "with causes"}
+_COLOURS = (charts.BEFORE, charts.AFTER)
+_LEADS = {
+    "smaller": "The gap between the arm and its model has shrunk.",
+    "larger": "The gap between the arm and its model has grown.",
+    "unchanged": "The gap between the arm and its model is about what it was.",
+    "none": "There is no gap, neither before nor after.",
+}
+
+
+def comparison_document(c: Comparison) -> Document:
+    """Return the report of a comparison."""
+    heading = f"Compared: {c.names[0]} and {c.names[1]}"
+    return Document(heading, _LEADS[c.outcome], answers(c), [_gap(c), _causes(c), _parameters(c), _method(c)])
+
+
+def answers(c: Comparison) -> list[Answer]:
+    """Three questions about a repair."""
+    return [
+        Answer("Did the gap shrink?", *_shrunk(c)),
+        Answer("What became of the causes?", *_became(c)),
+        Answer("Did the arm's own values change?", *_moved(c)),
+    ]
+
+
+def _shrunk(c: Comparison) -> tuple[str, str]:
+    gap = c.gap[0]
+    ends = f"{millis(gap.before, c.unit)} → {millis(gap.after, c.unit)}"
+    factor = "" if gap.factor is None else f" Above the sensors' floor it is {figure(gap.factor, 2)} times what it was."
+    joints = " per joint" if len(gap.before) > 1 else ""
+    return (
+        ends,
+        f"RMS error{joints} of the arm file as it is, predicted over {c.horizon_s:g} s on held-out motion.{factor}",
+    )
+
+
+def _became(c: Comparison) -> tuple[str, str]:
+    if not c.causes:
+        return "None was named, before or after", ""
+    headline = "; ".join(f"{_name(x)}: {x.status}" for x in c.causes)
+    return headline[:1].upper() + headline[1:], " ".join(f"{_name(x)}: {x.why}." for x in c.causes)
+
+
+def _moved(c: Comparison) -> tuple[str, str]:
+    changed = [p for p in c.parameters if p.changed]
+    if not changed:
+        return "No", "No parameter moved beyond its uncertainty by an amount that matters."
+    text = ", ".join(f"{p.name} {figure(p.before.value)} → {figure(p.after.value)} {p.after.unit}" for p in changed)
+    return f"Yes: {', '.join(p.name for p in changed)}", f"{text}."
+
+
+def _name(cause: CauseChange) -> str:
+    return f"{title(cause.effect)}, {joint_text(cause.joint)}"
+
+
+def _gap(c: Comparison) -> Section:
+    joints = [f"joint {j + 1}" for j in range(len(c.gap[0].before))]
+    drawn = [_bars(c, i, joints) for i in (0, 2)]
+    return Section("", figures=drawn)
+
+
+def _bars(c: Comparison, i: int, joints: list[str]) -> Drawing:
+    gap = c.gap[i]
+    pair = list(zip(c.names, (gap.before, gap.after), _COLOURS, strict=True))
+    series = [(name, [1e3 * v for v in values], colour) for name, values, colour in pair]
+    caption = f"{_MODELS[gap.model].capitalize()}: RMS prediction error over {c.horizon_s:g} s [m{c.unit}, log scale]"
+    top = max((*gap.before, *gap.after), default=0.0) or 1.0
+    rows: list[tuple[Cell, ...]] = [
+        (joint, name, Bar(values[j] / top, figure(1e3 * values[j]), colour))
+        for j, joint in enumerate(joints)
+        for name, values, colour in pair
+    ]
+    table = Table(("joint", "diagnosis", caption.replace(", log scale", "")), rows)
+    return Drawing(caption, charts.bars("", "", joints, series, log=True, height=260), table)
+
+
+def _causes(c: Comparison) -> Section:
+    rows = [(_name(x), x.status, _sizes(x.before), _sizes(x.after), x.why) for x in c.causes]
+    text = (
+        "Gone: looked for and found absent. Unseen: the later log could not have shown it. Undecided: it leaves a trace, but not on held-out motion. "
+        "Renamed: a look-alike is named instead."
+    )
+    header = ("cause", "status", *c.names, "because")
+    return Section(
+        "Causes",
+        text=[text] if rows else ["Neither diagnosis names a cause."],
+        tables=[Table(header, rows)] if rows else [],
+    )
+
+
+def _sizes(parameters: dict[str, Value] | None) -> str:
+    return sizes({name: asdict(p) for name, p in (parameters or {}).items()})
+
+
+def _parameters(c: Comparison) -> Section:
+    rows = [
+        (
+            p.name,
+            value(asdict(p.before)),
+            value(asdict(p.after)),
+            "" if p.sigmas is None else f"{p.sigmas:+.2g}",
+            "changed" if p.changed else "",
+        )
+        for p in c.parameters
+    ]
+    text = (
+        f"Re-estimated together with the causes. A value counts as changed if it moved by more than {SIGMAS:g} standard deviations of the "
+        f"difference and by more than {percent(SHARE)}."
+    )
+    return Section(
+        "The arm's own values", text=[text], tables=[Table(("parameter", *c.names, "change [sigma]", ""), rows)]
+    )
+
+
+def _method(c: Comparison) -> Section:
+    rows = [(c.names[0], c.verdict_before), (c.names[1], c.verdict_after)]
+    return Section(
+        "About this comparison", tables=[Table(("diagnosis", "verdict"), rows)], notes=[f"Note: {n}." for n in c.notes]
+    )
+
+
+def comparison_summary(c: Comparison) -> RenderableType:
+    """Return what `rich` prints: the three answers, and the gap per joint."""
+    from rich import box
+    from rich.console import Group
+    from rich.table import Table as Grid
+    from rich.text import Text
+
+    from armgap.report.terminal import answer_lines
+
+    grid = Grid(
+        box=box.SIMPLE_HEAD, pad_edge=False, title=f"RMS error over {c.horizon_s:g} s [m{c.unit}]", title_justify="left"
+    )
+    for name in ("joint", "model", *c.names):
+        grid.add_column(name, justify="left" if name in ("joint", "model") else "right", overflow="fold")
+    for j in range(len(c.gap[0].before)):
+        for g in c.gap:
+            grid.add_row(str(j + 1), _MODELS[g.model], figure(1e3 * g.before[j]), figure(1e3 * g.after[j]))
+    lines = [line for a in answers(c) for line in answer_lines(a)]
+    return Group(Text(_LEADS[c.outcome], style="bold reverse"), Text(), *lines, grid)

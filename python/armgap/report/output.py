@@ -1,0 +1,90 @@
+"""Reports as files, in the form that the file's extension asks for."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armgap.errors import OptionError
+from armgap.report.document import Document, diagnosis_document
+
+if TYPE_CHECKING:
+    from armgap.diagnosis import Diagnosis
+
+__all__ = ["FORMS", "check_report", "diagnosis_report", "render_report"]
+
+STANDARD_STREAM = "-"
+
+
+def _html(document: Document, _: dict[str, Any]) -> str:
+    from armgap.report.html import page_of
+
+    return page_of(document)
+
+
+def _markdown(document: Document, _: dict[str, Any]) -> str:
+    from armgap.report.markdown import markdown_of
+
+    return markdown_of(document)
+
+
+def _json(_: Document, data: dict[str, Any]) -> str:
+    return json.dumps(data, indent=2, allow_nan=False)
+
+
+FORMS: dict[str, Callable[[Document, dict[str, Any]], str]] = {
+    ".html": _html,
+    ".htm": _html,
+    ".md": _markdown,
+    ".json": _json,
+}
+"""File extension to form."""
+
+
+def _form(path: str | Path) -> Callable[[Document, dict[str, Any]], str]:
+    if str(path) == STANDARD_STREAM:
+        return _html
+    suffix = Path(path).suffix.lower()
+    if suffix not in FORMS:
+        what = f"`{suffix}` is no form of a report" if suffix else "the name of a report has no extension"
+        raise OptionError(what, remedy="name it .html, .md or .json", file=path)
+    return FORMS[suffix]
+
+
+def check_report(path: str | Path | None) -> None:
+    """Raise before any work is done if no report could be written under this name.
+
+    Raises
+    ------
+    OptionError
+        If the extension is unknown.
+    """
+    if path is not None:
+        _form(path)
+
+
+def render_report(document: Document, data: dict[str, Any], path: str | Path) -> str:
+    """Return a report in the form that a file name asks for.
+
+    Parameters
+    ----------
+    document : Document
+        What the report says.
+    data : dict
+        The result as a JSON object, for the machine form.
+    path : path-like
+        Name of the file, whose extension decides; ``-`` is HTML.
+
+    Raises
+    ------
+    OptionError
+        If the extension is unknown.
+    """
+    return _form(path)(document, data)
+
+
+def diagnosis_report(diagnosis: Diagnosis, path: str | Path) -> str:
+    """Return the report of a diagnosis in the form that a file name asks for; see `render_report`."""
+    return render_report(diagnosis_document(diagnosis), diagnosis.to_dict(), path)

@@ -1,0 +1,72 @@
+"""The logs and their quality; how everything was computed."""
+
+from __future__ import annotations
+
+import platform
+
+from armgap.report.page import Section, Table
+from armgap.report.sections.steps import Data, length_unit
+from armgap.report.words import figure
+
+__all__ = ["data_quality", "method"]
+
+
+def data_quality(data: Data) -> Section:
+    """The logs, what was noticed in them, and remarks."""
+    rows = [
+        (log["name"], use, str(log["samples"]), figure(log["duration_s"], 4), str(log["windows"]))
+        for use in ("training", "holdout")
+        for log in data.get(use) or []
+    ]
+    found = [(f["log"], f["kind"], f["message"]) for f in data.get("log_findings") or []]
+    tables = [Table(("log", "use", "samples", "duration [s]", "windows"), rows)]
+    if found:
+        tables.append(Table(("log", "noticed", "what"), found))
+    remarks = [f"Note: {note}." for note in data.get("notes") or []]
+    if not found:
+        remarks.append("Nothing unusual was noticed in the logs.")
+    return Section("The logs and their quality", text=_noise(data), tables=tables, notes=remarks)
+
+
+def _noise(data: Data) -> list[str]:
+    noise = data.get("noise") or {}
+    if not noise:
+        return []
+    sigma = " / ".join(figure(1e3 * v) for v in noise["position_sigma"])
+    step = " / ".join(figure(1e3 * v) if v else "none seen" for v in noise["encoder_step"])
+    unit = length_unit(data)
+    return [f"Position noise (one standard deviation, per joint): {sigma} m{unit}; encoder step: {step} m{unit}."]
+
+
+def method(data: Data) -> Section:
+    """How it was computed, with which options, versions and seed."""
+    text = [
+        "The logs are cut into short windows. Each starts from its measured state, which is itself fitted within its noise, and runs under the "
+        "logged torque through a simulator with dry friction whose reversals are located inside the steps. Parameters and effects are fitted "
+        "together to the positions; what the arm file states with its standard deviations enters as prior knowledge. Probabilities and intervals "
+        "come from resampled windows.",
+    ]
+    return Section("How this was computed", text=text, tables=[Table(("what", "value"), _facts(data))])
+
+
+def _facts(data: Data) -> list[tuple[str, str]]:
+    arm, options = data.get("arm") or {}, data.get("options") or {}
+    smoothing = options.get("friction_smoothing")
+    facts = [
+        ("arm", f"{arm.get('name', '')} ({arm.get('kind', '')}, {arm.get('n_joints', '')} joints)"),
+        ("prediction horizon", f"{options.get('horizon_s', '')} s"),
+        ("causes at most", str(options.get("max_causes", ""))),
+        ("seed of the resampling", str(options.get("seed", ""))),
+        ("friction", f"smoothed over {figure(smoothing)} rad/s" if smoothing else "dry"),
+        ("schema", str(data.get("schema", ""))),
+        ("armgap", str(data.get("version", ""))),
+        ("drawn with", _drawn_with()),
+        ("time taken", f"{figure(data.get('seconds') or 0.0)} s"),
+    ]
+    return [fact for fact in facts if fact[1]]
+
+
+def _drawn_with() -> str:
+    from importlib.metadata import version
+
+    return f"bokeh {version('bokeh')}, Python {platform.python_version()}"

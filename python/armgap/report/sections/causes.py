@@ -1,0 +1,132 @@
+"""Which: the evidence for each cause, the candidates against each other, and what looks alike."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+from armgap.report import charts
+from armgap.report.page import Bar, Cell, Drawing, Section, Table
+from armgap.report.sections.steps import Data, length_unit, load_text
+from armgap.report.words import figure, joint_text, named, percent, sizes, title
+
+__all__ = ["evidence", "look_alikes", "ranking"]
+
+_WORST_SHARE = -9.99
+#: Share explained from which on it is called all.
+ALL = 0.995
+#: Candidates of the ranking that are shown at once.
+SHOWN = 8
+
+
+def evidence(data: Data) -> Section | None:
+    """Each cause against its own variable, with the fitted law through the data."""
+    laws = [law for law in data.get("laws") or [] if law.get("bins")]
+    if not laws:
+        return None
+    what = load_text(data)
+    text = (
+        f"Dots: the {what} that the model without this cause lacks, on held-out motion. Rings: its mean over a range, with the 95 % interval. "
+        "Line: what the fitted law adds in the same samples. A law that is right runs through the rings. Samples at rest are left out, "
+        f"where dry friction hides every other {what}."
+    )
+    notes = [f"{_name(law)}: {_verdict(law)}" for law in laws]
+    drawn = [Drawing(_caption(law), charts.law(law)) for law in laws]
+    return Section(
+        "The evidence: each cause against its own variable", text=[text], figures=drawn, notes=notes, columns=2
+    )
+
+
+def _name(law: Data) -> str:
+    text = named(law)
+    return text[:1].upper() + text[1:]
+
+
+def _caption(law: Data) -> str:
+    along = " along the motion" if law["folded"] else ""
+    what = "force" if law["torque_unit"] == "N" else "torque"
+    return f"{_name(law)}: {what} on joint {law['shown_joint']}{along} [{law['torque_unit']}] over {law['variable']}"
+
+
+def _verdict(law: Data) -> str:
+    share = law["explained"]
+    failed = f"; {law['failed']} windows could not be simulated ({law.get('why', '')})" if law["failed"] else ""
+    if share > ALL:
+        return f"the law explains all of what the ranges' means show{failed}."
+    if share <= 0:
+        return f"the law explains none of what the ranges' means show{failed}."
+    return f"the law explains {percent(share)} of what the ranges' means show (mean square){failed}."
+
+
+def ranking(data: Data) -> Section | None:
+    """The candidates against each other, with probabilities."""
+    ranked = data.get("ranking") or []
+    if not ranked:
+        return None
+    header = (
+        "candidate",
+        "share of the gap removed",
+        "probability",
+        f"RMS [m{length_unit(data)}]",
+        "size",
+        "distance from trusted values [σ²]",
+    )
+    text = (
+        "Every candidate was tested to first order; those that passed were fitted one by one together with the arm's parameters on the "
+        "training logs and judged on held-out motion. The share counts held-out windows with their tails cut. The last column says how far the arm's "
+        "own parameters had to leave the values that the arm file trusts."
+    )
+    rows = [_rank(data, r) for r in ranked]
+    tables = [Table(header, rows[:SHOWN])]
+    if rows[SHOWN:]:
+        tables.append(Table(header, rows[SHOWN:], fold=f"{len(rows) - SHOWN} more"))
+    return Section("Ranking of causes", text=[text], tables=tables, notes=_course(data))
+
+
+def _rank(data: Data, r: Data) -> tuple[Cell, ...]:
+    share = max(r["closed"], _WORST_SHARE)
+    cause = _cause(data, r)
+    return (
+        named(r),
+        Bar(min(max(share, 0.0), 1.0), percent(share), charts.AFTER if cause else charts.MEASURED),
+        f"{cause['probability']:.2f}" if cause else "",
+        " / ".join(figure(1e3 * v) for v in r["rms"]),
+        sizes(r["parameters"]),
+        figure(r.get("trust", 0.0)),
+    )
+
+
+def _cause(data: Data, ranked: Data) -> Any:
+    place = (ranked["effect"], ranked["joint"])
+    return next((c for c in data.get("causes") or [] if (c["effect"], c["joint"]) == place), None)
+
+
+def _course(data: Data) -> list[str]:
+    """How one cause after another came in."""
+    stages = data.get("stages") or []
+    unit = length_unit(data)
+    lines: list[str] = []
+    for before, after in pairwise(stages):
+        if before.get("added"):
+            errors = [" / ".join(figure(1e3 * v) for v in s["rms"]) for s in (before, after)]
+            lines.append(
+                f"Step {len(lines) + 1}: {named(before['added'])} was added, and the error fell from {errors[0]} to {errors[1]} m{unit}."
+            )
+    return lines
+
+
+def look_alikes(data: Data) -> Section | None:
+    """What these logs do not tell from the named causes, and why."""
+    rows = [
+        (
+            f"{title(c['effect'])} ({joint_text(c['joint'])})",
+            f"{title(e['effect'])} ({joint_text(e['joint'])})",
+            e["why"],
+        )
+        for c in data.get("causes") or []
+        for e in c.get("equivalents") or []
+    ]
+    if not rows:
+        return None
+    text = "Each of these would explain the logs as well as the cause it stands beside. Which one it is has to be decided by other means."
+    return Section("What looks alike", text=[text], tables=[Table(("named", "could also be", "why"), rows)])

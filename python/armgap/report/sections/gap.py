@@ -1,0 +1,141 @@
+"""How far, and where: the first picture, and the map in full."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+from armgap.report import charts
+from armgap.report.page import Bar, Cell, Drawing, Heat, Section, Table, Tile
+from armgap.report.sections.steps import Data, length_unit, load_text, steps, torque_unit
+from armgap.report.words import figure, variable_text
+
+__all__ = ["first_picture", "gap_map"]
+
+#: Below this a tile shows one digit, to fit on a phone.
+SMALL = 0.01
+#: Where there is no gap, the map shows noise, and is this many times paler.
+PALE = 5.0
+
+
+def first_picture(data: Data) -> Section:
+    """The gap before and after, and the map of where it lies."""
+    gap = data["gap"]
+    unit = length_unit(data)
+    joints = [f"joint {j + 1}" for j in range(len(gap["before"]))]
+    series = [(label, [1e3 * v for v in gap[key]], colour) for label, key, colour in steps(data)]
+    series.append(("sensor noise alone", [1e3 * v for v in gap["floor"]], charts.FLOOR))
+    caption = f"How far: RMS prediction error over {gap['horizon_s']:g} s [m{unit}, log scale]"
+    chart = charts.bars("", "", joints, series, log=True, height=280)
+    key = "before" if data["verdict"] == "parameters" else "refit"
+    name = {"before": "arm file's model", "refit": "re-estimated model"}[key]
+    what = (
+        f"Where: {load_text(data)} the {name} lacks [RMS, {torque_unit(data)}], low values of each variable on the left"
+    )
+    return Section("", figures=[Drawing(caption, chart, _bars(data))], heats=_heats(data, [(what, key)]))
+
+
+def _bars(data: Data) -> Table:
+    """The first chart as a table with bars of text, longest for the largest error."""
+    gap = data["gap"]
+    shown = [*((label, key) for label, key, _ in steps(data)), ("sensor noise alone", "floor")]
+    top = max((v for _, key in shown for v in gap[key]), default=0.0) or 1.0
+    rows: list[tuple[Cell, ...]] = [
+        (f"joint {j + 1}", label, Bar(gap[key][j] / top, figure(1e3 * gap[key][j]), charts.BEFORE))
+        for j in range(len(gap["before"]))
+        for label, key in shown
+    ]
+    return Table(("joint", "model", f"RMS error over {gap['horizon_s']:g} s [m{length_unit(data)}]"), rows)
+
+
+def _heats(data: Data, wanted: Sequence[tuple[str, str]]) -> list[Heat]:
+    """Maps of the lacking torque, all on one scale: a row per joint and variable, a tile per range, low values first."""
+    regimes = data.get("regimes") or []
+    if not regimes:
+        return []
+    weight = _weights(data)
+    order = sorted(regimes, key=lambda r: -weight[r["joint"]][1])
+    top = max(v * weight[r["joint"]][0] for r in regimes for _, key in wanted for v in r[key]) or 1.0
+    top *= PALE if data["verdict"] == "none" else 1.0
+    return [
+        Heat(
+            caption,
+            [
+                (_row(r), [_tile(data, r, i, v, v * weight[r["joint"]][0] / top) for i, v in enumerate(r[key])])
+                for r in order
+            ],
+        )
+        for caption, key in wanted
+    ]
+
+
+def _weights(data: Data) -> dict[int, tuple[float, float]]:
+    """What a torque of each joint weighs in its share of the gap, and that share."""
+    share = {p["joint"]: p["share"] for p in data.get("where") or []}
+    key = "before" if data["verdict"] == "parameters" else "refit"
+    found: dict[int, tuple[float, float]] = {}
+    for r in data["regimes"]:
+        squares = sum(n * v * v for n, v in zip(r["count"], r[key], strict=True))
+        rms = math.sqrt(squares / max(sum(r["count"]), 1))
+        part = share.get(r["joint"], 1.0)
+        found.setdefault(r["joint"], (math.sqrt(part) / rms if rms > 0 else 0.0, part))
+    return found
+
+
+def _row(regime: Data) -> str:
+    return f"joint {regime['joint']}: {variable_text(regime['variable'])}"
+
+
+def _tile(data: Data, regime: Data, i: int, value: float, depth: float) -> Tile:
+    span = _groups(regime)[i]
+    text = ("no ", "yes ")[min(i, 1)] if regime["variable"].startswith("reversal") else ""
+    if not regime["count"][i]:
+        return Tile("", 0.0, f"{span}: no samples")
+    tip = f"{span}: {figure(value)} {torque_unit(data)}, {regime['count'][i]} samples"
+    return Tile(f"{text}{value:.{2 if value >= SMALL else 1}g}", depth, tip, _stands_out(data, regime, i))
+
+
+def _stands_out(data: Data, regime: Data, i: int) -> bool:
+    """Whether a tile is the place that the first answer names."""
+    if data["verdict"] == "none" or not data.get("where"):
+        return False
+    place = data["where"][0]
+    span = place.get("range")
+    if not span or (place["joint"], span["variable"]) != (regime["joint"], regime["variable"]):
+        return False
+    return bool(span["from"] == regime["edges"][i] and span["to"] == regime["edges"][i + 1])
+
+
+def gap_map(data: Data) -> Section | None:
+    """The gap by joint and regime, before and after, on one scale; the same in figures."""
+    if not data.get("regimes"):
+        return None
+    what = load_text(data)
+    text = (
+        f"The {what} that each model lacks: the curvature of the prediction error within each window, times the inertia. All maps share "
+        f"one scale, on which each joint's {what} counts against what is typical of that joint. A right cause empties the map where it acts."
+    )
+    wanted = [(f"{label[:1].upper()}{label[1:]} [RMS, {torque_unit(data)}]", key) for label, key, _ in steps(data)]
+    return Section(
+        "The gap by joint and regime", text=[text], heats=_heats(data, wanted), tables=[_table(data)], columns=2
+    )
+
+
+def _groups(regime: Data) -> list[str]:
+    """The ranges of a regime in words."""
+    if regime["variable"].startswith("reversal"):
+        return ["away from reversals", "near a reversal"][: len(regime["count"])]
+    unit = regime["unit"]
+    return [f"{regime['variable']} {figure(a)} to {figure(b)} {unit}" for a, b in pairwise(regime["edges"])]
+
+
+def _table(data: Data) -> Table:
+    names = [label for label, _, _ in steps(data)]
+    rows = [
+        (f"joint {r['joint']}", span, str(r["count"][i]), *(figure(r[k][i]) for _, k, _ in steps(data)))
+        for r in data["regimes"]
+        for i, span in enumerate(_groups(r))
+    ]
+    unit = torque_unit(data)
+    return Table(("joint", "where", "samples", *(f"{n} [{unit}]" for n in names)), rows, fold="The same in figures")

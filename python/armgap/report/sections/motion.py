@@ -1,0 +1,86 @@
+"""Predicted against measured: window by window, and in free run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from armgap.report import charts
+from armgap.report.page import Drawing, Section
+from armgap.report.sections.steps import Data, length_unit, steps
+from armgap.report.words import millis
+
+__all__ = ["free_run", "predictions"]
+
+#: How far beyond the measured positions a free run is drawn, in their range.
+REACH = 1.0
+
+
+def predictions(data: Data) -> Section | None:
+    """Positions and errors on held-out motion, zoomable together."""
+    series = data.get("series") or []
+    if not series:
+        return None
+    drawn: list[Drawing] = []
+    for s in series:
+        position, error = _position(data, s), _error(data, s)
+        error.x_range = position.x_range
+        drawn += [
+            Drawing(f"{s['log']}, joint {s['joint']}: position [{length_unit(data)}]", position),
+            Drawing(f"{s['log']}, joint {s['joint']}: measured minus predicted [m{length_unit(data)}]", error),
+        ]
+    text = (
+        "Every window starts from its measured state and runs under the logged torque. Drag over a stretch of time to zoom in, or use Ctrl and the "
+        "wheel; position and error move together. A click on a name hides its curve."
+    )
+    return Section("Predicted against measured, on held-out motion", text=[text], figures=drawn, columns=2)
+
+
+def _position(data: Data, s: Data) -> Any:
+    curves = [("measured", s["measured"], charts.MEASURED)]
+    curves += [(label, s[key], colour) for label, key, colour in steps(data)]
+    return charts.lines("", "time [s]", "", s["t"], curves, breaks=s["window_start"])
+
+
+def _error(data: Data, s: Data) -> Any:
+    measured, *predicted = (np.asarray(s[key], dtype=float) for key in ("measured", *(k for _, k, _ in steps(data))))
+    curves = [
+        (label, 1e3 * (measured - values), colour)
+        for (label, _, colour), values in zip(steps(data), predicted, strict=True)
+    ]
+    return charts.lines("", "time [s]", "", s["t"], curves, breaks=s["window_start"])
+
+
+def free_run(data: Data) -> Section:
+    """The whole holdout from its first sample."""
+    gap, unit = data["gap"], length_unit(data)
+    run = gap["free_run"]
+    last = "with the causes" if data.get("causes") else "re-estimated"
+    text = (
+        "Simulated from the first sample of each held-out log to its last, without looking at the measurement again. Errors add up, and where "
+        "the motion is sensitive a small one decides the rest; the windows above are the fairer judge. RMS "
+        f"{millis(run['before'], unit)} with the arm file, {millis(run['after'], unit)} {last}."
+    )
+    drawn = [
+        Drawing(f"{s['log']}, joint {s['joint']} [{unit}]", _whole_run(s, last))
+        for s in data.get("free_run_series") or []
+    ]
+    return Section("Free run", text=[text], figures=drawn, columns=2)
+
+
+def _whole_run(s: Data, last: str) -> Any:
+    """A free run; one that runs away leaves the picture, not the scale."""
+    curves = [
+        ("measured", s["measured"], charts.MEASURED),
+        ("arm file", s["before"], charts.BEFORE),
+        (last, s["after"], charts.AFTER),
+    ]
+    low, high = min(s["measured"]), max(s["measured"])
+    reach = (high - low) or 1.0
+    chart = charts.lines("", "time [s]", "", s["t"], curves)
+    chart.y_range.bounds = (low - REACH * reach, high + REACH * reach)
+    values = [v for key in ("before", "after") for v in s[key] if v is not None]
+    if min(values) < low - REACH * reach or max(values) > high + REACH * reach:
+        chart.y_range.start, chart.y_range.end = chart.y_range.bounds
+    return chart

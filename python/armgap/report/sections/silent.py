@@ -1,0 +1,58 @@
+"""What was looked for and not found, and what the logs could not show."""
+
+from __future__ import annotations
+
+import functools
+
+from armgap import _native
+from armgap.report.page import Section, Table
+from armgap.report.sections.steps import Data
+from armgap.report.words import figure, joint_text, named, title, unit_text
+
+__all__ = ["excited_by", "not_shown", "ruled_out"]
+
+
+@functools.cache
+def _needs() -> dict[str, str]:
+    return {entry["name"]: str(entry["excited_by"]) for entry in _native.effects()}
+
+
+def excited_by(effect: str) -> str:
+    """The motion that would show an effect."""
+    return _needs().get(effect, "")
+
+
+def not_shown(data: Data) -> Section | None:
+    """Effects that could be there without a trace in these logs, and which motion would show them."""
+    silent = [r for r in data.get("ruled_out") or [] if r["status"] == "not excited"]
+    if not silent:
+        return None
+    joints: dict[str, list[str]] = {}
+    for r in silent:
+        joints.setdefault(r["effect"], []).append(joint_text(r["joint"]))
+    rows = [(title(effect), ", ".join(places), excited_by(effect)) for effect, places in joints.items()]
+    text = "These effects could be present without leaving a trace in these logs. The last column says which motion would show them."
+    return Section("What these logs could not show", text=[text], tables=[Table(("effect", "where", "needs"), rows)])
+
+
+def ruled_out(data: Data) -> Section | None:
+    """Every candidate that is no cause, with the bound on its size."""
+    found = data.get("ruled_out") or []
+    if not found:
+        return None
+    count = {status: sum(r["status"] == status for r in found) for status in ("absent", "undecided", "not excited")}
+    text = (
+        f"{len(found)} candidates are not named: {count['absent']} absent (no larger than the bound), {count['undecided']} undecided (a trace in "
+        f"training that held-out motion does not confirm), {count['not excited']} not excited."
+    )
+    rows = [(named(r), r["status"], bound_text(r), r.get("why") or "") for r in found]
+    table = Table(("candidate", "status", "bound (95 %)", "why"), rows, fold=f"All {len(found)} candidates")
+    return Section("What was looked for and not found", text=[text], tables=[table])
+
+
+def bound_text(entry: Data) -> str:
+    """The bound on the size of an absent effect."""
+    bound = entry.get("bound")
+    if not bound:
+        return ""
+    return f"{bound['parameter']} within {figure(bound['value'])} {unit_text(bound['unit'])}".strip()

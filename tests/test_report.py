@@ -1,0 +1,262 @@
+"""Reports: what they say, in which form, and that nothing of the input becomes markup."""
+
+from __future__ import annotations
+
+import copy
+import html
+import json
+import re
+
+import numpy as np
+import pytest
+
+import report_cases as cases
+from armgap import Arm, diagnose, simulate
+from armgap.errors import OptionError
+from armgap.report import check_report, diagnosis_document, diagnosis_report, render_html, summary_table
+from armgap.report.sections import SECTIONS
+from armgap.report.sections.motion import _whole_run
+from armgap.report.words import answers, figure, percent, value, verdict
+from armgap.simulation import Effect
+
+LARGEST_REPORT = 5_000_000  # bytes
+EVERY_CASE = pytest.mark.parametrize("case", cases.CASES.values(), ids=cases.CASES)
+
+
+def texts(data: dict) -> str:
+    return " ".join(f"{a.headline} {a.detail}" for a in answers(data))
+
+
+@EVERY_CASE
+def test_the_page_is_one_offline_file_with_the_three_answers(case) -> None:
+    page = render_html(case())
+    assert len(page.encode()) < LARGEST_REPORT
+    assert not re.search(
+        r"""(?:src|href|url)\s*[=(]\s*["']?(?:https?:)?//""", re.sub(r"<script.*?</script>", "", page, flags=re.S)
+    )
+    for answer in answers(case().to_dict()):
+        assert html.escape(answer.question) in page
+        assert answer.headline in html.unescape(page)
+
+
+def test_six_joints_and_three_long_logs_stay_below_the_limit() -> None:
+    data = copy.deepcopy(cases.named().to_dict())
+    length, logs, joints = 2500, 3, 6  # what a diagnosis keeps of a log at most
+    for key in ("series", "free_run_series"):
+        first = data[key][0]
+        stretched = {
+            k: (v * length)[:length] if isinstance(v, list) and k != "window_start" else v for k, v in first.items()
+        }
+        data[key] = [stretched | {"log": f"log {i}", "joint": j + 1} for i in range(logs) for j in range(joints)]
+    assert len(render_html(data).encode()) < LARGEST_REPORT
+
+
+def test_a_free_run_that_runs_away_leaves_the_picture_not_the_scale() -> None:
+    series = {"t": [0.0, 1.0, 2.0], "measured": [0.0, 1.0, 0.5], "before": [0.0, 2.0, 90.0], "after": [0.0, 1.0, None]}
+    chart = _whole_run(series, "with the causes")
+    assert (chart.y_range.start, chart.y_range.end) == (-1.0, 2.0)
+
+
+@EVERY_CASE
+def test_nothing_of_the_input_becomes_markup(case) -> None:
+    data = case().to_dict()
+    assert data["arm"]["name"] == data["holdout"][0]["name"] == cases.HOSTILE
+    page = render_html(case())
+    assert "<script>alert" not in page
+    assert "&lt;script&gt;alert" in page
+    text = diagnosis_report(case(), "x.md")
+    assert "<script>" not in text
+    assert "\\<script\\>" in text
+    assert case()._repr_html_().count("<script") == 0
+
+
+def test_every_verdict_answers_in_its_own_words() -> None:
+    data = {name: case().to_dict() for name, case in cases.CASES.items()}
+    assert {name: d["verdict"] for name, d in data.items()} == {name: name for name in cases.CASES}
+    assert "Stribeck friction (stiction), joint 1" in texts(data["effect"])
+    assert "No cause" in texts(data["none"])
+    assert "None that the library knows" in texts(data["unexplained"])
+    assert len({verdict(d) for d in data.values()}) == len(data)
+
+
+def test_a_doubtful_cause_is_called_so() -> None:
+    data = copy.deepcopy(cases.named().to_dict())
+    data["causes"][0]["probability"] = 0.3
+    assert "(doubtful)" in texts(data)
+    assert "stays unexplained" in verdict(data)
+
+
+def test_several_pushes_are_counted_in_the_headline_and_told_apart_in_the_text() -> None:
+    data = copy.deepcopy(cases.named().to_dict())
+    push = data["causes"][0] | {"effect": "external_pulse"}
+    data["causes"] = [push | {"log": "first run"}, push | {"log": "second run"}]
+    which = answers(data)[1]
+    assert which.headline == "External push, joint 1 (2 times)"
+    assert "in first run" in which.detail
+    assert "in second run" in which.detail
+
+
+def test_an_axis_has_forces_in_newtons_and_errors_in_millimetres() -> None:
+    arm = Arm("slide", "axis", 0.0, 0.004, np.array([2.0, 0.0, 3.0, 4.0]), sigma=np.array([0.2, 0.1, 1.0, 1.0]))
+    t = np.arange(1000) * arm.sample_period
+    hidden = Effect("stribeck", 1, {"amplitude": 5.0, "velocity": 0.1})
+    logs = [
+        simulate(arm, t, 25 * np.sin((3 + k) * t) + 10 * np.sin(11 * t + k), effects=[hidden], noise=1e-5)
+        for k in (0, 1)
+    ]
+    diagnosis = diagnose(logs[0], arm, holdout=logs[1])
+    text = diagnosis_report(diagnosis, "x.md")
+    assert "force the" in text
+    assert "torque the" not in text
+    assert " mm" in answers(diagnosis.to_dict())[2].headline
+
+
+@pytest.mark.parametrize(
+    ("number", "text"), [(136.2, "136"), (99.7, "100"), (1.36, "1.4"), (0.0136, "0.014"), (2.5e7, "2.5e+07")]
+)
+def test_numbers_are_written_out_unless_they_are_huge(number, text) -> None:
+    assert figure(number, 2) == text
+
+
+@EVERY_CASE
+def test_sections_say_what_the_diagnosis_holds(case) -> None:
+    data = case().to_dict()
+    page = html.unescape(render_html(case()))
+    for name, values in data["parameters"]["with_causes"].items():
+        assert f"<td>{name}</td>" in page
+        assert value(values) in page
+    silent = {r["effect"] for r in data["ruled_out"] if r["status"] == "not excited"}
+    assert bool(silent) == ("What these logs could not show" in page)
+    assert f">All {len(data['ruled_out'])} candidates<" in page
+    assert data["version"] in page
+    assert str(data["options"]["seed"]) in page
+    assert "the inertia matrix is positive definite" in page
+
+
+def test_evidence_and_look_alikes_stand_in_the_report_of_a_cause() -> None:
+    data = copy.deepcopy(cases.named().to_dict())
+    assert "The evidence" in render_html(data)
+    assert "What looks alike" not in render_html(data)
+    data["causes"][0]["equivalents"] = [{"effect": "backlash", "joint": 1, "why": "both act at reversals"}]
+    page = render_html(data)
+    assert "What looks alike" in page
+    assert "both act at reversals" in page
+
+
+def test_values_that_do_not_exist_are_dashes() -> None:
+    """JSON has no NaN: the core writes null."""
+    data = copy.deepcopy(cases.named().to_dict())
+    data["ranking"][0]["parameters"]["amplitude"] |= {"value": None, "sigma": None}
+    data["parameters"]["refit"]["theta1"]["sigma"] = None
+    for name in ("x.html", "x.md"):
+        assert "–" in diagnosis_report(type(cases.named()).from_dict(data), name)
+
+
+def test_an_older_diagnosis_without_what_was_added_since_still_has_a_report() -> None:
+    """Only what the schema demands."""
+    whole = cases.named().to_dict()
+    needed = ("schema", "verdict", "gap", "where", "causes", "ruled_out", "parameters")
+    least = {key: whole[key] for key in needed}
+    assert len([s for s in SECTIONS if s(least) is not None]) >= 5
+    assert "Stribeck" in render_html(least)
+
+
+def test_an_impossible_arm_is_pointed_out() -> None:
+    data = copy.deepcopy(cases.named().to_dict())
+    data["plausibility"][0] |= {"holds": False}
+    assert "does NOT hold" in render_html(data)
+    assert "Not physically possible" in render_html(data)
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.5, "50 %"),
+        (0.994, "99.4 %"),
+        (0.9988, "99.88 %"),
+        (0.99999, "99.99 %"),
+        (1.0, "100 %"),
+        (-0.001, "0 %"),
+        (-0.12, "-12 %"),
+    ],
+)
+def test_a_share_is_never_rounded_up_to_all(share, text) -> None:
+    assert percent(share).replace("\N{NO-BREAK SPACE}", " ") == text
+
+
+@pytest.mark.parametrize(
+    ("number", "sigma", "text"),
+    [
+        (0.901089, 5.9e-5, "0.901089 ± 0.000059 N m"),
+        (2.0, 0.1, "2.00 ± 0.10 N m"),
+        (1234.5, 30.0, "1234 ± 30 N m"),
+        (1.5e-9, 2e-10, "1.5e-09 ± 2e-10 N m"),
+        (3.0, None, "3 N m"),
+        (3.0, 0.0, "3 N m"),
+        (None, None, "– N m"),
+    ],
+)
+def test_a_value_and_its_uncertainty_end_at_the_same_place(number, sigma, text) -> None:
+    assert value({"value": number, "sigma": sigma, "unit": "N m"}) == text
+
+
+def test_markdown_has_tables_that_hold_together() -> None:
+    text = diagnosis_report(cases.named(), "x.md")
+    rows = [re.sub(r"\\\|", "", line).count("|") for line in text.splitlines() if line.startswith("|")]
+    heads = [i for i, line in enumerate(text.splitlines()) if re.fullmatch(r"\|( --- \|)+", line)]
+    lines = text.splitlines()
+    assert len(heads) >= 6
+    for i in heads:
+        width = lines[i].count("|")
+        assert re.sub(r"\\\|", "", lines[i - 1]).count("|") == width
+        for line in lines[i + 1 :]:
+            if not line.startswith("|"):
+                break
+            assert re.sub(r"\\\|", "", line).count("|") == width, line
+    assert rows
+    assert "█" in text
+    assert text.count("<details>") == text.count("</details>")
+
+
+def test_the_extension_decides() -> None:
+    assert diagnosis_report(cases.none(), "a.HTML").lower().startswith("<!doctype html>")
+    assert diagnosis_report(cases.none(), "-").lower().startswith("<!doctype html>")
+    assert json.loads(diagnosis_report(cases.none(), "a.json")) == cases.none().to_dict()
+    check_report(None)
+
+
+@pytest.mark.parametrize("name", ["report.pdf", "report", "report.html.bak"])
+def test_an_unknown_extension_ends_before_any_work(run, tmp_path, name) -> None:
+    target = tmp_path / name
+    status, out, err = run("diagnose", tmp_path / "none.csv", "--arm", tmp_path / "none.toml", "--report", target)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert ".html, .md or .json" in err
+    assert str(target) in err
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(OptionError):
+        check_report(target)
+
+
+@EVERY_CASE
+@pytest.mark.parametrize("width", [60, 80, 140])
+def test_the_summary_fits_the_terminal(case, width) -> None:
+    from io import StringIO
+
+    from rich.console import Console
+
+    out = StringIO()
+    Console(file=out, width=width, no_color=True).print(summary_table(case()))
+    lines = [line.rstrip() for line in out.getvalue().splitlines()]
+    assert max(map(len, lines)) <= width
+    assert not any("…" in line for line in lines)
+    joined = " ".join(" ".join(lines).split())
+    for answer in answers(case().to_dict()):
+        assert answer.question in joined
+        assert " ".join(answer.headline.split()) in joined
+
+
+def test_a_document_is_the_same_from_a_result_and_from_its_json() -> None:
+    data = json.loads(cases.named().to_json())
+    first, second = diagnosis_document(cases.named()), diagnosis_document(data)
+    assert first.answers == second.answers
+    assert [s.title for s in first.sections] == [s.title for s in second.sections]

@@ -1,0 +1,81 @@
+"""A diagnosis in a notebook: card, plots, table."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+import report_cases as cases
+from armgap import Diagnosis
+from armgap.errors import OptionError
+from armgap.report.notebook import PlotLibraryMissingError
+
+
+@pytest.fixture
+def axes():
+    """A picture that is drawn and thrown away."""
+    figure = pytest.importorskip("matplotlib.figure", reason="matplotlib is not installed").Figure()
+    return figure.subplots()
+
+
+def test_the_card_has_the_three_answers_and_no_markup_of_the_input() -> None:
+    card = cases.named()._repr_html_()
+    assert card.count("<dt") == 3
+    assert "Stribeck friction" in card
+    assert "script" not in card
+
+
+@pytest.mark.parametrize("case", cases.CASES.values(), ids=cases.CASES)
+@pytest.mark.parametrize("finding", ["gap", "where", "ranking", "prediction", "error"])
+def test_every_finding_is_drawn(case, finding, axes) -> None:
+    ax = case().plot(finding, ax=axes)
+    assert ax is axes
+    ax.figure.canvas.draw()
+    assert ax.lines or ax.patches or ax.images or not case().extra["ranking"]
+
+
+def test_a_cause_is_drawn_as_its_law_through_the_data(axes) -> None:
+    diagnosis = cases.named()
+    ax = diagnosis.plot(diagnosis.causes[0], ax=axes)
+    ax.figure.canvas.draw()
+    law = next(line for line in ax.lines if line.get_label() == "fitted law")
+    assert list(law.get_ydata()) == diagnosis.to_dict()["laws"][0]["bins"]["law"]
+    assert "dq1" in ax.get_xlabel()
+
+
+def test_the_error_is_the_difference_of_the_curves(axes) -> None:
+    series = cases.named().to_dict()["series"][0]
+    cases.named().plot("error", ax=axes)
+    after = axes.lines[-1].get_ydata()
+    assert after[0] == pytest.approx(1e3 * (series["measured"][0] - series["after"][0]))
+
+
+def test_what_does_not_exist_is_refused(axes) -> None:
+    with pytest.raises(OptionError, match="no finding `speed`"):
+        cases.named().plot("speed", ax=axes)
+    with pytest.raises(OptionError, match="joint 7"):
+        cases.named().plot("prediction", joint=7, ax=axes)
+    with pytest.raises(OptionError, match="no evidence"):
+        cases.none().plot(cases.named().causes[0], ax=axes)
+
+
+def test_without_matplotlib_plots_say_what_to_install(monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(PlotLibraryMissingError, match=r"pip install 'armgap\[notebook\]'"):
+        cases.named().plot()
+    assert cases.named().to_polars().height
+
+
+@pytest.mark.parametrize("case", cases.CASES.values(), ids=cases.CASES)
+def test_the_table_has_every_candidate_once(case) -> None:
+    diagnosis: Diagnosis = case()
+    table = diagnosis.to_polars()
+    places = set(table.select("effect", "joint").iter_rows())
+    expected = {(x.effect, x.joint) for x in (*diagnosis.causes, *diagnosis.ruled_out)}
+    assert places == expected
+    rows = sum(len(c.parameters) for c in diagnosis.causes) + len(diagnosis.ruled_out)
+    assert table.height == rows
+    named = table.filter(status="named")
+    assert set(named["effect"]) == {c.effect for c in diagnosis.causes}
+    assert named["value"].null_count() == 0
