@@ -312,7 +312,7 @@ def test_trial_plan_keeps_its_shares_and_covers_every_effect():
     assert count == {"single": 260, "null": 32, "parameters": 28, "pair": 48, "outside": 32}
     assert plan_trial(12, 400) == plans != plan_trial(13, 400)
     assert all(len(p.effects) == {"null": 0, "parameters": 0, "pair": 2}.get(p.family, 1) for p in plans)
-    hidden = {e for p in plans if p.family == "single" and p.model == "direct-drive" for e in p.effects}
+    hidden = {e for p in plans if p.family in ("single", "pair") and p.model == "direct-drive" for e in p.effects}
     assert hidden == set(possible("two-link", 2, ("library", "further")))
     with pytest.raises(ValueError, match="tripel"):
         plan_trial(1, 4, {"tripel": 1.0})

@@ -98,7 +98,7 @@ def test_true_signature_explains_the_residual(name, arm):
 def test_regression_peers_find_a_plain_effect(peer, arm):
     if peer == "frols":
         pytest.importorskip("sysidentpy", reason="pip install 'armgap[trial-peers]'")
-    assert first(sealed(arm, Effect("quadratic_drag", 2, {"c": 0.3})), peer) == ("quadratic_drag", 2)
+    assert first(sealed(arm, Effect("torque_dead_zone", 2, {"level": 1.0})), peer) == ("torque_dead_zone", 2)
 
 
 def test_correlation_finds_what_is_left_after_re_estimation(arm):

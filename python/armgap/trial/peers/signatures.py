@@ -98,6 +98,10 @@ def _drag(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
     yield _one(x.dq[:, j] * np.abs(x.dq[:, j]))
 
 
+def _cubic(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
+    yield _one(x.dq[:, j] ** 3)
+
+
 def _load(arm: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
     n = arm.n_inertial
     load = regressor(arm, x.q, x.dq, np.zeros_like(x.q))[:, j, :n] @ arm.theta[:n]
@@ -270,6 +274,7 @@ OWN: dict[str, Own] = {
     "torque_offset": _offset,
     "stribeck": _stribeck,
     "quadratic_drag": _drag,
+    "cubic_drag": _cubic,
     "load_dependent_friction": _load,
     "position_dependent_friction": _position,
     "friction_warmup": _warmup,

@@ -59,6 +59,8 @@ class Figures:
         Hidden effects that were called absent.
     closings : tuple of Closing
         The gap before and after, against the truth, of visible cases where that can be simulated.
+    version : str
+        Version of the software that answered, all of them where there are several.
     """
 
     method: str
@@ -66,6 +68,7 @@ class Figures:
     sizes: tuple[SizeScore, ...]
     bounds: tuple[BoundScore, ...]
     closings: tuple[Closing, ...] = ()
+    version: str = ""
 
     @property
     def visible(self) -> tuple[CaseScore, ...]:
@@ -159,6 +162,7 @@ class Figures:
         """Return the figures as a JSON object."""
         return {
             "method": self.method,
+            "version": self.version,
             "right": _share_dict(self.headline),
             "groups": {name: _share_dict(s) for name, s in self.by_group.items()},
             "bands": {name: _share_dict(s) for name, s in self.by_band.items()},
@@ -206,6 +210,7 @@ def figures(cases: Sequence[Path], keys: dict[str, Key], method: str) -> Figures
         tuple(s for _, answer, key in pairs for s in size_scores(answer, key)),
         tuple(b for _, answer, key in pairs for b in bound_scores(answer, key)),
         tuple(c for x in cases if x.name in asking if (c := closing(x, answers[x.name], keys[x.name])) is not None),
+        ", ".join(sorted({a.version for a in answers.values()})),
     )
 
 

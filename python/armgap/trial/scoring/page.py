@@ -54,7 +54,7 @@ def _head(first: Figures, manifest: Manifest | None, seal: str) -> str:
     if manifest is not None:
         made = (
             f"It is the output of `armgap trial all -n {manifest.cases} --seed {manifest.seed} -o DIR --md` "
-            f"with armgap {manifest.version} and {manifest.engine}; logs of {manifest.duration:g} s."
+            f"with armgap {first.version} and {manifest.engine}; logs of {manifest.duration:g} s."
         )
         if manifest.seed in DEVELOPMENT_SEEDS:
             made += " armgap was developed on cases of this seed: its scores flatter; a fresh seed is the test."

@@ -38,6 +38,7 @@ MAIN: dict[str, str] = {
     "contact": "position",
     "external_pulse": "impulse",
     "viscous_asymmetry": "delta",
+    "cubic_drag": "c3",
     "gear_efficiency": "loss",
     "cross_friction": "level",
     "hardening_spring": "cubic",
