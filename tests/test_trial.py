@@ -312,8 +312,8 @@ def test_trial_plan_keeps_its_shares_and_covers_every_effect():
     assert count == {"single": 260, "null": 32, "parameters": 28, "pair": 48, "outside": 32}
     assert plan_trial(12, 400) == plans != plan_trial(13, 400)
     assert all(len(p.effects) == {"null": 0, "parameters": 0, "pair": 2}.get(p.family, 1) for p in plans)
-    hidden = {e for p in plans if p.family == "single" and p.model == "direct-drive" for e in p.effects}
-    assert hidden == set(possible("two-link", 2))
+    hidden = {e for p in plans if p.family in ("single", "pair") and p.model == "direct-drive" for e in p.effects}
+    assert hidden == set(possible("two-link", 2, ("library", "further")))
     with pytest.raises(ValueError, match="tripel"):
         plan_trial(1, 4, {"tripel": 1.0})
 
@@ -333,6 +333,8 @@ def test_case_folders_say_nothing(tmp_path):
     (("encoder_offset", 2), ("base_tilt", None), False),
     (("torque_gain", 1), ("torque_gain", 2), True),
     (("actuator_lag", 1), ("actuator_delay", 1), False),
+    (("rotor_inertia", 2), ("rotor_coupling", None), True),
+    (("rotor_coupling", None), ("rotor_inertia", 2), False),
 ])  # fmt: skip
 def test_look_alikes(named, hidden, same):
     assert equivalent(named, hidden) is same

@@ -1,4 +1,7 @@
-"""``armgap trial``: make sealed cases, diagnose them, open the keys, score."""
+"""``armgap trial``: make sealed cases, diagnose them, open the keys, score.
+
+The steps are sub-commands; without one, a few cases are made, diagnosed and scored in one go.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ import click
 
 from armgap.cli.common import check_outputs, console, interruptible, json_option, quiet_option, working, write
 from armgap.errors import OptionError
+from armgap.trial.commands import all_of_it, make, peers, run, score
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -23,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command("trial")
+@click.group("trial", invoke_without_command=True)
 @click.option("--cases", default=10, show_default=True, type=click.IntRange(min=1), help="Number of cases to make.")
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of the cases; a fresh one by default.")
 @click.option("--duration", default=10.0, show_default=True, help="Length of each log [s].")
@@ -33,7 +37,9 @@ __all__ = ["command"]
 @click.option("--score", "made", type=click.Path(path_type=Path), metavar="DIR", help="Score the cases of a folder.")
 @json_option
 @quiet_option
+@click.pass_context
 def command(
+    context: click.Context,
     cases: int,
     seed: int | None,
     duration: float,
@@ -45,6 +51,9 @@ def command(
     quiet: bool,
 ) -> None:
     """Score the diagnosis on blind cases made by MuJoCo, whose hidden effects are sealed by a hash."""
+    if context.invoked_subcommand is not None:
+        _only(context)
+        return
     check_outputs(json_file)
     _check(folder, make_only, made, duration)
     say = console()
@@ -62,6 +71,20 @@ def command(
         write(json_file, json.dumps(_as_json(scores), indent=2))
     say.print(_table(scores))
     say.print(f"right: {right} of {len(scores)}")
+
+
+for _step in (make, run, score, peers, all_of_it):
+    command.add_command(_step)
+
+
+def _only(context: click.Context) -> None:
+    """Options before a sub-command would be lost."""
+    given = [p for p in context.params if context.get_parameter_source(p) is click.core.ParameterSource.COMMANDLINE]
+    if given:
+        raise OptionError(
+            f"options stand before `{context.invoked_subcommand}`",
+            remedy=f"write them after `{context.invoked_subcommand}`",
+        )
 
 
 def _check(folder: Path | None, make_only: bool, made: Path | None, duration: float) -> None:

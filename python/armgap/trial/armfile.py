@@ -31,13 +31,22 @@ class Nominal:
 def draw_nominal(rng: np.random.Generator, arm: TrialArm, exact: bool) -> Nominal:
     """Nominal values: the true ones, or off by draws from N(0, sigma)."""
     truth = np.array(arm.theta)
-    relative = np.full(truth.size, SIGMA_INERTIAL)
-    relative[len(arm.inertial) :] = SIGMA_FRICTION
     # Beyond two and a half sigma the trust itself would be wrong.
     error = np.zeros(truth.size) if exact else np.clip(rng.standard_normal(truth.size), -2.5, 2.5)
-    theta = truth * (1.0 + relative * error)
-    spread = np.where(truth != 0, relative * np.abs(theta), SIGMA_INERTIAL * np.max(truth))
-    return Nominal(tuple(float(x) for x in theta), tuple(float(f"{x:.3g}") for x in spread))
+    theta = tuple(float(x) for x in truth * (1.0 + _relative(arm) * error))
+    return Nominal(theta, tuple(float(f"{x:.3g}") for x in spread(arm, theta)))
+
+
+def spread(arm: TrialArm, theta: tuple[float, ...]) -> tuple[float, ...]:
+    """One-sigma trust that an arm file states with values `theta`."""
+    truth, stated = np.array(arm.theta), np.abs(theta)
+    sigma = np.where(truth != 0, _relative(arm) * stated, SIGMA_INERTIAL * np.max(truth))
+    return tuple(float(x) for x in sigma)
+
+
+def _relative(arm: TrialArm) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    friction = 2 * arm.n_joints
+    return np.repeat([SIGMA_INERTIAL, SIGMA_FRICTION], [len(arm.theta) - friction, friction])
 
 
 def arm_toml(arm: TrialArm, nominal: Nominal, name: str, sha256: str) -> str:

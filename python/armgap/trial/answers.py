@@ -1,0 +1,172 @@
+"""What a method answers to a case: named causes with probabilities and sizes, bounds, the gap, and the time it took.
+
+Every method under trial gives the same record, so that all are scored by the same rules. On disk it is one JSON file
+per case, schema ``armgap.answer/1``.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from armgap.errors import OptionError
+
+SCHEMA = "armgap.answer/1"
+Name = tuple[str, int | None]
+
+
+@dataclass(frozen=True)
+class Size:
+    """A parameter of a named cause, SI; sigma None where a method gives none."""
+
+    value: float
+    sigma: float | None = None
+
+
+@dataclass(frozen=True)
+class Named:
+    """A named cause.
+
+    Attributes
+    ----------
+    effect, joint
+        Standard name; joint from 1, None for the whole arm.
+    probability : float
+        The method's own, 0 to 1.
+    sizes : dict of str to Size
+        Parameters, where the method gives them.
+    look_alikes : tuple of (effect, joint)
+        What the method says it cannot tell from the cause.
+    """
+
+    effect: str
+    joint: int | None
+    probability: float
+    sizes: dict[str, Size] = field(default_factory=dict)
+    look_alikes: tuple[Name, ...] = ()
+
+    @property
+    def name(self) -> Name:
+        """Effect and joint."""
+        return self.effect, self.joint
+
+
+@dataclass(frozen=True)
+class Limit:
+    """An effect called absent: its size is said to stay below `value`, with 95 % confidence."""
+
+    effect: str
+    joint: int | None
+    parameter: str
+    value: float
+
+
+@dataclass(frozen=True)
+class Reach:
+    """RMS position errors per joint on the holdout, rad (m): as the arm file has it, re-estimated, with causes, floor."""
+
+    horizon_s: float
+    before: tuple[float, ...]
+    refit: tuple[float, ...]
+    after: tuple[float, ...]
+    floor: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A method's answer to one case.
+
+    Attributes
+    ----------
+    method : str
+        Name of the method.
+    verdict : str
+        ``"none"``, ``"parameters"``, ``"effect"`` or ``"unexplained"``.
+    causes : tuple of Named
+        First the one the method believes most.
+    limits : tuple of Limit
+        Effects called absent, with bounds.
+    reach : Reach, optional
+        How far predictions miss, where the method predicts.
+    theta : tuple of float
+        The arm's parameters beside the causes, in the arm file's order, where the method gives them.
+    error : str, optional
+        Why there is no answer.
+    remark : str
+        What the method itself says besides.
+    seconds : float
+        CPU time of one thread.
+    seal, version : str
+        Hash that the case states for its key; version of the software that answered.
+    """
+
+    method: str
+    verdict: str
+    causes: tuple[Named, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    reach: Reach | None = None
+    theta: tuple[float, ...] = ()
+    error: str | None = None
+    remark: str = ""
+    seconds: float = 0.0
+    seal: str = ""
+    version: str = ""
+
+    def stamped(self, seal: str, version: str, seconds: float) -> Answer:
+        """The same answer with where it belongs and what it cost."""
+        return replace(self, seal=seal, version=version, seconds=round(seconds, 4))
+
+    def to_json(self) -> str:
+        """Return the answer as JSON."""
+        return json.dumps({"schema": SCHEMA, **asdict(self)}, indent=1, allow_nan=False) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> Answer:
+        """Read an answer.
+
+        Raises
+        ------
+        ValueError
+            The text is not an answer of this schema.
+        """
+        data = json.loads(text)
+        if not isinstance(data, dict) or data.pop("schema", None) != SCHEMA:
+            raise ValueError(f"not an answer of schema {SCHEMA}")
+        try:
+            data["causes"] = tuple(_named(c) for c in data["causes"])
+            data["limits"] = tuple(Limit(**x) for x in data["limits"])
+            data["reach"] = _reach(data["reach"])
+            data["theta"] = tuple(data["theta"])
+            return cls(**data)
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"not a whole answer: {error}") from error
+
+
+def read_answer(path: Path) -> Answer:
+    """Read an answer's file.
+
+    Raises
+    ------
+    OptionError
+        It is not there, or not an answer.
+    """
+    try:
+        return Answer.from_json(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise OptionError(
+            f"cannot be read as an answer ({error})", remedy="delete it and run again", file=path
+        ) from None
+
+
+def _named(data: dict[str, Any]) -> Named:
+    sizes = {key: Size(**value) for key, value in data["sizes"].items()}
+    alike = tuple((effect, joint) for effect, joint in data["look_alikes"])
+    return Named(data["effect"], data["joint"], data["probability"], sizes, alike)
+
+
+def _reach(data: dict[str, Any] | None) -> Reach | None:
+    if data is None:
+        return None
+    return Reach(data["horizon_s"], *(tuple(data[key]) for key in ("before", "refit", "after", "floor")))

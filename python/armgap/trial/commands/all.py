@@ -1,0 +1,53 @@
+"""``armgap trial all``: the whole trial in one command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from armgap.cli.common import check_outputs, json_option, quiet_option
+from armgap.trial.commands.common import cases_option, duration_option, output_option, seed_option, workers_option
+from armgap.trial.commands.run import limit_option
+from armgap.trial.commands.score import md_option
+
+__all__ = ["all_of_it"]
+
+
+@click.command("all")
+@cases_option
+@seed_option
+@output_option
+@duration_option
+@workers_option
+@limit_option
+@click.option("--peers/--no-peers", "with_peers", default=True, show_default=True, help="Let other methods answer too.")
+@json_option
+@md_option
+@quiet_option
+def all_of_it(
+    cases: int,
+    seed: int | None,
+    folder: Path,
+    duration: float,
+    workers: int,
+    limit_s: float,
+    with_peers: bool,
+    json_file: str | None,
+    md_file: str | None,
+    quiet: bool,
+) -> None:
+    """Make cases, diagnose them, let peers name causes too, open the keys and score. Goes on where it stopped."""
+    from armgap.trial.commands.make import make_them
+    from armgap.trial.commands.run import answer_all
+    from armgap.trial.commands.score import score_all
+    from armgap.trial.methods import methods
+
+    check_outputs(json_file, md_file)
+    names = list(methods()) if with_peers else ["armgap"]
+    for name in names:
+        methods()[name].check()  # what is not installed is missed now, not after the cases are made
+    silent = quiet or "-" in (json_file, md_file)
+    make_them(folder, cases, seed, duration, workers, silent)
+    answer_all(folder, names, workers, limit_s, False, silent)
+    score_all(folder, json_file, md_file, silent)

@@ -1,0 +1,60 @@
+"""What the sub-commands of ``armgap trial`` share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TypeVar
+
+import click
+
+__all__ = [
+    "cases_option",
+    "duration_option",
+    "folder_argument",
+    "output_option",
+    "progress",
+    "seed_option",
+    "workers_option",
+]
+
+Item = TypeVar("Item")
+
+folder_argument = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path, exists=True, file_okay=False))
+output_option = click.option(
+    "-o",
+    "--output",
+    "folder",
+    required=True,
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="Folder of the trial.",
+)
+cases_option = click.option(
+    "-n", "--cases", default=200, show_default=True, type=click.IntRange(min=1), help="Number of cases."
+)
+seed_option = click.option("--seed", type=click.IntRange(min=0), help="Seed of the cases; a fresh one by default.")
+duration_option = click.option(
+    "--duration", default=10.0, show_default=True, type=click.FloatRange(1.0, 600.0), help="Length of each log [s]."
+)
+workers_option = click.option(
+    "--workers",
+    default=os.cpu_count() or 1,
+    show_default="one per processor",
+    type=click.IntRange(min=1),
+    help="Processes, of one thread each.",
+)
+
+
+def progress(items: Iterable[Item], total: int, label: str, *, quiet: bool) -> Iterator[Item]:
+    """Pass items on, with a bar on standard error at a terminal."""
+    from armgap.cli.common import console
+
+    say = console(error=True)
+    if quiet or not say.is_terminal:
+        yield from items
+        return
+    from rich.progress import track
+
+    yield from track(items, description=label, total=total, console=say, transient=True)

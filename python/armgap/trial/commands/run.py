@@ -1,0 +1,73 @@
+"""``armgap trial run`` and ``armgap trial peers``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from armgap.cli.common import console, quiet_option
+from armgap.trial.commands.common import folder_argument, progress, workers_option
+
+__all__ = ["answer_all", "limit_option", "peers", "run"]
+
+limit_option = click.option(
+    "--limit",
+    "limit_s",
+    default=300.0,
+    show_default=True,
+    type=click.FloatRange(min=1.0),
+    help="Longest time for one case [s].",
+)
+again_option = click.option("--again", is_flag=True, help="Answer anew what is answered already.")
+
+
+@click.command("run")
+@folder_argument
+@workers_option
+@limit_option
+@again_option
+@quiet_option
+def run(folder: Path, workers: int, limit_s: float, again: bool, quiet: bool) -> None:
+    """Diagnose the cases of DIR with armgap, keys closed. Goes on where it stopped."""
+    answer_all(folder, ["armgap"], workers, limit_s, again, quiet)
+
+
+@click.command("peers")
+@folder_argument
+@click.option("--only", multiple=True, metavar="NAME", help="Only this method; may be repeated. All peers by default.")
+@workers_option
+@limit_option
+@again_option
+@quiet_option
+def peers(folder: Path, only: tuple[str, ...], workers: int, limit_s: float, again: bool, quiet: bool) -> None:
+    """Let other methods name the causes in DIR, keys closed. Goes on where it stopped."""
+    from armgap.errors import OptionError
+    from armgap.trial.methods import methods
+
+    known = [name for name in methods() if name != "armgap"]
+    unknown = [name for name in only if name not in known]
+    if unknown:
+        raise OptionError(f"--only: no method `{unknown[0]}`", remedy=f"take one of {', '.join(known)}")
+    answer_all(folder, list(only) or known, workers, limit_s, again, quiet)
+
+
+def answer_all(folder: Path, names: Sequence[str], workers: int, limit_s: float, again: bool, quiet: bool) -> None:
+    """Let methods answer the cases that they have not answered."""
+    from armgap.trial.methods import methods
+    from armgap.trial.running import answer_cases, open_cases
+    from armgap.trial.sealed import case_folders
+
+    total = len(case_folders(folder))
+    for method in (methods()[name] for name in names):
+        method.check()
+        left = open_cases(folder, method, again)
+        answers = answer_cases(left, method, workers=workers, limit_s=limit_s)
+        done = [a for _, a in progress(answers, len(left), method.title, quiet=quiet)]
+        failed = sum(a.error is not None for a in done)
+        if not quiet:
+            note = f", {failed} without an answer" if failed else ""
+            console().print(
+                f"{method.title}: {len(done)} cases answered, {total - len(left)} were before{note}", highlight=False
+            )

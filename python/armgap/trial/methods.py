@@ -1,0 +1,109 @@
+"""The methods under trial: armgap's own diagnosis, and the peers. One interface: a sealed case in, an answer out."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import armgap
+from armgap import _native
+from armgap.trial.answers import Answer, Limit, Named, Reach, Size
+
+if TYPE_CHECKING:
+    from armgap.diagnosis import Cause, Diagnosis
+    from armgap.trial.sealed import SealedCase
+
+__all__ = ["ARMGAP", "Method", "methods"]
+
+HORIZON = 0.25  # s
+
+
+@cache
+def _build() -> str:
+    """Version of armgap, with a mark of the compiled core: answers of another build are given again."""
+    core = hashlib.sha256(Path(_native.__file__).read_bytes()).hexdigest()
+    return f"{armgap.__version__}+{core[:8]}"
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method under trial.
+
+    Attributes
+    ----------
+    name, title : str
+        For folders and for people.
+    settings : str
+        What it is and how it was set, in one sentence or two.
+    answer : callable
+        Answers a sealed case.
+    version : callable
+        Version of the software behind it; answers of another version are given again.
+    check : callable
+        Raises before any work is done if the method cannot run.
+    expresses : frozenset of str, optional
+        Effects it can name, or their equivalents, where these are not all.
+    """
+
+    name: str
+    title: str
+    settings: str
+    answer: Callable[[SealedCase], Answer]
+    version: Callable[[], str] = _build
+    check: Callable[[], None] = lambda: None
+    expresses: frozenset[str] | None = None
+
+
+def methods() -> dict[str, Method]:
+    """All methods by name, armgap first."""
+    from armgap.trial.peers import PEERS
+
+    return {m.name: m for m in (ARMGAP, *PEERS)}
+
+
+def answer_with_armgap(case: SealedCase) -> Answer:
+    """Diagnose a case with default settings."""
+    from armgap.diagnosis import diagnose
+
+    result = diagnose(case.training, case.arm, holdout=case.holdout, horizon=HORIZON)
+    return from_diagnosis(result, case.arm.parameter_names)
+
+
+def from_diagnosis(result: Diagnosis, names: Sequence[str]) -> Answer:
+    """A diagnosis as an answer; `names` are the arm's parameters in its order."""
+    gap = result.gap
+    final = result.parameters["with_causes"]
+    absent = [r for r in result.ruled_out if r.status == "absent" and r.bound is not None]
+    return Answer(
+        method="armgap",
+        verdict=result.verdict,
+        causes=tuple(_named(c) for c in result.causes) if result.verdict == "effect" else (),
+        limits=tuple(Limit(r.effect, r.joint, r.bound.parameter, r.bound.value) for r in absent if r.bound),
+        reach=Reach(gap.horizon_s, gap.before, gap.refit, gap.after, gap.floor),
+        theta=tuple(final[name].value for name in names),
+        remark=_first_ranks(result),
+    )
+
+
+def _named(cause: Cause) -> Named:
+    sizes = {key: Size(x.value, x.sigma) for key, x in cause.parameters.items()}
+    alike = tuple((e.effect, e.joint) for e in cause.equivalents)
+    return Named(cause.effect, cause.joint, cause.probability, sizes, alike)
+
+
+def _first_ranks(result: Diagnosis) -> str:
+    """The candidates that closed most alone, for whoever studies a failure."""
+    first = result.extra.get("ranking", [])[:5]
+    return ", ".join(f"{r['effect']}:{r['joint'] or ''} {r['closed']:.0%}" for r in first)
+
+
+ARMGAP = Method(
+    "armgap",
+    "armgap",
+    "armgap diagnose with its default settings: output error over windows of 0.25 s, judged on the held-out log",
+    answer_with_armgap,
+)

@@ -1,0 +1,128 @@
+"""Many cases answered by one method, in parallel processes; what is already answered stays.
+
+The answer to ``DIR/case-0007`` by method M is ``DIR/answers/M/case-0007.json``. An answer is kept when it belongs to
+the case (its seal) and to the software (its version), and is no failure. Keys stay closed: a method is given what `SealedCase` holds.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import TimeoutError as TookTooLong
+from contextlib import contextmanager
+from pathlib import Path
+
+from armgap.errors import ArmgapError
+from armgap.trial.answers import Answer
+from armgap.trial.engine import worker_pool
+from armgap.trial.key import sealed_hash
+from armgap.trial.methods import Method, methods
+from armgap.trial.sealed import SealedCase, case_folders
+
+__all__ = ["ANSWERS", "LIMIT_S", "answer_cases", "answer_file", "open_cases"]
+
+ANSWERS = "answers"
+#: Longest time for one case, s.
+LIMIT_S = 300.0
+THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS")
+
+
+def answer_file(case: Path, method: str) -> Path:
+    """Where the answer of a method to a case lies."""
+    return case.parent / ANSWERS / method / f"{case.name}.json"
+
+
+def open_cases(folder: str | Path, method: Method, again: bool = False) -> list[Path]:
+    """Case folders that a method has not answered yet."""
+    return [c for c in case_folders(folder) if again or not _answered(c, method)]
+
+
+def answer_cases(
+    cases: list[Path], method: Method, *, workers: int = 1, limit_s: float = LIMIT_S
+) -> Iterator[tuple[Path, Answer]]:
+    """Let a method answer cases, in processes of one thread each; every answer is written as soon as it is there.
+
+    Parameters
+    ----------
+    cases : list of Path
+        Case folders.
+    method : Method
+        One of `methods`.
+    workers : int, default 1
+        Processes.
+    limit_s : float, default 300
+        Longest time for one case [s]; a case that takes longer has an answer with an error.
+
+    Yields
+    ------
+    tuple of Path and Answer
+        In order.
+    """
+    if not cases:
+        return
+    with _one_thread(), worker_pool(min(workers, len(cases))) as pool:
+        futures = [pool.schedule(_answer, args=[str(c), method.name], timeout=limit_s) for c in cases]
+        try:
+            for case, future in zip(cases, futures, strict=True):
+                answer = _result(future.result, case, method, limit_s)
+                _write(answer_file(case, method.name), answer)
+                yield case, answer
+        finally:
+            pool.stop()
+
+
+def _result(result: Callable[[], Answer], case: Path, method: Method, limit_s: float) -> Answer:
+    """The answer, or why there is none."""
+    from pebble import ProcessExpired
+
+    try:
+        return result()
+    except TookTooLong:
+        reason = f"took longer than {limit_s:g} s"
+    except ProcessExpired as end:
+        reason = f"its process ended with status {end.exitcode}"
+    failed = Answer(method.name, "none", error=reason)
+    return failed.stamped(sealed_hash(case), method.version(), limit_s)
+
+
+def _answer(case: str, name: str) -> Answer:
+    """One case in a process of its own; complaints of armgap and failures of a peer become answers."""
+    method = methods()[name]
+    start = time.process_time()
+    try:
+        sealed = SealedCase.read(case)
+        start = time.process_time()
+        answer = method.answer(sealed)
+    except (ArmgapError, ArithmeticError, ValueError, RuntimeError, LookupError) as error:
+        answer = Answer(name, "none", error=f"{type(error).__name__}: {error}")
+    return answer.stamped(sealed_hash(case), method.version(), time.process_time() - start)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let processes started meanwhile use one thread each; libraries read this when they are loaded."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name, None)
+            if value is not None:
+                os.environ[name] = value
+
+
+def _answered(case: Path, method: Method) -> bool:
+    try:
+        answer = Answer.from_json(answer_file(case, method.name).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return answer.error is None and answer.seal == sealed_hash(case) and answer.version == method.version()
+
+
+def _write(path: Path, answer: Answer) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.partial")
+    temporary.write_text(answer.to_json(), encoding="utf-8")
+    temporary.replace(path)

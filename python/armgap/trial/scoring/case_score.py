@@ -1,0 +1,144 @@
+"""One answer against one opened key."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+from armgap.simulation import effects
+from armgap.trial.answers import Answer, Name, Named
+from armgap.trial.key import Key
+from armgap.trial.verdict import describe, equivalent
+
+__all__ = ["GROUPS", "CaseScore", "hidden_names", "score_case"]
+
+#: Groups of cases in the order of the tables, with what counts as right in each.
+GROUPS = {
+    "one effect": "the first cause is the hidden one, on its joint, or its equivalent",
+    "two effects": "the first cause is one of the two, or its equivalent",
+    "not visible": "no wrong cause is named",
+    "no effect": "no cause is named",
+    "parameters only": "no cause is named",
+    "outside the library": "no cause is named",
+}
+
+
+@dataclass(frozen=True)
+class CaseScore:
+    """What came of one case.
+
+    Attributes
+    ----------
+    case, group, model, style : str
+        Its name, a key of :data:`GROUPS`, the machine, the motion of the first training log.
+    hidden : tuple of (effect, joint)
+        Distinct hidden effects.
+    visible : float
+        How far the least visible hidden effect stands above what the measurement leaves; see
+        `armgap.trial.visibility`.
+    named : tuple of Named
+        What was named, first cause first.
+    matches : tuple of bool
+        Which of them are hidden, or equivalents of a hidden one.
+    right, exact : bool
+        By the rule of the group; without help of an equivalence.
+    listed : bool
+        Right, or a hidden effect stands among the look-alikes of the first cause.
+    found : int
+        Hidden effects among all causes.
+    verdict, error, seconds
+        From the answer.
+    """
+
+    case: str
+    group: str
+    model: str
+    style: str
+    hidden: tuple[Name, ...]
+    visible: float
+    named: tuple[Named, ...]
+    matches: tuple[bool, ...]
+    right: bool
+    exact: bool
+    listed: bool
+    found: int
+    verdict: str
+    error: str | None
+    seconds: float
+    extra_details: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def extra(self) -> int:
+        """Causes named that are not hidden."""
+        return sum(not m for m in self.matches)
+
+    @property
+    def headline(self) -> str:
+        """Hidden and named, for people."""
+        named = " and ".join(f"{describe([n.name])} p={n.probability:.2f}" for n in self.named)
+        return f"{describe(list(self.hidden))} -> {named or self.verdict}"
+
+
+def score_case(case: str, answer: Answer, key: Key) -> CaseScore:
+    """Score one answer; see :data:`GROUPS` for what counts as right."""
+    hidden, named = hidden_names(key), answer.causes
+    matches = tuple(any(equivalent(n.name, h) for h in hidden) for n in named)
+    group = _group(key, hidden)
+    return CaseScore(
+        case=case,
+        group=group,
+        model=key.details["model"],
+        style=next(iter(key.details["motions"].values())),
+        hidden=hidden,
+        visible=_visible(key),
+        named=named,
+        matches=matches,
+        right=answer.error is None and _right(group, matches),
+        exact=answer.error is None and _right(group, tuple(n.name in hidden for n in named)),
+        listed=bool(named) and _listed(named[0], matches[0], hidden),
+        found=sum(any(equivalent(n.name, h) for n in named) for h in hidden),
+        verdict=answer.verdict,
+        error=answer.error,
+        seconds=answer.seconds,
+    )
+
+
+def hidden_names(key: Key) -> tuple[Name, ...]:
+    """Distinct effects and joints of a key, in its order."""
+    return tuple(dict.fromkeys((e.effect, e.joint) for e in key.effects))
+
+
+def _group(key: Key, hidden: Sequence[Name]) -> str:
+    if not hidden:
+        return "no effect" if key.nominal == "exact" else "parameters only"
+    if not key.details.get("visible", True):
+        return "not visible"
+    if any(e.effect not in _library() for e in key.effects):
+        return "outside the library"
+    return "one effect" if len(hidden) == 1 else "two effects"
+
+
+@cache
+def _library() -> frozenset[str]:
+    """Effects that armgap knows."""
+    return frozenset(e["name"] for e in effects())
+
+
+def _visible(key: Key) -> float:
+    return min(
+        (float(x["above_floor"]) for x in key.details.get("visibility", {}).values() if "above_floor" in x), default=0.0
+    )
+
+
+def _right(group: str, matches: tuple[bool, ...]) -> bool:
+    if group in ("one effect", "two effects"):
+        return bool(matches) and matches[0]
+    if group == "not visible":
+        return all(matches)
+    return not matches
+
+
+def _listed(first: Named, match: bool, hidden: Sequence[Name]) -> bool:
+    return match or any(equivalent(alike, h) for alike in first.look_alikes for h in hidden)

@@ -1,0 +1,102 @@
+"""How much of the gap a method's model closes, against the best possible: the true form with its true sizes.
+
+Three models predict the same held-out windows from the same measured starts: the arm file as it is, the method's answer,
+and the truth of the key, as far as armgap can simulate it. What the truth still misses is noise. Left out are effects whose
+state at the start of a window no log holds: delays and lags of commands before the window, the deflection of springs,
+bristles and play. That the truth, made by MuJoCo, is predicted to the noise at all is a test of the effects' equations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from armgap.arm import Arm
+from armgap.simulation import effects
+from armgap.trial.answers import Answer
+from armgap.trial.key import Key
+from armgap.trial.methods import HORIZON
+from armgap.trial.sealed import SealedCase
+from armgap.trial.windows import Array, Mechanism, Placed, Window, cut, misses
+
+__all__ = ["HISTORY", "Closing", "closing", "model_error"]
+
+#: Effects with a state of their own.
+HISTORY = frozenset({"actuator_lag", "actuator_delay", "presliding", "joint_elasticity", "backlash"})
+#: Effects of one log.
+EVENTS = frozenset({"external_pulse"})
+STEPS = 20
+
+
+@dataclass(frozen=True)
+class Closing:
+    """RMS errors per joint on held-out windows: arm file, answer, truth."""
+
+    case: str
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+    best: tuple[float, ...]
+
+    @property
+    def closed(self) -> float:
+        """Share of the gap above the truth's that is closed, over all joints."""
+        open_before = sum(max(b - t, 0.0) for b, t in zip(self.before, self.best, strict=True))
+        open_after = sum(max(a - t, 0.0) for a, t in zip(self.after, self.best, strict=True))
+        return 1.0 - open_after / open_before if open_before > 0 else 0.0
+
+
+def closing(folder: Path, answer: Answer, key: Key) -> Closing | None:
+    """Compare an answer's model with arm file and truth; None where one of them cannot be simulated window by window."""
+    hidden = [(h.effect, h.joint, h.parameters) for h in key.effects if h.log is None]
+    named = [(c.effect, c.joint, {k: x.value for k, x in c.sizes.items()}) for c in answer.causes]
+    named = [n for n in named if n[0] not in EVENTS]
+    if not answer.theta or not _simulable([*hidden, *named]):
+        return None
+    case = SealedCase.read(folder)
+    windows = [w for log in case.holdout for w in cut(log.t - log.t[0], log.q, log.tau, HORIZON)]
+    try:
+        rms = [
+            model_error(case.arm, np.array(theta), windows, placed)
+            for theta, placed in ((case.arm.theta, []), (answer.theta, named), (key.theta, hidden))
+        ]
+    except ValueError:
+        return None
+    return Closing(folder.name, *(tuple(float(x) for x in r) for r in rms))
+
+
+def model_error(arm: Arm, theta: Array, windows: Sequence[Window], placed: Sequence[Placed]) -> Array:
+    """RMS error per joint of a model on windows, starts read through the encoders that it has."""
+    lengths = () if arm.link_length is None else tuple(arm.link_length.tolist())
+    error = misses(Mechanism(arm.kind, arm.gravity, lengths), theta, [_read(w, placed) for w in windows], placed)
+    rms: Array = np.sqrt(np.mean(error**2, axis=(0, 1)))
+    return rms
+
+
+def _simulable(placed: Sequence[Placed]) -> bool:
+    known = {e["name"] for e in effects()}
+    return all(name in known and name not in HISTORY for name, _, _ in placed)
+
+
+def _read(w: Window, placed: Sequence[Placed]) -> Window:
+    """The window with its start as the joint has it, where the encoder shows something else."""
+    q, dq = w.q0.copy(), w.dq0.copy()
+    for name, joint, p in placed:
+        j = (joint or 1) - 1
+        if name == "encoder_offset":
+            q[j] -= p["offset"]
+        elif name == "encoder_eccentricity":
+            q[j] = _inverse(float(w.q0[j]), p["a"], p["b"])
+            dq[j] /= 1.0 + p["a"] * math.cos(q[j]) - p["b"] * math.sin(q[j])
+    return Window(w.t, w.tau, q, dq, w.q)
+
+
+def _inverse(shown: float, a: float, b: float) -> float:
+    """Solve ``q + a sin q + b cos q = shown`` by iteration; a and b are small."""
+    q = shown
+    for _ in range(STEPS):
+        q = shown - a * math.sin(q) - b * math.cos(q)
+    return q

@@ -1,0 +1,264 @@
+"""The figures of a trial: every case's score, summed up by what was hidden, and by method."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from armgap.errors import OptionError
+from armgap.trial.answers import Answer, read_answer
+from armgap.trial.key import Key, open_key, sealed_hash
+from armgap.trial.running import answer_file
+from armgap.trial.scoring.calibration import Calibration, calibrate, wilson
+from armgap.trial.scoring.case_score import GROUPS, CaseScore, score_case
+from armgap.trial.scoring.closing import Closing, closing
+from armgap.trial.scoring.sizes import BoundScore, SizeScore, bound_scores, size_scores
+
+__all__ = ["BANDS", "CONFIDENT", "Figures", "Share", "figures", "opened_keys"]
+
+#: A cause with this probability or more is named with confidence.
+CONFIDENT = 0.9
+#: Bands of visibility: lower edges, as multiples of the floor.
+BANDS = (0.0, 2.0, 10.0, 50.0, 250.0)
+
+
+@dataclass(frozen=True)
+class Share:
+    """So many right of so many, and the 95 % interval of the share."""
+
+    right: int
+    of: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's 95 % interval."""
+        return wilson(self.right, self.of)
+
+    @property
+    def value(self) -> float:
+        """The share; 0 of 0 counts as 0."""
+        return self.right / self.of if self.of else 0.0
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a method scored.
+
+    Attributes
+    ----------
+    method : str
+        Its name.
+    cases : tuple of CaseScore
+        Every case.
+    sizes : tuple of SizeScore
+        Sizes of rightly named causes.
+    bounds : tuple of BoundScore
+        Hidden effects that were called absent.
+    closings : tuple of Closing
+        The gap before and after, against the truth, of visible cases where that can be simulated.
+    version : str
+        Version of the software that answered, all of them where there are several.
+    """
+
+    method: str
+    cases: tuple[CaseScore, ...]
+    sizes: tuple[SizeScore, ...]
+    bounds: tuple[BoundScore, ...]
+    closings: tuple[Closing, ...] = ()
+    version: str = ""
+
+    @property
+    def visible(self) -> tuple[CaseScore, ...]:
+        """Cases with visible effects of the library: those that ask for a cause."""
+        return tuple(c for c in self.cases if c.group in ("one effect", "two effects"))
+
+    @property
+    def headline(self) -> Share:
+        """First cause and its joint right."""
+        return share(self.visible)
+
+    @property
+    def quiet(self) -> tuple[CaseScore, ...]:
+        """Cases in which naming any cause is a false alarm."""
+        return tuple(c for c in self.cases if c.group in ("no effect", "parameters only"))
+
+    @property
+    def calibration(self) -> Calibration:
+        """Of all causes named in all cases."""
+        return calibrate([(n.probability, m) for c in self.cases for n, m in zip(c.named, c.matches, strict=True)])
+
+    @property
+    def confident(self) -> Share:
+        """Causes named with confidence, and how many of them are right."""
+        sure = [m for c in self.cases for n, m in zip(c.named, c.matches, strict=True) if n.probability >= CONFIDENT]
+        return Share(sum(sure), len(sure))
+
+    @property
+    def extra(self) -> float:
+        """Causes named that are not there, per case."""
+        return _mean([c.extra for c in self.cases])
+
+    @property
+    def alike(self) -> float:
+        """Look-alikes listed beside the first cause, per case with a cause."""
+        return _mean([len(c.named[0].look_alikes) for c in self.cases if c.named])
+
+    @property
+    def size_error(self) -> float | None:
+        """Median error of the sizes of rightly named causes, as a share."""
+        return statistics.median(s.error for s in self.sizes) if self.sizes else None
+
+    @property
+    def coverage(self) -> Share:
+        """95 % intervals of sizes that hold the truth."""
+        told = [s.covered for s in self.sizes if s.covered is not None]
+        return Share(sum(told), len(told))
+
+    @property
+    def bounds_hold(self) -> Share:
+        """95 % bounds of effects called absent that hold the hidden size."""
+        return Share(sum(b.holds for b in self.bounds), len(self.bounds))
+
+    @property
+    def closed(self) -> tuple[float, float] | None:
+        """Share of the gap that is closed against the best possible: median, and lower decile."""
+        if not self.closings:
+            return None
+        shares = sorted(c.closed for c in self.closings)
+        return statistics.median(shares), shares[len(shares) // 10]
+
+    @property
+    def seconds(self) -> tuple[float, float]:
+        """Median and largest CPU time per case, s."""
+        times = [c.seconds for c in self.cases]
+        return (statistics.median(times), max(times)) if times else (0.0, 0.0)
+
+    def by(
+        self, key: Callable[[CaseScore], Iterable[str]], cases: Sequence[CaseScore] | None = None
+    ) -> dict[str, Share]:
+        """Shares by what `key` says of a case, which may be several things."""
+        found: dict[str, list[CaseScore]] = {}
+        for case in self.cases if cases is None else cases:
+            for name in key(case):
+                found.setdefault(name, []).append(case)
+        return {name: share(part) for name, part in found.items()}
+
+    @property
+    def by_group(self) -> dict[str, Share]:
+        """By group, in their order."""
+        found = self.by(lambda c: [c.group])
+        return {group: found[group] for group in GROUPS if group in found}
+
+    @property
+    def by_band(self) -> dict[str, Share]:
+        """By how far the least visible effect stands above the floor."""
+        found = self.by(lambda c: [band(c.visible)], self.visible)
+        return {name: found[name] for name in map(_band_name, range(len(BANDS))) if name in found}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as a JSON object."""
+        return {
+            "method": self.method,
+            "version": self.version,
+            "right": _share_dict(self.headline),
+            "groups": {name: _share_dict(s) for name, s in self.by_group.items()},
+            "bands": {name: _share_dict(s) for name, s in self.by_band.items()},
+            "confident": _share_dict(self.confident),
+            "calibration": asdict(self.calibration),
+            "extra_per_case": self.extra,
+            "look_alikes_per_case": self.alike,
+            "closed": None
+            if self.closed is None
+            else {"median": self.closed[0], "lower_decile": self.closed[1], "of": len(self.closings)},
+            "size_error": self.size_error,
+            "intervals_hold": _share_dict(self.coverage),
+            "bounds_hold": _share_dict(self.bounds_hold),
+            "seconds": {"median": self.seconds[0], "largest": self.seconds[1]},
+            "cases": [_case_dict(c) for c in self.cases],
+        }
+
+
+def opened_keys(cases: Sequence[Path]) -> dict[str, Key]:
+    """Open the keys of all cases, each checked against its seal.
+
+    Raises
+    ------
+    SealError
+        A key is not the one that was sealed.
+    """
+    return {case.name: open_key(case) for case in cases}
+
+
+def figures(cases: Sequence[Path], keys: dict[str, Key], method: str) -> Figures:
+    """Score a method's answers to all cases.
+
+    Raises
+    ------
+    OptionError
+        An answer is missing, cannot be read, or belongs to another case.
+    """
+    answers = {case.name: _answer_to(case, method) for case in cases}
+    pairs = [(name, answer, keys[name]) for name, answer in answers.items()]
+    scores = tuple(score_case(name, answer, key) for name, answer, key in pairs)
+    asking = {c.case for c in scores if c.group in ("one effect", "two effects")}
+    return Figures(
+        method,
+        scores,
+        tuple(s for _, answer, key in pairs for s in size_scores(answer, key)),
+        tuple(b for _, answer, key in pairs for b in bound_scores(answer, key)),
+        tuple(c for x in cases if x.name in asking if (c := closing(x, answers[x.name], keys[x.name])) is not None),
+        ", ".join(sorted({a.version for a in answers.values()})),
+    )
+
+
+def _answer_to(case: Path, method: str) -> Answer:
+    path = answer_file(case, method)
+    answer = read_answer(path)
+    if answer.seal != sealed_hash(case):
+        raise OptionError("answers another case of this name", remedy="delete it and run again", file=path)
+    return answer
+
+
+def share(cases: Sequence[CaseScore]) -> Share:
+    """How many cases are right."""
+    return Share(sum(c.right for c in cases), len(cases))
+
+
+def band(visible: float) -> str:
+    """Name of the band of visibility."""
+    return _band_name(max(i for i, low in enumerate(BANDS) if visible >= low))
+
+
+def _band_name(i: int) -> str:
+    if i == 0:
+        return "by its parameters only"
+    if i == len(BANDS) - 1:
+        return f"over {BANDS[i]:g} x floor"
+    return f"{BANDS[i]:g} to {BANDS[i + 1]:g} x floor"
+
+
+def _mean(values: Sequence[float]) -> float:
+    return sum(values) / len(values) if values else 0.0
+
+
+def _share_dict(s: Share) -> dict[str, Any]:
+    return {"right": s.right, "of": s.of, "interval": [round(x, 4) for x in s.interval]}
+
+
+def _case_dict(c: CaseScore) -> dict[str, Any]:
+    return {
+        "case": c.case,
+        "group": c.group,
+        "right": c.right,
+        "exact": c.exact,
+        "listed": c.listed,
+        "hidden": [list(h) for h in c.hidden],
+        "named": [{"effect": n.effect, "joint": n.joint, "probability": n.probability} for n in c.named],
+        "matches": list(c.matches),
+        "verdict": c.verdict,
+        "error": c.error,
+        "seconds": c.seconds,
+    }

@@ -1,0 +1,140 @@
+"""How well sizes are told: error of a named cause's size, intervals that hold the truth, bounds of what is called absent."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from armgap.trial.answers import Answer, Limit, Named
+from armgap.trial.key import Hidden, Key
+from armgap.trial.verdict import equivalent
+
+__all__ = ["BoundScore", "SizeScore", "bound_scores", "size_scores"]
+
+Z_95 = 1.96
+
+#: The number that stands for an effect's size, from its parameters; where one parameter is it, that parameter.
+MAIN: dict[str, str] = {
+    "coulomb_asymmetry": "delta",
+    "torque_offset": "offset",
+    "stribeck": "amplitude",
+    "quadratic_drag": "c",
+    "load_dependent_friction": "mu",
+    "friction_warmup": "amplitude",
+    "presliding": "amplitude",
+    "joint_elasticity": "stiffness",
+    "backlash": "gap",
+    "torque_gain": "gain",
+    "actuator_lag": "time_constant",
+    "actuator_delay": "delay",
+    "torque_saturation": "level",
+    "torque_ripple": "amplitude",
+    "torque_dead_zone": "level",
+    "payload": "mass",
+    "base_tilt": "angle",
+    "joint_spring": "k",
+    "rotor_inertia": "inertia",
+    "encoder_offset": "offset",
+    "contact": "position",
+    "external_pulse": "impulse",
+    "viscous_asymmetry": "delta",
+    "cubic_drag": "c3",
+    "gear_efficiency": "loss",
+    "cross_friction": "level",
+    "hardening_spring": "cubic",
+    "rotor_coupling": "inertia",
+}
+#: Effects whose size is the length of a vector.
+VECTOR = {"position_dependent_friction": ("a", "b"), "encoder_eccentricity": ("a", "b")}
+#: Sizes that count from another value than zero.
+NEUTRAL = {"torque_gain": 1.0}
+
+
+@dataclass(frozen=True)
+class SizeScore:
+    """Size of one rightly named cause.
+
+    Attributes
+    ----------
+    effect : str
+        Its name.
+    error : float
+        Difference from the hidden size, as a share of the hidden size.
+    covered : bool or None
+        Whether value plus and minus 1.96 sigma holds the hidden size; None where no sigma is given.
+    """
+
+    effect: str
+    error: float
+    covered: bool | None
+
+
+@dataclass(frozen=True)
+class BoundScore:
+    """A hidden effect that was called absent: whether the bound holds its size."""
+
+    effect: str
+    joint: int | None
+    bound: float
+    truth: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the truth is within."""
+        return abs(self.truth) <= self.bound
+
+
+def size_scores(answer: Answer, key: Key) -> list[SizeScore]:
+    """Score the sizes of causes that name a hidden effect itself, not its look-alike."""
+    found = []
+    for cause in answer.causes:
+        hidden = [h for h in key.effects if (h.effect, h.joint) == cause.name]
+        if hidden and cause.sizes and cause.effect in (MAIN.keys() | VECTOR.keys()):
+            found.append(min((_size(cause, h) for h in hidden), key=lambda s: s.error))
+    return found
+
+
+def bound_scores(answer: Answer, key: Key) -> list[BoundScore]:
+    """Check the bounds of hidden effects that were called absent, unless an equivalent was named in their place."""
+    named = [c.name for c in answer.causes]
+    found = []
+    for h in key.effects:
+        if any(equivalent(n, (h.effect, h.joint)) for n in named):
+            continue
+        limits = [x for x in answer.limits if (x.effect, x.joint) == (h.effect, h.joint)]
+        found += [_bound(x, h) for x in limits if x.parameter in h.parameters]
+    return found
+
+
+def _size(cause: Named, hidden: Hidden) -> SizeScore:
+    if cause.effect in VECTOR:
+        return _vector(cause, hidden, VECTOR[cause.effect])
+    key = MAIN[cause.effect]
+    truth = _truth(hidden, key)
+    told, sigma = cause.sizes[key].value - NEUTRAL.get(cause.effect, 0.0), cause.sizes[key].sigma
+    if key == "amplitude" and cause.effect == "torque_ripple":
+        told, truth = abs(told), abs(truth)  # the sign is in the phase
+    return SizeScore(cause.effect, abs(told - truth) / abs(truth), _covers(told - truth, sigma))
+
+
+def _truth(hidden: Hidden, key: str) -> float:
+    """Hidden size in the library's terms, from its neutral value."""
+    if hidden.effect == "rotor_coupling":  # the library states what the rotor adds off the diagonal
+        return hidden.parameters["inertia"] * hidden.parameters["gear"]
+    return hidden.parameters[key] - NEUTRAL.get(hidden.effect, 0.0)
+
+
+def _vector(cause: Named, hidden: Hidden, keys: tuple[str, ...]) -> SizeScore:
+    apart = [cause.sizes[k].value - hidden.parameters[k] for k in keys]
+    covers = [_covers(d, cause.sizes[k].sigma) for d, k in zip(apart, keys, strict=True)]
+    covered = None if None in covers else all(c is True for c in covers)
+    truth = math.hypot(*(hidden.parameters[k] for k in keys))
+    return SizeScore(cause.effect, math.hypot(*apart) / truth, covered)
+
+
+def _covers(difference: float, sigma: float | None) -> bool | None:
+    return None if sigma is None or sigma <= 0 else abs(difference) <= Z_95 * sigma
+
+
+def _bound(limit: Limit, hidden: Hidden) -> BoundScore:
+    return BoundScore(hidden.effect, hidden.joint, limit.value, _truth(hidden, limit.parameter))

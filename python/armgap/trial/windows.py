@@ -1,0 +1,172 @@
+"""Short windows of a log, predicted from measured starts by the model that the arm file describes, and its re-estimation.
+
+What re-estimating an arm's parameters can absorb is a question about the model that is re-estimated; so here, unlike
+in the making of the logs, armgap's own arm predicts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap import _native
+
+Array = NDArray[np.float64]
+Placed = tuple[str, int | None, dict[str, float]]
+
+#: Length of a window, s.
+WINDOW = 0.2
+#: Start states come from a cubic through the samples within this time, s, and through this many at least.
+AROUND, FEWEST = 0.012, 4
+#: Tolerances of the simulation, rad (m), the next where one is not reached.
+TOLERANCES = (1e-8, 1e-6, 1e-4)
+STEPS, STEP = 8, 1e-4
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """What does not change in an arm when its parameters do."""
+
+    kind: str
+    gravity: float
+    link_length: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Window:
+    """One window: times and torques from its start on, the measured start, and the positions to predict.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n + 1,)
+        s.
+    tau : ndarray, shape (n + 1, n_joints)
+        Commands.
+    q0, dq0 : ndarray, shape (n_joints,)
+        Start, from the measured positions around it.
+    q : ndarray, shape (n, n_joints)
+        Measured positions after the start.
+    """
+
+    t: Array
+    tau: Array
+    q0: Array
+    dq0: Array
+    q: Array
+
+
+def cut(t: Array, q: Array, tau: Array, length: float = WINDOW) -> list[Window]:
+    """Cut a log into windows, end to end."""
+    h = float(np.median(np.diff(t)))
+    rows, margin = round(length / h), max(FEWEST, round(AROUND / h))
+    return [_window(t, q, tau, s, rows, margin) for s in range(margin, len(t) - max(rows, margin) - 1, rows)]
+
+
+def _window(t: Array, q: Array, tau: Array, s: int, rows: int, margin: int) -> Window:
+    near = slice(s - margin, s + margin + 1)
+    cubic = np.polynomial.polynomial.polyfit(t[near] - t[s], q[near], 3)
+    part = slice(s, s + rows + 1)
+    fix = np.ascontiguousarray
+    return Window(fix(t[part]), fix(tau[part]), fix(cubic[0]), fix(cubic[1]), q[s + 1 : s + rows + 1])
+
+
+def misses(m: Mechanism, theta: Array, windows: Sequence[Window], effects: Sequence[Placed] = ()) -> Array:
+    """Measured minus predicted positions, shape (n_windows, n, n_joints).
+
+    Raises
+    ------
+    ValueError
+        No arm has these parameters, or the motion diverges.
+    """
+    return np.array([w.q - _predict(m, theta, w, effects) for w in windows])
+
+
+def _predict(m: Mechanism, theta: Array, w: Window, effects: Sequence[Placed]) -> Array:
+    arm = (m.kind, m.gravity, list(m.link_length), theta.tolist())
+    for tolerance in TOLERANCES:
+        try:
+            return _native.simulate(*arm, w.t, w.tau, w.q0, w.dq0, list(effects), tolerance, 0.0)[0][1:]
+        except ValueError as error:
+            problem = error
+    raise problem
+
+
+def refit(
+    m: Mechanism,
+    theta: Array,
+    sigma: Array,
+    windows: Sequence[Window],
+    noise: Array,
+    effects: Sequence[Placed] = (),
+) -> Array:
+    """Estimate the arm's parameters by Gauss-Newton, from `theta` and with `sigma` around it as prior.
+
+    Parameters
+    ----------
+    theta, sigma : ndarray, shape (n_parameters,)
+        Prior; a parameter of `sigma` zero stays.
+    windows : sequence of Window
+        Data.
+    noise : ndarray, shape (n_joints,)
+        Standard deviation of what a perfect model misses by, per joint.
+    effects : sequence of (name, joint, parameters)
+        Held as they are.
+
+    Returns
+    -------
+    ndarray, shape (n_parameters,)
+    """
+    best, cost = theta, _cost(m, theta, theta, sigma, windows, noise, effects)
+    for _ in range(STEPS):
+        step = _newton(m, best, theta, sigma, windows, noise, effects)
+        for shrink in (1.0, 0.3, 0.1):
+            trial = best + shrink * step
+            found = _cost(m, trial, theta, sigma, windows, noise, effects)
+            if found < cost:
+                break
+        else:
+            return best
+        done, best, cost = cost - found < 1e-3 * cost, trial, found
+        if done:
+            return best
+    return best
+
+
+def _cost(
+    m: Mechanism,
+    theta: Array,
+    prior: Array,
+    sigma: Array,
+    windows: Sequence[Window],
+    noise: Array,
+    effects: Sequence[Placed],
+) -> float:
+    try:
+        error = misses(m, theta, windows, effects) / noise
+    except ValueError:
+        return np.inf
+    return float(np.sum(error**2) + np.sum(((theta - prior) / sigma) ** 2))
+
+
+def _newton(
+    m: Mechanism,
+    theta: Array,
+    prior: Array,
+    sigma: Array,
+    windows: Sequence[Window],
+    noise: Array,
+    effects: Sequence[Placed],
+) -> Array:
+    now = misses(m, theta, windows, effects)
+    columns = []
+    for i, s in enumerate(sigma):
+        moved = theta.copy()
+        moved[i] += STEP * s
+        columns.append(((now - misses(m, moved, windows, effects)) / noise).ravel() / STEP)
+    jacobian = np.vstack([np.column_stack(columns), np.eye(len(theta))])
+    target = np.concatenate([(now / noise).ravel(), (prior - theta) / sigma])
+    step: Array = sigma * np.linalg.lstsq(jacobian, target, rcond=None)[0]
+    return step
