@@ -6,7 +6,7 @@ use crate::screen::{Scored, candidates, screen};
 use crate::solve::{Effort, Fit};
 use crate::study::{Study, Weights};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{NEVER, Trial};
+use armgap_core::effect::{MAX_PARAMETERS, NEVER, Trial, find};
 use rayon::prelude::*;
 
 /// Candidates that get a full fit in each stage.
@@ -23,6 +23,9 @@ const SHRUNK: f64 = 1.15;
 
 /// A candidate that leaves less than this part of its trace unexplained by the arm's own parameters shows only against trusted values.
 const ABSORBED: f64 = 0.03;
+
+/// A candidate that leaves less than this part is imitated as exactly as derivatives can tell.
+const IMITATED: f64 = 1e-4;
 
 /// A candidate that to first order removes less than this part of the cost is not fitted.
 const TRACE: f64 = 0.01;
@@ -165,7 +168,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let least = if gap { self.least_trace(weights, fit) * training } else { f64::INFINITY };
         let more = promising(&screened, least).into_iter().map(|found| {
             let effect = found.effect;
-            self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| compensated(&fit.hypothesis, found))
+            self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| self.compensated(&fit.hypothesis, found))
         });
         let mut starts: Vec<Hypothesis<P>> = more.collect();
         if gap {
@@ -210,6 +213,34 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             *value -= mass * shift;
         }
         Some(start)
+    }
+
+    /// The model with a candidate; where the arm's parameters can imitate it, they make room for it at once, and where they imitate it
+    /// to rounding, so that motion says nothing of its size, it gets the size that brings them closest to their trusted values.
+    fn compensated(&self, model: &Hypothesis<P>, found: &Scored) -> Hypothesis<P> {
+        if found.distinct >= ABSORBED {
+            return model.with(found.effect);
+        }
+        let (effect, size) =
+            if found.distinct < IMITATED { self.trusted(model, found) } else { (found.effect, found.size) };
+        let values = model.values();
+        let room: Vec<f64> = values.iter().zip(&found.imitation).map(|(value, d)| value + d * size).collect();
+        model.with_values(&room).with(effect)
+    }
+
+    /// A candidate at the size that brings the arm's parameters closest to their trusted values, and that size.
+    fn trusted(&self, model: &Hypothesis<P>, found: &Scored) -> (Placed, f64) {
+        let parameter = &found.effect.law.spec().parameters[found.tested];
+        let (mut along, mut off) = (0.0, 0.0);
+        for i in 0..P {
+            let shift = found.imitation[i] / self.prior.sigma[i];
+            along += shift * shift;
+            off += shift * (self.prior.theta[i] - model.theta[i]) / self.prior.sigma[i];
+        }
+        let mut effect = found.effect;
+        let size = if along > 0.0 { off / along } else { 0.0 };
+        effect.p[found.tested] = (parameter.neutral + size).clamp(parameter.lower, parameter.upper);
+        (effect, effect.p[found.tested] - parameter.neutral)
     }
 
     /// The model with smoother friction, or with exact friction if it is smoothed now, where that is not plainly worse.
@@ -303,7 +334,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 weights = self.weights(&best.fit.hypothesis, scale);
             }
             let last = shrunk <= SHRUNK || round == MAX_REWEIGHTINGS;
-            let starts = finalists(&contenders, hopeless);
+            let mut starts = finalists(&contenders, hopeless);
+            starts.extend(contenders.first().and_then(|best| simpler(current, best)));
             contenders =
                 self.contend(&weights, current, starts, if last { Effort::FULL } else { Effort::ROUGH });
             if last {
@@ -355,13 +387,19 @@ fn without_worst(mut costs: Vec<f64>) -> f64 {
     costs.iter().take(kept).sum()
 }
 
-/// The model with a candidate; where the arm's parameters can imitate it, they make room for it at once.
-fn compensated<const P: usize>(model: &Hypothesis<P>, found: &Scored) -> Hypothesis<P> {
-    if found.distinct >= ABSORBED {
-        return model.with(found.effect);
+/// The model with what is left of a contender's effect when its first parameter vanishes, if that is an effect of its own.
+fn simpler<const P: usize>(model: &Hypothesis<P>, contender: &Contender<P>) -> Option<Hypothesis<P>> {
+    let effect = contender.effect?;
+    let law = find::<f64>(effect.law.simpler()?)?;
+    let value =
+        |name: &str| effect.law.spec().parameters.iter().position(|p| p.name == name).map(|i| effect.p[i]);
+    let mut p = [0.0; MAX_PARAMETERS];
+    for (slot, parameter) in p.iter_mut().zip(law.spec().parameters) {
+        *slot = value(parameter.name)?;
     }
-    let room: Vec<f64> = model.values().iter().zip(&found.room).map(|(value, shift)| value + shift).collect();
-    model.with_values(&room).with(found.effect)
+    let taken = model.effects.iter().any(|e| e.law.spec().name == law.spec().name && e.joint == effect.joint);
+    let theta = contender.fit.hypothesis.theta;
+    (!taken).then(|| Hypothesis { theta, ..model.with(Placed { law, joint: effect.joint, p }) })
 }
 
 /// The best start of each of the best-scoring candidates, and of those that only trusted values can reveal.

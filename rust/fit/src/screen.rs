@@ -27,8 +27,12 @@ pub struct Scored {
     pub sigma: f64,
     /// Standard deviation if the residual were white with the metric's scale: what the log could tell at best.
     pub information_sigma: f64,
-    /// Changes of the model's own values that make room for the candidate, to first order.
-    pub room: Vec<f64>,
+    /// Changes of the model's own values that make room for the candidate, per unit of its size, to first order.
+    pub imitation: Vec<f64>,
+    /// Deviation from neutral that the test suggests.
+    pub size: f64,
+    /// Which of its parameters was tested.
+    pub tested: usize,
     /// Share of the candidate's trace that the arm's own parameters cannot imitate.
     pub distinct: f64,
 }
@@ -92,10 +96,8 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         let slope = gram.total[(c, last)] - weights.dot(&own_score);
         let scatter: f64 = gram.scores.iter().map(|s| (s[c] - weights.dot(&s.rows(0, k))).powi(2)).sum();
         let mut test = scored(effect, raw, information, slope, scatter);
-        // What the others take back, and what they gain of themselves.
-        let own_step = &inverse * &own_score;
-        let taken = test.admissible(effect);
-        test.room = (0..k).map(|i| own_step[i] - weights[i] * taken).collect();
+        test.imitation = weights.iter().map(|w| -w).collect();
+        test.size = test.admissible(effect);
         if let Some(direct) = direct[i] {
             test.gain = test.gain.max(direct);
         }
@@ -172,7 +174,9 @@ fn scored(effect: &Placed, raw: f64, information: f64, slope: f64, scatter: f64)
         estimate,
         sigma: scatter.sqrt() / information,
         information_sigma: 1.0 / information.sqrt(),
-        room: Vec::new(),
+        imitation: Vec::new(),
+        size: 0.0,
+        tested: tested(effect),
         distinct: if raw > 0.0 { information / raw } else { 0.0 },
     }
 }

@@ -305,6 +305,11 @@ pub trait Effect<T: Real>: Sync {
     /// Name, parameters, hooks.
     fn spec(&self) -> &'static Spec;
 
+    /// Name of the law that is left when the first parameter vanishes; it has the other parameters under the same names.
+    fn simpler(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Torque added to the actuator's side of the joint's equation.
     fn force(&self, _p: &[T; MAX_PARAMETERS], _x: &JointPoint<T>) -> T {
         T::zero()
