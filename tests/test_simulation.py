@@ -100,18 +100,27 @@ def test_asymmetric_friction_is_an_offset_while_the_joint_moves(arm):
     np.testing.assert_allclose(asymmetric.q, offset.q, atol=1e-8)
 
 
+#: Motors that swing on a shaft of a real arm's stiffness, and play of a real gear.
+STIFF = {
+    "joint_elasticity": {"stiffness": 5e3, "damping": 5.0, "rotor_inertia": 0.1},
+    "backlash": {"gap": 2e-3, "rotor_share": 0.1},
+}
+
+
 def test_effects_of_the_format_exist_and_each_changes_the_motion(arm, seed_log):
     known = {e["name"]: e for e in effects()}
     assert set(FORMATS) <= set(known)
     arm = dataclasses.replace(arm, link_length=np.array([0.45, 0.3]))
     plain = simulate(arm, seed_log.t, seed_log.tau, encoder=False).q
     for name, effect in known.items():
-        values = {p["name"]: _typical(p) for p in effect["parameters"]}
+        values = {p["name"]: _typical(p) for p in effect["parameters"]} | STIFF.get(name, {})
         joint = 1 if effect["scope"] == "joint" else None
+        # Flanks that meet and part make a kink each time: first-order convergence.
+        accuracy = 1e-4 if name == "backlash" else 1e-6
         changed = simulate(
-            arm, seed_log.t, seed_log.tau, effects=[Effect(name, joint, values)], encoder=False, tolerance=1e-6
+            arm, seed_log.t, seed_log.tau, effects=[Effect(name, joint, values)], encoder=False, tolerance=accuracy
         ).q
-        assert np.abs(changed - plain).max() > 1e-5, name
+        assert np.abs(changed - plain).max() > 10 * accuracy, name
 
 
 def _typical(parameter: dict[str, float]) -> float:

@@ -27,6 +27,7 @@ FAMILIES = {
         "coulomb_asymmetry",
         "stribeck",
         "quadratic_drag",
+        "cubic_drag",
         "load_dependent_friction",
         "position_dependent_friction",
         "friction_warmup",

@@ -62,6 +62,7 @@ SIGNATURES: dict[str, Signature] = {
     "torque_offset": Signature({"offset": 0.08}, "t"),
     "stribeck": Signature({"amplitude": 0.12, "velocity": 0.4}, "dq"),
     "quadratic_drag": Signature({"c": 0.008}, "dq", 1.1),
+    "cubic_drag": Signature({"c3": 0.002}, "dq", 1.1),
     "load_dependent_friction": Signature({"mu": 0.25}, "gravity"),
     "position_dependent_friction": Signature({"a": 0.06, "b": 0.05}, "q", 1.1),
     "friction_warmup": Signature({"amplitude": 1.2, "time_constant": 2.0}, "t"),

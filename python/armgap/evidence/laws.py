@@ -83,6 +83,7 @@ VARIABLES = {
     "torque_offset": _SPEED,
     "stribeck": _SPEED,
     "quadratic_drag": _SPEED,
+    "cubic_drag": _SPEED,
     "viscous_asymmetry": _SPEED,
     "gear_efficiency": _TORQUE,
     "position_dependent_friction": _ALONG,

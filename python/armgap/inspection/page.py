@@ -59,9 +59,9 @@ def _over_time(found: Inspection) -> list[Any]:
     for j in range(log.n_joints):
         for name, values in ((f"q{j + 1}", log.q[:, j]), (f"tau{j + 1}", log.tau[:, j])):
             t, shown = _envelope(log.t, values)
-            share = figures[0] if figures else None
+            options = {"x_range": figures[0].x_range} if figures else {}
             curve = [(name, shown, charts.MEASURED)]
-            figures.append(charts.lines(name, "time [s]", "", t, curve, share=share, height=180))
+            figures.append(charts.lines(name, "time [s]", "", t, curve, height=180, **options))
     return figures
 
 

@@ -17,7 +17,7 @@ use crate::solve::Fit;
 use crate::study::{Sample, Study};
 use crate::window::{Dataset, Shift, Window};
 use armgap_core::arm::Arm;
-use armgap_core::effect::Trial;
+use armgap_core::effect::{Scope, Spec, Trial, catalogue};
 
 /// Points of a drawn curve at most.
 const DRAWN: usize = 2500;
@@ -79,7 +79,12 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             .map(|c| cause(c, N, rotary))
             .chain(events.iter().map(|e| push(study, e, rotary)))
             .collect(),
-        ruled_out: ruled_out(study, attribution, rotary),
+        ruled_out: ruled_out(study, attribution, rotary)
+            .into_iter()
+            .filter(|r| {
+                !events.iter().any(|e| r.effect == "external_pulse" && r.joint == e.push.joint_number())
+            })
+            .collect(),
         parameters: Parameters {
             nominal: nominal(study, description),
             refit: values(&attribution.refit, description),
@@ -423,7 +428,27 @@ fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             None => list.push((test.effect, entry)),
         }
     }
-    list.into_iter().map(|(_, entry)| entry).collect()
+    let mut entries: Vec<RuledOut> = list.into_iter().map(|(_, entry)| entry).collect();
+    entries.extend(never_fitted::<N>());
+    entries
+}
+
+/// Status of the effects that no test of candidates looks for.
+fn never_fitted<const N: usize>() -> Vec<RuledOut> {
+    let laws = catalogue::<f64>().iter().map(|law| law.spec());
+    let unsearched = laws.filter(|spec| spec.starts.is_empty() && spec.least_joints <= N);
+    let entry = |spec: &Spec, joint: Option<usize>| {
+        let (status, why) = if spec.trial == Trial::Event {
+            ("absent", "no impulse stands alone in any of these logs")
+        } else {
+            ("undecided", "another effect and other parameters of the arm give the same motion, always")
+        };
+        RuledOut { effect: spec.name, joint, status, bound: None, why: Some(why.to_owned()) }
+    };
+    let places = |spec: &Spec| -> Vec<Option<usize>> {
+        if spec.scope == Scope::Joint { (1..=N).map(Some).collect() } else { vec![None] }
+    };
+    unsearched.flat_map(|spec| places(spec).into_iter().map(move |joint| entry(spec, joint))).collect()
 }
 
 fn weaker(a: &RuledOut, b: &RuledOut) -> bool {

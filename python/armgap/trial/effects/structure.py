@@ -117,7 +117,7 @@ def rotor_coupling(rig: Rig, joint: int, p: Parameters) -> None:
 @effect(
     "cubic_drag",
     lambda d: {"c3": (d.coulomb + d.arm.viscous[d.joint] * d.use.speed) * d.between(0.2, 1.5) / d.use.speed**3},
-    family="outside",
+    family="further",
 )
 def cubic_drag(rig: Rig, joint: int, p: Parameters) -> None:
     """``c3 dq^3``, MuJoCo's cubic damping."""
