@@ -1,6 +1,6 @@
 //! Cost per sample of the online estimators, filters to covariance.
 
-use armgap_benches::{SAMPLES, arm, samples};
+use armgap_bench::run::{SAMPLES, arm, samples};
 use armgap_core::filter::Cutoff;
 use armgap_core::identify::{Estimator, Settings};
 use armgap_core::real::{Real, lit};

@@ -1,6 +1,6 @@
 //! Cost of simulating the seed paper's 10 s.
 
-use armgap_benches::rollout;
+use armgap_bench::run::rollout;
 use criterion::{Criterion, criterion_group, criterion_main};
 
 fn rollouts(c: &mut Criterion) {

@@ -16,3 +16,4 @@ pub mod plant;
 pub mod real;
 pub mod regression;
 pub mod rls;
+pub mod trig;

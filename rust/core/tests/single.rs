@@ -1,6 +1,6 @@
 //! What single precision does to recursive least squares: the figures of `docs/decisions/006-least-squares-form.md`.
 
-#[path = "../../../benches/src/lib.rs"]
+#[path = "../../bench/src/run.rs"]
 mod run;
 
 use armgap_core::filter::Cutoff;
