@@ -67,7 +67,7 @@ impl Arrays {
     pub fn estimate(&self, build: Build, scheme: Scheme, variant: Variant, h: f64) -> [f64; PARAMETERS] {
         let mut state = [0.0_f64; WORDS];
         let (start, run) = build.functions();
-        let samples = (self.q.len() / 2) as c_long;
+        let samples = c_long::try_from(self.q.len() / 2).expect("a run of some seconds");
         // SAFETY: the state is large enough, as asserted, and the arrays hold two numbers per sample.
         unsafe {
             assert!(usize::try_from(peer_size()).is_ok_and(|size| size <= size_of_val(&state)));

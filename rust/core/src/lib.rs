@@ -12,6 +12,8 @@ pub mod filter;
 pub mod identify;
 pub mod integrate;
 pub mod linear;
+pub mod monitor;
+pub mod online;
 pub mod plant;
 pub mod real;
 pub mod regression;
