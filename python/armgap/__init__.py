@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from armgap.arm import Arm
     from armgap.diagnosis import Diagnosis, diagnose
     from armgap.errors import ArmgapError
+    from armgap.estimator import Estimator
     from armgap.identification import Identification, identify
     from armgap.log import Finding, Log
     from armgap.reproduction import Reproduction, reproduce
@@ -20,6 +21,7 @@ __all__ = [
     "Arm",
     "ArmgapError",
     "Diagnosis",
+    "Estimator",
     "Finding",
     "Identification",
     "Log",
@@ -38,6 +40,7 @@ _HOMES = {
     "ArmgapError": "armgap.errors",
     "Diagnosis": "armgap.diagnosis",
     "diagnose": "armgap.diagnosis",
+    "Estimator": "armgap.estimator",
     "Finding": "armgap.log",
     "Log": "armgap.log",
     "Identification": "armgap.identification",

@@ -16,6 +16,7 @@ COMMANDS = {
     "diagnose": ("armgap.cli.diagnose", "Where the gap lies, what causes it, how far it shrinks."),
     "identify": ("armgap.cli.identify", "Estimate the arm's parameters from logs."),
     "simulate": ("armgap.cli.simulate", "Simulate an arm, with effects on request."),
+    "bench": ("armgap.cli.bench", "Cost per sample on this machine against the sample period."),
     "demo": ("armgap.cli.demo", "Diagnose the sample log and open its sealed key."),
     "reproduce": ("armgap.cli.reproduce", "The seed paper's tables and figures beside our own."),
     "trial": ("armgap.cli.trial", "Blind trials: sealed cases, diagnosed and scored."),
