@@ -2,3 +2,4 @@
 
 pub mod cost;
 pub mod run;
+pub mod scaling;
