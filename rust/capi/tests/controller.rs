@@ -17,7 +17,7 @@ fn library() -> PathBuf {
         std::fs::read_dir(&folder).expect("readable").filter_map(Result::ok).map(|entry| entry.path());
     let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     built
-        .filter(|path| name(path).starts_with("libarmgap") && name(path).ends_with(".a"))
+        .filter(|path| name(path).starts_with("libarmgap") && path.extension().is_some_and(|e| e == "a"))
         .filter(|path| !name(path).contains("embed"))
         .max_by_key(|path| path.metadata().and_then(|m| m.modified()).ok())
         .expect("the static library beside the tests")
