@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint test-rust test-python reproduce bench wheel wheel-check docs clean all tools lint-tools
+.PHONY: help setup demo test lint test-rust test-python reproduce bench bench-peers bench-instructions header dist docs wheel wheel-check clean all tools lint-tools
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
@@ -40,7 +40,7 @@ lint: setup lint-tools ## formatting, types and stubs
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest armgap._native --mypy-config-file pyproject.toml
 	cargo fmt --check
-	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy -q --release --all-targets -p armgap-core -p armgap-fit -p armgap-py -- -D warnings
+	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy -q --release --all-targets -p armgap-core -p armgap-fit -p armgap-capi -p armgap-bench -p armgap-benches -p armgap-py -- -D warnings
 
 test-rust: tools ## the Rust tests
 	cargo test -q --release
@@ -54,8 +54,29 @@ test: lint test-rust test-python ## everything that has to hold
 reproduce: setup ## the seed paper's tables and figures beside our own
 	$(BIN)/armgap reproduce
 
-bench: ## cost per sample of the core
+bench: ## cost per sample, per step and per effect of the core
 	cargo bench -p armgap-benches
+
+bench-peers: $(VENV)/.built ## the core beside plain C, numpy, padasip, filterpy, MuJoCo, Pinocchio and scipy
+	$(BIN)/python -m pip install -q --disable-pip-version-check $$($(BIN)/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']['peers'])")
+	cargo run -q --release -p armgap-benches --bin peers
+	$(BIN)/python benches/peers/compare.py
+
+bench-instructions: tools ## instructions per sample under valgrind
+	cargo build -q --release -p armgap-benches --bin instructions
+	$(PYTHON) benches/instructions.py target/release/instructions
+
+header: tools ## write rust/capi/include/armgap.h from the sources
+	ARMGAP_WRITE_HEADER=1 cargo test -q --release -p armgap-capi --test header
+
+dist: tools ## the C library for controllers: header, libraries, example, in dist/
+	cargo build -q --release -p armgap-capi
+	cargo rustc -q --profile embed -p armgap-capi --no-default-features --features freestanding --crate-type staticlib --target-dir target/freestanding
+	@rm -rf dist/armgap-c && mkdir -p dist/armgap-c/include dist/armgap-c/freestanding
+	@cp rust/capi/include/armgap.h dist/armgap-c/include/ && cp LICENSE examples/controller/controller.c examples/controller/README.md dist/armgap-c/
+	@cp target/release/libarmgap.a target/release/libarmgap.so dist/armgap-c/ && cp target/freestanding/embed/libarmgap.a dist/armgap-c/freestanding/
+	@cc -O2 -Wall -Wextra -Werror -I dist/armgap-c/include dist/armgap-c/controller.c dist/armgap-c/freestanding/libarmgap.a -lm -o dist/controller && dist/controller > /dev/null && rm dist/controller
+	@tar -C dist -czf dist/armgap-c.tar.gz armgap-c && echo "dist/armgap-c.tar.gz"
 
 wheel: $(VENV)/.tools ## a wheel in dist/
 	@rm -f dist/armgap-*.whl

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from armgap.arm import Arm
     from armgap.diagnosis import Diagnosis, diagnose
     from armgap.errors import ArmgapError
+    from armgap.estimator import Estimator
     from armgap.export import Corrected, correct
     from armgap.identification import Identification, identify
     from armgap.inspection import Inspection, inspect
@@ -23,6 +24,7 @@ __all__ = [
     "ArmgapError",
     "Corrected",
     "Diagnosis",
+    "Estimator",
     "Finding",
     "Identification",
     "Inspection",
@@ -46,6 +48,7 @@ _HOMES = {
     "correct": "armgap.export",
     "Diagnosis": "armgap.diagnosis",
     "diagnose": "armgap.diagnosis",
+    "Estimator": "armgap.estimator",
     "Finding": "armgap.log",
     "Log": "armgap.log",
     "Identification": "armgap.identification",

@@ -1,12 +1,14 @@
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "Estimator",
     "__version__",
     "arm_kinds",
+    "bench",
     "diagnose",
     "effects",
     "identify",
@@ -65,3 +67,48 @@ def identify(
 def velocity(
     t: NDArray[np.float64], q: NDArray[np.float64], method: str, half_width: int = 3
 ) -> NDArray[np.float64]: ...
+def bench(
+    scheme: str | None, paper: bool, plain: bool, single: bool, samples: int
+) -> tuple[float, float, float, float, float]: ...
+
+@final
+class Estimator:
+    def __new__(
+        cls,
+        kind: str,
+        scheme: str,
+        paper: bool,
+        form: str | None,
+        asymmetry: bool,
+        single: bool,
+        numbers: Sequence[float],
+        counts: Sequence[int],
+        theta0: Sequence[float],
+    ) -> Estimator: ...
+    def update(
+        self,
+        when: float,
+        after: bool,
+        q: NDArray[np.float64],
+        dq: NDArray[np.float64] | None,
+        tau: NDArray[np.float64],
+    ) -> int: ...
+    def run(
+        self,
+        when: NDArray[np.float64],
+        after: bool,
+        q: NDArray[np.float64],
+        dq: NDArray[np.float64] | None,
+        tau: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
+    def copy(self) -> Estimator: ...
+    @property
+    def theta(self) -> NDArray[np.float64]: ...
+    @property
+    def sigma(self) -> NDArray[np.float64]: ...
+    @property
+    def errors(self) -> NDArray[np.float64]: ...
+    @property
+    def signals(self) -> tuple[float, float]: ...
+    @property
+    def counts(self) -> tuple[int, int]: ...

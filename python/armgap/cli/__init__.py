@@ -19,6 +19,7 @@ COMMANDS = {
     "identify": ("armgap.cli.identify", "Estimate the arm's parameters from logs."),
     "simulate": ("armgap.cli.simulate", "Simulate an arm, with effects on request."),
     "export": ("armgap.cli.export", "What was found, as a model for a simulator."),
+    "bench": ("armgap.cli.bench", "Cost per sample on this machine against the sample period."),
     "demo": ("armgap.cli.demo", "Diagnose the sample log and open its sealed key."),
     "replay": ("armgap.cli.replay", "Measured and predicted arm side by side, for the Rerun viewer."),
     "reproduce": ("armgap.cli.reproduce", "The seed paper's tables and figures beside our own."),

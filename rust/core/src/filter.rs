@@ -9,7 +9,8 @@
 //!   the torque), and `D = lambda (1 - F)`, which makes the pair consistent by construction. Energies are quadratic in the velocity:
 //!   for them `D` also takes the value half-way, because a chord lies above a convex curve at every sample, which adds up to a bias.
 //!
-//! Configuration ([`Cutoff`], [`Step`]) and state ([`State`]) are separate, so one step's coefficients drive any number of channels.
+//! Configuration ([`Cutoff`], [`Step`]) and state (one output per channel, the caller's) are separate, so one step's coefficients drive
+//! any number of channels; [`Kept`] keeps them while the interval stays the same.
 //! Starting values: with `D` started in the steady state of its first input and every `F` of the same equation from zero, an equation
 //! `y = dp/dt + b` holds for the filtered signals from the first sample on, whatever the motion at that time.
 
@@ -33,6 +34,8 @@ pub struct Step<T> {
     pub last: T,
     /// Weight of the height by which the input's middle lies above the chord, input quadratic over the interval.
     pub bulge: T,
+    /// `h lambda`.
+    pub x: T,
     /// Cut-off, rad/s.
     pub lambda: T,
 }
@@ -41,24 +44,95 @@ impl<T: Real> Cutoff<T> {
     /// Coefficients for an interval of `h` seconds.
     #[inline]
     pub fn step(&self, h: T) -> Step<T> {
-        let lambda = self.rad_per_s;
-        let x = lambda * h;
-        let decay = (-x).exp();
+        let x = self.rad_per_s * h;
+        Step::with_decay(self.rad_per_s, x, (-x).exp())
+    }
+}
+
+impl<T: Real> Step<T> {
+    #[inline]
+    fn with_decay(lambda: T, x: T, decay: T) -> Self {
         // (1 - a)/x, from its series where the difference would cancel.
         let mean = if x > lit(1e-4) {
             (T::one() - decay) / x
         } else {
             T::one() - x * lit(0.5) * (T::one() - x / lit(3.0))
         };
-        Step { decay, first: mean - decay, last: T::one() - mean, bulge: bulge(x, decay), lambda }
+        Self { decay, first: mean - decay, last: T::one() - mean, bulge: bulge(x, decay), x, lambda }
+    }
+
+    /// The coefficients of an interval that is nearly this one: `exp` from its series around the known value.
+    #[inline]
+    fn near(&self, x: T) -> Self {
+        let d = self.x - x;
+        let change = T::one() + d * (T::one() + d * (lit::<T>(0.5) + d * lit(1.0 / 6.0)));
+        Self::with_decay(self.lambda, x, self.decay * change)
+    }
+
+    /// `F`, one interval after `y`, of an input held at `held`.
+    #[inline]
+    pub fn held(&self, y: T, held: T) -> T {
+        self.decay * y + (T::one() - self.decay) * held
+    }
+
+    /// `F`, one interval after `y`, of an input that goes linearly from `from` to `to`.
+    #[inline]
+    pub fn ramp(&self, y: T, from: T, to: T) -> T {
+        self.decay * y + self.first * from + self.last * to
+    }
+
+    /// `F`, one interval after `y`, of a parabola from `from` to `to` that half-way lies `height` above the chord.
+    #[inline]
+    pub fn curve(&self, y: T, from: T, to: T, height: T) -> T {
+        self.ramp(y, from, to) + self.bulge * height
+    }
+
+    /// The paper's `D`, one interval after `y`.
+    #[inline]
+    pub fn paper_derivative(&self, y: T, from: T, to: T) -> T {
+        self.decay * y + self.lambda * (to - from)
     }
 }
 
-impl<T: Real> Step<T> {
-    /// Coefficients of a `share` of this step's interval of `h` seconds.
+/// The coefficients of one interval, kept for the next, which usually is as long.
+///
+/// Lengths that differ by rounding of the clock count as equal; those that differ a little more take `exp` from its series.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kept<T> {
+    h: T,
+    step: Step<T>,
+}
+
+/// Relative change of a decay below which two intervals are as long as each other; the estimates follow it to first order.
+const SAME: f64 = 1e-12;
+/// The same up to which three terms of the series suffice: the fourth is 4e-18.
+const NEAR: f64 = 1e-4;
+
+impl<T: Real> Kept<T> {
+    /// Nothing kept yet.
     #[inline]
-    pub(crate) fn part(&self, cutoff: &Cutoff<T>, h: T, share: T) -> Self {
-        if share >= T::one() { *self } else { cutoff.step(h * share) }
+    pub fn new(cutoff: &Cutoff<T>) -> Self {
+        Self { h: T::zero(), step: cutoff.step(T::zero()) }
+    }
+
+    /// Coefficients for an interval of `h` seconds.
+    #[inline]
+    pub fn step(&mut self, h: T) -> Step<T> {
+        if h != self.h {
+            self.renew(h);
+        }
+        self.step
+    }
+
+    fn renew(&mut self, h: T) {
+        let x = self.step.lambda * h;
+        let change = (x - self.step.x).abs();
+        if change <= lit::<T>(SAME).max(T::default_epsilon()) && self.h > T::zero() {
+            return;
+        }
+        let near = change <= lit(NEAR) && self.h > T::zero();
+        self.step = if near { self.step.near(x) } else { Cutoff { rad_per_s: self.step.lambda }.step(h) };
+        self.h = h;
     }
 }
 
@@ -76,81 +150,6 @@ fn bulge<T: Real>(x: T, decay: T) -> T {
     four * inverse * (T::one() - two + decay * (T::one() + two))
 }
 
-/// State of one channel.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct State<T> {
-    /// Output of `F`.
-    pub y: T,
-    /// Last input, for the filters that look back one sample.
-    pub input: T,
-}
-
-impl<T: Real> State<T> {
-    /// A channel at rest at zero, seeing `input` first.
-    #[inline]
-    pub fn from_zero(input: T) -> Self {
-        Self { y: T::zero(), input }
-    }
-
-    /// A channel in the steady state of its first input.
-    #[inline]
-    pub fn steady(input: T) -> Self {
-        Self { y: input, input }
-    }
-
-    /// `F` of an input held at `held` over the interval.
-    #[inline]
-    pub fn low_held(&mut self, step: &Step<T>, held: T) -> T {
-        self.y = step.decay * self.y + (T::one() - step.decay) * held;
-        self.y
-    }
-
-    /// `F` of an input that goes linearly from `from` to `to` over the interval.
-    #[inline]
-    pub fn low_ramp(&mut self, step: &Step<T>, from: T, to: T) -> T {
-        self.y = step.decay * self.y + step.first * from + step.last * to;
-        self.y
-    }
-
-    /// `F` of an input linear between samples.
-    #[inline]
-    pub fn low(&mut self, step: &Step<T>, input: T) -> T {
-        let from = self.input;
-        self.input = input;
-        self.low_ramp(step, from, input)
-    }
-
-    /// `D` of an input linear between samples.
-    #[inline]
-    pub fn derivative(&mut self, step: &Step<T>, input: T) -> T {
-        (input - self.low(step, input)) * step.lambda
-    }
-
-    /// `D` of an input that is quadratic between samples and half-way lies `height` above the chord.
-    #[inline]
-    pub fn derivative_curved(&mut self, step: &Step<T>, input: T, height: T) -> T {
-        self.low(step, input);
-        self.y += step.bulge * height;
-        (input - self.y) * step.lambda
-    }
-
-    /// The paper's `F`.
-    #[inline]
-    pub fn paper_low(&mut self, step: &Step<T>, input: T) -> T {
-        let last = self.input;
-        self.input = input;
-        self.low_held(step, last)
-    }
-
-    /// The paper's `D`; here `y` holds the output of `D`.
-    #[inline]
-    pub fn paper_derivative(&mut self, step: &Step<T>, input: T) -> T {
-        self.y = step.decay * self.y + step.lambda * (input - self.input);
-        self.input = input;
-        self.y
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -159,15 +158,12 @@ mod tests {
 
     #[test]
     fn exact_pair_is_exact_on_a_ramp() {
-        // D of a ramp of slope 1 is 1 - exp(-lambda t), F of it t - D/lambda.
-        let (mut low, mut high) = (State::from_zero(0.0), State::steady(0.0));
-        let mut t = 0.0;
+        // F of a ramp of slope 1 is t - (1 - exp(-lambda t))/lambda, whatever the intervals.
+        let (mut low, mut t) = (0.0, 0.0);
         for h in [0.0025, 0.001, 0.004, 0.0025] {
+            low = CUTOFF.step(h).ramp(low, t, t + h);
             t += h;
-            let step = CUTOFF.step(h);
-            let rise = 1.0 - (-50.0 * t).exp();
-            assert!((high.derivative(&step, t) - rise).abs() < 1e-13);
-            assert!((low.low(&step, t) - (t - rise / 50.0)).abs() < 1e-13);
+            assert!((low - (t - (1.0 - (-50.0 * t).exp()) / 50.0)).abs() < 1e-13);
         }
     }
 
@@ -175,13 +171,13 @@ mod tests {
     fn a_parabola_passes_without_error_at_small_and_large_steps() {
         // F of t^2 from rest is t^2 - 2 t/lambda + 2 (1 - exp(-lambda t))/lambda^2.
         for lambda in [0.5, 7.9, 8.1, 50.0, 4000.0] {
-            let cutoff = Cutoff { rad_per_s: lambda };
-            let mut state = State::steady(0.0_f64);
+            let step = Cutoff { rad_per_s: lambda }.step(0.0025);
+            let mut low = 0.0_f64;
             for k in 1..=200 {
-                let t = f64::from(k) * 0.0025;
-                let d = state.derivative_curved(&cutoff.step(0.0025), t * t, -0.0025 * 0.0025 / 4.0);
-                let low = t * t - 2.0 * t / lambda + 2.0 * (1.0 - (-lambda * t).exp()) / (lambda * lambda);
-                assert!((d / lambda - (t * t - low)).abs() < 1e-14, "{lambda} rad/s");
+                let (before, t) = (f64::from(k - 1) * 0.0025, f64::from(k) * 0.0025);
+                low = step.curve(low, before * before, t * t, -0.0025 * 0.0025 / 4.0);
+                let exact = t * t - 2.0 * t / lambda + 2.0 * (1.0 - (-lambda * t).exp()) / (lambda * lambda);
+                assert!((low - exact).abs() < 1e-14, "{lambda} rad/s");
             }
         }
     }
@@ -189,11 +185,10 @@ mod tests {
     #[test]
     fn papers_pair_inflates_derivatives_as_its_ratio_says() {
         let step = CUTOFF.step(0.0025);
-        let (mut low, mut high) = (State::from_zero(0.0), State::from_zero(0.0));
         let (mut d, mut f) = (0.0, 0.0);
         for k in 1..4000 {
-            d = high.paper_derivative(&step, f64::from(k) * 0.0025);
-            f = low.paper_low(&step, 1.0);
+            d = step.paper_derivative(d, f64::from(k - 1) * 0.0025, f64::from(k) * 0.0025);
+            f = step.held(f, 1.0);
         }
         let inflation = 50.0 * 0.0025 / (1.0 - (-50.0_f64 * 0.0025).exp());
         assert!((d / f - inflation).abs() < 1e-12);
@@ -202,10 +197,27 @@ mod tests {
 
     #[test]
     fn a_held_input_settles_without_error_at_any_period() {
-        let mut state = State::from_zero(0.0);
+        let mut y = 0.0;
         for k in 0..400 {
-            state.low_held(&CUTOFF.step(0.001 + 0.001 * f64::from(k % 3)), 2.0);
+            y = CUTOFF.step(0.001 + 0.001 * f64::from(k % 3)).held(y, 2.0);
         }
-        assert!((state.y - 2.0).abs() < 1e-9);
+        assert!((y - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn kept_coefficients_are_those_of_the_interval() {
+        // Equal, off by a clock's rounding, off by jitter, another period, and back.
+        let mut kept = Kept::new(&CUTOFF);
+        for h in [0.0025, 0.0025, 0.0025 + 1e-15, 0.0025 + 1e-6, 0.0025 - 1e-6, 0.004, 1e-9, 0.0025] {
+            let (step, fresh) = (kept.step(h), CUTOFF.step(h));
+            for (a, b) in [
+                (step.decay, fresh.decay),
+                (step.first, fresh.first),
+                (step.last, fresh.last),
+                (step.bulge, fresh.bulge),
+            ] {
+                assert!((a - b).abs() < 4.0 * SAME, "{h}: {a} {b}");
+            }
+        }
     }
 }

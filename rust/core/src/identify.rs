@@ -2,13 +2,17 @@
 //!
 //! Each call takes the position read at a sample and the torque that acts from it on. The velocity is the caller's, or comes from the
 //! positions: the paper's variant takes the backward difference as the velocity of the sample, half a period late; the exact variant
-//! takes it for what it is, the velocity half-way between the two samples, and aligns everything else with that instant.
+//! takes it for what it is, the velocity half-way between the two samples, and aligns everything else with that instant. Whether
+//! velocities are given is settled by the first sample.
+//!
+//! A sample comes with its time ([`Estimator::update`]), or with the period since the last one ([`Estimator::update_after`]), which in
+//! single precision is the only way to keep its resolution: after three hours a time in `f32` has steps of a millisecond.
 
 use crate::arm::Arm;
 use crate::filter::Cutoff;
 use crate::real::{Real, lit};
 use crate::regression::{FilteredDynamic, FilteredPower, Passage, Scheme, Snapshot, SuppliedEnergy, Variant};
-use crate::rls::{Rls, Update};
+use crate::rls::{Form, Rls, Update};
 use nalgebra::SVector;
 
 /// Positions, velocities, torques and intervals beyond this belong to no arm, and their squares would stay in filters and integrals for good.
@@ -33,7 +37,7 @@ pub struct Settings<T, const R: usize> {
     pub p0: T,
 }
 
-/// One sample.
+/// One sample with its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample<T, const N: usize> {
     /// Time, s.
@@ -42,26 +46,60 @@ pub struct Sample<T, const N: usize> {
     pub q: SVector<T, N>,
     /// Velocities at `t`, where they are known.
     pub dq: Option<SVector<T, N>>,
-    /// Torques held from `t` on.
+    /// Torques that act from `t` until the next sample.
     pub tau: SVector<T, N>,
 }
 
-/// What a sample led to.
+/// One sample without its time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading<T, const N: usize> {
+    /// Positions.
+    pub q: SVector<T, N>,
+    /// Velocities, where they are known.
+    pub dq: Option<SVector<T, N>>,
+    /// Torques that act until the next sample.
+    pub tau: SVector<T, N>,
+}
+
+/// What became of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome<T, const N: usize> {
-    /// Not enough samples yet for a regression.
+    /// Taken, but there are not enough samples yet for a regression.
     Starting,
     /// The estimate was updated; the prediction error, its first entry only for scalar schemes.
     Updated(SVector<T, N>),
-    /// The sample is not finite, of impossible size, or not later than the last; nothing but the count has changed.
+    /// The sample is not finite, of impossible size, not later than the last, or has a velocity where the first had none or the other
+    /// way round; nothing but the count has changed. Or least squares rejected the regressor that it led to; then the estimate has not
+    /// changed, and filters and integrals start again at this sample.
     Rejected,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Regression<T: Real, const N: usize, const R: usize> {
-    Dynamic(FilteredDynamic<T, N, R>),
-    Energy(SuppliedEnergy<T, N, R>),
-    Power(FilteredPower<T, N, R>),
+enum Regression<T: Real, const N: usize, const P: usize> {
+    Dynamic(FilteredDynamic<T, N, P>),
+    Energy(SuppliedEnergy<T, N, P>),
+    Power(FilteredPower<T, N, P>),
+}
+
+/// The last sample, and what is still needed of the one before; `seen` tells what of it holds.
+#[derive(Debug, Clone, Copy)]
+struct Past<T, const N: usize> {
+    seen: Seen,
+    t: T,
+    q: SVector<T, N>,
+    tau: SVector<T, N>,
+    sensor: bool,
+    /// Interval that ended with the last sample, its reciprocal, and the torque over it.
+    h: T,
+    inverse: T,
+    tau_before: SVector<T, N>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Seen {
+    Nothing,
+    One,
+    More,
 }
 
 /// A running estimator: settings, arm, and state in one value without allocation.
@@ -70,9 +108,8 @@ pub struct Estimator<T: Real, A, const N: usize, const P: usize, const R: usize>
     arm: A,
     settings: Settings<T, R>,
     rls: Rls<T, R>,
-    last: Option<Sample<T, N>>,
-    before: Option<Sample<T, N>>,
-    regression: Option<Regression<T, N, R>>,
+    past: Past<T, N>,
+    regression: Option<Regression<T, N, P>>,
     rejected: u64,
 }
 
@@ -83,10 +120,28 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
             assert!(R == P || R == P + N, "R is the arm's parameters, or those and one asymmetry per joint");
         }
         let rls = Rls::new(settings.theta0, settings.p0, settings.forgetting);
-        Self { arm, settings, rls, last: None, before: None, regression: None, rejected: 0 }
+        let (zero, none) = (SVector::zeros(), T::zero());
+        let past = Past {
+            seen: Seen::Nothing,
+            t: none,
+            q: zero,
+            tau: zero,
+            sensor: false,
+            h: none,
+            inverse: none,
+            tau_before: zero,
+        };
+        Self { arm, settings, rls, past, regression: None, rejected: 0 }
+    }
+
+    /// The same with the covariance kept in another form than the default of its precision.
+    pub fn with_form(mut self, form: Form) -> Self {
+        self.rls = self.rls.with_form(form);
+        self
     }
 
     /// Estimate and covariance.
+    #[inline]
     pub fn rls(&self) -> &Rls<T, R> {
         &self.rls
     }
@@ -96,72 +151,115 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         self.rejected + self.rls.rejected()
     }
 
-    /// Takes one sample.
+    /// Takes one sample with its time.
     #[inline]
     pub fn update(&mut self, sample: &Sample<T, N>) -> Outcome<T, N> {
-        if !self.acceptable(sample) {
+        let Sample { t, q, dq, tau } = sample;
+        let h = if self.past.seen == Seen::Nothing { T::one() } else { *t - self.past.t };
+        self.take(*t, h, q, dq.as_ref(), tau)
+    }
+
+    /// Takes one sample `h` seconds after the last one; for the first sample any positive number will do.
+    #[inline]
+    pub fn update_after(&mut self, h: T, reading: &Reading<T, N>) -> Outcome<T, N> {
+        let Reading { q, dq, tau } = reading;
+        self.take(self.past.t + h, h, q, dq.as_ref(), tau)
+    }
+
+    #[inline]
+    fn take(
+        &mut self,
+        t: T,
+        h: T,
+        q: &SVector<T, N>,
+        dq: Option<&SVector<T, N>>,
+        tau: &SVector<T, N>,
+    ) -> Outcome<T, N> {
+        if !self.acceptable(t, h, q, dq, tau) {
             self.rejected += 1;
             return Outcome::Rejected;
         }
-        let Some(last) = self.last else {
-            self.last = Some(*sample);
-            if sample.dq.is_some() || self.settings.variant == Variant::Paper {
-                let dq = sample.dq.unwrap_or_else(SVector::zeros);
-                self.start(&Snapshot { q: sample.q, dq }, &sample.tau);
+        let outcome = if self.past.seen == Seen::Nothing {
+            if dq.is_some() || self.settings.variant == Variant::Paper {
+                self.start(&Snapshot { q: *q, dq: dq.copied().unwrap_or_else(SVector::zeros) }, tau);
             }
-            return Outcome::Starting;
+            Outcome::Starting
+        } else {
+            self.advance(h, q, dq, tau)
         };
-        let outcome = self.advance(&last, sample);
-        self.before = Some(last);
-        self.last = Some(*sample);
+        let past = &mut self.past;
+        past.seen = if past.seen == Seen::Nothing { Seen::One } else { Seen::More };
+        past.tau_before = past.tau;
+        if h != past.h {
+            (past.h, past.inverse) = (h, T::one() / h);
+        }
+        (past.t, past.sensor) = (t, dq.is_some());
+        past.q = *q;
+        past.tau = *tau;
         outcome
     }
 
     /// Whether a sample can be used: finite, of possible size, later than the last and reachable from it.
-    fn acceptable(&self, sample: &Sample<T, N>) -> bool {
-        let numbers = sample.q.iter().chain(sample.tau.iter()).chain(sample.dq.iter().flatten());
+    #[inline]
+    fn acceptable(
+        &self,
+        t: T,
+        h: T,
+        q: &SVector<T, N>,
+        dq: Option<&SVector<T, N>>,
+        tau: &SVector<T, N>,
+    ) -> bool {
         let limit: T = lit(LARGEST);
-        let possible = sample.t.abs() <= lit(LATEST) && numbers.into_iter().all(|x| x.abs() <= limit);
-        possible
-            && self.last.is_none_or(|last| {
-                let h = sample.t - last.t;
-                h > T::zero() && h <= limit && (sample.q - last.q).amax() <= limit * h
-            })
+        let possible = |x: &SVector<T, N>, limit: T| x.iter().fold(true, |all, x| all & (x.abs() <= limit));
+        let mut fine = possible(q, limit) & possible(tau, limit) & (t.abs() <= lit(LATEST));
+        if let Some(dq) = dq {
+            fine &= possible(dq, limit);
+        }
+        fine &= (h > T::zero()) & (h <= limit);
+        if self.past.seen != Seen::Nothing {
+            fine &= possible(&(q - self.past.q), limit * h) & (self.past.sensor == dq.is_some());
+        }
+        fine
     }
 
     fn start(&mut self, now: &Snapshot<T, N>, tau: &SVector<T, N>) {
-        let variant = self.settings.variant;
-        self.regression = Some(match self.settings.scheme {
-            Scheme::FilteredDynamic => {
-                Regression::Dynamic(FilteredDynamic::new(&self.arm, variant, now, tau))
-            }
-            Scheme::SuppliedEnergy => Regression::Energy(SuppliedEnergy::new(&self.arm, now, tau)),
-            Scheme::FilteredPower => Regression::Power(FilteredPower::new(&self.arm, variant, now, tau)),
+        let Settings { scheme, variant, cutoff, .. } = &self.settings;
+        let (arm, variant) = (&self.arm, *variant);
+        self.regression = Some(match scheme {
+            Scheme::FilteredDynamic => Regression::Dynamic(FilteredDynamic::new(arm, variant, cutoff, now)),
+            Scheme::SuppliedEnergy => Regression::Energy(SuppliedEnergy::new(arm, now, tau)),
+            Scheme::FilteredPower => Regression::Power(FilteredPower::new(arm, variant, cutoff, now, tau)),
         });
     }
 
     #[inline]
-    fn advance(&mut self, last: &Sample<T, N>, sample: &Sample<T, N>) -> Outcome<T, N> {
+    fn advance(
+        &mut self,
+        h: T,
+        q: &SVector<T, N>,
+        dq: Option<&SVector<T, N>>,
+        tau: &SVector<T, N>,
+    ) -> Outcome<T, N> {
         let half: T = lit(0.5);
-        let difference = (sample.q - last.q) / (sample.t - last.t);
-        let between = (last.q + sample.q) * half;
-        let at_samples = sample.dq.is_some() || self.settings.variant == Variant::Paper;
-        if at_samples {
-            let now = Snapshot { q: sample.q, dq: sample.dq.unwrap_or(difference) };
-            let h = sample.t - last.t;
-            let passage = Passage { h, split: h * half, first: last.tau, second: last.tau, middle: between };
-            return self.regress(&now, &passage, &sample.tau);
+        let past = &self.past;
+        let inverse = if h == past.h { past.inverse } else { T::one() / h };
+        let difference = (q - past.q) * inverse;
+        let between = (past.q + q) * half;
+        if dq.is_some() || self.settings.variant == Variant::Paper {
+            let now = Snapshot { q: *q, dq: dq.copied().unwrap_or(difference) };
+            let passage = Passage { h, split: h * half, first: past.tau, second: past.tau, middle: between };
+            return self.regress(&now, &passage, tau);
         }
-        // The state half-way between the two samples; on the way there from the one before, the torque changed at `last`.
-        let now = Snapshot { q: between, dq: difference };
-        let Some(before) = self.before else {
-            self.start(&now, &last.tau);
+        // The state half-way between the two samples; on the way there from the one before, the torque changed at the last sample.
+        let (now, held) = (Snapshot { q: between, dq: difference }, past.tau);
+        if past.seen == Seen::One {
+            self.start(&now, &held);
             return Outcome::Starting;
-        };
-        let h = (sample.t - before.t) * half;
-        let split = (last.t - before.t) * half;
-        let passage = Passage { h, split, first: before.tau, second: last.tau, middle: last.q };
-        self.regress(&now, &passage, &last.tau)
+        }
+        let split = past.h * half;
+        let passage =
+            Passage { h: split + h * half, split, first: past.tau_before, second: held, middle: past.q };
+        self.regress(&now, &passage, &held)
     }
 
     #[inline]
@@ -171,12 +269,11 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         passage: &Passage<T, N>,
         tau: &SVector<T, N>,
     ) -> Outcome<T, N> {
-        let Settings { variant, cutoff, .. } = self.settings;
-        let arm = &self.arm;
-        match &mut self.regression {
+        let (arm, variant) = (&self.arm, self.settings.variant);
+        let outcome = match &mut self.regression {
             None => Outcome::Starting,
             Some(Regression::Dynamic(scheme)) => {
-                let (psi, y) = scheme.update(arm, variant, &cutoff, now, passage, tau);
+                let (psi, y) = scheme.update(arm, variant, now, passage);
                 match self.rls.update(&psi, &y) {
                     Update::Used(error) => Outcome::Updated(error),
                     Update::Rejected => Outcome::Rejected,
@@ -187,10 +284,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
                 scalar(self.rls.update(&psi, &y))
             }
             Some(Regression::Power(scheme)) => {
-                let (psi, y) = scheme.update(arm, variant, &cutoff, now, passage, tau);
+                let (psi, y) = scheme.update(arm, variant, now, passage, tau);
                 scalar(self.rls.update(&psi, &y))
             }
+        };
+        if outcome == Outcome::Rejected {
+            // Filters and integrals hold what least squares cannot use; the equations hold from any start.
+            self.start(now, tau);
         }
+        outcome
     }
 }
 

@@ -1,7 +1,7 @@
 //! Laws of the filters, the least squares and the online estimator under any input.
 
 use armgap_core::arm::{Axis, TwoLink};
-use armgap_core::filter::{Cutoff, State};
+use armgap_core::filter::Cutoff;
 use armgap_core::identify::{Estimator, Outcome, Sample, Settings};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::{Rls, Update};
@@ -26,29 +26,10 @@ proptest! {
     ) {
         let cutoff = Cutoff { rad_per_s: lambda };
         let middle = u + (v - u) * share;
-        let (mut whole, mut parts) = (State { y, input: u }, State { y, input: u });
-        whole.low_ramp(&cutoff.step(h), u, v);
-        parts.low_ramp(&cutoff.step(h * share), u, middle);
-        parts.low_ramp(&cutoff.step(h - h * share), middle, v);
-        prop_assert!((whole.y - parts.y).abs() < 1e-12);
-        whole.low_held(&cutoff.step(h), v);
-        parts.low_held(&cutoff.step(h * share), v);
-        parts.low_held(&cutoff.step(h - h * share), v);
-        prop_assert!((whole.y - parts.y).abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_exact_pair_adds_up_to_its_input(lambda in 0.1..2000.0_f64, h in 1e-5..0.1_f64, inputs in prop::array::uniform5(-5.0..5.0_f64)) {
-        // F + D/lambda = 1, for both kinds of curve.
-        let step = Cutoff { rad_per_s: lambda }.step(h);
-        let (mut low, mut high) = (State::steady(inputs[0]), State::steady(inputs[0]));
-        for input in inputs {
-            let f = low.low(&step, input);
-            let d = high.derivative(&step, input);
-            prop_assert!((f + d / lambda - input).abs() < 1e-12);
-        }
-        let (mut flat, mut curved) = (State::steady(inputs[0]), State::steady(inputs[0]));
-        prop_assert_eq!(flat.derivative(&step, inputs[1]), curved.derivative_curved(&step, inputs[1], 0.0));
+        let (whole, first, second) = (cutoff.step(h), cutoff.step(h * share), cutoff.step(h - h * share));
+        prop_assert!((whole.ramp(y, u, v) - second.ramp(first.ramp(y, u, middle), middle, v)).abs() < 1e-12);
+        prop_assert!((whole.held(y, v) - second.held(first.held(y, v), v)).abs() < 1e-12);
+        prop_assert_eq!(whole.ramp(y, u, v), whole.curve(y, u, v, 0.0));
     }
 
     #[test]

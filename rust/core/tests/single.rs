@@ -1,13 +1,13 @@
 //! What single precision does to recursive least squares: the figures of `docs/decisions/006-least-squares-form.md`.
 
-#[path = "../../../benches/src/lib.rs"]
+#[path = "../../bench/src/run.rs"]
 mod run;
 
 use armgap_core::filter::Cutoff;
 use armgap_core::identify::{Estimator, Settings};
 use armgap_core::real::{Real, lit};
 use armgap_core::regression::{Scheme, Variant};
-use armgap_core::rls::Rls;
+use armgap_core::rls::{Form, Rls};
 use nalgebra::{SMatrix, SVector};
 
 /// Share by which single precision may differ from double on the seed's run; 1.1e-3 is the largest seen.
@@ -99,4 +99,36 @@ fn a_million_random_updates() {
             assert!(off < 0.02 / p0 + 1e-3, "P(0) = {p0}: off by {off:e}");
         }
     }
+}
+
+/// A million samples of a motion that hardly excites one of three directions: the estimate, its distance from the truth, and whether the
+/// covariance was found positive definite at every thousandth sample.
+fn weakly_excited<T: Real>(form: Form) -> (SVector<f64, 3>, bool) {
+    let mut rls = Rls::<T, 3>::new(SVector::zeros(), lit(1000.0), T::one()).with_form(form);
+    let mut definite = true;
+    for k in 0..1_000_000 {
+        let t = f64::from(k) * 0.0025;
+        // The third regressor is the second's twin but for three parts in a thousand.
+        let psi =
+            [20.0 * (3.1 * t).sin(), 10.0 * (7.3 * t).sin(), 10.0 * (7.3 * t).sin() + 0.03 * (5.7 * t).cos()];
+        let y = 2.0 * psi[0] + 0.5 * psi[1] + 1.5 * psi[2];
+        rls.update(&SMatrix::<f64, 1, 3>::from_row_slice(&psi).map(lit::<T>), &SVector::<T, 1>::new(lit(y)));
+        if k % 1000 == 0 {
+            definite &= is_positive_definite(&rls.covariance());
+        }
+    }
+    (rls.theta().map(double), definite)
+}
+
+#[test]
+fn weak_excitation_needs_the_factorized_form_in_single_precision() {
+    let (reference, _) = weakly_excited::<f64>(Form::Factorized);
+    let off = |theta: SVector<f64, 3>| (theta - reference).component_div(&reference).amax();
+    let (factorized, definite) = weakly_excited::<f32>(Form::Factorized);
+    assert!(definite && off(factorized) < 0.01, "{definite} {:e}", off(factorized));
+    let (plain, definite) = weakly_excited::<f64>(Form::Plain);
+    assert!(definite && off(plain) < 1e-6, "{definite} {:e}", off(plain));
+    // What the plain form does in single precision: it loses definiteness.
+    let (_, definite) = weakly_excited::<f32>(Form::Plain);
+    assert!(!definite);
 }

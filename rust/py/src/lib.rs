@@ -1,7 +1,9 @@
 //! The Python module `armgap._native`: views in, check, release the GIL, arrays out. Nothing is computed here.
 
+mod bench;
 mod convert;
 mod diagnose;
+mod estimator;
 mod identify;
 mod simulate;
 
@@ -10,9 +12,13 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
+    use crate::bench::bench;
+    #[pymodule_export]
     use crate::convert::{arm_kinds, effects, theta_from_links};
     #[pymodule_export]
     use crate::diagnose::diagnose;
+    #[pymodule_export]
+    use crate::estimator::Estimator;
     #[pymodule_export]
     use crate::identify::{identify, velocity};
     #[pymodule_export]

@@ -116,6 +116,16 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Regressor of `g(q) - dK/dq`: what is left of the inertial torque once the momentum's rate is taken out.
     fn potential_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, P>;
 
+    /// The two regressors above together, for the online estimator; arms override it where terms are shared.
+    #[inline]
+    fn momentum_and_potential(
+        &self,
+        q: &SVector<T, N>,
+        dq: &SVector<T, N>,
+    ) -> (SMatrix<T, N, P>, SMatrix<T, N, P>) {
+        (self.momentum_regressor(q, dq), self.potential_regressor(q, dq))
+    }
+
     /// Change of `theta` when a point `mass` [kg] is fixed `distance` [m] along the last link.
     fn payload(&self, theta: &[T; P], mass: T, distance: T) -> [T; P];
 

@@ -3,7 +3,8 @@
 //! `theta1` is the inertia about the joint, `theta2 = m g l` the largest gravity torque.
 
 use super::{Arm, Parameter};
-use crate::real::{Real, sin_cos};
+use crate::real::Real;
+use crate::trig::sin_cos;
 use nalgebra::{SMatrix, SVector};
 
 /// A physical pendulum with a motor in its pivot.

@@ -12,7 +12,8 @@
 //! `C dq`; for that one only `dq' (dM/dt - 2 C) dq = 0` holds.
 
 use super::{Arm, Parameter};
-use crate::real::{Real, lit, sin_cos};
+use crate::real::{Real, lit};
+use crate::trig::sin_cos;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// The two-link vertical arm.
@@ -98,14 +99,16 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
         (inertia, Vector2::new(bias1, outer + ks * dq[0] * dq[0]))
     }
 
+    #[inline]
     fn energy_regressor(&self, q: &Vector2<T>, dq: &Vector2<T>) -> SVector<T, 9> {
         let (half, sum) = (lit::<T>(0.5), dq[0] + dq[1]);
+        let ((s1, c1), (s2, c2)) = (sin_cos(q[0]), sin_cos(q[1]));
         let mut e = SVector::zeros();
         e[0] = half * dq[0] * dq[0];
-        e[1] = q[1].cos() * dq[0] * sum;
+        e[1] = c2 * dq[0] * sum;
         e[2] = dq[1] * (dq[0] + half * dq[1]);
-        e[3] = T::one() - q[0].cos();
-        e[4] = T::one() - (q[0] + q[1]).cos();
+        e[3] = T::one() - c1;
+        e[4] = T::one() - (c1 * c2 - s1 * s2);
         e
     }
 
@@ -130,8 +133,29 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
         b
     }
 
+    #[inline]
+    fn momentum_and_potential(
+        &self,
+        q: &Vector2<T>,
+        dq: &Vector2<T>,
+    ) -> (SMatrix<T, 2, 9>, SMatrix<T, 2, 9>) {
+        let ((s1, c1), (s2, c2)) = (sin_cos(q[0]), sin_cos(q[1]));
+        let (sum, outer) = (dq[0] + dq[1], s1 * c2 + c1 * s2);
+        let (mut p, mut b) = (SMatrix::zeros(), SMatrix::zeros());
+        p[(0, 0)] = dq[0];
+        p[(0, 1)] = c2 * (dq[0] + sum);
+        p[(0, 2)] = dq[1];
+        p[(1, 1)] = c2 * dq[0];
+        p[(1, 2)] = sum;
+        b[(0, 3)] = s1;
+        b[(0, 4)] = outer;
+        b[(1, 1)] = s2 * dq[0] * sum;
+        b[(1, 4)] = outer;
+        (p, b)
+    }
+
     fn regressor(&self, q: &Vector2<T>, dq: &Vector2<T>, ddq: &Vector2<T>) -> SMatrix<T, 2, 9> {
-        let (s2, c2) = q[1].sin_cos();
+        let (s2, c2) = sin_cos(q[1]);
         let outer = (q[0] + q[1]).sin();
         let mut y = self.friction_regressor(dq);
         y[(0, 0)] = ddq[0];

@@ -3,119 +3,119 @@
 //! `Pm theta = M(q) dq` is the momentum and `B theta = g - dK/dq + f` the rest, so `tau = d/dt(Pm theta) + B theta` needs no acceleration
 //! once filtered.
 
-use super::reversal::Pieces;
-use super::{Passage, Snapshot, Variant, friction_rows, inertial_rows};
+use super::friction::Friction;
+use super::{Passage, Snapshot, Steps, Variant};
 use crate::arm::Arm;
-use crate::filter::{Cutoff, State};
+use crate::filter::Cutoff;
 use crate::real::Real;
 use nalgebra::{SMatrix, SVector};
 
-/// State of the scheme.
+/// State of the scheme. Of the matrices over all parameters only the inertial columns are used.
 #[derive(Debug, Clone, Copy)]
-pub struct FilteredDynamic<T: Real, const N: usize, const R: usize> {
-    momentum: SMatrix<State<T>, N, R>,
-    rest: SMatrix<State<T>, N, R>,
-    torque: SVector<State<T>, N>,
-    last_potential: SMatrix<T, N, R>,
-    last_dq: SVector<T, N>,
+pub struct FilteredDynamic<T: Real, const N: usize, const P: usize> {
+    steps: Steps<T>,
+    last: Snapshot<T, N>,
+    last_momentum: SMatrix<T, N, P>,
+    last_potential: SMatrix<T, N, P>,
+    /// The paper's `D` of the momentum, or `F` of it.
+    momentum: SMatrix<T, N, P>,
+    potential: SMatrix<T, N, P>,
+    friction: Friction<T, N>,
+    torque: SVector<T, N>,
 }
 
-impl<T: Real, const N: usize, const R: usize> FilteredDynamic<T, N, R> {
-    /// The scheme at its first state; `tau` is the torque that acts from then on.
-    pub fn new<A: Arm<T, N, P>, const P: usize>(
-        arm: &A,
-        variant: Variant,
-        now: &Snapshot<T, N>,
-        tau: &SVector<T, N>,
-    ) -> Self {
-        let (momentum, potential) = inertial_rows::<T, A, N, P, R>(arm, now);
-        let rest = potential + friction_rows::<T, A, N, P, R>(arm, &now.dq);
-        Self {
-            momentum: momentum.map(|x| variant.derivative_state(x)),
-            rest: rest.map(State::from_zero),
-            torque: tau.map(State::from_zero),
-            last_potential: potential,
-            last_dq: now.dq,
-        }
-    }
-
-    /// The rows and outputs at the next state, reached by `passage`; `tau` is the torque that acts from then on.
-    #[inline]
-    pub fn update<A: Arm<T, N, P>, const P: usize>(
-        &mut self,
-        arm: &A,
-        variant: Variant,
-        cutoff: &Cutoff<T>,
-        now: &Snapshot<T, N>,
-        passage: &Passage<T, N>,
-        tau: &SVector<T, N>,
-    ) -> (SMatrix<T, N, R>, SVector<T, N>) {
-        let rows = inertial_rows::<T, A, N, P, R>(arm, now);
-        let result = match variant {
-            Variant::Paper => self.paper(arm, cutoff, now, &rows, passage.h, tau),
-            Variant::Exact => self.exact(arm, cutoff, now, &rows, passage),
+impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
+    /// The scheme at its first state.
+    pub fn new<A: Arm<T, N, P>>(arm: &A, variant: Variant, cutoff: &Cutoff<T>, now: &Snapshot<T, N>) -> Self {
+        let (last_momentum, last_potential) = arm.momentum_and_potential(&now.q, &now.dq);
+        let momentum = match variant {
+            Variant::Paper => SMatrix::zeros(),
+            Variant::Exact => last_momentum,
         };
-        self.last_dq = now.dq;
-        self.last_potential = rows.1;
-        result
-    }
-
-    #[inline]
-    fn paper<A: Arm<T, N, P>, const P: usize>(
-        &mut self,
-        arm: &A,
-        cutoff: &Cutoff<T>,
-        now: &Snapshot<T, N>,
-        (momentum, potential): &(SMatrix<T, N, R>, SMatrix<T, N, R>),
-        h: T,
-        tau: &SVector<T, N>,
-    ) -> (SMatrix<T, N, R>, SVector<T, N>) {
-        let step = cutoff.step(h);
-        let rest = potential + friction_rows::<T, A, N, P, R>(arm, &now.dq);
-        let (mut psi, mut y) = (SMatrix::zeros(), SVector::zeros());
-        for i in 0..N {
-            for j in 0..R {
-                psi[(i, j)] = self.momentum[(i, j)].paper_derivative(&step, momentum[(i, j)])
-                    + self.rest[(i, j)].paper_low(&step, rest[(i, j)]);
-            }
-            y[i] = self.torque[i].paper_low(&step, tau[i]);
+        Self {
+            steps: Steps::new(cutoff),
+            last: *now,
+            last_momentum,
+            last_potential,
+            momentum,
+            potential: SMatrix::zeros(),
+            friction: Friction::zero(),
+            torque: SVector::zeros(),
         }
-        (psi, y)
     }
 
+    /// The rows and outputs at the next state, reached by `passage`.
     #[inline]
-    fn exact<A: Arm<T, N, P>, const P: usize>(
+    pub fn update<A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
-        cutoff: &Cutoff<T>,
+        variant: Variant,
         now: &Snapshot<T, N>,
-        (momentum, potential): &(SMatrix<T, N, R>, SMatrix<T, N, R>),
         passage: &Passage<T, N>,
     ) -> (SMatrix<T, N, R>, SVector<T, N>) {
-        let step = cutoff.step(passage.h);
-        let rise = potential - self.last_potential;
-        Pieces::of(&self.last_dq, &now.dq).each(
-            |dq| friction_rows::<T, A, N, P, R>(arm, dq),
-            |start, end, from, to| {
-                let part = step.part(cutoff, passage.h, end - start);
-                for i in 0..N {
-                    for j in 0..R {
-                        let (base, rise) = (self.last_potential[(i, j)], rise[(i, j)]);
-                        let (from, to) = (from[(i, j)] + start * rise, to[(i, j)] + end * rise);
-                        self.rest[(i, j)].low_ramp(&part, base + from, base + to);
-                    }
-                }
-            },
-        );
-        let parts = passage.steps(cutoff);
-        let (mut psi, mut y) = (SMatrix::zeros(), SVector::zeros());
-        for i in 0..N {
-            for j in 0..R {
-                psi[(i, j)] = self.momentum[(i, j)].derivative(&step, momentum[(i, j)]) + self.rest[(i, j)].y;
-            }
-            self.torque[i].low_held(&parts[0], passage.first[i]);
-            y[i] = self.torque[i].low_held(&parts[1], passage.second[i]);
+        let (momentum, potential) = arm.momentum_and_potential(&now.q, &now.dq);
+        let mut psi = SMatrix::zeros();
+        match variant {
+            Variant::Paper => self.paper::<A, R>(&momentum, passage, &mut psi),
+            Variant::Exact => self.exact::<A, R>(&momentum, &potential, now, passage, &mut psi),
         }
-        (psi, y)
+        for i in 0..N {
+            self.friction.write(A::INERTIAL, Some(i), |j, value| {
+                if j < R {
+                    psi[(i, j)] = value;
+                }
+            });
+        }
+        (self.last, self.last_momentum, self.last_potential) = (*now, momentum, potential);
+        (psi, self.torque)
+    }
+
+    #[inline]
+    fn paper<A: Arm<T, N, P>, const R: usize>(
+        &mut self,
+        momentum: &SMatrix<T, N, P>,
+        passage: &Passage<T, N>,
+        psi: &mut SMatrix<T, N, R>,
+    ) {
+        let step = self.steps.whole(passage.h);
+        for j in 0..A::INERTIAL {
+            for i in 0..N {
+                let (from, to) = (self.last_momentum[(i, j)], momentum[(i, j)]);
+                let derivative = step.paper_derivative(self.momentum[(i, j)], from, to);
+                let rest = step.held(self.potential[(i, j)], self.last_potential[(i, j)]);
+                (self.momentum[(i, j)], self.potential[(i, j)]) = (derivative, rest);
+                psi[(i, j)] = derivative + rest;
+            }
+        }
+        self.friction.hold_torques(&step, &self.last.dq);
+        for i in 0..N {
+            self.torque[i] = step.held(self.torque[i], passage.second[i]);
+        }
+    }
+
+    #[inline]
+    fn exact<A: Arm<T, N, P>, const R: usize>(
+        &mut self,
+        momentum: &SMatrix<T, N, P>,
+        potential: &SMatrix<T, N, P>,
+        now: &Snapshot<T, N>,
+        passage: &Passage<T, N>,
+        psi: &mut SMatrix<T, N, R>,
+    ) {
+        let step = self.steps.whole(passage.h);
+        for j in 0..A::INERTIAL {
+            for i in 0..N {
+                let low = step.ramp(self.momentum[(i, j)], self.last_momentum[(i, j)], momentum[(i, j)]);
+                let rest = step.ramp(self.potential[(i, j)], self.last_potential[(i, j)], potential[(i, j)]);
+                (self.momentum[(i, j)], self.potential[(i, j)]) = (low, rest);
+                psi[(i, j)] = (momentum[(i, j)] - low) * step.lambda + rest;
+            }
+        }
+        self.friction.filter_torques(&step, &self.last.dq, &now.dq);
+        let parts = self.steps.parts(passage);
+        for i in 0..N {
+            let middle = parts[0].held(self.torque[i], passage.first[i]);
+            self.torque[i] = parts[1].held(middle, passage.second[i]);
+        }
     }
 }

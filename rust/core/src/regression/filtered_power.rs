@@ -1,116 +1,120 @@
 //! Filtered power model, equations (29) and (30): `F[tau.dq] = (D[E] + F[W]) theta`, the paper's own proposal.
 
-use super::reversal::Pieces;
-use super::{Passage, Snapshot, Variant, energy_row, power_row};
+use super::friction::Friction;
+use super::{Passage, Snapshot, Steps, Variant};
 use crate::arm::Arm;
-use crate::filter::{Cutoff, State};
+use crate::filter::Cutoff;
 use crate::real::{Real, lit};
 use nalgebra::{SMatrix, SVector};
 
-/// State of the scheme.
+/// State of the scheme. Of the rows over all parameters only the inertial entries are used.
 #[derive(Debug, Clone, Copy)]
-pub struct FilteredPower<T: Real, const N: usize, const R: usize> {
-    energy: SMatrix<State<T>, 1, R>,
-    dissipation: SMatrix<State<T>, 1, R>,
-    supplied: State<T>,
+pub struct FilteredPower<T: Real, const N: usize, const P: usize> {
+    steps: Steps<T>,
     last: Snapshot<T, N>,
+    last_energy: SVector<T, P>,
+    last_supply: T,
+    /// The paper's `D` of the energy, or `F` of it.
+    energy: SVector<T, P>,
+    friction: Friction<T, N>,
+    supply: T,
 }
 
-impl<T: Real, const N: usize, const R: usize> FilteredPower<T, N, R> {
+impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
     /// The scheme at its first state; `tau` is the torque that acts from then on.
-    pub fn new<A: Arm<T, N, P>, const P: usize>(
+    pub fn new<A: Arm<T, N, P>>(
         arm: &A,
         variant: Variant,
+        cutoff: &Cutoff<T>,
         now: &Snapshot<T, N>,
         tau: &SVector<T, N>,
     ) -> Self {
-        let energy = energy_row::<T, A, N, P, R>(arm, now);
-        let power = power_row::<T, A, N, P, R>(arm, &now.dq);
+        let last_energy = arm.energy_regressor(&now.q, &now.dq);
+        let energy = match variant {
+            Variant::Paper => SVector::zeros(),
+            Variant::Exact => last_energy,
+        };
         Self {
-            energy: energy.map(|x| variant.derivative_state(x)),
-            dissipation: power.map(State::from_zero),
-            supplied: State::from_zero(tau.dot(&now.dq)),
+            steps: Steps::new(cutoff),
             last: *now,
+            last_energy,
+            last_supply: tau.dot(&now.dq),
+            energy,
+            friction: Friction::zero(),
+            supply: T::zero(),
         }
     }
 
     /// The row and output at the next state, reached by `passage`; `tau` is the torque that acts from then on.
     #[inline]
-    pub fn update<A: Arm<T, N, P>, const P: usize>(
+    pub fn update<A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
         variant: Variant,
-        cutoff: &Cutoff<T>,
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
         tau: &SVector<T, N>,
     ) -> (SMatrix<T, 1, R>, SVector<T, 1>) {
-        let result = match variant {
-            Variant::Paper => self.paper(arm, cutoff, now, passage.h, tau),
-            Variant::Exact => {
-                (self.exact(arm, cutoff, now, passage.h), self.exact_supply(cutoff, now, passage))
+        let energy = arm.energy_regressor(&now.q, &now.dq);
+        let mut psi = SMatrix::<T, 1, R>::zeros();
+        match variant {
+            Variant::Paper => self.paper::<A, R>(&energy, passage, &mut psi),
+            Variant::Exact => self.exact::<A, R>(arm, &energy, now, passage, &mut psi),
+        }
+        self.friction.write(A::INERTIAL, None, |j, value| {
+            if j < R {
+                psi[j] = value;
             }
-        };
-        self.last = *now;
-        (result.0, SVector::<T, 1>::new(result.1))
+        });
+        (self.last, self.last_energy, self.last_supply) = (*now, energy, tau.dot(&now.dq));
+        (psi, SVector::<T, 1>::new(self.supply))
     }
 
     #[inline]
-    fn paper<A: Arm<T, N, P>, const P: usize>(
+    fn paper<A: Arm<T, N, P>, const R: usize>(
         &mut self,
-        arm: &A,
-        cutoff: &Cutoff<T>,
-        now: &Snapshot<T, N>,
-        h: T,
-        tau: &SVector<T, N>,
-    ) -> (SMatrix<T, 1, R>, T) {
-        let step = cutoff.step(h);
-        let energy = energy_row::<T, A, N, P, R>(arm, now);
-        let power = power_row::<T, A, N, P, R>(arm, &now.dq);
-        let mut psi = SMatrix::zeros();
-        for j in 0..R {
-            psi[j] = self.energy[j].paper_derivative(&step, energy[j])
-                + self.dissipation[j].paper_low(&step, power[j]);
+        energy: &SVector<T, P>,
+        passage: &Passage<T, N>,
+        psi: &mut SMatrix<T, 1, R>,
+    ) {
+        let step = self.steps.whole(passage.h);
+        for j in 0..A::INERTIAL {
+            self.energy[j] = step.paper_derivative(self.energy[j], self.last_energy[j], energy[j]);
+            psi[j] = self.energy[j];
         }
-        (psi, self.supplied.paper_low(&step, tau.dot(&now.dq)))
+        self.friction.hold_powers(&step, &self.last.dq);
+        self.supply = step.held(self.supply, self.last_supply);
     }
 
     #[inline]
-    fn exact<A: Arm<T, N, P>, const P: usize>(
+    fn exact<A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
-        cutoff: &Cutoff<T>,
+        energy: &SVector<T, P>,
         now: &Snapshot<T, N>,
-        h: T,
-    ) -> SMatrix<T, 1, R> {
-        let step = cutoff.step(h);
-        let energy = energy_row::<T, A, N, P, R>(arm, now);
-        let middle = energy_row::<T, A, N, P, R>(arm, &self.last.half_way(now, h));
-        Pieces::of(&self.last.dq, &now.dq).each(
-            |dq| power_row::<T, A, N, P, R>(arm, dq),
-            |start, end, from, to| {
-                let part = step.part(cutoff, h, end - start);
-                for j in 0..R {
-                    self.dissipation[j].low_ramp(&part, from[j], to[j]);
-                }
-            },
-        );
-        let mut psi = SMatrix::zeros();
-        for j in 0..R {
-            let height = middle[j] - (energy[j] + self.energy[j].input) * lit(0.5);
-            psi[j] = self.energy[j].derivative_curved(&step, energy[j], height) + self.dissipation[j].y;
+        passage: &Passage<T, N>,
+        psi: &mut SMatrix<T, 1, R>,
+    ) {
+        let step = self.steps.whole(passage.h);
+        let half_way = self.last.half_way(now, passage.h);
+        let middle = arm.energy_regressor(&half_way.q, &half_way.dq);
+        for j in 0..A::INERTIAL {
+            let height = middle[j] - (energy[j] + self.last_energy[j]) * lit(0.5);
+            self.energy[j] = step.curve(self.energy[j], self.last_energy[j], energy[j], height);
+            psi[j] = (energy[j] - self.energy[j]) * step.lambda;
         }
-        psi
+        self.friction.filter_powers(&step, &self.last.dq, &now.dq);
+        self.supply = self.exact_supply(now, passage);
     }
 
     /// `F` of the power of torques that are held in two parts, velocity linear over the whole.
     #[inline]
-    fn exact_supply(&mut self, cutoff: &Cutoff<T>, now: &Snapshot<T, N>, passage: &Passage<T, N>) -> T {
-        let parts = passage.steps(cutoff);
+    fn exact_supply(&mut self, now: &Snapshot<T, N>, passage: &Passage<T, N>) -> T {
+        let parts = self.steps.parts(passage);
         let from = self.last.dq;
         let middle = from + (now.dq - from) * (passage.split / passage.h);
         let (first, second) = (&passage.first, &passage.second);
-        self.supplied.low_ramp(&parts[0], first.dot(&from), first.dot(&middle));
-        self.supplied.low_ramp(&parts[1], second.dot(&middle), second.dot(&now.dq))
+        let half_way = parts[0].ramp(self.supply, first.dot(&from), first.dot(&middle));
+        parts[1].ramp(half_way, second.dot(&middle), second.dot(&now.dq))
     }
 }

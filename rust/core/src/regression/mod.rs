@@ -8,23 +8,22 @@
 //!
 //! * [`Variant::Paper`]: the filters as printed, and `q(k), dq(k), tau(k)` all of one sample.
 //! * [`Variant::Exact`]: consistent filters, the torque that really acted between two states ([`Passage`]), and Coulomb friction that
-//!   changes sign where the velocity does (`reversal`), not half-way to the next sample.
+//!   changes sign where the velocity does (`friction`), not half-way to the next sample.
 //!
 //! Adding a scheme is one file here and one line in [`Scheme::ALL`].
 
 mod filtered_dynamic;
 mod filtered_power;
-mod reversal;
+mod friction;
 mod supplied_energy;
 
 pub use filtered_dynamic::FilteredDynamic;
 pub use filtered_power::FilteredPower;
 pub use supplied_energy::SuppliedEnergy;
 
-use crate::arm::Arm;
-use crate::filter::{Cutoff, State, Step};
+use crate::filter::{Cutoff, Kept, Step};
 use crate::real::{Real, lit};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
 /// The schemes of the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,25 +91,29 @@ pub struct Passage<T, const N: usize> {
     pub middle: SVector<T, N>,
 }
 
-impl Variant {
-    /// A `D` channel at its first input: the paper's starts at rest, the consistent one in the steady state.
-    #[inline]
-    fn derivative_state<T: Real>(self, input: T) -> State<T> {
-        match self {
-            Self::Paper => State::from_zero(input),
-            Self::Exact => State::steady(input),
-        }
-    }
+/// Coefficients of a passage and of its two parts, kept while they stay as long.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Steps<T> {
+    whole: Kept<T>,
+    first: Kept<T>,
+    second: Kept<T>,
 }
 
-impl<T: Real, const N: usize> Passage<T, N> {
-    /// Coefficients of the two parts.
+impl<T: Real> Steps<T> {
     #[inline]
-    fn steps(&self, cutoff: &Cutoff<T>) -> [Step<T>; 2] {
-        let first = cutoff.step(self.split);
-        let rest = self.h - self.split;
-        let second = if rest == self.split { first } else { cutoff.step(rest) };
-        [first, second]
+    fn new(cutoff: &Cutoff<T>) -> Self {
+        let none = Kept::new(cutoff);
+        Self { whole: none, first: none, second: none }
+    }
+
+    #[inline]
+    fn whole(&mut self, h: T) -> Step<T> {
+        self.whole.step(h)
+    }
+
+    #[inline]
+    fn parts<const N: usize>(&mut self, passage: &Passage<T, N>) -> [Step<T>; 2] {
+        [self.first.step(passage.split), self.second.step(passage.h - passage.split)]
     }
 }
 
@@ -124,69 +127,4 @@ impl<T: Real, const N: usize> Snapshot<T, N> {
             dq: (self.dq + to.dq) * half,
         }
     }
-}
-
-/// Momentum, and gravity with the rest of what is not friction, as rows over all `R` parameters.
-#[inline]
-pub(crate) fn inertial_rows<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
-    arm: &A,
-    now: &Snapshot<T, N>,
-) -> (SMatrix<T, N, R>, SMatrix<T, N, R>) {
-    let momentum = arm.momentum_regressor(&now.q, &now.dq);
-    let potential = arm.potential_regressor(&now.q, &now.dq);
-    (widened::<T, N, P, R>(&momentum), widened::<T, N, P, R>(&potential))
-}
-
-/// Friction as rows over all `R` parameters.
-#[inline]
-pub(crate) fn friction_rows<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
-    arm: &A,
-    dq: &SVector<T, N>,
-) -> SMatrix<T, N, R> {
-    let mut rows = widened::<T, N, P, R>(&arm.friction_regressor(dq));
-    for j in 0..N {
-        if P + j < R {
-            rows[(j, P + j)] = T::one();
-        }
-    }
-    rows
-}
-
-/// Energy as a row over all `R` parameters.
-#[inline]
-pub(crate) fn energy_row<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
-    arm: &A,
-    now: &Snapshot<T, N>,
-) -> SMatrix<T, 1, R> {
-    widened::<T, 1, P, R>(&arm.energy_regressor(&now.q, &now.dq).transpose())
-}
-
-/// Dissipated power as a row over all `R` parameters.
-#[inline]
-pub(crate) fn power_row<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>(
-    arm: &A,
-    dq: &SVector<T, N>,
-) -> SMatrix<T, 1, R> {
-    let mut power = widened::<T, 1, P, R>(&arm.dissipation_regressor(dq).transpose());
-    for j in 0..N {
-        if P + j < R {
-            power[(0, P + j)] = dq[j];
-        }
-    }
-    power
-}
-
-#[inline]
-fn widened<T: Real, const M: usize, const P: usize, const R: usize>(
-    rows: &SMatrix<T, M, P>,
-) -> SMatrix<T, M, R> {
-    let mut wide = SMatrix::zeros();
-    for i in 0..M {
-        for j in 0..P {
-            if j < R {
-                wide[(i, j)] = rows[(i, j)];
-            }
-        }
-    }
-    wide
 }

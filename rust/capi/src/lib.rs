@@ -1,0 +1,23 @@
+//! The online estimator for C and C++.
+//!
+//! This crate only converts: pointers are checked for null and alignment, lengths for the arm's, and everything else is
+//! [`armgap_core::online`]. `include/armgap.h` is made from these files; a test compares them.
+#![cfg_attr(not(feature = "std"), no_std)]
+#![allow(non_camel_case_types)]
+
+mod double;
+mod settings;
+mod simulate;
+mod single;
+mod slot;
+
+pub use double::*;
+pub use settings::*;
+pub use simulate::*;
+pub use single::*;
+
+#[cfg(feature = "freestanding")]
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    loop {}
+}

@@ -1,0 +1,235 @@
+//! What is chosen before the first sample, and what a call may answer.
+
+use armgap_core::arm::Kind;
+use armgap_core::monitor::Watch;
+use armgap_core::online::{Choice, Problem};
+use armgap_core::real::{Real, lit};
+use armgap_core::regression::{Scheme, Variant};
+use armgap_core::rls::Form;
+
+/// What a call answers.
+#[repr(i32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum armgap_status {
+    /// Done; an update has moved the estimate.
+    ARMGAP_OK = 0,
+    /// The sample was taken; there are not enough samples for an estimate yet.
+    ARMGAP_STARTING = 1,
+    /// The sample was not used: not finite, of impossible size, or not later than the last one. The estimate has not changed.
+    ARMGAP_REJECTED = 2,
+    /// A pointer is null.
+    ARMGAP_NULL = -1,
+    /// A pointer is not aligned for its type.
+    ARMGAP_UNALIGNED = -2,
+    /// An array has another length than the arm needs.
+    ARMGAP_LENGTH = -3,
+    /// A setting or a number is not finite or outside its range.
+    ARMGAP_RANGE = -4,
+    /// The estimator was never started, or its memory was overwritten.
+    ARMGAP_NOT_STARTED = -5,
+    /// The caller was compiled with another version of the header.
+    ARMGAP_VERSION = -6,
+}
+
+/// Kinds of arm.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum armgap_arm {
+    /// One linear joint: moving mass, weight along the axis, viscous, Coulomb.
+    ARMGAP_AXIS = 0,
+    /// One rotary joint under gravity: inertia, gravity torque, viscous, Coulomb.
+    ARMGAP_PENDULUM = 1,
+    /// The vertical two-link arm of Reyes and Kelly (1997): theta1 to theta5, viscous 1 and 2, Coulomb 1 and 2.
+    ARMGAP_TWO_LINK = 2,
+}
+
+/// Regression models.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum armgap_scheme {
+    /// Equation (24): filtered torques, one error per joint.
+    ARMGAP_FILTERED_DYNAMIC = 0,
+    /// Equation (28): supplied energy.
+    ARMGAP_SUPPLIED_ENERGY = 1,
+    /// Equation (30): filtered power.
+    ARMGAP_FILTERED_POWER = 2,
+}
+
+/// Filters.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum armgap_filters {
+    /// Consistent with each other and with held torques.
+    ARMGAP_EXACT = 0,
+    /// As printed in the paper.
+    ARMGAP_PAPER = 1,
+}
+
+/// How the covariance is kept.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum armgap_form {
+    /// Plain in double precision, factorized in single precision.
+    ARMGAP_DEFAULT_FORM = 0,
+    /// Equation (21) as printed.
+    ARMGAP_PLAIN = 1,
+    /// U D U'.
+    ARMGAP_FACTORIZED = 2,
+}
+
+/// Settings; `armgap_settings_default` fills them.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct armgap_settings {
+    /// An `armgap_arm`.
+    pub arm: u32,
+    /// An `armgap_scheme`.
+    pub scheme: u32,
+    /// An `armgap_filters`.
+    pub filters: u32,
+    /// An `armgap_form`.
+    pub form: u32,
+    /// Whether one constant torque per joint is estimated too, after all other parameters: 0 or 1.
+    pub asymmetry: u32,
+    /// Samples used before the alarm begins to learn.
+    pub settling: u32,
+    /// Samples from which the alarm learns the errors' sizes, at least 2.
+    pub learning: u32,
+    /// Not used; 0.
+    pub reserved: u32,
+    /// Cut-off of the filters, rad/s.
+    pub cutoff: f64,
+    /// Forgetting factor, above 0 and at most 1.
+    pub forgetting: f64,
+    /// Initial covariance, times the unit matrix; forgetting lifts no variance above it.
+    pub p0: f64,
+    /// Samples over which spread and excitation are averaged, at least 1.
+    pub memory: f64,
+    /// Mean samples between false alarms, at least 10.
+    pub between: f64,
+    /// Smallest standard deviation of an error that matters, in the error's unit.
+    pub floor: f64,
+}
+
+/// What an estimator says about itself.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct armgap_report {
+    /// Samples used.
+    pub updates: u64,
+    /// Samples rejected.
+    pub rejected: u64,
+    /// Near 1 while the motion excites every parameter, near 0 while it teaches nothing new.
+    pub excitation: f64,
+    /// Above 1 the model no longer explains the arm.
+    pub alarm: f64,
+    /// Parameters that are estimated.
+    pub parameters: u32,
+    /// Prediction errors per sample.
+    pub outputs: u32,
+}
+
+impl armgap_settings {
+    /// The defaults for a kind of arm.
+    pub(crate) fn of(kind: Kind) -> Self {
+        let choice = Choice::<f64>::new(kind);
+        Self {
+            arm: kind as u32,
+            scheme: choice.scheme as u32,
+            filters: armgap_filters::ARMGAP_EXACT as u32,
+            form: armgap_form::ARMGAP_DEFAULT_FORM as u32,
+            asymmetry: 0,
+            settling: choice.watch.settling,
+            learning: choice.watch.learning,
+            reserved: 0,
+            cutoff: choice.cutoff,
+            forgetting: choice.forgetting,
+            p0: choice.p0,
+            memory: choice.watch.memory,
+            between: choice.watch.between,
+            floor: choice.watch.floor,
+        }
+    }
+
+    /// The settings as the core takes them.
+    pub(crate) fn choice<T: Real>(&self) -> Option<Choice<T>> {
+        let kind = kind_of(self.arm)?;
+        Some(Choice {
+            kind,
+            scheme: *Scheme::ALL.get(self.scheme as usize)?,
+            variant: *[Variant::Exact, Variant::Paper].get(self.filters as usize)?,
+            form: *[Form::default_for::<T>(), Form::Plain, Form::Factorized].get(self.form as usize)?,
+            asymmetry: *[false, true].get(self.asymmetry as usize)?,
+            cutoff: lit(self.cutoff),
+            forgetting: lit(self.forgetting),
+            p0: lit(self.p0),
+            watch: Watch {
+                memory: lit(self.memory),
+                settling: self.settling,
+                learning: self.learning,
+                between: lit(self.between),
+                floor: lit(self.floor),
+            },
+        })
+    }
+}
+
+/// A kind of arm by its number.
+pub(crate) fn kind_of(arm: u32) -> Option<Kind> {
+    Kind::ALL.get(arm as usize).copied()
+}
+
+/// What the core's complaint is in C.
+pub(crate) fn status_of(problem: Problem) -> armgap_status {
+    match problem {
+        Problem::Range(_) => armgap_status::ARMGAP_RANGE,
+        Problem::Length { .. } => armgap_status::ARMGAP_LENGTH,
+    }
+}
+
+/// Fills `settings` with the defaults for an `armgap_arm`: filtered power, exact filters at 50 rad/s, no forgetting.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armgap_settings_default(settings: *mut armgap_settings, arm: u32) -> armgap_status {
+    if settings.is_null() {
+        return armgap_status::ARMGAP_NULL;
+    }
+    if !settings.is_aligned() {
+        return armgap_status::ARMGAP_UNALIGNED;
+    }
+    let Some(kind) = kind_of(arm) else {
+        return armgap_status::ARMGAP_RANGE;
+    };
+    // SAFETY: not null, aligned; that it points to the caller's settings is the caller's promise.
+    unsafe { settings.write(armgap_settings::of(kind)) };
+    armgap_status::ARMGAP_OK
+}
+
+/// Number of joints of an `armgap_arm`; 0 for no known one.
+#[unsafe(no_mangle)]
+pub extern "C" fn armgap_joints(arm: u32) -> usize {
+    kind_of(arm).map_or(0, Kind::joints)
+}
+
+/// Number of parameters of an `armgap_arm` without asymmetries; 0 for no known one.
+#[unsafe(no_mangle)]
+pub extern "C" fn armgap_parameters(arm: u32) -> usize {
+    kind_of(arm).map_or(0, |kind| kind.parameters().len())
+}
+
+/// One line about an `armgap_status`, never null.
+#[unsafe(no_mangle)]
+pub extern "C" fn armgap_message(status: i32) -> *const core::ffi::c_char {
+    let text = match status {
+        0 => c"done",
+        1 => c"the sample was taken; there are not enough samples for an estimate yet",
+        2 => c"the sample was not used: not finite, of impossible size, or not later than the last one",
+        -1 => c"a pointer is null",
+        -2 => c"a pointer is not aligned for its type",
+        -3 => c"an array has another length than the arm needs",
+        -4 => c"a setting or a number is not finite or outside its range",
+        -5 => c"the estimator was never started, or its memory was overwritten",
+        -6 => c"the caller was compiled with another version of armgap.h",
+        _ => c"no armgap_status",
+    };
+    text.as_ptr()
+}

@@ -1,0 +1,159 @@
+//! What an estimator that runs on its own has to say about itself: how large its errors are, whether the motion still teaches it
+//! anything, and whether the model has stopped explaining the arm.
+//!
+//! **Spread.** Mean square of each prediction error over the last `memory` samples; with the diagonal of `P` it gives standard deviations.
+//!
+//! **Excitation.** The leverage of a sample, averaged over `memory` samples, as a share of what an equally exciting sample would have at
+//! this age: near 1 while every parameter keeps being excited, near 0 while the arm rests or repeats what is known.
+//!
+//! **Alarm.** A cumulative sum test (Page 1954) on the normalised error. While learning, the variance of each error and its correlation
+//! from one sample to the next are measured; afterwards `u = (e - rho e_last)/sigma` is tested for a standard deviation that has grown
+//! by half against an unchanged one:
+//!
+//! ```text
+//! S <- max(0, S + min(u^2, 25) (1 - 1/r^2)/2 - ln r),  r = 1.5;      alarm while S > ln(n between)
+//! ```
+//!
+//! The mean number of samples between false alarms is at least `between` if the `n` errors stay Gaussian with the variance that was
+//! learned (Lorden 1971: the increments are at most a log-likelihood ratio; the cut at 25 makes them smaller, so that single
+//! outliers raise no alarm). The errors of the filtered dynamic model are torques and meet that best; those of the energy and power models
+//! grow with the speed and must be learned on motion as fast as what follows.
+
+use crate::real::{Real, lit};
+use nalgebra::SVector;
+
+/// Growth of the standard deviation that the alarm looks for.
+const GROWTH: f64 = 1.5;
+/// Largest squared error in units of its variance.
+const OUTLIER: f64 = 25.0;
+
+/// Settings of a monitor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Watch<T> {
+    /// Samples over which spread and excitation are averaged.
+    pub memory: T,
+    /// Samples used before learning begins, while estimate and filters settle.
+    pub settling: u32,
+    /// Samples over which the errors' variances and correlations are learned; no alarm before.
+    pub learning: u32,
+    /// Mean samples between false alarms.
+    pub between: T,
+    /// Least standard deviation of an error, in its unit: smaller ones are not worth an alarm.
+    pub floor: T,
+}
+
+impl<T: Real> Default for Watch<T> {
+    /// For a period of some milliseconds: a second of memory, one of settling, four of learning, a false alarm in a million samples.
+    fn default() -> Self {
+        Self { memory: lit(400.0), settling: 400, learning: 1600, between: lit(1e6), floor: T::zero() }
+    }
+}
+
+/// State of a monitor of `N` errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Monitor<T, const N: usize> {
+    watch: Watch<T>,
+    samples: u32,
+    mean_square: SVector<T, N>,
+    excitation: T,
+    last: SVector<T, N>,
+    square: SVector<T, N>,
+    product: SVector<T, N>,
+    correlation: SVector<T, N>,
+    inverse_sigma: SVector<T, N>,
+    sum: SVector<T, N>,
+    limit: T,
+}
+
+impl<T: Real, const N: usize> Monitor<T, N> {
+    /// A monitor that has seen nothing yet.
+    pub fn new(watch: Watch<T>) -> Self {
+        let zero = SVector::zeros();
+        Self {
+            watch,
+            samples: 0,
+            mean_square: zero,
+            excitation: T::zero(),
+            last: zero,
+            square: zero,
+            product: zero,
+            correlation: zero,
+            inverse_sigma: zero,
+            sum: zero,
+            limit: (watch.between * lit(N as f64)).ln(),
+        }
+    }
+
+    /// Takes the errors of a sample that was used, its leverage, and the number of `parameters` with the memory of the estimate.
+    #[inline]
+    pub fn update(&mut self, error: &SVector<T, N>, leverage: T, parameters: usize, age: T) {
+        self.samples = self.samples.saturating_add(1);
+        let weight = T::one() / self.watch.memory.min(lit(f64::from(self.samples))).max(T::one());
+        for j in 0..N {
+            let change = error[j] * error[j] - self.mean_square[j];
+            self.mean_square[j] += change * weight;
+        }
+        let share = leverage * age / lit(parameters as f64);
+        self.excitation += (share - self.excitation) * weight;
+        let learned = self.watch.settling.saturating_add(self.watch.learning);
+        if self.samples > learned {
+            self.test(error);
+        } else if self.samples > self.watch.settling {
+            self.learn(error, self.samples == learned);
+        }
+        self.last = *error;
+    }
+
+    #[inline]
+    fn learn(&mut self, error: &SVector<T, N>, finished: bool) {
+        for j in 0..N {
+            self.square[j] += error[j] * error[j];
+            self.product[j] += error[j] * self.last[j];
+        }
+        if !finished {
+            return;
+        }
+        let most: T = lit(0.999);
+        for j in 0..N {
+            let variance = self.square[j] / lit(f64::from(self.watch.learning.max(1)));
+            let ratio = self.product[j] / self.square[j];
+            let rho = if ratio.is_finite() { ratio.max(-most).min(most) } else { T::zero() };
+            let floor = self.watch.floor.max(lit(1e-15));
+            self.correlation[j] = rho;
+            self.inverse_sigma[j] = T::one() / (variance * (T::one() - rho * rho)).sqrt().max(floor);
+        }
+    }
+
+    #[inline]
+    fn test(&mut self, error: &SVector<T, N>) {
+        let gain: T = lit(0.5 * (1.0 - 1.0 / (GROWTH * GROWTH)));
+        // ln 1.5
+        let toll: T = lit(0.405_465_108_108_164_4);
+        for j in 0..N {
+            let u = (error[j] - self.correlation[j] * self.last[j]) * self.inverse_sigma[j];
+            let step = (u * u).min(lit(OUTLIER)) * gain - toll;
+            // Twice the limit is far enough: so an alarm ends soon after its cause.
+            self.sum[j] = (self.sum[j] + step).max(T::zero()).min(self.limit + self.limit);
+        }
+    }
+
+    /// Mean square of each error over the memory.
+    pub fn mean_square(&self) -> &SVector<T, N> {
+        &self.mean_square
+    }
+
+    /// Share of a full excitation, from 0 to about 1.
+    pub fn excitation(&self) -> T {
+        self.excitation
+    }
+
+    /// Which errors no longer look like those that were learned.
+    pub fn alarms(&self) -> [bool; N] {
+        core::array::from_fn(|j| self.sum[j] > self.limit)
+    }
+
+    /// Largest cumulative sum as a share of its limit; above 1 there is an alarm.
+    pub fn alarm_level(&self) -> T {
+        self.sum.iter().fold(T::zero(), |most, sum| most.max(*sum)) / self.limit
+    }
+}

@@ -1,0 +1,228 @@
+//! Filters of friction over an interval in which joints may turn round.
+//!
+//! A sampled `sgn(dq)` says only that the sign changed somewhere between two samples. Taken as a ramp it is wrong by up to half a period
+//! at every reversal, and a regressor with such an error draws its coefficient towards zero. With the velocity linear between states
+//! the reversal has a place, a share `c` of the interval, and everything has a closed form. With `x = lambda h`, `a = exp(-x)`,
+//! `E = exp(-x (1 - c))` (1 without a reversal), `s` the sign at the start and `Delta` the change of velocity:
+//!
+//! ```text
+//! F[sgn dq]  <-  a y + G,                                 G = s (2 E - 1 - a)
+//! F[|dq|]    <-  a y + |dq_to| - a |dq_from| - G Delta/x
+//! F[dq^2]    <-  a y + the parabola's filter, middle Delta^2/4 below the chord
+//! ```
+//!
+//! Friction here is the law of every arm, `f_j = b_j dq_j + fc_j sgn dq_j` ([`crate::arm`]), with one constant torque per joint where
+//! the asymmetry is estimated too.
+
+use crate::filter::Step;
+use crate::real::{Real, lit, sgn};
+use nalgebra::SVector;
+
+/// What a velocity does between two states.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Swing<T> {
+    from: T,
+    to: T,
+    /// Sign at the start.
+    sign: T,
+    /// Whether the sign changes.
+    turns: bool,
+}
+
+impl<T: Real> Swing<T> {
+    /// From one velocity to another, linear in between.
+    #[inline]
+    pub(super) fn new(from: T, to: T) -> Self {
+        let turns = (from > T::zero() && to < T::zero()) || (from < T::zero() && to > T::zero());
+        let sign = if turns { sgn(from) } else { sgn(from + to) };
+        Self { from, to, sign, turns }
+    }
+
+    /// `G`, what the sign adds to its filter.
+    #[inline]
+    pub(super) fn sign(&self, step: &Step<T>) -> T {
+        let mut end = T::one();
+        if self.turns {
+            // Share of the interval after the reversal.
+            end = (-step.x * (self.to / (self.to - self.from))).exp();
+        }
+        self.sign * (end + end - T::one() - step.decay)
+    }
+
+    /// `F` of the speed.
+    #[inline]
+    pub(super) fn speed(&self, step: &Step<T>, y: T) -> T {
+        if !self.turns {
+            return step.ramp(y, self.from.abs(), self.to.abs());
+        }
+        let slope = (self.to - self.from) / step.x;
+        step.decay * (y - self.from.abs()) + self.to.abs() - slope * self.sign(step)
+    }
+
+    /// `F` of the squared velocity.
+    #[inline]
+    pub(super) fn square(&self, step: &Step<T>, y: T) -> T {
+        let change = self.to - self.from;
+        step.curve(y, self.from * self.from, self.to * self.to, change * change * lit(-0.25))
+    }
+
+    /// Integral of the speed over an interval of unit length.
+    #[inline]
+    pub(super) fn distance(&self) -> T {
+        let (from, to) = (self.from.abs(), self.to.abs());
+        let total = from + to;
+        let mean = if self.turns { (from * from + to * to) / total } else { total };
+        mean * lit(0.5)
+    }
+
+    /// Integral of the squared velocity over an interval of unit length.
+    #[inline]
+    pub(super) fn distance_squared(&self) -> T {
+        (self.from * (self.from + self.to) + self.to * self.to) * lit(1.0 / 3.0)
+    }
+}
+
+/// One entry per joint for each of viscous, Coulomb and constant friction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Friction<T, const N: usize> {
+    pub(super) viscous: SVector<T, N>,
+    pub(super) coulomb: SVector<T, N>,
+    pub(super) constant: SVector<T, N>,
+}
+
+impl<T: Real, const N: usize> Friction<T, N> {
+    /// Filters that start at rest.
+    #[inline]
+    pub(super) fn zero() -> Self {
+        Self { viscous: SVector::zeros(), coulomb: SVector::zeros(), constant: SVector::zeros() }
+    }
+
+    /// Torques at a velocity, the paper's filter over them as held.
+    #[inline]
+    pub(super) fn hold_torques(&mut self, step: &Step<T>, dq: &SVector<T, N>) {
+        for j in 0..N {
+            self.viscous[j] = step.held(self.viscous[j], dq[j]);
+            self.coulomb[j] = step.held(self.coulomb[j], sgn(dq[j]));
+            self.constant[j] = step.held(self.constant[j], T::one());
+        }
+    }
+
+    /// Torques over a swing.
+    #[inline]
+    pub(super) fn filter_torques(&mut self, step: &Step<T>, from: &SVector<T, N>, to: &SVector<T, N>) {
+        for j in 0..N {
+            let swing = Swing::new(from[j], to[j]);
+            self.viscous[j] = step.ramp(self.viscous[j], from[j], to[j]);
+            self.coulomb[j] = step.decay * self.coulomb[j] + swing.sign(step);
+            self.constant[j] = step.held(self.constant[j], T::one());
+        }
+    }
+
+    /// Dissipated powers at a velocity, the paper's filter over them as held.
+    #[inline]
+    pub(super) fn hold_powers(&mut self, step: &Step<T>, dq: &SVector<T, N>) {
+        for j in 0..N {
+            self.viscous[j] = step.held(self.viscous[j], dq[j] * dq[j]);
+            self.coulomb[j] = step.held(self.coulomb[j], dq[j].abs());
+            self.constant[j] = step.held(self.constant[j], dq[j]);
+        }
+    }
+
+    /// Dissipated powers over a swing.
+    #[inline]
+    pub(super) fn filter_powers(&mut self, step: &Step<T>, from: &SVector<T, N>, to: &SVector<T, N>) {
+        for j in 0..N {
+            let swing = Swing::new(from[j], to[j]);
+            self.viscous[j] = swing.square(step, self.viscous[j]);
+            self.coulomb[j] = swing.speed(step, self.coulomb[j]);
+            self.constant[j] = step.ramp(self.constant[j], from[j], to[j]);
+        }
+    }
+
+    /// Dissipated energies of a swing of `h` seconds by the trapezoidal rule, as in the paper.
+    #[inline]
+    pub(super) fn add_trapezes(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
+        let half = h * lit(0.5);
+        for j in 0..N {
+            self.viscous[j] += (from[j] * from[j] + to[j] * to[j]) * half;
+            self.coulomb[j] += (from[j].abs() + to[j].abs()) * half;
+            self.constant[j] += (from[j] + to[j]) * half;
+        }
+    }
+
+    /// Dissipated energies of a swing of `h` seconds.
+    #[inline]
+    pub(super) fn add_energies(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
+        for j in 0..N {
+            let swing = Swing::new(from[j], to[j]);
+            self.viscous[j] += h * swing.distance_squared();
+            self.coulomb[j] += h * swing.distance();
+            self.constant[j] += h * lit(0.5) * (from[j] + to[j]);
+        }
+    }
+
+    /// The entries of a row over the `R` parameters of which the first `inertial` are not friction: joint `j`'s only, or all.
+    #[inline]
+    pub(super) fn write(&self, inertial: usize, only: Option<usize>, mut put: impl FnMut(usize, T)) {
+        for j in 0..N {
+            if only.is_none_or(|joint| joint == j) {
+                put(inertial + j, self.viscous[j]);
+                put(inertial + N + j, self.coulomb[j]);
+                put(inertial + 2 * N + j, self.constant[j]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::filter::Cutoff;
+
+    const STEP: f64 = 0.0025;
+    const PIECES: u32 = 200_000;
+
+    /// `F` of a function of the velocity, in very small pieces.
+    fn numeric(lambda: f64, y: f64, (from, to): (f64, f64), of: impl Fn(f64) -> f64) -> f64 {
+        let step = Cutoff { rad_per_s: lambda }.step(STEP / f64::from(PIECES));
+        (0..PIECES).fold(y, |y, k| {
+            let share = (f64::from(k) + 0.5) / f64::from(PIECES);
+            step.held(y, of(from + (to - from) * share))
+        })
+    }
+
+    #[test]
+    fn closed_forms_are_the_filters_of_the_swing() {
+        for lambda in [5.0, 50.0, 900.0] {
+            let step = Cutoff { rad_per_s: lambda }.step(STEP);
+            for (from, to) in [(0.3, 1.1), (-1.0, 3.0), (1.0, -0.01), (0.0, 0.4), (-0.4, 0.0), (0.0, 0.0)] {
+                let (swing, y) = (Swing::new(from, to), 0.7);
+                let close = |a: f64, of: fn(f64) -> f64| {
+                    let b = numeric(lambda, y, (from, to), of);
+                    assert!((a - b).abs() < 2e-5, "{lambda} rad/s, {from} to {to}: {a} and {b}");
+                };
+                close(step.decay * y + swing.sign(&step), sgn);
+                close(swing.speed(&step, y), f64::abs);
+                close(swing.square(&step, y), |v| v * v);
+            }
+        }
+    }
+
+    #[test]
+    fn distances_are_integrals() {
+        for (from, to) in [(0.3_f64, 1.1), (-1.0, 3.0), (1.0, -0.01), (0.0, 0.4)] {
+            let at = |k: u32| from + (to - from) * (f64::from(k) + 0.5) / f64::from(PIECES);
+            let mean = |of: fn(f64) -> f64| (0..PIECES).map(|k| of(at(k))).sum::<f64>() / f64::from(PIECES);
+            let swing = Swing::new(from, to);
+            assert!((swing.distance() - mean(f64::abs)).abs() < 1e-9);
+            assert!((swing.distance_squared() - mean(|v| v * v)).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_start_from_rest_already_has_its_sign() {
+        assert_eq!(Swing::new(0.0, 0.1).sign, 1.0);
+        assert_eq!(Swing::new(-0.1, 0.0).sign, -1.0);
+        assert_eq!(Swing::new(0.0, 0.0).sign, 0.0);
+    }
+}

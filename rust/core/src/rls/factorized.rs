@@ -1,0 +1,190 @@
+//! `P` as `U D U'`, `U` unit upper triangular and `D` diagonal, updated row by row of `Psi'`.
+//!
+//! Bierman 1977, *Factorization methods for discrete sequential estimation*, chapter V, with everything that does not depend on the
+//! column before it taken out of the loop over columns: with `f = U' psi`, `v = D f` and `alpha_j = mu + sum_(k < j) f_k v_k`,
+//!
+//! ```text
+//! d_j  <- d_j alpha_j / alpha_(j+1)
+//! u_ij <- u_ij - k_i f_j / alpha_j,    k_i <- k_i + u_ij v_j       column by column, k_i = v_i at first
+//! ```
+//!
+//! Each entry of `D` is multiplied by a positive number, so `P` is symmetric and positive definite whatever the rounding. With entries
+//! of `psi` within bounds nothing overflows: `k_i^2 <= P_ii psi' P psi`, and `u_ij^2 <= P_ii / d_j`.
+
+use super::lanes::{LANES, all_within, dot, lead};
+use super::{Forgetting, is_double, largest};
+use crate::real::{Real, lit};
+use nalgebra::SMatrix;
+
+/// The factors; `u` column by column with ones on the diagonal and zeros below.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Factorized<T, const R: usize> {
+    u: [[T; R]; R],
+    d: [T; R],
+}
+
+impl<T: Real, const R: usize> Factorized<T, R> {
+    pub(super) fn of(p: &SMatrix<T, R, R>) -> Self {
+        let mut p = *p;
+        let mut u = [[T::zero(); R]; R];
+        let mut d = [T::zero(); R];
+        for j in (0..R).rev() {
+            d[j] = p[(j, j)];
+            u[j][j] = T::one();
+            for i in 0..j {
+                u[j][i] = p[(i, j)] / d[j];
+            }
+            for k in 0..j {
+                for i in 0..=k {
+                    let step = u[j][i] * d[j] * u[j][k];
+                    p[(i, k)] -= step;
+                }
+            }
+        }
+        Self { u, d }
+    }
+
+    pub(super) fn matrix(&self) -> SMatrix<T, R, R> {
+        let mut p = SMatrix::zeros();
+        for j in 0..R {
+            for i in 0..=j {
+                let mut sum = T::zero();
+                for k in j..R {
+                    sum += self.u[k][i] * self.d[k] * self.u[k][j];
+                }
+                p[(i, j)] = sum;
+                p[(j, i)] = sum;
+            }
+        }
+        p
+    }
+
+    pub(super) fn diagonal(&self) -> [T; R] {
+        let mut sums = [T::zero(); R];
+        for k in 0..R {
+            for i in 0..=k {
+                sums[i] += self.u[k][i] * self.u[k][i] * self.d[k];
+            }
+        }
+        sums
+    }
+
+    /// Learns from rows of `Psi'` and their errors; the leverage, or nothing changed because the rows are of impossible size.
+    #[inline(always)]
+    pub(super) fn learn<const M: usize>(
+        &mut self,
+        theta: &mut [T; R],
+        rows: &[[T; R]; M],
+        error: &[T; M],
+        forgetting: &Forgetting<T, R>,
+    ) -> Option<T> {
+        let mut within = true;
+        for row in rows {
+            within &= all_within(row, largest());
+        }
+        if !within {
+            return None;
+        }
+        let mut moved = [T::zero(); R];
+        let mut leverage = T::zero();
+        for m in 0..M {
+            // What the rows before have already explained.
+            let left = if m == 0 { error[m] } else { error[m] - dot(&moved, &rows[m]) };
+            leverage += self.row(&mut moved, &rows[m], left, forgetting.mu);
+        }
+        for i in 0..R {
+            theta[i] += moved[i];
+        }
+        if forgetting.mu < T::one() {
+            self.forget(forgetting);
+        }
+        Some(leverage)
+    }
+
+    /// One row: moves the estimate, and returns the leverage.
+    #[inline(always)]
+    fn row(&mut self, moved: &mut [T; R], psi: &[T; R], error: T, mu: T) -> T {
+        let mut f = [T::zero(); R];
+        for j in 0..R {
+            f[j] = self.dot(j, psi);
+        }
+        let (mut v, mut before, mut inverse) = ([T::zero(); R], [T::zero(); R], [T::zero(); R]);
+        let mut total = mu;
+        for j in 0..R {
+            v[j] = self.d[j] * f[j];
+            before[j] = total;
+            total += f[j] * v[j];
+        }
+        for j in 0..R {
+            inverse[j] = T::one() / before[j];
+        }
+        let last = T::one() / total;
+        for j in 0..R {
+            let shrunk = self.d[j] * before[j] * if j + 1 < R { inverse[j + 1] } else { last };
+            self.d[j] = shrunk.max(least());
+        }
+        let mut gain = [T::zero(); R];
+        for j in 0..R {
+            let factor = f[j] * inverse[j];
+            for i in 0..j {
+                let old = self.u[j][i];
+                self.u[j][i] = old - gain[i] * factor;
+                gain[i] += old * v[j];
+            }
+            gain[j] = v[j];
+        }
+        let rate = error * last;
+        for i in 0..R {
+            moved[i] += gain[i] * rate;
+        }
+        T::one() - mu * last
+    }
+
+    /// Entry `j` of `U' psi`.
+    #[inline(always)]
+    fn dot(&self, j: usize, psi: &[T; R]) -> T {
+        let column = &self.u[j];
+        let mut sums = [T::zero(); LANES];
+        for c in 0..lanes_of::<R>(j) {
+            for l in 0..LANES {
+                let i = c * LANES + l;
+                sums[l] += column[i] * psi[i];
+            }
+        }
+        let mut rest = T::zero();
+        if j >= lead::<R>() {
+            for i in lead::<R>()..R {
+                rest += column[i] * psi[i];
+            }
+        }
+        (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
+    }
+
+    fn forget(&mut self, forgetting: &Forgetting<T, R>) {
+        let (lift, limited) = forgetting.lift(&self.diagonal());
+        if !limited {
+            for d in &mut self.d {
+                *d /= forgetting.mu;
+            }
+            return;
+        }
+        for j in 0..R {
+            for i in 0..j {
+                self.u[j][i] *= lift[i] / lift[j];
+            }
+            self.d[j] *= lift[j] * lift[j];
+        }
+    }
+}
+
+/// Whole lanes that hold entries `0..=j` of a column.
+#[inline(always)]
+const fn lanes_of<const R: usize>(j: usize) -> usize {
+    if j < lead::<R>() { j / LANES + 1 } else { R / LANES }
+}
+
+/// Smallest entry of `D`: a variance of no arm, which keeps `U` finite.
+#[inline]
+fn least<T: Real>() -> T {
+    if is_double::<T>() { lit(1e-100) } else { lit(1e-20) }
+}

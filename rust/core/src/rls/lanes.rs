@@ -1,0 +1,42 @@
+//! Sums and products of small vectors, four entries at a time.
+//!
+//! Written so that a compiler finds vector instructions for entries that lie side by side; of `R` entries the first multiple of four are
+//! the `lead`, the rest the tail.
+
+use crate::real::Real;
+
+/// Entries taken together.
+pub(super) const LANES: usize = 4;
+
+/// How many of `R` entries fill whole lanes.
+#[inline(always)]
+pub(super) const fn lead<const R: usize>() -> usize {
+    R / LANES * LANES
+}
+
+/// `a . b`.
+#[inline(always)]
+pub(super) fn dot<T: Real, const R: usize>(a: &[T; R], b: &[T; R]) -> T {
+    let ((a_lead, a_tail), (b_lead, b_tail)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    let mut sums = [T::zero(); LANES];
+    for (x, y) in a_lead.iter().zip(b_lead) {
+        for l in 0..LANES {
+            sums[l] += x[l] * y[l];
+        }
+    }
+    let mut rest = T::zero();
+    for (x, y) in a_tail.iter().zip(b_tail) {
+        rest += *x * *y;
+    }
+    (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
+}
+
+/// Whether every entry is a number of at most this size.
+#[inline(always)]
+pub(super) fn all_within<T: Real, const R: usize>(a: &[T; R], limit: T) -> bool {
+    let mut all = true;
+    for x in a {
+        all &= x.abs() <= limit;
+    }
+    all
+}

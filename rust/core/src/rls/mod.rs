@@ -1,0 +1,215 @@
+//! Recursive least squares, equations (20) to (22), for scalar and vector errors, with forgetting.
+//!
+//! ```text
+//! e = y - Psi' theta
+//! theta <- theta + P Psi (mu I + Psi' P Psi)^-1 e
+//! P     <- (P - P Psi (mu I + Psi' P Psi)^-1 Psi' P) / mu
+//! ```
+//!
+//! `P` is kept in one of two forms ([`Form`]), with the same result up to rounding. With forgetting, what is not excited grows by
+//! `1/mu` per sample, which ends in numbers without meaning while the arm rests; so no variance grows beyond a limit, at first that of
+//! `P(0)`: rows and columns are divided by `sqrt(mu)` or by less, which keeps `P` positive definite.
+
+mod factorized;
+mod lanes;
+mod plain;
+
+use crate::real::{Real, lit};
+use factorized::Factorized;
+use nalgebra::{SMatrix, SVector};
+use plain::Plain;
+
+/// How `P` is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Equation (21) as printed, rounded symmetrically. Positive definite as long as `psi' P psi` stays far below the reciprocal of the
+    /// rounding unit: in double precision for any arm, in single precision not.
+    Plain,
+    /// `U D U'`: positive definite whatever the rounding.
+    Factorized,
+}
+
+impl Form {
+    /// Plain in double precision, factorized in single precision.
+    #[inline]
+    pub fn default_for<T: Real>() -> Self {
+        if is_double::<T>() { Self::Plain } else { Self::Factorized }
+    }
+}
+
+/// Estimate and covariance of `R` parameters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rls<T: Real, const R: usize> {
+    theta: SVector<T, R>,
+    covariance: Covariance<T, R>,
+    forgetting: Forgetting<T, R>,
+    leverage: T,
+    updates: u64,
+    rejected: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Covariance<T: Real, const R: usize> {
+    Plain(Plain<T, R>),
+    Factorized(Factorized<T, R>),
+}
+
+/// Forgetting factor, and the variances that it does not lift.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Forgetting<T: Real, const R: usize> {
+    mu: T,
+    limit: [T; R],
+}
+
+/// What an update did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Update<T, const M: usize> {
+    /// The sample was used; its prediction error before the update.
+    Used(SVector<T, M>),
+    /// The sample is not finite, of impossible size, or would leave `P` indefinite; nothing has changed but the count.
+    Rejected,
+}
+
+impl<T: Real, const R: usize> Rls<T, R> {
+    /// `theta(0)`, `P(0) = p0 I`, and the forgetting factor `mu` in `(0, 1]`.
+    pub fn new(theta0: SVector<T, R>, p0: T, forgetting: T) -> Self {
+        Self::with_covariance(theta0, SMatrix::identity() * p0, forgetting)
+    }
+
+    /// The same with a full positive definite `P(0)`, of which the upper triangle counts.
+    pub fn with_covariance(theta0: SVector<T, R>, p0: SMatrix<T, R, R>, forgetting: T) -> Self {
+        Self {
+            theta: theta0,
+            covariance: Covariance::of(&p0, Form::default_for::<T>()),
+            forgetting: Forgetting { mu: forgetting, limit: p0.diagonal().into() },
+            leverage: T::zero(),
+            updates: 0,
+            rejected: 0,
+        }
+    }
+
+    /// The same with `P` kept in another form.
+    pub fn with_form(mut self, form: Form) -> Self {
+        self.covariance = Covariance::of(&self.covariance(), form);
+        self
+    }
+
+    /// The same with other variances beyond which forgetting lifts none.
+    pub fn with_limit(mut self, limit: SVector<T, R>) -> Self {
+        self.forgetting.limit = limit.into();
+        self
+    }
+
+    /// Estimate.
+    #[inline]
+    pub fn theta(&self) -> &SVector<T, R> {
+        &self.theta
+    }
+
+    /// Covariance `P` for an error of unit variance.
+    pub fn covariance(&self) -> SMatrix<T, R, R> {
+        match &self.covariance {
+            Covariance::Plain(p) => p.matrix(),
+            Covariance::Factorized(p) => p.matrix(),
+        }
+    }
+
+    /// Diagonal of `P`.
+    pub fn variances(&self) -> SVector<T, R> {
+        match &self.covariance {
+            Covariance::Plain(p) => p.diagonal().into(),
+            Covariance::Factorized(p) => p.diagonal().into(),
+        }
+    }
+
+    /// How `P` is kept.
+    pub fn form(&self) -> Form {
+        match &self.covariance {
+            Covariance::Plain(_) => Form::Plain,
+            Covariance::Factorized(_) => Form::Factorized,
+        }
+    }
+
+    /// Leverage of the last sample used: the sum over its errors of `psi' P psi / (mu + psi' P psi)`, each in `[0, 1)`.
+    ///
+    /// Summed over a life without forgetting it comes to the number of parameters learned and then grows like a logarithm; it vanishes
+    /// where a sample says nothing new.
+    #[inline]
+    pub fn leverage(&self) -> T {
+        self.leverage
+    }
+
+    /// Samples used.
+    pub fn updates(&self) -> u64 {
+        self.updates
+    }
+
+    /// Samples rejected.
+    pub fn rejected(&self) -> u64 {
+        self.rejected
+    }
+
+    /// One sample with `M` errors: `psi` has one row per error.
+    #[inline(always)]
+    pub fn update<const M: usize>(&mut self, psi: &SMatrix<T, M, R>, y: &SVector<T, M>) -> Update<T, M> {
+        let rows: [[T; R]; M] = core::array::from_fn(|m| core::array::from_fn(|j| psi[(m, j)]));
+        let mut error = *y;
+        let mut sound = true;
+        for m in 0..M {
+            error[m] -= lanes::dot(&rows[m], &self.theta.data.0[0]);
+            sound &= error[m].abs() <= largest();
+        }
+        let theta = &mut self.theta.data.0[0];
+        let leverage = match &mut self.covariance {
+            _ if !sound => None,
+            Covariance::Plain(p) => p.learn(theta, &rows, &error.data.0[0], &self.forgetting),
+            Covariance::Factorized(p) => p.learn(theta, &rows, &error.data.0[0], &self.forgetting),
+        };
+        let Some(leverage) = leverage else {
+            self.rejected += 1;
+            return Update::Rejected;
+        };
+        self.leverage = leverage;
+        self.updates += 1;
+        Update::Used(error)
+    }
+}
+
+impl<T: Real, const R: usize> Covariance<T, R> {
+    fn of(p: &SMatrix<T, R, R>, form: Form) -> Self {
+        match form {
+            Form::Plain => Self::Plain(Plain::of(p)),
+            Form::Factorized => Self::Factorized(Factorized::of(p)),
+        }
+    }
+}
+
+impl<T: Real, const R: usize> Forgetting<T, R> {
+    /// By what rows and columns of a `P` with this diagonal are multiplied, and whether that is not the same for all.
+    #[inline]
+    fn lift(&self, diagonal: &[T; R]) -> ([T; R], bool) {
+        let full = T::one() / self.mu.sqrt();
+        let mut limited = false;
+        let lift = core::array::from_fn(|i| {
+            let room = self.limit[i] * self.mu;
+            if diagonal[i] <= room {
+                return full;
+            }
+            limited = true;
+            (self.limit[i] / diagonal[i]).sqrt().max(T::one())
+        });
+        (lift, limited)
+    }
+}
+
+/// Whether numbers are `f64`.
+#[inline]
+fn is_double<T: Real>() -> bool {
+    T::default_epsilon() < lit(1e-12)
+}
+
+/// Largest entry of a regressor or an error that is taken; products of three such with `P` stay finite.
+#[inline]
+fn largest<T: Real>() -> T {
+    if is_double::<T>() { lit(1e30) } else { lit(1e9) }
+}
