@@ -21,7 +21,7 @@ from armgap import Log, __version__
 from armgap.cli import COMMANDS
 
 IMPORT_LIMIT_S = 0.6
-PROMISED = {"identify", "simulate", "diagnose", "trial", "reproduce", "demo"}
+PROMISED = {"identify", "simulate", "diagnose", "trial", "reproduce", "bench", "demo"}
 
 
 def armgap(*arguments: object, **options: object) -> subprocess.CompletedProcess[bytes]:
