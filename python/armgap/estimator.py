@@ -61,7 +61,8 @@ class Estimator:
     asymmetry : bool, default False
         Estimate a constant resisting torque per joint too.
     form : {"plain", "factorized"}, optional
-        How the covariance is kept: equation (21) as printed, or U D U'. By default plain in double, factorized in single precision.
+        How the covariance is kept: equation (21) as printed, or U D U'. By default plain in double precision with `p0` up to 1e6, factorized
+        otherwise.
     single : bool, default False
         Compute in single precision, as on a controller without a unit for doubles.
     memory : float, default 400

@@ -161,7 +161,7 @@ enum armgap_form
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   Plain in double precision, factorized in single precision.
+   Plain in double precision with p0 up to 1e6, factorized otherwise.
    */
   ARMGAP_DEFAULT_FORM = 0,
   /*

@@ -69,7 +69,7 @@ pub enum armgap_filters {
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum armgap_form {
-    /// Plain in double precision, factorized in single precision.
+    /// Plain in double precision with p0 up to 1e6, factorized otherwise.
     ARMGAP_DEFAULT_FORM = 0,
     /// Equation (21) as printed.
     ARMGAP_PLAIN = 1,
@@ -158,7 +158,7 @@ impl armgap_settings {
             kind,
             scheme: *Scheme::ALL.get(self.scheme as usize)?,
             variant: *[Variant::Exact, Variant::Paper].get(self.filters as usize)?,
-            form: *[Form::default_for::<T>(), Form::Plain, Form::Factorized].get(self.form as usize)?,
+            form: *[None, Some(Form::Plain), Some(Form::Factorized)].get(self.form as usize)?,
             asymmetry: *[false, true].get(self.asymmetry as usize)?,
             cutoff: lit(self.cutoff),
             forgetting: lit(self.forgetting),

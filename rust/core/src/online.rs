@@ -25,8 +25,8 @@ pub struct Choice<T> {
     pub scheme: Scheme,
     /// Filters and alignment.
     pub variant: Variant,
-    /// How the covariance is kept.
-    pub form: Form,
+    /// How the covariance is kept; by default as suits the precision and `p0`.
+    pub form: Option<Form>,
     /// Whether one constant torque per joint is estimated too.
     pub asymmetry: bool,
     /// Cut-off of the filters, rad/s.
@@ -80,7 +80,7 @@ impl<T: Real> Choice<T> {
             kind,
             scheme: Scheme::FilteredPower,
             variant: Variant::Exact,
-            form: Form::default_for::<T>(),
+            form: None,
             asymmetry: false,
             cutoff: lit(50.0),
             forgetting: T::one(),
@@ -296,8 +296,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> W
             p0: choice.p0,
         };
         let forgotten = T::one() - choice.forgetting;
+        let estimator = Estimator::new(arm, settings);
         Self {
-            estimator: Estimator::new(arm, settings).with_form(choice.form),
+            estimator: match choice.form {
+                Some(form) => estimator.with_form(form),
+                None => estimator,
+            },
             monitor: Monitor::new(choice.watch),
             errors: SVector::zeros(),
             memory: if forgotten > T::zero() { T::one() / forgotten } else { lit(1e30) },

@@ -69,12 +69,20 @@ proptest! {
         };
         let mut estimator = Estimator::<f64, _, 2, 9, 11>::new(TwoLink { gravity: 9.81, length1: 0.45 }, settings);
         let mut last = f64::NEG_INFINITY;
+        // Times so late that nothing can follow them are left out.
+        let sane = |t: f64| if t.abs() < 1e10 { t } else { f64::NAN };
         for x in numbers.chunks_exact(7) {
             let dq = sensor.then(|| Vector2::new(x[5], x[6]));
-            let sample = Sample { t: x[0], q: Vector2::new(x[1], x[2]), dq, tau: Vector2::new(x[3], x[4]) };
-            let before = *estimator.rls().theta();
+            let sample = Sample { t: sane(x[0]), q: Vector2::new(x[1], x[2]), dq, tau: Vector2::new(x[3], x[4]) };
+            let (before, rejected) = (*estimator.rls().theta(), estimator.rls().rejected());
             match estimator.update(&sample) {
-                Outcome::Rejected => prop_assert_eq!(*estimator.rls().theta(), before),
+                Outcome::Rejected => {
+                    prop_assert_eq!(*estimator.rls().theta(), before);
+                    // A sample whose regressor was rejected counts as taken.
+                    if estimator.rls().rejected() > rejected {
+                        last = x[0];
+                    }
+                }
                 Outcome::Starting | Outcome::Updated(_) => {
                     prop_assert!(x[..5].iter().all(|v| v.is_finite()) && x[0] > last);
                     last = x[0];

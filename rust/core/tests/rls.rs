@@ -1,6 +1,6 @@
 //! Recursive least squares against batch least squares, and over a long life.
 
-use armgap_core::rls::{Rls, Update};
+use armgap_core::rls::{Form, Rls, Update};
 use nalgebra::{SMatrix, SVector};
 
 /// A repeatable source of numbers in (-1, 1).
@@ -96,4 +96,18 @@ fn a_rejected_sample_leaves_no_trace() {
     assert_eq!(rls.update(&broken, &y), Update::Rejected);
     assert_eq!((rls.theta(), rls.covariance()), (before.theta(), before.covariance()));
     assert_eq!((rls.updates(), rls.rejected()), (1, 1));
+}
+
+#[test]
+fn a_large_initial_covariance_is_kept_in_factors() {
+    let form = |p0| Rls::new(SVector::<f64, 6>::zeros(), p0, 1.0).form();
+    assert_eq!((form(1e6), form(1e7)), (Form::Plain, Form::Factorized));
+    // Plain, an absurd row is rejected and leaves no trace; in factors it is used.
+    let row = SMatrix::<f64, 1, 6>::repeat(1e8);
+    let y = SVector::<f64, 1>::new(1.0);
+    let mut plain = Rls::new(SVector::<f64, 6>::zeros(), 1000.0, 1.0);
+    let before = plain;
+    assert_eq!(plain.update(&row, &y), Update::Rejected);
+    assert_eq!((plain.theta(), plain.covariance()), (before.theta(), before.covariance()));
+    assert!(matches!(plain.with_form(Form::Factorized).update(&row, &y), Update::Used(_)));
 }

@@ -11,6 +11,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// An estimator in either precision; numbers cross the boundary as float64.
+#[allow(clippy::large_enum_variant)] // Kept in a box.
 #[derive(Clone, Copy)]
 enum Any {
     Double(Online<f64>),
@@ -39,9 +40,9 @@ fn choice<T: Real>(
     let scheme = Scheme::from_name(scheme)
         .ok_or_else(|| PyValueError::new_err(format!("unknown scheme `{scheme}`")))?;
     let form = match form {
-        None => Form::default_for::<T>(),
-        Some("plain") => Form::Plain,
-        Some("factorized") => Form::Factorized,
+        None => None,
+        Some("plain") => Some(Form::Plain),
+        Some("factorized") => Some(Form::Factorized),
         Some(other) => return Err(PyValueError::new_err(format!("unknown form `{other}`"))),
     };
     let [cutoff, forgetting, p0, memory, between, floor] = numbers.map(lit::<T>);
@@ -67,6 +68,7 @@ fn complaint(problem: Problem) -> PyErr {
 }
 
 /// Numbers of a slice in another precision, in fixed memory.
+#[allow(clippy::cast_possible_truncation)] // That is the purpose.
 fn narrowed(x: &[f64]) -> ([f32; MOST_PARAMETERS], usize) {
     let mut narrow = [0.0; MOST_PARAMETERS];
     for (n, x) in narrow.iter_mut().zip(x) {
@@ -80,9 +82,10 @@ impl Any {
         let outcome = match self {
             Self::Double(online) => online.update(when, q, dq, tau),
             Self::Single(online) => {
+                let single = |x: f64| narrowed(&[x]).0[0];
                 let when = match when {
-                    When::At(t) => When::At(t as f32),
-                    When::After(h) => When::After(h as f32),
+                    When::At(t) => When::At(single(t)),
+                    When::After(h) => When::After(single(h)),
                 };
                 let ((q, n), (tau, _)) = (narrowed(q), narrowed(tau));
                 let dq = dq.map(|dq| narrowed(dq).0);
@@ -157,8 +160,11 @@ impl Estimator {
     ) -> PyResult<Self> {
         let any = if single {
             let choice = choice::<f32>(kind, scheme, paper, form, asymmetry, numbers, counts)?;
-            let theta0: Vec<f32> = theta0.iter().map(|x| *x as f32).collect();
-            Any::Single(Online::new(choice, &theta0).map_err(complaint)?)
+            if theta0.len() > MOST_PARAMETERS {
+                return Err(complaint(Problem::Length { name: "theta0", expected: choice.parameters() }));
+            }
+            let (theta0, count) = narrowed(&theta0);
+            Any::Single(Online::new(choice, &theta0[..count]).map_err(complaint)?)
         } else {
             let choice = choice::<f64>(kind, scheme, paper, form, asymmetry, numbers, counts)?;
             Any::Double(Online::new(choice, &theta0).map_err(complaint)?)

@@ -30,10 +30,11 @@ pub enum Form {
 }
 
 impl Form {
-    /// Plain in double precision, factorized in single precision.
+    /// Plain in double precision, unless a variance of `P(0)` is above 10^6; factorized in single precision.
     #[inline]
-    pub fn default_for<T: Real>() -> Self {
-        if is_double::<T>() { Self::Plain } else { Self::Factorized }
+    pub fn default_for<T: Real, const R: usize>(variances: &[T; R]) -> Self {
+        let moderate = lanes::all_within(variances, lit(1e6));
+        if is_double::<T>() && moderate { Self::Plain } else { Self::Factorized }
     }
 }
 
@@ -78,10 +79,11 @@ impl<T: Real, const R: usize> Rls<T, R> {
 
     /// The same with a full positive definite `P(0)`, of which the upper triangle counts.
     pub fn with_covariance(theta0: SVector<T, R>, p0: SMatrix<T, R, R>, forgetting: T) -> Self {
+        let limit: [T; R] = p0.diagonal().into();
         Self {
             theta: theta0,
-            covariance: Covariance::of(&p0, Form::default_for::<T>()),
-            forgetting: Forgetting { mu: forgetting, limit: p0.diagonal().into() },
+            covariance: Covariance::of(&p0, Form::default_for(&limit)),
+            forgetting: Forgetting { mu: forgetting, limit },
             leverage: T::zero(),
             updates: 0,
             rejected: 0,

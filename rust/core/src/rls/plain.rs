@@ -4,9 +4,9 @@
 //! what vector instructions like. Of the rows beyond the last whole lane only the diagonal block is kept; their other entries are those
 //! of the columns.
 
+use super::Forgetting;
 use super::lanes::{LANES, dot, lead};
-use super::{Forgetting, largest};
-use crate::real::Real;
+use crate::real::{Real, lit};
 use nalgebra::SMatrix;
 
 /// The matrix, column by column.
@@ -52,7 +52,8 @@ impl<T: Real, const R: usize> Plain<T, R> {
                 rate[m] -= step;
             }
             let total = forgetting.mu + dot(&gain[m], &rows[m]);
-            sound &= (total > T::zero()) & (total <= largest());
+            // Beyond this what is left of `P` in the direction of the row would be rounding; less than nothing cannot be.
+            sound &= (total > T::zero()) & (total * T::default_epsilon() <= forgetting.mu * lit(0.125));
             inverse[m] = T::one() / total;
             rate[m] *= inverse[m];
             leverage += T::one() - forgetting.mu * inverse[m];
