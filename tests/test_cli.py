@@ -21,7 +21,19 @@ from armgap import Log, __version__
 from armgap.cli import COMMANDS
 
 IMPORT_LIMIT_S = 0.6
-PROMISED = {"bench", "export", "compare", "replay", "inspect", "identify", "simulate", "diagnose", "trial", "reproduce", "demo"}
+PROMISED = {
+    "bench",
+    "export",
+    "compare",
+    "replay",
+    "inspect",
+    "identify",
+    "simulate",
+    "diagnose",
+    "trial",
+    "reproduce",
+    "demo",
+}
 
 
 def armgap(*arguments: object, **options: object) -> subprocess.CompletedProcess[bytes]:
