@@ -347,7 +347,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     }
 
     /// Inertia of joint `j` at `q` with all other joints free to move.
-    fn free_inertia(&self, j: usize, inertia: &SMatrix<T, N, N>) -> T {
+    fn free_inertia(j: usize, inertia: &SMatrix<T, N, N>) -> T {
         let mut least = inertia[(j, j)];
         for k in 0..N {
             if k != j {
@@ -366,7 +366,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         }
         let inertia = self.arm.dynamics(&self.theta, q, &SVector::zeros(), self.tilt).0 + self.added;
         for j in 0..N {
-            let free = self.free_inertia(j, &inertia);
+            let free = Self::free_inertia(j, &inertia);
             if self.smoothing > T::zero() {
                 let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
                 fastest = fastest.max(self.level(j, &x, T::one()) / (self.smoothing * free));
