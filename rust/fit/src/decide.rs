@@ -306,7 +306,9 @@ fn temper<const N: usize, const P: usize>(stages: &[Stage<N, P>], causes: &mut [
     if last.relative_error() <= CONSEQUENCE || last.excess() <= ABOVE_FLOOR {
         return;
     }
-    let explained = 1.0 - (last.relative_error() / first.relative_error()).min(1.0).powi(2);
+    // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them.
+    let left = (last.relative_error() / first.relative_error()).powi(2).max(last.excess() / first.excess());
+    let explained = 1.0 - left.min(1.0);
     for cause in causes {
         cause.probability *= REMAINDER_DOUBT + (1.0 - REMAINDER_DOUBT) * explained * explained;
     }
