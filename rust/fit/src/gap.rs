@@ -1,0 +1,255 @@
+//! How far predictions miss on the holdout: windows from measured starts, and whole logs from their first sample.
+
+use crate::arm::ArmDescription;
+use crate::compose::Compared;
+use crate::decide::Random;
+use crate::diagnose::Options;
+use crate::event::without_pushes;
+use crate::model::Hypothesis;
+use crate::report::{FreeRun, FreeRunSeries, Gap, Series};
+use crate::study::Study;
+use crate::window::{Dataset, Shift, Window};
+use armgap_core::arm::Arm;
+
+/// Points of a drawn curve at most.
+const DRAWN: usize = 2500;
+
+/// Holdout logs that are drawn.
+const DRAWN_LOGS: usize = 3;
+
+/// Resamples of the holdout windows for the interval of the closed share.
+const RESAMPLES: usize = 500;
+
+/// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
+const FREE_RUN_LIMIT: f64 = 100.0;
+
+/// A window's variance from its measured start counts up to this many times the typical one.
+const WORST_START: f64 = 10.0;
+
+/// Predictions on the holdout from measured starts, and their squared errors.
+pub struct Errors<const N: usize> {
+    before: Vec<f64>,
+    refit: Vec<f64>,
+    after: Vec<f64>,
+    /// Mean variance that measured starts and the measurement itself put into the errors, per joint.
+    floor: [f64; N],
+}
+
+impl<const N: usize> Errors<N> {
+    /// Predictions of the three hypotheses.
+    pub fn new<A: Arm<f64, N, P>, const P: usize>(study: &Study<A, N, P>, compared: &Compared<P>) -> Self {
+        let data = &study.holdout.data;
+        let starts = data.measured_starts();
+        let bare = without_pushes(&study.holdout).data;
+        Self {
+            before: bare.predict(&study.arm, &compared.before, &starts),
+            refit: bare.predict(&study.arm, &compared.refit, &starts),
+            after: data.predict(&study.arm, &compared.after, &starts),
+            floor: floor(study, &compared.after),
+        }
+    }
+
+    /// Measured and predicted positions for drawing.
+    pub fn series<A: Arm<f64, N, P>, const P: usize>(&self, study: &Study<A, N, P>) -> Vec<Series> {
+        let data = &study.holdout.data;
+        let mut all = Vec::new();
+        for (index, track) in data.tracks.iter().enumerate().take(DRAWN_LOGS) {
+            let stride = track.len().div_ceil(DRAWN);
+            for j in 0..N {
+                let mut s = Series {
+                    log: track.name.clone(),
+                    joint: j + 1,
+                    t: Vec::new(),
+                    measured: Vec::new(),
+                    before: Vec::new(),
+                    refit: Vec::new(),
+                    after: Vec::new(),
+                    window_start: Vec::new(),
+                };
+                for window in data.windows.iter().filter(|w| w.track == index) {
+                    s.window_start.push(s.t.len());
+                    for i in (0..window.rows()).step_by(stride) {
+                        let at = (window.offset + i) * N + j;
+                        s.t.push(track.t[window.first + 1 + i]);
+                        s.measured.push(study.holdout.measured[at]);
+                        s.before.push(self.before[at]);
+                        s.refit.push(self.refit[at]);
+                        s.after.push(self.after[at]);
+                    }
+                }
+                all.push(s);
+            }
+        }
+        all
+    }
+}
+
+/// Variance of a perfect model's errors: noise of the sample itself, and of the measured start carried along the window.
+fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    study: &Study<A, N, P>,
+    model: &Hypothesis<P>,
+) -> [f64; N] {
+    let data = &study.holdout.data;
+    let columns = crate::metric::start_sensitivities(data, &study.arm, model, &data.measured_starts());
+    let carried = |window: &Window<N>| -> [f64; N] {
+        let mut sum = [0.0; N];
+        for row in window.range().step_by(N) {
+            for (j, total) in sum.iter_mut().enumerate() {
+                for (k, [vq, cov, vdq]) in window.start.covariance.iter().enumerate() {
+                    let (a, b) = (columns[k][row + j], columns[N + k][row + j]);
+                    *total += a * a * vq + 2.0 * a * b * cov + b * b * vdq;
+                }
+            }
+        }
+        sum.map(|x| x / window.rows() as f64)
+    };
+    let windows: Vec<[f64; N]> = data.windows.iter().map(carried).collect();
+    std::array::from_fn(|j| {
+        // A window whose start decides whether a joint sticks has no meaningful derivative; it counts as a bad one, not as infinite.
+        let typical = crate::track::median(windows.iter().map(|w| w[j]).collect());
+        let mean =
+            windows.iter().map(|w| w[j].min(WORST_START * typical)).sum::<f64>() / windows.len() as f64;
+        study.noise[j].powi(2) + mean
+    })
+}
+
+/// RMS difference of each joint.
+pub fn rms<const N: usize>(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
+    let rows = (measured.len() / N).max(1) as f64;
+    let squares = |j: usize| -> f64 {
+        measured.iter().zip(predicted).skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
+    };
+    (0..N).map(|j| (squares(j) / rows).sqrt()).collect()
+}
+
+/// The gap before, re-estimated, and with the causes.
+pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    study: &Study<A, N, P>,
+    compared: &Compared<P>,
+    errors: &Errors<N>,
+    description: &ArmDescription,
+    options: &Options,
+) -> Gap {
+    let measured = &study.holdout.measured;
+    let floor: Vec<f64> = errors.floor.iter().map(|v| v.sqrt()).collect();
+    let before = rms::<N>(measured, &errors.before);
+    let after = rms::<N>(measured, &errors.after);
+    Gap {
+        horizon_s: options.horizon,
+        unit: if description.kind.rotary() { "rad" } else { "m" },
+        closed: closed(&before, &after, &floor),
+        closed_ci: closed_interval(study, errors, &floor, options.seed),
+        refit: rms::<N>(measured, &errors.refit),
+        free_run: FreeRun {
+            before: free_run_rms(study, &without_pushes(&study.holdout).data, &compared.before),
+            after: free_run_rms(study, &study.holdout.data, &compared.after),
+        },
+        before,
+        after,
+        floor,
+    }
+}
+
+/// Share of the gap above the floor that is closed, over all joints.
+fn closed(before: &[f64], after: &[f64], floor: &[f64]) -> f64 {
+    let above =
+        |x: &[f64]| x.iter().zip(floor).map(|(x, f)| ((x - f) / before_scale(before)).max(0.0)).sum::<f64>();
+    let (b, a) = (above(before), above(after));
+    if b > 0.0 { 1.0 - a / b } else { 0.0 }
+}
+
+fn before_scale(before: &[f64]) -> f64 {
+    before.iter().copied().fold(f64::MIN_POSITIVE, f64::max)
+}
+
+/// 95 % interval of the closed share from resampled holdout windows.
+fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    study: &Study<A, N, P>,
+    errors: &Errors<N>,
+    floor: &[f64],
+    seed: u64,
+) -> [f64; 2] {
+    let data = &study.holdout.data;
+    let squares = |predicted: &[f64], w: &Window<N>, j: usize| -> f64 {
+        let pairs = study.holdout.measured[w.range()].iter().zip(&predicted[w.range()]);
+        pairs.skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
+    };
+    let table = |predicted: &[f64]| -> Vec<[f64; N]> {
+        data.windows.iter().map(|w| std::array::from_fn(|j| squares(predicted, w, j))).collect()
+    };
+    let (before, after) = (table(&errors.before), table(&errors.after));
+    let mut random = Random(seed);
+    let count = data.windows.len();
+    let mut shares: Vec<f64> = (0..RESAMPLES)
+        .map(|_| {
+            let draw: Vec<usize> = (0..count).map(|_| random.below(count)).collect();
+            let rows: usize = draw.iter().map(|&w| data.windows[w].rows()).sum();
+            let pooled = |table: &[[f64; N]]| -> Vec<f64> {
+                (0..N)
+                    .map(|j| (draw.iter().map(|&w| table[w][j]).sum::<f64>() / rows.max(1) as f64).sqrt())
+                    .collect()
+            };
+            closed(&pooled(&before), &pooled(&after), floor)
+        })
+        .collect();
+    shares.sort_by(f64::total_cmp);
+    [shares[RESAMPLES / 40], shares[RESAMPLES - 1 - RESAMPLES / 40]]
+}
+
+/// The holdout as one window per log.
+fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
+    let (mut windows, mut rows) = (Vec::new(), 0);
+    for (index, track) in data.tracks.iter().enumerate() {
+        let last = track.len() - 1;
+        windows.push(Window { track: index, first: 0, last, offset: rows, start: track.start(0) });
+        rows += last;
+    }
+    Dataset { tracks: data.tracks.clone(), windows, rows }
+}
+
+fn free_run_rms<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    study: &Study<A, N, P>,
+    data: &Dataset<N>,
+    model: &Hypothesis<P>,
+) -> Vec<f64> {
+    let data = whole(data);
+    let predicted =
+        limited(&data, &data.predict(&study.arm, model, &vec![Shift::none(); data.windows.len()]));
+    rms::<N>(&data.measured(), &predicted)
+}
+
+/// Predictions kept within reach of the measurement, so that a diverged run stays a number.
+fn limited<const N: usize>(data: &Dataset<N>, predicted: &[f64]) -> Vec<f64> {
+    let measured = data.measured();
+    predicted.iter().zip(&measured).map(|(p, m)| m + (p - m).clamp(-FREE_RUN_LIMIT, FREE_RUN_LIMIT)).collect()
+}
+
+/// Free runs for drawing.
+pub fn free_run_series<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    study: &Study<A, N, P>,
+    compared: &Compared<P>,
+) -> Vec<FreeRunSeries> {
+    let data = whole(&study.holdout.data);
+    let starts = vec![Shift::none(); data.windows.len()];
+    let run = |data: &Dataset<N>, h: &Hypothesis<P>| limited(data, &data.predict(&study.arm, h, &starts));
+    let bare = whole(&without_pushes(&study.holdout).data);
+    let (before, after, measured) =
+        (run(&bare, &compared.before), run(&data, &compared.after), data.measured());
+    let mut all = Vec::new();
+    for window in data.windows.iter().take(DRAWN_LOGS) {
+        let track = &data.tracks[window.track];
+        let rows: Vec<usize> = (0..window.rows()).step_by(window.rows().div_ceil(DRAWN)).collect();
+        for j in 0..N {
+            let pick = |x: &[f64]| rows.iter().map(|i| x[(window.offset + i) * N + j]).collect();
+            all.push(FreeRunSeries {
+                log: track.name.clone(),
+                joint: j + 1,
+                t: rows.iter().map(|i| track.t[i + 1]).collect(),
+                measured: pick(&measured),
+                before: pick(&before),
+                after: pick(&after),
+            });
+        }
+    }
+    all
+}

@@ -1,0 +1,111 @@
+//! What was looked for and not found: a status for every candidate that is no cause.
+
+use crate::decide::Attribution;
+use crate::model::Placed;
+use crate::report::{Bound, RuledOut};
+use crate::screen::{Scored, screen};
+use crate::study::Study;
+use armgap_core::arm::Arm;
+use armgap_core::effect::{Scope, Spec, Trial, catalogue};
+
+/// An effect whose size this log pins down to no better than this part of a typical size has not been excited.
+const PINNED: f64 = 0.5;
+
+/// Two-sided 95 % of the normal distribution.
+const NORMAL_95: f64 = 1.96;
+
+/// Status of every candidate that is no cause, from its first-order test around the final model.
+pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    study: &Study<A, N, P>,
+    attribution: &Attribution<N, P>,
+    rotary: bool,
+) -> Vec<RuledOut> {
+    let stage = &attribution.stages[attribution.stages.len() - 1];
+    let model = &attribution.model.hypothesis;
+    let open = study.open_candidates(model);
+    let scored = screen(&study.problem(&stage.weights.training), model, &open);
+    let mut list: Vec<(Placed, RuledOut)> = Vec::new();
+    for test in &scored {
+        let entry = status(study, test, rotary);
+        match list.iter_mut().find(|(place, _)| place.same_place(&test.effect)) {
+            // The weakest statement over an effect's shapes holds for the effect.
+            Some((_, known)) if weaker(&entry, known) => *known = entry,
+            Some(_) => {}
+            None => list.push((test.effect, entry)),
+        }
+    }
+    let mut entries: Vec<RuledOut> = list.into_iter().map(|(_, entry)| entry).collect();
+    entries.extend(never_fitted::<N>());
+    entries
+}
+
+/// Status of the effects that no test of candidates looks for.
+fn never_fitted<const N: usize>() -> Vec<RuledOut> {
+    let laws = catalogue::<f64>().iter().map(|law| law.spec());
+    let unsearched = laws.filter(|spec| spec.starts.is_empty() && spec.least_joints <= N);
+    let entry = |spec: &Spec, joint: Option<usize>| {
+        let (status, why) = if spec.trial == Trial::Event {
+            ("absent", "no impulse stands alone in any of these logs")
+        } else {
+            ("undecided", "another effect and other parameters of the arm give the same motion, always")
+        };
+        RuledOut { effect: spec.name, joint, status, bound: None, why: Some(why.to_owned()) }
+    };
+    let places = |spec: &Spec| -> Vec<Option<usize>> {
+        if spec.scope == Scope::Joint { (1..=N).map(Some).collect() } else { vec![None] }
+    };
+    unsearched.flat_map(|spec| places(spec).into_iter().map(move |joint| entry(spec, joint))).collect()
+}
+
+fn weaker(a: &RuledOut, b: &RuledOut) -> bool {
+    let rank = |s: &str| ["absent", "undecided", "not excited"].iter().position(|x| *x == s).unwrap_or(0);
+    let size = |r: &RuledOut| r.bound.as_ref().map_or(f64::INFINITY, |b| b.value);
+    (rank(a.status), size(a)) > (rank(b.status), size(b))
+}
+
+fn status<A, const N: usize, const P: usize>(
+    study: &Study<A, N, P>,
+    test: &Scored,
+    rotary: bool,
+) -> RuledOut {
+    let spec = test.effect.law.spec();
+    let parameter = &spec.parameters[0];
+    let typical = study.scales.size(parameter.quantity, test.effect.joint);
+    let sigma = test.sigma.max(test.information_sigma);
+    let (effect, joint) = (spec.name, test.effect.joint_number());
+    if spec.trial == Trial::Whole {
+        return threshold_status(test);
+    }
+    let pinned = sigma < PINNED * typical;
+    if !pinned {
+        let why = format!("these logs do not pin it down; it needs {}", spec.excited_by);
+        return RuledOut { effect, joint, status: "not excited", bound: None, why: Some(why) };
+    }
+    let value = test.estimate.abs() + NORMAL_95 * sigma;
+    let bound =
+        Bound { parameter: parameter.name, value, unit: parameter.quantity.unit(rotary), level: 0.95 };
+    let traced = test.estimate.abs() > 3.0 * sigma;
+    RuledOut {
+        effect,
+        joint,
+        status: if traced { "undecided" } else { "absent" },
+        bound: Some(bound),
+        why: traced.then(|| {
+            "it leaves a trace in the training logs, but does not reduce the gap on the holdout".to_owned()
+        }),
+    }
+}
+
+/// Status of an effect that begins beyond a threshold: excited if any trial threshold was passed.
+fn threshold_status(test: &Scored) -> RuledOut {
+    let spec = test.effect.law.spec();
+    let (effect, joint) = (spec.name, test.effect.joint_number());
+    let reached = test.distinct > 0.0 && test.information_sigma < 0.5;
+    let why = if reached {
+        "at trial values it would leave a trace that these logs do not show".to_owned()
+    } else {
+        format!("these logs never reach it; it needs {}", spec.excited_by)
+    };
+    let status = if reached { "absent" } else { "not excited" };
+    RuledOut { effect, joint, status, bound: None, why: Some(why) }
+}
