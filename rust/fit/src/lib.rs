@@ -21,6 +21,7 @@ mod observe;
 pub mod report;
 mod ruled_out;
 pub mod scale;
+mod scan;
 pub mod screen;
 pub mod simulate;
 pub mod smooth;
