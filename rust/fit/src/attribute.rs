@@ -1,6 +1,6 @@
 //! Which effect: screening, full fits of what passes, and the holdout's decision, one cause after another.
 
-use crate::decide::CONSEQUENCE;
+use crate::decide::{ABOVE_FLOOR, CONSEQUENCE};
 use crate::model::{Hypothesis, Placed};
 use crate::scan::repeats;
 use crate::screen::{Scored, candidates, screen};
@@ -136,6 +136,11 @@ impl<const N: usize, const P: usize> Stage<N, P> {
     /// RMS error of the current model on the holdout, relative to the motion within the windows.
     pub fn relative_error(&self) -> f64 {
         (self.base.error / self.motion).sqrt()
+    }
+
+    /// Whether the current model leaves a gap of consequence above the floor.
+    pub fn is_open(&self) -> bool {
+        self.relative_error() > CONSEQUENCE && self.excess() > ABOVE_FLOOR
     }
 
     /// How far the current model's cost lies above the floor, as a factor.

@@ -22,7 +22,7 @@ const MATTERS: f64 = 0.1;
 const MATTERS_IN_SMALL: f64 = 0.5;
 
 /// Cost above the floor, as a factor, below which there is nothing left to explain.
-const ABOVE_FLOOR: f64 = 1.25;
+pub const ABOVE_FLOOR: f64 = 1.25;
 
 /// Decrease of the distance from trusted values, in squared sigmas, that makes a cause on its own.
 const TRUST_GAIN: f64 = 16.0;
@@ -108,6 +108,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             model = stage.settled.clone();
         }
         self.prune(&mut model, &mut causes, &stage);
+        self.widen(&mut model, &stage.weights);
         stages.push(stage);
         refresh(&model, &mut causes);
         temper(&stages, &mut causes);
@@ -303,7 +304,7 @@ fn trust_probability<const N: usize, const P: usize>(
 /// causes stand in for.
 fn temper<const N: usize, const P: usize>(stages: &[Stage<N, P>], causes: &mut [Cause]) {
     let (Some(first), Some(last)) = (stages.first(), stages.last()) else { return };
-    if last.relative_error() <= CONSEQUENCE || last.excess() <= ABOVE_FLOOR {
+    if !last.is_open() {
         return;
     }
     // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them.

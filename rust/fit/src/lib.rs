@@ -5,6 +5,7 @@
 
 #![forbid(unsafe_code)]
 
+mod agreement;
 pub mod arm;
 pub mod attribute;
 pub mod compose;
