@@ -143,9 +143,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 }
 
-/// Improvement relative to the motion below which a cause is not worth a name, given the first gap.
+/// Improvement relative to the motion below which a cause is not worth a name, given the first gap; what is of consequence by itself
+/// always is.
 pub fn noticeable(first_gap: f64) -> f64 {
-    RELEVANT.max(NOTICEABLE * first_gap)
+    (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENCE)
 }
 
 /// Why a contender deserves to be adopted.
