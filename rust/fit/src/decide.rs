@@ -301,18 +301,25 @@ fn trust_probability<const N: usize, const P: usize>(
     (ours / all) * plausible
 }
 
+/// Part of the first gap that the final model leaves without explanation; zero where what is left is of no consequence.
+pub fn left_over<const N: usize, const P: usize>(stages: &[Stage<N, P>]) -> f64 {
+    let (Some(first), Some(last)) = (stages.first(), stages.last()) else { return 0.0 };
+    if !last.is_open() {
+        return 0.0;
+    }
+    // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them.
+    (last.relative_error() / first.relative_error()).powi(2).max(last.excess() / first.excess()).min(1.0)
+}
+
 /// Lowers the probabilities where a gap of consequence remains that no candidate explains: what leaves it may also be what the named
 /// causes stand in for.
 fn temper<const N: usize, const P: usize>(stages: &[Stage<N, P>], causes: &mut [Cause]) {
-    let (Some(first), Some(last)) = (stages.first(), stages.last()) else { return };
-    if !last.is_open() {
+    let left = left_over(stages);
+    if left == 0.0 {
         return;
     }
-    // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them.
-    let left = (last.relative_error() / first.relative_error()).powi(2).max(last.excess() / first.excess());
-    let explained = 1.0 - left.min(1.0);
     for cause in causes {
-        cause.probability *= REMAINDER_DOUBT + (1.0 - REMAINDER_DOUBT) * explained * explained;
+        cause.probability *= REMAINDER_DOUBT + (1.0 - REMAINDER_DOUBT) * (1.0 - left).powi(2);
     }
 }
 
