@@ -314,7 +314,9 @@ struct Take<'a, T: Real, A, const N: usize, const P: usize, const R: usize> {
     tau: &'a SVector<T, N>,
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Work for Take<'_, T, A, N, P, R> {
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Work
+    for Take<'_, T, A, N, P, R>
+{
     type Output = Outcome<T, N>;
 
     #[inline(always)]
