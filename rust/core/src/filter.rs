@@ -70,25 +70,25 @@ impl<T: Real> Step<T> {
     }
 
     /// `F`, one interval after `y`, of an input held at `held`.
-    #[inline]
+    #[inline(always)]
     pub fn held(&self, y: T, held: T) -> T {
         self.decay * y + (T::one() - self.decay) * held
     }
 
     /// `F`, one interval after `y`, of an input that goes linearly from `from` to `to`.
-    #[inline]
+    #[inline(always)]
     pub fn ramp(&self, y: T, from: T, to: T) -> T {
         self.decay * y + self.first * from + self.last * to
     }
 
     /// `F`, one interval after `y`, of a parabola from `from` to `to` that half-way lies `height` above the chord.
-    #[inline]
+    #[inline(always)]
     pub fn curve(&self, y: T, from: T, to: T, height: T) -> T {
         self.ramp(y, from, to) + self.bulge * height
     }
 
     /// The paper's `D`, one interval after `y`.
-    #[inline]
+    #[inline(always)]
     pub fn paper_derivative(&self, y: T, from: T, to: T) -> T {
         self.decay * y + self.lambda * (to - from)
     }
@@ -116,7 +116,7 @@ impl<T: Real> Kept<T> {
     }
 
     /// Coefficients for an interval of `h` seconds.
-    #[inline]
+    #[inline(always)]
     pub fn step(&mut self, h: T) -> Step<T> {
         if h != self.h {
             self.renew(h);

@@ -9,6 +9,7 @@
 //! single precision is the only way to keep its resolution: after three hours a time in `f32` has steps of a millisecond.
 
 use crate::arm::Arm;
+use crate::cpu::{Cpu, Level, Work};
 use crate::filter::Cutoff;
 use crate::real::{Real, lit};
 use crate::regression::{FilteredDynamic, FilteredPower, Passage, Scheme, Snapshot, SuppliedEnergy, Variant};
@@ -140,6 +141,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         self
     }
 
+    /// The same with other instructions than the most that the processor has.
+    pub fn with_level(mut self, level: Level) -> Self {
+        self.rls = self.rls.with_level(level);
+        self
+    }
+
     /// Estimate and covariance.
     #[inline]
     pub fn rls(&self) -> &Rls<T, R> {
@@ -156,18 +163,19 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
     pub fn update(&mut self, sample: &Sample<T, N>) -> Outcome<T, N> {
         let Sample { t, q, dq, tau } = sample;
         let h = if self.past.seen == Seen::Nothing { T::one() } else { *t - self.past.t };
-        self.take(*t, h, q, dq.as_ref(), tau)
+        self.rls.level().run(Take { estimator: self, t: *t, h, q, dq: dq.as_ref(), tau })
     }
 
     /// Takes one sample `h` seconds after the last one; for the first sample any positive number will do.
     #[inline]
     pub fn update_after(&mut self, h: T, reading: &Reading<T, N>) -> Outcome<T, N> {
         let Reading { q, dq, tau } = reading;
-        self.take(self.past.t + h, h, q, dq.as_ref(), tau)
+        let t = self.past.t + h;
+        self.rls.level().run(Take { estimator: self, t, h, q, dq: dq.as_ref(), tau })
     }
 
-    #[inline]
-    fn take(
+    #[inline(always)]
+    fn take<C: Cpu>(
         &mut self,
         t: T,
         h: T,
@@ -185,7 +193,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
             }
             Outcome::Starting
         } else {
-            self.advance(h, q, dq, tau)
+            self.advance::<C>(h, q, dq, tau)
         };
         let past = &mut self.past;
         past.seen = if past.seen == Seen::Nothing { Seen::One } else { Seen::More };
@@ -200,7 +208,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
     }
 
     /// Whether a sample can be used: finite, of possible size, later than the last and reachable from it.
-    #[inline]
+    #[inline(always)]
     fn acceptable(
         &self,
         t: T,
@@ -232,8 +240,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         });
     }
 
-    #[inline]
-    fn advance(
+    #[inline(always)]
+    fn advance<C: Cpu>(
         &mut self,
         h: T,
         q: &SVector<T, N>,
@@ -248,7 +256,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         if dq.is_some() || self.settings.variant == Variant::Paper {
             let now = Snapshot { q: *q, dq: dq.copied().unwrap_or(difference) };
             let passage = Passage { h, split: h * half, first: past.tau, second: past.tau, middle: between };
-            return self.regress(&now, &passage, tau);
+            return self.regress::<C>(&now, &passage, tau);
         }
         // The state half-way between the two samples; on the way there from the one before, the torque changed at the last sample.
         let (now, held) = (Snapshot { q: between, dq: difference }, past.tau);
@@ -259,11 +267,11 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         let split = past.h * half;
         let passage =
             Passage { h: split + h * half, split, first: past.tau_before, second: held, middle: past.q };
-        self.regress(&now, &passage, &held)
+        self.regress::<C>(&now, &passage, &held)
     }
 
-    #[inline]
-    fn regress(
+    #[inline(always)]
+    fn regress<C: Cpu>(
         &mut self,
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
@@ -274,18 +282,18 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
             None => Outcome::Starting,
             Some(Regression::Dynamic(scheme)) => {
                 let (psi, y) = scheme.update(arm, variant, now, passage);
-                match self.rls.update(&psi, &y) {
+                match self.rls.learn::<C, _>(&psi, &y) {
                     Update::Used(error) => Outcome::Updated(error),
                     Update::Rejected => Outcome::Rejected,
                 }
             }
             Some(Regression::Energy(scheme)) => {
                 let (psi, y) = scheme.update(arm, variant, now, passage, tau);
-                scalar(self.rls.update(&psi, &y))
+                scalar(self.rls.learn::<C, _>(&psi, &y))
             }
             Some(Regression::Power(scheme)) => {
                 let (psi, y) = scheme.update(arm, variant, now, passage, tau);
-                scalar(self.rls.update(&psi, &y))
+                scalar(self.rls.learn::<C, _>(&psi, &y))
             }
         };
         if outcome == Outcome::Rejected {
@@ -296,7 +304,28 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
     }
 }
 
-#[inline]
+/// One call of [`Estimator::update`].
+struct Take<'a, T: Real, A, const N: usize, const P: usize, const R: usize> {
+    estimator: &'a mut Estimator<T, A, N, P, R>,
+    t: T,
+    h: T,
+    q: &'a SVector<T, N>,
+    dq: Option<&'a SVector<T, N>>,
+    tau: &'a SVector<T, N>,
+}
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Work
+    for Take<'_, T, A, N, P, R>
+{
+    type Output = Outcome<T, N>;
+
+    #[inline(always)]
+    fn run<C: Cpu>(self) -> Self::Output {
+        self.estimator.take::<C>(self.t, self.h, self.q, self.dq, self.tau)
+    }
+}
+
+#[inline(always)]
 fn scalar<T: Real, const N: usize>(update: Update<T, 1>) -> Outcome<T, N> {
     match update {
         Update::Used(error) => {

@@ -18,6 +18,18 @@ const MAX_EVENTS: usize = 16;
 /// Corrections of the located instant; each squares the error of the last.
 const MAX_REFINEMENTS: usize = 4;
 
+/// A correction of this part of a step is as good on a straight line: what is left out is of the order of its square.
+const STRAIGHT: f64 = 1e-6;
+
+/// Attempts at the instant of a release.
+const MAX_FALSE_POSITIONS: usize = 12;
+
+/// A release is found where holding takes more than friction gives, but by less than this part of what the step changes.
+const RELEASED: f64 = 1e-8;
+
+/// Attempts are made this part of a step beyond where the root is expected, so that they end on its far side.
+const BEYOND: f64 = 1e-9;
+
 /// Position, velocity and friction mode of every joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State<T, const N: usize> {
@@ -87,6 +99,16 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
             Step { plant, interval }.exact(state, from, dt);
         }
     }
+}
+
+/// One sample interval with exact friction in one step, from mode change to mode change.
+#[inline(never)]
+pub(crate) fn exact<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
+    plant: &Plant<T, A, N, P>,
+    state: &mut State<T, N>,
+    interval: &Interval<T, N>,
+) {
+    Step { plant, interval }.exact(state, T::zero(), interval.h);
 }
 
 /// One sub-step's surroundings.
@@ -212,7 +234,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
             } else if state.modes[j] == Mode::Stuck {
                 let tau = self.joint_torque(x, state);
                 let (excess, direction) =
-                    self.plant.excess(j, self.interval.t + x, &state.q, &tau, motion.holding[j]);
+                    self.plant.excess(j, self.interval.t + x, state.q[j], tau[j], motion.holding[j]);
                 if excess > worst && !tried[j] {
                     (found, worst) = (Some((j, Mode::of(direction))), excess);
                 }
@@ -271,34 +293,96 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
     ) -> Option<Event<T>> {
         let t = self.interval.t;
         let tau_end = self.joint_torque(x + dt, trial);
-        let (after, direction) = self.plant.excess(j, t + x + dt, &trial.q, &tau_end, end.holding[j]);
+        let (after, direction) = self.plant.excess(j, t + x + dt, trial.q[j], tau_end[j], end.holding[j]);
         if after <= T::zero() {
             return None;
         }
         let start = self.motion(x, state);
         let tau = self.joint_torque(x, state);
-        let (before, _) = self.plant.excess(j, t + x, &state.q, &tau, start.holding[j]);
+        let (before, _) = self.plant.excess(j, t + x, state.q[j], tau[j], start.holding[j]);
         let s = if before < T::zero() { before / (before - after) } else { T::zero() };
-        Some(Event { joint: j, s, change: Change::Release(Mode::of(direction)) })
+        let change = Change::Release { mode: Mode::of(direction), excess: [before, after] };
+        Some(Event { joint: j, s, change })
     }
 
-    /// Integrates up to the event; the instant of a stop is corrected until the velocity vanishes to rounding.
+    /// Integrates up to the event.
+    #[inline(never)]
     fn locate(&self, state: &State<T, N>, event: &Event<T>, x: T, dt: T, k1: &Motion<T, N>) -> Located<T, N> {
+        match event.change {
+            Change::Stop => self.locate_stop(state, event, x, dt, k1),
+            Change::Release { excess: [before, after], .. } if before < T::zero() => {
+                self.locate_release(state, event.joint, [before, after], x, dt, k1)
+            }
+            Change::Release { .. } => Located { length: T::zero(), reached: *state },
+        }
+    }
+
+    /// Integrates to where a velocity vanishes: Newton's method, its last correction so small that a straight line is exact.
+    fn locate_stop(
+        &self,
+        state: &State<T, N>,
+        event: &Event<T>,
+        x: T,
+        dt: T,
+        k1: &Motion<T, N>,
+    ) -> Located<T, N> {
         let mut s = event.s;
         let mut reached = self.runge_kutta(state, x, s * dt, k1);
-        if matches!(event.change, Change::Stop) {
-            for _ in 0..MAX_REFINEMENTS {
-                let slope = self.motion(x + s * dt, &reached).ddq[event.joint] * dt;
-                let correction = reached.dq[event.joint] / slope;
-                let next = s - correction;
-                if !(next > T::zero() && next <= T::one()) || correction.abs() < lit(1e-12) {
-                    break;
-                }
-                s = next;
-                reached = self.runge_kutta(state, x, s * dt, k1);
+        for _ in 0..MAX_REFINEMENTS {
+            let slope = self.motion(x + s * dt, &reached);
+            let correction = -reached.dq[event.joint] / (slope.ddq[event.joint] * dt);
+            let next = s + correction;
+            if !(next > T::zero() && next <= T::one()) {
+                break;
             }
+            s = next;
+            if correction.abs() < lit(STRAIGHT) {
+                reached = self.moved(&reached, correction * dt, &reached, &slope);
+                break;
+            }
+            reached = self.runge_kutta(state, x, s * dt, k1);
         }
         Located { length: s * dt, reached }
+    }
+
+    /// Integrates to just beyond where friction no longer holds joint `j`: false position in Illinois' way (Dowell and Jarratt 1971)
+    /// between the start of the step, where `excess[0] < 0`, and its end, where `excess[1] > 0`.
+    fn locate_release(
+        &self,
+        state: &State<T, N>,
+        j: usize,
+        excess: [T; 2],
+        x: T,
+        dt: T,
+        k1: &Motion<T, N>,
+    ) -> Located<T, N> {
+        let ([mut low, mut high], [mut before, mut after]) = ([T::zero(), T::one()], excess);
+        let enough = (after - before) * lit(RELEASED);
+        let mut last_high = None;
+        let mut reached = None;
+        for _ in 0..MAX_FALSE_POSITIONS {
+            let s = (high - after * (high - low) / (after - before) + lit(BEYOND)).min(high);
+            let there = self.runge_kutta(state, x, s * dt, k1);
+            let motion = self.motion(x + s * dt, &there);
+            let tau = self.joint_torque(x + s * dt, &there);
+            let (lacks, _) =
+                self.plant.excess(j, self.interval.t + x + s * dt, there.q[j], tau[j], motion.holding[j]);
+            let beyond = lacks > T::zero();
+            let again = last_high == Some(beyond);
+            last_high = Some(beyond);
+            if beyond {
+                (high, after, reached) = (s, lacks, Some(there));
+                before *= if again { lit(0.5) } else { T::one() };
+            } else {
+                (low, before) = (s, lacks);
+                after *= if again { lit(0.5) } else { T::one() };
+            }
+            if beyond && lacks < enough {
+                break;
+            }
+        }
+        let reached = reached.unwrap_or_else(|| self.runge_kutta(state, x, high * dt, k1));
+        Located { length: high * dt, reached }
     }
 }
 
@@ -306,15 +390,20 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
 struct Event<T> {
     joint: usize,
     s: T,
-    change: Change,
+    change: Change<T>,
 }
 
 /// What happens at an event.
-enum Change {
+enum Change<T> {
     /// The velocity reaches zero.
     Stop,
-    /// Friction no longer holds.
-    Release(Mode),
+    /// Friction no longer holds; by how much it lacks at the start and at the end of the step.
+    Release {
+        /// The mode it changes to.
+        mode: Mode,
+        /// What holding takes beyond friction's level at both ends of the step.
+        excess: [T; 2],
+    },
 }
 
 /// A state at a located event and the time it took to get there.
@@ -329,7 +418,7 @@ impl<T: Real> Event<T> {
         let j = self.joint;
         match self.change {
             Change::Stop => (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck),
-            Change::Release(mode) => state.modes[j] = mode,
+            Change::Release { mode, .. } => state.modes[j] = mode,
         }
         state
     }

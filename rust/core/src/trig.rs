@@ -8,6 +8,7 @@
 //! W. J. Cody and W. Waite 1980, *Software manual for the elementary functions*, chapter 8. The coefficients interpolate the series at
 //! Chebyshev's points of `r^2` up to `(pi/2)^2`; the polynomials are off by less than 4e-17, in single precision by 1.1e-10.
 
+use crate::number::Number;
 use crate::real::{Real, lit};
 
 /// What depends on the precision.
@@ -76,35 +77,52 @@ const SINGLE: Constants = Constants {
     ],
 };
 
+/// Angles up to this take the series, rad.
+pub const LARGEST: f64 = DOUBLE.largest;
+
+#[inline(always)]
+fn constants<T: Real>() -> (&'static Constants, bool) {
+    if T::default_epsilon() < lit(1e-12) { (&DOUBLE, true) } else { (&SINGLE, false) }
+}
+
+/// [`LARGEST`] for this precision.
+#[inline(always)]
+pub(crate) fn largest<T: Real>() -> f64 {
+    constants::<T>().0.largest
+}
+
 /// Sine and cosine of `x` rad.
 #[inline(always)]
 pub fn sin_cos<T: Real>(x: T) -> (T, T) {
-    let double = T::default_epsilon() < lit(1e-12);
-    let constants = if double { &DOUBLE } else { &SINGLE };
-    let within = x.abs() <= lit(constants.largest);
-    if !within {
-        return x.sin_cos();
-    }
-    let rounder: T = lit(constants.rounder);
-    let k = (x * lit(core::f64::consts::FRAC_1_PI) + rounder) - rounder;
-    let [high, middle, low] = constants.parts.map(lit::<T>);
-    let r = (x - k * high) - (k * middle + k * low);
+    if x.abs() <= lit(largest::<T>()) { series_of(x) } else { x.sin_cos() }
+}
+
+/// The same by the series alone.
+#[inline(always)]
+pub(crate) fn series_of<V: Number>(x: V) -> (V, V) {
+    let (constants, double) = constants::<V::Real>();
+    let c = |x: f64| V::of(lit(x));
+    let (one, rounder) = (c(1.0), c(constants.rounder));
+    let k = x.fused(c(core::f64::consts::FRAC_1_PI), rounder) - rounder;
+    let [high, middle, low] = constants.parts;
+    let r = (-k).fused(c(high), x) - k.fused(c(middle), k * c(low));
     let z = r * r;
-    let odd = k - ((k * lit(0.5) + rounder) - rounder) * lit(2.0);
-    let sign = T::one() - odd * odd * lit(2.0);
-    let sine = r + (r * z) * series(z, &constants.sine, double);
-    let cosine = (T::one() - z * lit(0.5)) + (z * z) * series(z, &constants.cosine, double);
+    let odd = k - (k.fused(c(0.5), rounder) - rounder) * c(2.0);
+    let sign = one - odd * odd * c(2.0);
+    let sine = (r * z).fused(series(z, &constants.sine, double), r);
+    let cosine = (z * z).fused(series(z, &constants.cosine, double), (-z).fused(c(0.5), one));
     (sine * sign, cosine * sign)
 }
 
 /// A polynomial by pairs of terms, which need not wait for each other; all eight, or the first five.
 #[inline(always)]
-fn series<T: Real>(z: T, c: &[f64; 8], whole: bool) -> T {
-    let pair = |i: usize| lit::<T>(c[i]) + z * lit(c[i + 1]);
+fn series<V: Number>(z: V, c: &[f64; 8], whole: bool) -> V {
+    let c = |i: usize| V::of(lit(c[i]));
+    let pair = |i: usize| z.fused(c(i + 1), c(i));
     let z2 = z * z;
     let z4 = z2 * z2;
-    let low = pair(0) + z2 * pair(2);
-    if whole { low + z4 * (pair(4) + z2 * pair(6)) } else { low + z4 * lit(c[4]) }
+    let low = z2.fused(pair(2), pair(0));
+    if whole { z4.fused(z2.fused(pair(6), pair(4)), low) } else { z4.fused(c(4), low) }
 }
 
 #[cfg(test)]

@@ -2,7 +2,8 @@
 //!
 //! `theta1` is the moving mass, `theta2` the component of its weight along the axis (0 when horizontal).
 
-use super::{Arm, Parameter};
+use super::{Arm, Balance, Parameter};
+use crate::number::Number;
 use crate::real::Real;
 use nalgebra::{SMatrix, SVector};
 
@@ -32,6 +33,13 @@ impl<T: Real> Arm<T, 1, 4> for Axis<T> {
 
     fn gravity(&self, theta: &[T; 4], _q: &SVector<T, 1>, tilt: T) -> SVector<T, 1> {
         SVector::<T, 1>::new(theta[1] * tilt.cos() + theta[0] * self.gravity * tilt.sin())
+    }
+
+    #[inline(always)]
+    fn balance<V: Number<Real = T>>(&self, theta: &[V; 4], _: &[V; 1], _: &[V; 1], tilt: V) -> Balance<V, 1> {
+        let (sine, cosine) = tilt.sine_cosine();
+        let along = theta[0] * V::of(self.gravity) * sine;
+        Balance { inertia: [[theta[0]]], bias: [theta[1].fused(cosine, along)] }
     }
 
     fn energy_regressor(&self, q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SVector<T, 4> {

@@ -2,7 +2,8 @@
 //!
 //! `theta1` is the inertia about the joint, `theta2 = m g l` the largest gravity torque.
 
-use super::{Arm, Parameter};
+use super::{Arm, Balance, Parameter};
+use crate::number::Number;
 use crate::real::Real;
 use crate::trig::sin_cos;
 use nalgebra::{SMatrix, SVector};
@@ -33,6 +34,11 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
 
     fn gravity(&self, theta: &[T; 4], q: &SVector<T, 1>, tilt: T) -> SVector<T, 1> {
         SVector::<T, 1>::new(theta[1] * sin_cos(q[0] + tilt).0)
+    }
+
+    #[inline(always)]
+    fn balance<V: Number<Real = T>>(&self, theta: &[V; 4], q: &[V; 1], _: &[V; 1], tilt: V) -> Balance<V, 1> {
+        Balance { inertia: [[theta[0]]], bias: [theta[1] * (q[0] + tilt).sine_cosine().0] }
     }
 
     fn energy_regressor(&self, q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SVector<T, 4> {

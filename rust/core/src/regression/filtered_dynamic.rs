@@ -45,16 +45,16 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
     }
 
     /// The rows and outputs at the next state, reached by `passage`.
-    #[inline]
+    #[inline(always)]
     pub fn update<A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
         variant: Variant,
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
-    ) -> (SMatrix<T, N, R>, SVector<T, N>) {
+    ) -> ([[T; R]; N], [T; N]) {
         let (momentum, potential) = arm.momentum_and_potential(&now.q, &now.dq);
-        let mut psi = SMatrix::zeros();
+        let mut psi = [[T::zero(); R]; N];
         match variant {
             Variant::Paper => self.paper::<A, R>(&momentum, passage, &mut psi),
             Variant::Exact => self.exact::<A, R>(&momentum, &potential, now, passage, &mut psi),
@@ -62,20 +62,20 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
         for i in 0..N {
             self.friction.write(A::INERTIAL, Some(i), |j, value| {
                 if j < R {
-                    psi[(i, j)] = value;
+                    psi[i][j] = value;
                 }
             });
         }
         (self.last, self.last_momentum, self.last_potential) = (*now, momentum, potential);
-        (psi, self.torque)
+        (psi, self.torque.data.0[0])
     }
 
-    #[inline]
+    #[inline(always)]
     fn paper<A: Arm<T, N, P>, const R: usize>(
         &mut self,
         momentum: &SMatrix<T, N, P>,
         passage: &Passage<T, N>,
-        psi: &mut SMatrix<T, N, R>,
+        psi: &mut [[T; R]; N],
     ) {
         let step = self.steps.whole(passage.h);
         for j in 0..A::INERTIAL {
@@ -84,7 +84,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
                 let derivative = step.paper_derivative(self.momentum[(i, j)], from, to);
                 let rest = step.held(self.potential[(i, j)], self.last_potential[(i, j)]);
                 (self.momentum[(i, j)], self.potential[(i, j)]) = (derivative, rest);
-                psi[(i, j)] = derivative + rest;
+                psi[i][j] = derivative + rest;
             }
         }
         self.friction.hold_torques(&step, &self.last.dq);
@@ -93,14 +93,14 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn exact<A: Arm<T, N, P>, const R: usize>(
         &mut self,
         momentum: &SMatrix<T, N, P>,
         potential: &SMatrix<T, N, P>,
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
-        psi: &mut SMatrix<T, N, R>,
+        psi: &mut [[T; R]; N],
     ) {
         let step = self.steps.whole(passage.h);
         for j in 0..A::INERTIAL {
@@ -108,7 +108,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
                 let low = step.ramp(self.momentum[(i, j)], self.last_momentum[(i, j)], momentum[(i, j)]);
                 let rest = step.ramp(self.potential[(i, j)], self.last_potential[(i, j)], potential[(i, j)]);
                 (self.momentum[(i, j)], self.potential[(i, j)]) = (low, rest);
-                psi[(i, j)] = (momentum[(i, j)] - low) * step.lambda + rest;
+                psi[i][j] = (momentum[(i, j)] - low) * step.lambda + rest;
             }
         }
         self.friction.filter_torques(&step, &self.last.dq, &now.dq);

@@ -5,7 +5,7 @@ use super::{Passage, Snapshot, Steps, Variant};
 use crate::arm::Arm;
 use crate::filter::Cutoff;
 use crate::real::{Real, lit};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
 /// State of the scheme. Of the rows over all parameters only the inertial entries are used.
 #[derive(Debug, Clone, Copy)]
@@ -46,7 +46,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
     }
 
     /// The row and output at the next state, reached by `passage`; `tau` is the torque that acts from then on.
-    #[inline]
+    #[inline(always)]
     pub fn update<A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
@@ -54,9 +54,9 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
         tau: &SVector<T, N>,
-    ) -> (SMatrix<T, 1, R>, SVector<T, 1>) {
+    ) -> ([[T; R]; 1], [T; 1]) {
         let energy = arm.energy_regressor(&now.q, &now.dq);
-        let mut psi = SMatrix::<T, 1, R>::zeros();
+        let mut psi = [T::zero(); R];
         match variant {
             Variant::Paper => self.paper::<A, R>(&energy, passage, &mut psi),
             Variant::Exact => self.exact::<A, R>(arm, &energy, now, passage, &mut psi),
@@ -67,15 +67,15 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
             }
         });
         (self.last, self.last_energy, self.last_supply) = (*now, energy, tau.dot(&now.dq));
-        (psi, SVector::<T, 1>::new(self.supply))
+        ([psi], [self.supply])
     }
 
-    #[inline]
+    #[inline(always)]
     fn paper<A: Arm<T, N, P>, const R: usize>(
         &mut self,
         energy: &SVector<T, P>,
         passage: &Passage<T, N>,
-        psi: &mut SMatrix<T, 1, R>,
+        psi: &mut [T; R],
     ) {
         let step = self.steps.whole(passage.h);
         for j in 0..A::INERTIAL {
@@ -86,14 +86,14 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
         self.supply = step.held(self.supply, self.last_supply);
     }
 
-    #[inline]
+    #[inline(always)]
     fn exact<A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
         energy: &SVector<T, P>,
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
-        psi: &mut SMatrix<T, 1, R>,
+        psi: &mut [T; R],
     ) {
         let step = self.steps.whole(passage.h);
         let half_way = self.last.half_way(now, passage.h);
@@ -108,7 +108,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
     }
 
     /// `F` of the power of torques that are held in two parts, velocity linear over the whole.
-    #[inline]
+    #[inline(always)]
     fn exact_supply(&mut self, now: &Snapshot<T, N>, passage: &Passage<T, N>) -> T {
         let parts = self.steps.parts(passage);
         let from = self.last.dq;

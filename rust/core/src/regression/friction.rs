@@ -31,7 +31,7 @@ pub(super) struct Swing<T> {
 
 impl<T: Real> Swing<T> {
     /// From one velocity to another, linear in between.
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(from: T, to: T) -> Self {
         let turns = (from > T::zero() && to < T::zero()) || (from < T::zero() && to > T::zero());
         let sign = if turns { sgn(from) } else { sgn(from + to) };
@@ -39,7 +39,7 @@ impl<T: Real> Swing<T> {
     }
 
     /// `G`, what the sign adds to its filter.
-    #[inline]
+    #[inline(always)]
     pub(super) fn sign(&self, step: &Step<T>) -> T {
         let mut end = T::one();
         if self.turns {
@@ -50,7 +50,7 @@ impl<T: Real> Swing<T> {
     }
 
     /// `F` of the speed.
-    #[inline]
+    #[inline(always)]
     pub(super) fn speed(&self, step: &Step<T>, y: T) -> T {
         if !self.turns {
             return step.ramp(y, self.from.abs(), self.to.abs());
@@ -60,14 +60,14 @@ impl<T: Real> Swing<T> {
     }
 
     /// `F` of the squared velocity.
-    #[inline]
+    #[inline(always)]
     pub(super) fn square(&self, step: &Step<T>, y: T) -> T {
         let change = self.to - self.from;
         step.curve(y, self.from * self.from, self.to * self.to, change * change * lit(-0.25))
     }
 
     /// Integral of the speed over an interval of unit length.
-    #[inline]
+    #[inline(always)]
     pub(super) fn distance(&self) -> T {
         let (from, to) = (self.from.abs(), self.to.abs());
         let total = from + to;
@@ -76,7 +76,7 @@ impl<T: Real> Swing<T> {
     }
 
     /// Integral of the squared velocity over an interval of unit length.
-    #[inline]
+    #[inline(always)]
     pub(super) fn distance_squared(&self) -> T {
         (self.from * (self.from + self.to) + self.to * self.to) * lit(1.0 / 3.0)
     }
@@ -92,13 +92,13 @@ pub(super) struct Friction<T, const N: usize> {
 
 impl<T: Real, const N: usize> Friction<T, N> {
     /// Filters that start at rest.
-    #[inline]
+    #[inline(always)]
     pub(super) fn zero() -> Self {
         Self { viscous: SVector::zeros(), coulomb: SVector::zeros(), constant: SVector::zeros() }
     }
 
     /// Torques at a velocity, the paper's filter over them as held.
-    #[inline]
+    #[inline(always)]
     pub(super) fn hold_torques(&mut self, step: &Step<T>, dq: &SVector<T, N>) {
         for j in 0..N {
             self.viscous[j] = step.held(self.viscous[j], dq[j]);
@@ -108,7 +108,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
     }
 
     /// Torques over a swing.
-    #[inline]
+    #[inline(always)]
     pub(super) fn filter_torques(&mut self, step: &Step<T>, from: &SVector<T, N>, to: &SVector<T, N>) {
         for j in 0..N {
             let swing = Swing::new(from[j], to[j]);
@@ -119,7 +119,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
     }
 
     /// Dissipated powers at a velocity, the paper's filter over them as held.
-    #[inline]
+    #[inline(always)]
     pub(super) fn hold_powers(&mut self, step: &Step<T>, dq: &SVector<T, N>) {
         for j in 0..N {
             self.viscous[j] = step.held(self.viscous[j], dq[j] * dq[j]);
@@ -129,7 +129,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
     }
 
     /// Dissipated powers over a swing.
-    #[inline]
+    #[inline(always)]
     pub(super) fn filter_powers(&mut self, step: &Step<T>, from: &SVector<T, N>, to: &SVector<T, N>) {
         for j in 0..N {
             let swing = Swing::new(from[j], to[j]);
@@ -140,7 +140,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
     }
 
     /// Dissipated energies of a swing of `h` seconds by the trapezoidal rule, as in the paper.
-    #[inline]
+    #[inline(always)]
     pub(super) fn add_trapezes(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
         let half = h * lit(0.5);
         for j in 0..N {
@@ -151,7 +151,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
     }
 
     /// Dissipated energies of a swing of `h` seconds.
-    #[inline]
+    #[inline(always)]
     pub(super) fn add_energies(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
         for j in 0..N {
             let swing = Swing::new(from[j], to[j]);
@@ -162,7 +162,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
     }
 
     /// The entries of a row over the `R` parameters of which the first `inertial` are not friction: joint `j`'s only, or all.
-    #[inline]
+    #[inline(always)]
     pub(super) fn write(&self, inertial: usize, only: Option<usize>, mut put: impl FnMut(usize, T)) {
         for j in 0..N {
             if only.is_none_or(|joint| joint == j) {
