@@ -189,7 +189,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         }
         let outcome = if self.past.seen == Seen::Nothing {
             if dq.is_some() || self.settings.variant == Variant::Paper {
-                self.start(&Snapshot { q: *q, dq: dq.copied().unwrap_or_else(SVector::zeros) }, tau);
+                self.start(Snapshot { q: *q, dq: dq.copied().unwrap_or_else(SVector::zeros) }, *tau);
             }
             Outcome::Starting
         } else {
@@ -230,9 +230,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         fine
     }
 
-    fn start(&mut self, now: &Snapshot<T, N>, tau: &SVector<T, N>) {
+    /// Takes its own copies, so that those of the hot code can stay in registers.
+    #[cold]
+    #[inline(never)]
+    fn start(&mut self, now: Snapshot<T, N>, tau: SVector<T, N>) {
         let Settings { scheme, variant, cutoff, .. } = &self.settings;
-        let (arm, variant) = (&self.arm, *variant);
+        let (arm, variant, now, tau) = (&self.arm, *variant, &now, &tau);
         self.regression = Some(match scheme {
             Scheme::FilteredDynamic => Regression::Dynamic(FilteredDynamic::new(arm, variant, cutoff, now)),
             Scheme::SuppliedEnergy => Regression::Energy(SuppliedEnergy::new(arm, now, tau)),
@@ -261,7 +264,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         // The state half-way between the two samples; on the way there from the one before, the torque changed at the last sample.
         let (now, held) = (Snapshot { q: between, dq: difference }, past.tau);
         if past.seen == Seen::One {
-            self.start(&now, &held);
+            self.start(now, held);
             return Outcome::Starting;
         }
         let split = past.h * half;
@@ -298,7 +301,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         };
         if outcome == Outcome::Rejected {
             // Filters and integrals hold what least squares cannot use; the equations hold from any start.
-            self.start(now, tau);
+            self.start(*now, *tau);
         }
         outcome
     }

@@ -10,15 +10,19 @@ use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 use nalgebra::SMatrix;
 
-/// The matrix, column by column.
+/// The matrix, column by column, and its diagonal once more, side by side for the check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Plain<T, const R: usize> {
     p: [[T; R]; R],
+    diagonal: [T; R],
 }
 
 impl<T: Real, const R: usize> Plain<T, R> {
     pub(super) fn of(p: &SMatrix<T, R, R>) -> Self {
-        Self { p: core::array::from_fn(|j| core::array::from_fn(|i| p[(i.min(j), i.max(j))])) }
+        Self {
+            p: core::array::from_fn(|j| core::array::from_fn(|i| p[(i.min(j), i.max(j))])),
+            diagonal: core::array::from_fn(|i| p[(i, i)]),
+        }
     }
 
     pub(super) fn matrix(&self) -> SMatrix<T, R, R> {
@@ -26,7 +30,7 @@ impl<T: Real, const R: usize> Plain<T, R> {
     }
 
     pub(super) fn diagonal(&self) -> [T; R] {
-        core::array::from_fn(|i| self.p[i][i])
+        self.diagonal
     }
 
     /// Learns from rows of `Psi'` and their errors; the leverage, or nothing changed because `P` would not stay positive definite.
@@ -66,9 +70,11 @@ impl<T: Real, const R: usize> Plain<T, R> {
             rate[m] *= inverse[m];
             leverage += T::one() - forgetting.mu * inverse[m];
         }
-        if !(sound & self.stays_positive::<M>(&gain, &inverse)) {
+        let (diagonal, positive) = self.shrunk::<C, M>(&gain, &inverse);
+        if !(sound & positive) {
             return None;
         }
+        self.diagonal = diagonal;
         for m in 0..M {
             for i in 0..R {
                 theta[i] = C::fused(gain[m][i], rate[m], theta[i]);
@@ -110,18 +116,19 @@ impl<T: Real, const R: usize> Plain<T, R> {
         product
     }
 
-    /// Whether the diagonal stays positive, which no rounding short of lost definiteness would change.
+    /// The new diagonal, and whether it stays positive, which no rounding short of lost definiteness would change.
     #[inline(always)]
-    fn stays_positive<const M: usize>(&self, gain: &[[T; R]; M], inverse: &[T; M]) -> bool {
-        let mut positive = true;
-        for i in 0..R {
-            let mut off = T::zero();
-            for m in 0..M {
-                off += gain[m][i] * gain[m][i] * inverse[m];
+    fn shrunk<C: Cpu, const M: usize>(&self, gain: &[[T; R]; M], inverse: &[T; M]) -> ([T; R], bool) {
+        let (mut diagonal, mut positive) = (self.diagonal, true);
+        for m in 0..M {
+            for i in 0..R {
+                diagonal[i] = C::fused(gain[m][i] * gain[m][i], -inverse[m], diagonal[i]);
             }
-            positive &= self.p[i][i] > off;
         }
-        positive
+        for i in 0..R {
+            positive &= diagonal[i] > T::zero();
+        }
+        (diagonal, positive)
     }
 
     /// Takes the sum of `gain gain' / total` off. The product of two gains is the same for `(i, j)` and `(j, i)`, and need not wait for the
@@ -148,12 +155,13 @@ impl<T: Real, const R: usize> Plain<T, R> {
     }
 
     fn forget(&mut self, forgetting: &Forgetting<T, R>) {
-        let (lift, limited) = forgetting.lift(&self.diagonal());
+        let (lift, limited) = forgetting.lift(&self.diagonal);
         let grow = T::one() / forgetting.mu;
         for j in 0..R {
             for i in 0..R {
                 self.p[j][i] *= if limited { lift[i] * lift[j] } else { grow };
             }
+            self.diagonal[j] = self.p[j][j];
         }
     }
 }
