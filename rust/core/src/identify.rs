@@ -256,21 +256,22 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         let inverse = if h == past.h { past.inverse } else { T::one() / h };
         let difference = (q - past.q) * inverse;
         let between = (past.q + q) * half;
-        if dq.is_some() || self.settings.variant == Variant::Paper {
+        let (now, passage, tau) = if dq.is_some() || self.settings.variant == Variant::Paper {
             let now = Snapshot { q: *q, dq: dq.copied().unwrap_or(difference) };
             let passage = Passage { h, split: h * half, first: past.tau, second: past.tau, middle: between };
-            return self.regress::<C>(&now, &passage, tau);
-        }
-        // The state half-way between the two samples; on the way there from the one before, the torque changed at the last sample.
-        let (now, held) = (Snapshot { q: between, dq: difference }, past.tau);
-        if past.seen == Seen::One {
-            self.start(now, held);
-            return Outcome::Starting;
-        }
-        let split = past.h * half;
-        let passage =
-            Passage { h: split + h * half, split, first: past.tau_before, second: held, middle: past.q };
-        self.regress::<C>(&now, &passage, &held)
+            (now, passage, *tau)
+        } else {
+            // The state half-way between the two samples; on the way there from the one before, the torque changed at the last sample.
+            let (now, held, split) = (Snapshot { q: between, dq: difference }, past.tau, past.h * half);
+            if past.seen == Seen::One {
+                self.start(now, held);
+                return Outcome::Starting;
+            }
+            let passage =
+                Passage { h: split + h * half, split, first: past.tau_before, second: held, middle: past.q };
+            (now, passage, held)
+        };
+        self.regress::<C>(&now, &passage, &tau)
     }
 
     #[inline(always)]

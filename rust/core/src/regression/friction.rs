@@ -43,8 +43,7 @@ impl<T: Real> Swing<T> {
     pub(super) fn sign(&self, step: &Step<T>) -> T {
         let mut end = T::one();
         if self.turns {
-            // Share of the interval after the reversal.
-            end = (-step.x * (self.to / (self.to - self.from))).exp();
+            end = after_reversal(step.x, self.from, self.to);
         }
         self.sign * (end + end - T::one() - step.decay)
     }
@@ -80,6 +79,12 @@ impl<T: Real> Swing<T> {
     pub(super) fn distance_squared(&self) -> T {
         (self.from * (self.from + self.to) + self.to * self.to) * lit(1.0 / 3.0)
     }
+}
+
+/// Decay over the share of the interval after the reversal.
+#[inline(never)]
+fn after_reversal<T: Real>(x: T, from: T, to: T) -> T {
+    (-x * (to / (to - from))).exp()
 }
 
 /// One entry per joint for each of viscous, Coulomb and constant friction.
