@@ -285,18 +285,18 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         let outcome = match &mut self.regression {
             None => Outcome::Starting,
             Some(Regression::Dynamic(scheme)) => {
-                let (psi, y) = scheme.update(arm, variant, now, passage);
+                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, passage);
                 match self.rls.learn::<C, _>(&psi, &y) {
                     Update::Used(error) => Outcome::Updated(error),
                     Update::Rejected => Outcome::Rejected,
                 }
             }
             Some(Regression::Energy(scheme)) => {
-                let (psi, y) = scheme.update(arm, variant, now, passage, tau);
+                let (psi, y) = scheme.update::<A, R>(arm, variant, now, passage, tau);
                 scalar(self.rls.learn::<C, _>(&psi, &y))
             }
             Some(Regression::Power(scheme)) => {
-                let (psi, y) = scheme.update(arm, variant, now, passage, tau);
+                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, passage, tau);
                 scalar(self.rls.learn::<C, _>(&psi, &y))
             }
         };
@@ -318,7 +318,9 @@ struct Take<'a, T: Real, A, const N: usize, const P: usize, const R: usize> {
     tau: &'a SVector<T, N>,
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Work for Take<'_, T, A, N, P, R> {
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Work
+    for Take<'_, T, A, N, P, R>
+{
     type Output = Outcome<T, N>;
 
     #[inline(always)]

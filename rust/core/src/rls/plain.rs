@@ -93,18 +93,17 @@ impl<T: Real, const R: usize> Plain<T, R> {
         let mut product = [[T::zero(); R]; M];
         for c in 0..R / LANES {
             // Two strands, so that additions need not wait for each other.
-            let mut sums = [[[T::zero(); LANES]; 2]; M];
-            for j in 0..R {
-                for m in 0..M {
-                    for l in 0..LANES {
-                        let sum = &mut sums[m][j & 1][l];
-                        *sum = C::fused(self.p[j][c * LANES + l], rows[m][j], *sum);
-                    }
-                }
+            let (mut even, mut odd) = ([[T::zero(); LANES]; M], [[T::zero(); LANES]; M]);
+            for k in 0..R / 2 {
+                self.add_column::<C, M>(&mut even, c, 2 * k, rows);
+                self.add_column::<C, M>(&mut odd, c, 2 * k + 1, rows);
+            }
+            if R % 2 == 1 {
+                self.add_column::<C, M>(&mut even, c, R - 1, rows);
             }
             for m in 0..M {
                 for l in 0..LANES {
-                    product[m][c * LANES + l] = sums[m][0][l] + sums[m][1][l];
+                    product[m][c * LANES + l] = even[m][l] + odd[m][l];
                 }
             }
         }
@@ -114,6 +113,22 @@ impl<T: Real, const R: usize> Plain<T, R> {
             }
         }
         product
+    }
+
+    /// Adds lane `c` of column `j` times the rows' entries `j`.
+    #[inline(always)]
+    fn add_column<C: Cpu, const M: usize>(
+        &self,
+        sums: &mut [[T; LANES]; M],
+        c: usize,
+        j: usize,
+        rows: &[[T; R]; M],
+    ) {
+        for m in 0..M {
+            for l in 0..LANES {
+                sums[m][l] = C::fused(self.p[j][c * LANES + l], rows[m][j], sums[m][l]);
+            }
+        }
     }
 
     /// The new diagonal, and whether it stays positive, which no rounding short of lost definiteness would change.
@@ -136,12 +151,9 @@ impl<T: Real, const R: usize> Plain<T, R> {
     #[inline(always)]
     fn take_off<C: Cpu, const M: usize>(&mut self, gain: &[[T; R]; M], inverse: &[T; M]) {
         for j in 0..R {
-            for c in 0..R / LANES {
+            for i in 0..lead::<R>() {
                 for m in 0..M {
-                    for l in 0..LANES {
-                        let i = c * LANES + l;
-                        self.p[j][i] = C::fused(-(gain[m][i] * gain[m][j]), inverse[m], self.p[j][i]);
-                    }
+                    self.p[j][i] = C::fused(-(gain[m][i] * gain[m][j]), inverse[m], self.p[j][i]);
                 }
             }
         }
