@@ -62,7 +62,7 @@ bench-peers: $(VENV)/.built ## the core beside plain C, numpy, padasip, filterpy
 	cargo run -q --release -p armgap-benches --bin peers
 	$(BIN)/python benches/peers/compare.py
 
-bench-instructions: tools ## instructions per sample under valgrind
+bench-instructions: tools ## instructions per sample, counted one by one
 	cargo build -q --release -p armgap-benches --bin instructions
 	$(PYTHON) benches/instructions.py target/release/instructions
 
