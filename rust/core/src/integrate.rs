@@ -7,9 +7,11 @@
 
 use crate::arm::Arm;
 use crate::effect::Pulse;
+use crate::glide::{Glided, Modes, Place, Pose, Span, glide};
 use crate::plant::{Mode, Motion, Plant};
 use crate::real::{Real, lit};
 use crate::transmission::Hidden;
+use crate::trig::NEAR;
 use nalgebra::SVector;
 
 /// Mode changes located within one sub-step before the rest of it is taken with all crossing joints held.
@@ -20,6 +22,9 @@ const MAX_REFINEMENTS: usize = 4;
 
 /// A correction of this part of a step is as good on a straight line: what is left out is of the order of its square.
 const STRAIGHT: f64 = 1e-6;
+
+/// The same on a curve of constant rate of acceleration, whose error is of the order of its cube.
+const CURVED: f64 = 1e-3;
 
 /// Attempts at the instant of a release.
 const MAX_FALSE_POSITIONS: usize = 12;
@@ -90,15 +95,41 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
         return;
     }
     let count = substeps.max(1);
+    if count == 1 && plant.glides() && glided(plant, state, interval) {
+        return;
+    }
     let dt = interval.h / lit(count as f64);
     for i in 0..count {
         let from = dt * lit(i as f64);
         if plant.smoothing() > T::zero() {
-            *state = Step { plant, interval }.smooth(state, from, dt);
+            *state = Step::new(plant, interval, state).smooth(state, from, dt);
         } else {
-            Step { plant, interval }.exact(state, from, dt);
+            Step::new(plant, interval, state).exact(state, from, dt);
         }
     }
+}
+
+/// One sample interval in one step, if no friction mode changes within it.
+#[inline(always)]
+fn glided<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
+    plant: &Plant<T, A, N, P>,
+    state: &mut State<T, N>,
+    interval: &Interval<T, N>,
+) -> bool {
+    let mut span = Span { t: interval.t, h: interval.h, tau: [[T::zero(); N]; 3] };
+    let mut direction = [T::zero(); N];
+    for j in 0..N {
+        let Pulse { start, middle, end } = interval.torque[j];
+        (span.tau[0][j], span.tau[1][j], span.tau[2][j]) = (start, middle, end);
+        direction[j] = state.modes[j].direction();
+    }
+    let start = plant.rigid().pose(&Place { q: state.q.into(), dq: state.dq.into() });
+    let Glided { pose, wrong } = glide(plant, &start, &Modes::new(direction), &span);
+    let right = wrong <= T::zero();
+    if right {
+        (state.q, state.dq) = (pose.place.q.into(), pose.place.dq.into());
+    }
+    right
 }
 
 /// One sample interval with exact friction in one step, from mode change to mode change.
@@ -108,21 +139,33 @@ pub(crate) fn exact<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     state: &mut State<T, N>,
     interval: &Interval<T, N>,
 ) {
-    Step { plant, interval }.exact(state, T::zero(), interval.h);
+    Step::new(plant, interval, state).exact(state, T::zero(), interval.h);
 }
 
 /// One sub-step's surroundings.
 struct Step<'a, T: Real, A, const N: usize, const P: usize> {
     plant: &'a Plant<T, A, N, P>,
     interval: &'a Interval<'a, T, N>,
+    /// Where the sub-step starts; sines and cosines within it are turned on from here.
+    origin: Pose<T, N>,
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N, P> {
+impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A, N, P> {
+    #[inline]
+    fn new(plant: &'a Plant<T, A, N, P>, interval: &'a Interval<'a, T, N>, state: &State<T, N>) -> Self {
+        let origin = plant.rigid().pose(&Place { q: state.q.into(), dq: state.dq.into() });
+        Self { plant, interval, origin }
+    }
+
     #[inline]
     fn motion(&self, x: T, state: &State<T, N>) -> Motion<T, N> {
+        let place = Place { q: state.q.into(), dq: state.dq.into() };
+        let (mut pose, far) = self.plant.rigid().near(&self.origin, &place);
+        if far > lit(NEAR) {
+            pose = self.plant.rigid().pose(&place);
+        }
         let tau = self.interval.torque_at(x);
-        let State { q, dq, modes, hidden } = state;
-        self.plant.acceleration(self.interval.t + x, q, dq, &tau, modes, hidden)
+        self.plant.acceleration(self.interval.t + x, &pose, &tau, &state.modes, &state.hidden)
     }
 
     /// `state` moved on by `dt` with the rates `(dq, motion)` of some stage.
@@ -190,8 +233,17 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         }
         let k1 = self.settle(state, x);
         let mut last = self.runge_kutta(state, x, left, &k1);
-        hold_reversed(&mut last);
+        self.hold_reversed(&mut last);
         *state = last;
+    }
+
+    /// Holds every joint with dry friction whose velocity contradicts its mode.
+    fn hold_reversed(&self, state: &mut State<T, N>) {
+        for j in (0..N).filter(|j| self.plant.is_dry(*j)) {
+            if state.dq[j] * state.modes[j].direction() < T::zero() {
+                (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck);
+            }
+        }
     }
 
     /// Releases stuck joints that friction cannot hold, and sticks joints that were released to no avail; returns the motion.
@@ -228,7 +280,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         let (mut found, mut worst) = (None, T::zero());
         for j in 0..N {
             if state.dq[j] != T::zero() {
-                if state.modes[j] != Mode::of(state.dq[j]) {
+                let contradicts = self.plant.is_dry(j) || state.modes[j] == Mode::Stuck;
+                if contradicts && state.modes[j] != Mode::of(state.dq[j]) {
                     return Some((j, Mode::of(state.dq[j])));
                 }
             } else if state.modes[j] == Mode::Stuck {
@@ -238,7 +291,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
                 if excess > worst && !tried[j] {
                     (found, worst) = (Some((j, Mode::of(direction))), excess);
                 }
-            } else if motion.ddq[j] * state.modes[j].direction() < T::zero() {
+            } else if self.plant.is_dry(j) && motion.ddq[j] * state.modes[j].direction() < T::zero() {
                 return Some((j, Mode::Stuck));
             }
         }
@@ -256,7 +309,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         k1: &Motion<T, N>,
     ) -> Option<Event<T>> {
         let reverses =
-            |j: usize| state.modes[j] != Mode::Stuck && trial.dq[j] * state.modes[j].direction() < T::zero();
+            |j: usize| self.plant.is_dry(j) && trial.dq[j] * state.modes[j].direction() < T::zero();
         let any_stuck = state.modes.contains(&Mode::Stuck);
         if !any_stuck && !(0..N).any(reverses) {
             return None;
@@ -340,6 +393,11 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
                 reached = self.moved(&reached, correction * dt, &reached, &slope);
                 break;
             }
+            if correction.abs() < lit(CURVED) && !self.plant.is_driven() && s > lit(0.01) {
+                let rate = (slope.ddq - k1.ddq) / ((s - correction) * dt);
+                let (part, reached) = curved(&reached, event.joint, &slope.ddq, &rate);
+                return Located { length: (s - correction) * dt + part, reached };
+            }
             reached = self.runge_kutta(state, x, s * dt, k1);
         }
         Located { length: s * dt, reached }
@@ -384,6 +442,22 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         let reached = reached.unwrap_or_else(|| self.runge_kutta(state, x, high * dt, k1));
         Located { length: high * dt, reached }
     }
+}
+
+/// The state where joint `j`'s velocity vanishes, close to `state` with these accelerations and their rates, and the time to there.
+fn curved<T: Real, const N: usize>(
+    state: &State<T, N>,
+    j: usize,
+    ddq: &SVector<T, N>,
+    rate: &SVector<T, N>,
+) -> (T, State<T, N>) {
+    let half: T = lit(0.5);
+    let first = -state.dq[j] / ddq[j];
+    let d = -(state.dq[j] + half * rate[j] * first * first) / ddq[j];
+    let mut next = *state;
+    next.q += (state.dq + (ddq + rate * (d / lit(3.0))) * (half * d)) * d;
+    next.dq += (ddq + rate * (half * d)) * d;
+    (d, next)
 }
 
 /// A change of one joint's mode at the fraction `s` of a step.
@@ -448,13 +522,4 @@ fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
         s = next;
     }
     s
-}
-
-/// Holds every joint whose velocity contradicts its mode.
-fn hold_reversed<T: Real, const N: usize>(state: &mut State<T, N>) {
-    for j in 0..N {
-        if state.dq[j] * state.modes[j].direction() < T::zero() {
-            (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck);
-        }
-    }
 }

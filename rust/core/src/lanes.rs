@@ -119,4 +119,13 @@ impl<T: Real, C: Cpu, const W: usize> Number for Lanes<T, C, W> {
         }
         Self::new(x)
     }
+
+    #[inline(always)]
+    fn any_zero(self) -> bool {
+        let mut any = false;
+        for l in 0..W {
+            any |= self.0[l] == T::zero();
+        }
+        any
+    }
 }

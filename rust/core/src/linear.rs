@@ -6,6 +6,9 @@ use crate::real::lit;
 /// Solves `a x = b` for symmetric positive definite `a` by `L D L'`; an indefinite `a` gives non-finite numbers, not a panic.
 #[inline(always)]
 pub fn solve_positive_definite<V: Number, const N: usize>(mut a: [[V; N]; N], mut b: [V; N]) -> [V; N] {
+    if N == 2 {
+        return cramer(&a, &b);
+    }
     let one = V::of(lit(1.0));
     let mut pivots = b;
     for k in 0..N {
@@ -25,4 +28,16 @@ pub fn solve_positive_definite<V: Number, const N: usize>(mut a: [[V; N]; N], mu
         b[k] = b[k] * pivots[k];
     }
     b
+}
+
+/// Two equations by Cramer's rule, which divides once.
+#[inline(always)]
+fn cramer<V: Number, const N: usize>(a: &[[V; N]; N], b: &[V; N]) -> [V; N] {
+    let (i, j) = (0, N - 1);
+    let one = V::of(lit(1.0));
+    let scale = one / a[i][i].fused(a[j][j], -(a[i][j] * a[j][i]));
+    let mut x = *b;
+    x[i] = a[j][j].fused(b[i], -(a[i][j] * b[j])) * scale;
+    x[j] = a[i][i].fused(b[j], -(a[j][i] * b[i])) * scale;
+    x
 }

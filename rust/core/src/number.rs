@@ -31,6 +31,9 @@ pub trait Number:
 
     /// `zero` where `self` is zero, `other` where it is not.
     fn where_zero(self, zero: Self, other: Self) -> Self;
+
+    /// Whether any of them is zero.
+    fn any_zero(self) -> bool;
 }
 
 impl<T: Real> Number for T {
@@ -64,5 +67,10 @@ impl<T: Real> Number for T {
     #[inline(always)]
     fn where_zero(self, zero: Self, other: Self) -> Self {
         if self == T::zero() { zero } else { other }
+    }
+
+    #[inline(always)]
+    fn any_zero(self) -> bool {
+        self == T::zero()
     }
 }

@@ -6,8 +6,9 @@
 
 use crate::arm::{Arm, Balance};
 use crate::effect::{Active, Hooks, JointPoint};
-use crate::glide::{Body, Instant, Place, Rigid};
+use crate::glide::{Body, Instant, Place, Pose, Rigid};
 use crate::linear::solve_positive_definite;
+use crate::number::Number;
 use crate::real::{Real, lit};
 use crate::transmission::{Drive, Hidden};
 use nalgebra::SVector;
@@ -204,6 +205,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.effects.iter().flatten()
     }
 
+    /// Whether joint `j` has dry friction, or effects that may tell in which direction it slides.
+    #[inline]
+    pub fn is_dry(&self, j: usize) -> bool {
+        self.rigid.coulomb[j] > T::zero() || self.hooks.iter().any(|on| on.force || on.coulomb)
+    }
+
     /// Width of the smoothed sign, zero for exact dry friction.
     pub fn smoothing(&self) -> T {
         self.smoothing
@@ -223,7 +230,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
     /// Direction in which joint `j` slides, between -1 and 1 where friction is smoothed.
     #[inline]
-    fn sliding(&self, j: usize, dq: &SVector<T, N>, modes: &[Mode; N]) -> T {
+    fn sliding(&self, j: usize, dq: &[T; N], modes: &[Mode; N]) -> T {
         if self.smoothing > T::zero() { (dq[j] / self.smoothing).tanh() } else { modes[j].direction() }
     }
 
@@ -273,17 +280,16 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     pub fn acceleration(
         &self,
         t: T,
-        q: &SVector<T, N>,
-        dq: &SVector<T, N>,
+        pose: &Pose<T, N>,
         tau: &SVector<T, N>,
         modes: &[Mode; N],
         hidden: &Hidden<T, N>,
     ) -> Motion<T, N> {
         if !self.is_driven() {
-            return self.undriven(t, q, dq, tau, modes, hidden);
+            return self.undriven(t, pose, tau, modes, hidden);
         }
         let transmitted = self.transmitted(tau, hidden);
-        let mut motion = self.undriven(t, q, dq, &transmitted, modes, hidden);
+        let mut motion = self.undriven(t, pose, &transmitted, modes, hidden);
         for j in 0..N {
             if let Some(drive) = &self.drives[j] {
                 motion.ddtwist[j] = (tau[j] - transmitted[j]) / drive.inertia - motion.ddq[j];
@@ -297,14 +303,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     fn undriven(
         &self,
         t: T,
-        q: &SVector<T, N>,
-        dq: &SVector<T, N>,
+        pose: &Pose<T, N>,
         tau: &SVector<T, N>,
         modes: &[Mode; N],
         hidden: &Hidden<T, N>,
     ) -> Motion<T, N> {
-        let Balance { inertia, bias } = self.rigid.balance(&(*q).into(), &(*dq).into());
-        let memory = self.memory(q, hidden);
+        let Pose { place: Place { q, dq }, balance: Balance { inertia, bias }, .. } = pose;
+        let memory = if self.remembers { self.memory(&SVector::from(*q), hidden) } else { hidden.memory };
         let mut rhs = SVector::<T, N>::zeros();
         for j in 0..N {
             let mut x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
@@ -315,7 +320,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             rhs[j] = tau[j] - bias[j] - self.rigid.viscous[j] * dq[j] - self.dry_friction(j, &x, modes[j])
                 + self.force(j, &x);
         }
-        self.solve(&inertia, &rhs, modes)
+        self.solve(inertia, &rhs, modes)
     }
 
     /// `M ddq = rhs` with the rows and columns of stuck joints taken out.
@@ -381,7 +386,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         if self.smoothing == T::zero() && !self.is_driven() {
             return fastest;
         }
-        let inertia = self.rigid.balance(&(*q).into(), &[T::zero(); N]).inertia;
+        let inertia = self.rigid.balance(&Place { q: (*q).into(), dq: [T::zero(); N] }).inertia;
         for j in 0..N {
             let free = Self::free_inertia(j, &inertia);
             if self.smoothing > T::zero() {
@@ -398,23 +403,32 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Body<T, N> for Plant<T, A, N, P> {
     #[inline(always)]
-    fn balance(&self, place: &Place<T, N>) -> Balance<T, N> {
-        self.rigid.balance(&place.q, &place.dq)
+    fn near(&self, known: &Pose<T, N>, place: &Place<T, N>) -> (Pose<T, N>, T) {
+        self.rigid.near(known, place)
+    }
+
+    #[inline(always)]
+    fn dry(&self, j: usize) -> T {
+        if self.is_dry(j) { T::one() } else { T::zero() }
     }
 
     #[inline(always)]
     fn pull(&self, at: &Instant<'_, T, N>, direction: &[T; N]) -> [T; N] {
-        let Instant { t, place: Place { q, dq }, tau, balance } = at;
-        let mut pull = **tau;
+        let Pose { place: Place { q, dq }, balance, .. } = at.pose;
+        let mut pull = *at.tau;
         for j in 0..N {
-            let rigid = tau[j] - balance.bias[j] - self.rigid.viscous[j] * dq[j];
-            let mut x = self.point(j, *t, q[j], dq[j], tau[j], balance.bias[j]);
-            let level = if direction[j] == T::zero() { T::zero() } else { self.level(j, &x, direction[j]) };
-            pull[j] = rigid - level * direction[j];
-            if self.hooks[j].force {
-                x.other = direction[(j + 1) % N];
-                pull[j] += self.force(j, &x);
+            pull[j] = pull[j] - balance.bias[j] - self.rigid.viscous[j] * dq[j];
+            let hooks = self.hooks[j];
+            if !(hooks.coulomb || hooks.force) {
+                pull[j] -= self.rigid.coulomb[j].larger(T::zero()) * direction[j];
+                continue;
             }
+            let mut x = self.point(j, at.t, q[j], dq[j], at.tau[j], balance.bias[j]);
+            if direction[j] != T::zero() {
+                pull[j] -= self.level(j, &x, direction[j]) * direction[j];
+            }
+            x.other = direction[(j + 1) % N];
+            pull[j] += self.force(j, &x);
         }
         pull
     }
@@ -424,7 +438,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Body<T, N> for Pl
         let mut excess = [T::zero(); N];
         for j in 0..N {
             if direction[j] == T::zero() {
-                excess[j] = self.excess(j, at.t, at.place.q[j], at.tau[j], holding[j]).0;
+                excess[j] = self.excess(j, at.t, at.pose.place.q[j], at.tau[j], holding[j]).0;
             }
         }
         excess

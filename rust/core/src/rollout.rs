@@ -4,10 +4,10 @@
 //! ([`crate::glide`]); a lane whose modes change within it takes that step alone ([`crate::integrate`]) and goes back into its lane. A
 //! run whose plant has more to it than friction modes, or that has no neighbours, is made alone from start to end.
 
-use crate::arm::{Arm, Balance};
+use crate::arm::Arm;
 use crate::cpu::{Cpu, Level, Work};
 use crate::effect::{Hooks, JointPoint, Pulse};
-use crate::glide::{Body, Glided, Instant, Place, Rigid, Span, glide};
+use crate::glide::{Body, Glided, Instant, Modes, Place, Pose, Rigid, Span, glide};
 use crate::integrate::{Interval, State, exact};
 use crate::lanes::Lanes;
 use crate::number::Number;
@@ -45,7 +45,7 @@ pub struct Together<'r, 'a, T: Real, A, const N: usize, const P: usize> {
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Together<'_, '_, T, A, N, P> {
     /// Makes them with these instructions.
     pub fn make(self, level: Level) {
-        level.run(self);
+        level.run_wide(self);
     }
 }
 
@@ -71,6 +71,8 @@ struct Bundle<'a, T: Real, C, A, const N: usize, const P: usize> {
     alike: bool,
     /// Hooks in use on each joint, in any lane.
     hooks: [Hooks; N],
+    /// 1 where a joint has dry friction.
+    dry: [Wide<T, C>; N],
 }
 
 impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Bundle<'a, T, C, A, N, P> {
@@ -90,7 +92,8 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Bundl
             coulomb: plants.iter().any(|plant| plant.hooks(j).coulomb),
             ..Hooks::NONE
         });
-        Self { plants, rigid, alike, hooks }
+        let dry = core::array::from_fn(|j| Lanes::new(plants.map(|plant| plant.dry(j))));
+        Self { plants, rigid, alike, hooks, dry }
     }
 
     /// Coulomb levels of sliding joints, and torques of the effects.
@@ -120,8 +123,15 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Bundl
 
     #[inline]
     fn point(&self, at: &Instant<'_, Wide<T, C>, N>, j: usize, l: usize) -> JointPoint<T> {
-        let Place { q, dq } = at.place;
-        self.plants[l].point(j, at.t.0[l], q[j].0[l], dq[j].0[l], at.tau[j].0[l], at.balance.bias[j].0[l])
+        let Place { q, dq } = &at.pose.place;
+        self.plants[l].point(
+            j,
+            at.t.0[l],
+            q[j].0[l],
+            dq[j].0[l],
+            at.tau[j].0[l],
+            at.pose.balance.bias[j].0[l],
+        )
     }
 
     /// Coulomb levels of joint `j` in the lanes where it slides.
@@ -184,7 +194,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Bundl
         let mut excess = Wide::of(T::zero());
         for l in 0..WIDTH {
             if direction.0[l] == T::zero() {
-                let (t, q, tau) = (at.t.0[l], at.place.q[j].0[l], at.tau[j].0[l]);
+                let (t, q, tau) = (at.t.0[l], at.pose.place.q[j].0[l], at.tau[j].0[l]);
                 excess.0[l] = self.plants[l].excess(j, t, q, tau, holding.0[l]).0;
             }
         }
@@ -196,15 +206,24 @@ impl<T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Body<Wide
     for Bundle<'_, T, C, A, N, P>
 {
     #[inline(always)]
-    fn balance(&self, place: &Place<Wide<T, C>, N>) -> Balance<Wide<T, C>, N> {
-        self.rigid.balance(&place.q, &place.dq)
+    fn near(
+        &self,
+        known: &Pose<Wide<T, C>, N>,
+        place: &Place<Wide<T, C>, N>,
+    ) -> (Pose<Wide<T, C>, N>, Wide<T, C>) {
+        self.rigid.near(known, place)
+    }
+
+    #[inline(always)]
+    fn dry(&self, j: usize) -> Wide<T, C> {
+        self.dry[j]
     }
 
     #[inline(always)]
     fn pull(&self, at: &Instant<'_, Wide<T, C>, N>, direction: &[Wide<T, C>; N]) -> [Wide<T, C>; N] {
         let mut pull = *at.tau;
         for j in 0..N {
-            pull[j] = (-self.rigid.viscous[j]).fused(at.place.dq[j], pull[j] - at.balance.bias[j]);
+            pull[j] = (-self.rigid.viscous[j]).fused(at.pose.place.dq[j], pull[j] - at.pose.balance.bias[j]);
             if self.hooks[j].force || self.hooks[j].coulomb {
                 let [level, force] = self.laws(at, direction, j);
                 pull[j] = (-level).fused(direction[j], pull[j] + force);
@@ -235,13 +254,15 @@ impl<T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Body<Wide
     }
 }
 
+/// Steps after which sines and cosines that were turned on step by step are computed afresh.
+const AFRESH: usize = 64;
+
 /// The lanes' states on their way.
 struct Abreast<'a, T: Real, C, A, const N: usize, const P: usize> {
     bundle: Bundle<'a, T, C, A, N, P>,
-    place: Place<Wide<T, C>, N>,
-    direction: [Wide<T, C>; N],
-    balance: Balance<Wide<T, C>, N>,
-    /// Samples left to each lane; none once it has left the limit.
+    pose: Pose<Wide<T, C>, N>,
+    modes: Modes<Wide<T, C>, N>,
+    /// Samples of each lane; none once it has left the limit.
     rows: [usize; WIDTH],
     limit: T,
 }
@@ -260,18 +281,17 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Abrea
             enter(&mut place, &mut direction, l, &of(l).state);
             rows[l] = runs.get(l).map_or(0, |run| run.torque.len().min(run.positions.len() / N));
         }
-        let balance = bundle.balance(&place);
-        Some(Self { bundle, place, direction, balance, rows, limit })
+        let pose = bundle.rigid.pose(&place);
+        Some(Self { bundle, pose, modes: Modes::new(direction), rows, limit })
     }
 
     /// All lanes over the interval after sample `k`.
     #[inline(always)]
     fn step(&mut self, runs: &mut [Run<'a, T, A, N, P>], k: usize) {
         let span = self.span(runs, k);
-        let Glided { place, balance, wrong } =
-            glide(&self.bundle, &self.place, &self.balance, &self.direction, &span);
-        let start = core::mem::replace(&mut self.place, place);
-        self.balance = balance;
+        let Glided { pose, wrong } = glide(&self.bundle, &self.pose, &self.modes, &span);
+        let start = self.pose.place;
+        self.pose = pose;
         let mut alone = false;
         for l in 0..WIDTH.min(runs.len()) {
             let right = wrong.0[l] <= T::zero();
@@ -281,7 +301,10 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Abrea
             }
         }
         if alone {
-            self.balance = self.bundle.balance(&self.place);
+            self.modes = Modes::new(self.modes.direction);
+        }
+        if alone || k % AFRESH == AFRESH - 1 {
+            self.pose = self.bundle.rigid.pose(&self.pose.place);
         }
         for (l, run) in runs.iter_mut().enumerate() {
             if k < self.rows[l] {
@@ -314,10 +337,10 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Abrea
     #[inline(never)]
     fn step_alone(&mut self, runs: &[Run<'a, T, A, N, P>], k: usize, l: usize, start: &Place<Wide<T, C>, N>) {
         let run = &runs[l];
-        let mut state = taken_out(start, &self.direction, l);
+        let mut state = taken_out(start, &self.modes.direction, l);
         let interval = Interval { t: run.t[k], h: run.t[k + 1] - run.t[k], torque: &run.torque[k] };
         exact(run.plant, &mut state, &interval);
-        enter(&mut self.place, &mut self.direction, l, &state);
+        enter(&mut self.pose.place, &mut self.modes.direction, l, &state);
     }
 
     /// Writes lane `l`'s positions after the interval, or ends it.
@@ -325,21 +348,21 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Abrea
     fn note(&mut self, run: &mut Run<'a, T, A, N, P>, k: usize, l: usize) {
         let mut within = true;
         for j in 0..N {
-            within &= self.place.q[j].0[l].abs() <= self.limit;
+            within &= self.pose.place.q[j].0[l].abs() <= self.limit;
         }
         if !within {
             self.rows[l] = 0;
             return;
         }
         for j in 0..N {
-            run.positions[k * N + j] = self.place.q[j].0[l];
+            run.positions[k * N + j] = self.pose.place.q[j].0[l];
         }
     }
 
     /// Hands the final states back.
     fn leave(&self, runs: &mut [Run<'a, T, A, N, P>]) {
         for (l, run) in runs.iter_mut().enumerate().take(WIDTH) {
-            run.state = taken_out(&self.place, &self.direction, l);
+            run.state = taken_out(&self.pose.place, &self.modes.direction, l);
         }
     }
 }

@@ -82,7 +82,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 }
 
 fn assert_same(plants: &[Seed], what: &str) {
-    for level in [Level::PORTABLE, Level::detect()] {
+    for level in [Level::PORTABLE, Level::detect(), Level::widest()] {
         for (l, positions) in together(plants, level).iter().enumerate() {
             let off = apart(positions, &alone(&plants[l], l));
             assert!(off < 1e-10, "{what}, lane {l}, {}: {off:e}", level.name());

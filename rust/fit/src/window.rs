@@ -14,6 +14,7 @@ use armgap_core::plant::Plant;
 use armgap_core::rollout::{Run, Together, WIDTH};
 use armgap_core::transmission::Hidden;
 use nalgebra::SVector;
+use rayon::prelude::*;
 
 /// A prediction that left this range [rad or m] has diverged; it is kept there so that its cost stays finite.
 const DIVERGED: f64 = 1e3;
@@ -172,14 +173,14 @@ impl<const N: usize> Shift<N> {
 
 /// Makes runs of one plant: together where nothing but friction modes can change during a step.
 fn make<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
-    let level = Level::detect();
-    for group in runs.chunks_mut(WIDTH) {
+    let level = Level::widest();
+    runs.par_chunks_mut(WIDTH).for_each(|group| {
         if group.iter().all(|run| run.plant.glides()) {
             Together { runs: group, limit: DIVERGED }.make(level);
         } else {
             group.iter_mut().for_each(make_alone);
         }
-    }
+    });
 }
 
 /// Makes one run, in as many steps per sample as its plant needs.

@@ -5,6 +5,7 @@
 use super::{Arm, Balance, Parameter};
 use crate::number::Number;
 use crate::real::Real;
+use crate::trig::Turn;
 use nalgebra::{SMatrix, SVector};
 
 /// A linear axis; `gravity` [m/s^2] is needed only when its base tilts.
@@ -36,10 +37,19 @@ impl<T: Real> Arm<T, 1, 4> for Axis<T> {
     }
 
     #[inline(always)]
-    fn balance<V: Number<Real = T>>(&self, theta: &[V; 4], _: &[V; 1], _: &[V; 1], tilt: V) -> Balance<V, 1> {
-        let (sine, cosine) = tilt.sine_cosine();
-        let along = theta[0] * V::of(self.gravity) * sine;
-        Balance { inertia: [[theta[0]]], bias: [theta[1].fused(cosine, along)] }
+    fn angles<V: Number<Real = T>>(&self, _: &[V; 1], tilt: V) -> [V; 1] {
+        [tilt]
+    }
+
+    #[inline(always)]
+    fn balance<V: Number<Real = T>>(
+        &self,
+        theta: &[V; 4],
+        turns: &[Turn<V>; 1],
+        _: &[V; 1],
+    ) -> Balance<V, 1> {
+        let along = theta[0] * V::of(self.gravity) * turns[0].sine;
+        Balance { inertia: [[theta[0]]], bias: [theta[1].fused(turns[0].cosine, along)] }
     }
 
     #[inline(always)]

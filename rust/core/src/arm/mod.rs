@@ -20,6 +20,7 @@ pub use two_link::{LinkParameters, TwoLink};
 
 use crate::number::Number;
 use crate::real::{Real, sgn};
+use crate::trig::Turn;
 use nalgebra::{SMatrix, SVector};
 
 /// Inertia matrix, by rows, and `C dq + g` at a state.
@@ -139,9 +140,16 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Change of `theta` when a point `mass` [kg] is fixed `distance` [m] along the last link.
     fn payload(&self, theta: &[T; P], mass: T, distance: T) -> [T; P];
 
+    /// Angles whose sines and cosines [`Arm::balance`] needs, with the base turned by `tilt`.
+    fn angles<V: Number<Real = T>>(&self, q: &[V; N], tilt: V) -> [V; N];
+
     /// Inertia matrix and `C dq + g` together, for the integrator: of one arm, or of several side by side.
-    fn balance<V: Number<Real = T>>(&self, theta: &[V; P], q: &[V; N], dq: &[V; N], tilt: V)
-    -> Balance<V, N>;
+    fn balance<V: Number<Real = T>>(
+        &self,
+        theta: &[V; P],
+        turns: &[Turn<V>; N],
+        dq: &[V; N],
+    ) -> Balance<V, N>;
 
     /// Regressor of the whole equation of motion: `Y(q, dq, ddq) theta = tau`, equation (15).
     fn regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>, ddq: &SVector<T, N>) -> SMatrix<T, N, P>;

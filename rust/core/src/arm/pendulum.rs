@@ -5,7 +5,7 @@
 use super::{Arm, Balance, Parameter};
 use crate::number::Number;
 use crate::real::Real;
-use crate::trig::sin_cos;
+use crate::trig::{Turn, sin_cos};
 use nalgebra::{SMatrix, SVector};
 
 /// A physical pendulum with a motor in its pivot.
@@ -37,8 +37,18 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
     }
 
     #[inline(always)]
-    fn balance<V: Number<Real = T>>(&self, theta: &[V; 4], q: &[V; 1], _: &[V; 1], tilt: V) -> Balance<V, 1> {
-        Balance { inertia: [[theta[0]]], bias: [theta[1] * (q[0] + tilt).sine_cosine().0] }
+    fn angles<V: Number<Real = T>>(&self, q: &[V; 1], tilt: V) -> [V; 1] {
+        [q[0] + tilt]
+    }
+
+    #[inline(always)]
+    fn balance<V: Number<Real = T>>(
+        &self,
+        theta: &[V; 4],
+        turns: &[Turn<V>; 1],
+        _: &[V; 1],
+    ) -> Balance<V, 1> {
+        Balance { inertia: [[theta[0]]], bias: [theta[1] * turns[0].sine] }
     }
 
     #[inline(always)]

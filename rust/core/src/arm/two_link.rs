@@ -14,7 +14,7 @@
 use super::{Arm, Balance, Parameter};
 use crate::number::Number;
 use crate::real::{Real, lit};
-use crate::trig::sin_cos;
+use crate::trig::{Turn, sin_cos};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// The two-link vertical arm.
@@ -90,15 +90,18 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
     }
 
     #[inline(always)]
+    fn angles<V: Number<Real = T>>(&self, q: &[V; 2], tilt: V) -> [V; 2] {
+        [q[0] + tilt, q[1]]
+    }
+
+    #[inline(always)]
     fn balance<V: Number<Real = T>>(
         &self,
         theta: &[V; 9],
-        q: &[V; 2],
+        turns: &[Turn<V>; 2],
         dq: &[V; 2],
-        tilt: V,
     ) -> Balance<V, 2> {
-        let (s1, c1) = (q[0] + tilt).sine_cosine();
-        let (s2, c2) = q[1].sine_cosine();
+        let [Turn { sine: s1, cosine: c1 }, Turn { sine: s2, cosine: c2 }] = *turns;
         let outer = theta[4] * s1.fused(c2, c1 * s2);
         let (kc, ks) = (theta[1] * c2, theta[1] * s2);
         let coupled = theta[2] + kc;
