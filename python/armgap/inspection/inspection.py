@@ -13,6 +13,7 @@ from armgap.inspection.channels import Joint, joint
 from armgap.inspection.excitation import Excitation, excitation
 from armgap.inspection.sampling import Sampling, sampling
 from armgap.log import Finding, Log, gather
+from armgap.progress import tell
 
 __all__ = ["Inspection", "inspect"]
 
@@ -98,11 +99,19 @@ def inspect(log: Any, arm: Arm | None = None) -> Inspection:
             remedy="use the arm file that belongs to this log",
             file=log.path or log.name,
         )
+    steps = log.n_joints + 2
+    tell(f"inspecting {log.name}", 0.0)
+    sampled = sampling(log)
+    joints = []
+    for j in range(log.n_joints):
+        tell(f"inspecting {log.name}", (j + 1) / steps)
+        joints.append(joint(log, j, arm))
+    tell(f"inspecting {log.name}", (log.n_joints + 1) / steps)
     return Inspection(
         log=log.name,
         columns=dict(log.columns),
-        sampling=sampling(log),
-        joints=tuple(joint(log, j, arm) for j in range(log.n_joints)),
+        sampling=sampled,
+        joints=tuple(joints),
         excitation=None if arm is None else excitation(log, arm),
         findings=log.findings,
         source=log,

@@ -18,6 +18,7 @@ pub mod locate;
 pub mod metric;
 pub mod model;
 mod observe;
+pub mod progress;
 pub mod report;
 mod ruled_out;
 pub mod scale;
