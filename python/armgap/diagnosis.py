@@ -26,6 +26,8 @@ __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOu
 
 #: What a part of a log is called after the log's own name.
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
+#: What a stretch of a log is called after the log's own name.
+_STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 _HELD_OUT = 0.4
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
@@ -311,7 +313,7 @@ def _diagnose(
     notes = []
     if holdout is None:
         training, held = _split(training)
-        notes.append(f"no holdout was given: the last {_HELD_OUT:.0%} of every log were held out")
+        notes.append(f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out")
     else:
         held = _logs(holdout, arm)
         notes += _overlap(training, held)
@@ -336,7 +338,7 @@ def _diagnose(
     data["notes"] = notes + data["notes"]
     data["laws"], data["plausibility"] = laws(data, arm, training, held), plausibility(data, arm)
     data["log_findings"] = [
-        {"log": log.name, "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings
+        {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings
     ]
     return Diagnosis.from_dict(data)
 

@@ -36,6 +36,10 @@ class Inspection:
         What the log tells about the arm's parameters; None without an arm.
     findings : tuple of Finding
         What was noticed, recognised or changed while reading.
+    source : Log
+        The log itself.
+    rotary : bool, optional
+        Whether the joints turn; None without an arm.
     """
 
     log: str
@@ -45,6 +49,14 @@ class Inspection:
     excitation: Excitation | None
     findings: tuple[Finding, ...]
     source: Log = field(repr=False, compare=False)
+    rotary: bool | None = None
+
+    @property
+    def units(self) -> tuple[str, str]:
+        """Units of positions and of torques; both kinds without an arm that says which."""
+        if self.rotary is None:
+            return "rad or m", "N m or N"
+        return ("rad", "N m") if self.rotary else ("m", "N")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result, ready for JSON, without the log itself; what is infinite becomes null."""
@@ -115,6 +127,7 @@ def inspect(log: Any, arm: Arm | None = None) -> Inspection:
         excitation=None if arm is None else excitation(log, arm),
         findings=log.findings,
         source=log,
+        rotary=None if arm is None else arm.rotary,
     )
 
 

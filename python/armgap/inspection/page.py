@@ -44,24 +44,34 @@ def _brief(found: Inspection) -> str:
 def _sections(found: Inspection, *, single: bool) -> list[Section]:
     before = "" if single else f"{found.log}: "
     notes = [f"{f.message}." for f in found.findings]
-    tables = [grid for _, grid in words.grids(found)]
+    grids = words.grids(found)
+    tables = [grid for _, grid in grids]
+    captions = [f"{title}." for title, _ in grids[1:]]
     text = [] if single else [f"{question}: {answer}" for question, answer in words.overview(found)]
     return [
-        Section(f"{before}over time", figures=_over_time(found)),
-        Section(f"{before}channels and parameters", text=text, tables=tables, notes=notes),
-        Section(f"{before}sampling and coverage", figures=[_periods(found), *_coverage(found)]),
+        Section(_headed(before, "over time"), figures=_over_time(found)),
+        Section(_headed(before, "joints and parameters"), text=[*text, *captions], tables=tables, notes=notes),
+        Section(_headed(before, "sampling and coverage"), figures=[_periods(found), *_coverage(found)]),
     ]
+
+
+def _headed(before: str, title: str) -> str:
+    return f"{before}{title}" if before else title.capitalize()
 
 
 def _over_time(found: Inspection) -> list[Any]:
     log = found.source
     figures: list[Any] = []
+    length, load = found.units
     for j in range(log.n_joints):
-        for name, values in ((f"q{j + 1}", log.q[:, j]), (f"tau{j + 1}", log.tau[:, j])):
+        for name, title, values in (
+            (f"q{j + 1}", f"position of joint {j + 1}, q{j + 1} [{length}]", log.q[:, j]),
+            (f"tau{j + 1}", f"torque of joint {j + 1}, tau{j + 1} [{load}]", log.tau[:, j]),
+        ):
             t, shown = _envelope(log.t, values)
             options = {"x_range": figures[0].x_range} if figures else {}
             curve = [(name, shown, charts.MEASURED)]
-            figures.append(charts.lines(name, "time [s]", "", t, curve, height=180, **options))
+            figures.append(charts.lines(title, "time [s]", "", t, curve, height=180, **options))
     return figures
 
 
@@ -90,10 +100,16 @@ def _periods(found: Inspection) -> Any:
 def _coverage(found: Inspection) -> list[Any]:
     log = found.source
     stride = max(1, len(log) // (4 * _POINTS))
+    length, _ = found.units
     figures = []
     for j in range(log.n_joints):
         speed = np.gradient(log.q[::stride, j], log.t[::stride])
-        f = charts.figure(f"joint {j + 1}: positions and speeds visited", "position", "speed", height=220)
+        f = charts.figure(
+            f"joint {j + 1}: positions and speeds visited",
+            f"position [{length}]",
+            f"speed [{length} per s]",
+            height=220,
+        )
         f.scatter(log.q[::stride, j], speed, size=2, color=charts.AFTER, alpha=0.4)
         figures.append(f)
     return figures

@@ -117,7 +117,7 @@ def _sampling(arrays: Arrays, arm: Arm | None) -> list[tuple[str, str]]:
             (
                 "sampling",
                 f"uneven sampling: median {period * 1e3:.4g} ms, {off} of {len(steps)} periods differ by more than "
-                f"{_JITTER:.0%}, at most by {jitter * 1e3:.3g} ms",
+                f"{100 * _JITTER:.0f} %, at most by {jitter * 1e3:.3g} ms",
             )
         )
     if arm is not None and abs(period / arm.sample_period - 1) > _PERIOD_MARGIN:

@@ -1,6 +1,6 @@
 //! Long work on a thread of its own, while the calling thread tells Python how far it is and looks for signals.
 //!
-//! Only the calling thread enters Python, at most ten times a second. When it is interrupted it returns at once; the work is told to
+//! Only the calling thread enters Python: for signals 25 times a second, to tell the progress 8 times. When it is interrupted it returns at once; the work is told to
 //! stop, and ends at its next unit without anyone waiting for it, which is why it owns its data.
 
 use armgap_fit::progress::{Control, Observer, Progress};
@@ -11,8 +11,11 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Time between two looks at Python.
-const LOOK: Duration = Duration::from_millis(100);
+/// Time between two looks for signals.
+const LOOK: Duration = Duration::from_millis(40);
+
+/// Looks from one telling of the progress to the next.
+const TELL: u32 = 3;
 
 /// What the two threads share.
 #[derive(Default)]
@@ -56,18 +59,24 @@ pub fn watched<T: Send + 'static>(
 
 /// Waits for the result; none if the thread ended without.
 fn wait<T>(ended: &Receiver<T>, shared: &Shared, told: &Py<PyAny>) -> PyResult<Option<T>> {
+    let mut looks = 0;
     loop {
+        looks += 1;
         match ended.recv_timeout(LOOK) {
             Ok(result) => return Ok(Some(result)),
             Err(RecvTimeoutError::Disconnected) => return Ok(None),
-            Err(RecvTimeoutError::Timeout) => Python::attach(|py| look(py, shared, told))?,
+            Err(RecvTimeoutError::Timeout) => {
+                let told = (looks % TELL == 0).then_some(told);
+                Python::attach(|py| look(py, shared, told))?;
+            }
         }
     }
 }
 
-/// Lets Python handle its signals, and tells it how far the work is.
-fn look(py: Python<'_>, shared: &Shared, told: &Py<PyAny>) -> PyResult<()> {
+/// Lets Python handle its signals, and tells it how far the work is if it wants to know now.
+fn look(py: Python<'_>, shared: &Shared, told: Option<&Py<PyAny>>) -> PyResult<()> {
     py.check_signals()?;
+    let Some(told) = told else { return Ok(()) };
     let latest = shared.latest.lock().unwrap_or_else(PoisonError::into_inner).take();
     if let Some(progress) = latest {
         told.call1(py, (progress.work.title(), progress.fraction))?;

@@ -9,7 +9,7 @@ import numpy as np
 from armgap.report import charts
 from armgap.report.page import Drawing, Section
 from armgap.report.sections.steps import Data, length_unit, steps
-from armgap.report.words import millis
+from armgap.report.words import each_joint
 
 __all__ = ["free_run", "predictions"]
 
@@ -59,8 +59,8 @@ def free_run(data: Data) -> Section:
     last = "with the causes" if data.get("causes") else "re-estimated"
     text = (
         "Simulated from the first sample of each held-out log to its last, without looking at the measurement again. Errors add up, and where "
-        "the motion is sensitive a small one decides the rest; the windows above are the fairer judge. RMS "
-        f"{millis(run['before'], unit)} with the arm file, {millis(run['after'], unit)} {last}."
+        "the motion is sensitive a small one decides the rest; the windows above are the fairer judge. "
+        f"{each_joint(run['before'], run['after'], unit=unit)} (RMS error with the arm file → {last})."
     )
     drawn = [
         Drawing(f"{s['log']}, joint {s['joint']} [{unit}]", _whole_run(s, last))
