@@ -338,7 +338,9 @@ def _diagnose(
     data["notes"] = notes + data["notes"]
     data["laws"], data["plausibility"] = laws(data, arm, training, held), plausibility(data, arm)
     data["log_findings"] = [
-        {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings
+        {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
+        for log in (*training, *held)
+        for f in log.findings
     ]
     return Diagnosis.from_dict(data)
 

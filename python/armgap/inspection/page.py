@@ -44,13 +44,12 @@ def _brief(found: Inspection) -> str:
 def _sections(found: Inspection, *, single: bool) -> list[Section]:
     before = "" if single else f"{found.log}: "
     notes = [f"{f.message}." for f in found.findings]
-    grids = words.grids(found)
-    tables = [grid for _, grid in grids]
-    captions = [f"{title}." for title, _ in grids[1:]]
+    (_, joints), *parameters = words.grids(found)
     text = [] if single else [f"{question}: {answer}" for question, answer in words.overview(found)]
     return [
         Section(_headed(before, "over time"), figures=_over_time(found)),
-        Section(_headed(before, "joints and parameters"), text=[*text, *captions], tables=tables, notes=notes),
+        Section(_headed(before, "joints"), text=text, tables=[joints], notes=notes),
+        *(Section(_headed(before, "parameters"), text=[f"{title}."], tables=[grid]) for title, grid in parameters),
         Section(_headed(before, "sampling and coverage"), figures=[_periods(found), *_coverage(found)]),
     ]
 

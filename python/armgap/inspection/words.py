@@ -52,7 +52,11 @@ def _duration(seconds: float) -> str:
 def _jitter(rms_s: float, most_s: float) -> str:
     if most_s < 1e-9:
         return "none (below 1 ns)"
-    return f"{rms_s * 1e6:.3g} µs RMS, {most_s * 1e6:.3g} µs at most"
+    return f"{_short(rms_s)} RMS, {_short(most_s)} at most"
+
+
+def _short(seconds: float) -> str:
+    return f"{seconds * 1e6:.3g} µs" if seconds < 1e-3 else f"{seconds * 1e3:.3g} ms"
 
 
 def _gaps(found: Inspection) -> str:
@@ -63,12 +67,16 @@ def _gaps(found: Inspection) -> str:
     return f"{s.gaps}, together {s.gap_s:.3g} s; the widest: {widest}"
 
 
+def _plain(number: float) -> str:
+    return f"{number:.0f}" if 1e3 <= number < 1e6 else f"{number:.3g}"
+
+
 def _excitation(e: Excitation) -> str:
     weak = [p.name for p in e.parameters if p.excited != "well"]
     quality = (
         "good" if e.condition <= _RECOMMENDED else f"above {_RECOMMENDED:g} parameters can stand in for each other"
     )
-    said = f"condition number {e.condition:.3g} ({quality})"
+    said = f"condition number {_plain(e.condition)} ({quality})"
     said += f"; told least: {e.weakest}" if weak else ""
     return f"{said}; not well excited: {', '.join(weak)}" if weak else f"{said}; every parameter is well excited"
 
@@ -77,7 +85,7 @@ def grids(found: Inspection) -> list[tuple[str, Grid]]:
     """Return titles and tables."""
     all_grids = [("Joints", _joints(found))]
     if found.excitation is not None:
-        share = "By how much each parameter would be off if the torque were: 1 % of its RMS, as white noise"
+        share = "Standard deviation of each parameter if the torque carried white noise of 1 % of its RMS"
         all_grids.append((share, _parameters(found.excitation)))
     return all_grids
 

@@ -57,16 +57,17 @@ _NO_CAUSE = {
         "Every known effect was tried and none explains the gap; naming one would mislead.",
     ),
 }
+_ARROW = "\N{NO-BREAK SPACE}→\N{NO-BREAK SPACE}"
 _FRICTION = {"viscous": "viscous friction", "coulomb": "Coulomb friction"}
 _INERTIAL = {
     "axis": {"theta1": "moving mass", "theta2": "weight along the axis"},
-    "pendulum": {"theta1": "inertia about the joint", "theta2": "gravity torque of the horizontal link"},
+    "pendulum": {"theta1": "inertia about the joint", "theta2": "gravity torque of the level link"},
     "two-link": {
         "theta1": "inertia about joint 1, elbow at 90°",
         "theta2": "inertial coupling of the links",
         "theta3": "inertia of link 2 about joint 2",
-        "theta4": "gravity torque of horizontal link 1, link 2's mass at the elbow",
-        "theta5": "gravity torque of horizontal link 2",
+        "theta4": "gravity torque of link 1 and the elbow",
+        "theta5": "gravity torque of link 2",
     },
 }
 _SYMBOLS = {"q": "position", "dq": "speed", "ddq": "acceleration", "tau": "torque"}
@@ -178,11 +179,11 @@ def each_joint(*models: Sequence[float], unit: str) -> str:
     Examples
     --------
     >>> each_joint([0.0076, 0.0396], [3.3e-5, 2.9e-5], unit="rad").split("; ")
-    ['Joint 1: 7.6 → 0.033\xa0mrad', 'joint 2: 40 → 0.029\xa0mrad']
+    ['Joint 1: 7.6\xa0→\xa00.033\xa0mrad', 'joint 2: 40\xa0→\xa00.029\xa0mrad']
     """
     scale, prefix = (1.0, "") if max(max(values) for values in models) >= 1.0 else (1e3, "m")
     ends = [
-        f"{' → '.join(error_text(scale * v) for v in errors)}\N{NO-BREAK SPACE}{prefix}{unit}"
+        f"{_ARROW.join(error_text(scale * v) for v in errors)}\N{NO-BREAK SPACE}{prefix}{unit}"
         for errors in zip(*models, strict=True)
     ]
     return (
@@ -233,12 +234,15 @@ def _where(data: Data) -> tuple[str, str]:
     first = places[0]
     ranged = bool(first.get("range"))
     headline = f"Joint {first['joint']}, {_regime(first)}"
-    model = "the arm file's model" if data["verdict"] == "parameters" else "the model, its values re-estimated,"
-    text = f"{percent(first['share'])} of what {model} cannot explain is missing at joint {first['joint']}"
+    load = "force" if data["gap"].get("unit") == "m" else "torque"
+    text = f"{percent(first['share'])} of the {load} that is missing from the model acts on joint {first['joint']}"
     if ranged:
         text += f", most of it {_inside(first)}"
-    others = [f"{percent(p['share'])} at joint {p['joint']}" for p in places[1:] if p["share"] >= MINOR_JOINT]
-    return headline, text + (f"; {', '.join(others)}." if others else ".")
+    others = [f"{percent(p['share'])} on joint {p['joint']}" for p in places[1:] if p["share"] >= MINOR_JOINT]
+    text += f"; {', '.join(others)}." if others else "."
+    return headline, text if data[
+        "verdict"
+    ] == "parameters" else f"{text} Missing is what re-estimated values cannot supply."
 
 
 def _regime(place: Data) -> str:
