@@ -77,7 +77,7 @@ def _repeat(arrays: Arrays, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
 
 def motion(arrays: Arrays, place: Path | str, names: Names) -> None:
     """Raise unless some joint moves and some torque acts."""
-    if np.all(np.ptp(arrays.q, axis=0) == 0):
+    if np.all(arrays.q == arrays.q[0]):
         raise LogShapeError(
             "no joint moves",
             remedy="a log without motion says nothing about the arm",
@@ -144,7 +144,7 @@ def _constants(arrays: Arrays, names: Names) -> list[tuple[str, str]]:
     found = []
     for values, group in ((arrays.q, names.q), (arrays.tau, names.tau)):
         for j, name in enumerate(group):
-            if np.ptp(values[:, j]) == 0:
+            if np.all(values[:, j] == values[0, j]):
                 found.append(("constant", f"`{name}` is constant at {values[0, j]:.6g}"))
     return found
 
