@@ -18,6 +18,8 @@ __all__ = ["render"]
 
 _POINTS = 1500
 _BINS = 60
+#: What is marked in the curves: its words, its shape, its colour.
+_MARKS = {"cleaned": ("left out", "inverted_triangle", charts.BEFORE), "gap": ("gap", "triangle", charts.REFIT)}
 
 
 def render(inspections: Sequence[Inspection]) -> str:
@@ -71,7 +73,18 @@ def _over_time(found: Inspection) -> list[Any]:
             options = {"x_range": figures[0].x_range} if figures else {}
             curve = [(name, shown, charts.MEASURED)]
             figures.append(charts.lines(title, "time [s]", "", t, curve, height=180, **options))
+            _mark(figures[-1], found, float(values.min()))
     return figures
+
+
+def _mark(chart: Any, found: Inspection, low: float) -> None:
+    """Mark below a curve when rows were left out, and where there are gaps."""
+    for kind, (label, marker, colour) in _MARKS.items():
+        times = [t for f in found.findings if f.kind == kind for t in f.times]
+        if times:
+            chart.scatter(
+                times, [low] * len(times), marker=marker, size=9, color=colour, fill_alpha=0.6, legend_label=label
+            )
 
 
 def _envelope(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
