@@ -19,12 +19,15 @@ from armgap.evidence import laws, plausibility
 from armgap.log import Log, gather
 from armgap.log.findings import remarks
 from armgap.log.stretches import choose
+from armgap.progress import Told, following, tell
 from armgap.report.notebook import Shown
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
 
 #: What a part of a log is called after the log's own name.
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
+#: What a stretch of a log is called after the log's own name.
+_STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 _HELD_OUT = 0.4
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
@@ -272,6 +275,7 @@ def diagnose(
     horizon: float = 0.25,
     max_causes: int = 4,
     seed: int = 1,
+    progress: Told | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between an arm's nominal model and its logs.
 
@@ -292,6 +296,9 @@ def diagnose(
         Causes named at most.
     seed : int, default 1
         Seed of the resampling behind probabilities and intervals.
+    progress : callable, optional
+        ``progress(work, fraction)`` is called now and then with what is being done and an estimate of how much of it is done, from 0
+        to 1.
 
     Returns
     -------
@@ -301,7 +308,22 @@ def diagnose(
     ------
     ArmgapError
         A leaf of it, if a log, the arm or an option cannot be used.
+    KeyboardInterrupt
+        On an interrupt, within a fifth of a second.
     """
+    with following(progress):
+        return _diagnose(logs, arm, holdout, horizon, max_causes, seed)
+
+
+def _diagnose(
+    logs: LogLike | Sequence[LogLike],
+    arm: Arm | str | os.PathLike[str],
+    holdout: LogLike | Sequence[LogLike] | None,
+    horizon: float,
+    max_causes: int,
+    seed: int,
+) -> Diagnosis:
+    """Check, read, split, choose; hand over to the core; and add what is known on this side."""
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
     if not (np.isfinite(horizon) and horizon > 0):
         raise OptionError(f"the horizon is {horizon}", remedy="give a positive number of seconds")
@@ -311,7 +333,7 @@ def diagnose(
     notes = []
     if holdout is None:
         training, held = _split(training)
-        notes.append(f"no holdout was given: the last {_HELD_OUT:.0%} of every log were held out")
+        notes.append(f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out")
     else:
         held = _logs(holdout, arm)
         notes += _overlap(training, held)
@@ -325,7 +347,7 @@ def diagnose(
             )
     options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed)}
     try:
-        text = _native.diagnose(arm.to_native(), _columns(training), _columns(held), options)
+        text = _native.diagnose(arm.to_native(), _columns(training), _columns(held), options, tell)
     except ValueError as error:
         raise _refused(str(error), training, held) from None
     data = json.loads(text)
@@ -336,7 +358,9 @@ def diagnose(
     data["notes"] = notes + data["notes"]
     data["laws"], data["plausibility"] = laws(data, arm, training, held), plausibility(data, arm)
     data["log_findings"] = [
-        {"log": log.name, "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings
+        {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
+        for log in (*training, *held)
+        for f in log.findings
     ]
     return Diagnosis.from_dict(data)
 

@@ -2,10 +2,11 @@
 
 use crate::decide::{ABOVE_FLOOR, CONSEQUENCE};
 use crate::model::{Hypothesis, Placed};
+use crate::progress::Work;
 use crate::scan::repeats;
 use crate::screen::{Scored, candidates, screen};
 use crate::solve::{Effort, Fit};
-use crate::study::{Study, Weights};
+use crate::study::{MAX_ROUNDS, Study, Weights};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{MAX_PARAMETERS, NEVER, Trial, find};
 use rayon::prelude::*;
@@ -152,10 +153,13 @@ impl<const N: usize, const P: usize> Stage<N, P> {
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// One stage around the current model; improvements below `noticeable`, relative to the motion, are not looked for.
     pub fn stage(&self, current: &Hypothesis<P>, scale: [f64; N], noticeable: f64) -> Stage<N, P> {
+        self.watch.begin(Work::Refit, MAX_ROUNDS + 1);
         let (fit, weights) = self.settle(current, scale);
         let starts = self.starts(&fit, &weights, noticeable);
+        self.watch.begin(Work::Candidates, starts.len());
         let first = self.contend(&weights, &fit.hypothesis, starts, Effort::ROUGH);
         let field = self.field(&weights, &fit, &first);
+        self.watch.begin(Work::Finalists, 2 * FINALISTS + MAX_REWEIGHTINGS);
         let (base, contenders, weights) = self.final_round(&fit.hypothesis, first, weights);
         let floor = self.floor(&weights);
         let motion = self.motion(&weights);
@@ -170,6 +174,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         }
         let mut all = self.open_candidates(&fit.hypothesis);
         all.extend(self.repeating(&all, weights, fit));
+        self.watch.begin(Work::Screen, all.len());
         let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
         let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
         let least = if gap { self.least_trace(weights, fit) * training } else { f64::INFINITY };

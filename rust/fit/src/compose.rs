@@ -17,6 +17,7 @@ use crate::ruled_out::ruled_out;
 use crate::solve::Fit;
 use crate::study::{Sample, Study};
 use armgap_core::arm::Arm;
+use rayon::prelude::*;
 
 /// The three hypotheses a report compares.
 pub struct Compared<const P: usize> {
@@ -201,6 +202,7 @@ fn ranking<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let data = &study.holdout.data;
     let starts = data.measured_starts();
     let ranked = |c: &Contender<P>, closed: f64| {
+        study.watch.unit();
         let effect = c.effect?;
         let n = c.fit.hypothesis.values().len();
         let sigma: Vec<f64> = (n - effect.len()..n).map(|i| c.fit.sigma(i)).collect();
@@ -218,7 +220,8 @@ fn ranking<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let final_of = |c: &Contender<P>| stage.contenders.iter().any(|f| same_effect(f, c));
     let finalists = stage.contenders.iter().map(|c| (c, stage.share(c)));
     let others = stage.field.iter().filter(|(c, _)| !final_of(c)).map(|(c, share)| (c, *share));
-    finalists.chain(others).filter_map(|(c, share)| ranked(c, share)).collect()
+    let all: Vec<(&Contender<P>, f64)> = finalists.chain(others).collect();
+    all.into_par_iter().filter_map(|(c, share)| ranked(c, share)).collect()
 }
 
 fn same_effect<const P: usize>(a: &Contender<P>, b: &Contender<P>) -> bool {

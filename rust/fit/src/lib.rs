@@ -20,6 +20,7 @@ pub mod metric;
 pub mod model;
 mod observe;
 mod products;
+pub mod progress;
 pub mod report;
 mod ruled_out;
 pub mod scale;
