@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from armgap.identification import Identification, identify
     from armgap.inspection import Inspection, inspect
     from armgap.log import Finding, Log
+    from armgap.own import OwnEffect
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
 
@@ -29,6 +30,7 @@ __all__ = [
     "Identification",
     "Inspection",
     "Log",
+    "OwnEffect",
     "Reproduction",
     "__version__",
     "correct",
@@ -51,6 +53,7 @@ _HOMES = {
     "Estimator": "armgap.estimator",
     "Finding": "armgap.log",
     "Log": "armgap.log",
+    "OwnEffect": "armgap.own",
     "Identification": "armgap.identification",
     "identify": "armgap.identification",
     "Reproduction": "armgap.reproduction",
