@@ -18,6 +18,7 @@ pub mod locate;
 pub mod metric;
 pub mod model;
 mod observe;
+pub mod output_error;
 mod products;
 pub mod report;
 mod ruled_out;
