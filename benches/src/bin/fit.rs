@@ -1,5 +1,5 @@
 //! The nine parameters of the two-link arm from 10 s of motion with dry friction, by output error over windows of 0.2 s. Markdown on
-//! standard output; with a file's name, the same problem as JSON for other solvers (`peers/fit.py`).
+//! standard output; with a file's name, the same problem as JSON for other solvers (`peers/output_error.py`).
 
 use armgap_bench::run::{PERIOD, SAMPLES, THETA, rollout, torque};
 use armgap_core::arm::Kind;

@@ -189,7 +189,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         }
         let outcome = if self.past.seen == Seen::Nothing {
             if dq.is_some() || self.settings.variant == Variant::Paper {
-                self.start(&Snapshot { q: *q, dq: dq.copied().unwrap_or_else(SVector::zeros) }, tau);
+                self.start(Snapshot { q: *q, dq: dq.copied().unwrap_or_else(SVector::zeros) }, *tau);
             }
             Outcome::Starting
         } else {
@@ -230,9 +230,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         fine
     }
 
-    fn start(&mut self, now: &Snapshot<T, N>, tau: &SVector<T, N>) {
+    /// Takes its own copies, so that those of the hot code can stay in registers.
+    #[cold]
+    #[inline(never)]
+    fn start(&mut self, now: Snapshot<T, N>, tau: SVector<T, N>) {
         let Settings { scheme, variant, cutoff, .. } = &self.settings;
-        let (arm, variant) = (&self.arm, *variant);
+        let (arm, variant, now, tau) = (&self.arm, *variant, &now, &tau);
         self.regression = Some(match scheme {
             Scheme::FilteredDynamic => Regression::Dynamic(FilteredDynamic::new(arm, variant, cutoff, now)),
             Scheme::SuppliedEnergy => Regression::Energy(SuppliedEnergy::new(arm, now, tau)),
@@ -253,21 +256,22 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         let inverse = if h == past.h { past.inverse } else { T::one() / h };
         let difference = (q - past.q) * inverse;
         let between = (past.q + q) * half;
-        if dq.is_some() || self.settings.variant == Variant::Paper {
+        let (now, passage, tau) = if dq.is_some() || self.settings.variant == Variant::Paper {
             let now = Snapshot { q: *q, dq: dq.copied().unwrap_or(difference) };
             let passage = Passage { h, split: h * half, first: past.tau, second: past.tau, middle: between };
-            return self.regress::<C>(&now, &passage, tau);
-        }
-        // The state half-way between the two samples; on the way there from the one before, the torque changed at the last sample.
-        let (now, held) = (Snapshot { q: between, dq: difference }, past.tau);
-        if past.seen == Seen::One {
-            self.start(&now, &held);
-            return Outcome::Starting;
-        }
-        let split = past.h * half;
-        let passage =
-            Passage { h: split + h * half, split, first: past.tau_before, second: held, middle: past.q };
-        self.regress::<C>(&now, &passage, &held)
+            (now, passage, *tau)
+        } else {
+            // The state half-way between the two samples; on the way there from the one before, the torque changed at the last sample.
+            let (now, held, split) = (Snapshot { q: between, dq: difference }, past.tau, past.h * half);
+            if past.seen == Seen::One {
+                self.start(now, held);
+                return Outcome::Starting;
+            }
+            let passage =
+                Passage { h: split + h * half, split, first: past.tau_before, second: held, middle: past.q };
+            (now, passage, held)
+        };
+        self.regress::<C>(&now, &passage, &tau)
     }
 
     #[inline(always)]
@@ -281,24 +285,24 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         let outcome = match &mut self.regression {
             None => Outcome::Starting,
             Some(Regression::Dynamic(scheme)) => {
-                let (psi, y) = scheme.update(arm, variant, now, passage);
+                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, passage);
                 match self.rls.learn::<C, _>(&psi, &y) {
                     Update::Used(error) => Outcome::Updated(error),
                     Update::Rejected => Outcome::Rejected,
                 }
             }
             Some(Regression::Energy(scheme)) => {
-                let (psi, y) = scheme.update(arm, variant, now, passage, tau);
+                let (psi, y) = scheme.update::<A, R>(arm, variant, now, passage, tau);
                 scalar(self.rls.learn::<C, _>(&psi, &y))
             }
             Some(Regression::Power(scheme)) => {
-                let (psi, y) = scheme.update(arm, variant, now, passage, tau);
+                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, passage, tau);
                 scalar(self.rls.learn::<C, _>(&psi, &y))
             }
         };
         if outcome == Outcome::Rejected {
             // Filters and integrals hold what least squares cannot use; the equations hold from any start.
-            self.start(now, tau);
+            self.start(*now, *tau);
         }
         outcome
     }

@@ -5,6 +5,7 @@
 
 #![forbid(unsafe_code)]
 
+mod agreement;
 pub mod arm;
 pub mod attribute;
 pub mod compose;
@@ -20,9 +21,11 @@ pub mod model;
 mod observe;
 pub mod output_error;
 mod products;
+pub mod progress;
 pub mod report;
 mod ruled_out;
 pub mod scale;
+mod scan;
 pub mod screen;
 pub mod simulate;
 pub mod smooth;

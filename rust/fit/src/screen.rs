@@ -132,6 +132,7 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         Trial::Whole | Trial::Event => (*candidate, 1.0),
     };
     let there = problem.residual(&base.with(moved));
+    problem.watch.unit();
     // What begins beyond a threshold may show in few windows, which weigh next to nothing until it explains them.
     let direct = (candidate.law.spec().trial == Trial::Whole).then(|| before - tempered(problem, &there));
     (residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect(), direct)

@@ -52,15 +52,18 @@ impl<T: Real> Arm<T, 1, 4> for Axis<T> {
         Balance { inertia: [[theta[0]]], bias: [theta[1].fused(turns[0].cosine, along)] }
     }
 
+    #[inline(always)]
     fn energy_regressor(&self, q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SVector<T, 4> {
         let half: T = crate::real::lit(0.5);
         SVector::from([half * dq[0] * dq[0], q[0], T::zero(), T::zero()])
     }
 
+    #[inline(always)]
     fn momentum_regressor(&self, _q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
         SMatrix::from([[dq[0]], [T::zero()], [T::zero()], [T::zero()]])
     }
 
+    #[inline(always)]
     fn potential_regressor(&self, _q: &SVector<T, 1>, _dq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
         SMatrix::from([[T::zero()], [T::one()], [T::zero()], [T::zero()]])
     }

@@ -128,7 +128,7 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     fn potential_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, P>;
 
     /// The two regressors above together, for the online estimator; arms override it where terms are shared.
-    #[inline]
+    #[inline(always)]
     fn momentum_and_potential(
         &self,
         q: &SVector<T, N>,

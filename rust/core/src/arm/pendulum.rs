@@ -51,15 +51,18 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
         Balance { inertia: [[theta[0]]], bias: [theta[1] * turns[0].sine] }
     }
 
+    #[inline(always)]
     fn energy_regressor(&self, q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SVector<T, 4> {
         let half: T = crate::real::lit(0.5);
         SVector::from([half * dq[0] * dq[0], T::one() - q[0].cos(), T::zero(), T::zero()])
     }
 
+    #[inline(always)]
     fn momentum_regressor(&self, _q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
         SMatrix::from([[dq[0]], [T::zero()], [T::zero()], [T::zero()]])
     }
 
+    #[inline(always)]
     fn potential_regressor(&self, q: &SVector<T, 1>, _dq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
         SMatrix::from([[T::zero()], [q[0].sin()], [T::zero()], [T::zero()]])
     }

@@ -110,7 +110,7 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
         Balance { inertia, bias: [bias1, (ks * dq[0]).fused(dq[0], outer)] }
     }
 
-    #[inline]
+    #[inline(always)]
     fn energy_regressor(&self, q: &Vector2<T>, dq: &Vector2<T>) -> SVector<T, 9> {
         let (half, sum) = (lit::<T>(0.5), dq[0] + dq[1]);
         let ((s1, c1), (s2, c2)) = (sin_cos(q[0]), sin_cos(q[1]));
@@ -144,7 +144,7 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
         b
     }
 
-    #[inline]
+    #[inline(always)]
     fn momentum_and_potential(
         &self,
         q: &Vector2<T>,

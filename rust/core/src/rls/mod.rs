@@ -191,7 +191,10 @@ impl<T: Real, const R: usize> Rls<T, R> {
         let leverage = match &mut self.covariance {
             _ if !sound => None,
             Covariance::Plain(p) => p.learn::<C, M>(theta, rows, &error, &self.forgetting),
-            Covariance::Factorized(p) => p.learn::<C, M>(theta, rows, &error, &self.forgetting),
+            Covariance::Factorized(p) => {
+                let rows = *rows;
+                p.learn::<C, M>(theta, &rows, &error, &self.forgetting)
+            }
         };
         let Some(leverage) = leverage else {
             self.rejected += 1;

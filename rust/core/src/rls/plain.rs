@@ -10,15 +10,19 @@ use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 use nalgebra::SMatrix;
 
-/// The matrix, column by column.
+/// The matrix, column by column, and its diagonal once more, side by side for the check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Plain<T, const R: usize> {
     p: [[T; R]; R],
+    diagonal: [T; R],
 }
 
 impl<T: Real, const R: usize> Plain<T, R> {
     pub(super) fn of(p: &SMatrix<T, R, R>) -> Self {
-        Self { p: core::array::from_fn(|j| core::array::from_fn(|i| p[(i.min(j), i.max(j))])) }
+        Self {
+            p: core::array::from_fn(|j| core::array::from_fn(|i| p[(i.min(j), i.max(j))])),
+            diagonal: core::array::from_fn(|i| p[(i, i)]),
+        }
     }
 
     pub(super) fn matrix(&self) -> SMatrix<T, R, R> {
@@ -26,7 +30,7 @@ impl<T: Real, const R: usize> Plain<T, R> {
     }
 
     pub(super) fn diagonal(&self) -> [T; R] {
-        core::array::from_fn(|i| self.p[i][i])
+        self.diagonal
     }
 
     /// Learns from rows of `Psi'` and their errors; the leverage, or nothing changed because `P` would not stay positive definite.
@@ -66,9 +70,11 @@ impl<T: Real, const R: usize> Plain<T, R> {
             rate[m] *= inverse[m];
             leverage += T::one() - forgetting.mu * inverse[m];
         }
-        if !(sound & self.stays_positive::<M>(&gain, &inverse)) {
+        let (diagonal, positive) = self.shrunk::<C, M>(&gain, &inverse);
+        if !(sound & positive) {
             return None;
         }
+        self.diagonal = diagonal;
         for m in 0..M {
             for i in 0..R {
                 theta[i] = C::fused(gain[m][i], rate[m], theta[i]);
@@ -87,18 +93,17 @@ impl<T: Real, const R: usize> Plain<T, R> {
         let mut product = [[T::zero(); R]; M];
         for c in 0..R / LANES {
             // Two strands, so that additions need not wait for each other.
-            let mut sums = [[[T::zero(); LANES]; 2]; M];
-            for j in 0..R {
-                for m in 0..M {
-                    for l in 0..LANES {
-                        let sum = &mut sums[m][j & 1][l];
-                        *sum = C::fused(self.p[j][c * LANES + l], rows[m][j], *sum);
-                    }
-                }
+            let (mut even, mut odd) = ([[T::zero(); LANES]; M], [[T::zero(); LANES]; M]);
+            for k in 0..R / 2 {
+                self.add_column::<C, M>(&mut even, c, 2 * k, rows);
+                self.add_column::<C, M>(&mut odd, c, 2 * k + 1, rows);
+            }
+            if R % 2 == 1 {
+                self.add_column::<C, M>(&mut even, c, R - 1, rows);
             }
             for m in 0..M {
                 for l in 0..LANES {
-                    product[m][c * LANES + l] = sums[m][0][l] + sums[m][1][l];
+                    product[m][c * LANES + l] = even[m][l] + odd[m][l];
                 }
             }
         }
@@ -110,18 +115,35 @@ impl<T: Real, const R: usize> Plain<T, R> {
         product
     }
 
-    /// Whether the diagonal stays positive, which no rounding short of lost definiteness would change.
+    /// Adds lane `c` of column `j` times the rows' entries `j`.
     #[inline(always)]
-    fn stays_positive<const M: usize>(&self, gain: &[[T; R]; M], inverse: &[T; M]) -> bool {
-        let mut positive = true;
-        for i in 0..R {
-            let mut off = T::zero();
-            for m in 0..M {
-                off += gain[m][i] * gain[m][i] * inverse[m];
+    fn add_column<C: Cpu, const M: usize>(
+        &self,
+        sums: &mut [[T; LANES]; M],
+        c: usize,
+        j: usize,
+        rows: &[[T; R]; M],
+    ) {
+        for m in 0..M {
+            for l in 0..LANES {
+                sums[m][l] = C::fused(self.p[j][c * LANES + l], rows[m][j], sums[m][l]);
             }
-            positive &= self.p[i][i] > off;
         }
-        positive
+    }
+
+    /// The new diagonal, and whether it stays positive, which no rounding short of lost definiteness would change.
+    #[inline(always)]
+    fn shrunk<C: Cpu, const M: usize>(&self, gain: &[[T; R]; M], inverse: &[T; M]) -> ([T; R], bool) {
+        let (mut diagonal, mut positive) = (self.diagonal, true);
+        for m in 0..M {
+            for i in 0..R {
+                diagonal[i] = C::fused(gain[m][i] * gain[m][i], -inverse[m], diagonal[i]);
+            }
+        }
+        for i in 0..R {
+            positive &= diagonal[i] > T::zero();
+        }
+        (diagonal, positive)
     }
 
     /// Takes the sum of `gain gain' / total` off. The product of two gains is the same for `(i, j)` and `(j, i)`, and need not wait for the
@@ -129,12 +151,9 @@ impl<T: Real, const R: usize> Plain<T, R> {
     #[inline(always)]
     fn take_off<C: Cpu, const M: usize>(&mut self, gain: &[[T; R]; M], inverse: &[T; M]) {
         for j in 0..R {
-            for c in 0..R / LANES {
+            for i in 0..lead::<R>() {
                 for m in 0..M {
-                    for l in 0..LANES {
-                        let i = c * LANES + l;
-                        self.p[j][i] = C::fused(-(gain[m][i] * gain[m][j]), inverse[m], self.p[j][i]);
-                    }
+                    self.p[j][i] = C::fused(-(gain[m][i] * gain[m][j]), inverse[m], self.p[j][i]);
                 }
             }
         }
@@ -148,12 +167,13 @@ impl<T: Real, const R: usize> Plain<T, R> {
     }
 
     fn forget(&mut self, forgetting: &Forgetting<T, R>) {
-        let (lift, limited) = forgetting.lift(&self.diagonal());
+        let (lift, limited) = forgetting.lift(&self.diagonal);
         let grow = T::one() / forgetting.mu;
         for j in 0..R {
             for i in 0..R {
                 self.p[j][i] *= if limited { lift[i] * lift[j] } else { grow };
             }
+            self.diagonal[j] = self.p[j][j];
         }
     }
 }
