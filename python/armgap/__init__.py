@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from armgap.errors import ArmgapError
     from armgap.estimator import Estimator
     from armgap.export import Corrected, correct
+    from armgap.fitting import ArmFit, fit
     from armgap.identification import Identification, identify
     from armgap.inspection import Inspection, inspect
     from armgap.log import Finding, Log
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Arm",
+    "ArmFit",
     "ArmgapError",
     "Corrected",
     "Diagnosis",
@@ -34,6 +36,7 @@ __all__ = [
     "correct",
     "diagnose",
     "effects",
+    "fit",
     "identify",
     "inspect",
     "reproduce",
@@ -50,6 +53,8 @@ _HOMES = {
     "diagnose": "armgap.diagnosis",
     "Estimator": "armgap.estimator",
     "Finding": "armgap.log",
+    "ArmFit": "armgap.fitting",
+    "fit": "armgap.fitting",
     "Log": "armgap.log",
     "Identification": "armgap.identification",
     "identify": "armgap.identification",
