@@ -168,6 +168,15 @@ static void period(const struct arm *arm, struct state *s, double h)
 		}
 		h *= 1 - first;
 	}
+	if (h > 0) {
+		/* A joint at the edge of breaking away: the rest with whatever turns round held. */
+		double a[2];
+		settle(arm, s, a);
+		*s = step(arm, s, h, a);
+		for (int j = 0; j < 2; j++)
+			if (s->v[j] * s->way[j] < 0)
+				s->v[j] = 0, s->way[j] = 0;
+	}
 }
 
 /* A run from x = (q1, q2, dq1, dq2) under torques held for h each; positions after every period. */

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from armgap.errors import ArmgapError
     from armgap.estimator import Estimator
     from armgap.export import Corrected, correct
+    from armgap.fitting import ArmFit, fit
     from armgap.identification import Identification, identify
     from armgap.inspection import Inspection, inspect
     from armgap.log import Finding, Log
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Arm",
+    "ArmFit",
     "ArmgapError",
     "Corrected",
     "Diagnosis",
@@ -36,6 +38,7 @@ __all__ = [
     "correct",
     "diagnose",
     "effects",
+    "fit",
     "identify",
     "inspect",
     "reproduce",
@@ -52,6 +55,8 @@ _HOMES = {
     "diagnose": "armgap.diagnosis",
     "Estimator": "armgap.estimator",
     "Finding": "armgap.log",
+    "ArmFit": "armgap.fitting",
+    "fit": "armgap.fitting",
     "Log": "armgap.log",
     "OwnEffect": "armgap.own",
     "Identification": "armgap.identification",

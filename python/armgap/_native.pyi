@@ -11,7 +11,9 @@ __all__ = [
     "bench",
     "diagnose",
     "effects",
+    "fit",
     "identify",
+    "inertia",
     "simulate",
     "theta_from_links",
     "velocity",
@@ -46,6 +48,14 @@ def simulate(
     smoothing: float = 0.0,
     progress: Callable[[str, float], object] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def inertia(
+    kind: str,
+    gravity: float,
+    link_length: Sequence[float] | None,
+    theta: Sequence[float],
+    q: NDArray[np.float64],
+    effects: Sequence[tuple[str, int | None, dict[str, float]]],
+) -> NDArray[np.float64]: ...
 def diagnose(
     arm: dict[str, Any],
     training: Sequence[_Log],
@@ -53,6 +63,13 @@ def diagnose(
     options: dict[str, Any],
     progress: Callable[[str, float], object] | None = None,
 ) -> str: ...
+def fit(
+    arm: dict[str, Any],
+    t: NDArray[np.float64],
+    q: NDArray[np.float64],
+    tau: NDArray[np.float64],
+    horizon: float,
+) -> dict[str, Any] | None: ...
 def identify(
     kind: str,
     gravity: float,

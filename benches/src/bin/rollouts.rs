@@ -167,7 +167,7 @@ fn main() -> std::io::Result<()> {
         let (t, off) = compare(&case);
         same &= off < SAME;
         let times: Vec<String> = t.iter().map(|t| format!("{t:.0}")).collect();
-        let (single, many) = (t[2] / t[0], t[0] / t[4]);
+        let (single, many) = (t[2] / t[0], t[0] / t[5]);
         writeln!(out, "| {} | {} | {single:.2} | {many:.1} | {off:.0e} |", case.name, times.join(" | "))?;
     }
     if !same {

@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 
 #: Largest change of a position when the simulator halves its steps, rad or m.
 TOLERANCE = 3e-6
-#: A motion this short is as good as its first acceleration, s.
-INSTANT = 1e-6
 #: Effects that change the inertia matrix.
 ON_INERTIA = ("rotor_inertia", "rotor_coupling", "payload")
 #: Points of the table that turns measured positions into true ones.
@@ -91,22 +89,18 @@ class Hypothesis:
             arm.kind, arm.gravity, lengths, theta, t, tau, q0, dq0, effects, TOLERANCE, self.smoothing
         )
 
-    def acceleration(self, q: Array, dq: Array, tau: Array) -> Array:
-        """Acceleration of one state under one torque, shape (n_joints,)."""
-        _, speed = self.run(np.array([0.0, INSTANT]), np.vstack([tau, tau]), q, dq)
-        return np.asarray((speed[1] - speed[0]) / INSTANT)
+    def inertia(self, q: Array) -> Array:
+        """Inertia matrices at poses `q` of shape (n_poses, n_joints): shape (n_poses, n_joints, n_joints).
 
-    def frictionless(self) -> Hypothesis:
-        """Return the same arm without friction, and with no effects but those on its inertia."""
-        b = self.arm.n_inertial
-        inertial = tuple(e for e in self.effects if e.effect in ON_INERTIA)
-        return replace(self, theta=self.theta[:b] + (0.0,) * (len(self.theta) - b), effects=inertial, smoothing=0.0)
-
-    def compliance(self, q: Array) -> Array:
-        """Inverse of the inertia matrix, shape (n_joints, n_joints): what each unit torque accelerates, friction aside."""
-        free, rest = self.frictionless(), np.zeros(self.arm.n_joints)
-        idle = free.acceleration(q, rest, rest)
-        return np.column_stack([free.acceleration(q, rest, unit) - idle for unit in np.eye(len(rest))])
+        Raises
+        ------
+        ValueError
+            If there are more effects than the simulator carries.
+        """
+        arm, inertial = self.arm, [e.on(e.joint) for e in self.effects if e.effect in ON_INERTIA]
+        lengths = None if arm.link_length is None else arm.link_length.tolist()
+        poses = np.ascontiguousarray(q, dtype=np.float64)
+        return _native.inertia(arm.kind, arm.gravity, lengths, list(self.theta), poses, inertial)
 
 
 def delivered(t: Array, tau: Array, effects: Sequence[Placed]) -> Array:

@@ -233,7 +233,7 @@ class _Scene:
         without, full = self.without.predict(rows), self.full.predict(rows)
         inner = np.arange(self.half, 5 * self.half + 1)
         at = first + inner
-        inertia = np.linalg.inv([self.without.model.compliance(q) for q in self.full.q[at]])
+        inertia = self.without.model.inertia(self.full.q[at])
         curvature = _curvature(log.t[rows], np.hstack([log.q[rows] - without, full - without, log.q[rows]]), inner)
         n = log.n_joints
         lack, law = (np.einsum("kij,kj->ki", inertia, curvature[:, s : s + n]) for s in (0, n))

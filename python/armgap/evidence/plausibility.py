@@ -47,10 +47,9 @@ def _inertia(model: Hypothesis) -> dict[str, Any]:
 def _largest_compliance(model: Hypothesis) -> float | None:
     """Largest eigenvalue of the inverse inertia matrix over all poses; None where it is not positive definite."""
     try:
-        compliance = np.array([model.compliance(q) for q in _poses(model.arm)])
-    except ValueError:  # the simulator has no acceleration for such an arm
+        eigenvalues = np.linalg.eigvalsh(np.linalg.inv(model.inertia(_poses(model.arm))))
+    except ValueError:  # a pose without mobility, or more effects than the simulator carries
         return None
-    eigenvalues = np.linalg.eigvalsh((compliance + np.swapaxes(compliance, 1, 2)) / 2)
     return float(eigenvalues.max()) if np.isfinite(eigenvalues).all() and eigenvalues.min() > 0 else None
 
 

@@ -35,6 +35,12 @@ pub trait WithArm {
 }
 
 impl ArmDescription {
+    /// Smallest steps of the position measurement, where encoders are known.
+    pub fn steps(&self) -> Option<Vec<f64>> {
+        let whole = if self.kind.rotary() { std::f64::consts::TAU } else { 1.0 };
+        self.counts_per_rev.as_ref().map(|counts| counts.iter().map(|count| whole / count).collect())
+    }
+
     /// Runs `work` with the arm of this kind; `None` if the number of parameters does not fit the kind.
     pub fn dispatch<W: WithArm>(&self, work: W) -> Option<W::Output> {
         let gravity = self.gravity;

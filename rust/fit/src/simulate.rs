@@ -5,6 +5,7 @@ use crate::model::{Hypothesis, Placed};
 use crate::progress::{Watch, Work};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Pulse, interval};
+use armgap_core::glide::Place;
 use armgap_core::integrate::{Interval, State, advance};
 use nalgebra::SVector;
 
@@ -136,5 +137,33 @@ impl Simulation<'_> {
             advance(&plant, &mut state, &step, substeps);
         }
         Ok(Trajectory { q, dq, substeps })
+    }
+}
+
+/// Inertia matrices of an arm with effects at the poses `q`, row by row.
+#[derive(Debug, Clone)]
+pub struct Inertia<'a> {
+    /// Positions.
+    pub q: &'a [f64],
+    /// Effects with their values.
+    pub effects: &'a [Placed],
+}
+
+impl WithArm for Inertia<'_> {
+    type Output = Option<Vec<f64>>;
+
+    /// All entries of all matrices by rows; none for more effects than a plant carries.
+    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
+        self,
+        arm: A,
+        theta: [f64; P],
+    ) -> Self::Output {
+        let hypothesis = Hypothesis { effects: self.effects.to_vec(), ..Hypothesis::rigid(theta) };
+        let plant = hypothesis.plant::<A, N>(&arm)?;
+        let at = |q: &[f64]| {
+            let place = Place { q: std::array::from_fn(|j| q[j]), dq: [0.0; N] };
+            plant.rigid().balance(&place).inertia
+        };
+        Some(self.q.chunks_exact(N).flat_map(|q| at(q).into_iter().flatten()).collect())
     }
 }

@@ -4,6 +4,7 @@ mod bench;
 mod convert;
 mod diagnose;
 mod estimator;
+mod fit;
 mod identify;
 mod simulate;
 mod watched;
@@ -21,9 +22,11 @@ mod _native {
     #[pymodule_export]
     use crate::estimator::Estimator;
     #[pymodule_export]
+    use crate::fit::fit;
+    #[pymodule_export]
     use crate::identify::{identify, velocity};
     #[pymodule_export]
-    use crate::simulate::simulate;
+    use crate::simulate::{inertia, simulate};
 
     use super::{Bound, PyModule, PyModuleMethods, PyResult};
 

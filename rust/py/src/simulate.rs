@@ -1,11 +1,11 @@
-//! `simulate`.
+//! `simulate` and `inertia`.
 
 use crate::convert::{kind_of, matrix, placed, vector};
 use crate::watched::watched;
 use armgap_fit::arm::ArmDescription;
 use armgap_fit::progress::{Observer, Watch, guarded};
-use armgap_fit::simulate::Simulation;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use armgap_fit::simulate::{Inertia, Simulation};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
@@ -69,4 +69,28 @@ pub fn simulate<'py>(
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
     let shape = |x: Vec<f64>| PyArray1::from_vec(py, x).reshape([rows, n]);
     Ok((shape(trajectory.q)?, shape(trajectory.dq)?))
+}
+
+/// Inertia matrices at some poses, effects included.
+#[pyfunction]
+pub fn inertia<'py>(
+    py: Python<'py>,
+    kind: &str,
+    gravity: f64,
+    link_length: Option<Vec<f64>>,
+    theta: Vec<f64>,
+    q: PyReadonlyArray2<'py, f64>,
+    effects: Vec<(String, Option<usize>, BTreeMap<String, f64>)>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let kind = kind_of(kind)?;
+    let (n, rows) = (kind.joints(), numpy::PyUntypedArrayMethods::shape(&*q)[0]);
+    let q = matrix(&q, "q", rows, n)?;
+    let effects = placed(kind, effects)?;
+    let sigma = vec![1.0; theta.len()];
+    let arm =
+        ArmDescription { kind, gravity, theta, sigma, counts_per_rev: None, torque_limit: None, link_length };
+    let found = arm.dispatch(Inertia { q, effects: &effects }).flatten().ok_or_else(|| {
+        PyValueError::new_err("`theta` has the wrong length for this arm, or there are too many effects")
+    })?;
+    PyArray1::from_vec(py, found).reshape([rows, n, n])
 }
