@@ -44,6 +44,7 @@ lint: setup lint-tools ## formatting, types and stubs
 
 test-rust: tools ## the Rust tests
 	cargo test -q --release
+	cargo test -q --release --doc -p armgap-bench
 	rust/embed/check.sh
 
 test-python: setup ## the Python tests
