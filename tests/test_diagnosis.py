@@ -173,7 +173,7 @@ def test_results_cannot_be_changed(found):
 
 
 def test_no_holdout_is_said_and_cut_from_the_logs(clean):
-    assert any("40%" in note for note in clean.extra["notes"])
+    assert any("40 %" in note for note in clean.extra["notes"])
     assert clean.to_dict()["holdout"] != clean.to_dict()["training"]
 
 

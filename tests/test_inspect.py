@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import polars as pl
 import pytest
 
 from armgap import Arm, Log, inspect
@@ -128,3 +129,15 @@ def test_refused(arm, frame, tmp_path):
         inspect(made(), arm)
     with pytest.raises(OptionError, match="2 logs"):
         inspect([frame, frame])
+
+
+def test_what_was_left_out_and_where_gaps_are_is_counted_listed_and_drawn():
+    frame = made().to_polars()
+    found = inspect(pl.concat([frame[:100], frame[99:300], frame[320:]]))
+    times = {f.kind: f.times for f in found.findings if f.times}
+    assert times["cleaned"] == pytest.approx([0.099])
+    assert times["gap"] == pytest.approx([0.299])
+    assert "1 row like the row before" in " ".join(f.message for f in found.findings)
+    text = render([found])
+    assert '"left out"' in text
+    assert '"gap"' in text

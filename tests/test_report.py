@@ -106,9 +106,9 @@ def test_an_axis_has_forces_in_newtons_and_errors_in_millimetres() -> None:
     ]
     diagnosis = diagnose(logs[0], arm, holdout=logs[1])
     text = diagnosis_report(diagnosis, "x.md")
-    assert "force the" in text
-    assert "torque the" not in text
-    assert " mm" in answers(diagnosis.to_dict())[2].headline
+    assert "force missing" in text
+    assert "torque missing" not in text
+    assert "\N{NO-BREAK SPACE}mm" in answers(diagnosis.to_dict())[2].detail
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -41,12 +41,14 @@ def simulate(
     effects: Sequence[tuple[str, int | None, dict[str, float]]],
     tolerance: float = 1e-9,
     smoothing: float = 0.0,
+    progress: Callable[[str, float], object] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 def diagnose(
     arm: dict[str, Any],
     training: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]],
     holdout: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]],
     options: dict[str, Any],
+    progress: Callable[[str, float], object] | None = None,
 ) -> str: ...
 def identify(
     kind: str,

@@ -19,12 +19,15 @@ from armgap.evidence import laws, plausibility
 from armgap.log import Log, gather
 from armgap.log.findings import remarks
 from armgap.log.stretches import choose
+from armgap.progress import Told, following, tell
 from armgap.report.notebook import Shown
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
 
 #: What a part of a log is called after the log's own name.
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
+#: What a stretch of a log is called after the log's own name.
+_STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 _HELD_OUT = 0.4
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
@@ -36,6 +39,17 @@ class Value:
     value: float
     sigma: float
     unit: str
+
+
+@dataclass(frozen=True)
+class AtHorizon:
+    """RMS position error per joint on the holdout at one prediction horizon [s]; fields as in `Gap` [rad or m]."""
+
+    horizon_s: float
+    before: tuple[float, ...]
+    refit: tuple[float, ...]
+    after: tuple[float, ...]
+    floor: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -55,6 +69,8 @@ class Gap:
         95 % interval of it, from resampled windows.
     free_run_before, free_run_after : tuple of float
         The same over the whole holdout, simulated from its first sample.
+    horizons : tuple of AtHorizon
+        The same at other prediction horizons, as far as the logs are long enough.
     """
 
     horizon_s: float
@@ -66,6 +82,7 @@ class Gap:
     closed_ci: tuple[float, float]
     free_run_before: tuple[float, ...]
     free_run_after: tuple[float, ...]
+    horizons: tuple[AtHorizon, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -181,6 +198,7 @@ class Diagnosis(Shown):
                 (gap["closed_ci"][0], gap["closed_ci"][1]),
                 tuple(gap["free_run"]["before"]),
                 tuple(gap["free_run"]["after"]),
+                tuple(_at_horizon(h) for h in gap.get("horizons", ())),
             ),
             where=tuple(_place(p) for p in data["where"]),
             causes=tuple(_cause(c) for c in data["causes"]),
@@ -214,6 +232,11 @@ class Diagnosis(Shown):
 def _take(kind: type[_Record], data: dict[str, Any]) -> _Record:
     """Build a record from the entries it knows."""
     return kind(**{f.name: data[f.name] for f in fields(kind) if f.name in data})
+
+
+def _at_horizon(data: dict[str, Any]) -> AtHorizon:
+    errors = (tuple(data[key]) for key in ("before", "refit", "after", "floor"))
+    return AtHorizon(data["horizon_s"], *errors)
 
 
 def _place(data: dict[str, Any]) -> Place:
@@ -252,6 +275,7 @@ def diagnose(
     horizon: float = 0.25,
     max_causes: int = 4,
     seed: int = 1,
+    progress: Told | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between an arm's nominal model and its logs.
 
@@ -272,6 +296,9 @@ def diagnose(
         Causes named at most.
     seed : int, default 1
         Seed of the resampling behind probabilities and intervals.
+    progress : callable, optional
+        ``progress(work, fraction)`` is called now and then with what is being done and an estimate of how much of it is done, from 0
+        to 1.
 
     Returns
     -------
@@ -281,7 +308,22 @@ def diagnose(
     ------
     ArmgapError
         A leaf of it, if a log, the arm or an option cannot be used.
+    KeyboardInterrupt
+        On an interrupt, within a fifth of a second.
     """
+    with following(progress):
+        return _diagnose(logs, arm, holdout, horizon, max_causes, seed)
+
+
+def _diagnose(
+    logs: LogLike | Sequence[LogLike],
+    arm: Arm | str | os.PathLike[str],
+    holdout: LogLike | Sequence[LogLike] | None,
+    horizon: float,
+    max_causes: int,
+    seed: int,
+) -> Diagnosis:
+    """Check, read, split, choose; hand over to the core; and add what is known on this side."""
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
     if not (np.isfinite(horizon) and horizon > 0):
         raise OptionError(f"the horizon is {horizon}", remedy="give a positive number of seconds")
@@ -291,7 +333,7 @@ def diagnose(
     notes = []
     if holdout is None:
         training, held = _split(training)
-        notes.append(f"no holdout was given: the last {_HELD_OUT:.0%} of every log were held out")
+        notes.append(f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out")
     else:
         held = _logs(holdout, arm)
         notes += _overlap(training, held)
@@ -305,7 +347,7 @@ def diagnose(
             )
     options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed)}
     try:
-        text = _native.diagnose(arm.to_native(), _columns(training), _columns(held), options)
+        text = _native.diagnose(arm.to_native(), _columns(training), _columns(held), options, tell)
     except ValueError as error:
         raise _refused(str(error), training, held) from None
     data = json.loads(text)
@@ -316,7 +358,9 @@ def diagnose(
     data["notes"] = notes + data["notes"]
     data["laws"], data["plausibility"] = laws(data, arm, training, held), plausibility(data, arm)
     data["log_findings"] = [
-        {"log": log.name, "kind": f.kind, "message": f.message} for log in (*training, *held) for f in log.findings
+        {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
+        for log in (*training, *held)
+        for f in log.findings
     ]
     return Diagnosis.from_dict(data)
 

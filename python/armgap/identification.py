@@ -13,6 +13,7 @@ from armgap import _native
 from armgap.arm import Arm
 from armgap.errors import ColumnError, OptionError
 from armgap.log import Log
+from armgap.progress import tell
 
 __all__ = ["SCHEMES", "Identification", "identify", "velocity"]
 
@@ -219,7 +220,9 @@ def identify(
     def course(cutoff: float) -> dict[str, Any]:
         return _course(log, arm, dq, start, (scheme, filters == "paper", cutoff, forgetting, p0))
 
+    tell(scheme, 0.0)
     whole = course(cutoff)
+    tell(scheme, 0.5)
     theta = whole["theta"][-1].copy()
     return Identification(
         log=log.name,

@@ -14,6 +14,7 @@ from armgap import _native
 from armgap.arm import Arm
 from armgap.errors import OptionError
 from armgap.log import Log
+from armgap.progress import tell
 
 __all__ = ["Effect", "effects", "seed_torque", "simulate"]
 
@@ -162,7 +163,7 @@ def simulate(
     lengths = None if arm.link_length is None else arm.link_length.tolist()
     try:
         q, dq = _native.simulate(
-            arm.kind, arm.gravity, lengths, arm.theta.tolist(), t, tau, start, speed, placed, tolerance, smoothing
+            arm.kind, arm.gravity, lengths, arm.theta.tolist(), t, tau, start, speed, placed, tolerance, smoothing, tell
         )
     except ValueError as error:
         raise OptionError(str(error), remedy="see `armgap.effects()` and the arm file") from None

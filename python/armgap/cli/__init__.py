@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib import import_module
+from typing import NoReturn
 
 import click
 
@@ -73,11 +75,17 @@ def main(arguments: list[str] | None = None) -> None:
     except click.ClickException as error:
         _fail(" ".join(error.format_message().split()))
     except (click.Abort, KeyboardInterrupt):
-        click.echo("armgap: interrupted", err=True)
-        sys.exit(INTERRUPTED)
+        _interrupted()
     except BrokenPipeError:
         sys.exit(0)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _interrupted() -> NoReturn:
+    """End at once: everything half done has been cleared away on the way here, and threads that still compute are not waited for."""
+    click.echo("armgap: interrupted", err=True)
+    sys.stdout.flush()
+    os._exit(INTERRUPTED)
 
 
 def _fail(message: str) -> None:

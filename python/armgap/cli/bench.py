@@ -8,7 +8,9 @@ from typing import Any
 
 import click
 
-from armgap.cli.common import check_outputs, console, interruptible, json_option, quiet_option, working, write
+from armgap.cli.common import check_outputs, console, interruptible, json_option, quiet_option, write
+from armgap.cli.progress import working
+from armgap.progress import tell
 
 __all__ = ["command", "measure"]
 
@@ -41,10 +43,12 @@ def measure(samples: int, period: float, *, everything: bool = False) -> dict[st
     from armgap import _native
 
     noise = dict(zip(FIELDS, _native.bench(None, False, False, False, samples), strict=True))
-    rows = []
+    rows: list[dict[str, Any]] = []
+    count = len(SCHEMES) * 2 * (4 if everything else 2)
     for scheme in SCHEMES:
         for filters in ("paper", "exact"):
             for single in (False, True):
+                tell("measuring", len(rows) / count)
                 for plain in (True, False) if everything else (not single,):
                     times = _native.bench(scheme, filters == "paper", plain, single, samples)
                     row: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""What the sub-commands share: options, column mappings, progress, and writing results whole or not at all."""
+"""What the sub-commands share: options, column mappings, interrupts, and writing results whole or not at all."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import os
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextvars import copy_context
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -29,7 +29,6 @@ __all__ = [
     "quiet_option",
     "report_option",
     "units_option",
-    "working",
     "write",
 ]
 
@@ -121,20 +120,6 @@ def check_outputs(*paths: str | None) -> None:
             raise ResultError("its folder cannot be written to", remedy="choose another place", file=path)
 
 
-@contextmanager
-def working(message: str, *, quiet: bool) -> Iterator[None]:
-    """Show that work goes on, and for how long, on standard error, unless quiet or not at a terminal."""
-    if quiet or not sys.stderr.isatty():
-        yield
-        return
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-    with Progress(*columns, console=console(error=True), transient=True) as progress:
-        progress.add_task(message, total=None)
-        yield
-
-
 def interruptible(work: Callable[[], Result]) -> Result:
     """Do long work in a thread, so that an interrupt ends the program at once; the work writes nothing by itself."""
     done: list[Result] = []
@@ -146,7 +131,7 @@ def interruptible(work: Callable[[], Result]) -> Result:
         except BaseException as error:
             failed.append(error)
 
-    thread = threading.Thread(target=attempt, daemon=True)
+    thread = threading.Thread(target=copy_context().run, args=(attempt,), daemon=True)
     thread.start()
     while thread.is_alive():
         thread.join(_POLL_S)

@@ -20,9 +20,9 @@ from armgap.cli.common import (
     parse_units,
     quiet_option,
     units_option,
-    working,
     write,
 )
+from armgap.cli.progress import working
 from armgap.errors import OptionError
 
 if TYPE_CHECKING:
@@ -122,8 +122,8 @@ def _diagnose(
 
     report_file, json_file, quiet = outputs
     arm = Arm.read(arm_file)
-    training, held = (gather(paths, arm, **naming) for paths in (logs, holdout))
-    with working("diagnosing", quiet=quiet):
+    with working("reading", quiet=quiet):
+        training, held = (gather(paths, arm, **naming) for paths in (logs, holdout))
         result = diagnose(training, arm, holdout=held or None)
     write(report_file, diagnosis_report(result, report_file))
     if json_file is not None:

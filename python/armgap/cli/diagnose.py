@@ -12,16 +12,15 @@ from armgap.cli.common import (
     check_outputs,
     columns_option,
     console,
-    interruptible,
     json_option,
     parse_columns,
     parse_units,
     quiet_option,
     report_option,
     units_option,
-    working,
     write,
 )
+from armgap.cli.progress import working
 
 __all__ = ["command"]
 
@@ -61,12 +60,10 @@ def command(
     check_report(report_file)
     arm = Arm.read(Path(arm_file))
     mapping, declared = parse_columns(columns), parse_units(units)
-    training = gather(logs, arm, columns=mapping, units=declared)
-    held = gather(holdout, arm, columns=mapping, units=declared) or None
-    with working("diagnosing", quiet=quiet):
-        result = interruptible(
-            lambda: diagnose(training, arm, holdout=held, horizon=horizon, max_causes=max_causes, seed=seed)
-        )
+    with working("reading", quiet=quiet):
+        training = gather(logs, arm, columns=mapping, units=declared)
+        held = gather(holdout, arm, columns=mapping, units=declared) or None
+        result = diagnose(training, arm, holdout=held, horizon=horizon, max_causes=max_causes, seed=seed)
     if report_file is not None:
         write(report_file, diagnosis_report(result, report_file))
     if json_file is not None:

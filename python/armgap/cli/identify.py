@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,6 +13,7 @@ from armgap.cli.common import (
     check_outputs,
     columns_option,
     console,
+    interruptible,
     json_option,
     parse_columns,
     parse_units,
@@ -18,6 +21,13 @@ from armgap.cli.common import (
     units_option,
     write,
 )
+from armgap.cli.progress import working
+from armgap.progress import following, of_many
+
+if TYPE_CHECKING:
+    from armgap.arm import Arm
+    from armgap.identification import Identification
+    from armgap.log import Log
 
 __all__ = ["command"]
 
@@ -59,19 +69,16 @@ def command(
     from rich.table import Table
 
     from armgap.arm import Arm
-    from armgap.identification import identify
     from armgap.log import gather
     from armgap.log.findings import remarks
 
     check_outputs(json_file)
     arm = Arm.read(Path(arm_file))
-    read = gather(logs, arm, columns=parse_columns(columns), units=parse_units(units))
     schemes = SCHEMES if scheme == "all" else (scheme,)
-    results = [
-        identify(log, arm, scheme=s, filters=filters, cutoff=cutoff, velocity=velocity, asymmetry=asymmetry)
-        for log in read
-        for s in schemes
-    ]
+    with working("reading", quiet=quiet):
+        read = gather(logs, arm, columns=parse_columns(columns), units=parse_units(units))
+        settings: dict[str, Any] = {"filters": filters, "cutoff": cutoff, "velocity": velocity, "asymmetry": asymmetry}
+        results = interruptible(lambda: _identified(read, arm, schemes, settings))
     if json_file is not None:
         write(json_file, json.dumps([r.to_dict() for r in results], indent=2))
     if quiet or json_file == "-":
@@ -95,3 +102,17 @@ def command(
         for r in mine:
             for note in r.notes:
                 console().print(f"[bold]{r.scheme}:[/bold] {note}.")
+
+
+def _identified(
+    logs: Sequence[Log], arm: Arm, schemes: Sequence[str], settings: dict[str, Any]
+) -> list[Identification]:
+    """Every scheme on every log."""
+    from armgap.identification import identify
+
+    work = [(log, scheme) for log in logs for scheme in schemes]
+    results = []
+    for number, (log, scheme) in enumerate(work):
+        with following(of_many("identifying", number, len(work))):
+            results.append(identify(log, arm, scheme=scheme, **settings))
+    return results

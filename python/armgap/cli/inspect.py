@@ -10,14 +10,15 @@ from armgap.cli.common import (
     check_outputs,
     columns_option,
     console,
+    interruptible,
     json_option,
     parse_columns,
     parse_units,
     quiet_option,
     units_option,
-    working,
     write,
 )
+from armgap.cli.progress import working
 
 __all__ = ["command"]
 
@@ -50,7 +51,7 @@ def command(
     naming = {"columns": parse_columns(columns), "units": parse_units(units)}
     arm = Arm.read(Path(arm_file)) if arm_file is not None else None
     with working("reading", quiet=quiet):
-        found = [inspect(Log.read(path, arm=arm, **naming), arm) for path in paths(logs)]
+        found = interruptible(lambda: [inspect(Log.read(path, arm=arm, **naming), arm) for path in paths(logs)])
     if report_file is not None:
         from armgap.inspection.page import render
 

@@ -15,9 +15,9 @@ from armgap.cli.common import (
     parse_units,
     quiet_option,
     units_option,
-    working,
     write,
 )
+from armgap.cli.progress import working
 from armgap.errors import OptionError
 
 __all__ = ["command"]

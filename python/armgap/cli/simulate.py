@@ -13,13 +13,13 @@ from armgap.cli.common import (
     check_outputs,
     columns_option,
     console,
-    interruptible,
     parse_columns,
     parse_units,
     quiet_option,
     units_option,
     write,
 )
+from armgap.cli.progress import working
 from armgap.errors import OptionError, ResultError
 
 if TYPE_CHECKING:
@@ -92,9 +92,8 @@ def command(
             console(error=True).print(f"note: {source.name}: {finding.message}", highlight=False, markup=False)
         keep = source.t <= (duration if duration is not None else source.duration)
         t, tau, start, name = source.t[keep], source.tau[keep], _start(source), source.name
-    log = interruptible(
-        lambda: simulate(arm, t, tau, q0=start[0], dq0=start[1], effects=effects, noise=noise, seed=seed, name=name)
-    )
+    with working("simulating", quiet=quiet):
+        log = simulate(arm, t, tau, q0=start[0], dq0=start[1], effects=effects, noise=noise, seed=seed, name=name)
     if output == "-":
         write(output, log.to_polars().write_csv().rstrip())
     else:

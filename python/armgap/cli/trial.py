@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armgap.cli.common import check_outputs, console, interruptible, json_option, quiet_option, working, write
+from armgap.cli.common import check_outputs, console, interruptible, json_option, quiet_option, write
+from armgap.cli.progress import working
 from armgap.errors import OptionError
+from armgap.progress import following, tell
 from armgap.trial.commands import all_of_it, make, peers, run, score
 
 if TYPE_CHECKING:
@@ -63,9 +65,11 @@ def command(
             say.print(f"{folder}: {len(found)} sealed cases")
             return
         scores = []
-        for i, case in enumerate(found, start=1):
-            with working(f"diagnosing case {i} of {len(found)}", quiet=quiet):
-                scores.append(interruptible(partial(_score, case, horizon)))
+        with working("diagnosing", quiet=quiet):
+            for i, case in enumerate(found):
+                tell(f"diagnosing case {i + 1} of {len(found)}", i / len(found))
+                with following(_nobody):
+                    scores.append(interruptible(partial(_score, case, horizon)))
     right = sum(judgement.right for _, judgement, _ in scores)
     if json_file is not None:
         write(json_file, json.dumps(_as_json(scores), indent=2))
@@ -119,6 +123,10 @@ def _make(target: Path, cases: int, seed: int | None, duration: float, quiet: bo
     chosen = fresh_seed() if seed is None else seed
     with working(f"making {cases} cases of seed {chosen}", quiet=quiet):
         return make_trial(chosen, cases, folder=target, duration=duration)
+
+
+def _nobody(_: str, __: float) -> None:
+    """Follow nothing: what a case tells of itself is less than what all cases tell."""
 
 
 def _score(case: Path, horizon: float) -> tuple[str, Judgement, float]:

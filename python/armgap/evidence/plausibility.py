@@ -6,6 +6,7 @@ friction that feeds energy into the arm is impossible at any speed.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -64,5 +65,17 @@ def _friction(name: str, value: dict[str, Any]) -> dict[str, Any]:
     """A friction coefficient is possible unless it is negative by more than its uncertainty."""
     sigma = value["sigma"] or 0.0
     holds = value["value"] + 2.0 * sigma >= 0.0
-    figure = f"{value['value']:.3g} ± {sigma:.2g} {value['unit']}"
-    return {"check": f"{name} is not negative", "holds": bool(holds), "figure": figure}
+    within = ", within twice its uncertainty" if holds and value["value"] < 0 else ""
+    return {
+        "check": f"{name} is not negative{within}",
+        "holds": bool(holds),
+        "figure": _rounded(value["value"], sigma, value["unit"]),
+    }
+
+
+def _rounded(number: float, sigma: float, unit: str) -> str:
+    """A value and its uncertainty to the same place."""
+    if sigma <= 0:
+        return f"{number:.3g} {unit}"
+    places = max(0, 1 - math.floor(math.log10(sigma)))
+    return f"{number:.{places}f} ± {sigma:.{places}f} {unit}"

@@ -13,6 +13,7 @@ from armgap.inspection.channels import Joint, joint
 from armgap.inspection.excitation import Excitation, excitation
 from armgap.inspection.sampling import Sampling, sampling
 from armgap.log import Finding, Log, gather
+from armgap.progress import tell
 
 __all__ = ["Inspection", "inspect"]
 
@@ -35,6 +36,10 @@ class Inspection:
         What the log tells about the arm's parameters; None without an arm.
     findings : tuple of Finding
         What was noticed, recognised or changed while reading.
+    source : Log
+        The log itself.
+    rotary : bool, optional
+        Whether the joints turn; None without an arm.
     """
 
     log: str
@@ -44,6 +49,14 @@ class Inspection:
     excitation: Excitation | None
     findings: tuple[Finding, ...]
     source: Log = field(repr=False, compare=False)
+    rotary: bool | None = None
+
+    @property
+    def units(self) -> tuple[str, str]:
+        """Units of positions and of torques; both kinds without an arm that says which."""
+        if self.rotary is None:
+            return "rad or m", "N m or N"
+        return ("rad", "N m") if self.rotary else ("m", "N")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result, ready for JSON, without the log itself; what is infinite becomes null."""
@@ -98,14 +111,23 @@ def inspect(log: Any, arm: Arm | None = None) -> Inspection:
             remedy="use the arm file that belongs to this log",
             file=log.path or log.name,
         )
+    steps = log.n_joints + 2
+    tell(f"inspecting {log.name}", 0.0)
+    sampled = sampling(log)
+    joints = []
+    for j in range(log.n_joints):
+        tell(f"inspecting {log.name}", (j + 1) / steps)
+        joints.append(joint(log, j, arm))
+    tell(f"inspecting {log.name}", (log.n_joints + 1) / steps)
     return Inspection(
         log=log.name,
         columns=dict(log.columns),
-        sampling=sampling(log),
-        joints=tuple(joint(log, j, arm) for j in range(log.n_joints)),
+        sampling=sampled,
+        joints=tuple(joints),
         excitation=None if arm is None else excitation(log, arm),
         findings=log.findings,
         source=log,
+        rotary=None if arm is None else arm.rotary,
     )
 
 

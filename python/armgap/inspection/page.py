@@ -18,6 +18,8 @@ __all__ = ["render"]
 
 _POINTS = 1500
 _BINS = 60
+#: What is marked in the curves: its words, its shape, its colour.
+_MARKS = {"cleaned": ("left out", "inverted_triangle", charts.BEFORE), "gap": ("gap", "triangle", charts.REFIT)}
 
 
 def render(inspections: Sequence[Inspection]) -> str:
@@ -44,25 +46,45 @@ def _brief(found: Inspection) -> str:
 def _sections(found: Inspection, *, single: bool) -> list[Section]:
     before = "" if single else f"{found.log}: "
     notes = [f"{f.message}." for f in found.findings]
-    tables = [grid for _, grid in words.grids(found)]
+    (_, joints), *parameters = words.grids(found)
     text = [] if single else [f"{question}: {answer}" for question, answer in words.overview(found)]
     return [
-        Section(f"{before}over time", figures=_over_time(found)),
-        Section(f"{before}channels and parameters", text=text, tables=tables, notes=notes),
-        Section(f"{before}sampling and coverage", figures=[_periods(found), *_coverage(found)]),
+        Section(_headed(before, "over time"), figures=_over_time(found)),
+        Section(_headed(before, "joints"), text=text, tables=[joints], notes=notes),
+        *(Section(_headed(before, "parameters"), text=[f"{title}."], tables=[grid]) for title, grid in parameters),
+        Section(_headed(before, "sampling and coverage"), figures=[_periods(found), *_coverage(found)]),
     ]
+
+
+def _headed(before: str, title: str) -> str:
+    return f"{before}{title}" if before else title.capitalize()
 
 
 def _over_time(found: Inspection) -> list[Any]:
     log = found.source
     figures: list[Any] = []
+    length, load = found.units
     for j in range(log.n_joints):
-        for name, values in ((f"q{j + 1}", log.q[:, j]), (f"tau{j + 1}", log.tau[:, j])):
+        for name, title, values in (
+            (f"q{j + 1}", f"position of joint {j + 1}, q{j + 1} [{length}]", log.q[:, j]),
+            (f"tau{j + 1}", f"torque of joint {j + 1}, tau{j + 1} [{load}]", log.tau[:, j]),
+        ):
             t, shown = _envelope(log.t, values)
             options = {"x_range": figures[0].x_range} if figures else {}
             curve = [(name, shown, charts.MEASURED)]
-            figures.append(charts.lines(name, "time [s]", "", t, curve, height=180, **options))
+            figures.append(charts.lines(title, "time [s]", "", t, curve, height=180, **options))
+            _mark(figures[-1], found, float(values.min()))
     return figures
+
+
+def _mark(chart: Any, found: Inspection, low: float) -> None:
+    """Mark below a curve when rows were left out, and where there are gaps."""
+    for kind, (label, marker, colour) in _MARKS.items():
+        times = [t for f in found.findings if f.kind == kind for t in f.times]
+        if times:
+            chart.scatter(
+                times, [low] * len(times), marker=marker, size=9, color=colour, fill_alpha=0.6, legend_label=label
+            )
 
 
 def _envelope(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -90,10 +112,16 @@ def _periods(found: Inspection) -> Any:
 def _coverage(found: Inspection) -> list[Any]:
     log = found.source
     stride = max(1, len(log) // (4 * _POINTS))
+    length, _ = found.units
     figures = []
     for j in range(log.n_joints):
         speed = np.gradient(log.q[::stride, j], log.t[::stride])
-        f = charts.figure(f"joint {j + 1}: positions and speeds visited", "position", "speed", height=220)
+        f = charts.figure(
+            f"joint {j + 1}: positions and speeds visited",
+            f"position [{length}]",
+            f"speed [{length} per s]",
+            height=220,
+        )
         f.scatter(log.q[::stride, j], speed, size=2, color=charts.AFTER, alpha=0.4)
         figures.append(f)
     return figures

@@ -25,14 +25,38 @@ def overview(found: Inspection) -> list[tuple[str, str]]:
             "columns",
             ", ".join(key if key == name else f"{key} = {name}" for key, name in found.columns.items()) or "arrays",
         ),
-        ("samples", f"{s.samples} over {s.duration_s:.6g} s"),
+        ("samples", f"{s.samples:,} over {_duration(s.duration_s)}".replace(",", "\N{NARROW NO-BREAK SPACE}")),
         ("rate", f"{s.rate_hz:.6g} Hz (median period {s.period_s * 1e3:.4g} ms)"),
-        ("jitter", f"{s.jitter_s * 1e6:.3g} us RMS, {s.jitter_max_s * 1e6:.3g} us at most"),
+        ("jitter", _jitter(s.jitter_s, s.jitter_max_s)),
         ("gaps", _gaps(found)),
     ]
     if found.excitation is not None:
         answers.append(("excitation", _excitation(found.excitation)))
     return answers
+
+
+def _duration(seconds: float) -> str:
+    """Seconds, and minutes or hours where there are many.
+
+    Examples
+    --------
+    >>> _duration(9.9975), _duration(7200.0)
+    ('9.9975 s', '7200 s (2.0 h)')
+    """
+    text = f"{seconds:.6g} s"
+    if seconds < 120:
+        return text
+    return f"{text} ({seconds / 60:.1f} min)" if seconds < 7200 else f"{text} ({seconds / 3600:.1f} h)"
+
+
+def _jitter(rms_s: float, most_s: float) -> str:
+    if most_s < 1e-9:
+        return "none (below 1 ns)"
+    return f"{_short(rms_s)} RMS, {_short(most_s)} at most"
+
+
+def _short(seconds: float) -> str:
+    return f"{seconds * 1e6:.3g} µs" if seconds < 1e-3 else f"{seconds * 1e3:.3g} ms"
 
 
 def _gaps(found: Inspection) -> str:
@@ -43,12 +67,16 @@ def _gaps(found: Inspection) -> str:
     return f"{s.gaps}, together {s.gap_s:.3g} s; the widest: {widest}"
 
 
+def _plain(number: float) -> str:
+    return f"{number:.0f}" if 1e3 <= number < 1e6 else f"{number:.3g}"
+
+
 def _excitation(e: Excitation) -> str:
     weak = [p.name for p in e.parameters if p.excited != "well"]
     quality = (
         "good" if e.condition <= _RECOMMENDED else f"above {_RECOMMENDED:g} parameters can stand in for each other"
     )
-    said = f"condition number {e.condition:.3g} ({quality})"
+    said = f"condition number {_plain(e.condition)} ({quality})"
     said += f"; told least: {e.weakest}" if weak else ""
     return f"{said}; not well excited: {', '.join(weak)}" if weak else f"{said}; every parameter is well excited"
 
@@ -57,25 +85,30 @@ def grids(found: Inspection) -> list[tuple[str, Grid]]:
     """Return titles and tables."""
     all_grids = [("Joints", _joints(found))]
     if found.excitation is not None:
-        share = "What 1 % of the RMS torque as white error would do to each parameter"
+        share = "Standard deviation of each parameter if the torque carried white noise of 1 % of its RMS"
         all_grids.append((share, _parameters(found.excitation)))
     return all_grids
 
 
 def _joints(found: Inspection) -> Grid:
     header = ["", *(f"joint {j.joint}" for j in found.joints)]
+    length, load = found.units
     lines = (
-        ("position", lambda j: f"{j.q_range[0]:.4g} to {j.q_range[1]:.4g}"),
-        ("position step", _position_step),
-        ("speed, 99 % below", lambda j: f"{j.top_speed:.4g}"),
-        ("at rest", lambda j: f"{j.rest:.1%}"),
-        ("in motion", lambda j: f"{j.motion:.1%}"),
+        (f"position [{length}]", lambda j: f"{j.q_range[0]:.4g} to {j.q_range[1]:.4g}"),
+        (f"position step [{length}]", _position_step),
+        (f"speed, 99 % below [{_rate(length)}]", lambda j: f"{j.top_speed:.4g}"),
+        ("at rest", lambda j: f"{100 * j.rest:.1f} %"),
+        ("in motion", lambda j: f"{100 * j.motion:.1f} %"),
         ("reversals", lambda j: f"{j.reversals}"),
-        ("torque", lambda j: f"{j.tau_range[0]:.4g} to {j.tau_range[1]:.4g}"),
-        ("torque step", lambda j: "none" if j.tau_step is None else f"{j.tau_step:.4g}"),
+        (f"torque [{load}]", lambda j: f"{j.tau_range[0]:.4g} to {j.tau_range[1]:.4g}"),
+        (f"torque step [{load}]", lambda j: "none" if j.tau_step is None else f"{j.tau_step:.4g}"),
         ("torque cut off", _flat),
     )
     return header, [[name, *(of(j) for j in found.joints)] for name, of in lines]
+
+
+def _rate(length: str) -> str:
+    return " or ".join(f"{unit}/s" for unit in length.split(" or "))
 
 
 def _position_step(j: Joint) -> str:
@@ -86,7 +119,7 @@ def _position_step(j: Joint) -> str:
 
 
 def _flat(j: Joint) -> str:
-    return "; ".join(f"at {f.level:.4g}: {f.share:.1%}, up to {f.longest_s:.3g} s" for f in j.flat_tops) or "no"
+    return "; ".join(f"at {f.level:.4g}: {100 * f.share:.1f} %, up to {f.longest_s:.3g} s" for f in j.flat_tops) or "no"
 
 
 def _parameters(e: Excitation) -> Grid:

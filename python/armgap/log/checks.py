@@ -25,6 +25,8 @@ _GAP_PERIODS = 3.0
 _PERIOD_MARGIN = 0.1
 # Sample times further than this part of a period from an even grid are worth naming.
 _JITTER = 0.02
+# Moments of one finding that are kept to be drawn.
+_DRAWN = 200
 
 
 def order(arrays: Arrays, place: Path | str, names: Names) -> None:
@@ -63,7 +65,8 @@ def without_repeats(arrays: Arrays) -> tuple[Arrays, list[Finding]]:
     keep[again] = False
     dq = None if arrays.dq is None else arrays.dq[keep]
     said = f"left out: {counted(len(again), 'row')} like the row before in every value, the first of them row {again[0] + 1}"
-    return Arrays(arrays.t[keep], arrays.q[keep], arrays.tau[keep], dq), [Finding("cleaned", said)]
+    when = tuple((arrays.t[again[:_DRAWN]] - arrays.t[0]).tolist())
+    return Arrays(arrays.t[keep], arrays.q[keep], arrays.tau[keep], dq), [Finding("cleaned", said, when)]
 
 
 def _repeat(arrays: Arrays, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -77,7 +80,7 @@ def _repeat(arrays: Arrays, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
 
 def motion(arrays: Arrays, place: Path | str, names: Names) -> None:
     """Raise unless some joint moves and some torque acts."""
-    if np.all(np.ptp(arrays.q, axis=0) == 0):
+    if np.all(arrays.q == arrays.q[0]):
         raise LogShapeError(
             "no joint moves",
             remedy="a log without motion says nothing about the arm",
@@ -95,8 +98,12 @@ def motion(arrays: Arrays, place: Path | str, names: Names) -> None:
 
 def notice(arrays: Arrays, names: Names, arm: Arm | None) -> list[Finding]:
     """Return what a reader should know although it does not stop the work."""
-    found = [*_sampling(arrays, arm), *_constants(arrays, names), *_limits(arrays, names, arm)]
-    return [Finding(kind, message) for kind, message in found]
+    plain = [*_constants(arrays, names), *_limits(arrays, names, arm)]
+    return [
+        *(Finding(kind, message) for kind, message in _sampling(arrays, arm)),
+        *_gaps(arrays),
+        *(Finding(kind, message) for kind, message in plain),
+    ]
 
 
 def unused(recording: Recording, names: Names) -> list[Finding]:
@@ -117,7 +124,7 @@ def _sampling(arrays: Arrays, arm: Arm | None) -> list[tuple[str, str]]:
             (
                 "sampling",
                 f"uneven sampling: median {period * 1e3:.4g} ms, {off} of {len(steps)} periods differ by more than "
-                f"{_JITTER:.0%}, at most by {jitter * 1e3:.3g} ms",
+                f"{100 * _JITTER:.0f} %, at most by {jitter * 1e3:.3g} ms",
             )
         )
     if arm is not None and abs(period / arm.sample_period - 1) > _PERIOD_MARGIN:
@@ -127,24 +134,28 @@ def _sampling(arrays: Arrays, arm: Arm | None) -> list[tuple[str, str]]:
                 f"sampled every {period * 1e3:.4g} ms, the arm file says {arm.sample_period * 1e3:.4g} ms",
             )
         )
-    gaps = np.flatnonzero(steps > _GAP_PERIODS * period)
-    if len(gaps):
-        widest = int(np.argmax(steps))
-        found.append(
-            (
-                "gap",
-                f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} of more than {_GAP_PERIODS:g} sample periods, the "
-                f"widest {steps[widest] * 1e3:.3g} ms after row {widest + 1}; the torque is taken to be held there",
-            )
-        )
     return found
+
+
+def _gaps(arrays: Arrays) -> list[Finding]:
+    steps = np.diff(arrays.t)
+    period = float(np.median(steps))
+    gaps = np.flatnonzero(steps > _GAP_PERIODS * period)
+    if not len(gaps):
+        return []
+    widest = int(np.argmax(steps))
+    said = (
+        f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} of more than {_GAP_PERIODS:g} sample periods, the "
+        f"widest {steps[widest] * 1e3:.3g} ms after row {widest + 1}; the torque is taken to be held there"
+    )
+    return [Finding("gap", said, tuple((arrays.t[gaps[:_DRAWN]] - arrays.t[0]).tolist()))]
 
 
 def _constants(arrays: Arrays, names: Names) -> list[tuple[str, str]]:
     found = []
     for values, group in ((arrays.q, names.q), (arrays.tau, names.tau)):
         for j, name in enumerate(group):
-            if np.ptp(values[:, j]) == 0:
+            if np.all(values[:, j] == values[0, j]):
                 found.append(("constant", f"`{name}` is constant at {values[0, j]:.6g}"))
     return found
 

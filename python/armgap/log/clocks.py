@@ -36,6 +36,8 @@ _SHORTEST_PERIOD_S = 2e-5
 _EPOCH_S = (1e9, 4e9)
 # A torque is held for at most so many of its own periods.
 _HELD_PERIODS = 3.0
+# Moments of one finding that are kept to be drawn.
+_DRAWN = 200
 
 
 @dataclass(frozen=True)
@@ -186,7 +188,9 @@ def _report(
     if unseen:
         message += f"; {unseen} torques lie between two positions and act on none"
     findings.append(Finding("clock", message))
-    early, late = int(np.sum(held < 0)), int(np.sum(~keep & (held >= 0)))
-    for count, where in ((early, "before the first torque"), (late, "after the last torque")):
-        if count:
-            findings.append(Finding("cleaned", f"left out {where}: {counted(count, 'row')}"))
+    start = t.t[keep][0]
+    early, late = held < 0, ~keep & (held >= 0)
+    for rows, where in ((early, "before the first torque"), (late, "after the last torque")):
+        if rows.any():
+            when = tuple((t.t[rows][:_DRAWN] - start).tolist())
+            findings.append(Finding("cleaned", f"left out {where}: {counted(int(rows.sum()), 'row')}", when))

@@ -16,6 +16,7 @@ from armgap.errors import ColumnError, LogShapeError, SampleError
 from armgap.log.findings import Finding
 from armgap.log.index import Index
 from armgap.log.recording import Recording
+from armgap.progress import tell
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
@@ -50,6 +51,11 @@ class Names:
     def by_key(self) -> dict[str, str]:
         """Column by standard name."""
         return dict(self.pairs)
+
+    def order(self, column: str) -> float:
+        """Return which part of the columns comes before this one."""
+        columns = [name for _, name in self.pairs]
+        return columns.index(column) / len(columns)
 
 
 @dataclass(frozen=True)
@@ -257,12 +263,14 @@ def extract(recording: Recording, place: Path | str, names: Names) -> Raw:
     def several(group: tuple[str, ...]) -> NDArray[np.float64]:
         values: NDArray[np.float64] | None = None
         for j, name in enumerate(group):
+            tell(f"reading {label}", names.order(name))
             column = _column(recording.stream_of(name).fetch(name), place, name)
             values = np.empty((len(column), len(group))) if values is None else values
             values[:, j] = column
         assert values is not None
         return values
 
+    label = place.name if isinstance(place, Path) else place
     t, tick_s = _times(recording, place, names.t)
     if len(t) == 0:
         raise LogShapeError("holds no samples", remedy="give a log with samples", file=place)

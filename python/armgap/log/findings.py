@@ -23,10 +23,13 @@ class Finding:
         ``"constant"``, ``"limit"``.
     message : str
         In words.
+    times : tuple of float
+        When it happened, counted from the log's first sample [s], where it can be drawn; the first 200 of more.
     """
 
     kind: str
     message: str
+    times: tuple[float, ...] = ()
 
 
 def counted(count: int, thing: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -204,7 +205,7 @@ class Log:
         """Number of joints."""
         return int(self.q.shape[1])
 
-    @property
+    @cached_property
     def sample_period(self) -> float:
         """Median sample period [s]."""
         return float(np.median(np.diff(self.t)))

@@ -21,10 +21,10 @@ from armgap.log.log import Log
 
 __all__ = ["BUDGET", "STRETCH_S", "choose"]
 
-BUDGET = 48_000
+BUDGET = 24_000
 """Samples of all training logs, or of all holdout logs, that are diagnosed whole; of more, stretches are chosen."""
 
-STRETCH_S = 3.0
+STRETCH_S = 2.0
 """Length of a stretch [s]."""
 
 _FEWEST = 4  # stretches, however long
@@ -98,7 +98,7 @@ def _cut(index: int, log: Log, length_s: float, budget: int) -> list[tuple[int, 
 def _visits(logs: Sequence[Log], pieces: list[tuple[int, int, int]]) -> NDArray[np.float64]:
     """Return how much of each piece lies in each cell, shape (n_pieces, n_cells); nothing for pieces at rest."""
     speeds = [_Speeds(log) for log in logs]
-    ranges = _ranges(logs, speeds)
+    ranges = _ranges(speeds)
     cells = np.array([_cells(logs[i], speeds[i], slice(first, last), ranges) for i, first, last in pieces])
     times = np.zeros((len(pieces), len(logs) * _TIMES))
     for row, (i, first, _) in enumerate(pieces):
@@ -129,13 +129,16 @@ def _step(values: NDArray[np.float64]) -> float:
     return float(np.quantile(moved, 0.05)) if len(moved) else 0.0
 
 
-def _ranges(logs: Sequence[Log], speeds: Sequence[_Speeds]) -> _Ranges:
+def _ranges(speeds: Sequence[_Speeds]) -> _Ranges:
+    """Return ranges from a view of the logs that is as thin as the speeds are."""
     tops = [np.quantile(np.abs(s.of(slice(0, len(s.log)))[0]), 0.999, axis=0) for s in speeds]
+    q = [s.log.q[:: s.stride] for s in speeds]
+    tau = [np.abs(s.log.tau[:: s.stride]) for s in speeds]
     return _Ranges(
-        np.min([log.q.min(axis=0) for log in logs], axis=0),
-        np.max([log.q.max(axis=0) for log in logs], axis=0),
+        np.min([x.min(axis=0) for x in q], axis=0),
+        np.max([x.max(axis=0) for x in q], axis=0),
         np.max(tops, axis=0),
-        np.max([np.abs(log.tau).max(axis=0) for log in logs], axis=0),
+        np.max([x.max(axis=0) for x in tau], axis=0),
     )
 
 
@@ -158,7 +161,7 @@ def _joint_cells(
 ) -> NDArray[np.float64]:
     go = moving[:, j]
     span = max(float(ranges.high[j] - ranges.low[j]), 1e-12)
-    place = np.minimum((_POSITIONS * (log.q[at, j] - ranges.low[j]) / span).astype(int), _POSITIONS - 1)
+    place = np.clip((_POSITIONS * (log.q[at, j] - ranges.low[j]) / span).astype(int), 0, _POSITIONS - 1)
     ratio = np.abs(dq[:, j]) / max(float(ranges.speed[j]), 1e-12)
     slow = np.clip((-2 * np.log10(np.maximum(ratio, 1e-12))).astype(int), 0, _SPEEDS - 1)
     load = np.abs(log.tau[at, j]) / max(float(ranges.torque[j]), 1e-12)

@@ -40,7 +40,7 @@ _FARTHEST_M = 40.0
 _SPEED_SPAN_S = 0.02
 # Positions and velocities in different units disagree by 57.3 (degrees) or 1000 (mm), give or take noise.
 _DEGREE_RATIO = (40.0, 80.0)
-# So many samples tell whether positions move in whole encoder counts.
+# So many samples tell the sample period, and whether positions move in whole encoder counts.
 _ENOUGH = 100_000
 _SURE_RATIO = (52.0, 63.0)
 _MILLI_RATIO = (700.0, 1400.0)
@@ -251,7 +251,7 @@ def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
 
 def _peak_speed(arrays: Arrays, j: int) -> float:
     """Return the speed that is exceeded for 1 % of the log."""
-    stride = max(1, round(_SPEED_SPAN_S / float(np.median(np.diff(arrays.t)))))
+    stride = max(1, round(_SPEED_SPAN_S / float(np.median(np.diff(arrays.t[:_ENOUGH])))))
     t, q = arrays.t[::stride], arrays.q[::stride, j]
     return float(np.quantile(np.abs(np.diff(q) / np.diff(t)), 0.99)) if len(t) > 1 else 0.0
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armgap.report.words import unit_text
+from armgap.report.words import error_text, symbol_text, unit_text
 
 __all__ = ["AFTER", "BEFORE", "FLOOR", "MEASURED", "REFIT", "bars", "law", "lines"]
 
@@ -144,7 +144,7 @@ def bars(
         data = {
             "x": [(group, series[i][0]) for group in groups],
             "top": tops,
-            "text": [f"{v:.3g}" for v in values],
+            "text": [error_text(v) for v in values],
         }
         source = ColumnDataSource(data)
         f.vbar("x", top="top", bottom=bottom, width=0.9, color=colour, source=source, legend_label=label)
@@ -172,7 +172,7 @@ def law(entry: dict[str, Any]) -> Any:
     from bokeh.models import ColumnDataSource, Whisker
 
     bins, points = entry["bins"], entry["points"]
-    f = figure("", f"{entry['variable']} [{unit_text(entry['unit'])}]", "", height=300)
+    f = figure("", f"{symbol_text(entry['variable'])} [{unit_text(entry['unit'])}]", "", height=300)
     f.scatter(points["x"], points["y"], size=4, color=MEASURED, alpha=0.45, line_color=None, legend_label="samples")
     ends = {
         "x": bins["x"],

@@ -169,4 +169,15 @@ def _template() -> Any:
     environment = Environment(
         autoescape=True, loader=DictLoader(files), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["code"] = _code
     return environment.get_template("page.html")
+
+
+def _code(text: str) -> Any:
+    """Text whose words between backticks are set as code; all of it escaped."""
+    from markupsafe import Markup, escape
+
+    parts = text.split("`")
+    if len(parts) % 2 == 0:
+        return escape(text)
+    return Markup("").join(Markup("<code>{}</code>").format(p) if i % 2 else escape(p) for i, p in enumerate(parts))

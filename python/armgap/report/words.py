@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,12 +15,16 @@ __all__ = [
     "Answer",
     "answers",
     "doubtful",
+    "each_joint",
+    "error_text",
     "figure",
     "joint_text",
     "millis",
     "named",
+    "parameter_text",
     "percent",
     "sizes",
+    "symbol_text",
     "title",
     "unit_text",
     "value",
@@ -52,6 +57,21 @@ _NO_CAUSE = {
         "Every known effect was tried and none explains the gap; naming one would mislead.",
     ),
 }
+_ARROW = "\N{NO-BREAK SPACE}→\N{NO-BREAK SPACE}"
+_FRICTION = {"viscous": "viscous friction", "coulomb": "Coulomb friction"}
+_INERTIAL = {
+    "axis": {"theta1": "moving mass", "theta2": "weight along the axis"},
+    "pendulum": {"theta1": "inertia about the joint", "theta2": "gravity torque of the level link"},
+    "two-link": {
+        "theta1": "inertia about joint 1, elbow at 90°",
+        "theta2": "inertial coupling of the links",
+        "theta3": "inertia of link 2 about joint 2",
+        "theta4": "gravity torque of link 1 and the elbow",
+        "theta5": "gravity torque of link 2",
+    },
+}
+_SYMBOLS = {"q": "position", "dq": "speed", "ddq": "acceleration", "tau": "torque"}
+_SYMBOL = re.compile(r"(q|dq|ddq|tau)[0-9]+")
 _VARIABLES = {"dq": "speed", "reversal": "near a reversal", "q": "position", "tau": "torque", "t": "time"}
 
 
@@ -111,7 +131,7 @@ def percent(share: float) -> str:
 
 def unit_text(unit: str) -> str:
     """A unit for people: powers raised, and none for ratios."""
-    return "" if unit == "1" else unit.replace("^2", "²")
+    return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³")
 
 
 def value(entry: Any, digits: int = 4) -> str:
@@ -135,10 +155,48 @@ def sizes(parameters: Data) -> str:
     return ", ".join(f"{name} {value(p, 3)}" for name, p in parameters.items())
 
 
+def error_text(number: float) -> str:
+    """An error with two significant digits, zeros included; it is an RMS and worth no more.
+
+    Examples
+    --------
+    >>> error_text(39.6), error_text(0.00698), error_text(102.0)
+    ('40', '0.0070', '102')
+    """
+    return figure(number) if abs(number) >= 100 or number == 0 else f"{number:#.2g}".rstrip(".")
+
+
 def millis(values: Sequence[float], unit: str) -> str:
     """RMS errors per joint in thousandths, or in whole units where one is that large."""
     scale, prefix = (1.0, "") if max(values) >= 1.0 else (1e3, "m")
-    return f"{' / '.join(figure(scale * v) for v in values)} {prefix}{unit}"
+    numbers = [error_text(scale * v) for v in values]
+    return f"{' and '.join(filter(None, (', '.join(numbers[:-1]), numbers[-1])))} {prefix}{unit}"
+
+
+def each_joint(*models: Sequence[float], unit: str) -> str:
+    r"""The errors of each joint from one model to the next, in thousandths, or in whole units where one is that large.
+
+    Examples
+    --------
+    >>> each_joint([0.0076, 0.0396], [3.3e-5, 2.9e-5], unit="rad").split("; ")
+    ['Joint 1: 7.6\xa0→\xa00.033\xa0mrad', 'joint 2: 40\xa0→\xa00.029\xa0mrad']
+    """
+    scale, prefix = (1.0, "") if max(max(values) for values in models) >= 1.0 else (1e3, "m")
+    ends = [
+        f"{_ARROW.join(error_text(scale * v) for v in errors)}\N{NO-BREAK SPACE}{prefix}{unit}"
+        for errors in zip(*models, strict=True)
+    ]
+    return (
+        ends[0] if len(ends) == 1 else _capital("; ".join(f"joint {j}: {end}" for j, end in enumerate(ends, start=1)))
+    )
+
+
+def parameter_text(kind: str, name: str) -> str:
+    """What a parameter of the arm stands for, in a few words; nothing for one that is not known."""
+    stem, number = name.rstrip("0123456789"), name[len(name.rstrip("0123456789")) :]
+    if stem in _FRICTION:
+        return f"{_FRICTION[stem]} of joint {number}"
+    return _INERTIAL.get(kind, {}).get(name, "")
 
 
 def named(effect: Data) -> str:
@@ -176,18 +234,21 @@ def _where(data: Data) -> tuple[str, str]:
     first = places[0]
     ranged = bool(first.get("range"))
     headline = f"Joint {first['joint']}, {_regime(first)}"
-    model = "arm file's model" if data["verdict"] == "parameters" else "re-estimated model"
-    text = f"It bears {percent(first['share'])} of what the {model} lacks"
+    load = "force" if data["gap"].get("unit") == "m" else "torque"
+    text = f"{percent(first['share'])} of the {load} that is missing from the model acts on joint {first['joint']}"
     if ranged:
         text += f", most of it {_inside(first)}"
-    others = [f"joint {p['joint']} {percent(p['share'])}" for p in places[1:] if p["share"] >= MINOR_JOINT]
-    return headline, text + (f"; {', '.join(others)}." if others else ".")
+    others = [f"{percent(p['share'])} on joint {p['joint']}" for p in places[1:] if p["share"] >= MINOR_JOINT]
+    text += f"; {', '.join(others)}." if others else "."
+    return headline, text if data[
+        "verdict"
+    ] == "parameters" else f"{text} Missing is what re-estimated values cannot supply."
 
 
 def _regime(place: Data) -> str:
     """The regime of a place, as it follows the joint."""
     if not place.get("range"):
-        return "in every regime"
+        return "throughout its motion"
     return f"{'in' if place['regime'].startswith('part') else 'at'} {place['regime']}"
 
 
@@ -198,8 +259,27 @@ def _inside(place: Data) -> str:
         return str(place["detail"])
     unit = str(place["detail"]).rpartition(f"{span['to']:.3f}")[2].strip()
     name = variable_text(span["variable"])
-    what = "t" if name == "time" else f"the {name} of joint {place['joint']}"
+    what = "t" if name == "time" else f"its {name}"
     return f"where {what} is {figure(span['from'])} to {figure(span['to'])} {unit}".strip()
+
+
+def symbol_text(variable: str) -> str:
+    """A variable of the evidence, such as ``dq2``, with what it is; anything else as it is.
+
+    Examples
+    --------
+    >>> symbol_text("ddq2"), symbol_text("rate of change of tau1"), symbol_text("t")
+    ('acceleration of joint 2', 'rate of change of the torque of joint 1', 'time')
+    """
+    words = variable.split(" ")
+    symbol = next((w for w in words if _SYMBOL.fullmatch(w)), None)
+    if symbol is None:
+        return "time" if variable == "t" else variable
+    stem = symbol.rstrip("0123456789")
+    meaning = f"{_SYMBOLS[stem]} of joint {symbol[len(stem) :]}"
+    return " ".join(
+        (meaning if len(words) == 1 or w != words[-1] else f"the {meaning}") if w == symbol else w for w in words
+    )
 
 
 def variable_text(variable: str) -> str:
@@ -243,19 +323,17 @@ def _capital(text: str) -> str:
 def _how_far(data: Data) -> tuple[str, str]:
     gap = data["gap"]
     unit = gap.get("unit", "rad")
-    low, high = gap["closed_ci"]
-    before, after = (" / ".join(figure(1e3 * v, 2) for v in gap[key]) for key in ("before", "after"))
     if data["verdict"] == "none":
-        headline = f"Nothing to shrink: it is {after} m{unit}"
+        headline, errors = "Nothing to shrink", each_joint(gap["after"], unit=unit)
     elif data["verdict"] == "unexplained":
-        headline = f"It stays: {after} m{unit}"
+        headline, errors = "It stays", each_joint(gap["after"], unit=unit)
     else:
-        headline = f"By {percent(gap['closed'])}: {before} → {after} m{unit}"
-    joints = " per joint" if len(gap["before"]) > 1 else ""
+        headline, errors = f"By {percent(gap['closed'])}", each_joint(gap["before"], gap["after"], unit=unit)
     detail = (
-        f"RMS error{joints} of predictions over {gap['horizon_s']:g} s on held-out motion. Re-estimating the arm file's own values alone leaves "
-        f"{millis(gap['refit'], unit)}, sensor noise {millis(gap['floor'], unit)}."
+        f"{errors}: RMS error of predictions over {gap['horizon_s']:g} s on held-out motion. Re-estimating the arm file's own values alone "
+        f"leaves {millis(gap['refit'], unit)}, sensor noise {millis(gap['floor'], unit)}."
     )
     if data["verdict"] != "none":
-        detail += f" Share closed: {percent(gap['closed'])}, 95\N{NO-BREAK SPACE}% interval {percent(low)} to {percent(high)}."
+        low, high = gap["closed_ci"]
+        detail += f" 95\N{NO-BREAK SPACE}% interval of the share closed: {percent(low)} to {percent(high)}."
     return headline, detail

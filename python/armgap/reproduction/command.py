@@ -24,7 +24,8 @@ NARROW = 100
 @click.option("--quiet", is_flag=True, help="No summary.")
 def command(report_file: str, json_file: str | None, quiet: bool) -> None:
     """Repeat the seed paper's experiment: Table II, Figures 2 to 7, and what explains their deviations."""
-    from armgap.cli.common import check_outputs, interruptible, working, write
+    from armgap.cli.common import check_outputs, interruptible, write
+    from armgap.cli.progress import working
     from armgap.report import check_report, render_report
     from armgap.reproduction.page import document
 

@@ -61,6 +61,9 @@ enum Kind {
     /// Made by [`Level::detect`] alone, where the processor has them.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     Avx2,
+    /// Made by [`Level::widest`] alone, where the processor has them and AVX2.
+    #[cfg(all(feature = "std", target_arch = "x86_64"))]
+    Avx512,
 }
 
 impl Level {
@@ -81,12 +84,24 @@ impl Level {
         Self::PORTABLE
     }
 
+    /// The same with eight doubles at once for work that is run by [`Level::run_wide`].
+    #[inline]
+    pub fn widest() -> Self {
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        if Self::detect() != Self::PORTABLE && std::arch::is_x86_feature_detected!("avx512f") {
+            return Self(Kind::Avx512);
+        }
+        Self::detect()
+    }
+
     /// Name in tables.
     pub const fn name(self) -> &'static str {
         match self.0 {
             Kind::Portable => "portable",
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Kind::Avx2 => "AVX2 and FMA",
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Kind::Avx512 => "AVX-512",
         }
     }
 
@@ -96,7 +111,17 @@ impl Level {
         match self.0 {
             Kind::Portable => portable(work),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
-            Kind::Avx2 => on_avx2(work),
+            Kind::Avx2 | Kind::Avx512 => on_avx2(work),
+        }
+    }
+
+    /// Runs work that has eight doubles side by side.
+    #[inline(always)]
+    pub fn run_wide<W: Work>(self, work: W) -> W::Output {
+        match self.0 {
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Kind::Avx512 => on_avx512(work),
+            _ => self.run(work),
         }
     }
 }
@@ -120,6 +145,21 @@ fn on_avx2<W: Work>(work: W) -> W::Output {
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[target_feature(enable = "avx2,fma")]
 fn avx2<W: Work>(work: W) -> W::Output {
+    work.run::<Fused>()
+}
+
+/// Runs the work compiled for AVX-512.
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+#[inline(always)]
+#[allow(unsafe_code)]
+fn on_avx512<W: Work>(work: W) -> W::Output {
+    // SAFETY: called for `Kind::Avx512` only, which only `Level::widest` makes, after asking the processor for all three.
+    unsafe { avx512(work) }
+}
+
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+#[target_feature(enable = "avx2,fma,avx512f")]
+fn avx512<W: Work>(work: W) -> W::Output {
     work.run::<Fused>()
 }
 

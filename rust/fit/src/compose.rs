@@ -2,11 +2,11 @@
 
 use crate::arm::ArmDescription;
 use crate::attribute::Contender;
-use crate::decide::{Attribution, CONSEQUENCE};
+use crate::decide::{Attribution, CONSEQUENCE, left_over};
 use crate::diagnose::Options;
 use crate::event::Event;
 use crate::gap::{Errors, free_run_series, gap, rms};
-use crate::locate::{Lacks, lacking_torque, places, regimes};
+use crate::locate::{Lack, Lacks, lacking_torque, places, regimes, shares};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
 use crate::report::{
@@ -17,6 +17,7 @@ use crate::ruled_out::ruled_out;
 use crate::solve::Fit;
 use crate::study::{Sample, Study};
 use armgap_core::arm::Arm;
+use rayon::prelude::*;
 
 /// The three hypotheses a report compares.
 pub struct Compared<const P: usize> {
@@ -47,12 +48,10 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let lacks = lacks(study, &compared, &last.weights.holdout);
     let regimes = regimes(&lacks, rotary);
     let verdict = if events.is_empty() { verdict(attribution, &gap) } else { "effect" };
-    let gap_of =
-        if attribution.causes.is_empty() && verdict == "parameters" { &lacks.before } else { &lacks.refit };
     Diagnosis {
         schema: "armgap.diagnosis/1",
         verdict,
-        places: places(gap_of, &regimes, &study.scales.torque),
+        places: places(&joint_shares(study, (attribution, events), &lacks, verdict), &regimes),
         gap,
         causes: attribution
             .causes
@@ -100,6 +99,35 @@ fn lacks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let data = &study.holdout.data;
     let of = |h: &Hypothesis<P>| lacking_torque(&study.arm, data, &weights.starts, h);
     Lacks { before: of(&compared.before), refit: of(&compared.refit), after: of(&compared.after) }
+}
+
+/// Each joint's share of the gap: what causes explain lies where they sit, the rest where torque is lacking.
+///
+/// A torque that is lacking on one joint bends the motion of all, and an error of its coupling shows on the others; so where a cause
+/// is known, its own joint says more than the lacking torque does.
+fn joint_shares<A, const N: usize, const P: usize>(
+    study: &Study<A, N, P>,
+    (attribution, events): (&Attribution<N, P>, &[Event]),
+    lacks: &Lacks<N>,
+    verdict: &str,
+) -> [f64; N] {
+    let of = |gap: &[Lack<N>]| shares(gap, &study.scales.torque);
+    let placed = attribution.causes.iter().map(|c| (c.effect.joint_number(), c.share));
+    let placed: Vec<(Option<usize>, f64)> =
+        placed.chain(events.iter().map(|e| (e.push.joint_number(), e.share.clamp(0.0, 1.0)))).collect();
+    let total: f64 = placed.iter().map(|(_, share)| share).sum();
+    if total <= 0.0 {
+        return of(if verdict == "parameters" { &lacks.before } else { &lacks.refit });
+    }
+    let left = left_over(&attribution.stages);
+    let (whole_arm, rest) = (of(&lacks.refit), of(&lacks.after));
+    std::array::from_fn(|j| {
+        let own = |(joint, share): &(Option<usize>, f64)| match joint {
+            Some(number) => share * f64::from(u8::from(*number == j + 1)),
+            None => share * whole_arm[j],
+        };
+        (1.0 - left) * placed.iter().map(own).sum::<f64>() / total + left * rest[j]
+    })
 }
 
 /// What the figures amount to.
@@ -174,6 +202,7 @@ fn ranking<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let data = &study.holdout.data;
     let starts = data.measured_starts();
     let ranked = |c: &Contender<P>, closed: f64| {
+        study.watch.unit();
         let effect = c.effect?;
         let n = c.fit.hypothesis.values().len();
         let sigma: Vec<f64> = (n - effect.len()..n).map(|i| c.fit.sigma(i)).collect();
@@ -191,7 +220,8 @@ fn ranking<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let final_of = |c: &Contender<P>| stage.contenders.iter().any(|f| same_effect(f, c));
     let finalists = stage.contenders.iter().map(|c| (c, stage.share(c)));
     let others = stage.field.iter().filter(|(c, _)| !final_of(c)).map(|(c, share)| (c, *share));
-    finalists.chain(others).filter_map(|(c, share)| ranked(c, share)).collect()
+    let all: Vec<(&Contender<P>, f64)> = finalists.chain(others).collect();
+    all.into_par_iter().filter_map(|(c, share)| ranked(c, share)).collect()
 }
 
 fn same_effect<const P: usize>(a: &Contender<P>, b: &Contender<P>) -> bool {

@@ -8,6 +8,7 @@ use crate::model::{Hypothesis, Placed};
 use crate::solve::{Effort, Fit};
 use crate::study::Study;
 use armgap_core::arm::Arm;
+use armgap_core::effect::Trial;
 
 /// Mean advantage per window, in standard errors, below which a cause is not accepted.
 const CERTAIN: f64 = 3.5;
@@ -22,7 +23,7 @@ const MATTERS: f64 = 0.1;
 const MATTERS_IN_SMALL: f64 = 0.5;
 
 /// Cost above the floor, as a factor, below which there is nothing left to explain.
-const ABOVE_FLOOR: f64 = 1.25;
+pub const ABOVE_FLOOR: f64 = 1.25;
 
 /// Decrease of the distance from trusted values, in squared sigmas, that makes a cause on its own.
 const TRUST_GAIN: f64 = 16.0;
@@ -36,8 +37,20 @@ pub const CONSEQUENCE: f64 = 1e-3;
 /// Improvement relative to the motion within a window below which an effect is of no consequence.
 const RELEVANT: f64 = 1e-4;
 
+/// A gap below [`RELEVANT`] is looked into down to this size if it stands this far above the floor.
+const FAINTEST: f64 = 5e-6;
+const CLEAR: f64 = 2.75;
+
+/// There a cause must explain this part of it, with this certainty, as no error of an integrator does.
+const MATTERS_IF_FAINT: f64 = 0.7;
+const CERTAIN_IF_FAINT: f64 = 5.0;
+
 /// Probability left to a cause beside a remainder that it does not touch at all.
-const REMAINDER_DOUBT: f64 = 0.25;
+const REMAINDER_DOUBT: f64 = 0.2;
+
+/// How fast a remainder takes the probability from causes that leave it: effects that are in no library were seen to be imitated by
+/// two or three that are, for up to eight tenths of the gap.
+const REMAINDER_POWER: i32 = 6;
 
 /// The same relative to the first gap: what lies below it is no cause of that gap.
 const NOTICEABLE: f64 = 0.02;
@@ -91,7 +104,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let mut model = refit.clone();
         let (mut causes, mut stages): (Vec<Cause>, Vec<Stage<N, P>>) = (Vec::new(), Vec::new());
         let mut smoothed = false;
-        let noticeable = noticeable(stage.relative_error());
+        let mut noticeable = noticeable(stage.relative_error());
+        if is_faint(&stage) {
+            noticeable = FAINTEST;
+            stage = self.stage(&nominal, scale, noticeable);
+        }
         while causes.len() < max_causes {
             let Some((choice, ground)) = choose(&stage, smoothed, noticeable) else {
                 break;
@@ -108,6 +125,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             model = stage.settled.clone();
         }
         self.prune(&mut model, &mut causes, &stage);
+        self.widen(&mut model, &stage.weights);
         stages.push(stage);
         refresh(&model, &mut causes);
         temper(&stages, &mut causes);
@@ -142,9 +160,23 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 }
 
-/// Improvement relative to the motion below which a cause is not worth a name, given the first gap.
+/// Improvement relative to the motion below which a cause is not worth a name, given the first gap; what is of consequence by itself
+/// always is.
 pub fn noticeable(first_gap: f64) -> f64 {
-    RELEVANT.max(NOTICEABLE * first_gap)
+    (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENCE)
+}
+
+/// Whether a gap is too small to matter by itself, and yet clearly there.
+fn is_faint<const N: usize, const P: usize>(stage: &Stage<N, P>) -> bool {
+    (FAINTEST..=RELEVANT).contains(&stage.relative_error()) && stage.excess() > CLEAR
+}
+
+/// Whether an effect can be told from the errors of an integrator: a torque at the joint can, a shift in time or a stiff spring cannot.
+fn is_tangible(effect: Option<&Placed>) -> bool {
+    effect.is_some_and(|e| {
+        let spec = e.law.spec();
+        (spec.hooks.force || spec.hooks.coulomb) && spec.trial != Trial::Whole
+    })
 }
 
 /// Why a contender deserves to be adopted.
@@ -198,12 +230,17 @@ fn moves<const N: usize, const P: usize>(
     noticeable: f64,
 ) -> bool {
     let possible = contender.size < AT_BOUND && !contender.is_idle();
-    let matters = if stage.relative_error() > CONSEQUENCE { MATTERS } else { MATTERS_IN_SMALL };
+    let (matters, certain) = match stage.relative_error() {
+        error if error > CONSEQUENCE => (MATTERS, CERTAIN),
+        error if error > RELEVANT => (MATTERS_IN_SMALL, CERTAIN),
+        _ => (MATTERS_IF_FAINT, CERTAIN_IF_FAINT),
+    };
     stage.excess() > ABOVE_FLOOR
+        && (stage.relative_error() > RELEVANT || is_tangible(contender.effect.as_ref()))
         && possible
         && stage.share(contender) > matters
         && stage.relevance(contender) > noticeable
-        && contender.z_over(&stage.base) > CERTAIN
+        && contender.z_over(&stage.base) > certain
         && contender.holdout_z_over(&stage.base) > HOLDOUT_CERTAIN
 }
 
@@ -299,18 +336,25 @@ fn trust_probability<const N: usize, const P: usize>(
     (ours / all) * plausible
 }
 
+/// Part of the first gap that the final model leaves without explanation; zero where what is left is of no consequence.
+pub fn left_over<const N: usize, const P: usize>(stages: &[Stage<N, P>]) -> f64 {
+    let (Some(first), Some(last)) = (stages.first(), stages.last()) else { return 0.0 };
+    if !last.is_open() {
+        return 0.0;
+    }
+    // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them.
+    (last.relative_error() / first.relative_error()).powi(2).max(last.excess() / first.excess()).min(1.0)
+}
+
 /// Lowers the probabilities where a gap of consequence remains that no candidate explains: what leaves it may also be what the named
 /// causes stand in for.
 fn temper<const N: usize, const P: usize>(stages: &[Stage<N, P>], causes: &mut [Cause]) {
-    let (Some(first), Some(last)) = (stages.first(), stages.last()) else { return };
-    if last.relative_error() <= CONSEQUENCE || last.excess() <= ABOVE_FLOOR {
+    let left = left_over(stages);
+    if left == 0.0 {
         return;
     }
-    // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them.
-    let left = (last.relative_error() / first.relative_error()).powi(2).max(last.excess() / first.excess());
-    let explained = 1.0 - left.min(1.0);
     for cause in causes {
-        cause.probability *= REMAINDER_DOUBT + (1.0 - REMAINDER_DOUBT) * explained * explained;
+        cause.probability *= REMAINDER_DOUBT + (1.0 - REMAINDER_DOUBT) * (1.0 - left).powi(REMAINDER_POWER);
     }
 }
 

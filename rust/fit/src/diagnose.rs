@@ -1,6 +1,7 @@
 //! The diagnosis: where the gap lies, which effect causes it, how far it shrinks.
 
 use crate::arm::{ArmDescription, WithArm};
+use crate::progress::{Observer, Watch, Work, guarded};
 use crate::report::Diagnosis;
 use crate::scale::Scales;
 use crate::solve::Prior;
@@ -58,6 +59,8 @@ pub enum DiagnoseError {
     BadSamples(String),
     /// The horizon is not a positive number of seconds.
     Horizon(f64),
+    /// The observer wanted no more.
+    Stopped,
 }
 
 impl std::fmt::Display for DiagnoseError {
@@ -74,6 +77,7 @@ impl std::fmt::Display for DiagnoseError {
                 write!(f, "log `{name}` holds values that are not finite, or times that do not increase")
             }
             Self::Horizon(h) => write!(f, "the horizon must be a positive number of seconds, not {h}"),
+            Self::Stopped => write!(f, "the diagnosis was stopped"),
         }
     }
 }
@@ -83,12 +87,13 @@ impl std::error::Error for DiagnoseError {}
 /// Windows without which nothing can be said.
 const FEWEST_WINDOWS: usize = 4;
 
-/// Diagnoses the gap between an arm and its logs.
+/// Diagnoses the gap between an arm and its logs; `observer` is told how far it is and may stop it.
 pub fn diagnose(
     arm: &ArmDescription,
     training: &[LogData<'_>],
     holdout: &[LogData<'_>],
     options: &Options,
+    observer: &Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
     if !(options.horizon > 0.0 && options.horizon.is_finite()) {
         return Err(DiagnoseError::Horizon(options.horizon));
@@ -99,7 +104,9 @@ pub fn diagnose(
             return Err(DiagnoseError::BadSamples(log.name.clone()));
         }
     }
-    arm.dispatch(Request { arm, training, holdout, options }).ok_or(DiagnoseError::Parameters(arm.kind))?
+    let request = Request { arm, training, holdout, options, observer };
+    let ended = guarded(|| arm.dispatch(request)).ok_or(DiagnoseError::Stopped)?;
+    ended.ok_or(DiagnoseError::Parameters(arm.kind))?
 }
 
 struct Request<'a> {
@@ -107,6 +114,7 @@ struct Request<'a> {
     training: &'a [LogData<'a>],
     holdout: &'a [LogData<'a>],
     options: &'a Options,
+    observer: &'a Observer,
 }
 
 impl WithArm for Request<'_> {
@@ -120,6 +128,9 @@ impl WithArm for Request<'_> {
         let started = Instant::now();
         let mut study = self.study::<A, N, P>(arm, theta)?;
         let conclusion = study.conclude(self.options.max_causes, self.options.seed);
+        let attribution = &conclusion.0;
+        let open = study.open_candidates(&attribution.model.hypothesis).len();
+        study.watch.begin(Work::Result, open + attribution.stages[0].field.len());
         let mut diagnosis = crate::compose::compose(&study, &conclusion, self.arm, self.options);
         diagnosis.seconds = started.elapsed().as_secs_f64();
         Ok(diagnosis)
@@ -141,7 +152,8 @@ impl Request<'_> {
         let noise = std::array::from_fn(|j| {
             crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
         });
-        Ok(Study { arm, prior, scales, training, holdout, noise })
+        let watch = Watch::new(Observer::clone(self.observer));
+        Ok(Study { arm, prior, scales, training, holdout, noise, watch })
     }
 
     fn sample<const N: usize>(

@@ -8,6 +8,7 @@ use crate::decide::{Attribution, noticeable};
 use crate::locate::{Lack, lacking_torque};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
+use crate::progress::Work;
 use crate::solve::scaled_inverse;
 use crate::study::{Sample, Study};
 use crate::track::Track;
@@ -85,6 +86,7 @@ struct Stretch {
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// Pushes that a model leaves unexplained; those that lower the error by less than `noticeable`, relative to the motion, do not count.
     pub fn events(&self, model: &Hypothesis<P>, scale: [f64; N], noticeable: f64) -> Vec<Event> {
+        self.watch.begin(Work::Pushes, MOST);
         let bare = [without_pushes(&self.training), without_pushes(&self.holdout)];
         let metrics = bare.each_ref().map(|sample| self.metric(sample, model, scale));
         let peaks = self.peaks(&bare, model);
@@ -94,6 +96,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let typical = metrics[stretch.set].typical;
             let known: Vec<Placed> =
                 found.iter().filter(|e| e.is_in(stretch.set, stretch.track)).map(|e| e.push).collect();
+            self.watch.unit();
             let fitted = self.fit_push(&bare[stretch.set], model, scale, stretch, &known, typical);
             let least = noticeable.powi(2) * bare[stretch.set].motion(&scale);
             if let Some(mut event) = fitted.filter(|e| e.share > EXPLAINS && e.gain > least) {

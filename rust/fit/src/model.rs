@@ -1,8 +1,10 @@
 //! A hypothesis about the arm: parameter values, friction smoothing, and effects placed on joints.
 
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Active, Effect, MAX_PARAMETERS, Pulse, Scope};
+use armgap_core::effect::{Active, Effect, MAX_PARAMETERS, Pulse, Quantity, Scope};
+use armgap_core::integrate::State;
 use armgap_core::plant::Plant;
+use nalgebra::SVector;
 
 /// An effect on a joint, with values for its parameters.
 #[derive(Clone, Copy)]
@@ -35,6 +37,11 @@ impl Placed {
     /// The same effect on the same joint, whatever its values.
     pub fn same_place(&self, other: &Self) -> bool {
         self.law.spec().name == other.law.spec().name && self.joint == other.joint
+    }
+
+    /// Whether it repeats with position: its parameters are amplitude, cycles per turn and phase.
+    pub fn is_periodic(&self) -> bool {
+        self.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Cycles)
     }
 
     /// 1-based joint, or none for effects of the whole arm.
@@ -117,6 +124,15 @@ impl<const P: usize> Hypothesis<P> {
             }
         }
         Some(torque)
+    }
+
+    /// The state of joints whose encoders show these positions and velocities.
+    pub fn start<const N: usize>(&self, q: SVector<f64, N>, dq: SVector<f64, N>) -> State<f64, N> {
+        if !self.distorts() {
+            return State::new(q, dq);
+        }
+        let at = SVector::from_fn(|j, _| self.actual(j, q[j]));
+        State::new(at, SVector::from_fn(|j, _| dq[j] / self.stretch(j, at[j])))
     }
 
     /// Position that joint `j`'s encoder shows.

@@ -2,6 +2,7 @@
 
 use crate::arm::WithArm;
 use crate::model::{Hypothesis, Placed};
+use crate::progress::{Watch, Work};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Pulse, interval};
 use armgap_core::integrate::{Interval, State, advance};
@@ -10,8 +11,11 @@ use nalgebra::SVector;
 /// Sub-steps per sample beyond which a tolerance is given up.
 const MAX_SUBSTEPS: usize = 256;
 
+/// Samples between two looks at who looks on.
+const LOOK: usize = 4096;
+
 /// A simulation to be run.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Simulation<'a> {
     /// Sample times, s.
     pub t: &'a [f64],
@@ -27,6 +31,8 @@ pub struct Simulation<'a> {
     pub tolerance: f64,
     /// Width of the smoothed sign, rad/s; zero for exact dry friction.
     pub smoothing: f64,
+    /// Who looks on.
+    pub watch: &'a Watch,
 }
 
 /// Positions and velocities at the samples, row by row.
@@ -108,6 +114,7 @@ impl Simulation<'_> {
         hypothesis: &Hypothesis<P>,
         substeps: usize,
     ) -> Result<Trajectory, SimulationError> {
+        self.watch.begin(Work::Simulate, self.t.len() / LOOK);
         let plant = hypothesis.plant(arm).ok_or(SimulationError::Effects)?;
         let held: Vec<[Pulse<f64>; N]> =
             self.tau.chunks_exact(N).map(|row| std::array::from_fn(|j| Pulse::held(row[j]))).collect();
@@ -117,6 +124,9 @@ impl Simulation<'_> {
         let n = self.t.len();
         let (mut q, mut dq) = (Vec::with_capacity(n * N), Vec::with_capacity(n * N));
         for k in 0..n {
+            if k % LOOK == LOOK - 1 {
+                self.watch.unit();
+            }
             if !state.is_finite() {
                 return Err(SimulationError::Diverged(k));
             }

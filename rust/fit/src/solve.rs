@@ -5,6 +5,7 @@
 
 use crate::metric::{Gram, Metric};
 use crate::model::{Hypothesis, Placed};
+use crate::progress::Watch;
 use crate::scale::Scales;
 use crate::window::Dataset;
 use armgap_core::arm::Arm;
@@ -63,6 +64,8 @@ pub struct Problem<'a, A, const N: usize, const P: usize> {
     pub prior: &'a Prior<P>,
     /// Typical sizes of the effects' parameters.
     pub scales: &'a Scales<N>,
+    /// Who looks on.
+    pub watch: &'a Watch,
 }
 
 /// The end of a search.
@@ -88,6 +91,7 @@ impl<const P: usize> Fit<P> {
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
     /// Whitened residual, measured minus predicted.
     pub fn residual(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        self.watch.check();
         let predicted = self.data.predict(self.arm, hypothesis, &self.metric.starts);
         let mut residual: Vec<f64> = self.measured.iter().zip(&predicted).map(|(y, p)| y - p).collect();
         self.metric.whiten(&mut residual);
@@ -189,6 +193,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
             }
             gram = self.gram(&at, &all);
         }
+        self.watch.unit();
         let covariance = self.covariance(&gram, &at);
         Fit { hypothesis: at.hypothesis, data_cost: at.data_cost, prior_cost: at.prior_cost, covariance }
     }
@@ -211,7 +216,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
         (normal, gradient)
     }
 
-    /// Sandwich covariance: curvature inside, the windows' own scatter of scores between (White 1982).
+    /// Sandwich covariance: curvature inside, the windows' own scatter of scores between (White 1982), which the fit has made smaller by
+    /// the values it has drawn from the windows (`MacKinnon` and White 1985).
     fn covariance(&self, gram: &Gram, at: &Point<P>) -> DMatrix<f64> {
         let (normal, _) = self.normal_equations(gram, &at.hypothesis);
         let k = normal.nrows();
@@ -223,11 +229,18 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
             let s = score.rows(0, k);
             scatter += s * s.transpose();
         }
+        scatter *= spent(gram.scores.len(), (&inverse * gram.total.view((0, 0), (k, k))).trace());
         for i in 0..P {
             scatter[(i, i)] += 1.0 / self.prior.sigma[i].powi(2);
         }
         &inverse * scatter * &inverse
     }
+}
+
+/// Factor by which scores of `windows` scatter less once `drawn` values have been fitted to them.
+fn spent(windows: usize, drawn: f64) -> f64 {
+    let n = windows as f64;
+    (n / (n - drawn).max(1.0)).powi(2)
 }
 
 /// A hypothesis with its residual and cost.

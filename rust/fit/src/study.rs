@@ -2,13 +2,14 @@
 
 use crate::metric::Metric;
 use crate::model::Hypothesis;
+use crate::progress::Watch;
 use crate::scale::Scales;
 use crate::solve::{Effort, Fit, Prior, Problem};
 use crate::window::{Dataset, Shift};
 use armgap_core::arm::Arm;
 
 /// Rounds of re-weighting at most.
-const MAX_ROUNDS: usize = 5;
+pub const MAX_ROUNDS: usize = 5;
 
 /// A round that changes every joint's scale by less than this factor is the last.
 const SETTLED: f64 = 1.1;
@@ -27,6 +28,8 @@ pub struct Study<A, const N: usize, const P: usize> {
     pub holdout: Sample<N>,
     /// Standard deviation of the position measurement.
     pub noise: [f64; N],
+    /// Who looks on.
+    pub watch: Watch,
 }
 
 /// Windows with their measured positions.
@@ -84,6 +87,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             metric,
             prior: &self.prior,
             scales: &self.scales,
+            watch: &self.watch,
         }
     }
 
@@ -97,6 +101,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
     /// A metric whose starts have been fitted to the hypothesis once and relinearised there.
     pub fn metric(&self, sample: &Sample<N>, hypothesis: &Hypothesis<P>, scale: [f64; N]) -> Metric<N> {
+        self.watch.check();
         let rough = Metric::new(&sample.data, &self.arm, hypothesis, scale, sample.data.measured_starts());
         let residual = self.on(sample, &rough).residual(hypothesis);
         let starts = bounded(&sample.data, rough.refit_starts(&sample.data, &residual));

@@ -1,6 +1,7 @@
 //! `diagnose`.
 
 use crate::convert::{description, matrix, vector};
+use crate::watched::watched;
 use armgap_fit::diagnose::{LogData, Options, diagnose as run};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -10,19 +11,29 @@ use pyo3::types::PyDict;
 type PyLog<'py> =
     (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>);
 
-/// The diagnosis of training and holdout logs, as JSON.
+/// A log's own copy of its numbers, for a thread that may outlive the caller.
+struct Owned {
+    name: String,
+    t: Vec<f64>,
+    q: Vec<f64>,
+    tau: Vec<f64>,
+}
+
+/// The diagnosis of training and holdout logs, as JSON; `progress(title, fraction)` is called now and then.
 #[pyfunction]
+#[pyo3(signature = (arm, training, holdout, options, progress=None))]
 pub fn diagnose(
     py: Python<'_>,
     arm: &Bound<'_, PyDict>,
     training: Vec<PyLog<'_>>,
     holdout: Vec<PyLog<'_>>,
     options: &Bound<'_, PyDict>,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
     let arm = description(arm)?;
     let n = arm.kind.joints();
-    let training = training.iter().map(|log| view(log, n)).collect::<PyResult<Vec<_>>>()?;
-    let holdout = holdout.iter().map(|log| view(log, n)).collect::<PyResult<Vec<_>>>()?;
+    let training = training.iter().map(|log| copy(log, n)).collect::<PyResult<Vec<_>>>()?;
+    let holdout = holdout.iter().map(|log| copy(log, n)).collect::<PyResult<Vec<_>>>()?;
     let mut chosen = Options::default();
     if let Some(value) = options.get_item("horizon")? {
         chosen.horizon = value.extract()?;
@@ -33,18 +44,25 @@ pub fn diagnose(
     if let Some(value) = options.get_item("seed")? {
         chosen.seed = value.extract()?;
     }
-    let result = py.detach(|| run(&arm, &training, &holdout, &chosen));
-    let diagnosis = result.map_err(|e| PyValueError::new_err(e.to_string()))?;
-    serde_json::to_string(&diagnosis).map_err(|e| PyValueError::new_err(e.to_string()))
+    let result = watched(py, progress.as_ref(), move |observer| {
+        let (training, holdout) = (views(&training), views(&holdout));
+        let diagnosis = run(&arm, &training, &holdout, &chosen, observer).map_err(|e| e.to_string())?;
+        serde_json::to_string(&diagnosis).map_err(|e| e.to_string())
+    })?;
+    result.map_err(PyValueError::new_err)
 }
 
-fn view<'a>(log: &'a PyLog<'_>, n: usize) -> PyResult<LogData<'a>> {
+fn copy(log: &PyLog<'_>, n: usize) -> PyResult<Owned> {
     let (name, t, q, tau) = log;
     let t = vector(t, "t")?;
-    Ok(LogData {
+    Ok(Owned {
         name: name.clone(),
-        t,
-        q: matrix(q, "q", t.len(), n)?,
-        tau: matrix(tau, "tau", t.len(), n)?,
+        t: t.to_vec(),
+        q: matrix(q, "q", t.len(), n)?.to_vec(),
+        tau: matrix(tau, "tau", t.len(), n)?.to_vec(),
     })
+}
+
+fn views(logs: &[Owned]) -> Vec<LogData<'_>> {
+    logs.iter().map(|log| LogData { name: log.name.clone(), t: &log.t, q: &log.q, tau: &log.tau }).collect()
 }

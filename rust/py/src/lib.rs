@@ -6,6 +6,7 @@ mod diagnose;
 mod estimator;
 mod identify;
 mod simulate;
+mod watched;
 
 use pyo3::prelude::*;
 

@@ -1,7 +1,9 @@
 //! `simulate`.
 
 use crate::convert::{kind_of, matrix, placed, vector};
+use crate::watched::watched;
 use armgap_fit::arm::ArmDescription;
+use armgap_fit::progress::{Observer, Watch, guarded};
 use armgap_fit::simulate::Simulation;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -10,7 +12,7 @@ use std::collections::BTreeMap;
 
 /// Positions and velocities of an arm under held torques.
 #[pyfunction]
-#[pyo3(signature = (kind, gravity, link_length, theta, t, tau, q0, dq0, effects, tolerance=1e-9, smoothing=0.0))]
+#[pyo3(signature = (kind, gravity, link_length, theta, t, tau, q0, dq0, effects, tolerance=1e-9, smoothing=0.0, progress=None))]
 pub fn simulate<'py>(
     py: Python<'py>,
     kind: &str,
@@ -24,6 +26,7 @@ pub fn simulate<'py>(
     effects: Vec<(String, Option<usize>, BTreeMap<String, f64>)>,
     tolerance: f64,
     smoothing: f64,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
     let kind = kind_of(kind)?;
     let n = kind.joints();
@@ -43,11 +46,27 @@ pub fn simulate<'py>(
         torque_limit: None,
         link_length,
     };
-    let work = Simulation { t, tau, q0, dq0, effects: &effects, tolerance, smoothing };
-    let trajectory = py
-        .detach(|| arm.dispatch(work))
+    let rows = t.len();
+    let (t, tau, q0, dq0) = (t.to_vec(), tau.to_vec(), q0.to_vec(), dq0.to_vec());
+    let ended = watched(py, progress.as_ref(), move |observer| {
+        let watch = Watch::new(Observer::clone(observer));
+        let work = Simulation {
+            t: &t,
+            tau: &tau,
+            q0: &q0,
+            dq0: &dq0,
+            effects: &effects,
+            tolerance,
+            smoothing,
+            watch: &watch,
+        };
+        guarded(|| arm.dispatch(work))
+    })?;
+    // Stopped only when this thread has left already.
+    let trajectory = ended
+        .flatten()
         .ok_or_else(|| PyValueError::new_err(format!("`theta` needs {} values", kind.parameters().len())))?
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
-    let shape = |x: Vec<f64>| PyArray1::from_vec(py, x).reshape([t.len(), n]);
+    let shape = |x: Vec<f64>| PyArray1::from_vec(py, x).reshape([rows, n]);
     Ok((shape(trajectory.q)?, shape(trajectory.dq)?))
 }

@@ -22,7 +22,7 @@ def read(source: Source) -> Recording:
     with reading("MCAP file", source.path), source.open() as stream:
         file = reader.make_reader(stream, validate_crcs=True, decoder_factories=[decoder.DecoderFactory()])
         seen = _topics(file, stream)
-        return messages.record(_messages(file, seen), source.path, seen)
+        return messages.record(_messages(file, seen), source.path, seen, _count(file, seen))
 
 
 def _topics(file: Any, stream: Any) -> dict[str, str]:
@@ -35,6 +35,15 @@ def _topics(file: Any, stream: Any) -> dict[str, str]:
     topics = {channel.topic: schema.name if schema else "" for schema, channel, _ in file.iter_messages()}
     stream.seek(0)
     return topics
+
+
+def _count(file: Any, seen: dict[str, str]) -> int:
+    """Return the number of messages that will be read, as far as the file says it."""
+    summary = file.get_summary()
+    if summary is None or summary.statistics is None:
+        return 0
+    counts = summary.statistics.channel_message_counts
+    return sum(counts.get(i, 0) for i, c in summary.channels.items() if seen.get(c.topic) in messages.KINDS)
 
 
 def _messages(file: Any, seen: dict[str, str]) -> Iterator[Message]:

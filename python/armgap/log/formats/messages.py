@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 from armgap.errors import ColumnError, LogReadError
 from armgap.log.findings import Finding, counted
 from armgap.log.recording import Recording, Stream, Suggestion
+from armgap.progress import tell
 
 __all__ = ["KINDS", "Message", "record"]
 
 _QUANTITIES = ("position", "velocity", "effort")
+_LOOK = 5000  # messages
 _TORQUE_WORDS = ("effort", "torque", "tau")
 # A time (none if the message has no stamp), names of columns, names of joints, values.
 Rows = list[tuple[int | None, tuple[str, ...], tuple[str, ...], list[float]]]
@@ -115,7 +117,7 @@ KINDS: Mapping[str, Callable[[Message], Rows]] = {
 """How the rows of each type of message are made."""
 
 
-def record(messages: Iterable[Message], path: Path, seen: Mapping[str, str]) -> Recording:
+def record(messages: Iterable[Message], path: Path, seen: Mapping[str, str], count: int = 0) -> Recording:
     """Return messages as a recording.
 
     Parameters
@@ -126,10 +128,14 @@ def record(messages: Iterable[Message], path: Path, seen: Mapping[str, str]) -> 
         File, for errors.
     seen : mapping
         Every topic of the file and its type, for errors.
+    count : int, default 0
+        Messages that the file says it holds, of any topic; 0 if it does not say.
     """
     topics: dict[tuple[str, tuple[str, ...]], _Topic] = {}
     empty: dict[str, int] = {}
     for number, message in enumerate(messages, start=1):
+        if count and number % _LOOK == 0:
+            tell(f"reading {path.name}", min(number / count, 1.0))
         try:
             rows = KINDS[message.kind](message)
         except (ValueError, TypeError, AttributeError, OverflowError) as error:

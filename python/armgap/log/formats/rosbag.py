@@ -30,11 +30,11 @@ def read(source: Source) -> Recording:
         store = types.get_typestore(types.Stores.ROS2_HUMBLE)
         with highlevel.AnyReader([source.path], default_typestore=store) as bag:
             seen = {c.topic: c.msgtype for c in bag.connections}
-            return messages.record(_messages(bag), source.path, seen)
+            wanted = [c for c in bag.connections if c.msgtype in messages.KINDS]
+            return messages.record(_messages(bag, wanted), source.path, seen, sum(c.msgcount for c in wanted))
 
 
-def _messages(bag: Any) -> Iterator[Message]:
-    wanted = [c for c in bag.connections if c.msgtype in messages.KINDS]
+def _messages(bag: Any, wanted: list[Any]) -> Iterator[Message]:
     if not wanted:
         return
     for connection, recorded, raw in bag.messages(connections=wanted):

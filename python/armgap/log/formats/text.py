@@ -22,6 +22,7 @@ from armgap.log.findings import Finding
 from armgap.log.formats.format import Format, first_line
 from armgap.log.recording import Recording, Source, Stream
 from armgap.log.spellings import unit_of
+from armgap.progress import tell
 
 __all__ = ["FORMAT"]
 
@@ -30,6 +31,7 @@ _COMMENTS = ("#", "%", "//")
 _COMMA = re.compile(r"(?:^|[;\s])[+-]?\d*,\d+(?:[eE][+-]?\d+)?(?:$|[;\s])")
 _POINT = re.compile(r"(?:^|[;\s])[+-]?\d*\.\d+(?:[eE][+-]?\d+)?(?:$|[;\s])")
 _BLOCK = 100_000  # lines
+_LOOK = 10_000  # lines
 _SAMPLE = 1000  # lines that decide on decimal commas
 _MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 
@@ -59,10 +61,14 @@ class _Lines:
     encoding: str
     comment: str = ""
     complete: bool = True
+    read: int = 0  # bytes
 
     def __iter__(self) -> Iterator[str]:
-        with io.TextIOWrapper(self.source.open(), encoding=self.encoding, errors="replace") as text:
-            for raw in text:
+        stream = self.source.open()
+        with io.TextIOWrapper(stream, encoding=self.encoding, errors="replace") as text:
+            for number, raw in enumerate(text):
+                if number % _LOOK == 0:
+                    self.read = stream.tell()
                 line = raw.rstrip("\r\n")
                 bare = line.strip()
                 if bare.startswith(_COMMENTS):
@@ -95,6 +101,7 @@ def read(source: Source) -> Recording:
     dialect, rows, said = _dialect(first, lines.comment, rows, source.path)
     table = _Table(findings=findings + said)
     while block := list(islice(rows, _BLOCK)):
+        tell(f"reading {source.path.name}", lines.read / max(source.size, lines.read, 1))
         _add(table, block, dialect, lines, source.path)
     if not table.rows:
         raise LogReadError("holds a header and no samples", remedy="give a log with samples", file=source.path)

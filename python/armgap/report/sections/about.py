@@ -6,7 +6,7 @@ import platform
 
 from armgap.report.page import Section, Table
 from armgap.report.sections.steps import Data, length_unit
-from armgap.report.words import figure
+from armgap.report.words import error_text, figure
 
 __all__ = ["data_quality", "method"]
 
@@ -14,7 +14,7 @@ __all__ = ["data_quality", "method"]
 def data_quality(data: Data) -> Section:
     """The logs, what was noticed in them, and remarks."""
     rows = [
-        (log["name"], use, str(log["samples"]), figure(log["duration_s"], 4), str(log["windows"]))
+        (log["name"], use, str(log["samples"]), f"{log['duration_s']:.2f}", str(log["windows"]))
         for use in ("training", "holdout")
         for log in data.get(use) or []
     ]
@@ -32,7 +32,7 @@ def _noise(data: Data) -> list[str]:
     noise = data.get("noise") or {}
     if not noise:
         return []
-    sigma = " / ".join(figure(1e3 * v) for v in noise["position_sigma"])
+    sigma = " / ".join(error_text(1e3 * v) for v in noise["position_sigma"])
     step = " / ".join(figure(1e3 * v) if v else "none seen" for v in noise["encoder_step"])
     unit = length_unit(data)
     return [f"Position noise (one standard deviation, per joint): {sigma} m{unit}; encoder step: {step} m{unit}."]

@@ -8,7 +8,7 @@ from typing import Any
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
 from armgap.report.sections.steps import Data, length_unit, load_text
-from armgap.report.words import figure, joint_text, named, percent, sizes, title
+from armgap.report.words import error_text, figure, joint_text, named, percent, sizes, symbol_text, title
 
 __all__ = ["evidence", "look_alikes", "ranking"]
 
@@ -45,7 +45,7 @@ def _name(law: Data) -> str:
 def _caption(law: Data) -> str:
     along = " along the motion" if law["folded"] else ""
     what = "force" if law["torque_unit"] == "N" else "torque"
-    return f"{_name(law)}: {what} on joint {law['shown_joint']}{along} [{law['torque_unit']}] over {law['variable']}"
+    return f"{_name(law)}: {what} on joint {law['shown_joint']}{along} [{law['torque_unit']}] over the {symbol_text(law['variable'])}"
 
 
 def _verdict(law: Data) -> str:
@@ -67,7 +67,7 @@ def ranking(data: Data) -> Section | None:
         "candidate",
         "share of the gap removed",
         "probability",
-        f"RMS [m{length_unit(data)}]",
+        f"RMS per joint [m{length_unit(data)}]",
         "size",
         "distance from trusted values [σ²]",
     )
@@ -90,7 +90,7 @@ def _rank(data: Data, r: Data) -> tuple[Cell, ...]:
         named(r),
         Bar(min(max(share, 0.0), 1.0), percent(share), charts.AFTER if cause else charts.MEASURED),
         f"{cause['probability']:.2f}" if cause else "",
-        " / ".join(figure(1e3 * v) for v in r["rms"]),
+        " / ".join(error_text(1e3 * v) for v in r["rms"]),
         sizes(r["parameters"]),
         figure(r.get("trust", 0.0)),
     )
@@ -108,7 +108,7 @@ def _course(data: Data) -> list[str]:
     lines: list[str] = []
     for before, after in pairwise(stages):
         if before.get("added"):
-            errors = [" / ".join(figure(1e3 * v) for v in s["rms"]) for s in (before, after)]
+            errors = [" / ".join(error_text(1e3 * v) for v in s["rms"]) for s in (before, after)]
             lines.append(
                 f"Step {len(lines) + 1}: {named(before['added'])} was added, and the error fell from {errors[0]} to {errors[1]} m{unit}."
             )

@@ -9,7 +9,7 @@ from itertools import pairwise
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Heat, Section, Table, Tile
 from armgap.report.sections.steps import Data, length_unit, load_text, steps, torque_unit
-from armgap.report.words import figure, variable_text
+from armgap.report.words import error_text, figure, variable_text
 
 __all__ = ["first_picture", "gap_map"]
 
@@ -30,9 +30,7 @@ def first_picture(data: Data) -> Section:
     chart = charts.bars("", "", joints, series, log=True, height=280)
     key = "before" if data["verdict"] == "parameters" else "refit"
     name = {"before": "arm file's model", "refit": "re-estimated model"}[key]
-    what = (
-        f"Where: {load_text(data)} the {name} lacks [RMS, {torque_unit(data)}], low values of each variable on the left"
-    )
+    what = f"Where: {load_text(data)} missing in the {name} [RMS, {torque_unit(data)}], by range of each variable, low to high"
     return Section("", figures=[Drawing(caption, chart, _bars(data))], heats=_heats(data, [(what, key)]))
 
 
@@ -42,7 +40,7 @@ def _bars(data: Data) -> Table:
     shown = [*((label, key) for label, key, _ in steps(data)), ("sensor noise alone", "floor")]
     top = max((v for _, key in shown for v in gap[key]), default=0.0) or 1.0
     rows: list[tuple[Cell, ...]] = [
-        (f"joint {j + 1}", label, Bar(gap[key][j] / top, figure(1e3 * gap[key][j]), charts.BEFORE))
+        (f"joint {j + 1}", label, Bar(gap[key][j] / top, error_text(1e3 * gap[key][j]), charts.BEFORE))
         for j in range(len(gap["before"]))
         for label, key in shown
     ]
@@ -114,7 +112,8 @@ def gap_map(data: Data) -> Section | None:
     what = load_text(data)
     text = (
         f"The {what} that each model lacks: the curvature of the prediction error within each window, times the inertia. All maps share "
-        f"one scale, on which each joint's {what} counts against what is typical of that joint. A right cause empties the map where it acts."
+        f"one scale, on which each joint's {what} counts against what is typical of that joint. Columns are ranges of the variable, low on the "
+        "left; the table below has them in figures. A right cause empties the map where it acts."
     )
     wanted = [(f"{label[:1].upper()}{label[1:]} [RMS, {torque_unit(data)}]", key) for label, key, _ in steps(data)]
     return Section(

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from armgap.report import charts
-from armgap.report.page import Drawing, Section
+from armgap.report.page import Drawing, Section, Table
 from armgap.report.sections.steps import Data, length_unit, steps
-from armgap.report.words import millis
+from armgap.report.words import each_joint, figure
 
-__all__ = ["free_run", "predictions"]
+__all__ = ["free_run", "horizons", "predictions"]
 
+_ARROW = " \N{RIGHTWARDS ARROW} "
 #: How far beyond the measured positions a free run is drawn, in their range.
 REACH = 1.0
 
@@ -52,6 +53,28 @@ def _error(data: Data, s: Data) -> Any:
     return charts.lines("", "time [s]", "", s["t"], curves, breaks=s["window_start"])
 
 
+def horizons(data: Data) -> Section | None:
+    """The gap at several prediction horizons."""
+    gap, unit = data["gap"], length_unit(data)
+    every = sorted([gap, *gap.get("horizons", [])], key=lambda h: float(h["horizon_s"]))
+    if len(every) < 2:
+        return None
+    header = ("horizon [s]", _ARROW.join(label for label, _, _ in steps(data)), "measurement alone")
+    rows = [
+        (
+            figure(h["horizon_s"]),
+            each_joint(*(h[key] for _, key, _ in steps(data)), unit=unit),
+            each_joint(h["floor"], unit=unit),
+        )
+        for h in every
+    ]
+    text = (
+        "RMS position error per joint when every prediction starts from a measured state and runs that long. What the measurement "
+        "alone leaves grows with the horizon, because the start's velocity is measured too."
+    )
+    return Section("How far, at several horizons", text=[text], tables=[Table(header, rows)])
+
+
 def free_run(data: Data) -> Section:
     """The whole holdout from its first sample."""
     gap, unit = data["gap"], length_unit(data)
@@ -59,8 +82,8 @@ def free_run(data: Data) -> Section:
     last = "with the causes" if data.get("causes") else "re-estimated"
     text = (
         "Simulated from the first sample of each held-out log to its last, without looking at the measurement again. Errors add up, and where "
-        "the motion is sensitive a small one decides the rest; the windows above are the fairer judge. RMS "
-        f"{millis(run['before'], unit)} with the arm file, {millis(run['after'], unit)} {last}."
+        "the motion is sensitive a small one decides the rest; the windows above are the fairer judge. "
+        f"{each_joint(run['before'], run['after'], unit=unit)} (RMS error with the arm file → {last})."
     )
     drawn = [
         Drawing(f"{s['log']}, joint {s['joint']} [{unit}]", _whole_run(s, last))

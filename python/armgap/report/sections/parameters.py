@@ -7,7 +7,7 @@ from typing import Any
 from armgap.report import charts
 from armgap.report.page import Cell, Section, Table, Track
 from armgap.report.sections.steps import Data
-from armgap.report.words import figure, joint_text, value
+from armgap.report.words import figure, named, parameter_text, unit_text, value
 
 __all__ = ["parameters"]
 
@@ -28,16 +28,17 @@ def parameters(data: Data) -> Section:
 def _values(data: Data) -> Table:
     tables, causes = data["parameters"], data.get("causes") or []
     names = list((data.get("arm") or {}).get("parameter_names") or tables["nominal"])
+    kind = str((data.get("arm") or {}).get("kind", ""))
     rows: list[tuple[Cell, ...]] = []
     for name in names:
         entries = [tables[key].get(name) for key in ("nominal", "refit", "with_causes")]
-        rows.append((name, *map(value, entries), _moved(entries, causes=bool(causes))))
+        meaning = parameter_text(kind, name)
+        rows.append((name, meaning, *map(value, entries), _moved(entries, causes=bool(causes))))
     for cause in causes:
-        rows += [
-            (f"{cause['effect']}.{name} ({joint_text(cause['joint'])})", "", "", value(p), "")
-            for name, p in cause["parameters"].items()
-        ]
-    return Table(("parameter", "arm file", "re-estimated", "with causes", "against the arm file's trust"), rows)
+        rows += [(name, named(cause), "", "", value(p), "") for name, p in cause["parameters"].items()]
+    return Table(
+        ("parameter", "what it is", "arm file", "re-estimated", "with causes", "against the arm file's trust"), rows
+    )
 
 
 def _moved(entries: list[Any], *, causes: bool) -> Cell:
@@ -56,7 +57,7 @@ def _moved(entries: list[Any], *, causes: bool) -> Cell:
 
 def _plausibility(data: Data) -> list[Table]:
     checks = data.get("plausibility") or []
-    rows = [("holds" if c["holds"] else "does NOT hold", c["check"], c["figure"]) for c in checks]
+    rows = [("holds" if c["holds"] else "does NOT hold", c["check"], unit_text(c["figure"])) for c in checks]
     return [Table(("physically possible?", "what", "figure"), rows)] if rows else []
 
 

@@ -2,8 +2,10 @@
 //!
 //! `theta1` is the moving mass, `theta2` the component of its weight along the axis (0 when horizontal).
 
-use super::{Arm, Parameter};
+use super::{Arm, Balance, Parameter};
+use crate::number::Number;
 use crate::real::Real;
+use crate::trig::Turn;
 use nalgebra::{SMatrix, SVector};
 
 /// A linear axis; `gravity` [m/s^2] is needed only when its base tilts.
@@ -32,6 +34,22 @@ impl<T: Real> Arm<T, 1, 4> for Axis<T> {
 
     fn gravity(&self, theta: &[T; 4], _q: &SVector<T, 1>, tilt: T) -> SVector<T, 1> {
         SVector::<T, 1>::new(theta[1] * tilt.cos() + theta[0] * self.gravity * tilt.sin())
+    }
+
+    #[inline(always)]
+    fn angles<V: Number<Real = T>>(&self, _: &[V; 1], tilt: V) -> [V; 1] {
+        [tilt]
+    }
+
+    #[inline(always)]
+    fn balance<V: Number<Real = T>>(
+        &self,
+        theta: &[V; 4],
+        turns: &[Turn<V>; 1],
+        _: &[V; 1],
+    ) -> Balance<V, 1> {
+        let along = theta[0] * V::of(self.gravity) * turns[0].sine;
+        Balance { inertia: [[theta[0]]], bias: [theta[1].fused(turns[0].cosine, along)] }
     }
 
     #[inline(always)]

@@ -2,9 +2,10 @@
 //!
 //! `theta1` is the inertia about the joint, `theta2 = m g l` the largest gravity torque.
 
-use super::{Arm, Parameter};
+use super::{Arm, Balance, Parameter};
+use crate::number::Number;
 use crate::real::Real;
-use crate::trig::sin_cos;
+use crate::trig::{Turn, sin_cos};
 use nalgebra::{SMatrix, SVector};
 
 /// A physical pendulum with a motor in its pivot.
@@ -33,6 +34,21 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
 
     fn gravity(&self, theta: &[T; 4], q: &SVector<T, 1>, tilt: T) -> SVector<T, 1> {
         SVector::<T, 1>::new(theta[1] * sin_cos(q[0] + tilt).0)
+    }
+
+    #[inline(always)]
+    fn angles<V: Number<Real = T>>(&self, q: &[V; 1], tilt: V) -> [V; 1] {
+        [q[0] + tilt]
+    }
+
+    #[inline(always)]
+    fn balance<V: Number<Real = T>>(
+        &self,
+        theta: &[V; 4],
+        turns: &[Turn<V>; 1],
+        _: &[V; 1],
+    ) -> Balance<V, 1> {
+        Balance { inertia: [[theta[0]]], bias: [theta[1] * turns[0].sine] }
     }
 
     #[inline(always)]

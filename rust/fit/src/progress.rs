@@ -1,0 +1,220 @@
+//! Who looks on while long work runs: told how far it is, asked whether to go on.
+//!
+//! Work is counted in units: a fit, a candidate's test. What is still to come is not known, for every cause that is found is followed by
+//! a search for the next; so a part of the work takes a share of what is left, and the fraction done never falls.
+//!
+//! A diagnosis that is told to stop unwinds from wherever it is (`resume_unwind`: no panic hook, no message; rayon hands it on) to
+//! `guarded`, which makes an error of it. Nothing outside this file sees the unwinding.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
+
+/// What a diagnosis is busy with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Work {
+    /// Fitting the model as far as it is known.
+    Refit,
+    /// Testing every candidate to first order.
+    Screen,
+    /// Fitting the candidates that passed.
+    Candidates,
+    /// Fitting the best of them to the end.
+    Finalists,
+    /// Looking for pushes.
+    Pushes,
+    /// Composing the result.
+    Result,
+    /// Simulating once more with half the steps.
+    Simulate,
+}
+
+impl Work {
+    /// In words.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Refit => "re-estimating the arm",
+            Self::Screen => "testing every effect",
+            Self::Candidates => "fitting candidates",
+            Self::Finalists => "comparing the best",
+            Self::Pushes => "looking for pushes",
+            Self::Result => "putting the result together",
+            Self::Simulate => "simulating",
+        }
+    }
+
+    /// Share of what is left that this work takes, measured on logs with one cause: their search has two rounds.
+    const fn share(self) -> f64 {
+        match self {
+            Self::Refit => 0.09,
+            Self::Screen => 0.16,
+            Self::Candidates => 0.30,
+            Self::Finalists => 0.38,
+            Self::Pushes => 0.05,
+            Self::Result => 0.95,
+            // Twice as dear as all before it, and once or twice is enough.
+            Self::Simulate => 0.4,
+        }
+    }
+}
+
+/// How far a diagnosis is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// What it is busy with.
+    pub work: Work,
+    /// Estimated fraction of the work that is done, from 0 to 1; never falls.
+    pub fraction: f64,
+}
+
+/// What an observer wants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Control {
+    /// Go on.
+    Go,
+    /// End with an error, soon.
+    Stop,
+}
+
+/// Called often and from any thread; must be quick.
+pub type Observer = Arc<dyn Fn(Progress) -> Control + Send + Sync>;
+
+/// The work counted, and who looks on.
+pub struct Watch {
+    observer: Observer,
+    /// Index of the work in `ORDER`.
+    work: AtomicUsize,
+    /// Units planned and done of the current work.
+    planned: AtomicUsize,
+    done: AtomicUsize,
+    /// Fractions where the current work begins and ends, and the largest told, as bits: positive numbers sort alike.
+    from: AtomicU64,
+    to: AtomicU64,
+    told: AtomicU64,
+}
+
+const ORDER: [Work; 7] = [
+    Work::Refit,
+    Work::Screen,
+    Work::Candidates,
+    Work::Finalists,
+    Work::Pushes,
+    Work::Result,
+    Work::Simulate,
+];
+
+/// What unwinds; found by its type.
+struct Stopped;
+
+impl Watch {
+    /// A count from nothing.
+    pub fn new(observer: Observer) -> Self {
+        let zero = || AtomicU64::new(0.0_f64.to_bits());
+        let count = || AtomicUsize::new(0);
+        Self {
+            observer,
+            work: count(),
+            planned: count(),
+            done: count(),
+            from: zero(),
+            to: zero(),
+            told: zero(),
+        }
+    }
+
+    /// Begins work of about so many units; what came before is over.
+    pub fn begin(&self, work: Work, units: usize) {
+        let from = f64::from_bits(self.to.load(Relaxed));
+        self.work.store(ORDER.iter().position(|w| *w == work).unwrap_or(0), Relaxed);
+        self.planned.store(units.max(1), Relaxed);
+        self.done.store(0, Relaxed);
+        self.from.store(from.to_bits(), Relaxed);
+        self.to.store((from + (1.0 - from) * work.share()).to_bits(), Relaxed);
+        self.check();
+    }
+
+    /// One unit is done.
+    pub fn unit(&self) {
+        self.done.fetch_add(1, Relaxed);
+        self.check();
+    }
+
+    /// Tells the observer; does not return if it wants to stop.
+    pub fn check(&self) {
+        if (self.observer)(self.progress()) == Control::Stop {
+            resume_unwind(Box::new(Stopped));
+        }
+    }
+
+    fn progress(&self) -> Progress {
+        let load = |x: &AtomicU64| f64::from_bits(x.load(Relaxed));
+        let (from, to) = (load(&self.from), load(&self.to));
+        let part = (self.done.load(Relaxed) as f64 / self.planned.load(Relaxed).max(1) as f64).min(1.0);
+        let fraction = from + (to - from) * part;
+        let before = f64::from_bits(self.told.fetch_max(fraction.to_bits(), Relaxed));
+        Progress { work: ORDER[self.work.load(Relaxed)], fraction: fraction.max(before) }
+    }
+}
+
+/// Runs `work`; none if it was stopped.
+pub fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(result) => Some(result),
+        Err(cause) if is_stop(cause.as_ref()) => None,
+        Err(cause) => resume_unwind(cause),
+    }
+}
+
+fn is_stop(cause: &(dyn Any + Send)) -> bool {
+    cause.is::<Stopped>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rayon::prelude::*;
+    use std::sync::Mutex;
+
+    fn recording() -> (Observer, Arc<Mutex<Vec<f64>>>) {
+        let told = Arc::new(Mutex::new(Vec::new()));
+        let seen = Arc::clone(&told);
+        (
+            Arc::new(move |p: Progress| {
+                seen.lock().unwrap().push(p.fraction);
+                Control::Go
+            }),
+            told,
+        )
+    }
+
+    #[test]
+    fn the_fraction_never_falls_and_stays_below_one() {
+        let (observer, told) = recording();
+        let watch = Watch::new(observer);
+        for _ in 0..5 {
+            for work in [Work::Refit, Work::Candidates, Work::Finalists] {
+                watch.begin(work, 3);
+                (0..7).for_each(|_| watch.unit());
+            }
+        }
+        watch.begin(Work::Result, 1);
+        let told = told.lock().unwrap();
+        assert!(told.windows(2).all(|w| w[1] >= w[0]));
+        assert!(told.iter().all(|x| (0.0..1.0).contains(x)));
+    }
+
+    #[test]
+    fn stopping_unwinds_through_threads_to_the_guard() {
+        let watch = Watch::new(Arc::new(|p| if p.fraction > 0.05 { Control::Stop } else { Control::Go }));
+        watch.begin(Work::Candidates, 100);
+        let result = guarded(|| (0..100).into_par_iter().map(|_| watch.unit()).count());
+        assert_eq!(result, None);
+    }
+
+    #[test]
+    fn another_panic_is_not_taken_for_a_stop() {
+        let result = catch_unwind(|| guarded(|| resume_unwind(Box::new("something else"))));
+        assert!(result.is_err());
+    }
+}
