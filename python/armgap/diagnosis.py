@@ -42,6 +42,17 @@ class Value:
 
 
 @dataclass(frozen=True)
+class AtHorizon:
+    """RMS position error per joint on the holdout at one prediction horizon [s]; fields as in `Gap` [rad or m]."""
+
+    horizon_s: float
+    before: tuple[float, ...]
+    refit: tuple[float, ...]
+    after: tuple[float, ...]
+    floor: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Gap:
     """How far predictions miss on the holdout: RMS position error per joint.
 
@@ -58,6 +69,8 @@ class Gap:
         95 % interval of it, from resampled windows.
     free_run_before, free_run_after : tuple of float
         The same over the whole holdout, simulated from its first sample.
+    horizons : tuple of AtHorizon
+        The same at other prediction horizons, as far as the logs are long enough.
     """
 
     horizon_s: float
@@ -69,6 +82,7 @@ class Gap:
     closed_ci: tuple[float, float]
     free_run_before: tuple[float, ...]
     free_run_after: tuple[float, ...]
+    horizons: tuple[AtHorizon, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -184,6 +198,7 @@ class Diagnosis(Shown):
                 (gap["closed_ci"][0], gap["closed_ci"][1]),
                 tuple(gap["free_run"]["before"]),
                 tuple(gap["free_run"]["after"]),
+                tuple(_at_horizon(h) for h in gap.get("horizons", ())),
             ),
             where=tuple(_place(p) for p in data["where"]),
             causes=tuple(_cause(c) for c in data["causes"]),
@@ -217,6 +232,11 @@ class Diagnosis(Shown):
 def _take(kind: type[_Record], data: dict[str, Any]) -> _Record:
     """Build a record from the entries it knows."""
     return kind(**{f.name: data[f.name] for f in fields(kind) if f.name in data})
+
+
+def _at_horizon(data: dict[str, Any]) -> AtHorizon:
+    errors = (tuple(data[key]) for key in ("before", "refit", "after", "floor"))
+    return AtHorizon(data["horizon_s"], *errors)
 
 
 def _place(data: dict[str, Any]) -> Place:

@@ -1,8 +1,9 @@
 //! Which effect: screening, full fits of what passes, and the holdout's decision, one cause after another.
 
-use crate::decide::CONSEQUENCE;
+use crate::decide::{ABOVE_FLOOR, CONSEQUENCE};
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Work;
+use crate::scan::repeats;
 use crate::screen::{Scored, candidates, screen};
 use crate::solve::{Effort, Fit};
 use crate::study::{MAX_ROUNDS, Study, Weights};
@@ -138,6 +139,11 @@ impl<const N: usize, const P: usize> Stage<N, P> {
         (self.base.error / self.motion).sqrt()
     }
 
+    /// Whether the current model leaves a gap of consequence above the floor.
+    pub fn is_open(&self) -> bool {
+        self.relative_error() > CONSEQUENCE && self.excess() > ABOVE_FLOOR
+    }
+
     /// How far the current model's cost lies above the floor, as a factor.
     pub fn excess(&self) -> f64 {
         self.base.holdout.iter().sum::<f64>() / self.floor
@@ -166,7 +172,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         if !gap && is_plausible::<P>(fit.prior_cost) {
             return Vec::new();
         }
-        let all = self.open_candidates(&fit.hypothesis);
+        let mut all = self.open_candidates(&fit.hypothesis);
+        all.extend(self.repeating(&all, weights, fit));
         self.watch.begin(Work::Screen, all.len());
         let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
         let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
@@ -192,6 +199,21 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     pub fn open_candidates(&self, model: &Hypothesis<P>) -> Vec<Placed> {
         let taken = |c: &Placed| model.effects.iter().any(|e| e.same_place(c));
         candidates(&self.scales).into_iter().filter(|c| !taken(c)).collect()
+    }
+
+    /// Further starts of candidates that repeat with position, where the residual does.
+    fn repeating(&self, all: &[Placed], weights: &Weights<N>, fit: &Fit<P>) -> Vec<Placed> {
+        let mut open: Vec<Placed> = all.iter().filter(|c| c.is_periodic()).copied().collect();
+        open.dedup_by(|a, b| a.same_place(b));
+        let problem = self.problem(&weights.training);
+        let starts = |effect: &Placed| {
+            let found = repeats(&problem, &fit.hypothesis, effect.joint);
+            found
+                .into_iter()
+                .map(|r| Placed { p: [r.amplitude, r.cycles, r.phase], ..*effect })
+                .collect::<Vec<_>>()
+        };
+        open.iter().flat_map(starts).collect()
     }
 
     /// The model with the load that brings its parameters closest to their trusted values, the motion staying the same; none for effects
@@ -300,7 +322,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 let size = effect.as_ref().map_or(0.0, |e| self.relative_size(e));
                 Contender { effect, size, fit, training, holdout, error }
             })
-            .filter(|c| c.score().is_finite())
+            .filter(|c| c.score().is_finite() && !c.is_idle())
             .collect();
         contenders.sort_by(|a, b| a.score().total_cmp(&b.score()));
         let mut best: Vec<Contender<P>> = Vec::new();
@@ -414,8 +436,9 @@ fn promising(screened: &[Scored], least: f64) -> Vec<&Scored> {
     let mut chosen: Vec<&Scored> = Vec::new();
     for scored in order {
         let wanted = (chosen.len() < FULL_FITS && scored.gain > least) || scored.distinct < ABSORBED;
-        // A test at a trial value says little of where to start, so two of them may.
-        let starts = if scored.effect.law.spec().trial == Trial::Whole { 2 } else { 1 };
+        // A test at a trial value says little of where to start, so two of them may; so may two peaks of a spectrum.
+        let several = scored.effect.law.spec().trial == Trial::Whole || scored.effect.is_periodic();
+        let starts = if several { 2 } else { 1 };
         if wanted && chosen.iter().filter(|c| c.effect.same_place(&scored.effect)).count() < starts {
             chosen.push(scored);
         }

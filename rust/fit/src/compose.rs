@@ -2,11 +2,11 @@
 
 use crate::arm::ArmDescription;
 use crate::attribute::Contender;
-use crate::decide::{Attribution, CONSEQUENCE};
+use crate::decide::{Attribution, CONSEQUENCE, left_over};
 use crate::diagnose::Options;
 use crate::event::Event;
 use crate::gap::{Errors, free_run_series, gap, rms};
-use crate::locate::{Lacks, lacking_torque, places, regimes};
+use crate::locate::{Lack, Lacks, lacking_torque, places, regimes, shares};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
 use crate::report::{
@@ -48,12 +48,10 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let lacks = lacks(study, &compared, &last.weights.holdout);
     let regimes = regimes(&lacks, rotary);
     let verdict = if events.is_empty() { verdict(attribution, &gap) } else { "effect" };
-    let gap_of =
-        if attribution.causes.is_empty() && verdict == "parameters" { &lacks.before } else { &lacks.refit };
     Diagnosis {
         schema: "armgap.diagnosis/1",
         verdict,
-        places: places(gap_of, &regimes, &study.scales.torque),
+        places: places(&joint_shares(study, (attribution, events), &lacks, verdict), &regimes),
         gap,
         causes: attribution
             .causes
@@ -101,6 +99,35 @@ fn lacks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let data = &study.holdout.data;
     let of = |h: &Hypothesis<P>| lacking_torque(&study.arm, data, &weights.starts, h);
     Lacks { before: of(&compared.before), refit: of(&compared.refit), after: of(&compared.after) }
+}
+
+/// Each joint's share of the gap: what causes explain lies where they sit, the rest where torque is lacking.
+///
+/// A torque that is lacking on one joint bends the motion of all, and an error of its coupling shows on the others; so where a cause
+/// is known, its own joint says more than the lacking torque does.
+fn joint_shares<A, const N: usize, const P: usize>(
+    study: &Study<A, N, P>,
+    (attribution, events): (&Attribution<N, P>, &[Event]),
+    lacks: &Lacks<N>,
+    verdict: &str,
+) -> [f64; N] {
+    let of = |gap: &[Lack<N>]| shares(gap, &study.scales.torque);
+    let placed = attribution.causes.iter().map(|c| (c.effect.joint_number(), c.share));
+    let placed: Vec<(Option<usize>, f64)> =
+        placed.chain(events.iter().map(|e| (e.push.joint_number(), e.share.clamp(0.0, 1.0)))).collect();
+    let total: f64 = placed.iter().map(|(_, share)| share).sum();
+    if total <= 0.0 {
+        return of(if verdict == "parameters" { &lacks.before } else { &lacks.refit });
+    }
+    let left = left_over(&attribution.stages);
+    let (whole_arm, rest) = (of(&lacks.refit), of(&lacks.after));
+    std::array::from_fn(|j| {
+        let own = |(joint, share): &(Option<usize>, f64)| match joint {
+            Some(number) => share * f64::from(u8::from(*number == j + 1)),
+            None => share * whole_arm[j],
+        };
+        (1.0 - left) * placed.iter().map(own).sum::<f64>() / total + left * rest[j]
+    })
 }
 
 /// What the figures amount to.

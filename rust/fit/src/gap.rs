@@ -6,7 +6,7 @@ use crate::decide::Random;
 use crate::diagnose::Options;
 use crate::event::without_pushes;
 use crate::model::Hypothesis;
-use crate::report::{FreeRun, FreeRunSeries, Gap, Series};
+use crate::report::{AtHorizon, FreeRun, FreeRunSeries, Gap, Series};
 use crate::study::Study;
 use crate::window::{Dataset, Shift, Window};
 use armgap_core::arm::Arm;
@@ -19,6 +19,9 @@ const DRAWN_LOGS: usize = 3;
 
 /// Resamples of the holdout windows for the interval of the closed share.
 const RESAMPLES: usize = 500;
+
+/// Further prediction horizons, s.
+const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
 
 /// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
 const FREE_RUN_LIMIT: f64 = 100.0;
@@ -45,7 +48,7 @@ impl<const N: usize> Errors<N> {
             before: bare.predict(&study.arm, &compared.before, &starts),
             refit: bare.predict(&study.arm, &compared.refit, &starts),
             after: data.predict(&study.arm, &compared.after, &starts),
-            floor: floor(study, &compared.after),
+            floor: floor(study, data, &compared.after),
         }
     }
 
@@ -87,9 +90,9 @@ impl<const N: usize> Errors<N> {
 /// Variance of a perfect model's errors: noise of the sample itself, and of the measured start carried along the window.
 fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     study: &Study<A, N, P>,
+    data: &Dataset<N>,
     model: &Hypothesis<P>,
 ) -> [f64; N] {
-    let data = &study.holdout.data;
     let columns = crate::metric::start_sensitivities(data, &study.arm, model, &data.measured_starts());
     let carried = |window: &Window<N>| -> [f64; N] {
         let mut sum = [0.0; N];
@@ -140,6 +143,7 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         closed: closed(&before, &after, &floor),
         closed_ci: closed_interval(study, errors, &floor, options.seed),
         refit: rms::<N>(measured, &errors.refit),
+        horizons: HORIZONS.iter().filter_map(|h| at_horizon(study, compared, *h)).collect(),
         free_run: FreeRun {
             before: free_run_rms(study, &without_pushes(&study.holdout).data, &compared.before),
             after: free_run_rms(study, &study.holdout.data, &compared.after),
@@ -148,6 +152,30 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         after,
         floor,
     }
+}
+
+/// The gap at another prediction horizon; none where the logs are shorter than two of it.
+fn at_horizon<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    study: &Study<A, N, P>,
+    compared: &Compared<P>,
+    horizon: f64,
+) -> Option<AtHorizon> {
+    let data = Dataset::new(study.holdout.data.tracks.clone(), horizon);
+    if data.windows.len() < 2 * data.tracks.len() {
+        return None;
+    }
+    let bare = Dataset::new(without_pushes(&study.holdout).data.tracks, horizon);
+    let (measured, starts) = (data.measured(), data.measured_starts());
+    let missed = |data: &Dataset<N>, h: &Hypothesis<P>| {
+        rms::<N>(&measured, &limited(data, &data.predict(&study.arm, h, &starts)))
+    };
+    Some(AtHorizon {
+        horizon_s: horizon,
+        before: missed(&bare, &compared.before),
+        refit: missed(&bare, &compared.refit),
+        after: missed(&data, &compared.after),
+        floor: floor(study, &data, &compared.after).map(f64::sqrt).to_vec(),
+    })
 }
 
 /// Share of the gap above the floor that is closed, over all joints.

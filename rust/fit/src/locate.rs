@@ -261,20 +261,18 @@ fn binned<const N: usize>(
 }
 
 /// Each joint's share of the gap and the regime that stands out in it, most of the gap first.
-///
-/// `gap` are the lacking torques that shares are taken of, `torque` the joints' typical torques.
-pub fn places<const N: usize>(gap: &[Lack<N>], regimes: &[Regime], torque: &[f64; N]) -> Vec<Place> {
-    let mean_square = |j: usize| gap.iter().map(|x| x.lack[j].powi(2)).sum::<f64>() / gap.len().max(1) as f64;
-    let weight: Vec<f64> = (0..N).map(|j| mean_square(j) / torque[j].powi(2).max(1e-300)).collect();
-    let whole: f64 = weight.iter().sum();
-    let mut places: Vec<Place> = (0..N)
-        .map(|j| {
-            let share = if whole > 0.0 { weight[j] / whole } else { 0.0 };
-            standing_out(j, share, regimes)
-        })
-        .collect();
+pub fn places<const N: usize>(shares: &[f64; N], regimes: &[Regime]) -> Vec<Place> {
+    let mut places: Vec<Place> = (0..N).map(|j| standing_out(j, shares[j], regimes)).collect();
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     places
+}
+
+/// Each joint's share of the mean square lacking torque, in units of its typical torque.
+pub fn shares<const N: usize>(gap: &[Lack<N>], torque: &[f64; N]) -> [f64; N] {
+    let mean_square = |j: usize| gap.iter().map(|x| x.lack[j].powi(2)).sum::<f64>() / gap.len().max(1) as f64;
+    let weight: [f64; N] = std::array::from_fn(|j| mean_square(j) / torque[j].powi(2).max(1e-300));
+    let whole: f64 = weight.iter().sum();
+    weight.map(|w| if whole > 0.0 { w / whole } else { 0.0 })
 }
 
 /// The regime of joint `j` in which the mean square residual exceeds the joint's own most.

@@ -1,7 +1,7 @@
 //! A hypothesis about the arm: parameter values, friction smoothing, and effects placed on joints.
 
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Active, Effect, MAX_PARAMETERS, Pulse, Scope};
+use armgap_core::effect::{Active, Effect, MAX_PARAMETERS, Pulse, Quantity, Scope};
 use armgap_core::plant::Plant;
 
 /// An effect on a joint, with values for its parameters.
@@ -35,6 +35,11 @@ impl Placed {
     /// The same effect on the same joint, whatever its values.
     pub fn same_place(&self, other: &Self) -> bool {
         self.law.spec().name == other.law.spec().name && self.joint == other.joint
+    }
+
+    /// Whether it repeats with position: its parameters are amplitude, cycles per turn and phase.
+    pub fn is_periodic(&self) -> bool {
+        self.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Cycles)
     }
 
     /// 1-based joint, or none for effects of the whole arm.

@@ -83,8 +83,25 @@ pub struct Gap {
     pub closed: f64,
     /// 95 % interval of it.
     pub closed_ci: [f64; 2],
+    /// The same at other prediction horizons.
+    pub horizons: Vec<AtHorizon>,
     /// Over the whole holdout from its first sample.
     pub free_run: FreeRun,
+}
+
+/// RMS errors at one prediction horizon, per joint.
+#[derive(Debug, Clone, Serialize)]
+pub struct AtHorizon {
+    /// Prediction horizon, s.
+    pub horizon_s: f64,
+    /// Arm file as it is.
+    pub before: Vec<f64>,
+    /// Parameters re-estimated.
+    pub refit: Vec<f64>,
+    /// Causes added.
+    pub after: Vec<f64>,
+    /// What measurement noise alone leaves.
+    pub floor: Vec<f64>,
 }
 
 /// RMS errors in free run.

@@ -14,6 +14,9 @@ const PINNED: f64 = 0.5;
 /// Two-sided 95 % of the normal distribution.
 const NORMAL_95: f64 = 1.96;
 
+/// An effect that could be behind more than this part of what remains unexplained is not absent.
+const COULD_BE: f64 = 0.1;
+
 /// Status of every candidate that is no cause, from its first-order test around the final model.
 pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     study: &Study<A, N, P>,
@@ -23,10 +26,16 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let stage = &attribution.stages[attribution.stages.len() - 1];
     let model = &attribution.model.hypothesis;
     let open = study.open_candidates(model);
-    let scored = screen(&study.problem(&stage.weights.training), model, &open);
+    let problem = study.problem(&stage.weights.training);
+    let scored = screen(&problem, model, &open);
+    let remains = problem.metric.total(&problem.raw_costs(model));
+    let unexplained = stage.is_open();
     let mut list: Vec<(Placed, RuledOut)> = Vec::new();
     for test in &scored {
-        let entry = status(study, test, rotary);
+        let mut entry = status(study, test, rotary);
+        if unexplained {
+            doubt(&mut entry, test, remains);
+        }
         match list.iter_mut().find(|(place, _)| place.same_place(&test.effect)) {
             // The weakest statement over an effect's shapes holds for the effect.
             Some((_, known)) if weaker(&entry, known) => *known = entry,
@@ -93,6 +102,17 @@ fn status<A, const N: usize, const P: usize>(
         why: traced.then(|| {
             "it leaves a trace in the training logs, but does not reduce the gap on the holdout".to_owned()
         }),
+    }
+}
+
+/// Where a gap remains, an effect is absent only if the largest size it could have would explain next to nothing of it.
+fn doubt(entry: &mut RuledOut, test: &Scored, remains: f64) {
+    let most = entry.bound.as_ref().map_or(test.gain, |bound| (bound.value / test.information_sigma).powi(2));
+    let share = (most / remains).min(1.0);
+    if entry.status == "absent" && share > COULD_BE {
+        entry.status = "undecided";
+        let percent = 100.0 * share;
+        entry.why = Some(format!("a gap remains, and up to {percent:.0} % of it could be its doing"));
     }
 }
 

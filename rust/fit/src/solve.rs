@@ -216,7 +216,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
         (normal, gradient)
     }
 
-    /// Sandwich covariance: curvature inside, the windows' own scatter of scores between (White 1982).
+    /// Sandwich covariance: curvature inside, the windows' own scatter of scores between (White 1982), which the fit has made smaller by
+    /// the values it has drawn from the windows (MacKinnon and White 1985).
     fn covariance(&self, gram: &Gram, at: &Point<P>) -> DMatrix<f64> {
         let (normal, _) = self.normal_equations(gram, &at.hypothesis);
         let k = normal.nrows();
@@ -228,11 +229,18 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
             let s = score.rows(0, k);
             scatter += s * s.transpose();
         }
+        scatter *= spent(gram.scores.len(), (&inverse * gram.total.view((0, 0), (k, k))).trace());
         for i in 0..P {
             scatter[(i, i)] += 1.0 / self.prior.sigma[i].powi(2);
         }
         &inverse * scatter * &inverse
     }
+}
+
+/// Factor by which scores of `windows` scatter less once `drawn` values have been fitted to them.
+fn spent(windows: usize, drawn: f64) -> f64 {
+    let n = windows as f64;
+    (n / (n - drawn).max(1.0)).powi(2)
 }
 
 /// A hypothesis with its residual and cost.

@@ -115,10 +115,13 @@ impl<const N: usize> Track<N> {
     /// The local cubic of joint `j` around a sample, as wide as the motion there allows.
     ///
     /// Widths grow while the confidence intervals of their velocities still have a point in common; a jump of the acceleration
-    /// nearby ends that early, smooth motion late (intersection of confidence intervals, Goldenshluger and Nemirovski 1997).
+    /// nearby ends that early, smooth motion late (intersection of confidence intervals, Goldenshluger and Nemirovski 1997). The
+    /// widest that passes may still err by several of its standard deviations, as its neighbours cannot tell; the one before
+    /// errs by a third of that and has the larger deviation, so it is the one that keeps what its covariance promises.
     pub fn local(&self, j: usize, at: usize) -> Local {
         let fit = |half: usize| local_cubic(&self.t, |k| self.q[k][j], at, half);
-        let mut best = fit(HALF_WIDTHS[0]);
+        let mut widest = fit(HALF_WIDTHS[0]);
+        let mut before = widest;
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         for half in HALF_WIDTHS.into_iter().filter(|half| 2 * half < self.len()) {
             let local = fit(half);
@@ -127,9 +130,9 @@ impl<const N: usize> Track<N> {
             if low > high {
                 break;
             }
-            best = local;
+            (before, widest) = (widest, local);
         }
-        best
+        before
     }
 }
 

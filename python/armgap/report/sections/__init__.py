@@ -8,7 +8,7 @@ from armgap.report.page import Section
 from armgap.report.sections.about import data_quality, method
 from armgap.report.sections.causes import evidence, look_alikes, ranking
 from armgap.report.sections.gap import first_picture, gap_map
-from armgap.report.sections.motion import free_run, predictions
+from armgap.report.sections.motion import free_run, horizons, predictions
 from armgap.report.sections.parameters import parameters
 from armgap.report.sections.silent import not_shown, ruled_out
 from armgap.report.sections.steps import Data
@@ -25,6 +25,7 @@ SECTIONS: tuple[Callable[[Data], Section | None], ...] = (
     parameters,
     not_shown,
     ruled_out,
+    horizons,
     free_run,
     data_quality,
     method,

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from armgap.report import charts
-from armgap.report.page import Drawing, Section
+from armgap.report.page import Drawing, Section, Table
 from armgap.report.sections.steps import Data, length_unit, steps
-from armgap.report.words import each_joint
+from armgap.report.words import each_joint, figure, millis
 
-__all__ = ["free_run", "predictions"]
+__all__ = ["free_run", "horizons", "predictions"]
 
 #: How far beyond the measured positions a free run is drawn, in their range.
 REACH = 1.0
@@ -50,6 +50,24 @@ def _error(data: Data, s: Data) -> Any:
         for (label, _, colour), values in zip(steps(data), predicted, strict=True)
     ]
     return charts.lines("", "time [s]", "", s["t"], curves, breaks=s["window_start"])
+
+
+def horizons(data: Data) -> Section | None:
+    """The gap at several prediction horizons."""
+    gap, unit = data["gap"], length_unit(data)
+    every = sorted([gap, *gap.get("horizons", [])], key=lambda h: float(h["horizon_s"]))
+    if len(every) < 2:
+        return None
+    named = [(label, key) for label, key, _ in steps(data)]
+    header = ("horizon [s]", *(label for label, _ in named), "measurement alone")
+    rows = [
+        (figure(h["horizon_s"]), *(millis(h[key], unit) for _, key in named), millis(h["floor"], unit)) for h in every
+    ]
+    text = (
+        "RMS position error per joint when every prediction starts from a measured state and runs that long. What the measurement "
+        "alone leaves grows with the horizon, because the start's velocity is measured too."
+    )
+    return Section("How far, at several horizons", text=[text], tables=[Table(header, rows)])
 
 
 def free_run(data: Data) -> Section:
