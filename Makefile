@@ -61,8 +61,9 @@ bench-peers: $(VENV)/.built ## the core beside plain C, numpy, padasip, filterpy
 	$(BIN)/python -m pip install -q --disable-pip-version-check $$($(BIN)/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']['peers'])")
 	cargo run -q --release -p armgap-benches --bin peers
 	$(BIN)/python benches/peers/compare.py
+	$(BIN)/python benches/peers/fit.py
 
-bench-instructions: tools ## instructions per sample under valgrind
+bench-instructions: tools ## instructions per sample, counted one by one
 	cargo build -q --release -p armgap-benches --bin instructions
 	$(PYTHON) benches/instructions.py target/release/instructions
 

@@ -1,11 +1,15 @@
-//! Compiles the plain C estimator twice: portable, and for this machine's processor.
+//! Compiles the plain C of `peers` twice: portable, and for this machine's processor.
+
+const FUNCTIONS: [&str; 6] =
+    ["peer_start", "peer_update", "peer_run", "peer_size", "peer_rollout", "peer_rollout_smooth"];
 
 fn main() {
     println!("cargo:rerun-if-changed=peers");
-    cc::Build::new().file("peers/online.c").opt_level(3).warnings(true).compile("peer");
+    let files = ["peers/online.c", "peers/rollout.c"];
+    cc::Build::new().files(files).opt_level(3).warnings(true).compile("peer");
     let mut native = cc::Build::new();
-    native.file("peers/online.c").opt_level(3).flag("-march=native");
-    for name in ["peer_start", "peer_update", "peer_run", "peer_size"] {
+    native.files(files).opt_level(3).flag("-march=native");
+    for name in FUNCTIONS {
         native.define(name, format!("{name}_native").as_str());
     }
     native.compile("peer_native");

@@ -6,6 +6,7 @@ use armgap_bench::cost::{fresh, readings};
 use armgap_bench::run::{PERIOD, samples};
 use armgap_bench::scaling;
 use armgap_benches::peer::{Arrays, Build};
+use armgap_core::cpu::Level;
 use armgap_core::identify::Reading;
 use armgap_core::real::{Real, lit};
 use armgap_core::regression::{Scheme, Variant};
@@ -19,8 +20,14 @@ const ROUNDS: usize = 301;
 const SAME: f64 = 1e-9;
 
 /// The estimate after the whole run.
-fn ours<T: Real>(data: &[Reading<T, 2>], scheme: Scheme, variant: Variant, form: Form) -> [T; 9] {
-    let mut estimator = fresh::<T>(scheme, variant, form);
+fn ours<T: Real>(
+    data: &[Reading<T, 2>],
+    scheme: Scheme,
+    variant: Variant,
+    form: Form,
+    level: Level,
+) -> [T; 9] {
+    let mut estimator = fresh::<T>(scheme, variant, form).with_level(level);
     let period = lit(PERIOD);
     for reading in data {
         estimator.update_after(period, reading);
@@ -33,40 +40,51 @@ fn median(times: &mut [f64]) -> f64 {
     times[times.len() / 2]
 }
 
-/// Median times per sample [ns] of plain C, C for this processor, and ours: plain, factorized, and both in single precision; and the
-/// largest relative difference between C and ours in double precision.
-fn compare(scheme: Scheme, variant: Variant) -> ([f64; 6], f64) {
+/// What a column measures.
+const COLUMNS: [&str; 7] = [
+    "C -O3",
+    "C -O3 -march=native",
+    "plain",
+    "plain, without AVX2",
+    "factorized",
+    "plain f32",
+    "factorized f32",
+];
+
+/// Median times per sample [ns], one per column, and the largest relative difference between C and ours in double precision.
+fn compare(scheme: Scheme, variant: Variant) -> ([f64; COLUMNS.len()], f64) {
     let (double, single) = (readings::<f64>(), readings::<f32>());
     let arrays = Arrays::of(&samples::<f64>());
-    let mut times: [Vec<f64>; 6] = Default::default();
-    let mut off = 0.0_f64;
+    let mut times: [Vec<f64>; COLUMNS.len()] = Default::default();
+    let best = Level::detect();
+    let in_double = |form, level| black_box(ours(&double, scheme, variant, form, level));
+    let in_single = |form| black_box(ours(&single, scheme, variant, form, best));
+    let in_c = |build| black_box(arrays.estimate(build, scheme, variant, PERIOD));
+    let mut estimates = [[0.0; 9]; 5];
     for _ in 0..ROUNDS {
         let mut timed = |column: usize, work: &mut dyn FnMut()| {
             let start = Instant::now();
             work();
             times[column].push(start.elapsed().as_nanos() as f64 / double.len() as f64);
         };
-        let (mut c, mut plain, mut factorized) = ([0.0; 9], [0.0; 9], [0.0; 9]);
-        timed(0, &mut || c = black_box(arrays.estimate(Build::Portable, scheme, variant, PERIOD)));
-        timed(1, &mut || _ = black_box(arrays.estimate(Build::Native, scheme, variant, PERIOD)));
-        timed(2, &mut || plain = black_box(ours(&double, scheme, variant, Form::Plain)));
-        timed(3, &mut || factorized = black_box(ours(&double, scheme, variant, Form::Factorized)));
-        timed(4, &mut || _ = black_box(ours(&single, scheme, variant, Form::Plain)));
-        timed(5, &mut || _ = black_box(ours(&single, scheme, variant, Form::Factorized)));
-        for j in 0..9 {
-            off = off.max((plain[j] / c[j] - 1.0).abs()).max((factorized[j] / c[j] - 1.0).abs());
-        }
+        timed(0, &mut || estimates[0] = in_c(Build::Portable));
+        timed(1, &mut || estimates[1] = in_c(Build::Native));
+        timed(2, &mut || estimates[2] = in_double(Form::Plain, best));
+        timed(3, &mut || estimates[3] = in_double(Form::Plain, Level::PORTABLE));
+        timed(4, &mut || estimates[4] = in_double(Form::Factorized, best));
+        timed(5, &mut || _ = in_single(Form::Plain));
+        timed(6, &mut || _ = in_single(Form::Factorized));
     }
-    (times.each_mut().map(|t| median(t)), off)
+    let [c, others @ ..] = estimates;
+    let off = others.iter().flatten().zip(c.iter().cycle()).map(|(x, c)| (x / c - 1.0).abs());
+    (times.each_mut().map(|t| median(t)), off.fold(0.0, f64::max))
 }
 
 fn main() -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
-    writeln!(
-        out,
-        "| scheme | filters | C -O3 | C -O3 -march=native | plain | factorized | plain f32 | factorized f32 | plain / C | estimates differ |"
-    )?;
-    writeln!(out, "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")?;
+    writeln!(out, "instructions: {}\n", Level::detect().name())?;
+    writeln!(out, "| scheme | filters | {} | plain / C | estimates differ |", COLUMNS.join(" | "))?;
+    writeln!(out, "| --- | --- |{}", " --- |".repeat(COLUMNS.len() + 2))?;
     let mut same = true;
     for variant in [Variant::Paper, Variant::Exact] {
         for scheme in Scheme::ALL {

@@ -14,6 +14,7 @@
 //! Starting values: with `D` started in the steady state of its first input and every `F` of the same equation from zero, an equation
 //! `y = dp/dt + b` holds for the filtered signals from the first sample on, whatever the motion at that time.
 
+use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 
 /// Cut-off `lambda`.
@@ -70,27 +71,27 @@ impl<T: Real> Step<T> {
     }
 
     /// `F`, one interval after `y`, of an input held at `held`.
-    #[inline]
-    pub fn held(&self, y: T, held: T) -> T {
-        self.decay * y + (T::one() - self.decay) * held
+    #[inline(always)]
+    pub fn held<C: Cpu>(&self, y: T, held: T) -> T {
+        C::fused(self.decay, y, (T::one() - self.decay) * held)
     }
 
     /// `F`, one interval after `y`, of an input that goes linearly from `from` to `to`.
-    #[inline]
-    pub fn ramp(&self, y: T, from: T, to: T) -> T {
-        self.decay * y + self.first * from + self.last * to
+    #[inline(always)]
+    pub fn ramp<C: Cpu>(&self, y: T, from: T, to: T) -> T {
+        C::fused(self.last, to, C::fused(self.decay, y, self.first * from))
     }
 
     /// `F`, one interval after `y`, of a parabola from `from` to `to` that half-way lies `height` above the chord.
-    #[inline]
-    pub fn curve(&self, y: T, from: T, to: T, height: T) -> T {
-        self.ramp(y, from, to) + self.bulge * height
+    #[inline(always)]
+    pub fn curve<C: Cpu>(&self, y: T, from: T, to: T, height: T) -> T {
+        C::fused(self.bulge, height, self.ramp::<C>(y, from, to))
     }
 
     /// The paper's `D`, one interval after `y`.
-    #[inline]
-    pub fn paper_derivative(&self, y: T, from: T, to: T) -> T {
-        self.decay * y + self.lambda * (to - from)
+    #[inline(always)]
+    pub fn paper_derivative<C: Cpu>(&self, y: T, from: T, to: T) -> T {
+        C::fused(self.lambda, to - from, self.decay * y)
     }
 }
 
@@ -116,7 +117,7 @@ impl<T: Real> Kept<T> {
     }
 
     /// Coefficients for an interval of `h` seconds.
-    #[inline]
+    #[inline(always)]
     pub fn step(&mut self, h: T) -> Step<T> {
         if h != self.h {
             self.renew(h);
@@ -153,6 +154,7 @@ fn bulge<T: Real>(x: T, decay: T) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::Portable;
 
     const CUTOFF: Cutoff<f64> = Cutoff { rad_per_s: 50.0 };
 
@@ -161,7 +163,7 @@ mod tests {
         // F of a ramp of slope 1 is t - (1 - exp(-lambda t))/lambda, whatever the intervals.
         let (mut low, mut t) = (0.0, 0.0);
         for h in [0.0025, 0.001, 0.004, 0.0025] {
-            low = CUTOFF.step(h).ramp(low, t, t + h);
+            low = CUTOFF.step(h).ramp::<Portable>(low, t, t + h);
             t += h;
             assert!((low - (t - (1.0 - (-50.0 * t).exp()) / 50.0)).abs() < 1e-13);
         }
@@ -175,7 +177,7 @@ mod tests {
             let mut low = 0.0_f64;
             for k in 1..=200 {
                 let (before, t) = (f64::from(k - 1) * 0.0025, f64::from(k) * 0.0025);
-                low = step.curve(low, before * before, t * t, -0.0025 * 0.0025 / 4.0);
+                low = step.curve::<Portable>(low, before * before, t * t, -0.0025 * 0.0025 / 4.0);
                 let exact = t * t - 2.0 * t / lambda + 2.0 * (1.0 - (-lambda * t).exp()) / (lambda * lambda);
                 assert!((low - exact).abs() < 1e-14, "{lambda} rad/s");
             }
@@ -187,8 +189,8 @@ mod tests {
         let step = CUTOFF.step(0.0025);
         let (mut d, mut f) = (0.0, 0.0);
         for k in 1..4000 {
-            d = step.paper_derivative(d, f64::from(k - 1) * 0.0025, f64::from(k) * 0.0025);
-            f = step.held(f, 1.0);
+            d = step.paper_derivative::<Portable>(d, f64::from(k - 1) * 0.0025, f64::from(k) * 0.0025);
+            f = step.held::<Portable>(f, 1.0);
         }
         let inflation = 50.0 * 0.0025 / (1.0 - (-50.0_f64 * 0.0025).exp());
         assert!((d / f - inflation).abs() < 1e-12);
@@ -199,7 +201,7 @@ mod tests {
     fn a_held_input_settles_without_error_at_any_period() {
         let mut y = 0.0;
         for k in 0..400 {
-            y = CUTOFF.step(0.001 + 0.001 * f64::from(k % 3)).held(y, 2.0);
+            y = CUTOFF.step(0.001 + 0.001 * f64::from(k % 3)).held::<Portable>(y, 2.0);
         }
         assert!((y - 2.0).abs() < 1e-9);
     }

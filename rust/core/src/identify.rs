@@ -9,6 +9,7 @@
 //! single precision is the only way to keep its resolution: after three hours a time in `f32` has steps of a millisecond.
 
 use crate::arm::Arm;
+use crate::cpu::{Cpu, Level, Work};
 use crate::filter::Cutoff;
 use crate::real::{Real, lit};
 use crate::regression::{FilteredDynamic, FilteredPower, Passage, Scheme, Snapshot, SuppliedEnergy, Variant};
@@ -140,6 +141,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         self
     }
 
+    /// The same with other instructions than the most that the processor has.
+    pub fn with_level(mut self, level: Level) -> Self {
+        self.rls = self.rls.with_level(level);
+        self
+    }
+
     /// Estimate and covariance.
     #[inline]
     pub fn rls(&self) -> &Rls<T, R> {
@@ -156,18 +163,19 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
     pub fn update(&mut self, sample: &Sample<T, N>) -> Outcome<T, N> {
         let Sample { t, q, dq, tau } = sample;
         let h = if self.past.seen == Seen::Nothing { T::one() } else { *t - self.past.t };
-        self.take(*t, h, q, dq.as_ref(), tau)
+        self.rls.level().run(Take { estimator: self, t: *t, h, q, dq: dq.as_ref(), tau })
     }
 
     /// Takes one sample `h` seconds after the last one; for the first sample any positive number will do.
     #[inline]
     pub fn update_after(&mut self, h: T, reading: &Reading<T, N>) -> Outcome<T, N> {
         let Reading { q, dq, tau } = reading;
-        self.take(self.past.t + h, h, q, dq.as_ref(), tau)
+        let t = self.past.t + h;
+        self.rls.level().run(Take { estimator: self, t, h, q, dq: dq.as_ref(), tau })
     }
 
-    #[inline]
-    fn take(
+    #[inline(always)]
+    fn take<C: Cpu>(
         &mut self,
         t: T,
         h: T,
@@ -181,11 +189,11 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         }
         let outcome = if self.past.seen == Seen::Nothing {
             if dq.is_some() || self.settings.variant == Variant::Paper {
-                self.start(&Snapshot { q: *q, dq: dq.copied().unwrap_or_else(SVector::zeros) }, tau);
+                self.start(Snapshot { q: *q, dq: dq.copied().unwrap_or_else(SVector::zeros) }, *tau);
             }
             Outcome::Starting
         } else {
-            self.advance(h, q, dq, tau)
+            self.advance::<C>(h, q, dq, tau)
         };
         let past = &mut self.past;
         past.seen = if past.seen == Seen::Nothing { Seen::One } else { Seen::More };
@@ -200,7 +208,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
     }
 
     /// Whether a sample can be used: finite, of possible size, later than the last and reachable from it.
-    #[inline]
+    #[inline(always)]
     fn acceptable(
         &self,
         t: T,
@@ -222,9 +230,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         fine
     }
 
-    fn start(&mut self, now: &Snapshot<T, N>, tau: &SVector<T, N>) {
+    /// Takes its own copies, so that those of the hot code can stay in registers.
+    #[cold]
+    #[inline(never)]
+    fn start(&mut self, now: Snapshot<T, N>, tau: SVector<T, N>) {
         let Settings { scheme, variant, cutoff, .. } = &self.settings;
-        let (arm, variant) = (&self.arm, *variant);
+        let (arm, variant, now, tau) = (&self.arm, *variant, &now, &tau);
         self.regression = Some(match scheme {
             Scheme::FilteredDynamic => Regression::Dynamic(FilteredDynamic::new(arm, variant, cutoff, now)),
             Scheme::SuppliedEnergy => Regression::Energy(SuppliedEnergy::new(arm, now, tau)),
@@ -232,8 +243,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         });
     }
 
-    #[inline]
-    fn advance(
+    #[inline(always)]
+    fn advance<C: Cpu>(
         &mut self,
         h: T,
         q: &SVector<T, N>,
@@ -245,25 +256,26 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         let inverse = if h == past.h { past.inverse } else { T::one() / h };
         let difference = (q - past.q) * inverse;
         let between = (past.q + q) * half;
-        if dq.is_some() || self.settings.variant == Variant::Paper {
+        let (now, passage, tau) = if dq.is_some() || self.settings.variant == Variant::Paper {
             let now = Snapshot { q: *q, dq: dq.copied().unwrap_or(difference) };
             let passage = Passage { h, split: h * half, first: past.tau, second: past.tau, middle: between };
-            return self.regress(&now, &passage, tau);
-        }
-        // The state half-way between the two samples; on the way there from the one before, the torque changed at the last sample.
-        let (now, held) = (Snapshot { q: between, dq: difference }, past.tau);
-        if past.seen == Seen::One {
-            self.start(&now, &held);
-            return Outcome::Starting;
-        }
-        let split = past.h * half;
-        let passage =
-            Passage { h: split + h * half, split, first: past.tau_before, second: held, middle: past.q };
-        self.regress(&now, &passage, &held)
+            (now, passage, *tau)
+        } else {
+            // The state half-way between the two samples; on the way there from the one before, the torque changed at the last sample.
+            let (now, held, split) = (Snapshot { q: between, dq: difference }, past.tau, past.h * half);
+            if past.seen == Seen::One {
+                self.start(now, held);
+                return Outcome::Starting;
+            }
+            let passage =
+                Passage { h: split + h * half, split, first: past.tau_before, second: held, middle: past.q };
+            (now, passage, held)
+        };
+        self.regress::<C>(&now, &passage, &tau)
     }
 
-    #[inline]
-    fn regress(
+    #[inline(always)]
+    fn regress<C: Cpu>(
         &mut self,
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
@@ -273,30 +285,51 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         let outcome = match &mut self.regression {
             None => Outcome::Starting,
             Some(Regression::Dynamic(scheme)) => {
-                let (psi, y) = scheme.update(arm, variant, now, passage);
-                match self.rls.update(&psi, &y) {
+                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, passage);
+                match self.rls.learn::<C, _>(&psi, &y) {
                     Update::Used(error) => Outcome::Updated(error),
                     Update::Rejected => Outcome::Rejected,
                 }
             }
             Some(Regression::Energy(scheme)) => {
-                let (psi, y) = scheme.update(arm, variant, now, passage, tau);
-                scalar(self.rls.update(&psi, &y))
+                let (psi, y) = scheme.update::<A, R>(arm, variant, now, passage, tau);
+                scalar(self.rls.learn::<C, _>(&psi, &y))
             }
             Some(Regression::Power(scheme)) => {
-                let (psi, y) = scheme.update(arm, variant, now, passage, tau);
-                scalar(self.rls.update(&psi, &y))
+                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, passage, tau);
+                scalar(self.rls.learn::<C, _>(&psi, &y))
             }
         };
         if outcome == Outcome::Rejected {
             // Filters and integrals hold what least squares cannot use; the equations hold from any start.
-            self.start(now, tau);
+            self.start(*now, *tau);
         }
         outcome
     }
 }
 
-#[inline]
+/// One call of [`Estimator::update`].
+struct Take<'a, T: Real, A, const N: usize, const P: usize, const R: usize> {
+    estimator: &'a mut Estimator<T, A, N, P, R>,
+    t: T,
+    h: T,
+    q: &'a SVector<T, N>,
+    dq: Option<&'a SVector<T, N>>,
+    tau: &'a SVector<T, N>,
+}
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Work
+    for Take<'_, T, A, N, P, R>
+{
+    type Output = Outcome<T, N>;
+
+    #[inline(always)]
+    fn run<C: Cpu>(self) -> Self::Output {
+        self.estimator.take::<C>(self.t, self.h, self.q, self.dq, self.tau)
+    }
+}
+
+#[inline(always)]
 fn scalar<T: Real, const N: usize>(update: Update<T, 1>) -> Outcome<T, N> {
     match update {
         Update::Used(error) => {

@@ -7,9 +7,11 @@
 
 use crate::arm::Arm;
 use crate::effect::Pulse;
+use crate::glide::{Glided, Modes, Place, Pose, Span, glide};
 use crate::plant::{Mode, Motion, Plant};
 use crate::real::{Real, lit};
 use crate::transmission::Hidden;
+use crate::trig::NEAR;
 use nalgebra::SVector;
 
 /// Mode changes located within one sub-step before the rest of it is taken with all crossing joints held.
@@ -17,6 +19,21 @@ const MAX_EVENTS: usize = 16;
 
 /// Corrections of the located instant; each squares the error of the last.
 const MAX_REFINEMENTS: usize = 4;
+
+/// A correction of this part of a step is as good on a straight line: what is left out is of the order of its square.
+const STRAIGHT: f64 = 1e-6;
+
+/// The same on a curve of constant rate of acceleration, whose error is of the order of its cube.
+const CURVED: f64 = 1e-3;
+
+/// Attempts at the instant of a release.
+const MAX_FALSE_POSITIONS: usize = 12;
+
+/// A release is found where holding takes more than friction gives, but by less than this part of what the step changes.
+const RELEASED: f64 = 1e-8;
+
+/// Attempts are made this part of a step beyond where the root is expected, so that they end on its far side.
+const BEYOND: f64 = 1e-9;
 
 /// Position, velocity and friction mode of every joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,29 +95,77 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
         return;
     }
     let count = substeps.max(1);
+    if count == 1 && plant.glides() && glided(plant, state, interval) {
+        return;
+    }
     let dt = interval.h / lit(count as f64);
     for i in 0..count {
         let from = dt * lit(i as f64);
         if plant.smoothing() > T::zero() {
-            *state = Step { plant, interval }.smooth(state, from, dt);
+            *state = Step::new(plant, interval, state).smooth(state, from, dt);
         } else {
-            Step { plant, interval }.exact(state, from, dt);
+            Step::new(plant, interval, state).exact(state, from, dt);
         }
     }
+}
+
+/// One sample interval in one step, if no friction mode changes within it.
+#[inline(always)]
+fn glided<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
+    plant: &Plant<T, A, N, P>,
+    state: &mut State<T, N>,
+    interval: &Interval<T, N>,
+) -> bool {
+    let mut span = Span { t: interval.t, h: interval.h, tau: [[T::zero(); N]; 3] };
+    let mut direction = [T::zero(); N];
+    for j in 0..N {
+        let Pulse { start, middle, end } = interval.torque[j];
+        (span.tau[0][j], span.tau[1][j], span.tau[2][j]) = (start, middle, end);
+        direction[j] = state.modes[j].direction();
+    }
+    let start = plant.rigid().pose(&Place { q: state.q.into(), dq: state.dq.into() });
+    let Glided { pose, wrong } = glide(plant, &start, &Modes::new(direction), &span);
+    let right = wrong <= T::zero();
+    if right {
+        (state.q, state.dq) = (pose.place.q.into(), pose.place.dq.into());
+    }
+    right
+}
+
+/// One sample interval with exact friction in one step, from mode change to mode change.
+#[inline(never)]
+pub(crate) fn exact<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
+    plant: &Plant<T, A, N, P>,
+    state: &mut State<T, N>,
+    interval: &Interval<T, N>,
+) {
+    Step::new(plant, interval, state).exact(state, T::zero(), interval.h);
 }
 
 /// One sub-step's surroundings.
 struct Step<'a, T: Real, A, const N: usize, const P: usize> {
     plant: &'a Plant<T, A, N, P>,
     interval: &'a Interval<'a, T, N>,
+    /// Where the sub-step starts; sines and cosines within it are turned on from here.
+    origin: Pose<T, N>,
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N, P> {
+impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A, N, P> {
+    #[inline]
+    fn new(plant: &'a Plant<T, A, N, P>, interval: &'a Interval<'a, T, N>, state: &State<T, N>) -> Self {
+        let origin = plant.rigid().pose(&Place { q: state.q.into(), dq: state.dq.into() });
+        Self { plant, interval, origin }
+    }
+
     #[inline]
     fn motion(&self, x: T, state: &State<T, N>) -> Motion<T, N> {
+        let place = Place { q: state.q.into(), dq: state.dq.into() };
+        let (mut pose, far) = self.plant.rigid().near(&self.origin, &place);
+        if far > lit(NEAR) {
+            pose = self.plant.rigid().pose(&place);
+        }
         let tau = self.interval.torque_at(x);
-        let State { q, dq, modes, hidden } = state;
-        self.plant.acceleration(self.interval.t + x, q, dq, &tau, modes, hidden)
+        self.plant.acceleration(self.interval.t + x, &pose, &tau, &state.modes, &state.hidden)
     }
 
     /// `state` moved on by `dt` with the rates `(dq, motion)` of some stage.
@@ -168,8 +233,17 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         }
         let k1 = self.settle(state, x);
         let mut last = self.runge_kutta(state, x, left, &k1);
-        hold_reversed(&mut last);
+        self.hold_reversed(&mut last);
         *state = last;
+    }
+
+    /// Holds every joint with dry friction whose velocity contradicts its mode.
+    fn hold_reversed(&self, state: &mut State<T, N>) {
+        for j in (0..N).filter(|j| self.plant.is_dry(*j)) {
+            if state.dq[j] * state.modes[j].direction() < T::zero() {
+                (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck);
+            }
+        }
     }
 
     /// Releases stuck joints that friction cannot hold, and sticks joints that were released to no avail; returns the motion.
@@ -206,17 +280,18 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         let (mut found, mut worst) = (None, T::zero());
         for j in 0..N {
             if state.dq[j] != T::zero() {
-                if state.modes[j] != Mode::of(state.dq[j]) {
+                let contradicts = self.plant.is_dry(j) || state.modes[j] == Mode::Stuck;
+                if contradicts && state.modes[j] != Mode::of(state.dq[j]) {
                     return Some((j, Mode::of(state.dq[j])));
                 }
             } else if state.modes[j] == Mode::Stuck {
                 let tau = self.joint_torque(x, state);
                 let (excess, direction) =
-                    self.plant.excess(j, self.interval.t + x, &state.q, &tau, motion.holding[j]);
+                    self.plant.excess(j, self.interval.t + x, state.q[j], tau[j], motion.holding[j]);
                 if excess > worst && !tried[j] {
                     (found, worst) = (Some((j, Mode::of(direction))), excess);
                 }
-            } else if motion.ddq[j] * state.modes[j].direction() < T::zero() {
+            } else if self.plant.is_dry(j) && motion.ddq[j] * state.modes[j].direction() < T::zero() {
                 return Some((j, Mode::Stuck));
             }
         }
@@ -234,7 +309,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         k1: &Motion<T, N>,
     ) -> Option<Event<T>> {
         let reverses =
-            |j: usize| state.modes[j] != Mode::Stuck && trial.dq[j] * state.modes[j].direction() < T::zero();
+            |j: usize| self.plant.is_dry(j) && trial.dq[j] * state.modes[j].direction() < T::zero();
         let any_stuck = state.modes.contains(&Mode::Stuck);
         if !any_stuck && !(0..N).any(reverses) {
             return None;
@@ -271,50 +346,138 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
     ) -> Option<Event<T>> {
         let t = self.interval.t;
         let tau_end = self.joint_torque(x + dt, trial);
-        let (after, direction) = self.plant.excess(j, t + x + dt, &trial.q, &tau_end, end.holding[j]);
+        let (after, direction) = self.plant.excess(j, t + x + dt, trial.q[j], tau_end[j], end.holding[j]);
         if after <= T::zero() {
             return None;
         }
         let start = self.motion(x, state);
         let tau = self.joint_torque(x, state);
-        let (before, _) = self.plant.excess(j, t + x, &state.q, &tau, start.holding[j]);
+        let (before, _) = self.plant.excess(j, t + x, state.q[j], tau[j], start.holding[j]);
         let s = if before < T::zero() { before / (before - after) } else { T::zero() };
-        Some(Event { joint: j, s, change: Change::Release(Mode::of(direction)) })
+        let change = Change::Release { mode: Mode::of(direction), excess: [before, after] };
+        Some(Event { joint: j, s, change })
     }
 
-    /// Integrates up to the event; the instant of a stop is corrected until the velocity vanishes to rounding.
+    /// Integrates up to the event.
+    #[inline(never)]
     fn locate(&self, state: &State<T, N>, event: &Event<T>, x: T, dt: T, k1: &Motion<T, N>) -> Located<T, N> {
+        match event.change {
+            Change::Stop => self.locate_stop(state, event, x, dt, k1),
+            Change::Release { excess: [before, after], .. } if before < T::zero() => {
+                self.locate_release(state, event.joint, [before, after], x, dt, k1)
+            }
+            Change::Release { .. } => Located { length: T::zero(), reached: *state },
+        }
+    }
+
+    /// Integrates to where a velocity vanishes: Newton's method, its last correction so small that a straight line is exact.
+    fn locate_stop(
+        &self,
+        state: &State<T, N>,
+        event: &Event<T>,
+        x: T,
+        dt: T,
+        k1: &Motion<T, N>,
+    ) -> Located<T, N> {
         let mut s = event.s;
         let mut reached = self.runge_kutta(state, x, s * dt, k1);
-        if matches!(event.change, Change::Stop) {
-            for _ in 0..MAX_REFINEMENTS {
-                let slope = self.motion(x + s * dt, &reached).ddq[event.joint] * dt;
-                let correction = reached.dq[event.joint] / slope;
-                let next = s - correction;
-                if !(next > T::zero() && next <= T::one()) || correction.abs() < lit(1e-12) {
-                    break;
-                }
-                s = next;
-                reached = self.runge_kutta(state, x, s * dt, k1);
+        for _ in 0..MAX_REFINEMENTS {
+            let slope = self.motion(x + s * dt, &reached);
+            let correction = -reached.dq[event.joint] / (slope.ddq[event.joint] * dt);
+            let next = s + correction;
+            if !(next > T::zero() && next <= T::one()) {
+                break;
             }
+            s = next;
+            if correction.abs() < lit(STRAIGHT) {
+                reached = self.moved(&reached, correction * dt, &reached, &slope);
+                break;
+            }
+            if correction.abs() < lit(CURVED) && !self.plant.is_driven() && s > lit(0.01) {
+                let rate = (slope.ddq - k1.ddq) / ((s - correction) * dt);
+                let (part, reached) = curved(&reached, event.joint, &slope.ddq, &rate);
+                return Located { length: (s - correction) * dt + part, reached };
+            }
+            reached = self.runge_kutta(state, x, s * dt, k1);
         }
         Located { length: s * dt, reached }
     }
+
+    /// Integrates to just beyond where friction no longer holds joint `j`: false position in Illinois' way (Dowell and Jarratt 1971)
+    /// between the start of the step, where `excess[0] < 0`, and its end, where `excess[1] > 0`.
+    fn locate_release(
+        &self,
+        state: &State<T, N>,
+        j: usize,
+        excess: [T; 2],
+        x: T,
+        dt: T,
+        k1: &Motion<T, N>,
+    ) -> Located<T, N> {
+        let ([mut low, mut high], [mut before, mut after]) = ([T::zero(), T::one()], excess);
+        let enough = (after - before) * lit(RELEASED);
+        let mut last_high = None;
+        let mut reached = None;
+        for _ in 0..MAX_FALSE_POSITIONS {
+            let s = (high - after * (high - low) / (after - before) + lit(BEYOND)).min(high);
+            let there = self.runge_kutta(state, x, s * dt, k1);
+            let motion = self.motion(x + s * dt, &there);
+            let tau = self.joint_torque(x + s * dt, &there);
+            let (lacks, _) =
+                self.plant.excess(j, self.interval.t + x + s * dt, there.q[j], tau[j], motion.holding[j]);
+            let beyond = lacks > T::zero();
+            let again = last_high == Some(beyond);
+            last_high = Some(beyond);
+            if beyond {
+                (high, after, reached) = (s, lacks, Some(there));
+                before *= if again { lit(0.5) } else { T::one() };
+            } else {
+                (low, before) = (s, lacks);
+                after *= if again { lit(0.5) } else { T::one() };
+            }
+            if beyond && lacks < enough {
+                break;
+            }
+        }
+        let reached = reached.unwrap_or_else(|| self.runge_kutta(state, x, high * dt, k1));
+        Located { length: high * dt, reached }
+    }
+}
+
+/// The state where joint `j`'s velocity vanishes, close to `state` with these accelerations and their rates, and the time to there.
+fn curved<T: Real, const N: usize>(
+    state: &State<T, N>,
+    j: usize,
+    ddq: &SVector<T, N>,
+    rate: &SVector<T, N>,
+) -> (T, State<T, N>) {
+    let half: T = lit(0.5);
+    let first = -state.dq[j] / ddq[j];
+    let d = -(state.dq[j] + half * rate[j] * first * first) / ddq[j];
+    let mut next = *state;
+    next.q += (state.dq + (ddq + rate * (d / lit(3.0))) * (half * d)) * d;
+    next.dq += (ddq + rate * (half * d)) * d;
+    (d, next)
 }
 
 /// A change of one joint's mode at the fraction `s` of a step.
 struct Event<T> {
     joint: usize,
     s: T,
-    change: Change,
+    change: Change<T>,
 }
 
 /// What happens at an event.
-enum Change {
+enum Change<T> {
     /// The velocity reaches zero.
     Stop,
-    /// Friction no longer holds.
-    Release(Mode),
+    /// Friction no longer holds; by how much it lacks at the start and at the end of the step.
+    Release {
+        /// The mode it changes to.
+        mode: Mode,
+        /// What holding takes beyond friction's level at both ends of the step.
+        excess: [T; 2],
+    },
 }
 
 /// A state at a located event and the time it took to get there.
@@ -329,7 +492,7 @@ impl<T: Real> Event<T> {
         let j = self.joint;
         match self.change {
             Change::Stop => (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck),
-            Change::Release(mode) => state.modes[j] = mode,
+            Change::Release { mode, .. } => state.modes[j] = mode,
         }
         state
     }
@@ -359,13 +522,4 @@ fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
         s = next;
     }
     s
-}
-
-/// Holds every joint whose velocity contradicts its mode.
-fn hold_reversed<T: Real, const N: usize>(state: &mut State<T, N>) {
-    for j in 0..N {
-        if state.dq[j] * state.modes[j].direction() < T::zero() {
-            (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck);
-        }
-    }
 }

@@ -4,7 +4,11 @@
 //! Kelly (1997), *Experimental evaluation of identification schemes on a direct drive robot*, Robotica 15,
 //! 563-571. No standard library, no allocation, no panic; `f64` and `f32`.
 #![no_std]
-#![forbid(unsafe_code)]
+// With the standard library one call needs it: the one that enters code for the processor's own instructions (`cpu`).
+#![cfg_attr(not(feature = "std"), forbid(unsafe_code))]
+
+#[cfg(feature = "std")]
+extern crate std;
 
 // The README's example is compiled and run with the documentation tests.
 #[cfg(doctest)]
@@ -12,16 +16,21 @@
 mod readme {}
 
 pub mod arm;
+pub mod cpu;
 pub mod effect;
 pub mod filter;
+pub mod glide;
 pub mod identify;
 pub mod integrate;
+pub mod lanes;
 pub mod linear;
 pub mod monitor;
+pub mod number;
 pub mod online;
 pub mod plant;
 pub mod real;
 pub mod regression;
 pub mod rls;
+pub mod rollout;
 pub mod transmission;
 pub mod trig;

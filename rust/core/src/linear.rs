@@ -1,32 +1,43 @@
 //! Small symmetric positive definite systems, solved in place without a library's panics.
 
-use crate::real::Real;
-use nalgebra::{SMatrix, SVector};
+use crate::number::Number;
+use crate::real::lit;
 
 /// Solves `a x = b` for symmetric positive definite `a` by `L D L'`; an indefinite `a` gives non-finite numbers, not a panic.
-#[inline]
-pub fn solve_positive_definite<T: Real, const N: usize>(
-    mut a: SMatrix<T, N, N>,
-    mut b: SVector<T, N>,
-) -> SVector<T, N> {
+#[inline(always)]
+pub fn solve_positive_definite<V: Number, const N: usize>(mut a: [[V; N]; N], mut b: [V; N]) -> [V; N] {
+    if N == 2 {
+        return cramer(&a, &b);
+    }
+    let one = V::of(lit(1.0));
+    let mut pivots = b;
     for k in 0..N {
-        let pivot = T::one() / a[(k, k)];
+        pivots[k] = one / a[k][k];
         for i in (k + 1)..N {
-            let factor = a[(i, k)] * pivot;
+            let factor = -(a[i][k] * pivots[k]);
             for j in (k + 1)..N {
-                let step = factor * a[(k, j)];
-                a[(i, j)] -= step;
+                a[i][j] = factor.fused(a[k][j], a[i][j]);
             }
-            let step = factor * b[k];
-            b[i] -= step;
+            b[i] = factor.fused(b[k], b[i]);
         }
     }
     for k in (0..N).rev() {
         for j in (k + 1)..N {
-            let step = a[(k, j)] * b[j];
-            b[k] -= step;
+            b[k] = (-a[k][j]).fused(b[j], b[k]);
         }
-        b[k] /= a[(k, k)];
+        b[k] = b[k] * pivots[k];
     }
     b
+}
+
+/// Two equations by Cramer's rule, which divides once.
+#[inline(always)]
+fn cramer<V: Number, const N: usize>(a: &[[V; N]; N], b: &[V; N]) -> [V; N] {
+    let (i, j) = (0, N - 1);
+    let one = V::of(lit(1.0));
+    let scale = one / a[i][i].fused(a[j][j], -(a[i][j] * a[j][i]));
+    let mut x = *b;
+    x[i] = a[j][j].fused(b[i], -(a[i][j] * b[j])) * scale;
+    x[j] = a[i][i].fused(b[j], -(a[j][i] * b[i])) * scale;
+    x
 }

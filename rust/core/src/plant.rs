@@ -4,12 +4,14 @@
 //! its velocity exactly zero and whatever friction torque that takes. [`Plant::acceleration`] is smooth while no mode changes;
 //! [`crate::integrate`] decides when one does.
 
-use crate::arm::Arm;
-use crate::effect::{Active, JointPoint};
+use crate::arm::{Arm, Balance};
+use crate::effect::{Active, Hooks, JointPoint};
+use crate::glide::{Body, Instant, Place, Pose, Rigid};
 use crate::linear::solve_positive_definite;
+use crate::number::Number;
 use crate::real::{Real, lit};
 use crate::transmission::{Drive, Hidden};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
 /// Most effects one plant can carry.
 pub const MAX_EFFECTS: usize = 8;
@@ -63,36 +65,27 @@ pub struct Motion<T, const N: usize> {
 /// An arm with parameter values, effects and a friction model.
 #[derive(Clone)]
 pub struct Plant<T: Real, A, const N: usize, const P: usize> {
-    arm: A,
-    theta: [T; P],
-    viscous: SVector<T, N>,
-    coulomb: SVector<T, N>,
-    added: SMatrix<T, N, N>,
+    rigid: Rigid<T, A, N, P>,
     drives: [Option<Drive<T>>; N],
-    tilt: T,
+    driven: bool,
     smoothing: T,
     effects: [Option<Active<T>>; MAX_EFFECTS],
-    forces: bool,
-    levels: bool,
+    hooks: [Hooks; N],
     remembers: bool,
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
     /// The arm without effects and with exact Coulomb friction.
     pub fn new(arm: A, theta: [T; P]) -> Self {
-        let (viscous, coulomb) = (arm.viscous(&theta), arm.coulomb(&theta));
+        let (viscous, coulomb) = (arm.viscous(&theta).into(), arm.coulomb(&theta).into());
+        let (added, tilt) = ([[T::zero(); N]; N], T::zero());
         Self {
-            arm,
-            theta,
-            viscous,
-            coulomb,
-            added: SMatrix::zeros(),
+            rigid: Rigid { arm, theta, viscous, coulomb, added, tilt },
             drives: [None; N],
-            tilt: T::zero(),
+            driven: false,
             smoothing: T::zero(),
             effects: [None; MAX_EFFECTS],
-            forces: false,
-            levels: false,
+            hooks: [Hooks::NONE; N],
             remembers: false,
         }
     }
@@ -108,23 +101,27 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         let slot = self.effects.iter_mut().find(|slot| slot.is_none())?;
         *slot = Some(effect);
         let hooks = effect.law.spec().hooks;
-        self.forces |= hooks.force;
-        self.levels |= hooks.coulomb;
-        self.remembers |= hooks.memory;
         let joint = effect.joint;
-        let own = *self.arm.inertia(&self.theta, &SVector::zeros()).get((joint, joint))?;
-        *self.added.get_mut((joint, joint))? += effect.law.inertia(&effect.p);
+        let on_joint = self.hooks.get_mut(joint)?;
+        on_joint.force |= hooks.force;
+        on_joint.coulomb |= hooks.coulomb;
+        self.remembers |= hooks.memory;
+        let rigid = &mut self.rigid;
+        let own = *rigid.arm.inertia(&rigid.theta, &SVector::zeros()).get((joint, joint))?;
+        *rigid.added.get_mut(joint)?.get_mut(joint)? += effect.law.inertia(&effect.p);
         if let Some(drive) = effect.law.drive(&effect.p, own) {
             *self.drives.get_mut(joint)? = Some(drive);
+            self.driven = true;
             if drive.inside {
-                *self.added.get_mut((joint, joint))? -= drive.inertia;
+                *rigid.added.get_mut(joint)?.get_mut(joint)? -= drive.inertia;
             }
         }
+        rigid.tilt += effect.law.tilt(&effect.p);
         self.couple(effect.law.coupling(&effect.p));
-        self.tilt += effect.law.tilt(&effect.p);
+        let rigid = &mut self.rigid;
         if let Some((mass, distance)) = effect.law.payload(&effect.p) {
-            let delta = self.arm.payload(&self.theta, mass, distance);
-            for (value, change) in self.theta.iter_mut().zip(delta) {
+            let delta = rigid.arm.payload(&rigid.theta, mass, distance);
+            for (value, change) in rigid.theta.iter_mut().zip(delta) {
                 *value += change;
             }
         }
@@ -133,8 +130,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
     /// Adds to the inertia between the first two joints.
     fn couple(&mut self, inertia: T) {
-        for at in [(0, 1), (1, 0)] {
-            if let Some(entry) = self.added.get_mut(at) {
+        for (row, column) in [(0, 1), (1, 0)] {
+            if let Some(entry) = self.rigid.added.get_mut(row).and_then(|row| row.get_mut(column)) {
                 *entry += inertia;
             }
         }
@@ -143,7 +140,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// Whether a joint has a motor side of its own.
     #[inline]
     pub fn is_driven(&self) -> bool {
-        self.drives.iter().any(Option::is_some)
+        self.driven
     }
 
     /// Whether a joint remembers its path.
@@ -181,9 +178,37 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         memory
     }
 
+    /// The arm's numbers, payloads and other inertial effects included.
+    pub fn rigid(&self) -> &Rigid<T, A, N, P> {
+        &self.rigid
+    }
+
     /// Parameter values, payloads included.
     pub fn theta(&self) -> &[T; P] {
-        &self.theta
+        &self.rigid.theta
+    }
+
+    /// Whether nothing but friction modes can change during a step: exact friction, and no states that no encoder shows.
+    #[inline]
+    pub fn glides(&self) -> bool {
+        self.smoothing == T::zero() && !self.driven && !self.remembers
+    }
+
+    /// Whether effects add a torque to joint `j`, and whether they change its Coulomb level.
+    #[inline]
+    pub(crate) fn hooks(&self, j: usize) -> Hooks {
+        self.hooks[j]
+    }
+
+    /// Its effects.
+    pub(crate) fn effects(&self) -> impl Iterator<Item = &Active<T>> {
+        self.effects.iter().flatten()
+    }
+
+    /// Whether joint `j` has dry friction, or effects that may tell in which direction it slides.
+    #[inline]
+    pub fn is_dry(&self, j: usize) -> bool {
+        self.rigid.coulomb[j] > T::zero() || self.hooks.iter().any(|on| on.force || on.coulomb)
     }
 
     /// Width of the smoothed sign, zero for exact dry friction.
@@ -193,27 +218,27 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
     /// A plant none of whose numbers is infinite or undefined.
     pub fn is_finite(&self) -> bool {
-        self.theta.iter().all(nalgebra::ComplexField::is_finite)
+        self.rigid.theta.iter().all(nalgebra::ComplexField::is_finite)
     }
 
     /// Joint `j` at an instant.
     #[inline]
-    fn point(&self, j: usize, t: T, q: T, dq: T, tau: T, load: T) -> JointPoint<T> {
-        let friction = self.viscous[j] * dq.abs() + self.coulomb[j];
+    pub(crate) fn point(&self, j: usize, t: T, q: T, dq: T, tau: T, load: T) -> JointPoint<T> {
+        let friction = self.rigid.viscous[j] * dq.abs() + self.rigid.coulomb[j];
         JointPoint { t, q, dq, tau, load, friction, other: T::zero(), memory: T::zero() }
     }
 
     /// Direction in which joint `j` slides, between -1 and 1 where friction is smoothed.
     #[inline]
-    fn sliding(&self, j: usize, dq: &SVector<T, N>, modes: &[Mode; N]) -> T {
+    fn sliding(&self, j: usize, dq: &[T; N], modes: &[Mode; N]) -> T {
         if self.smoothing > T::zero() { (dq[j] / self.smoothing).tanh() } else { modes[j].direction() }
     }
 
     /// Coulomb level of joint `j` in a direction, never negative.
     #[inline]
-    fn level(&self, j: usize, x: &JointPoint<T>, direction: T) -> T {
-        let mut level = self.coulomb[j];
-        if self.levels {
+    pub(crate) fn level(&self, j: usize, x: &JointPoint<T>, direction: T) -> T {
+        let mut level = self.rigid.coulomb[j];
+        if self.hooks[j].coulomb {
             for effect in self.effects.iter().flatten() {
                 if effect.joint == j && effect.law.spec().hooks.coulomb {
                     level += effect.law.coulomb(&effect.p, x, direction);
@@ -225,9 +250,9 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
     /// Torque of the force effects on joint `j`.
     #[inline]
-    fn force(&self, j: usize, x: &JointPoint<T>) -> T {
+    pub(crate) fn force(&self, j: usize, x: &JointPoint<T>) -> T {
         let mut sum = T::zero();
-        if self.forces {
+        if self.hooks[j].force {
             for effect in self.effects.iter().flatten() {
                 if effect.joint == j && effect.law.spec().hooks.force {
                     sum += effect.law.force(&effect.p, x);
@@ -255,17 +280,16 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     pub fn acceleration(
         &self,
         t: T,
-        q: &SVector<T, N>,
-        dq: &SVector<T, N>,
+        pose: &Pose<T, N>,
         tau: &SVector<T, N>,
         modes: &[Mode; N],
         hidden: &Hidden<T, N>,
     ) -> Motion<T, N> {
         if !self.is_driven() {
-            return self.rigid(t, q, dq, tau, modes, hidden);
+            return self.undriven(t, pose, tau, modes, hidden);
         }
         let transmitted = self.transmitted(tau, hidden);
-        let mut motion = self.rigid(t, q, dq, &transmitted, modes, hidden);
+        let mut motion = self.undriven(t, pose, &transmitted, modes, hidden);
         for j in 0..N {
             if let Some(drive) = &self.drives[j] {
                 motion.ddtwist[j] = (tau[j] - transmitted[j]) / drive.inertia - motion.ddq[j];
@@ -276,53 +300,51 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
     /// The same for given torques at the joints.
     #[inline]
-    fn rigid(
+    fn undriven(
         &self,
         t: T,
-        q: &SVector<T, N>,
-        dq: &SVector<T, N>,
+        pose: &Pose<T, N>,
         tau: &SVector<T, N>,
         modes: &[Mode; N],
         hidden: &Hidden<T, N>,
     ) -> Motion<T, N> {
-        let (mut inertia, bias) = self.arm.dynamics(&self.theta, q, dq, self.tilt);
-        inertia += self.added;
-        let memory = self.memory(q, hidden);
+        let Pose { place: Place { q, dq }, balance: Balance { inertia, bias }, .. } = pose;
+        let memory = if self.remembers { self.memory(&SVector::from(*q), hidden) } else { hidden.memory };
         let mut rhs = SVector::<T, N>::zeros();
         for j in 0..N {
             let mut x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
-            if self.forces {
+            if self.hooks[j].force {
                 x.other = self.sliding((j + 1) % N, dq, modes);
                 x.memory = memory[j];
             }
-            rhs[j] = tau[j] - bias[j] - self.viscous[j] * dq[j] - self.dry_friction(j, &x, modes[j])
+            rhs[j] = tau[j] - bias[j] - self.rigid.viscous[j] * dq[j] - self.dry_friction(j, &x, modes[j])
                 + self.force(j, &x);
         }
-        self.solve(&inertia, &rhs, modes)
+        self.solve(inertia, &rhs, modes)
     }
 
     /// `M ddq = rhs` with the rows and columns of stuck joints taken out.
     #[inline]
-    fn solve(&self, inertia: &SMatrix<T, N, N>, rhs: &SVector<T, N>, modes: &[Mode; N]) -> Motion<T, N> {
+    fn solve(&self, inertia: &[[T; N]; N], rhs: &SVector<T, N>, modes: &[Mode; N]) -> Motion<T, N> {
         let stuck = self.stuck(modes);
         let (mut reduced, mut b) = (*inertia, *rhs);
         for j in 0..N {
             if stuck[j] {
                 for k in 0..N {
-                    reduced[(j, k)] = T::zero();
-                    reduced[(k, j)] = T::zero();
+                    reduced[j][k] = T::zero();
+                    reduced[k][j] = T::zero();
                 }
-                reduced[(j, j)] = T::one();
+                reduced[j][j] = T::one();
                 b[j] = T::zero();
             }
         }
-        let ddq = solve_positive_definite(reduced, b);
+        let ddq = SVector::from(solve_positive_definite(reduced, b.into()));
         let mut holding = SVector::zeros();
         for j in 0..N {
             if stuck[j] {
                 holding[j] = rhs[j];
                 for k in 0..N {
-                    holding[j] -= inertia[(j, k)] * ddq[k];
+                    holding[j] -= inertia[j][k] * ddq[k];
                 }
             }
         }
@@ -339,19 +361,19 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// By how much the holding torque of joint `j` exceeds what friction can give, and the direction it would slide in.
     /// Not positive: it stays.
     #[inline]
-    pub fn excess(&self, j: usize, t: T, q: &SVector<T, N>, tau: &SVector<T, N>, holding: T) -> (T, T) {
+    pub fn excess(&self, j: usize, t: T, q: T, tau: T, holding: T) -> (T, T) {
         let direction = if holding < T::zero() { -T::one() } else { T::one() };
         // At rest the load of a joint is what has to be held.
-        let x = self.point(j, t, q[j], T::zero(), tau[j], holding - tau[j]);
+        let x = self.point(j, t, q, T::zero(), tau, holding - tau);
         (holding.abs() - self.level(j, &x, direction), direction)
     }
 
     /// Inertia of joint `j` at `q` with all other joints free to move.
-    fn free_inertia(j: usize, inertia: &SMatrix<T, N, N>) -> T {
-        let mut least = inertia[(j, j)];
+    fn free_inertia(j: usize, inertia: &[[T; N]; N]) -> T {
+        let mut least = inertia[j][j];
         for k in 0..N {
             if k != j {
-                least -= inertia[(j, k)] * inertia[(j, k)] / inertia[(k, k)];
+                least -= inertia[j][k] * inertia[j][k] / inertia[k][k];
             }
         }
         least.max(lit(1e-9))
@@ -364,7 +386,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         if self.smoothing == T::zero() && !self.is_driven() {
             return fastest;
         }
-        let inertia = self.arm.dynamics(&self.theta, q, &SVector::zeros(), self.tilt).0 + self.added;
+        let inertia = self.rigid.balance(&Place { q: (*q).into(), dq: [T::zero(); N] }).inertia;
         for j in 0..N {
             let free = Self::free_inertia(j, &inertia);
             if self.smoothing > T::zero() {
@@ -376,5 +398,49 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             }
         }
         fastest
+    }
+}
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Body<T, N> for Plant<T, A, N, P> {
+    #[inline(always)]
+    fn near(&self, known: &Pose<T, N>, place: &Place<T, N>) -> (Pose<T, N>, T) {
+        self.rigid.near(known, place)
+    }
+
+    #[inline(always)]
+    fn dry(&self, j: usize) -> T {
+        if self.is_dry(j) { T::one() } else { T::zero() }
+    }
+
+    #[inline(always)]
+    fn pull(&self, at: &Instant<'_, T, N>, direction: &[T; N]) -> [T; N] {
+        let Pose { place: Place { q, dq }, balance, .. } = at.pose;
+        let mut pull = *at.tau;
+        for j in 0..N {
+            pull[j] = pull[j] - balance.bias[j] - self.rigid.viscous[j] * dq[j];
+            let hooks = self.hooks[j];
+            if !(hooks.coulomb || hooks.force) {
+                pull[j] -= self.rigid.coulomb[j].larger(T::zero()) * direction[j];
+                continue;
+            }
+            let mut x = self.point(j, at.t, q[j], dq[j], at.tau[j], balance.bias[j]);
+            if direction[j] != T::zero() {
+                pull[j] -= self.level(j, &x, direction[j]) * direction[j];
+            }
+            x.other = direction[(j + 1) % N];
+            pull[j] += self.force(j, &x);
+        }
+        pull
+    }
+
+    #[inline(always)]
+    fn excess(&self, at: &Instant<'_, T, N>, holding: &[T; N], direction: &[T; N]) -> [T; N] {
+        let mut excess = [T::zero(); N];
+        for j in 0..N {
+            if direction[j] == T::zero() {
+                excess[j] = self.excess(j, at.t, at.pose.place.q[j], at.tau[j], holding[j]).0;
+            }
+        }
+        excess
     }
 }

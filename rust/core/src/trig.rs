@@ -8,6 +8,7 @@
 //! W. J. Cody and W. Waite 1980, *Software manual for the elementary functions*, chapter 8. The coefficients interpolate the series at
 //! Chebyshev's points of `r^2` up to `(pi/2)^2`; the polynomials are off by less than 4e-17, in single precision by 1.1e-10.
 
+use crate::number::Number;
 use crate::real::{Real, lit};
 
 /// What depends on the precision.
@@ -76,35 +77,94 @@ const SINGLE: Constants = Constants {
     ],
 };
 
+/// Angles up to this take the series, rad.
+pub const LARGEST: f64 = DOUBLE.largest;
+
+#[inline(always)]
+fn constants<T: Real>() -> (&'static Constants, bool) {
+    if T::default_epsilon() < lit(1e-12) { (&DOUBLE, true) } else { (&SINGLE, false) }
+}
+
+/// [`LARGEST`] for this precision.
+#[inline(always)]
+pub(crate) fn largest<T: Real>() -> f64 {
+    constants::<T>().0.largest
+}
+
 /// Sine and cosine of `x` rad.
 #[inline(always)]
 pub fn sin_cos<T: Real>(x: T) -> (T, T) {
-    let double = T::default_epsilon() < lit(1e-12);
-    let constants = if double { &DOUBLE } else { &SINGLE };
-    let within = x.abs() <= lit(constants.largest);
-    if !within {
-        return x.sin_cos();
-    }
-    let rounder: T = lit(constants.rounder);
-    let k = (x * lit(core::f64::consts::FRAC_1_PI) + rounder) - rounder;
-    let [high, middle, low] = constants.parts.map(lit::<T>);
-    let r = (x - k * high) - (k * middle + k * low);
+    if x.abs() <= lit(largest::<T>()) { series_of(x) } else { x.sin_cos() }
+}
+
+/// The same by the series alone.
+#[inline(always)]
+pub(crate) fn series_of<V: Number>(x: V) -> (V, V) {
+    let (constants, double) = constants::<V::Real>();
+    let c = |x: f64| V::of(lit(x));
+    let (one, rounder) = (c(1.0), c(constants.rounder));
+    let k = x.fused(c(core::f64::consts::FRAC_1_PI), rounder) - rounder;
+    let [high, middle, low] = constants.parts;
+    let r = (-k).fused(c(high), x) - k.fused(c(middle), k * c(low));
     let z = r * r;
-    let odd = k - ((k * lit(0.5) + rounder) - rounder) * lit(2.0);
-    let sign = T::one() - odd * odd * lit(2.0);
-    let sine = r + (r * z) * series(z, &constants.sine, double);
-    let cosine = (T::one() - z * lit(0.5)) + (z * z) * series(z, &constants.cosine, double);
+    let odd = k - (k.fused(c(0.5), rounder) - rounder) * c(2.0);
+    let sign = one - odd * odd * c(2.0);
+    let sine = (r * z).fused(series(z, &constants.sine, double), r);
+    let cosine = (z * z).fused(series(z, &constants.cosine, double), (-z).fused(c(0.5), one));
     (sine * sign, cosine * sign)
 }
 
 /// A polynomial by pairs of terms, which need not wait for each other; all eight, or the first five.
 #[inline(always)]
-fn series<T: Real>(z: T, c: &[f64; 8], whole: bool) -> T {
-    let pair = |i: usize| lit::<T>(c[i]) + z * lit(c[i + 1]);
+fn series<V: Number>(z: V, c: &[f64; 8], whole: bool) -> V {
+    let c = |i: usize| V::of(lit(c[i]));
+    let pair = |i: usize| z.fused(c(i + 1), c(i));
     let z2 = z * z;
     let z4 = z2 * z2;
-    let low = pair(0) + z2 * pair(2);
-    if whole { low + z4 * (pair(4) + z2 * pair(6)) } else { low + z4 * lit(c[4]) }
+    let low = z2.fused(pair(2), pair(0));
+    if whole { z4.fused(z2.fused(pair(6), pair(4)), low) } else { z4.fused(c(4), low) }
+}
+
+/// Sine and cosine of an angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turn<V> {
+    /// Sine.
+    pub sine: V,
+    /// Cosine.
+    pub cosine: V,
+}
+
+/// Differences of angles up to this, rad, turn on by [`Turn::by`] with errors below 2e-14; up to 0.2 rad, to rounding.
+pub const NEAR: f64 = 0.5;
+
+/// `(-1)^n / (2 n + 1)!` and `(-1)^n / (2 n)!` from `n = 1` on.
+const NEAR_SINE: [f64; 5] = [-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0, -1.0 / 39_916_800.0];
+const NEAR_COSINE: [f64; 6] =
+    [-0.5, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40_320.0, -1.0 / 3_628_800.0, 1.0 / 479_001_600.0];
+
+impl<V: Number> Turn<V> {
+    /// Of an angle, rad.
+    #[inline(always)]
+    pub fn of(angle: V) -> Self {
+        let (sine, cosine) = angle.sine_cosine();
+        Self { sine, cosine }
+    }
+
+    /// Of an angle further on by `d` rad, at most [`NEAR`]: two short series and the theorems of addition.
+    #[inline(always)]
+    pub fn by(&self, d: V) -> Self {
+        let z = d * d;
+        let pair = |c: &[f64], n: usize| z.fused(V::of(lit(c[n + 1])), V::of(lit(c[n])));
+        let z2 = z * z;
+        let s = z2.fused(z2.fused(V::of(lit(NEAR_SINE[4])), pair(&NEAR_SINE, 2)), pair(&NEAR_SINE, 0));
+        let c = z2.fused(z2.fused(pair(&NEAR_COSINE, 4), pair(&NEAR_COSINE, 2)), pair(&NEAR_COSINE, 0));
+        // The cosine less one: only the change is rounded anew.
+        let (s, c) = ((d * z).fused(s, d), z * c);
+        Self {
+            sine: self.sine.fused(c, self.cosine.fused(s, self.sine)),
+            cosine: self.cosine.fused(c, (-self.sine).fused(s, self.cosine)),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -138,6 +198,17 @@ mod tests {
             assert!((s - x.sin()).abs().max((c - x.cos()).abs()) < ROUNDINGS * f64::EPSILON, "{k}");
         }
         assert_eq!(sin_cos(0.0), (0.0, 1.0));
+    }
+
+    #[test]
+    fn turning_on_is_turning_there() {
+        for i in 0..1000 {
+            let (x, d) = (0.01 * f64::from(i) - 5.0, NEAR * f64::from(i % 41 - 20) / 20.0);
+            let (there, exact) = (Turn::of(x).by(d), Turn::of(x + d));
+            let off = (there.sine - exact.sine).abs().max((there.cosine - exact.cosine).abs());
+            // The sum of the angles is rounded too.
+            assert!(off < if d.abs() <= 0.2 { 1.5e-15 } else { 2e-14 }, "{x} by {d}: {off:e}");
+        }
     }
 
     #[test]

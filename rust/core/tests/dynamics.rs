@@ -1,6 +1,7 @@
 //! The arms as mechanics: identities that hold for every arm and every state.
 
-use armgap_core::arm::{Arm, Axis, Kind, Pendulum, TwoLink};
+use armgap_core::arm::{Arm, Axis, Balance, Kind, Pendulum, TwoLink};
+use armgap_core::trig::Turn;
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
@@ -18,9 +19,10 @@ fn check<A: Arm<f64, N, P>, const N: usize, const P: usize>(arm: &A, theta: [f64
 
     // Y theta = tau, and the integrator's shared terms are the same mathematics.
     assert!((arm.regressor(&q, &dq, &ddq) * vector - torque).amax() < 1e-12 * scale);
-    let (inertia, bias) = arm.dynamics(&theta, &q, &dq, 0.0);
-    assert!((inertia - m).amax() < 1e-12 * scale);
-    assert!((bias - c * dq - arm.gravity(&theta, &q, 0.0)).amax() < 1e-12 * scale);
+    let turns = arm.angles(&q.into(), 0.0).map(Turn::of);
+    let Balance { inertia, bias } = arm.balance(&theta, &turns, &dq.into());
+    assert!((SMatrix::from_fn(|i, j| inertia[i][j]) - m).amax() < 1e-12 * scale);
+    assert!((SVector::from(bias) - c * dq - arm.gravity(&theta, &q, 0.0)).amax() < 1e-12 * scale);
 
     // Momentum, energy and dissipation regressors.
     assert!((arm.momentum_regressor(&q, &dq) * vector - m * dq).amax() < 1e-12 * scale);

@@ -1,6 +1,7 @@
 //! Laws of the filters, the least squares and the online estimator under any input.
 
 use armgap_core::arm::{Axis, TwoLink};
+use armgap_core::cpu::Portable;
 use armgap_core::filter::Cutoff;
 use armgap_core::identify::{Estimator, Outcome, Sample, Settings};
 use armgap_core::regression::{Scheme, Variant};
@@ -27,9 +28,10 @@ proptest! {
         let cutoff = Cutoff { rad_per_s: lambda };
         let middle = u + (v - u) * share;
         let (whole, first, second) = (cutoff.step(h), cutoff.step(h * share), cutoff.step(h - h * share));
-        prop_assert!((whole.ramp(y, u, v) - second.ramp(first.ramp(y, u, middle), middle, v)).abs() < 1e-12);
-        prop_assert!((whole.held(y, v) - second.held(first.held(y, v), v)).abs() < 1e-12);
-        prop_assert_eq!(whole.ramp(y, u, v), whole.curve(y, u, v, 0.0));
+        prop_assert!((whole.ramp::<Portable>(y, u, v)
+            - second.ramp::<Portable>(first.ramp::<Portable>(y, u, middle), middle, v)).abs() < 1e-12);
+        prop_assert!((whole.held::<Portable>(y, v) - second.held::<Portable>(first.held::<Portable>(y, v), v)).abs() < 1e-12);
+        prop_assert_eq!(whole.ramp::<Portable>(y, u, v), whole.curve::<Portable>(y, u, v, 0.0));
     }
 
     #[test]

@@ -303,7 +303,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         fitted.iter().filter(|c| c.effect.is_some()).map(|c| (c.clone(), share(c))).collect()
     }
 
-    /// Fits all starts and judges them, best first.
+    /// Fits all starts and judges them, best first; what diverged or came down to nothing is left out.
     fn contend(
         &self,
         weights: &Weights<N>,
@@ -314,14 +314,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let known = base.effects.len();
         let mut contenders: Vec<Contender<P>> = starts
             .into_par_iter()
-            .map(|start| {
-                let fit = self.problem(&weights.training).solve(&start, effort);
-                let training = self.problem(&weights.training).window_costs(&fit.hypothesis);
-                let (holdout, error) = self.judged_on_holdout(weights, &fit);
-                let effect = fit.hypothesis.effects.get(known).copied();
-                let size = effect.as_ref().map_or(0.0, |e| self.relative_size(e));
-                Contender { effect, size, fit, training, holdout, error }
-            })
+            .map(|start| self.contender(weights, &start, known, effort))
             .filter(|c| c.score().is_finite() && !c.is_idle())
             .collect();
         contenders.sort_by(|a, b| a.score().total_cmp(&b.score()));
@@ -337,6 +330,22 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             }
         }
         best
+    }
+
+    /// A start fitted and judged; what it has beyond the `known` effects is the one under test.
+    fn contender(
+        &self,
+        weights: &Weights<N>,
+        start: &Hypothesis<P>,
+        known: usize,
+        effort: Effort,
+    ) -> Contender<P> {
+        let fit = self.problem(&weights.training).solve(start, effort);
+        let training = self.problem(&weights.training).window_costs(&fit.hypothesis);
+        let (holdout, error) = self.judged_on_holdout(weights, &fit);
+        let effect = fit.hypothesis.effects.get(known).copied();
+        let size = effect.as_ref().map_or(0.0, |e| self.relative_size(e));
+        Contender { effect, size, fit, training, holdout, error }
     }
 
     /// Tempered costs of the holdout windows, and their cost as they are.
@@ -368,11 +377,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             if last {
                 break;
             }
-            let base =
-                self.contend(&weights, current, vec![current.clone()], Effort::ROUGH).remove(0).score();
+            let base = self.contender(&weights, current, current.effects.len(), Effort::ROUGH).score();
             hopeless = contenders.first().map_or(base, |best| 0.5 * (base + best.score()));
         }
-        let base = self.contend(&weights, current, vec![current.clone()], Effort::FULL).remove(0);
+        let base = self.contender(&weights, current, current.effects.len(), Effort::FULL);
         (base, contenders, weights)
     }
 

@@ -8,6 +8,7 @@ use crate::model::{Hypothesis, Placed};
 use crate::solve::{Effort, Fit};
 use crate::study::Study;
 use armgap_core::arm::Arm;
+use armgap_core::effect::Trial;
 
 /// Mean advantage per window, in standard errors, below which a cause is not accepted.
 const CERTAIN: f64 = 3.5;
@@ -35,6 +36,14 @@ pub const CONSEQUENCE: f64 = 1e-3;
 
 /// Improvement relative to the motion within a window below which an effect is of no consequence.
 const RELEVANT: f64 = 1e-4;
+
+/// A gap below [`RELEVANT`] is looked into down to this size if it stands this far above the floor.
+const FAINTEST: f64 = 5e-6;
+const CLEAR: f64 = 2.75;
+
+/// There a cause must explain this part of it, with this certainty, as no error of an integrator does.
+const MATTERS_IF_FAINT: f64 = 0.7;
+const CERTAIN_IF_FAINT: f64 = 5.0;
 
 /// Probability left to a cause beside a remainder that it does not touch at all.
 const REMAINDER_DOUBT: f64 = 0.2;
@@ -95,7 +104,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let mut model = refit.clone();
         let (mut causes, mut stages): (Vec<Cause>, Vec<Stage<N, P>>) = (Vec::new(), Vec::new());
         let mut smoothed = false;
-        let noticeable = noticeable(stage.relative_error());
+        let mut noticeable = noticeable(stage.relative_error());
+        if is_faint(&stage) {
+            noticeable = FAINTEST;
+            stage = self.stage(&nominal, scale, noticeable);
+        }
         while causes.len() < max_causes {
             let Some((choice, ground)) = choose(&stage, smoothed, noticeable) else {
                 break;
@@ -153,6 +166,19 @@ pub fn noticeable(first_gap: f64) -> f64 {
     (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENCE)
 }
 
+/// Whether a gap is too small to matter by itself, and yet clearly there.
+fn is_faint<const N: usize, const P: usize>(stage: &Stage<N, P>) -> bool {
+    (FAINTEST..=RELEVANT).contains(&stage.relative_error()) && stage.excess() > CLEAR
+}
+
+/// Whether an effect can be told from the errors of an integrator: a torque at the joint can, a shift in time or a stiff spring cannot.
+fn is_tangible(effect: Option<&Placed>) -> bool {
+    effect.is_some_and(|e| {
+        let spec = e.law.spec();
+        (spec.hooks.force || spec.hooks.coulomb) && spec.trial != Trial::Whole
+    })
+}
+
 /// Why a contender deserves to be adopted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Ground {
@@ -204,12 +230,17 @@ fn moves<const N: usize, const P: usize>(
     noticeable: f64,
 ) -> bool {
     let possible = contender.size < AT_BOUND && !contender.is_idle();
-    let matters = if stage.relative_error() > CONSEQUENCE { MATTERS } else { MATTERS_IN_SMALL };
+    let (matters, certain) = match stage.relative_error() {
+        error if error > CONSEQUENCE => (MATTERS, CERTAIN),
+        error if error > RELEVANT => (MATTERS_IN_SMALL, CERTAIN),
+        _ => (MATTERS_IF_FAINT, CERTAIN_IF_FAINT),
+    };
     stage.excess() > ABOVE_FLOOR
+        && (stage.relative_error() > RELEVANT || is_tangible(contender.effect.as_ref()))
         && possible
         && stage.share(contender) > matters
         && stage.relevance(contender) > noticeable
-        && contender.z_over(&stage.base) > CERTAIN
+        && contender.z_over(&stage.base) > certain
         && contender.holdout_z_over(&stage.base) > HOLDOUT_CERTAIN
 }
 

@@ -19,6 +19,7 @@ pub mod locate;
 pub mod metric;
 pub mod model;
 mod observe;
+mod products;
 pub mod progress;
 pub mod report;
 mod ruled_out;

@@ -11,6 +11,7 @@
 //! projection, Golub and Pereyra 1973).
 
 use crate::model::Hypothesis;
+use crate::products::{cross, squares};
 use crate::track::Start;
 use crate::window::{Dataset, Shift};
 use armgap_core::arm::Arm;
@@ -41,6 +42,54 @@ struct Projection {
     pull: DVector<f64>,
     /// `R^-1` of the same factorisation: start corrections from coordinates.
     back: DMatrix<f64>,
+}
+
+impl Projection {
+    /// Columns of the rows that belong to samples.
+    fn basis(&self) -> Vec<&[f64]> {
+        self.samples.as_slice().chunks_exact(self.samples.nrows()).collect()
+    }
+
+    /// What the pull of the measured start adds to the residual's coordinates.
+    fn pulled(&self) -> DVector<f64> {
+        self.prior.tr_mul(&self.pull)
+    }
+
+    /// Cost of a whitened residual.
+    fn cost(&self, residual: &[f64]) -> f64 {
+        let along = cross(&[residual], &self.basis());
+        let coordinates = along.iter().zip(&self.pulled()).map(|(x, p)| (x + p).powi(2)).sum::<f64>();
+        (squares(&[residual])[0] + self.pull.norm_squared() - coordinates).max(0.0)
+    }
+
+    /// Products of each of the first `lead` columns, and of the residual, with every column and last the residual, row by row; then the
+    /// squares of the columns after the first `lead`.
+    fn products(&self, lead: usize, columns: &[&[f64]], residual: &[f64]) -> Vec<f64> {
+        let all: Vec<&[f64]> = columns.iter().copied().chain([residual]).collect();
+        let (k, basis) = (columns.len(), self.basis());
+        let mut coordinates = cross(&all, &basis);
+        let at = |c: usize| c * basis.len()..(c + 1) * basis.len();
+        for (coordinate, pulled) in coordinates[at(k)].iter_mut().zip(&self.pulled()) {
+            *coordinate += pulled;
+        }
+        let leading: Vec<&[f64]> = columns[..lead].iter().copied().chain([residual]).collect();
+        let mut products = cross(&leading, &all);
+        products.extend(squares(&columns[lead..]));
+        let along = |a: usize, b: usize| -> f64 {
+            coordinates[at(a)].iter().zip(&coordinates[at(b)]).map(|(a, b)| a * b).sum()
+        };
+        let (rows, rest) = products.split_at_mut((lead + 1) * (k + 1));
+        for (i, row) in rows.chunks_exact_mut(k + 1).enumerate() {
+            for (c, product) in row.iter_mut().enumerate() {
+                *product -= along(if i < lead { i } else { k }, c);
+            }
+        }
+        for (c, square) in rest.iter_mut().enumerate() {
+            *square -= along(lead + c, lead + c);
+        }
+        rows[lead * (k + 1) + k] += self.pull.norm_squared();
+        products
+    }
 }
 
 /// Weights of a dataset's residuals.
@@ -116,39 +165,43 @@ impl<const N: usize> Metric<N> {
 
     /// Inner products of whitened `columns` and, last, a whitened `residual`.
     pub fn gram(&self, data: &Dataset<N>, columns: &[Vec<f64>], residual: &[f64]) -> Gram {
+        self.gram_with(columns.len(), data, columns, residual)
+    }
+
+    /// The same without the products of two different columns after the first `lead`: they stay zero.
+    pub fn gram_with(&self, lead: usize, data: &Dataset<N>, columns: &[Vec<f64>], residual: &[f64]) -> Gram {
         let k = columns.len();
-        let one = |((window, projection), trust): ((&crate::window::Window<N>, &Projection), &f64)| {
-            let range = window.range();
-            let mut a = DMatrix::zeros(range.len(), k + 1);
-            for (c, column) in columns.iter().enumerate() {
-                a.column_mut(c).copy_from_slice(&column[range.clone()]);
-            }
-            a.column_mut(k).copy_from_slice(&residual[range]);
-            let mut coordinates = projection.samples.tr_mul(&a);
-            let pulled = projection.prior.tr_mul(&projection.pull);
-            coordinates.column_mut(k).axpy(1.0, &pulled, 1.0);
-            let mut gram = a.tr_mul(&a) - coordinates.tr_mul(&coordinates);
-            gram[(k, k)] += projection.pull.norm_squared();
-            gram * *trust
+        let one = |(window, projection): (&crate::window::Window<N>, &Projection)| {
+            let part: Vec<&[f64]> = columns.iter().map(|c| &c[window.range()]).collect();
+            projection.products(lead, &part, &residual[window.range()])
         };
-        let grams: Vec<DMatrix<f64>> =
-            data.windows.par_iter().zip(&self.projections).zip(&self.trust).map(one).collect();
+        let windows: Vec<Vec<f64>> = data.windows.par_iter().zip(&self.projections).map(one).collect();
         let mut total = DMatrix::zeros(k + 1, k + 1);
-        for gram in &grams {
-            total += gram;
+        let mut scores = Vec::with_capacity(windows.len());
+        for (products, trust) in windows.iter().zip(&self.trust) {
+            let (rows, squares) = products.split_at((lead + 1) * (k + 1));
+            for (i, row) in rows.chunks_exact(k + 1).enumerate() {
+                for (c, product) in row.iter().enumerate() {
+                    total[(c, if i < lead { i } else { k })] += product * trust;
+                }
+            }
+            for (c, square) in squares.iter().enumerate() {
+                total[(lead + c, lead + c)] += square * trust;
+            }
+            scores.push(DVector::from_column_slice(&rows[lead * (k + 1)..]) * *trust);
         }
-        let scores = grams.iter().map(|g| g.column(k).into_owned()).collect();
+        for i in (0..lead).chain([k]) {
+            for c in 0..=k {
+                total[(i, c)] = total[(c, i)];
+            }
+        }
         Gram { total, scores }
     }
 
     /// Cost of every window for a whitened residual.
     pub fn costs(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
-        let one = |(window, projection): (&crate::window::Window<N>, &Projection)| {
-            let r = DVector::from_column_slice(&residual[window.range()]);
-            let coordinates = projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.pull);
-            (r.norm_squared() + projection.pull.norm_squared() - coordinates.norm_squared()).max(0.0)
-        };
-        data.windows.iter().zip(&self.projections).map(one).collect()
+        let windows = data.windows.iter().zip(&self.projections);
+        windows.map(|(window, projection)| projection.cost(&residual[window.range()])).collect()
     }
 
     /// The residual that is left once the starts are fitted, whitened, in the order of the flat vector.

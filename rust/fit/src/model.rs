@@ -2,7 +2,9 @@
 
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Active, Effect, MAX_PARAMETERS, Pulse, Quantity, Scope};
+use armgap_core::integrate::State;
 use armgap_core::plant::Plant;
+use nalgebra::SVector;
 
 /// An effect on a joint, with values for its parameters.
 #[derive(Clone, Copy)]
@@ -122,6 +124,15 @@ impl<const P: usize> Hypothesis<P> {
             }
         }
         Some(torque)
+    }
+
+    /// The state of joints whose encoders show these positions and velocities.
+    pub fn start<const N: usize>(&self, q: SVector<f64, N>, dq: SVector<f64, N>) -> State<f64, N> {
+        if !self.distorts() {
+            return State::new(q, dq);
+        }
+        let at = SVector::from_fn(|j, _| self.actual(j, q[j]));
+        State::new(at, SVector::from_fn(|j, _| dq[j] / self.stretch(j, at[j])))
     }
 
     /// Position that joint `j`'s encoder shows.

@@ -7,11 +7,14 @@ use crate::model::Hypothesis;
 use crate::observe::hidden_states;
 use crate::track::{Start, Track};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Pulse, interval};
-use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::cpu::Level;
+use armgap_core::effect::Pulse;
+use armgap_core::integrate::{Interval, advance};
 use armgap_core::plant::Plant;
+use armgap_core::rollout::{Run, Together, WIDTH};
 use armgap_core::transmission::Hidden;
 use nalgebra::SVector;
+use rayon::prelude::*;
 
 /// A prediction that left this range [rad or m] has diverged; it is kept there so that its cost stays finite.
 const DIVERGED: f64 = 1e3;
@@ -109,32 +112,25 @@ impl<const N: usize> Dataset<N> {
             .map(|track| hypothesis.command(&track.t, &track.held, &track.pushes))
             .collect();
         let hidden = self.hidden(&plant, &commands);
-        let most = if plant.is_driven() { MAX_SUBSTEPS_DRIVEN } else { MAX_SUBSTEPS };
+        let mut runs = Vec::with_capacity(self.windows.len());
+        let mut rest = predicted.as_mut_slice();
         for (window, shift) in self.windows.iter().zip(starts) {
+            let (positions, after) = rest.split_at_mut(window.rows() * N);
+            rest = after;
             let track = &self.tracks[window.track];
             let torque = commands[window.track].as_deref().unwrap_or(&track.held);
-            let (q, dq) = (window.start.q + shift.q, window.start.dq + shift.dq);
-            let mut state = if hypothesis.distorts() {
-                let q = SVector::from_fn(|j, _| hypothesis.actual(j, q[j]));
-                State::new(q, SVector::from_fn(|j, _| dq[j] / hypothesis.stretch(j, q[j])))
-            } else {
-                State::new(q, dq)
-            };
+            let mut state = hypothesis.start(window.start.q + shift.q, window.start.dq + shift.dq);
             if let Some(states) = &hidden[window.track] {
                 state.hidden = Hidden { anchor: state.q, ..states[window.first] };
             }
-            let out = &mut predicted[window.range()];
-            for (k, row) in (window.first..window.last).zip(out.chunks_exact_mut(N)) {
-                let h = interval(&track.t, k);
-                let substeps = substeps(h * plant.fastest(&state.q)).min(most);
-                let step = Interval { t: track.t[k], h, torque: &torque[k] };
-                advance(&plant, &mut state, &step, substeps);
-                if !state.is_finite() || state.q.amax() > DIVERGED {
-                    break;
-                }
-                for j in 0..N {
-                    row[j] =
-                        if hypothesis.distorts() { hypothesis.measured(j, state.q[j]) } else { state.q[j] };
+            let (t, torque) = (&track.t[window.first..=window.last], &torque[window.first..window.last]);
+            runs.push(Run { plant: &plant, t, torque, state, positions });
+        }
+        make(&mut runs);
+        if hypothesis.distorts() {
+            for row in predicted.chunks_exact_mut(N) {
+                for (j, q) in row.iter_mut().enumerate().filter(|(_, q)| **q < DIVERGED) {
+                    *q = hypothesis.measured(j, *q);
                 }
             }
         }
@@ -172,6 +168,33 @@ impl<const N: usize> Shift<N> {
     /// No displacement.
     pub fn none() -> Self {
         Self { q: SVector::zeros(), dq: SVector::zeros() }
+    }
+}
+
+/// Makes runs of one plant: together where nothing but friction modes can change during a step.
+fn make<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
+    let level = Level::widest();
+    runs.par_chunks_mut(WIDTH).for_each(|group| {
+        if group.iter().all(|run| run.plant.glides()) {
+            Together { runs: group, limit: DIVERGED }.make(level);
+        } else {
+            group.iter_mut().for_each(make_alone);
+        }
+    });
+}
+
+/// Makes one run, in as many steps per sample as its plant needs.
+fn make_alone<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
+    let most = if run.plant.is_driven() { MAX_SUBSTEPS_DRIVEN } else { MAX_SUBSTEPS };
+    let state = &mut run.state;
+    for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
+        let h = run.t[k + 1] - run.t[k];
+        let substeps = substeps(h * run.plant.fastest(&state.q)).min(most);
+        advance(run.plant, state, &Interval { t: run.t[k], h, torque: &run.torque[k] }, substeps);
+        if !state.is_finite() || state.q.amax() > DIVERGED {
+            break;
+        }
+        row.copy_from_slice(state.q.as_slice());
     }
 }
 

@@ -9,10 +9,11 @@ import numpy as np
 from armgap.report import charts
 from armgap.report.page import Drawing, Section, Table
 from armgap.report.sections.steps import Data, length_unit, steps
-from armgap.report.words import each_joint, figure, millis
+from armgap.report.words import each_joint, figure
 
 __all__ = ["free_run", "horizons", "predictions"]
 
+_ARROW = " \N{RIGHTWARDS ARROW} "
 #: How far beyond the measured positions a free run is drawn, in their range.
 REACH = 1.0
 
@@ -58,10 +59,14 @@ def horizons(data: Data) -> Section | None:
     every = sorted([gap, *gap.get("horizons", [])], key=lambda h: float(h["horizon_s"]))
     if len(every) < 2:
         return None
-    named = [(label, key) for label, key, _ in steps(data)]
-    header = ("horizon [s]", *(label for label, _ in named), "measurement alone")
+    header = ("horizon [s]", _ARROW.join(label for label, _, _ in steps(data)), "measurement alone")
     rows = [
-        (figure(h["horizon_s"]), *(millis(h[key], unit) for _, key in named), millis(h["floor"], unit)) for h in every
+        (
+            figure(h["horizon_s"]),
+            each_joint(*(h[key] for _, key, _ in steps(data)), unit=unit),
+            each_joint(h["floor"], unit=unit),
+        )
+        for h in every
     ]
     text = (
         "RMS position error per joint when every prediction starts from a measured state and runs that long. What the measurement "

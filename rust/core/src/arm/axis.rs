@@ -2,8 +2,10 @@
 //!
 //! `theta1` is the moving mass, `theta2` the component of its weight along the axis (0 when horizontal).
 
-use super::{Arm, Parameter};
+use super::{Arm, Balance, Parameter};
+use crate::number::Number;
 use crate::real::Real;
+use crate::trig::Turn;
 use nalgebra::{SMatrix, SVector};
 
 /// A linear axis; `gravity` [m/s^2] is needed only when its base tilts.
@@ -34,15 +36,34 @@ impl<T: Real> Arm<T, 1, 4> for Axis<T> {
         SVector::<T, 1>::new(theta[1] * tilt.cos() + theta[0] * self.gravity * tilt.sin())
     }
 
+    #[inline(always)]
+    fn angles<V: Number<Real = T>>(&self, _: &[V; 1], tilt: V) -> [V; 1] {
+        [tilt]
+    }
+
+    #[inline(always)]
+    fn balance<V: Number<Real = T>>(
+        &self,
+        theta: &[V; 4],
+        turns: &[Turn<V>; 1],
+        _: &[V; 1],
+    ) -> Balance<V, 1> {
+        let along = theta[0] * V::of(self.gravity) * turns[0].sine;
+        Balance { inertia: [[theta[0]]], bias: [theta[1].fused(turns[0].cosine, along)] }
+    }
+
+    #[inline(always)]
     fn energy_regressor(&self, q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SVector<T, 4> {
         let half: T = crate::real::lit(0.5);
         SVector::from([half * dq[0] * dq[0], q[0], T::zero(), T::zero()])
     }
 
+    #[inline(always)]
     fn momentum_regressor(&self, _q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
         SMatrix::from([[dq[0]], [T::zero()], [T::zero()], [T::zero()]])
     }
 
+    #[inline(always)]
     fn potential_regressor(&self, _q: &SVector<T, 1>, _dq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
         SMatrix::from([[T::zero()], [T::one()], [T::zero()], [T::zero()]])
     }

@@ -18,8 +18,19 @@ pub use axis::Axis;
 pub use pendulum::Pendulum;
 pub use two_link::{LinkParameters, TwoLink};
 
+use crate::number::Number;
 use crate::real::{Real, sgn};
+use crate::trig::Turn;
 use nalgebra::{SMatrix, SVector};
+
+/// Inertia matrix, by rows, and `C dq + g` at a state.
+#[derive(Debug, Clone, Copy)]
+pub struct Balance<V, const N: usize> {
+    /// `M(q)`.
+    pub inertia: [[V; N]; N],
+    /// `C(q, dq) dq + g(q)`.
+    pub bias: [V; N],
+}
 
 /// Name and unit of one parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,7 +128,7 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     fn potential_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, P>;
 
     /// The two regressors above together, for the online estimator; arms override it where terms are shared.
-    #[inline]
+    #[inline(always)]
     fn momentum_and_potential(
         &self,
         q: &SVector<T, N>,
@@ -129,18 +140,16 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Change of `theta` when a point `mass` [kg] is fixed `distance` [m] along the last link.
     fn payload(&self, theta: &[T; P], mass: T, distance: T) -> [T; P];
 
-    /// Inertia matrix and `C dq + g` together, for the integrator; arms override it where terms are shared.
-    #[inline]
-    fn dynamics(
+    /// Angles whose sines and cosines [`Arm::balance`] needs, with the base turned by `tilt`.
+    fn angles<V: Number<Real = T>>(&self, q: &[V; N], tilt: V) -> [V; N];
+
+    /// Inertia matrix and `C dq + g` together, for the integrator: of one arm, or of several side by side.
+    fn balance<V: Number<Real = T>>(
         &self,
-        theta: &[T; P],
-        q: &SVector<T, N>,
-        dq: &SVector<T, N>,
-        tilt: T,
-    ) -> (SMatrix<T, N, N>, SVector<T, N>) {
-        let bias = self.coriolis(theta, q, dq) * dq + self.gravity(theta, q, tilt);
-        (self.inertia(theta, q), bias)
-    }
+        theta: &[V; P],
+        turns: &[Turn<V>; N],
+        dq: &[V; N],
+    ) -> Balance<V, N>;
 
     /// Regressor of the whole equation of motion: `Y(q, dq, ddq) theta = tau`, equation (15).
     fn regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>, ddq: &SVector<T, N>) -> SMatrix<T, N, P>;

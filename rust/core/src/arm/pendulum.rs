@@ -2,9 +2,10 @@
 //!
 //! `theta1` is the inertia about the joint, `theta2 = m g l` the largest gravity torque.
 
-use super::{Arm, Parameter};
+use super::{Arm, Balance, Parameter};
+use crate::number::Number;
 use crate::real::Real;
-use crate::trig::sin_cos;
+use crate::trig::{Turn, sin_cos};
 use nalgebra::{SMatrix, SVector};
 
 /// A physical pendulum with a motor in its pivot.
@@ -35,15 +36,33 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
         SVector::<T, 1>::new(theta[1] * sin_cos(q[0] + tilt).0)
     }
 
+    #[inline(always)]
+    fn angles<V: Number<Real = T>>(&self, q: &[V; 1], tilt: V) -> [V; 1] {
+        [q[0] + tilt]
+    }
+
+    #[inline(always)]
+    fn balance<V: Number<Real = T>>(
+        &self,
+        theta: &[V; 4],
+        turns: &[Turn<V>; 1],
+        _: &[V; 1],
+    ) -> Balance<V, 1> {
+        Balance { inertia: [[theta[0]]], bias: [theta[1] * turns[0].sine] }
+    }
+
+    #[inline(always)]
     fn energy_regressor(&self, q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SVector<T, 4> {
         let half: T = crate::real::lit(0.5);
         SVector::from([half * dq[0] * dq[0], T::one() - q[0].cos(), T::zero(), T::zero()])
     }
 
+    #[inline(always)]
     fn momentum_regressor(&self, _q: &SVector<T, 1>, dq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
         SMatrix::from([[dq[0]], [T::zero()], [T::zero()], [T::zero()]])
     }
 
+    #[inline(always)]
     fn potential_regressor(&self, q: &SVector<T, 1>, _dq: &SVector<T, 1>) -> SMatrix<T, 1, 4> {
         SMatrix::from([[T::zero()], [q[0].sin()], [T::zero()], [T::zero()]])
     }

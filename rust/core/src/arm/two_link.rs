@@ -11,9 +11,10 @@
 //! `C` is the one of Christoffel's symbols, for which `dM/dt - 2 C` is skew-symmetric. The paper prints another with the same product
 //! `C dq`; for that one only `dq' (dM/dt - 2 C) dq = 0` holds.
 
-use super::{Arm, Parameter};
+use super::{Arm, Balance, Parameter};
+use crate::number::Number;
 use crate::real::{Real, lit};
-use crate::trig::sin_cos;
+use crate::trig::{Turn, sin_cos};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// The two-link vertical arm.
@@ -88,18 +89,28 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
         Vector2::new(theta[3] * (q[0] + tilt).sin() + outer, outer)
     }
 
-    #[inline]
-    fn dynamics(&self, theta: &[T; 9], q: &Vector2<T>, dq: &Vector2<T>, tilt: T) -> (Matrix2<T>, Vector2<T>) {
-        let (s1, c1) = sin_cos(q[0] + tilt);
-        let (s2, c2) = sin_cos(q[1]);
-        let outer = theta[4] * (s1 * c2 + c1 * s2);
-        let (kc, ks) = (theta[1] * c2, theta[1] * s2);
-        let inertia = Matrix2::new(theta[0] + kc + kc, theta[2] + kc, theta[2] + kc, theta[2]);
-        let bias1 = theta[3] * s1 + outer - ks * dq[1] * (dq[0] + dq[0] + dq[1]);
-        (inertia, Vector2::new(bias1, outer + ks * dq[0] * dq[0]))
+    #[inline(always)]
+    fn angles<V: Number<Real = T>>(&self, q: &[V; 2], tilt: V) -> [V; 2] {
+        [q[0] + tilt, q[1]]
     }
 
-    #[inline]
+    #[inline(always)]
+    fn balance<V: Number<Real = T>>(
+        &self,
+        theta: &[V; 9],
+        turns: &[Turn<V>; 2],
+        dq: &[V; 2],
+    ) -> Balance<V, 2> {
+        let [Turn { sine: s1, cosine: c1 }, Turn { sine: s2, cosine: c2 }] = *turns;
+        let outer = theta[4] * s1.fused(c2, c1 * s2);
+        let (kc, ks) = (theta[1] * c2, theta[1] * s2);
+        let coupled = theta[2] + kc;
+        let inertia = [[theta[0] + kc + kc, coupled], [coupled, theta[2]]];
+        let bias1 = theta[3].fused(s1, outer) - ks * dq[1] * (dq[0] + dq[0] + dq[1]);
+        Balance { inertia, bias: [bias1, (ks * dq[0]).fused(dq[0], outer)] }
+    }
+
+    #[inline(always)]
     fn energy_regressor(&self, q: &Vector2<T>, dq: &Vector2<T>) -> SVector<T, 9> {
         let (half, sum) = (lit::<T>(0.5), dq[0] + dq[1]);
         let ((s1, c1), (s2, c2)) = (sin_cos(q[0]), sin_cos(q[1]));
@@ -133,7 +144,7 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
         b
     }
 
-    #[inline]
+    #[inline(always)]
     fn momentum_and_potential(
         &self,
         q: &Vector2<T>,

@@ -320,6 +320,26 @@ pub trait Effect<T: Real>: Sync {
         T::zero()
     }
 
+    /// Adds [`Effect::force`] at many points to `sums`, in one call.
+    fn add_forces(&self, p: &[T; MAX_PARAMETERS], points: &[JointPoint<T>], sums: &mut [T]) {
+        for (sum, x) in sums.iter_mut().zip(points) {
+            *sum += self.force(p, x);
+        }
+    }
+
+    /// Adds [`Effect::coulomb`] at many points to `levels`, in one call.
+    fn add_coulombs(
+        &self,
+        p: &[T; MAX_PARAMETERS],
+        points: &[JointPoint<T>],
+        directions: &[T],
+        levels: &mut [T],
+    ) {
+        for ((level, x), direction) in levels.iter_mut().zip(points).zip(directions) {
+            *level += self.coulomb(p, x, *direction);
+        }
+    }
+
     /// Inertia added to the joint's own acceleration only.
     fn inertia(&self, _p: &[T; MAX_PARAMETERS]) -> T {
         T::zero()

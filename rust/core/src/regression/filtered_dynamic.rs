@@ -6,6 +6,7 @@
 use super::friction::Friction;
 use super::{Passage, Snapshot, Steps, Variant};
 use crate::arm::Arm;
+use crate::cpu::Cpu;
 use crate::filter::Cutoff;
 use crate::real::Real;
 use nalgebra::{SMatrix, SVector};
@@ -45,77 +46,78 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
     }
 
     /// The rows and outputs at the next state, reached by `passage`.
-    #[inline]
-    pub fn update<A: Arm<T, N, P>, const R: usize>(
+    #[inline(always)]
+    pub fn update<C: Cpu, A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
         variant: Variant,
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
-    ) -> (SMatrix<T, N, R>, SVector<T, N>) {
+    ) -> ([[T; R]; N], [T; N]) {
         let (momentum, potential) = arm.momentum_and_potential(&now.q, &now.dq);
-        let mut psi = SMatrix::zeros();
+        let mut psi = [[T::zero(); R]; N];
         match variant {
-            Variant::Paper => self.paper::<A, R>(&momentum, passage, &mut psi),
-            Variant::Exact => self.exact::<A, R>(&momentum, &potential, now, passage, &mut psi),
+            Variant::Paper => self.paper::<C, A, R>(&momentum, passage, &mut psi),
+            Variant::Exact => self.exact::<C, A, R>(&momentum, &potential, now, passage, &mut psi),
         }
         for i in 0..N {
             self.friction.write(A::INERTIAL, Some(i), |j, value| {
                 if j < R {
-                    psi[(i, j)] = value;
+                    psi[i][j] = value;
                 }
             });
         }
         (self.last, self.last_momentum, self.last_potential) = (*now, momentum, potential);
-        (psi, self.torque)
+        (psi, self.torque.data.0[0])
     }
 
-    #[inline]
-    fn paper<A: Arm<T, N, P>, const R: usize>(
+    #[inline(always)]
+    fn paper<C: Cpu, A: Arm<T, N, P>, const R: usize>(
         &mut self,
         momentum: &SMatrix<T, N, P>,
         passage: &Passage<T, N>,
-        psi: &mut SMatrix<T, N, R>,
+        psi: &mut [[T; R]; N],
     ) {
         let step = self.steps.whole(passage.h);
         for j in 0..A::INERTIAL {
             for i in 0..N {
                 let (from, to) = (self.last_momentum[(i, j)], momentum[(i, j)]);
-                let derivative = step.paper_derivative(self.momentum[(i, j)], from, to);
-                let rest = step.held(self.potential[(i, j)], self.last_potential[(i, j)]);
+                let derivative = step.paper_derivative::<C>(self.momentum[(i, j)], from, to);
+                let rest = step.held::<C>(self.potential[(i, j)], self.last_potential[(i, j)]);
                 (self.momentum[(i, j)], self.potential[(i, j)]) = (derivative, rest);
-                psi[(i, j)] = derivative + rest;
+                psi[i][j] = derivative + rest;
             }
         }
-        self.friction.hold_torques(&step, &self.last.dq);
+        self.friction.hold_torques::<C>(&step, &self.last.dq);
         for i in 0..N {
-            self.torque[i] = step.held(self.torque[i], passage.second[i]);
+            self.torque[i] = step.held::<C>(self.torque[i], passage.second[i]);
         }
     }
 
-    #[inline]
-    fn exact<A: Arm<T, N, P>, const R: usize>(
+    #[inline(always)]
+    fn exact<C: Cpu, A: Arm<T, N, P>, const R: usize>(
         &mut self,
         momentum: &SMatrix<T, N, P>,
         potential: &SMatrix<T, N, P>,
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
-        psi: &mut SMatrix<T, N, R>,
+        psi: &mut [[T; R]; N],
     ) {
         let step = self.steps.whole(passage.h);
         for j in 0..A::INERTIAL {
             for i in 0..N {
-                let low = step.ramp(self.momentum[(i, j)], self.last_momentum[(i, j)], momentum[(i, j)]);
-                let rest = step.ramp(self.potential[(i, j)], self.last_potential[(i, j)], potential[(i, j)]);
+                let low = step.ramp::<C>(self.momentum[(i, j)], self.last_momentum[(i, j)], momentum[(i, j)]);
+                let rest =
+                    step.ramp::<C>(self.potential[(i, j)], self.last_potential[(i, j)], potential[(i, j)]);
                 (self.momentum[(i, j)], self.potential[(i, j)]) = (low, rest);
-                psi[(i, j)] = (momentum[(i, j)] - low) * step.lambda + rest;
+                psi[i][j] = (momentum[(i, j)] - low) * step.lambda + rest;
             }
         }
-        self.friction.filter_torques(&step, &self.last.dq, &now.dq);
+        self.friction.filter_torques::<C>(&step, &self.last.dq, &now.dq);
         let parts = self.steps.parts(passage);
         for i in 0..N {
-            let middle = parts[0].held(self.torque[i], passage.first[i]);
-            self.torque[i] = parts[1].held(middle, passage.second[i]);
+            let middle = parts[0].held::<C>(self.torque[i], passage.first[i]);
+            self.torque[i] = parts[1].held::<C>(middle, passage.second[i]);
         }
     }
 }

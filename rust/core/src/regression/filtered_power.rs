@@ -3,9 +3,10 @@
 use super::friction::Friction;
 use super::{Passage, Snapshot, Steps, Variant};
 use crate::arm::Arm;
+use crate::cpu::Cpu;
 use crate::filter::Cutoff;
 use crate::real::{Real, lit};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
 /// State of the scheme. Of the rows over all parameters only the inertial entries are used.
 #[derive(Debug, Clone, Copy)]
@@ -46,20 +47,20 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
     }
 
     /// The row and output at the next state, reached by `passage`; `tau` is the torque that acts from then on.
-    #[inline]
-    pub fn update<A: Arm<T, N, P>, const R: usize>(
+    #[inline(always)]
+    pub fn update<C: Cpu, A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
         variant: Variant,
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
         tau: &SVector<T, N>,
-    ) -> (SMatrix<T, 1, R>, SVector<T, 1>) {
+    ) -> ([[T; R]; 1], [T; 1]) {
         let energy = arm.energy_regressor(&now.q, &now.dq);
-        let mut psi = SMatrix::<T, 1, R>::zeros();
+        let mut psi = [T::zero(); R];
         match variant {
-            Variant::Paper => self.paper::<A, R>(&energy, passage, &mut psi),
-            Variant::Exact => self.exact::<A, R>(arm, &energy, now, passage, &mut psi),
+            Variant::Paper => self.paper::<C, A, R>(&energy, passage, &mut psi),
+            Variant::Exact => self.exact::<C, A, R>(arm, &energy, now, passage, &mut psi),
         }
         self.friction.write(A::INERTIAL, None, |j, value| {
             if j < R {
@@ -67,54 +68,54 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
             }
         });
         (self.last, self.last_energy, self.last_supply) = (*now, energy, tau.dot(&now.dq));
-        (psi, SVector::<T, 1>::new(self.supply))
+        ([psi], [self.supply])
     }
 
-    #[inline]
-    fn paper<A: Arm<T, N, P>, const R: usize>(
+    #[inline(always)]
+    fn paper<C: Cpu, A: Arm<T, N, P>, const R: usize>(
         &mut self,
         energy: &SVector<T, P>,
         passage: &Passage<T, N>,
-        psi: &mut SMatrix<T, 1, R>,
+        psi: &mut [T; R],
     ) {
         let step = self.steps.whole(passage.h);
         for j in 0..A::INERTIAL {
-            self.energy[j] = step.paper_derivative(self.energy[j], self.last_energy[j], energy[j]);
+            self.energy[j] = step.paper_derivative::<C>(self.energy[j], self.last_energy[j], energy[j]);
             psi[j] = self.energy[j];
         }
-        self.friction.hold_powers(&step, &self.last.dq);
-        self.supply = step.held(self.supply, self.last_supply);
+        self.friction.hold_powers::<C>(&step, &self.last.dq);
+        self.supply = step.held::<C>(self.supply, self.last_supply);
     }
 
-    #[inline]
-    fn exact<A: Arm<T, N, P>, const R: usize>(
+    #[inline(always)]
+    fn exact<C: Cpu, A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
         energy: &SVector<T, P>,
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
-        psi: &mut SMatrix<T, 1, R>,
+        psi: &mut [T; R],
     ) {
         let step = self.steps.whole(passage.h);
         let half_way = self.last.half_way(now, passage.h);
         let middle = arm.energy_regressor(&half_way.q, &half_way.dq);
         for j in 0..A::INERTIAL {
             let height = middle[j] - (energy[j] + self.last_energy[j]) * lit(0.5);
-            self.energy[j] = step.curve(self.energy[j], self.last_energy[j], energy[j], height);
+            self.energy[j] = step.curve::<C>(self.energy[j], self.last_energy[j], energy[j], height);
             psi[j] = (energy[j] - self.energy[j]) * step.lambda;
         }
-        self.friction.filter_powers(&step, &self.last.dq, &now.dq);
-        self.supply = self.exact_supply(now, passage);
+        self.friction.filter_powers::<C>(&step, &self.last.dq, &now.dq);
+        self.supply = self.exact_supply::<C>(now, passage);
     }
 
     /// `F` of the power of torques that are held in two parts, velocity linear over the whole.
-    #[inline]
-    fn exact_supply(&mut self, now: &Snapshot<T, N>, passage: &Passage<T, N>) -> T {
+    #[inline(always)]
+    fn exact_supply<C: Cpu>(&mut self, now: &Snapshot<T, N>, passage: &Passage<T, N>) -> T {
         let parts = self.steps.parts(passage);
         let from = self.last.dq;
         let middle = from + (now.dq - from) * (passage.split / passage.h);
         let (first, second) = (&passage.first, &passage.second);
-        let half_way = parts[0].ramp(self.supply, first.dot(&from), first.dot(&middle));
-        parts[1].ramp(half_way, second.dot(&middle), second.dot(&now.dq))
+        let half_way = parts[0].ramp::<C>(self.supply, first.dot(&from), first.dot(&middle));
+        parts[1].ramp::<C>(half_way, second.dot(&middle), second.dot(&now.dq))
     }
 }

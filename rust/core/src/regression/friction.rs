@@ -14,6 +14,7 @@
 //! Friction here is the law of every arm, `f_j = b_j dq_j + fc_j sgn dq_j` ([`crate::arm`]), with one constant torque per joint where
 //! the asymmetry is estimated too.
 
+use crate::cpu::Cpu;
 use crate::filter::Step;
 use crate::real::{Real, lit, sgn};
 use nalgebra::SVector;
@@ -31,7 +32,7 @@ pub(super) struct Swing<T> {
 
 impl<T: Real> Swing<T> {
     /// From one velocity to another, linear in between.
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(from: T, to: T) -> Self {
         let turns = (from > T::zero() && to < T::zero()) || (from < T::zero() && to > T::zero());
         let sign = if turns { sgn(from) } else { sgn(from + to) };
@@ -39,35 +40,34 @@ impl<T: Real> Swing<T> {
     }
 
     /// `G`, what the sign adds to its filter.
-    #[inline]
+    #[inline(always)]
     pub(super) fn sign(&self, step: &Step<T>) -> T {
         let mut end = T::one();
         if self.turns {
-            // Share of the interval after the reversal.
-            end = (-step.x * (self.to / (self.to - self.from))).exp();
+            end = after_reversal(step.x, self.from, self.to);
         }
         self.sign * (end + end - T::one() - step.decay)
     }
 
     /// `F` of the speed.
-    #[inline]
-    pub(super) fn speed(&self, step: &Step<T>, y: T) -> T {
+    #[inline(always)]
+    pub(super) fn speed<C: Cpu>(&self, step: &Step<T>, y: T) -> T {
         if !self.turns {
-            return step.ramp(y, self.from.abs(), self.to.abs());
+            return step.ramp::<C>(y, self.from.abs(), self.to.abs());
         }
         let slope = (self.to - self.from) / step.x;
         step.decay * (y - self.from.abs()) + self.to.abs() - slope * self.sign(step)
     }
 
     /// `F` of the squared velocity.
-    #[inline]
-    pub(super) fn square(&self, step: &Step<T>, y: T) -> T {
+    #[inline(always)]
+    pub(super) fn square<C: Cpu>(&self, step: &Step<T>, y: T) -> T {
         let change = self.to - self.from;
-        step.curve(y, self.from * self.from, self.to * self.to, change * change * lit(-0.25))
+        step.curve::<C>(y, self.from * self.from, self.to * self.to, change * change * lit(-0.25))
     }
 
     /// Integral of the speed over an interval of unit length.
-    #[inline]
+    #[inline(always)]
     pub(super) fn distance(&self) -> T {
         let (from, to) = (self.from.abs(), self.to.abs());
         let total = from + to;
@@ -76,10 +76,16 @@ impl<T: Real> Swing<T> {
     }
 
     /// Integral of the squared velocity over an interval of unit length.
-    #[inline]
+    #[inline(always)]
     pub(super) fn distance_squared(&self) -> T {
         (self.from * (self.from + self.to) + self.to * self.to) * lit(1.0 / 3.0)
     }
+}
+
+/// Decay over the share of the interval after the reversal.
+#[inline(never)]
+fn after_reversal<T: Real>(x: T, from: T, to: T) -> T {
+    (-x * (to / (to - from))).exp()
 }
 
 /// One entry per joint for each of viscous, Coulomb and constant friction.
@@ -92,55 +98,60 @@ pub(super) struct Friction<T, const N: usize> {
 
 impl<T: Real, const N: usize> Friction<T, N> {
     /// Filters that start at rest.
-    #[inline]
+    #[inline(always)]
     pub(super) fn zero() -> Self {
         Self { viscous: SVector::zeros(), coulomb: SVector::zeros(), constant: SVector::zeros() }
     }
 
     /// Torques at a velocity, the paper's filter over them as held.
-    #[inline]
-    pub(super) fn hold_torques(&mut self, step: &Step<T>, dq: &SVector<T, N>) {
+    #[inline(always)]
+    pub(super) fn hold_torques<C: Cpu>(&mut self, step: &Step<T>, dq: &SVector<T, N>) {
         for j in 0..N {
-            self.viscous[j] = step.held(self.viscous[j], dq[j]);
-            self.coulomb[j] = step.held(self.coulomb[j], sgn(dq[j]));
-            self.constant[j] = step.held(self.constant[j], T::one());
+            self.viscous[j] = step.held::<C>(self.viscous[j], dq[j]);
+            self.coulomb[j] = step.held::<C>(self.coulomb[j], sgn(dq[j]));
+            self.constant[j] = step.held::<C>(self.constant[j], T::one());
         }
     }
 
     /// Torques over a swing.
-    #[inline]
-    pub(super) fn filter_torques(&mut self, step: &Step<T>, from: &SVector<T, N>, to: &SVector<T, N>) {
+    #[inline(always)]
+    pub(super) fn filter_torques<C: Cpu>(
+        &mut self,
+        step: &Step<T>,
+        from: &SVector<T, N>,
+        to: &SVector<T, N>,
+    ) {
         for j in 0..N {
             let swing = Swing::new(from[j], to[j]);
-            self.viscous[j] = step.ramp(self.viscous[j], from[j], to[j]);
+            self.viscous[j] = step.ramp::<C>(self.viscous[j], from[j], to[j]);
             self.coulomb[j] = step.decay * self.coulomb[j] + swing.sign(step);
-            self.constant[j] = step.held(self.constant[j], T::one());
+            self.constant[j] = step.held::<C>(self.constant[j], T::one());
         }
     }
 
     /// Dissipated powers at a velocity, the paper's filter over them as held.
-    #[inline]
-    pub(super) fn hold_powers(&mut self, step: &Step<T>, dq: &SVector<T, N>) {
+    #[inline(always)]
+    pub(super) fn hold_powers<C: Cpu>(&mut self, step: &Step<T>, dq: &SVector<T, N>) {
         for j in 0..N {
-            self.viscous[j] = step.held(self.viscous[j], dq[j] * dq[j]);
-            self.coulomb[j] = step.held(self.coulomb[j], dq[j].abs());
-            self.constant[j] = step.held(self.constant[j], dq[j]);
+            self.viscous[j] = step.held::<C>(self.viscous[j], dq[j] * dq[j]);
+            self.coulomb[j] = step.held::<C>(self.coulomb[j], dq[j].abs());
+            self.constant[j] = step.held::<C>(self.constant[j], dq[j]);
         }
     }
 
     /// Dissipated powers over a swing.
-    #[inline]
-    pub(super) fn filter_powers(&mut self, step: &Step<T>, from: &SVector<T, N>, to: &SVector<T, N>) {
+    #[inline(always)]
+    pub(super) fn filter_powers<C: Cpu>(&mut self, step: &Step<T>, from: &SVector<T, N>, to: &SVector<T, N>) {
         for j in 0..N {
             let swing = Swing::new(from[j], to[j]);
-            self.viscous[j] = swing.square(step, self.viscous[j]);
-            self.coulomb[j] = swing.speed(step, self.coulomb[j]);
-            self.constant[j] = step.ramp(self.constant[j], from[j], to[j]);
+            self.viscous[j] = swing.square::<C>(step, self.viscous[j]);
+            self.coulomb[j] = swing.speed::<C>(step, self.coulomb[j]);
+            self.constant[j] = step.ramp::<C>(self.constant[j], from[j], to[j]);
         }
     }
 
     /// Dissipated energies of a swing of `h` seconds by the trapezoidal rule, as in the paper.
-    #[inline]
+    #[inline(always)]
     pub(super) fn add_trapezes(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
         let half = h * lit(0.5);
         for j in 0..N {
@@ -151,7 +162,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
     }
 
     /// Dissipated energies of a swing of `h` seconds.
-    #[inline]
+    #[inline(always)]
     pub(super) fn add_energies(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
         for j in 0..N {
             let swing = Swing::new(from[j], to[j]);
@@ -162,7 +173,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
     }
 
     /// The entries of a row over the `R` parameters of which the first `inertial` are not friction: joint `j`'s only, or all.
-    #[inline]
+    #[inline(always)]
     pub(super) fn write(&self, inertial: usize, only: Option<usize>, mut put: impl FnMut(usize, T)) {
         for j in 0..N {
             if only.is_none_or(|joint| joint == j) {
@@ -177,6 +188,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::Portable;
     use crate::filter::Cutoff;
 
     const STEP: f64 = 0.0025;
@@ -187,7 +199,7 @@ mod tests {
         let step = Cutoff { rad_per_s: lambda }.step(STEP / f64::from(PIECES));
         (0..PIECES).fold(y, |y, k| {
             let share = (f64::from(k) + 0.5) / f64::from(PIECES);
-            step.held(y, of(from + (to - from) * share))
+            step.held::<Portable>(y, of(from + (to - from) * share))
         })
     }
 
@@ -202,8 +214,8 @@ mod tests {
                     assert!((a - b).abs() < 2e-5, "{lambda} rad/s, {from} to {to}: {a} and {b}");
                 };
                 close(step.decay * y + swing.sign(&step), sgn);
-                close(swing.speed(&step, y), f64::abs);
-                close(swing.square(&step, y), |v| v * v);
+                close(swing.speed::<Portable>(&step, y), f64::abs);
+                close(swing.square::<Portable>(&step, y), |v| v * v);
             }
         }
     }

@@ -100,18 +100,18 @@ struct Steps<T> {
 }
 
 impl<T: Real> Steps<T> {
-    #[inline]
+    #[inline(always)]
     fn new(cutoff: &Cutoff<T>) -> Self {
         let none = Kept::new(cutoff);
         Self { whole: none, first: none, second: none }
     }
 
-    #[inline]
+    #[inline(always)]
     fn whole(&mut self, h: T) -> Step<T> {
         self.whole.step(h)
     }
 
-    #[inline]
+    #[inline(always)]
     fn parts<const N: usize>(&mut self, passage: &Passage<T, N>) -> [Step<T>; 2] {
         [self.first.step(passage.split), self.second.step(passage.h - passage.split)]
     }
@@ -119,7 +119,7 @@ impl<T: Real> Steps<T> {
 
 impl<T: Real, const N: usize> Snapshot<T, N> {
     /// The state half-way to another one `h` seconds later, velocity linear in between.
-    #[inline]
+    #[inline(always)]
     fn half_way(&self, to: &Self, h: T) -> Self {
         let half: T = lit(0.5);
         Self {

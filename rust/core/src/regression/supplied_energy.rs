@@ -7,7 +7,7 @@ use super::friction::Friction;
 use super::{Passage, Snapshot, Variant};
 use crate::arm::Arm;
 use crate::real::{Real, lit};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
 /// State of the scheme.
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +32,7 @@ impl<T: Real, const N: usize, const P: usize> SuppliedEnergy<T, N, P> {
     }
 
     /// The row and output at the next state, reached by `passage`; `tau` is the torque that acts from then on.
-    #[inline]
+    #[inline(always)]
     pub fn update<A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
@@ -40,7 +40,7 @@ impl<T: Real, const N: usize, const P: usize> SuppliedEnergy<T, N, P> {
         now: &Snapshot<T, N>,
         passage: &Passage<T, N>,
         tau: &SVector<T, N>,
-    ) -> (SMatrix<T, 1, R>, SVector<T, 1>) {
+    ) -> ([[T; R]; 1], [T; 1]) {
         let supply = tau.dot(&now.dq);
         match variant {
             Variant::Paper => {
@@ -55,7 +55,7 @@ impl<T: Real, const N: usize, const P: usize> SuppliedEnergy<T, N, P> {
         }
         (self.last, self.last_supply) = (*now, supply);
         let energy = arm.energy_regressor(&now.q, &now.dq);
-        let mut psi = SMatrix::<T, 1, R>::zeros();
+        let mut psi = [T::zero(); R];
         for j in 0..A::INERTIAL {
             psi[j] = energy[j] - self.first[j];
         }
@@ -64,6 +64,6 @@ impl<T: Real, const N: usize, const P: usize> SuppliedEnergy<T, N, P> {
                 psi[j] = value;
             }
         });
-        (psi, SVector::<T, 1>::new(self.work))
+        ([psi], [self.work])
     }
 }

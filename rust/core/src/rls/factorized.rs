@@ -13,6 +13,7 @@
 
 use super::lanes::{LANES, all_within, dot, lead};
 use super::{Forgetting, is_double, largest};
+use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 use nalgebra::SMatrix;
 
@@ -71,7 +72,7 @@ impl<T: Real, const R: usize> Factorized<T, R> {
 
     /// Learns from rows of `Psi'` and their errors; the leverage, or nothing changed because the rows are of impossible size.
     #[inline(always)]
-    pub(super) fn learn<const M: usize>(
+    pub(super) fn learn<C: Cpu, const M: usize>(
         &mut self,
         theta: &mut [T; R],
         rows: &[[T; R]; M],
@@ -89,8 +90,8 @@ impl<T: Real, const R: usize> Factorized<T, R> {
         let mut leverage = T::zero();
         for m in 0..M {
             // What the rows before have already explained.
-            let left = if m == 0 { error[m] } else { error[m] - dot(&moved, &rows[m]) };
-            leverage += self.row(&mut moved, &rows[m], left, forgetting.mu);
+            let left = if m == 0 { error[m] } else { error[m] - dot::<C, T, R>(&moved, &rows[m]) };
+            leverage += self.row::<C>(&mut moved, &rows[m], left, forgetting.mu);
         }
         for i in 0..R {
             theta[i] += moved[i];
@@ -103,17 +104,17 @@ impl<T: Real, const R: usize> Factorized<T, R> {
 
     /// One row: moves the estimate, and returns the leverage.
     #[inline(always)]
-    fn row(&mut self, moved: &mut [T; R], psi: &[T; R], error: T, mu: T) -> T {
+    fn row<C: Cpu>(&mut self, moved: &mut [T; R], psi: &[T; R], error: T, mu: T) -> T {
         let mut f = [T::zero(); R];
         for j in 0..R {
-            f[j] = self.dot(j, psi);
+            f[j] = self.dot::<C>(j, psi);
         }
         let (mut v, mut before, mut inverse) = ([T::zero(); R], [T::zero(); R], [T::zero(); R]);
         let mut total = mu;
         for j in 0..R {
             v[j] = self.d[j] * f[j];
             before[j] = total;
-            total += f[j] * v[j];
+            total = C::fused(f[j], v[j], total);
         }
         for j in 0..R {
             inverse[j] = T::one() / before[j];
@@ -128,33 +129,33 @@ impl<T: Real, const R: usize> Factorized<T, R> {
             let factor = f[j] * inverse[j];
             for i in 0..j {
                 let old = self.u[j][i];
-                self.u[j][i] = old - gain[i] * factor;
-                gain[i] += old * v[j];
+                self.u[j][i] = C::fused(-gain[i], factor, old);
+                gain[i] = C::fused(old, v[j], gain[i]);
             }
             gain[j] = v[j];
         }
         let rate = error * last;
         for i in 0..R {
-            moved[i] += gain[i] * rate;
+            moved[i] = C::fused(gain[i], rate, moved[i]);
         }
         T::one() - mu * last
     }
 
     /// Entry `j` of `U' psi`.
     #[inline(always)]
-    fn dot(&self, j: usize, psi: &[T; R]) -> T {
+    fn dot<C: Cpu>(&self, j: usize, psi: &[T; R]) -> T {
         let column = &self.u[j];
         let mut sums = [T::zero(); LANES];
         for c in 0..lanes_of::<R>(j) {
             for l in 0..LANES {
                 let i = c * LANES + l;
-                sums[l] += column[i] * psi[i];
+                sums[l] = C::fused(column[i], psi[i], sums[l]);
             }
         }
         let mut rest = T::zero();
         if j >= lead::<R>() {
             for i in lead::<R>()..R {
-                rest += column[i] * psi[i];
+                rest = C::fused(column[i], psi[i], rest);
             }
         }
         (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest

@@ -3,6 +3,7 @@
 //! Written so that a compiler finds vector instructions for entries that lie side by side; of `R` entries the first multiple of four are
 //! the `lead`, the rest the tail.
 
+use crate::cpu::Cpu;
 use crate::real::Real;
 
 /// Entries taken together.
@@ -16,17 +17,16 @@ pub(super) const fn lead<const R: usize>() -> usize {
 
 /// `a . b`.
 #[inline(always)]
-pub(super) fn dot<T: Real, const R: usize>(a: &[T; R], b: &[T; R]) -> T {
-    let ((a_lead, a_tail), (b_lead, b_tail)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+pub(super) fn dot<C: Cpu, T: Real, const R: usize>(a: &[T; R], b: &[T; R]) -> T {
     let mut sums = [T::zero(); LANES];
-    for (x, y) in a_lead.iter().zip(b_lead) {
+    for c in 0..R / LANES {
         for l in 0..LANES {
-            sums[l] += x[l] * y[l];
+            sums[l] = C::fused(a[c * LANES + l], b[c * LANES + l], sums[l]);
         }
     }
     let mut rest = T::zero();
-    for (x, y) in a_tail.iter().zip(b_tail) {
-        rest += *x * *y;
+    for i in lead::<R>()..R {
+        rest = C::fused(a[i], b[i], rest);
     }
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }

@@ -14,9 +14,10 @@ mod factorized;
 mod lanes;
 mod plain;
 
+use crate::cpu::{Cpu, Level, Work};
 use crate::real::{Real, lit};
 use factorized::Factorized;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{ArrayStorage, SMatrix, SVector};
 use plain::Plain;
 
 /// How `P` is kept.
@@ -44,6 +45,7 @@ pub struct Rls<T: Real, const R: usize> {
     theta: SVector<T, R>,
     covariance: Covariance<T, R>,
     forgetting: Forgetting<T, R>,
+    level: Level,
     leverage: T,
     updates: u64,
     rejected: u64,
@@ -84,6 +86,7 @@ impl<T: Real, const R: usize> Rls<T, R> {
             theta: theta0,
             covariance: Covariance::of(&p0, Form::default_for(&limit)),
             forgetting: Forgetting { mu: forgetting, limit },
+            level: Level::detect(),
             leverage: T::zero(),
             updates: 0,
             rejected: 0,
@@ -100,6 +103,18 @@ impl<T: Real, const R: usize> Rls<T, R> {
     pub fn with_limit(mut self, limit: SVector<T, R>) -> Self {
         self.forgetting.limit = limit.into();
         self
+    }
+
+    /// The same with other instructions than the most that the processor has.
+    pub fn with_level(mut self, level: Level) -> Self {
+        self.level = level;
+        self
+    }
+
+    /// The instructions in use.
+    #[inline(always)]
+    pub fn level(&self) -> Level {
+        self.level
     }
 
     /// Estimate.
@@ -152,20 +167,34 @@ impl<T: Real, const R: usize> Rls<T, R> {
     }
 
     /// One sample with `M` errors: `psi` has one row per error.
-    #[inline(always)]
+    #[inline]
     pub fn update<const M: usize>(&mut self, psi: &SMatrix<T, M, R>, y: &SVector<T, M>) -> Update<T, M> {
-        let rows: [[T; R]; M] = core::array::from_fn(|m| core::array::from_fn(|j| psi[(m, j)]));
+        let mut rows = [[T::zero(); R]; M];
+        for m in 0..M {
+            for j in 0..R {
+                rows[m][j] = psi[(m, j)];
+            }
+        }
+        self.level.run(Sample { rls: self, rows, y: y.data.0[0] })
+    }
+
+    /// The same within code that already runs with the instructions in use.
+    #[inline(always)]
+    pub(crate) fn learn<C: Cpu, const M: usize>(&mut self, rows: &[[T; R]; M], y: &[T; M]) -> Update<T, M> {
         let mut error = *y;
         let mut sound = true;
+        let theta = &mut self.theta.data.0[0];
         for m in 0..M {
-            error[m] -= lanes::dot(&rows[m], &self.theta.data.0[0]);
+            error[m] -= lanes::dot::<C, T, R>(&rows[m], theta);
             sound &= error[m].abs() <= largest();
         }
-        let theta = &mut self.theta.data.0[0];
         let leverage = match &mut self.covariance {
             _ if !sound => None,
-            Covariance::Plain(p) => p.learn(theta, &rows, &error.data.0[0], &self.forgetting),
-            Covariance::Factorized(p) => p.learn(theta, &rows, &error.data.0[0], &self.forgetting),
+            Covariance::Plain(p) => p.learn::<C, M>(theta, rows, &error, &self.forgetting),
+            Covariance::Factorized(p) => {
+                let rows = *rows;
+                p.learn::<C, M>(theta, &rows, &error, &self.forgetting)
+            }
         };
         let Some(leverage) = leverage else {
             self.rejected += 1;
@@ -173,7 +202,23 @@ impl<T: Real, const R: usize> Rls<T, R> {
         };
         self.leverage = leverage;
         self.updates += 1;
-        Update::Used(error)
+        Update::Used(SVector::from_array_storage(ArrayStorage([error])))
+    }
+}
+
+/// One call of [`Rls::update`].
+struct Sample<'a, T: Real, const M: usize, const R: usize> {
+    rls: &'a mut Rls<T, R>,
+    rows: [[T; R]; M],
+    y: [T; M],
+}
+
+impl<T: Real, const M: usize, const R: usize> Work for Sample<'_, T, M, R> {
+    type Output = Update<T, M>;
+
+    #[inline(always)]
+    fn run<C: Cpu>(self) -> Self::Output {
+        self.rls.learn::<C, M>(&self.rows, &self.y)
     }
 }
 
@@ -192,14 +237,13 @@ impl<T: Real, const R: usize> Forgetting<T, R> {
     fn lift(&self, diagonal: &[T; R]) -> ([T; R], bool) {
         let full = T::one() / self.mu.sqrt();
         let mut limited = false;
-        let lift = core::array::from_fn(|i| {
-            let room = self.limit[i] * self.mu;
-            if diagonal[i] <= room {
-                return full;
+        let mut lift = [full; R];
+        for i in 0..R {
+            if diagonal[i] > self.limit[i] * self.mu {
+                limited = true;
+                lift[i] = (self.limit[i] / diagonal[i]).sqrt().max(T::one());
             }
-            limited = true;
-            (self.limit[i] / diagonal[i]).sqrt().max(T::one())
-        });
+        }
         (lift, limited)
     }
 }

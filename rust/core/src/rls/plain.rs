@@ -6,18 +6,23 @@
 
 use super::Forgetting;
 use super::lanes::{LANES, dot, lead};
+use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 use nalgebra::SMatrix;
 
-/// The matrix, column by column.
+/// The matrix, column by column, and its diagonal once more, side by side for the check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Plain<T, const R: usize> {
     p: [[T; R]; R],
+    diagonal: [T; R],
 }
 
 impl<T: Real, const R: usize> Plain<T, R> {
     pub(super) fn of(p: &SMatrix<T, R, R>) -> Self {
-        Self { p: core::array::from_fn(|j| core::array::from_fn(|i| p[(i.min(j), i.max(j))])) }
+        Self {
+            p: core::array::from_fn(|j| core::array::from_fn(|i| p[(i.min(j), i.max(j))])),
+            diagonal: core::array::from_fn(|i| p[(i, i)]),
+        }
     }
 
     pub(super) fn matrix(&self) -> SMatrix<T, R, R> {
@@ -25,48 +30,57 @@ impl<T: Real, const R: usize> Plain<T, R> {
     }
 
     pub(super) fn diagonal(&self) -> [T; R] {
-        core::array::from_fn(|i| self.p[i][i])
+        self.diagonal
     }
 
     /// Learns from rows of `Psi'` and their errors; the leverage, or nothing changed because `P` would not stay positive definite.
     #[inline(always)]
-    pub(super) fn learn<const M: usize>(
+    pub(super) fn learn<C: Cpu, const M: usize>(
         &mut self,
         theta: &mut [T; R],
         rows: &[[T; R]; M],
         error: &[T; M],
         forgetting: &Forgetting<T, R>,
     ) -> Option<T> {
-        let (mut gain, mut rate, mut inverse) = (self.times(rows), *error, [T::zero(); M]);
-        let mut leverage = T::zero();
-        let mut sound = true;
-        for m in 0..M {
-            for l in 0..m {
-                let overlap = dot(&gain[l], &rows[m]);
-                let share = overlap * inverse[l];
-                for i in 0..R {
-                    let step = gain[l][i] * share;
-                    gain[m][i] -= step;
-                }
-                let step = overlap * rate[l];
-                rate[m] -= step;
+        let (mut gain, mut rate, mut inverse) = (self.times::<C, M>(rows), *error, [T::zero(); M]);
+        // `mu I + Psi' P Psi`, of which the upper triangle counts.
+        let (mut total, mut sound) = ([[T::zero(); M]; M], true);
+        for l in 0..M {
+            for m in l..M {
+                total[l][m] = dot::<C, T, R>(&gain[l], &rows[m]);
             }
-            let total = forgetting.mu + dot(&gain[m], &rows[m]);
-            // Beyond this what is left of `P` in the direction of the row would be rounding; less than nothing cannot be.
-            sound &= (total > T::zero()) & (total * T::default_epsilon() <= forgetting.mu * lit(0.125));
-            inverse[m] = T::one() / total;
+            total[l][l] += forgetting.mu;
+            // Beyond this what is left of `P` in the direction of the row would be rounding.
+            sound &= total[l][l] * T::default_epsilon() <= forgetting.mu * lit(0.125);
+        }
+        let mut leverage = T::zero();
+        for m in 0..M {
+            sound &= total[m][m] > T::zero();
+            inverse[m] = T::one() / total[m][m];
+            for n in m + 1..M {
+                let share = total[m][n] * inverse[m];
+                for k in n..M {
+                    total[n][k] = C::fused(-share, total[m][k], total[n][k]);
+                }
+                for i in 0..R {
+                    gain[n][i] = C::fused(-share, gain[m][i], gain[n][i]);
+                }
+                rate[n] = C::fused(-share, rate[m], rate[n]);
+            }
             rate[m] *= inverse[m];
             leverage += T::one() - forgetting.mu * inverse[m];
         }
-        if !(sound & self.stays_positive(&gain, &inverse)) {
+        let (diagonal, positive) = self.shrunk::<C, M>(&gain, &inverse);
+        if !(sound & positive) {
             return None;
         }
+        self.diagonal = diagonal;
         for m in 0..M {
             for i in 0..R {
-                theta[i] += gain[m][i] * rate[m];
+                theta[i] = C::fused(gain[m][i], rate[m], theta[i]);
             }
         }
-        self.take_off(gain, &inverse);
+        self.take_off::<C, M>(&gain, &inverse);
         if forgetting.mu < T::one() {
             self.forget(forgetting);
         }
@@ -75,87 +89,91 @@ impl<T: Real, const R: usize> Plain<T, R> {
 
     /// `P psi` for each row.
     #[inline(always)]
-    fn times<const M: usize>(&self, rows: &[[T; R]; M]) -> [[T; R]; M] {
+    fn times<C: Cpu, const M: usize>(&self, rows: &[[T; R]; M]) -> [[T; R]; M] {
         let mut product = [[T::zero(); R]; M];
         for c in 0..R / LANES {
             // Two strands, so that additions need not wait for each other.
-            let mut sums = [[[T::zero(); LANES]; 2]; M];
-            for j in 0..R {
-                for m in 0..M {
-                    for l in 0..LANES {
-                        sums[m][j & 1][l] += self.p[j][c * LANES + l] * rows[m][j];
-                    }
-                }
+            let (mut even, mut odd) = ([[T::zero(); LANES]; M], [[T::zero(); LANES]; M]);
+            for k in 0..R / 2 {
+                self.add_column::<C, M>(&mut even, c, 2 * k, rows);
+                self.add_column::<C, M>(&mut odd, c, 2 * k + 1, rows);
+            }
+            if R % 2 == 1 {
+                self.add_column::<C, M>(&mut even, c, R - 1, rows);
             }
             for m in 0..M {
                 for l in 0..LANES {
-                    product[m][c * LANES + l] = sums[m][0][l] + sums[m][1][l];
+                    product[m][c * LANES + l] = even[m][l] + odd[m][l];
                 }
             }
         }
         for i in lead::<R>()..R {
             for m in 0..M {
-                product[m][i] = dot(&self.p[i], &rows[m]);
+                product[m][i] = dot::<C, T, R>(&self.p[i], &rows[m]);
             }
         }
         product
     }
 
-    /// Whether the diagonal stays positive, which no rounding short of lost definiteness would change.
+    /// Adds lane `c` of column `j` times the rows' entries `j`.
     #[inline(always)]
-    fn stays_positive<const M: usize>(&self, gain: &[[T; R]; M], inverse: &[T; M]) -> bool {
-        let mut positive = true;
-        for i in 0..R {
-            let mut off = T::zero();
-            for m in 0..M {
-                off += gain[m][i] * gain[m][i] * inverse[m];
+    fn add_column<C: Cpu, const M: usize>(
+        &self,
+        sums: &mut [[T; LANES]; M],
+        c: usize,
+        j: usize,
+        rows: &[[T; R]; M],
+    ) {
+        for m in 0..M {
+            for l in 0..LANES {
+                sums[m][l] = C::fused(self.p[j][c * LANES + l], rows[m][j], sums[m][l]);
             }
-            positive &= self.p[i][i] > off;
         }
-        positive
     }
 
-    /// Takes the sum of `gain gain' / total` off. The product of two gains is the same for `(i, j)` and `(j, i)`; with one error it need
-    /// not wait for the reciprocal, with more a root of it in the gains saves half the products.
+    /// The new diagonal, and whether it stays positive, which no rounding short of lost definiteness would change.
     #[inline(always)]
-    fn take_off<const M: usize>(&mut self, mut gain: [[T; R]; M], inverse: &[T; M]) {
-        if M > 1 {
-            for m in 0..M {
-                let scale = inverse[m].sqrt();
-                for x in &mut gain[m] {
-                    *x *= scale;
-                }
+    fn shrunk<C: Cpu, const M: usize>(&self, gain: &[[T; R]; M], inverse: &[T; M]) -> ([T; R], bool) {
+        let (mut diagonal, mut positive) = (self.diagonal, true);
+        for m in 0..M {
+            for i in 0..R {
+                diagonal[i] = C::fused(gain[m][i] * gain[m][i], -inverse[m], diagonal[i]);
             }
         }
-        let step = |i: usize, j: usize| {
-            let mut sum = gain[0][i] * gain[0][j];
-            for gain in &gain[1..] {
-                sum += gain[i] * gain[j];
-            }
-            if M > 1 { sum } else { sum * inverse[0] }
-        };
+        for i in 0..R {
+            positive &= diagonal[i] > T::zero();
+        }
+        (diagonal, positive)
+    }
+
+    /// Takes the sum of `gain gain' / total` off. The product of two gains is the same for `(i, j)` and `(j, i)`, and need not wait for the
+    /// reciprocal.
+    #[inline(always)]
+    fn take_off<C: Cpu, const M: usize>(&mut self, gain: &[[T; R]; M], inverse: &[T; M]) {
         for j in 0..R {
-            for c in 0..R / LANES {
-                for l in 0..LANES {
-                    let i = c * LANES + l;
-                    self.p[j][i] -= step(i, j);
+            for i in 0..lead::<R>() {
+                for m in 0..M {
+                    self.p[j][i] = C::fused(-(gain[m][i] * gain[m][j]), inverse[m], self.p[j][i]);
                 }
             }
         }
         for j in lead::<R>()..R {
             for i in lead::<R>()..R {
-                self.p[j][i] -= step(i, j);
+                for m in 0..M {
+                    self.p[j][i] = C::fused(-(gain[m][i] * gain[m][j]), inverse[m], self.p[j][i]);
+                }
             }
         }
     }
 
     fn forget(&mut self, forgetting: &Forgetting<T, R>) {
-        let (lift, limited) = forgetting.lift(&self.diagonal());
+        let (lift, limited) = forgetting.lift(&self.diagonal);
         let grow = T::one() / forgetting.mu;
         for j in 0..R {
             for i in 0..R {
                 self.p[j][i] *= if limited { lift[i] * lift[j] } else { grow };
             }
+            self.diagonal[j] = self.p[j][j];
         }
     }
 }

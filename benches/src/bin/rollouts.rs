@@ -1,0 +1,178 @@
+//! Rollouts of the two-link arm beside plain C: one run, 64 runs, and the windows of one log. Markdown on standard output.
+//!
+//! All columns of a row are measured in turn, over and over, so that whatever else the machine does falls on all of them alike.
+
+use armgap_bench::run::{PERIOD, SAMPLES, THETA, arm, torque};
+use armgap_benches::peer::Build;
+use armgap_benches::peer_rollout;
+use armgap_core::arm::TwoLink;
+use armgap_core::cpu::Level;
+use armgap_core::effect::Pulse;
+use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::plant::Plant;
+use armgap_core::rollout::{Run, Together, WIDTH};
+use nalgebra::Vector2;
+use std::hint::black_box;
+use std::io::Write;
+use std::time::Instant;
+
+const ROUNDS: usize = 21;
+/// Largest difference of positions, rad, at which the work was the same.
+const SAME: f64 = 1e-6;
+
+type Seed = Plant<f64, TwoLink<f64>, 2, 9>;
+
+/// Runs of one arm: their starts, and their parts of one row of torques.
+struct Case {
+    name: &'static str,
+    plant: Seed,
+    tau: Vec<f64>,
+    torque: Vec<[Pulse<f64>; 2]>,
+    t: Vec<f64>,
+    /// First period and state of every run.
+    starts: Vec<(usize, [f64; 4])>,
+    periods: usize,
+}
+
+impl Case {
+    fn new(name: &'static str, dry: bool) -> Self {
+        let mut theta = THETA;
+        if !dry {
+            theta[7..].fill(0.0);
+        }
+        let rows: Vec<[f64; 2]> = (0..SAMPLES).map(|k| torque(f64::from(k) * PERIOD)).collect();
+        Self {
+            name,
+            plant: Plant::new(arm::<f64>(), theta),
+            tau: rows.concat(),
+            torque: rows.iter().map(|row| row.map(Pulse::held)).collect(),
+            t: (0..=SAMPLES).map(|k| f64::from(k) * PERIOD).collect(),
+            starts: vec![(0, [0.0; 4])],
+            periods: SAMPLES as usize,
+        }
+    }
+
+    /// So many runs from different states.
+    fn many(mut self, name: &'static str, count: u32, periods: usize) -> Self {
+        let start = |l: u32| (0, [0.002 * f64::from(l), -0.003 * f64::from(l), 0.1, -0.2]);
+        (self.name, self.starts, self.periods) = (name, (0..count).map(start).collect(), periods);
+        self
+    }
+
+    /// The run cut into windows of so many periods, each from where the run is then.
+    fn windows(mut self, name: &'static str, periods: usize) -> Self {
+        let mut state = State::new(Vector2::zeros(), Vector2::zeros());
+        self.starts.clear();
+        for k in 0..self.torque.len() {
+            if k % periods == 0 {
+                self.starts.push((k, [state.q[0], state.q[1], state.dq[0], state.dq[1]]));
+            }
+            let interval = Interval { t: self.t[k], h: PERIOD, torque: &self.torque[k] };
+            advance(&self.plant, &mut state, &interval, 1);
+        }
+        (self.name, self.periods) = (name, periods);
+        self
+    }
+
+    fn steps(&self) -> usize {
+        self.starts.len() * self.periods
+    }
+
+    fn peer(&self, build: Build, q: &mut [f64]) {
+        for ((first, x), q) in self.starts.iter().zip(q.chunks_exact_mut(2 * self.periods)) {
+            let tau = &self.tau[2 * first..2 * (first + self.periods)];
+            peer_rollout::rollout(build, self.plant.theta(), x, tau, PERIOD, q);
+        }
+    }
+
+    fn one_by_one(&self, q: &mut [f64]) {
+        for ((first, x), q) in self.starts.iter().zip(q.chunks_exact_mut(2 * self.periods)) {
+            let mut state = state(x);
+            for (k, q) in (*first..).zip(q.chunks_exact_mut(2)) {
+                let interval = Interval { t: self.t[k], h: PERIOD, torque: &self.torque[k] };
+                advance(&self.plant, &mut state, &interval, 1);
+                q.copy_from_slice(state.q.as_slice());
+            }
+        }
+    }
+
+    fn together(&self, level: Level, q: &mut [f64]) {
+        let runs = self.starts.iter().zip(q.chunks_exact_mut(2 * self.periods));
+        let mut runs: Vec<_> = runs
+            .map(|((first, x), positions)| Run {
+                plant: &self.plant,
+                t: &self.t[*first..=first + self.periods],
+                torque: &self.torque[*first..first + self.periods],
+                state: state(x),
+                positions,
+            })
+            .collect();
+        for group in runs.chunks_mut(WIDTH) {
+            Together { runs: group, limit: 1e3 }.make(level);
+        }
+    }
+}
+
+fn state(x: &[f64; 4]) -> State<f64, 2> {
+    State::new(Vector2::new(x[0], x[1]), Vector2::new(x[2], x[3]))
+}
+
+fn median(times: &mut [f64]) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
+
+/// Median times per step [ns] of C, C for this processor, ours one by one, together portably, with AVX2, and with the most there is;
+/// and
+/// the largest difference of positions from C's.
+fn compare(case: &Case) -> ([f64; 6], f64) {
+    let mut q: [Vec<f64>; 6] = std::array::from_fn(|_| vec![0.0; 2 * case.steps()]);
+    let mut times: [Vec<f64>; 6] = Default::default();
+    for _ in 0..ROUNDS {
+        for column in 0..6 {
+            let q = black_box(&mut q[column]);
+            let start = Instant::now();
+            match column {
+                0 => case.peer(Build::Portable, q),
+                1 => case.peer(Build::Native, q),
+                2 => case.one_by_one(q),
+                3 => case.together(Level::PORTABLE, q),
+                4 => case.together(Level::detect(), q),
+                _ => case.together(Level::widest(), q),
+            }
+            times[column].push(start.elapsed().as_nanos() as f64 / case.steps() as f64);
+        }
+    }
+    let apart = |a: &[f64]| a.iter().zip(&q[0]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    (times.each_mut().map(|t| median(t)), q[1..].iter().map(|q| apart(q)).fold(0.0, f64::max))
+}
+
+fn main() -> std::io::Result<()> {
+    let mut out = std::io::stdout().lock();
+    let (level, widest) = (Level::detect().name(), Level::widest().name());
+    writeln!(
+        out,
+        "| runs | C -O3 | C -O3 -march=native | one by one | together, portable | together, {level} | together, {widest} | one by one / C | C / together | positions differ |"
+    )?;
+    writeln!(out, "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")?;
+    let mut same = true;
+    for case in [
+        Case::new("one of 10 s, dry friction", true),
+        Case::new("one of 10 s, no dry friction", false),
+        Case::new("", true).many("64 of 0.5 s, dry friction", 64, 200),
+        Case::new("", false).many("64 of 0.5 s, no dry friction", 64, 200),
+        Case::new("", true).windows("50 windows of 0.2 s, dry friction", 80),
+        Case::new("", false).windows("50 windows of 0.2 s, no dry friction", 80),
+    ] {
+        let (t, off) = compare(&case);
+        same &= off < SAME;
+        let times: Vec<String> = t.iter().map(|t| format!("{t:.0}")).collect();
+        let (single, many) = (t[2] / t[0], t[0] / t[4]);
+        writeln!(out, "| {} | {} | {single:.2} | {many:.1} | {off:.0e} |", case.name, times.join(" | "))?;
+    }
+    if !same {
+        eprintln!("positions differ by more than {SAME:e} rad: the work was not the same");
+        std::process::exit(1);
+    }
+    Ok(())
+}

@@ -1,0 +1,192 @@
+//! Which of the processor's instructions the online estimator uses, found out when it is made.
+//!
+//! One wheel and one library run on every processor of their kind, while four doubles at once and `a b + c` with one rounding take a
+//! third off the cost of a sample. So the hot code is written once over a [`Cpu`] and compiled twice on x86-64: for every processor, and
+//! for those with AVX2 and FMA. A [`Level`] says which, and one call without a branch in between enters the code.
+//!
+//! `a b + c` goes through [`Cpu::fused`], because a compiler does not join the two on its own, and because the standard library's
+//! `mul_add` is a function call where the instruction is missing. Everything below [`Work::run`] has to be inlined: a function that
+//! stays outside is compiled for every processor.
+//!
+//! Without the feature `std` there is nothing to find out: what the builder's `target-cpu` has is known, and there is no unsafe code.
+
+use crate::real::Real;
+
+/// Arithmetic of a kind of processor.
+pub trait Cpu: Copy {
+    /// `a b + c`, rounded once where that is one instruction.
+    fn fused<T: Real>(a: T, b: T, c: T) -> T;
+}
+
+/// Any processor the code was compiled for.
+#[derive(Debug, Clone, Copy)]
+pub struct Portable;
+
+impl Cpu for Portable {
+    #[inline(always)]
+    fn fused<T: Real>(a: T, b: T, c: T) -> T {
+        if cfg!(all(feature = "std", target_feature = "fma")) { a.mul_add(b, c) } else { a * b + c }
+    }
+}
+
+/// A processor that multiplies and adds in one instruction.
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+#[derive(Debug, Clone, Copy)]
+struct Fused;
+
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+impl Cpu for Fused {
+    #[inline(always)]
+    fn fused<T: Real>(a: T, b: T, c: T) -> T {
+        a.mul_add(b, c)
+    }
+}
+
+/// What is compiled for each level.
+pub trait Work {
+    /// What it gives.
+    type Output;
+
+    /// Does it; the implementation is `#[inline(always)]`, and so is all that it calls and that has to be fast.
+    fn run<C: Cpu>(self) -> Self::Output;
+}
+
+/// Instructions that may be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Level(Kind);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Portable,
+    /// Made by [`Level::detect`] alone, where the processor has them.
+    #[cfg(all(feature = "std", target_arch = "x86_64"))]
+    Avx2,
+    /// Made by [`Level::widest`] alone, where the processor has them and AVX2.
+    #[cfg(all(feature = "std", target_arch = "x86_64"))]
+    Avx512,
+}
+
+impl Level {
+    /// Those that the code was compiled for.
+    pub const PORTABLE: Self = Self(Kind::Portable);
+
+    /// The most that the processor has, or, without the standard library, [`Level::PORTABLE`].
+    #[inline]
+    pub fn detect() -> Self {
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        if std::arch::is_x86_feature_detected!("avx2")
+            && std::arch::is_x86_feature_detected!("fma")
+            // All have it but the first with AVX2 and the one that valgrind plays, which does not know every form of AVX's instructions.
+            && std::arch::is_x86_feature_detected!("adx")
+        {
+            return Self(Kind::Avx2);
+        }
+        Self::PORTABLE
+    }
+
+    /// The same with eight doubles at once for work that is run by [`Level::run_wide`].
+    #[inline]
+    pub fn widest() -> Self {
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        if Self::detect() != Self::PORTABLE && std::arch::is_x86_feature_detected!("avx512f") {
+            return Self(Kind::Avx512);
+        }
+        Self::detect()
+    }
+
+    /// Name in tables.
+    pub const fn name(self) -> &'static str {
+        match self.0 {
+            Kind::Portable => "portable",
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Kind::Avx2 => "AVX2 and FMA",
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Kind::Avx512 => "AVX-512",
+        }
+    }
+
+    /// Runs the work with these instructions.
+    #[inline(always)]
+    pub fn run<W: Work>(self, work: W) -> W::Output {
+        match self.0 {
+            Kind::Portable => portable(work),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Kind::Avx2 | Kind::Avx512 => on_avx2(work),
+        }
+    }
+
+    /// Runs work that has eight doubles side by side.
+    #[inline(always)]
+    pub fn run_wide<W: Work>(self, work: W) -> W::Output {
+        match self.0 {
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Kind::Avx512 => on_avx512(work),
+            _ => self.run(work),
+        }
+    }
+}
+
+/// Runs the work compiled for every processor; a function of its own, so that there is one copy of it.
+#[inline(never)]
+fn portable<W: Work>(work: W) -> W::Output {
+    work.run::<Portable>()
+}
+
+/// Runs the work compiled for AVX2 and FMA.
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+#[inline(always)]
+#[allow(unsafe_code)]
+fn on_avx2<W: Work>(work: W) -> W::Output {
+    // SAFETY: called for `Kind::Avx2` only, which only `Level::detect` makes, after asking the processor for both. The function itself
+    // is safe code; what could go wrong is a processor without these instructions, and nothing else.
+    unsafe { avx2(work) }
+}
+
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+#[target_feature(enable = "avx2,fma")]
+fn avx2<W: Work>(work: W) -> W::Output {
+    work.run::<Fused>()
+}
+
+/// Runs the work compiled for AVX-512.
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+#[inline(always)]
+#[allow(unsafe_code)]
+fn on_avx512<W: Work>(work: W) -> W::Output {
+    // SAFETY: called for `Kind::Avx512` only, which only `Level::widest` makes, after asking the processor for all three.
+    unsafe { avx512(work) }
+}
+
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+#[target_feature(enable = "avx2,fma,avx512f")]
+fn avx512<W: Work>(work: W) -> W::Output {
+    work.run::<Fused>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What rounding takes off a square.
+    struct Rounding(f64);
+
+    impl Work for Rounding {
+        type Output = f64;
+
+        #[inline(always)]
+        fn run<C: Cpu>(self) -> f64 {
+            C::fused(self.0, self.0, -(self.0 * self.0))
+        }
+    }
+
+    #[test]
+    fn portable_code_rounds_twice_and_the_processors_own_once() {
+        let x = 1.0 / 3.0;
+        let once = f64::mul_add(x, x, -(x * x));
+        assert!(once != 0.0);
+        let compiled = if cfg!(target_feature = "fma") { once } else { 0.0 };
+        assert_eq!(Level::PORTABLE.run(Rounding(x)), compiled);
+        let best = if Level::detect() == Level::PORTABLE { compiled } else { once };
+        assert_eq!(Level::detect().run(Rounding(x)), best);
+    }
+}

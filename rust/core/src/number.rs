@@ -1,0 +1,76 @@
+//! What the equations of motion are written in: one real number, or several side by side.
+//!
+//! An arm's equation is written once over [`Number`]; with a [`Real`] it moves one arm, with [`crate::lanes::Lanes`] several at once.
+//! There are no comparisons to branch on: what differs from lane to lane is arithmetic, or a choice between two computed values.
+
+use crate::cpu::{Cpu, Portable};
+use crate::real::Real;
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// One or several real numbers.
+pub trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// One of them.
+    type Real: Real;
+
+    /// `x` in every lane.
+    fn of(x: Self::Real) -> Self;
+
+    /// `self a + b`, rounded once where that is one instruction.
+    fn fused(self, a: Self, b: Self) -> Self;
+
+    /// Sine and cosine; lanes may give numbers that are none beyond [`crate::trig::LARGEST`].
+    fn sine_cosine(self) -> (Self, Self);
+
+    /// Without the sign.
+    fn size(self) -> Self;
+
+    /// The larger of the two; `other` where `self` is no number.
+    fn larger(self, other: Self) -> Self;
+
+    /// `zero` where `self` is zero, `other` where it is not.
+    fn where_zero(self, zero: Self, other: Self) -> Self;
+
+    /// Whether any of them is zero.
+    fn any_zero(self) -> bool;
+}
+
+impl<T: Real> Number for T {
+    type Real = T;
+
+    #[inline(always)]
+    fn of(x: T) -> Self {
+        x
+    }
+
+    #[inline(always)]
+    fn fused(self, a: Self, b: Self) -> Self {
+        Portable::fused(self, a, b)
+    }
+
+    #[inline(always)]
+    fn sine_cosine(self) -> (Self, Self) {
+        crate::trig::sin_cos(self)
+    }
+
+    #[inline(always)]
+    fn size(self) -> Self {
+        self.abs()
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn where_zero(self, zero: Self, other: Self) -> Self {
+        if self == T::zero() { zero } else { other }
+    }
+
+    #[inline(always)]
+    fn any_zero(self) -> bool {
+        self == T::zero()
+    }
+}
