@@ -4,11 +4,11 @@ use crate::arm::ArmDescription;
 use crate::attribute::Contender;
 use crate::decide::{Attribution, CONSEQUENCE};
 use crate::diagnose::Options;
-use crate::event::Event;
 use crate::gap::{Errors, free_run_series, gap, rms};
 use crate::locate::{Lacks, lacking_torque, places, regimes};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
+use crate::push::Event;
 use crate::report::{
     ArmSummary, Cause, Diagnosis, EquivalentSummary, Gap, LogSummary, Named, Noise, OptionSummary,
     Parameters, Ranked, StageSummary, Value,
