@@ -119,7 +119,7 @@ fn verdict<const N: usize, const P: usize>(attribution: &Attribution<N, P>, gap:
 }
 
 /// Cost above the floor, as a factor, beyond which a gap without a cause is called unexplained.
-const UNEXPLAINED: f64 = 4.0;
+pub const UNEXPLAINED: f64 = 4.0;
 
 fn cause(cause: &crate::decide::Cause, joints: usize, rotary: bool) -> Cause {
     let spec = cause.effect.law.spec();

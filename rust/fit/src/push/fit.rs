@@ -1,6 +1,6 @@
 //! Sizes of a push by output error over the windows it touches: the push under which their predictions miss least.
 
-use super::{Event, SHORTEST, without_pushes};
+use super::{Event, SHORTEST, State, without_pushes};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
 use crate::solve::scaled_inverse;
@@ -20,8 +20,8 @@ const EXPLAINS: f64 = 0.5;
 
 /// How far, in its own durations and at least s, output error may move a push, and by what factor change its impulse.
 const MOVED: f64 = 0.3;
-const MOVED_LEAST: f64 = 0.05;
-const CHANGED: f64 = 2.0;
+const MOVED_LEAST: f64 = 0.1;
+const CHANGED: f64 = 1.5;
 
 /// Steps of the fit, attempts at each, and the relative decrease of the cost that ends it.
 const ITERATIONS: usize = 12;
@@ -39,45 +39,43 @@ struct Touched<'a, A, const N: usize, const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// The push with the values that output error gives it, and what it explains; as it was where that is too little to believe them.
-    pub(super) fn sized(
-        &self,
-        rough: Event,
-        model: &Hypothesis<P>,
-        scale: [f64; N],
-        known: &[Placed],
-    ) -> Event {
+    /// The push with the values that output error gives it, and what it explains.
+    ///
+    /// Beside a remainder it stays as it was where output error explains too little to be believed; without one, it then is none.
+    pub(super) fn sized(&self, rough: Event, state: &State<'_, N, P>, known: &[Placed]) -> Option<Event> {
         let sample = without_pushes(if rough.holdout { &self.holdout } else { &self.training });
         let data = around(&sample, &rough);
         if data.windows.is_empty() {
-            return rough;
+            return state.remainder.then_some(rough);
         }
+        let least = state.noticeable.powi(2) * sample.motion(&state.scale);
+        let usual = self.metric(&sample, state.model, state.scale).typical * data.windows.len() as f64;
         let starts = vec![Shift::none(); data.windows.len()];
-        let metric = Metric::new(&data, &self.arm, model, scale, starts);
+        let metric = Metric::new(&data, &self.arm, state.model, state.scale, starts);
         let sample = Sample::new(data);
-        let mut touched = Touched { arm: &self.arm, model, sample, metric, known, push: rough.push };
+        let touched = Touched { arm: &self.arm, model: state.model, sample, metric, known, push: rough.push };
         let p = Vector3::from(rough.push.p);
         let bare = touched.cost(&touched.residual_of(&Vector3::new(0.0, p[1], p[2])));
-        let as_seen = touched.cost(&touched.residual_of(&p));
+        let seen = touched.cost(&touched.residual_of(&p));
         let (fitted, inverse, left) = touched.minimise(p);
-        touched.push.p = fitted.into();
-        let share = |left: f64| (bare - left) / bare.max(1e-300);
-        let rows = (touched.sample.data.rows * N) as f64;
-        let noise = (left / rows).max(1.0);
-        if share(left) > EXPLAINS && close(&fitted, &p) {
+        let share = |left: f64| (bare - left) / (bare - usual.min(0.5 * bare)).max(1e-300);
+        let noise = (left / (touched.sample.data.rows * N) as f64).max(1.0);
+        let believed = share(left) > EXPLAINS && bare - left > least;
+        if believed && close(&fitted, &p, state.remainder) {
+            let push = Placed { p: fitted.into(), ..rough.push };
             let sigma = std::array::from_fn(|i| (inverse[(i, i)] * noise).sqrt());
-            return Event { push: touched.push, sigma, share: share(left), ..rough };
+            return Some(Event { push, sigma, share: share(left), ..rough });
         }
-        Event { share: share(as_seen).max(0.0), ..rough }
+        state.remainder.then(|| Event { share: share(seen).max(0.0), ..rough })
     }
 }
 
-/// Whether output error has found the same push.
-fn close(fitted: &Vector3<f64>, seen: &Vector3<f64>) -> bool {
+/// Whether output error has found the same push; beside a remainder also its size must be much the same, for the remainder may have
+/// gone into it.
+fn close(fitted: &Vector3<f64>, seen: &Vector3<f64>, remainder: bool) -> bool {
     let ratio = fitted[0] / seen[0];
-    (fitted[1] - seen[1]).abs() < (MOVED * seen[2]).max(MOVED_LEAST)
-        && ratio > 1.0 / CHANGED
-        && ratio < CHANGED
+    let near = (fitted[1] - seen[1]).abs() < (MOVED * seen[2]).max(MOVED_LEAST);
+    near && if remainder { ratio > 1.0 / CHANGED && ratio < CHANGED } else { ratio > 0.0 }
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {

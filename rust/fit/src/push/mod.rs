@@ -8,7 +8,8 @@ mod residual;
 mod scatter;
 mod search;
 
-use crate::decide::Attribution;
+use crate::compose::UNEXPLAINED;
+use crate::decide::{Attribution, CONSEQUENCE, noticeable};
 use crate::model::{Hypothesis, Placed};
 use crate::study::{Sample, Study};
 use crate::track::Track;
@@ -43,6 +44,18 @@ pub struct Event {
     pub probability: f64,
 }
 
+/// What pushes are judged against.
+struct State<'a, const N: usize, const P: usize> {
+    /// The model with all named causes.
+    model: &'a Hypothesis<P>,
+    /// Scales of the residuals under it.
+    scale: [f64; N],
+    /// Whether it leaves more unexplained than noise.
+    remainder: bool,
+    /// Improvement relative to the motion below which nothing is worth a name.
+    noticeable: f64,
+}
+
 /// Where a piece of a log is kept: whether in the holdout, and its index there.
 type Place = (usize, usize);
 
@@ -62,25 +75,30 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
     /// Pushes that the model of an attribution leaves unexplained, log by log.
     fn events(&self, attribution: &Attribution<N, P>) -> Vec<Event> {
-        let model = &attribution.model.hypothesis;
-        let scale = attribution.stages[attribution.stages.len() - 1].weights.training.scale;
-        self.recordings().iter().flat_map(|places| self.in_recording(places, model, scale)).collect()
+        let (first, last) = (&attribution.stages[0], &attribution.stages[attribution.stages.len() - 1]);
+        let state = State {
+            model: &attribution.model.hypothesis,
+            scale: last.weights.training.scale,
+            remainder: last.excess() > UNEXPLAINED && last.relative_error() > CONSEQUENCE,
+            noticeable: noticeable(first.relative_error()),
+        };
+        self.recordings().iter().flat_map(|places| self.in_recording(places, &state)).collect()
     }
 
-    fn in_recording(&self, places: &[Place], model: &Hypothesis<P>, scale: [f64; N]) -> Vec<Event> {
+    fn in_recording(&self, places: &[Place], state: &State<'_, N, P>) -> Vec<Event> {
         let pieces: Vec<&Track<N>> = places.iter().map(|p| self.track(*p)).collect();
         let whole = Track::joined(&pieces).filter(|t| t.t[t.len() - 1] - t.t[0] > SHORTEST_LOG);
-        let residual = whole.and_then(|track| Residual::new(&self.arm, &track, model, &self.prior));
-        let found = residual.and_then(|r| search(&r)).filter(|f| f.bells.len() < MOST);
-        let Some(found) = found else { return Vec::new() };
+        let residual = whole.and_then(|track| Residual::new(&self.arm, &track, state.model, &self.prior));
+        let Some(found) = residual.and_then(|r| search(&r, state.remainder)) else { return Vec::new() };
         let mut events: Vec<Event> = Vec::new();
         for bell in &found.bells {
             let Some(rough) = self.rough(places, bell, found.rest) else { continue };
             let known: Vec<Placed> =
                 events.iter().filter(|e| e.place() == rough.place()).map(|e| e.push).collect();
-            events.push(self.sized(rough, model, scale, &known));
+            events.extend(self.sized(rough, state, &known));
         }
-        events
+        // So many are no rare events, but something that the arm does again and again.
+        if events.len() < MOST { events } else { Vec::new() }
     }
 
     /// A push as the lacking torque shows it.

@@ -161,7 +161,7 @@ fn columns<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     for j in 0..N {
         y[(j, A::INERTIAL + N + j)] = sign[j];
     }
-    let mut all: Vec<SVector<f64, N>> = y.column_iter().map(|c| c.into_owned()).collect();
+    let mut all: Vec<SVector<f64, N>> = y.column_iter().map(nalgebra::Matrix::into_owned).collect();
     for j in 0..N {
         let mut push = |value: f64| {
             let mut column = SVector::zeros();

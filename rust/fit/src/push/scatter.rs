@@ -38,7 +38,7 @@ pub fn scatter<const N: usize>(residual: &Residual<N>, j: usize, left: &[f64]) -
     let half = (AROUND / residual.step).round() as usize;
     let mut local = typical;
     let at = |i: usize| {
-        if i % 10 == 0 {
+        if i.is_multiple_of(10) {
             let range = i.saturating_sub(half)..(i + half).min(left.len());
             let near: Vec<f64> = range.filter(|&k| moves[k]).map(|k| left[k].abs()).collect();
             local = if near.len() > FEWEST { NORMAL * median(near) } else { typical };

@@ -29,15 +29,17 @@ const MODEL_SCATTER: f64 = 0.05;
 /// A bell of which less is left by the other columns cannot be told from them.
 const DISTINCT: f64 = 0.15;
 
-/// Size, in standard deviations, from which a bell is tried, is a push if it also exceeds the joint's friction, and is one in any case.
+/// Size, in standard deviations, from which a bell is tried, and from which it is a push: on an arm that the model describes; on one
+/// that it does not, if the bell also exceeds the joint's friction; on any.
 const TRIED: f64 = 2.5;
-const LIKELY: f64 = 3.9;
+const LIKELY: f64 = 5.0;
+const ABOVE_REMAINDER: f64 = 3.9;
 const CERTAIN: f64 = 12.0;
 
-/// Height, relative to the joint's friction at rest, that a push between the last two must have.
+/// Height, relative to the joint's friction at rest, from which a push exceeds it.
 const ABOVE_FRICTION: f64 = 1.2;
 
-/// Pushes of one log; where there are more they are no rare events.
+/// Pushes that are looked for in one log; as many are no rare events.
 pub const MOST: usize = 8;
 
 /// A joint that moves for less than this, s, is not judged.
@@ -107,6 +109,8 @@ struct Fitted {
 
 struct Search<'a, const N: usize> {
     residual: &'a Residual<N>,
+    /// Whether the model leaves more unexplained than noise.
+    remainder: bool,
     /// Share of the time that each joint moves at each point.
     moving: Vec<Vec<f64>>,
     /// Standard deviation per joint and point.
@@ -115,14 +119,14 @@ struct Search<'a, const N: usize> {
     chance: Vec<Vec<f64>>,
 }
 
-/// Looks for pushes in a log.
-pub fn search<const N: usize>(residual: &Residual<N>) -> Option<Found> {
+/// Looks for pushes in a log; `remainder` tells whether the model leaves more unexplained than noise.
+pub fn search<const N: usize>(residual: &Residual<N>, remainder: bool) -> Option<Found> {
     let moving: Vec<Vec<f64>> =
         residual.joints.iter().map(|x| x.rest.iter().map(|r| (1.0 - r).clamp(0.0, 1.0)).collect()).collect();
     let first = |x: &super::residual::Joint| vec![FIRST_SCATTER * x.typical.max(1e-9); residual.t.len()];
     let scatter = residual.joints.iter().map(first).collect();
     let chance = vec![vec![1.0; WIDTHS.len()]; N];
-    let mut search = Search { residual, moving, scatter, chance };
+    let mut search = Search { residual, remainder, moving, scatter, chance };
     let mut bells: Vec<Bell> = Vec::new();
     loop {
         let fitted = search.settle(&bells)?;
@@ -154,7 +158,7 @@ impl<const N: usize> Search<'_, N> {
     /// Whether a bell is a push.
     fn stands(&self, bell: &Bell) -> bool {
         let above = bell.height.abs() > ABOVE_FRICTION * self.residual.joints[bell.joint].holding;
-        bell.z > CERTAIN || (bell.z > LIKELY && above)
+        if self.remainder { bell.z > CERTAIN || (bell.z > ABOVE_REMAINDER && above) } else { bell.z > LIKELY }
     }
 
     /// All columns and bells fitted, with the scatter that follows from what is left.
