@@ -323,6 +323,37 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.solve(inertia, &rhs, modes)
     }
 
+    /// Equation (1) read the other way: the torque that a measured motion needs beyond `tau`, with motors riding rigidly on their
+    /// links and friction smoothed as set.
+    pub fn lacking(
+        &self,
+        t: T,
+        motion: [&SVector<T, N>; 3],
+        tau: &SVector<T, N>,
+        hidden: &Hidden<T, N>,
+    ) -> SVector<T, N> {
+        let [q, dq, ddq] = motion;
+        let place = Place { q: core::array::from_fn(|j| q[j]), dq: core::array::from_fn(|j| dq[j]) };
+        let Balance { mut inertia, bias } = self.rigid.balance(&place);
+        for (j, drive) in self.drives.iter().enumerate() {
+            inertia[j][j] += drive.as_ref().map_or_else(T::zero, |d| d.inertia);
+        }
+        let memory = self.memory(q, hidden);
+        let modes: [Mode; N] = core::array::from_fn(|j| Mode::of(dq[j]));
+        let mut lack = -tau;
+        for j in 0..N {
+            for k in 0..N {
+                lack[j] += inertia[j][k] * ddq[k];
+            }
+            let mut x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
+            x.other = self.sliding((j + 1) % N, &place.dq, &modes);
+            x.memory = memory[j];
+            let friction = self.rigid.viscous[j] * dq[j] + self.dry_friction(j, &x, modes[j]);
+            lack[j] += bias[j] + friction - self.force(j, &x);
+        }
+        lack
+    }
+
     /// `M ddq = rhs` with the rows and columns of stuck joints taken out.
     #[inline]
     fn solve(&self, inertia: &[[T; N]; N], rhs: &SVector<T, N>, modes: &[Mode; N]) -> Motion<T, N> {

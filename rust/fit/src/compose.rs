@@ -4,11 +4,11 @@ use crate::arm::ArmDescription;
 use crate::attribute::Contender;
 use crate::decide::{Attribution, CONSEQUENCE, left_over};
 use crate::diagnose::Options;
-use crate::event::Event;
 use crate::gap::{Errors, free_run_series, gap, rms};
 use crate::locate::{Lack, Lacks, lacking_torque, places, regimes, shares};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
+use crate::push::Event;
 use crate::report::{
     ArmSummary, Cause, Diagnosis, EquivalentSummary, Gap, LogSummary, Named, Noise, OptionSummary,
     Parameters, Ranked, StageSummary, Value,
@@ -147,7 +147,7 @@ fn verdict<const N: usize, const P: usize>(attribution: &Attribution<N, P>, gap:
 }
 
 /// Cost above the floor, as a factor, beyond which a gap without a cause is called unexplained.
-const UNEXPLAINED: f64 = 4.0;
+pub const UNEXPLAINED: f64 = 4.0;
 
 fn cause(cause: &crate::decide::Cause, joints: usize, rotary: bool) -> Cause {
     let spec = cause.effect.law.spec();

@@ -54,7 +54,10 @@ fn never_fitted<const N: usize>() -> Vec<RuledOut> {
     let unsearched = laws.filter(|spec| spec.starts.is_empty() && spec.least_joints <= N);
     let entry = |spec: &Spec, joint: Option<usize>| {
         let (status, why) = if spec.trial == Trial::Event {
-            ("absent", "no impulse stands alone in any of these logs")
+            (
+                "absent",
+                "no push stands out of what the model lacks in any of these logs; a joint at rest shows none below its friction",
+            )
         } else {
             ("undecided", "another effect and other parameters of the arm give the same motion, always")
         };

@@ -78,6 +78,21 @@ impl<const N: usize> Track<N> {
         self
     }
 
+    /// One track of pieces that follow each other in time.
+    pub fn joined(pieces: &[&Self]) -> Option<Self> {
+        let (first, rest) = pieces.split_first()?;
+        let mut whole = Self { path: OnceLock::new(), pushes: Vec::new(), ..(*first).clone() };
+        for piece in rest {
+            whole.t.extend(&piece.t);
+            whole.q.extend(&piece.q);
+            whole.held.extend(&piece.held);
+            for (table, more) in whole.tables.iter_mut().zip(&piece.tables) {
+                table.extend(more);
+            }
+        }
+        Some(whole)
+    }
+
     /// Positions of one joint.
     pub fn column(&self, j: usize) -> Vec<f64> {
         self.q.iter().map(|q| q[j]).collect()

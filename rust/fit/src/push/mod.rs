@@ -1,0 +1,182 @@
+//! Pushes from outside: torques that no log shows, at one time of one log, judged inside that log.
+//!
+//! [`residual`] is the torque that a log lacks under a model, beside everything the model could be wrong by; [`search`] finds in it what
+//! comes once and does not follow from the state; [`fit`] sizes it by output error, where the model is good enough for that.
+
+mod fit;
+mod residual;
+mod scatter;
+mod search;
+
+use crate::compose::UNEXPLAINED;
+use crate::decide::{Attribution, CONSEQUENCE, noticeable};
+use crate::model::{Hypothesis, Placed};
+use crate::progress::Work;
+use crate::study::{Sample, Study};
+use crate::track::Track;
+use armgap_core::arm::Arm;
+use armgap_core::effect::find;
+use residual::Residual;
+use search::{Bell, MOST, search};
+
+/// Shortest push that is reported, s.
+const SHORTEST: f64 = 0.005;
+
+/// Pieces of one log follow each other within this many sample periods.
+const FOLLOWS: f64 = 8.0;
+
+/// Shortest log that is judged, s.
+const SHORTEST_LOG: f64 = 1.5;
+
+/// A push that was found.
+#[derive(Debug, Clone)]
+pub struct Event {
+    /// Whether it lies in a holdout log rather than a training log.
+    pub holdout: bool,
+    /// Index of the log.
+    pub track: usize,
+    /// The push.
+    pub push: Placed,
+    /// Standard deviations of its values.
+    pub sigma: [f64; 3],
+    /// Share of the cost of the windows it touches that it explains.
+    pub share: f64,
+    /// Probability that it is a push rather than something else that the model lacks.
+    pub probability: f64,
+}
+
+/// What pushes are judged against.
+struct State<'a, const N: usize, const P: usize> {
+    /// The model with all named causes.
+    model: &'a Hypothesis<P>,
+    /// Scales of the residuals under it.
+    scale: [f64; N],
+    /// Whether it leaves more unexplained than noise.
+    remainder: bool,
+    /// Improvement relative to the motion below which nothing is worth a name.
+    noticeable: f64,
+}
+
+/// Where a piece of a log is kept: whether in the holdout, and its index there.
+type Place = (usize, usize);
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+    /// The attribution with all pushes accounted for.
+    pub fn conclude(&mut self, max_causes: usize, seed: u64) -> (Attribution<N, P>, Vec<Event>) {
+        let mut attribution = self.attribute(max_causes, seed);
+        let mut events = self.events(&attribution);
+        if !events.is_empty() {
+            self.set_pushes(&events);
+            attribution = self.attribute(max_causes, seed);
+            events = self.events(&attribution);
+            self.set_pushes(&events);
+        }
+        (attribution, events)
+    }
+
+    /// Pushes that the model of an attribution leaves unexplained, log by log.
+    fn events(&self, attribution: &Attribution<N, P>) -> Vec<Event> {
+        let (first, last) = (&attribution.stages[0], &attribution.stages[attribution.stages.len() - 1]);
+        let state = State {
+            model: &attribution.model.hypothesis,
+            scale: last.weights.training.scale,
+            remainder: last.excess() > UNEXPLAINED && last.relative_error() > CONSEQUENCE,
+            noticeable: noticeable(first.relative_error()),
+        };
+        let recordings = self.recordings();
+        self.watch.begin(Work::Pushes, recordings.len());
+        let found = recordings.iter().flat_map(|places| {
+            self.watch.unit();
+            self.in_recording(places, &state)
+        });
+        found.collect()
+    }
+
+    fn in_recording(&self, places: &[Place], state: &State<'_, N, P>) -> Vec<Event> {
+        let pieces: Vec<&Track<N>> = places.iter().map(|p| self.track(*p)).collect();
+        let whole = Track::joined(&pieces).filter(|t| t.t[t.len() - 1] - t.t[0] > SHORTEST_LOG);
+        let residual = whole.and_then(|track| Residual::new(&self.arm, &track, state.model, &self.prior));
+        let Some(found) = residual.and_then(|r| search(&r, state.remainder)) else { return Vec::new() };
+        let mut events: Vec<Event> = Vec::new();
+        for bell in &found.bells {
+            let Some(rough) = self.rough(places, bell, found.rest) else { continue };
+            let known: Vec<Placed> =
+                events.iter().filter(|e| e.place() == rough.place()).map(|e| e.push).collect();
+            events.extend(self.sized(rough, state, &known));
+        }
+        // So many are no rare events, but something that the arm does again and again.
+        if events.len() < MOST { events } else { Vec::new() }
+    }
+
+    /// A push as the lacking torque shows it.
+    fn rough(&self, places: &[Place], bell: &Bell, rest: f64) -> Option<Event> {
+        let covers = |p: &&Place| self.track(**p).t[0] <= bell.time;
+        let &(set, track) = places.iter().rfind(covers)?;
+        let law = find::<f64>("external_pulse")?;
+        let duration = bell.duration().max(SHORTEST);
+        let impulse = bell.impulse();
+        let sigma = bell.sigma / bell.height.abs().max(1e-300);
+        Some(Event {
+            holdout: set == 1,
+            track,
+            push: Placed { law, joint: bell.joint, p: [impulse, bell.time, duration] },
+            sigma: [sigma * impulse.abs(), sigma * bell.width, sigma * duration],
+            share: 0.0,
+            probability: 1.0 - 0.5 * (rest / bell.z).powi(2).min(1.0),
+        })
+    }
+
+    /// Logs as they were recorded: pieces of the same log that follow each other in time belong together.
+    fn recordings(&self) -> Vec<Vec<Place>> {
+        let all = [&self.training, &self.holdout];
+        let mut places: Vec<Place> =
+            (0..2).flat_map(|s| (0..all[s].data.tracks.len()).map(move |i| (s, i))).collect();
+        places.sort_by(|a, b| self.track(*a).t[0].total_cmp(&self.track(*b).t[0]));
+        let mut recordings: Vec<Vec<Place>> = Vec::new();
+        for place in places {
+            let open = recordings.iter_mut().find(|r| r.last().is_some_and(|l| self.follows(*l, place)));
+            match open {
+                Some(recording) => recording.push(place),
+                None => recordings.push(vec![place]),
+            }
+        }
+        recordings
+    }
+
+    fn follows(&self, before: Place, after: Place) -> bool {
+        let (a, b) = (self.track(before), self.track(after));
+        let gap = b.t[0] - a.t[a.len() - 1];
+        stem(&a.name) == stem(&b.name) && gap > 0.0 && gap < FOLLOWS * a.period()
+    }
+
+    fn track(&self, (set, index): Place) -> &Track<N> {
+        &[&self.training, &self.holdout][set].data.tracks[index]
+    }
+
+    /// Puts pushes into the logs they belong to, in place of those known before.
+    pub fn set_pushes(&mut self, events: &[Event]) {
+        for (set, sample) in [&mut self.training, &mut self.holdout].into_iter().enumerate() {
+            for (index, track) in sample.data.tracks.iter_mut().enumerate() {
+                track.pushes = events.iter().filter(|e| e.place() == (set, index)).map(|e| e.push).collect();
+            }
+        }
+    }
+}
+
+impl Event {
+    fn place(&self) -> Place {
+        (usize::from(self.holdout), self.track)
+    }
+}
+
+/// Name of a log without what says which part of it this is.
+fn stem(name: &str) -> &str {
+    name.split(" (").next().unwrap_or(name)
+}
+
+/// The same windows without any known pushes.
+pub fn without_pushes<const N: usize>(sample: &Sample<N>) -> Sample<N> {
+    let mut data = sample.data.clone();
+    data.tracks.iter_mut().for_each(|track| track.pushes.clear());
+    Sample { data, measured: sample.measured.clone() }
+}

@@ -1,0 +1,344 @@
+//! Pushes in the lacking torque of one log: bells that stand out once everything the model could be wrong by has been allowed for.
+//!
+//! Parameters, unknown laws and pushes are fitted together, linearly; what a bell at one time, of one width, on one joint would gain is
+//! weighed against the scatter there and against how much of the bell the other columns could imitate (a generalised likelihood ratio).
+//! The largest are added one by one, for one push hides another by raising the scatter, and then the doubtful are taken out again.
+
+use super::residual::{LOW_PASS, Residual};
+use super::scatter::scatter;
+use crate::solve::scaled_inverse;
+use crate::track::median;
+use nalgebra::{DMatrix, DVector};
+
+/// Standard deviations of bells that are looked for, as they appear behind the low-pass, s.
+const WIDTHS: [f64; 7] = [0.045, 0.055, 0.07, 0.09, 0.115, 0.145, 0.18];
+
+/// Distance of centres that are tried, s, coarse and fine, and how far a fine search goes.
+const COARSE: f64 = 0.02;
+const FINE: f64 = 0.01;
+const REFINED: f64 = 0.08;
+
+/// Correlation time of what a model lacks, s, where its columns are fitted and where pushes are judged.
+const MODEL_TIME: f64 = 0.25;
+const JUDGED_TIME: f64 = 0.06;
+
+/// Scatter relative to the typical torque below which the columns are not fitted more closely: a joint that is hardly driven could
+/// otherwise be explained by parameters of next to nothing.
+const MODEL_SCATTER: f64 = 0.05;
+
+/// A bell of which less is left by the other columns cannot be told from them.
+const DISTINCT: f64 = 0.15;
+
+/// Size, in standard deviations, from which a bell is tried, and from which it is a push: on an arm that the model describes; on one
+/// that it does not, if the bell also exceeds the joint's friction; on any.
+const TRIED: f64 = 2.5;
+const LIKELY: f64 = 5.0;
+const ABOVE_REMAINDER: f64 = 3.9;
+const CERTAIN: f64 = 12.0;
+
+/// Height, relative to the joint's friction at rest, from which a push exceeds it.
+const ABOVE_FRICTION: f64 = 1.2;
+
+/// Pushes that are looked for in one log; as many are no rare events.
+pub const MOST: usize = 8;
+
+/// A joint that moves for less than this, s, is not judged.
+const MOVES: f64 = 0.5;
+
+/// Two bells on the same joint are apart by this, s.
+const APART: f64 = 0.3;
+
+/// First guess of the scatter relative to the typical torque, and rounds until it follows the residual.
+const FIRST_SCATTER: f64 = 0.15;
+const ROUNDS: usize = 4;
+
+/// Largest amplitude of a push relative to the typical torque of its joint.
+const LARGEST: f64 = 20.0;
+
+/// A bell on one joint.
+#[derive(Debug, Clone, Copy)]
+pub struct Bell {
+    /// 0-based joint.
+    pub joint: usize,
+    /// Time of the centre, s.
+    pub time: f64,
+    /// Standard deviation as it appears behind the low-pass, s.
+    pub width: f64,
+    /// Height, N m.
+    pub height: f64,
+    /// Standard deviation of the height.
+    pub sigma: f64,
+    /// Size in standard deviations of what bells of its kind have elsewhere in the log.
+    pub z: f64,
+}
+
+impl Bell {
+    /// Impulse, N m s.
+    pub fn impulse(&self) -> f64 {
+        self.height * self.width * std::f64::consts::TAU.sqrt()
+    }
+
+    /// Length of the rectangle that is spread as far as the bell before the low-pass, s.
+    pub fn duration(&self) -> f64 {
+        12.0_f64.sqrt() * (self.width.powi(2) - LOW_PASS.powi(2)).max(0.0).sqrt()
+    }
+
+    fn at(&self, t: f64) -> f64 {
+        let x = (t - self.time) / self.width;
+        if x.abs() > 5.0 { 0.0 } else { (-0.5 * x * x).exp() }
+    }
+}
+
+/// The pushes of a log and the largest of what is left.
+pub struct Found {
+    /// Pushes, in the order in which they were found.
+    pub bells: Vec<Bell>,
+    /// Size of the largest bell that is none.
+    pub rest: f64,
+}
+
+/// A linear fit of all columns and of some bells.
+struct Fitted {
+    /// What is left, per joint.
+    left: Vec<Vec<f64>>,
+    /// Inverse of the normal matrix.
+    inverse: DMatrix<f64>,
+    /// Bells in the fit.
+    bells: Vec<Bell>,
+}
+
+struct Search<'a, const N: usize> {
+    residual: &'a Residual<N>,
+    /// Whether the model leaves more unexplained than noise.
+    remainder: bool,
+    /// Share of the time that each joint moves at each point.
+    moving: Vec<Vec<f64>>,
+    /// Standard deviation per joint and point.
+    scatter: Vec<Vec<f64>>,
+    /// Size of chance bells per joint and width, at least one.
+    chance: Vec<Vec<f64>>,
+}
+
+/// Looks for pushes in a log; `remainder` tells whether the model leaves more unexplained than noise.
+pub fn search<const N: usize>(residual: &Residual<N>, remainder: bool) -> Option<Found> {
+    let moving: Vec<Vec<f64>> =
+        residual.joints.iter().map(|x| x.rest.iter().map(|r| (1.0 - r).clamp(0.0, 1.0)).collect()).collect();
+    let first = |x: &super::residual::Joint| vec![FIRST_SCATTER * x.typical.max(1e-9); residual.t.len()];
+    let scatter = residual.joints.iter().map(first).collect();
+    let chance = vec![vec![1.0; WIDTHS.len()]; N];
+    let mut search = Search { residual, remainder, moving, scatter, chance };
+    let mut bells: Vec<Bell> = Vec::new();
+    loop {
+        let fitted = search.settle(&bells)?;
+        let largest = search.scan(&fitted);
+        bells = search.refine(bells)?;
+        let Some(next) = largest.filter(|b| b.z > TRIED) else { break };
+        if bells.len() == MOST {
+            break;
+        }
+        bells.push(next);
+        bells = search.refine(bells)?;
+    }
+    let mut rest = TRIED;
+    while !bells.is_empty() {
+        let fitted = search.settle(&bells)?;
+        search.scan(&fitted);
+        bells = search.refine(bells)?;
+        let doubt = |b: &Bell| if search.stands(b) { b.z } else { 0.0 };
+        let weakest = (0..bells.len()).min_by(|&a, &b| doubt(&bells[a]).total_cmp(&doubt(&bells[b])))?;
+        if search.stands(&bells[weakest]) {
+            break;
+        }
+        rest = f64::max(rest, bells.remove(weakest).z.min(LIKELY));
+    }
+    Some(Found { bells, rest })
+}
+
+impl<const N: usize> Search<'_, N> {
+    /// Whether a bell is a push.
+    fn stands(&self, bell: &Bell) -> bool {
+        let above = bell.height.abs() > ABOVE_FRICTION * self.residual.joints[bell.joint].holding;
+        if self.remainder { bell.z > CERTAIN || (bell.z > ABOVE_REMAINDER && above) } else { bell.z > LIKELY }
+    }
+
+    /// All columns and bells fitted, with the scatter that follows from what is left.
+    fn settle(&mut self, bells: &[Bell]) -> Option<Fitted> {
+        let mut fitted = self.fit(bells)?;
+        for _ in 0..ROUNDS {
+            self.scatter = (0..N).map(|j| scatter(self.residual, j, &fitted.left[j])).collect();
+            fitted = self.fit(bells)?;
+        }
+        Some(fitted)
+    }
+
+    fn fit(&self, bells: &[Bell]) -> Option<Fitted> {
+        let residual = self.residual;
+        let (c, k) = (residual.prior.len(), residual.prior.len() + bells.len());
+        let tempering = residual.step / MODEL_TIME;
+        let (mut normal, mut right) = (DMatrix::<f64>::zeros(k, k), DVector::<f64>::zeros(k));
+        for (i, (expected, sigma)) in residual.prior.iter().enumerate() {
+            let precision = sigma.powi(-2).min(1e24);
+            normal[(i, i)] += precision;
+            right[i] += precision * expected;
+        }
+        for (i, bell) in bells.iter().enumerate() {
+            normal[(c + i, c + i)] += (LARGEST * residual.joints[bell.joint].typical.max(1e-9)).powi(-2);
+        }
+        let rows: Vec<DMatrix<f64>> = (0..N).map(|j| self.rows(j, bells)).collect();
+        for j in 0..N {
+            let weights = DVector::from_fn(residual.t.len(), |i, _| tempering * self.heed(j, i));
+            let mut weighted = rows[j].clone();
+            for (mut row, w) in weighted.row_iter_mut().zip(weights.iter()) {
+                row *= *w;
+            }
+            normal += weighted.tr_mul(&rows[j]);
+            right -= weighted.tr_mul(&DVector::from_column_slice(&residual.joints[j].lack));
+        }
+        let inverse = scaled_inverse(&normal)?;
+        let values = &inverse * right;
+        let left = (0..N).map(|j| {
+            let joint = &residual.joints[j];
+            let change = &rows[j] * &values;
+            let held = joint.rest.iter().map(|rest| joint.holding * rest);
+            let lack = joint.lack.iter().zip(change.iter()).map(|(r, d)| r + d);
+            lack.zip(held).map(|(r, held)| r.signum() * (r.abs() - held).max(0.0)).collect()
+        });
+        let left = left.collect();
+        Some(Fitted { left, inverse, bells: bells.to_vec() })
+    }
+
+    /// Weight of a point where the columns are fitted.
+    fn heed(&self, j: usize, i: usize) -> f64 {
+        let least = MODEL_SCATTER * self.residual.joints[j].typical;
+        self.moving[j][i] / self.scatter[j][i].max(least).powi(2)
+    }
+
+    /// Torque of joint `j` per unit of every column, then of every bell, which the model does not have.
+    fn rows(&self, j: usize, bells: &[Bell]) -> DMatrix<f64> {
+        let joint = &self.residual.joints[j];
+        let c = joint.columns.len();
+        DMatrix::from_fn(self.residual.t.len(), c + bells.len(), |i, k| match k.checked_sub(c) {
+            None => joint.columns[k][i],
+            Some(b) if bells[b].joint == j => -bells[b].at(self.residual.t[i]),
+            Some(_) => 0.0,
+        })
+    }
+
+    /// Size of a bell beside those of a fit, in standard deviations of a calm log, with its best height; zero where it is not distinct.
+    fn weigh(&self, fitted: &Fitted, bell: &Bell) -> Bell {
+        let (residual, j) = (self.residual, bell.joint);
+        let tempering = residual.step / MODEL_TIME;
+        let (first, last) = self.reach(bell);
+        let k = residual.prior.len() + fitted.bells.len();
+        let (mut along, mut full) = (0.0, 0.0);
+        // What the bell shares with the columns, by the weights it is judged with and by those they are fitted with.
+        let mut shared = DMatrix::<f64>::zeros(k, 2);
+        let columns = &residual.joints[j].columns;
+        for i in first..last {
+            let shape = bell.at(residual.t[i]);
+            let weight = tempering * self.moving[j][i] / self.scatter[j][i].powi(2);
+            along += shape * weight * fitted.left[j][i];
+            full += shape * shape * weight;
+            let both = [shape * weight, shape * tempering * self.heed(j, i)];
+            for (s, weight) in both.into_iter().enumerate() {
+                for (c, column) in columns.iter().enumerate() {
+                    shared[(c, s)] += weight * column[i];
+                }
+                for (b, other) in fitted.bells.iter().enumerate().filter(|(_, b)| b.joint == j) {
+                    shared[(columns.len() + b, s)] -= weight * other.at(residual.t[i]);
+                }
+            }
+        }
+        let imitated = shared.column(0).dot(&(&fitted.inverse * shared.column(1)));
+        let own = (full - imitated).max(0.02 * full).max(1e-300);
+        let size = along / own.sqrt() * (MODEL_TIME / JUDGED_TIME).sqrt();
+        let distinct = own > DISTINCT * full;
+        let sigma = (JUDGED_TIME / MODEL_TIME / own).sqrt();
+        Bell { height: along / own, sigma, z: if distinct { size.abs() } else { 0.0 }, ..*bell }
+    }
+
+    /// Times at which a bell lies within the log.
+    fn span(&self, width: f64) -> (f64, f64) {
+        let t = &self.residual.t;
+        (t[0] + 2.0 * width, t[t.len() - 1] - 2.0 * width)
+    }
+
+    /// Grid points that a bell reaches.
+    fn reach(&self, bell: &Bell) -> (usize, usize) {
+        let t = &self.residual.t;
+        let from = bell.time - 4.0 * bell.width;
+        let to = bell.time + 4.0 * bell.width;
+        (t.partition_point(|t| *t < from), t.partition_point(|t| *t <= to))
+    }
+
+    /// Bells of all widths over the log; keeps what their sizes typically are, and gives the largest.
+    fn scan(&mut self, fitted: &Fitted) -> Option<Bell> {
+        let residual = self.residual;
+        let mut largest: Option<Bell> = None;
+        for joint in (0..N).filter(|&j| self.moving[j].iter().sum::<f64>() * residual.step > MOVES) {
+            for (w, &width) in WIDTHS.iter().enumerate() {
+                let (from, to) = self.span(width);
+                let count = ((to - from) / COARSE).floor().max(0.0) as usize;
+                let tried: Vec<Bell> = (0..count)
+                    .map(|i| from + i as f64 * COARSE)
+                    .map(|time| Bell { joint, time, width, height: 0.0, sigma: 0.0, z: 0.0 })
+                    .map(|bell| self.weigh(fitted, &bell))
+                    .collect();
+                self.chance[joint][w] = self.typical(joint, &tried);
+                let best = tried
+                    .into_iter()
+                    .filter(|b| fitted.bells.iter().all(|o| !b.touches(o)))
+                    .max_by(|a, b| a.z.total_cmp(&b.z));
+                if let Some(best) = best {
+                    let best = Bell { z: best.z / self.chance[joint][w], ..best };
+                    largest = largest.filter(|l| l.z >= best.z).or(Some(best));
+                }
+            }
+        }
+        largest
+    }
+
+    /// Size that bells of one kind have by chance in this log, where the joint moves; at least one.
+    fn typical(&self, joint: usize, tried: &[Bell]) -> f64 {
+        let t = &self.residual.t;
+        let moves = |b: &&Bell| self.moving[joint][t.partition_point(|t| *t < b.time).min(t.len() - 1)] > 0.5;
+        let mut sizes: Vec<f64> = tried.iter().filter(moves).map(|b| b.z).collect();
+        if sizes.len() < 20 {
+            return 1.0;
+        }
+        sizes.sort_by(f64::total_cmp);
+        let middle = 1.4826 * median(sizes.clone());
+        middle.max(sizes[sizes.len() * 9 / 10] / 1.645).max(1.0)
+    }
+
+    /// Times and widths that fit each bell best beside the others.
+    fn refine(&self, bells: Vec<Bell>) -> Option<Vec<Bell>> {
+        let mut bells = bells;
+        for i in 0..bells.len() {
+            let others: Vec<Bell> =
+                bells.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, b)| *b).collect();
+            let fitted = self.fit(&others)?;
+            let mut best = Bell { z: -1.0, ..bells[i] };
+            let mut chance = 1.0;
+            let steps = (REFINED / FINE).round() as i32;
+            for (w, &width) in WIDTHS.iter().enumerate() {
+                let (from, to) = self.span(width);
+                for step in -steps..=steps {
+                    let time = (bells[i].time + f64::from(step) * FINE).max(from).min(to);
+                    let tried = self.weigh(&fitted, &Bell { time, width, ..bells[i] });
+                    if tried.z > best.z && others.iter().all(|o| !tried.touches(o)) {
+                        (best, chance) = (tried, self.chance[bells[i].joint][w]);
+                    }
+                }
+            }
+            bells[i] = Bell { z: best.z / chance, sigma: best.sigma * chance, ..best };
+        }
+        Some(bells)
+    }
+}
+
+impl Bell {
+    fn touches(&self, other: &Self) -> bool {
+        self.joint == other.joint && (self.time - other.time).abs() < APART
+    }
+}

@@ -1,0 +1,74 @@
+"""Smooth, long pushes on an arm whose model lacks several things at once: found beside that remainder, and nowhere else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from armgap import Arm, Diagnosis, Log, diagnose, simulate
+from armgap.simulation import Effect
+
+REAL = np.array([0.105, 0.031, 0.049, 2.1, 1.5, 0.004, 0.004, 0.2, 0.15])
+SIGMA = np.array([0.011, 0.004, 0.005, 0.23, 0.16, 0.01, 0.01, 0.08, 0.06])
+OFF = np.array([0.5, -0.5, 0.4, 0.7, -0.4, -0.3, 0.3, 0.6, -0.6])  # of a sigma
+TRUE = Arm("double pendulum", "two-link", 9.81, 0.002, REAL, sigma=SIGMA)
+ARM = replace(TRUE, theta=REAL + OFF * SIGMA)
+UNMODELLED = [
+    Effect("rotor_inertia", 2, {"inertia": 0.003}),
+    Effect("stribeck", 1, {"amplitude": 0.05, "velocity": 0.3}),
+    Effect("torque_ripple", 1, {"amplitude": 0.06, "n": 6.0, "phase": 0.3}),
+    Effect("torque_ripple", 2, {"amplitude": 0.05, "n": 6.0, "phase": 1.0}),
+    Effect("actuator_delay", 2, {"delay": 0.004}),
+]
+PUSHES = ((1, 2.6, 0.1, 0.75), (2, 5.4, 0.09, -0.65))  # joint, centre s, standard deviation s, height N m
+
+
+def bells(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    push = np.zeros((len(t), 2))
+    for joint, centre, width, height in PUSHES:
+        push[:, joint - 1] += height * np.exp(-0.5 * ((t - centre) / width) ** 2)
+    return push
+
+
+def run(seed: int, *, pushed: bool) -> Log:
+    """Eight seconds of a multisine; the log holds the torque without the pushes."""
+    t = np.arange(4000) * TRUE.sample_period
+    draw = np.random.default_rng(seed).uniform(size=(3, 2, 5))
+    phase = np.multiply.outer(t, 2.0 + 8.0 * draw[1]) + 2 * np.pi * draw[2]
+    tau = ((0.15 + 0.25 * draw[0]) * np.sin(phase)).sum(axis=2)
+    given = tau + bells(t) if pushed else tau
+    log = simulate(TRUE, t, given, effects=UNMODELLED, noise=1e-4, seed=seed, name="log")
+    return replace(log, tau=tau)
+
+
+def judged(log: Log) -> Diagnosis:
+    return diagnose(log, ARM, max_causes=0)
+
+
+@pytest.fixture(scope="module")
+def pushed() -> Diagnosis:
+    return judged(run(3, pushed=True))
+
+
+def test_every_push_is_found_on_its_joint_at_its_time(pushed: Diagnosis) -> None:
+    assert [c.effect for c in pushed.causes] == ["external_pulse"] * 2
+    found = sorted((c.joint, c.parameters["time"].value, c.parameters["impulse"].value) for c in pushed.causes)
+    for (joint, time, impulse), (true_joint, centre, width, height) in zip(found, PUSHES, strict=True):
+        assert joint == true_joint
+        assert time == pytest.approx(centre, abs=0.1)
+        assert impulse == pytest.approx(height * width * np.sqrt(2 * np.pi), rel=0.35)
+
+
+def test_a_push_is_likely_and_belongs_to_its_log(pushed: Diagnosis) -> None:
+    for cause in pushed.causes:
+        assert cause.log == "log"
+        assert 0.8 < cause.probability < 1.0
+
+
+def test_the_same_motion_without_pushes_shows_none() -> None:
+    found = judged(run(3, pushed=False))
+    assert found.causes == ()
+    assert found.verdict == "unexplained"
