@@ -3,7 +3,8 @@
 use armgap_core::arm::{Arm, TwoLink};
 use armgap_core::effect::{Active, Pulse, Trial, find};
 use armgap_core::integrate::{Interval, State, advance};
-use armgap_core::plant::Plant;
+use armgap_core::plant::{Mode, Plant};
+use armgap_core::transmission::Hidden;
 use nalgebra::{SVector, Vector2};
 
 const THETA: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6, 1.734];
@@ -180,4 +181,17 @@ fn a_delayed_command_keeps_its_impulse() {
             "{name} {p}: {shifted} against {exact}"
         );
     }
+}
+
+#[test]
+fn a_motion_lacks_the_torque_that_the_log_does_not_hold() {
+    let law = find::<f64>("rotor_inertia").expect("in the catalogue");
+    let plant = seed(THETA).with_effect(Active { law, joint: 1, p: [0.05, 0.0, 0.0] }).expect("room");
+    let (q, dq) = (Vector2::new(0.7, -1.1), Vector2::new(1.3, -0.4));
+    let (tau, push) = (Vector2::new(12.0, -3.0), Vector2::new(0.9, -0.6));
+    let hidden = Hidden::none(q);
+    let modes = [Mode::of(dq[0]), Mode::of(dq[1])];
+    let motion = plant.acceleration(0.0, &q, &dq, &(tau + push), &modes, &hidden);
+    let lacking = plant.lacking(0.0, [&q, &dq, &motion.ddq], &tau, &hidden);
+    assert!((lacking - push).norm() < 1e-12, "{lacking}");
 }
