@@ -241,37 +241,45 @@ fn activity<const N: usize>(rows: &[Row<N>], low: &LowPass) -> Vec<Vec<f64>> {
 }
 
 /// A Gaussian low-pass from uneven samples onto a regular grid.
-struct LowPass<'a> {
-    t: &'a [f64],
+struct LowPass {
     grid: Vec<f64>,
     step: f64,
+    /// For every grid point, the first sample that counts and the weights from there on.
+    kernels: Vec<(usize, Vec<f64>)>,
 }
 
-impl<'a> LowPass<'a> {
-    fn new(t: &'a [f64], step: f64) -> Self {
+impl LowPass {
+    fn new(t: &[f64], step: f64) -> Self {
         let (first, last) = (t[0], t[t.len() - 1]);
         let count = ((last - first) / step).floor() as usize;
-        let grid = (0..=count).map(|i| first + i as f64 * step).collect();
-        Self { t, grid, step }
+        let grid: Vec<f64> = (0..=count).map(|i| first + i as f64 * step).collect();
+        let kernels = grid.iter().map(|at| kernel(t, *at, step)).collect();
+        Self { grid, step, kernels }
     }
 
-    /// Means around every grid point; samples count by the time they stand for.
+    /// Means around every grid point.
     fn apply(&self, x: &[f64]) -> Vec<f64> {
-        let reach = 4.0 * LOW_PASS;
-        let mean = |&at: &f64| {
-            let (a, b) =
-                (self.t.partition_point(|&t| t < at - reach), self.t.partition_point(|&t| t <= at + reach));
-            let (mut sum, mut weights) = (0.0, 0.0);
-            for k in a..b {
-                let before = if k > 0 { self.t[k] - self.t[k - 1] } else { self.step };
-                let weight = before.min(LOW_PASS) * (-0.5 * ((self.t[k] - at) / LOW_PASS).powi(2)).exp();
-                sum += weight * x[k];
-                weights += weight;
-            }
-            if weights > 0.0 { sum / weights } else { 0.0 }
+        let mean = |(first, weights): &(usize, Vec<f64>)| {
+            weights.iter().zip(&x[*first..]).map(|(weight, x)| weight * x).sum()
         };
-        self.grid.iter().map(mean).collect()
+        self.kernels.iter().map(mean).collect()
     }
+}
+
+/// Weights of the samples around one instant, from the first that counts; they count by the time they stand for.
+fn kernel(t: &[f64], at: f64, step: f64) -> (usize, Vec<f64>) {
+    let reach = 4.0 * LOW_PASS;
+    let (a, b) = (t.partition_point(|&t| t < at - reach), t.partition_point(|&t| t <= at + reach));
+    let weight = |k: usize| {
+        let before = if k > 0 { t[k] - t[k - 1] } else { step };
+        before.min(LOW_PASS) * (-0.5 * ((t[k] - at) / LOW_PASS).powi(2)).exp()
+    };
+    let mut weights: Vec<f64> = (a..b).map(weight).collect();
+    let sum: f64 = weights.iter().sum();
+    if sum > 0.0 {
+        weights.iter_mut().for_each(|w| *w /= sum);
+    }
+    (a, weights)
 }
 
 /// Central differences.
