@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint test-rust test-python reproduce bench bench-peers bench-instructions header dist docs wheel wheel-check clean all tools lint-tools
+.PHONY: help setup demo test lint test-rust test-python reproduce bench bench-peers bench-ferromotion bench-instructions header dist docs wheel wheel-check clean all tools lint-tools
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
@@ -44,6 +44,7 @@ lint: setup lint-tools ## formatting, types and stubs
 
 test-rust: tools ## the Rust tests
 	cargo test -q --release
+	cargo test -q --release --doc -p armgap-bench
 	rust/embed/check.sh
 
 test-python: setup ## the Python tests
@@ -62,6 +63,9 @@ bench-peers: $(VENV)/.built ## the core beside plain C, numpy, padasip, filterpy
 	cargo run -q --release -p armgap-benches --bin peers
 	$(BIN)/python benches/peers/compare.py
 	$(BIN)/python benches/peers/fit.py
+
+bench-ferromotion: tools ## the core's rollout beside the crate ferromotion, which is downloaded and takes minutes to compile
+	CARGO_TARGET_DIR=target/ferromotion cargo run -q --release --manifest-path benches/ferromotion/Cargo.toml
 
 bench-instructions: tools ## instructions per sample, counted one by one
 	cargo build -q --release -p armgap-benches --bin instructions

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from armgap.identification import Identification, identify
     from armgap.inspection import Inspection, inspect
     from armgap.log import Finding, Log
+    from armgap.own import OwnEffect
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
 
@@ -31,6 +32,7 @@ __all__ = [
     "Identification",
     "Inspection",
     "Log",
+    "OwnEffect",
     "Reproduction",
     "__version__",
     "correct",
@@ -56,6 +58,7 @@ _HOMES = {
     "ArmFit": "armgap.fitting",
     "fit": "armgap.fitting",
     "Log": "armgap.log",
+    "OwnEffect": "armgap.own",
     "Identification": "armgap.identification",
     "identify": "armgap.identification",
     "Reproduction": "armgap.reproduction",

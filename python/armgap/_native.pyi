@@ -21,6 +21,9 @@ __all__ = [
 
 __version__: str
 
+_Floats = NDArray[np.float64]
+_Log = tuple[str, _Floats, _Floats, _Floats, Sequence[_Floats]]
+
 def arm_kinds() -> list[dict[str, Any]]: ...
 def effects() -> list[dict[str, Any]]: ...
 def theta_from_links(
@@ -55,8 +58,8 @@ def inertia(
 ) -> NDArray[np.float64]: ...
 def diagnose(
     arm: dict[str, Any],
-    training: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]],
-    holdout: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]],
+    training: Sequence[_Log],
+    holdout: Sequence[_Log],
     options: dict[str, Any],
     progress: Callable[[str, float], object] | None = None,
 ) -> str: ...

@@ -19,6 +19,7 @@ from armgap.evidence import laws, plausibility
 from armgap.log import Log, gather
 from armgap.log.findings import remarks
 from armgap.log.stretches import choose
+from armgap.own import OwnEffect, Tables
 from armgap.progress import Told, following, tell
 from armgap.report.notebook import Shown
 
@@ -275,6 +276,7 @@ def diagnose(
     horizon: float = 0.25,
     max_causes: int = 4,
     seed: int = 1,
+    effects: Sequence[OwnEffect] = (),
     progress: Told | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between an arm's nominal model and its logs.
@@ -296,6 +298,8 @@ def diagnose(
         Causes named at most.
     seed : int, default 1
         Seed of the resampling behind probabilities and intervals.
+    effects : sequence of OwnEffect, default none
+        Effects of your own that take part in the ranking, four at most.
     progress : callable, optional
         ``progress(work, fraction)`` is called now and then with what is being done and an estimate of how much of it is done, from 0
         to 1.
@@ -312,7 +316,7 @@ def diagnose(
         On an interrupt, within a fifth of a second.
     """
     with following(progress):
-        return _diagnose(logs, arm, holdout, horizon, max_causes, seed)
+        return _diagnose(logs, arm, holdout, horizon, max_causes, seed, effects)
 
 
 def _diagnose(
@@ -322,6 +326,7 @@ def _diagnose(
     horizon: float,
     max_causes: int,
     seed: int,
+    effects: Sequence[OwnEffect],
 ) -> Diagnosis:
     """Check, read, split, choose; hand over to the core; and add what is known on this side."""
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
@@ -345,18 +350,23 @@ def _diagnose(
                 remedy="give a longer log or a shorter --horizon",
                 file=log.path or log.name,
             )
-    options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed)}
+    own = Tables.of(effects, training, held)
+    joints = [e.joint - 1 for e in effects]
+    options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed), "own": joints}
     try:
-        text = _native.diagnose(arm.to_native(), _columns(training), _columns(held), options, tell)
+        text = _native.diagnose(arm.to_native(), _columns(training, own), _columns(held, own), options, tell)
     except ValueError as error:
         raise _refused(str(error), training, held) from None
-    data = json.loads(text)
+    data = own.named(json.loads(text))
     data["arm"]["name"] = arm.name
     for cause in data["causes"]:
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = notes + data["notes"]
-    data["laws"], data["plausibility"] = laws(data, arm, training, held), plausibility(data, arm)
+    known, logs_with_own = own.applied(data, (*training, *held))
+    count = len(training)
+    data["laws"] = laws(known, arm, logs_with_own[:count], logs_with_own[count:])
+    data["plausibility"] = plausibility(known, arm)
     data["log_findings"] = [
         {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
         for log in (*training, *held)
@@ -420,6 +430,6 @@ def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
     return training, held
 
 
-def _columns(logs: list[Log]) -> list[tuple[str, Any, Any, Any]]:
+def _columns(logs: list[Log], own: Tables) -> list[tuple[str, Any, Any, Any, list[Any]]]:
     fix = np.ascontiguousarray
-    return [(log.name, fix(log.t), fix(log.q), fix(log.tau)) for log in logs]
+    return [(log.name, fix(log.t), fix(log.q), fix(log.tau), own.by_log[log.name]) for log in logs]

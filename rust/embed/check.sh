@@ -37,3 +37,6 @@ cargo rustc -q --profile embed -p armgap-capi --no-default-features --features f
 library=target/freestanding/embed/libarmgap.a
 mapfile -t functions < <(grep -o -E '\barmgap_[a-z0-9_]+\(' rust/capi/include/armgap.h | tr -d '(' | sort -u)
 check "C interface" "$library" "${functions[@]}"
+
+cc -O1 -w -I rust/capi/include rust/embed/stack.c "$library" -lm -o "$folder/stack"
+"$folder/stack"

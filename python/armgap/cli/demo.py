@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 REPORT = "armgap-demo.html"
+_NEXT = "your own logs: armgap inspect LOG, then armgap diagnose LOG --arm ARM.toml --report OUT.html"
 PACKAGE = Path(__file__).resolve().parents[1]
 #: The sample case.
 CASE_FOLDER = PACKAGE / "demo_case"
@@ -106,6 +107,7 @@ def _sealed_case(folder: Path, outputs: tuple[str, str | None, bool]) -> None:
         raise OptionError("holds no train-*.parquet", remedy="give the folder of a sealed case", file=folder)
     result = _diagnose(training, folder / "arm.toml", held, {}, outputs)
     say.print(_opened(open_key(folder), result), highlight=False)
+    say.print(_NEXT, highlight=False, markup=False)
 
 
 def _diagnose(
@@ -132,7 +134,8 @@ def _diagnose(
     say.print(summary_table(result))
     for remark in result.remarks:
         say.print(f"note: {remark}", highlight=False, markup=False)
-    say.print(f"report: {report_file}", highlight=False)
+    hint = " (open it in a browser)" if str(report_file).endswith(".html") else ""
+    say.print(f"report: {report_file}{hint}", highlight=False, markup=False)
     return result
 
 

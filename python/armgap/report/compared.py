@@ -10,7 +10,7 @@ from armgap.diagnosis import Value
 from armgap.report import charts
 from armgap.report.document import Document
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
-from armgap.report.words import Answer, figure, joint_text, millis, percent, sizes, title, value
+from armgap.report.words import Answer, each_joint, error_text, figure, joint_text, percent, sizes, title, value
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -44,13 +44,16 @@ def answers(c: Comparison) -> list[Answer]:
 
 def _shrunk(c: Comparison) -> tuple[str, str]:
     gap = c.gap[0]
-    ends = f"{millis(gap.before, c.unit)} → {millis(gap.after, c.unit)}"
-    factor = "" if gap.factor is None else f" Above the sensors' floor it is {figure(gap.factor, 2)} times what it was."
-    joints = " per joint" if len(gap.before) > 1 else ""
+    factor = "" if gap.factor is None else f" Above the sensors' floor it is {_times(gap.factor)}."
     return (
-        ends,
-        f"RMS error{joints} of the arm file as it is, predicted over {c.horizon_s:g} s on held-out motion.{factor}",
+        each_joint(gap.before, gap.after, unit=c.unit),
+        f"RMS error of the arm file as it is, predicted over {c.horizon_s:g} s on held-out motion.{factor}",
     )
+
+
+def _times(factor: float) -> str:
+    text = figure(factor, 2)
+    return "what it was" if text == "1" else f"{text} times what it was"
 
 
 def _became(c: Comparison) -> tuple[str, str]:
@@ -85,7 +88,7 @@ def _bars(c: Comparison, i: int, joints: list[str]) -> Drawing:
     caption = f"{_MODELS[gap.model].capitalize()}: RMS prediction error over {c.horizon_s:g} s [m{c.unit}, log scale]"
     top = max((*gap.before, *gap.after), default=0.0) or 1.0
     rows: list[tuple[Cell, ...]] = [
-        (joint, name, Bar(values[j] / top, figure(1e3 * values[j]), colour))
+        (joint, name, Bar(values[j] / top, error_text(1e3 * values[j]), colour))
         for j, joint in enumerate(joints)
         for name, values, colour in pair
     ]
@@ -154,6 +157,6 @@ def comparison_summary(c: Comparison) -> RenderableType:
         grid.add_column(name, justify="left" if name in ("joint", "model") else "right", overflow="fold")
     for j in range(len(c.gap[0].before)):
         for g in c.gap:
-            grid.add_row(str(j + 1), _MODELS[g.model], figure(1e3 * g.before[j]), figure(1e3 * g.after[j]))
+            grid.add_row(str(j + 1), _MODELS[g.model], error_text(1e3 * g.before[j]), error_text(1e3 * g.after[j]))
     lines = [line for a in answers(c) for line in answer_lines(a)]
     return Group(Text(_LEADS[c.outcome], style="bold reverse"), Text(), *lines, grid)

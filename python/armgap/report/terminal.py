@@ -62,5 +62,5 @@ def gap_table(data: Data) -> Table:
     for name, _ in shown:
         table.add_column(name, justify="right")
     for j in range(len(gap["before"])):
-        table.add_row(str(j + 1), *(words.figure(1e3 * gap[key][j]) for _, key in shown))
+        table.add_row(str(j + 1), *(words.error_text(1e3 * gap[key][j]) for _, key in shown))
     return table

@@ -236,6 +236,8 @@ def _where(data: Data) -> tuple[str, str]:
     headline = f"Joint {first['joint']}, {_regime(first)}"
     load = "force" if data["gap"].get("unit") == "m" else "torque"
     text = f"{percent(first['share'])} of the {load} that is missing from the model acts on joint {first['joint']}"
+    if len(data["gap"]["before"]) == 1:
+        text = f"The {load} that is missing from the model acts throughout"
     if ranged:
         text += f", most of it {_inside(first)}"
     others = [f"{percent(p['share'])} on joint {p['joint']}" for p in places[1:] if p["share"] >= MINOR_JOINT]

@@ -92,6 +92,8 @@ class Answer:
         How far predictions miss, where the method predicts.
     theta : tuple of float
         The arm's parameters beside the causes, in the arm file's order, where the method gives them.
+    place : int, optional
+        Joint on which most of the gap lies, where the method says it.
     error : str, optional
         Why there is no answer.
     remark : str
@@ -108,6 +110,7 @@ class Answer:
     limits: tuple[Limit, ...] = ()
     reach: Reach | None = None
     theta: tuple[float, ...] = ()
+    place: int | None = None
     error: str | None = None
     remark: str = ""
     seconds: float = 0.0

@@ -85,6 +85,7 @@ def from_diagnosis(result: Diagnosis, names: Sequence[str]) -> Answer:
         limits=tuple(Limit(r.effect, r.joint, r.bound.parameter, r.bound.value) for r in absent if r.bound),
         reach=Reach(gap.horizon_s, gap.before, gap.refit, gap.after, gap.floor),
         theta=tuple(final[name].value for name in names),
+        place=result.where[0].joint if result.where else None,
         remark=_first_ranks(result),
     )
 

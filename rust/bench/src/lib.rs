@@ -3,3 +3,8 @@
 pub mod cost;
 pub mod run;
 pub mod scaling;
+
+// The example in Rust of the project's README is compiled and run with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+mod readme {}

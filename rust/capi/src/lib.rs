@@ -3,7 +3,8 @@
 //! This crate only converts: pointers are checked for null and alignment, lengths for the arm's, and everything else is
 //! [`armgap_core::online`]. `include/armgap.h` is made from these files; a test compares them.
 #![cfg_attr(not(feature = "std"), no_std)]
-#![allow(non_camel_case_types)]
+// Units in brackets are for the header, which is made from these comments.
+#![allow(non_camel_case_types, rustdoc::broken_intra_doc_links)]
 
 mod double;
 mod settings;

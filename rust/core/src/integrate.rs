@@ -361,6 +361,10 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
     /// Integrates up to the event.
     #[inline(never)]
     fn locate(&self, state: &State<T, N>, event: &Event<T>, x: T, dt: T, k1: &Motion<T, N>) -> Located<T, N> {
+        if event.joint >= N {
+            // No event has such a joint; said here so that no index below needs a panic.
+            return Located { length: dt, reached: *state };
+        }
         match event.change {
             Change::Stop => self.locate_stop(state, event, x, dt, k1),
             Change::Release { excess: [before, after], .. } if before < T::zero() => {

@@ -12,7 +12,7 @@ extern crate std;
 
 // The README's example is compiled and run with the documentation tests.
 #[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
+#[doc = include_str!("../README.md")]
 mod readme {}
 
 pub mod arm;

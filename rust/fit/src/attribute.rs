@@ -198,7 +198,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// Candidates not yet in the model.
     pub fn open_candidates(&self, model: &Hypothesis<P>) -> Vec<Placed> {
         let taken = |c: &Placed| model.effects.iter().any(|e| e.same_place(c));
-        candidates(&self.scales).into_iter().filter(|c| !taken(c)).collect()
+        let known = candidates(&self.scales).into_iter();
+        known.chain(self.own.iter().copied()).filter(|c| !taken(c)).collect()
     }
 
     /// Further starts of candidates that repeat with position, where the residual does.

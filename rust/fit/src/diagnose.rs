@@ -1,12 +1,14 @@
 //! The diagnosis: where the gap lies, which effect causes it, how far it shrinks.
 
 use crate::arm::{ArmDescription, WithArm};
+use crate::model::Placed;
 use crate::progress::{Observer, Watch, Work, guarded};
 use crate::report::Diagnosis;
 use crate::scale::Scales;
 use crate::solve::Prior;
 use crate::study::{Sample, Study};
 use crate::track::Track;
+use crate::user;
 use crate::window::Dataset;
 use armgap_core::arm::{Arm, Kind};
 use std::time::Instant;
@@ -22,6 +24,8 @@ pub struct LogData<'a> {
     pub q: &'a [f64],
     /// Torques, one row per sample, held until the next.
     pub tau: &'a [f64],
+    /// Torque per unit of size of each of the user's own effects, sample by sample; as many as there are `own` effects.
+    pub tables: Vec<&'a [f64]>,
 }
 
 /// What a diagnosis may be told.
@@ -33,11 +37,13 @@ pub struct Options {
     pub max_causes: usize,
     /// Seed of the resampling that gives probabilities and intervals.
     pub seed: u64,
+    /// Joints, from 0, of the user's own effects; their torques lie in the logs' tables.
+    pub own: Vec<usize>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { horizon: 0.25, max_causes: 4, seed: 1 }
+        Self { horizon: 0.25, max_causes: 4, seed: 1, own: Vec::new() }
     }
 }
 
@@ -59,6 +65,8 @@ pub enum DiagnoseError {
     BadSamples(String),
     /// The horizon is not a positive number of seconds.
     Horizon(f64),
+    /// Too many effects of the user's own, one without a table of torques in some log, or on a joint that is not there.
+    Own,
     /// The observer wanted no more.
     Stopped,
 }
@@ -77,6 +85,11 @@ impl std::fmt::Display for DiagnoseError {
                 write!(f, "log `{name}` holds values that are not finite, or times that do not increase")
             }
             Self::Horizon(h) => write!(f, "the horizon must be a positive number of seconds, not {h}"),
+            Self::Own => write!(
+                f,
+                "effects of your own do not fit the logs; give at most {}, each on a joint of the arm, with one torque per sample of every log",
+                user::MOST
+            ),
             Self::Stopped => write!(f, "the diagnosis was stopped"),
         }
     }
@@ -99,7 +112,17 @@ pub fn diagnose(
         return Err(DiagnoseError::Horizon(options.horizon));
     }
     for log in training.iter().chain(holdout) {
-        let finite = log.t.iter().chain(log.q).chain(log.tau).all(|x| x.is_finite());
+        let finite = log
+            .t
+            .iter()
+            .chain(log.q)
+            .chain(log.tau)
+            .chain(log.tables.iter().copied().flatten())
+            .all(|x| x.is_finite());
+        let fits = log.tables.len() == options.own.len() && log.tables.iter().all(|x| x.len() == log.t.len());
+        if !fits || options.own.len() > user::MOST || options.own.iter().any(|j| *j >= arm.kind.joints()) {
+            return Err(DiagnoseError::Own);
+        }
         if !finite || log.t.windows(2).any(|w| w[1] <= w[0]) || log.t.len() < 2 {
             return Err(DiagnoseError::BadSamples(log.name.clone()));
         }
@@ -153,7 +176,19 @@ impl Request<'_> {
             crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
         });
         let watch = Watch::new(Observer::clone(self.observer));
-        Ok(Study { arm, prior, scales, training, holdout, noise, watch })
+        let own = self.own(&scales);
+        Ok(Study { arm, prior, scales, training, holdout, noise, own, watch })
+    }
+
+    /// The user's own effects at their starts.
+    fn own<const N: usize>(&self, scales: &Scales<N>) -> Vec<Placed> {
+        let placed = |(index, joint): (usize, &usize)| {
+            let law = user::law(index);
+            let (parameter, start) = (&law.spec().parameters[0], law.spec().starts[0][0]);
+            let size = start * scales.size(parameter.quantity, *joint);
+            Placed { law, joint: *joint, p: [size, 0.0, 0.0] }
+        };
+        self.options.own.iter().enumerate().map(placed).collect()
     }
 
     fn sample<const N: usize>(
@@ -166,7 +201,11 @@ impl Request<'_> {
                 if self.arm.kind.rotary() { std::f64::consts::TAU / counts[j] } else { 1.0 / counts[j] }
             })
         });
-        let tracks = logs.iter().map(|log| Track::new(&log.name, log.t, log.q, log.tau, steps)).collect();
+        let track = |log: &LogData<'_>| {
+            let tables = log.tables.iter().map(|table| table.to_vec()).collect();
+            Track::new(&log.name, log.t, log.q, log.tau, steps).with_tables(tables)
+        };
+        let tracks = logs.iter().map(track).collect();
         let data = Dataset::new(tracks, self.options.horizon);
         if data.windows.len() < FEWEST_WINDOWS {
             return Err(DiagnoseError::TooShort { set, windows: data.windows.len(), needed: FEWEST_WINDOWS });

@@ -32,4 +32,5 @@ pub mod smooth;
 pub mod solve;
 pub mod study;
 pub mod track;
+pub mod user;
 pub mod window;

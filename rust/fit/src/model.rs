@@ -1,5 +1,6 @@
 //! A hypothesis about the arm: parameter values, friction smoothing, and effects placed on joints.
 
+use crate::user;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Active, Effect, MAX_PARAMETERS, Pulse, Quantity, Scope};
 use armgap_core::integrate::State;
@@ -104,12 +105,14 @@ impl<const P: usize> Hypothesis<P> {
             .try_fold(plant, |plant, e| plant.with_effect(Active { law: e.law, joint: e.joint, p: e.p }))
     }
 
-    /// Rewrites the held commands of a log into the torque that reaches the joints; `pushes` are added last.
+    /// Rewrites the held commands of a log into the torque that reaches the joints; `pushes` are added last, `tables` are those of the
+    /// user's own effects.
     pub fn command<const N: usize>(
         &self,
         t: &[f64],
         held: &[[Pulse<f64>; N]],
         pushes: &[Placed],
+        tables: &[Vec<f64>],
     ) -> Option<Vec<[Pulse<f64>; N]>> {
         let laws = || self.effects.iter().chain(pushes).filter(|e| e.law.spec().hooks.command);
         laws().next()?;
@@ -118,7 +121,7 @@ impl<const P: usize> Hypothesis<P> {
         for effect in laws() {
             column.clear();
             column.extend(torque.iter().map(|row| row[effect.joint]));
-            effect.law.command(&effect.p, t, &mut column);
+            user::command(effect.law, &effect.p, t, tables, &mut column);
             for (row, pulse) in torque.iter_mut().zip(&column) {
                 row[effect.joint] = *pulse;
             }

@@ -46,7 +46,7 @@ pub fn repeats<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 ) -> Vec<Repeat> {
     let [from, to] = problem.scales.travel[j];
     let travel = to - from;
-    if !(travel > 0.0) {
+    if travel.is_nan() || travel <= 0.0 {
         return Vec::new();
     }
     let unit = std::f64::consts::TAU / travel;
@@ -134,7 +134,7 @@ fn fitted(paths: &[Path], cycles: f64) -> Repeat {
     }
     let [ss, sc, cc] = normal;
     let determinant = ss * cc - sc * sc;
-    if !(determinant > 1e-9 * ss * cc) {
+    if determinant.is_nan() || determinant <= 1e-9 * ss * cc {
         return Repeat { amplitude: 0.0, cycles, phase: 0.0, gain: 0.0 };
     }
     let sine = (cc * right[0] - sc * right[1]) / determinant;

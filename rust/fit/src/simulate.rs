@@ -119,7 +119,7 @@ impl Simulation<'_> {
         let plant = hypothesis.plant(arm).ok_or(SimulationError::Effects)?;
         let held: Vec<[Pulse<f64>; N]> =
             self.tau.chunks_exact(N).map(|row| std::array::from_fn(|j| Pulse::held(row[j]))).collect();
-        let torque = hypothesis.command(self.t, &held, &[]).unwrap_or(held);
+        let torque = hypothesis.command(self.t, &held, &[], &[]).unwrap_or(held);
         let start = |x: &[f64]| SVector::<f64, N>::from_fn(|j, _| x[j]);
         let mut state = State::new(start(self.q0), start(self.dq0));
         let n = self.t.len();

@@ -217,7 +217,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
     }
 
     /// Sandwich covariance: curvature inside, the windows' own scatter of scores between (White 1982), which the fit has made smaller by
-    /// the values it has drawn from the windows (MacKinnon and White 1985).
+    /// the values it has drawn from the windows (`MacKinnon` and White 1985).
     fn covariance(&self, gram: &Gram, at: &Point<P>) -> DMatrix<f64> {
         let (normal, _) = self.normal_equations(gram, &at.hypothesis);
         let k = normal.nrows();

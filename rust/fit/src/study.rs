@@ -1,7 +1,7 @@
 //! The study of one arm: training and holdout windows, trusted values, and the current weights of residuals.
 
 use crate::metric::Metric;
-use crate::model::Hypothesis;
+use crate::model::{Hypothesis, Placed};
 use crate::progress::Watch;
 use crate::scale::Scales;
 use crate::solve::{Effort, Fit, Prior, Problem};
@@ -28,6 +28,8 @@ pub struct Study<A, const N: usize, const P: usize> {
     pub holdout: Sample<N>,
     /// Standard deviation of the position measurement.
     pub noise: [f64; N],
+    /// Effects of the user's own, at their start.
+    pub own: Vec<Placed>,
     /// Who looks on.
     pub watch: Watch,
 }

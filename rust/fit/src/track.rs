@@ -30,6 +30,8 @@ pub struct Track<const N: usize> {
     pub step: [f64; N],
     /// Pushes from outside that are known.
     pub pushes: Vec<Placed>,
+    /// Torque per unit of size of each of the user's own effects, sample by sample.
+    pub tables: Vec<Vec<f64>>,
     /// Smoothed motion, once it is asked for.
     path: OnceLock<Vec<Moving<N>>>,
 }
@@ -59,6 +61,7 @@ impl<const N: usize> Track<N> {
             noise: [0.0; N],
             step: [0.0; N],
             pushes: Vec::new(),
+            tables: Vec::new(),
             path: OnceLock::new(),
         };
         for j in 0..N {
@@ -67,6 +70,12 @@ impl<const N: usize> Track<N> {
             track.noise[j] = noise_level(&track.t, &column, track.step[j]);
         }
         track
+    }
+
+    /// The same log with the torques of the user's own effects.
+    pub fn with_tables(mut self, tables: Vec<Vec<f64>>) -> Self {
+        self.tables = tables;
+        self
     }
 
     /// Positions of one joint.

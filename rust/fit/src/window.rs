@@ -109,7 +109,7 @@ impl<const N: usize> Dataset<N> {
         let commands: Vec<_> = self
             .tracks
             .iter()
-            .map(|track| hypothesis.command(&track.t, &track.held, &track.pushes))
+            .map(|track| hypothesis.command(&track.t, &track.held, &track.pushes, &track.tables))
             .collect();
         let hidden = self.hidden(&plant, &commands);
         let mut runs = Vec::with_capacity(self.windows.len());

@@ -8,8 +8,14 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-type PyLog<'py> =
-    (String, PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>);
+/// Name, times, positions, torques, and the torques of the user's own effects.
+type PyLog<'py> = (
+    String,
+    PyReadonlyArray1<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+    Vec<PyReadonlyArray1<'py, f64>>,
+);
 
 /// A log's own copy of its numbers, for a thread that may outlive the caller.
 struct Owned {
@@ -17,6 +23,7 @@ struct Owned {
     t: Vec<f64>,
     q: Vec<f64>,
     tau: Vec<f64>,
+    tables: Vec<Vec<f64>>,
 }
 
 /// The diagnosis of training and holdout logs, as JSON; `progress(title, fraction)` is called now and then.
@@ -41,6 +48,9 @@ pub fn diagnose(
     if let Some(value) = options.get_item("max_causes")? {
         chosen.max_causes = value.extract()?;
     }
+    if let Some(value) = options.get_item("own")? {
+        chosen.own = value.extract()?;
+    }
     if let Some(value) = options.get_item("seed")? {
         chosen.seed = value.extract()?;
     }
@@ -53,16 +63,24 @@ pub fn diagnose(
 }
 
 fn copy(log: &PyLog<'_>, n: usize) -> PyResult<Owned> {
-    let (name, t, q, tau) = log;
+    let (name, t, q, tau, tables) = log;
     let t = vector(t, "t")?;
     Ok(Owned {
         name: name.clone(),
         t: t.to_vec(),
         q: matrix(q, "q", t.len(), n)?.to_vec(),
         tau: matrix(tau, "tau", t.len(), n)?.to_vec(),
+        tables: tables.iter().map(|x| Ok(vector(x, "effects")?.to_vec())).collect::<PyResult<_>>()?,
     })
 }
 
-fn views(logs: &[Owned]) -> Vec<LogData<'_>> {
-    logs.iter().map(|log| LogData { name: log.name.clone(), t: &log.t, q: &log.q, tau: &log.tau }).collect()
+fn views<'a>(logs: &'a [Owned]) -> Vec<LogData<'a>> {
+    let view = |log: &'a Owned| LogData {
+        name: log.name.clone(),
+        t: &log.t,
+        q: &log.q,
+        tau: &log.tau,
+        tables: log.tables.iter().map(Vec::as_slice).collect(),
+    };
+    logs.iter().map(view).collect()
 }

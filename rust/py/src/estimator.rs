@@ -108,8 +108,15 @@ impl Any {
         }
     }
 
+    fn parameters(&self) -> usize {
+        match self {
+            Self::Double(online) => online.theta().len(),
+            Self::Single(online) => online.theta().len(),
+        }
+    }
+
     fn theta(&self) -> Vec<f64> {
-        let mut theta = Vec::new();
+        let mut theta = Vec::with_capacity(self.parameters());
         self.append_theta(&mut theta);
         theta
     }
@@ -209,7 +216,8 @@ impl Estimator {
         let dq = dq.as_ref().map(|dq| matrix(dq, "dq", when.len(), n)).transpose()?;
         let any = &mut self.any;
         let (theta, outcomes) = py.detach(|| {
-            let (mut theta, mut outcomes) = (Vec::new(), Vec::with_capacity(when.len()));
+            let (mut theta, mut outcomes) =
+                (Vec::with_capacity(when.len() * any.parameters()), Vec::with_capacity(when.len()));
             for (k, t) in when.iter().enumerate() {
                 let row = |x: &'_ [f64]| k * n..(k * n + n).min(x.len());
                 let moment = if after { When::After(*t) } else { When::At(*t) };
@@ -219,7 +227,7 @@ impl Estimator {
             }
             (theta, outcomes)
         });
-        let parameters = theta.len() / when.len().max(1);
+        let parameters = self.any.parameters();
         let theta = PyArray1::from_vec(py, theta).reshape([when.len(), parameters])?;
         Ok((theta, PyArray1::from_vec(py, outcomes)))
     }

@@ -4,8 +4,10 @@
 //! stop, and ends at its next unit without anyone waiting for it, which is why it owns its data.
 
 use armgap_fit::progress::{Control, Observer, Progress};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use std::panic::resume_unwind;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -33,7 +35,8 @@ pub fn watched<T: Send + 'static>(
 ) -> PyResult<T> {
     let Some(told) = told else {
         let nobody: Observer = Arc::new(|_| Control::Go);
-        return Ok(py.detach(move || work(&nobody)));
+        let ended = py.detach(move || catch_unwind(AssertUnwindSafe(|| work(&nobody))));
+        return ended.map_err(defect);
     };
     let shared = Arc::new(Shared::default());
     let observer = observer(&shared);
@@ -47,7 +50,7 @@ pub fn watched<T: Send + 'static>(
     match result {
         Ok(Some(result)) => Ok(result),
         Ok(None) => match thread.join() {
-            Err(panic) => resume_unwind(panic),
+            Err(panic) => Err(defect(panic)),
             Ok(()) => unreachable!("a thread that ends without a result has panicked"),
         },
         Err(error) => {
@@ -55,6 +58,17 @@ pub fn watched<T: Send + 'static>(
             Err(error)
         }
     }
+}
+
+/// A panic as an error for Python: what the work said last, and that it should not have.
+#[expect(clippy::needless_pass_by_value, reason = "a panic's payload is given away")]
+fn defect(panic: Box<dyn Any + Send>) -> PyErr {
+    let said =
+        panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
+    let said = said.unwrap_or("no message");
+    PyRuntimeError::new_err(format!(
+        "armgap failed inside ({said}); this is a defect of armgap, please report it with the arm file and the logs"
+    ))
 }
 
 /// Waits for the result; none if the thread ended without.

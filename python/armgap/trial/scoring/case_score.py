@@ -48,6 +48,8 @@ class CaseScore:
         Right, or a hidden effect stands among the look-alikes of the first cause.
     found : int
         Hidden effects among all causes.
+    located : bool, optional
+        The joint said to bear most of the gap is the hidden effects'; None where no joint is said, or they sit on several or on none.
     verdict, error, seconds
         From the answer.
     """
@@ -64,6 +66,7 @@ class CaseScore:
     exact: bool
     listed: bool
     found: int
+    located: bool | None
     verdict: str
     error: str | None
     seconds: float
@@ -99,10 +102,18 @@ def score_case(case: str, answer: Answer, key: Key) -> CaseScore:
         exact=answer.error is None and _right(group, tuple(n.name in hidden for n in named)),
         listed=bool(named) and _listed(named[0], matches[0], hidden),
         found=sum(any(equivalent(n.name, h) for n in named) for h in hidden),
+        located=_located(answer, hidden, key),
         verdict=answer.verdict,
         error=answer.error,
         seconds=answer.seconds,
     )
+
+
+def _located(answer: Answer, hidden: tuple[Name, ...], key: Key) -> bool | None:
+    joints = {joint for _, joint in hidden}
+    if answer.place is None or len(joints) != 1 or None in joints or key.details["kind"] != "two-link":
+        return None
+    return answer.place in joints
 
 
 def hidden_names(key: Key) -> tuple[Name, ...]:

@@ -48,6 +48,11 @@ class Closing:
         open_after = sum(max(a - t, 0.0) for a, t in zip(self.after, self.best, strict=True))
         return 1.0 - open_after / open_before if open_before > 0 else 0.0
 
+    @property
+    def ratio(self) -> float:
+        """RMS error of the answer over that of the truth, joints pooled."""
+        return math.hypot(*self.after) / math.hypot(*self.best)
+
 
 def closing(folder: Path, answer: Answer, key: Key) -> Closing | None:
     """Compare an answer's model with arm file and truth; None where one of them cannot be simulated window by window."""

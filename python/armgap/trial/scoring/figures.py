@@ -131,6 +131,23 @@ class Figures:
         return statistics.median(shares), shares[len(shares) // 10]
 
     @property
+    def ratio(self) -> tuple[float, float] | None:
+        """RMS error on the holdout over the truth's: median, and upper decile."""
+        if not self.closings:
+            return None
+        ratios = sorted(c.ratio for c in self.closings)
+        return statistics.median(ratios), ratios[len(ratios) * 9 // 10]
+
+    @property
+    def located(self) -> dict[str, Share]:
+        """By group: the joint said to bear most of the gap is that of the hidden effect."""
+        groups: dict[str, list[bool]] = {}
+        for c in self.cases:
+            if c.located is not None:
+                groups.setdefault(c.group, []).append(c.located)
+        return {g: Share(sum(told), len(told)) for g, told in groups.items()}
+
+    @property
     def seconds(self) -> tuple[float, float]:
         """Median and largest CPU time per case, s."""
         times = [c.seconds for c in self.cases]
@@ -173,6 +190,8 @@ class Figures:
             "closed": None
             if self.closed is None
             else {"median": self.closed[0], "lower_decile": self.closed[1], "of": len(self.closings)},
+            "ratio": None if self.ratio is None else {"median": self.ratio[0], "upper_decile": self.ratio[1]},
+            "located": {name: _share_dict(s) for name, s in self.located.items()},
             "size_error": self.size_error,
             "intervals_hold": _share_dict(self.coverage),
             "bounds_hold": _share_dict(self.bounds_hold),

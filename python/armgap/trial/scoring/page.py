@@ -124,12 +124,21 @@ def _groups(all_figures: Sequence[Figures]) -> str:
     rows = [(g, GROUPS[g], *(_plain(s.get(g)) for s in shares)) for g in GROUPS if any(g in s for s in shares)]
     outside = [c for c in all_figures[0].cases if c.group == "outside the library"]
     unexplained = sum(c.verdict == "unexplained" for c in outside)
+    believed = sum(any(n.probability > 0.5 for n in c.named) for c in outside)
+    places = all_figures[0].located
+    told = [f"{_plain(places[g])} ({g})" for g in GROUPS if g in places]
+    located = (
+        f"On arms with two joints the one said to bear most of the gap is the hidden effect's in {', '.join(told)}. "
+        if told
+        else ""
+    )
     pairs = [c for c in all_figures[0].cases if c.group == "two effects"]
     both = sum(c.found == len(c.hidden) for c in pairs)
     text = "## By kind of case\n\n" + table(("hidden", "right when", *_titles(all_figures)), rows)
     return text + (
         f"\n\nOf the pairs armgap names both in {both} of {len(pairs)}. Outside the library it says "
-        f"*unexplained* in {unexplained} of {len(outside)}. "
+        f"*unexplained* in {unexplained} of {len(outside)}, and names a cause with a probability over 0.5 in {believed}. "
+        f"{located}"
         f"*Not visible*: after re-estimating the parameters, predictions miss by less than {MULTIPLE:g} times what they miss by "
         f"without the effect, and the parameters move by less than {SIGMAS:g} of the arm file's sigmas."
     )
@@ -187,7 +196,7 @@ def _sizes(first: Figures) -> str:
         if first.size_error is None
         else [("median error of sizes, of causes rightly named", f"{first.size_error:.2%}")]
     )
-    shut = first.closed
+    shut, ratio = first.closed, first.ratio
     closed = (
         []
         if shut is None
@@ -198,6 +207,13 @@ def _sizes(first: Figures) -> str:
             )
         ]
     )
+    if ratio is not None:
+        closed.append(
+            (
+                "RMS error on the holdout over that of the true form: median, upper decile",
+                f"{ratio[0]:.2f}, {ratio[1]:.2f}",
+            )
+        )
     rows = [
         *closed,
         *told,

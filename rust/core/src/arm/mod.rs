@@ -115,7 +115,7 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Coriolis matrix `C(q, dq)` with `dM/dt - 2 C` skew-symmetric.
     fn coriolis(&self, theta: &[T; P], q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, N>;
 
-    /// Gravity torque `g(q) = dU/dq` with the base turned by `tilt` [rad] in the plane of motion.
+    /// Gravity torque `g(q) = dU/dq` with the base turned by `tilt`, rad, in the plane of motion.
     fn gravity(&self, theta: &[T; P], q: &SVector<T, N>, tilt: T) -> SVector<T, N>;
 
     /// Regressor of the energy above rest at `q = 0`: `E . theta = K(q, dq) + U(q) - U(0)`.
@@ -137,7 +137,7 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
         (self.momentum_regressor(q, dq), self.potential_regressor(q, dq))
     }
 
-    /// Change of `theta` when a point `mass` [kg] is fixed `distance` [m] along the last link.
+    /// Change of `theta` when a point `mass`, kg, is fixed `distance`, m, along the last link.
     fn payload(&self, theta: &[T; P], mass: T, distance: T) -> [T; P];
 
     /// Angles whose sines and cosines [`Arm::balance`] needs, with the base turned by `tilt`.
