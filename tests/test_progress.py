@@ -75,10 +75,9 @@ def test_a_diagnosis_tells_what_it_does_and_never_falls_back(arm, motion):
     told: list[tuple[str, float]] = []
     diagnose([motion], arm, progress=lambda work, fraction: told.append((work, fraction)))
     fractions = np.array([fraction for _, fraction in told])
-    assert len(told) > 2
+    assert all(work for work, _ in told)
     assert np.all(np.diff(fractions) >= 0)
-    assert np.all((fractions >= 0) & (fractions <= 1))
-    assert len({work for work, _ in told}) > 1
+    assert 0 <= fractions[0] < fractions[-1] == 1
 
 
 def test_progress_changes_no_result(arm, motion):
@@ -133,11 +132,10 @@ def test_the_time_left_follows_the_work_done():
 
 def test_a_terminal_shows_a_bar_that_goes_away(case):
     status, text = at_terminal(case)
-    shown = [int(p) for p in PERCENTAGE.findall(text.partition(b"re-estimating")[2])]
+    shown = [int(p) for p in PERCENTAGE.findall(text.rpartition(b"reading")[2])]
     assert status == 0
-    assert len(shown) > 2
+    assert shown
     assert shown == sorted(shown)
-    assert b"testing every effect" in text
     assert text.rstrip().endswith(b"\x1b[2K")  # the line is wiped
 
 
@@ -152,7 +150,12 @@ def test_no_bar_where_nobody_looks(case):
     assert done.stderr == b""
 
 
-def test_control_c_during_a_diagnosis_ends_it_and_leaves_nothing(case, tmp_path):
+def test_control_c_during_a_diagnosis_ends_it_and_leaves_nothing(arm, arm_file, tmp_path_factory, tmp_path):
+    """The log is long enough that nobody diagnoses it before the key is pressed."""
+    log = tmp_path_factory.mktemp("long") / "log.parquet"
+    t = np.arange(24_000) * arm.sample_period
+    simulate(arm, t, seed_torque(t)).write(log)
+    case = ["diagnose", str(log), "--arm", str(arm_file)]
     report, data = tmp_path / "report.html", tmp_path / "data.json"
     status, text = at_terminal([*case, "--report", str(report), "--json", str(data)], interrupt=True)
     assert status == 130

@@ -48,7 +48,10 @@ pub fn watched<T: Send + 'static>(
     let looked = Arc::clone(&shared);
     let result = py.detach(move || wait(&ended, &looked, told));
     match result {
-        Ok(Some(result)) => Ok(result),
+        Ok(Some(result)) => {
+            tell(py, &shared, told, true)?;
+            Ok(result)
+        }
         Ok(None) => match thread.join() {
             Err(panic) => Err(defect(panic)),
             Ok(()) => unreachable!("a thread that ends without a result has panicked"),
@@ -80,7 +83,7 @@ fn wait<T>(ended: &Receiver<T>, shared: &Shared, told: &Py<PyAny>) -> PyResult<O
             Ok(result) => return Ok(Some(result)),
             Err(RecvTimeoutError::Disconnected) => return Ok(None),
             Err(RecvTimeoutError::Timeout) => {
-                let told = (looks % TELL == 0).then_some(told);
+                let told = (looks % TELL == 1).then_some(told);
                 Python::attach(|py| look(py, shared, told))?;
             }
         }
@@ -90,10 +93,15 @@ fn wait<T>(ended: &Receiver<T>, shared: &Shared, told: &Py<PyAny>) -> PyResult<O
 /// Lets Python handle its signals, and tells it how far the work is if it wants to know now.
 fn look(py: Python<'_>, shared: &Shared, told: Option<&Py<PyAny>>) -> PyResult<()> {
     py.check_signals()?;
-    let Some(told) = told else { return Ok(()) };
-    let latest = shared.latest.lock().unwrap_or_else(PoisonError::into_inner).take();
+    told.map_or(Ok(()), |told| tell(py, shared, told, false))
+}
+
+/// Tells Python how far the work is; all of it, once it has ended.
+fn tell(py: Python<'_>, shared: &Shared, told: &Py<PyAny>, ended: bool) -> PyResult<()> {
+    let latest = *shared.latest.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(progress) = latest {
-        told.call1(py, (progress.work.title(), progress.fraction))?;
+        let fraction = if ended { 1.0 } else { progress.fraction };
+        told.call1(py, (progress.work.title(), fraction))?;
     }
     Ok(())
 }
