@@ -64,6 +64,12 @@ const RESAMPLES: usize = 400;
 /// A contender with fewer parameters is preferred if it reaches this part of the best one's advantage.
 const ALMOST: f64 = 0.95;
 
+/// The same where even the best leaves most of the gap: there, further parameters are taken up by what they are not about.
+const ALMOST_IN_DOUBT: f64 = 0.6;
+
+/// A contender that explains more than this part of the gap is about it.
+const MOST: f64 = 0.5;
+
 /// A contender whose cost is within this part of the winner's advantage is a look-alike.
 const LOOK_ALIKE: f64 = 0.03;
 
@@ -214,7 +220,8 @@ fn choose<const N: usize, const P: usize>(
 fn simplest<const N: usize, const P: usize>(stage: &Stage<N, P>, best: usize, noticeable: f64) -> usize {
     let advantage = |i: usize| stage.base.score() - stage.contenders[i].score();
     let size = |i: usize| stage.contenders[i].effect.as_ref().map_or(0, Placed::len);
-    let enough = ALMOST * advantage(best);
+    let almost = if stage.share(&stage.contenders[best]) > MOST { ALMOST } else { ALMOST_IN_DOUBT };
+    let enough = almost * advantage(best);
     let as_good =
         |i: &usize| advantage(*i) > enough && moves(stage, &stage.contenders[*i], noticeable) && size(*i) > 0;
     if size(best) == 0 {

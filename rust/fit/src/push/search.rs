@@ -36,6 +36,9 @@ const LIKELY: f64 = 5.0;
 const ABOVE_REMAINDER: f64 = 3.9;
 const CERTAIN: f64 = 12.0;
 
+/// A log whose largest bell is smaller than this holds no push, not even ones that hide each other.
+const WORTH_A_SEARCH: f64 = 3.9;
+
 /// Height, relative to the joint's friction at rest, from which a push exceeds it.
 const ABOVE_FRICTION: f64 = 1.2;
 
@@ -131,6 +134,9 @@ pub fn search<const N: usize>(residual: &Residual<N>, remainder: bool) -> Option
     loop {
         let fitted = search.settle(&bells)?;
         let largest = search.scan(&fitted);
+        if bells.is_empty() && largest.is_none_or(|b| b.z < WORTH_A_SEARCH) {
+            return Some(Found { bells, rest: TRIED });
+        }
         bells = search.refine(bells)?;
         let Some(next) = largest.filter(|b| b.z > TRIED) else { break };
         if bells.len() == MOST {
