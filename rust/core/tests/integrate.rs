@@ -2,6 +2,7 @@
 
 use armgap_core::arm::{Arm, TwoLink};
 use armgap_core::effect::{Active, Pulse, Trial, find};
+use armgap_core::glide::Place;
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::{Mode, Plant};
 use armgap_core::transmission::Hidden;
@@ -191,7 +192,8 @@ fn a_motion_lacks_the_torque_that_the_log_does_not_hold() {
     let (tau, push) = (Vector2::new(12.0, -3.0), Vector2::new(0.9, -0.6));
     let hidden = Hidden::none(q);
     let modes = [Mode::of(dq[0]), Mode::of(dq[1])];
-    let motion = plant.acceleration(0.0, &q, &dq, &(tau + push), &modes, &hidden);
+    let pose = plant.rigid().pose(&Place { q: q.into(), dq: dq.into() });
+    let motion = plant.acceleration(0.0, &pose, &(tau + push), &modes, &hidden);
     let lacking = plant.lacking(0.0, [&q, &dq, &motion.ddq], &tau, &hidden);
     assert!((lacking - push).norm() < 1e-12, "{lacking}");
 }

@@ -107,7 +107,9 @@ fn path<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let drift: Vec<f64> = t.iter().map(|t| (t - middle) / length).collect();
     let mean = residual.iter().sum::<f64>() / residual.len() as f64;
     let slope: f64 = residual.iter().zip(&drift).map(|(r, d)| r * d).sum();
-    residual.iter_mut().zip(&drift).for_each(|(r, d)| *r -= mean + slope * d);
+    for (r, d) in residual.iter_mut().zip(&drift) {
+        *r -= mean + slope * d;
+    }
     let response = |k: usize| {
         let inertia = problem.arm.inertia(&base.theta, &track.q[k]);
         let own = inertia.try_inverse().map_or(0.0, |inverse| inverse[(j, j)]);
@@ -129,8 +131,9 @@ fn fitted(paths: &[Path], cycles: f64) -> Repeat {
     let mut right = [0.0; 2];
     for path in paths {
         let (n, b) = products(path, cycles);
-        normal.iter_mut().zip(n).for_each(|(sum, x)| *sum += path.trust * x);
-        right.iter_mut().zip(b).for_each(|(sum, x)| *sum += path.trust * x);
+        for (sum, x) in normal.iter_mut().zip(n).chain(right.iter_mut().zip(b)) {
+            *sum += path.trust * x;
+        }
     }
     let [ss, sc, cc] = normal;
     let determinant = ss * cc - sc * sc;

@@ -277,7 +277,9 @@ fn kernel(t: &[f64], at: f64, step: f64) -> (usize, Vec<f64>) {
     let mut weights: Vec<f64> = (a..b).map(weight).collect();
     let sum: f64 = weights.iter().sum();
     if sum > 0.0 {
-        weights.iter_mut().for_each(|w| *w /= sum);
+        for weight in &mut weights {
+            *weight /= sum;
+        }
     }
     (a, weights)
 }
