@@ -154,13 +154,13 @@ def test_a_closed_pipe_is_no_error(arm_file, log_file):
 def test_an_interrupt_ends_cleanly(arm_file, tmp_path):
     """Control-C during a long simulation: status 130, one line, nothing written."""
     out = tmp_path / "long.parquet"
-    words = ("simulate", "--arm", arm_file, "--torque", "seed", "--duration", "3000", "-o", out)
+    words = ("simulate", "--arm", arm_file, "--torque", "seed", "--duration", "15000", "-o", out)
     # A shell's background job is started with interrupts ignored; a terminal's is not.
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
     command = [sys.executable, "-c", code + "from armgap.cli import main; main()", *map(str, words)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
-        time.sleep(2.5)
+        time.sleep(2)
         assert process.poll() is None, "the simulation was over before the interrupt"
         process.send_signal(signal.SIGINT)
         out_text, err = process.communicate(timeout=5)
