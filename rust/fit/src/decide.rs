@@ -28,6 +28,9 @@ pub const ABOVE_FLOOR: f64 = 1.25;
 /// Decrease of the distance from trusted values, in squared sigmas, that makes a cause on its own.
 const TRUST_GAIN: f64 = 16.0;
 
+/// Beside an unexplained gap larger than this part of the motion, implausible values are no evidence: the gap may have moved them.
+const TRUSTWORTHY: f64 = 0.01;
+
 /// Contenders whose distance from trusted values differs by less, in squared sigmas, are look-alikes.
 const ALIKE_TRUST: f64 = 6.0;
 
@@ -255,6 +258,7 @@ fn moves<const N: usize, const P: usize>(
 fn restores<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Contender<P>) -> bool {
     let before = stage.base.fit.prior_cost;
     contender.effect.is_some()
+        && (stage.relative_error() < TRUSTWORTHY || !stage.is_open())
         && !is_plausible::<P>(before)
         && before - contender.fit.prior_cost > TRUST_GAIN
         && contender.fit.prior_cost < 0.4 * before
