@@ -53,7 +53,7 @@ const REMAINDER_DOUBT: f64 = 0.2;
 
 /// How fast a remainder takes the probability from causes that leave it: effects that are in no library were seen to be imitated by
 /// two or three that are, for up to eight tenths of the gap.
-const REMAINDER_POWER: i32 = 6;
+pub const REMAINDER_POWER: i32 = 6;
 
 /// The same relative to the first gap: what lies below it is no cause of that gap.
 const NOTICEABLE: f64 = 0.02;

@@ -15,6 +15,9 @@ const AROUND: f64 = 0.25;
 /// Longest push, s.
 const LONGEST: f64 = 2.5;
 
+/// A push that lowers the cost of the windows it touches by less than this share is not seen there.
+const HELPS: f64 = 0.01;
+
 /// Least share of the cost of the windows it touches that a push must explain before its size by output error is believed.
 const EXPLAINS: f64 = 0.5;
 
@@ -41,7 +44,8 @@ struct Touched<'a, A, const N: usize, const P: usize> {
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// The push with the values that output error gives it, and what it explains.
     ///
-    /// Beside a remainder it stays as it was where output error explains too little to be believed; without one, it then is none.
+    /// Beside a remainder it stays as it was where output error explains too little to be believed, if it helps at all; without one, it
+    /// then is none.
     pub(super) fn sized(&self, rough: Event, state: &State<'_, N, P>, known: &[Placed]) -> Option<Event> {
         let sample = without_pushes(if rough.holdout { &self.holdout } else { &self.training });
         let data = around(&sample, &rough);
@@ -66,7 +70,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let sigma = std::array::from_fn(|i| (inverse[(i, i)] * noise).sqrt());
             return Some(Event { push, sigma, share: share(left), ..rough });
         }
-        state.remainder.then(|| Event { share: share(seen).max(0.0), ..rough })
+        (state.remainder && share(seen) > HELPS).then(|| Event { share: share(seen), ..rough })
     }
 }
 

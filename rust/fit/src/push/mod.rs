@@ -9,7 +9,7 @@ mod scatter;
 mod search;
 
 use crate::compose::UNEXPLAINED;
-use crate::decide::{Attribution, CONSEQUENCE, noticeable};
+use crate::decide::{Attribution, CONSEQUENCE, REMAINDER_POWER, left_over, noticeable};
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Work;
 use crate::study::{Sample, Study};
@@ -24,6 +24,12 @@ const SHORTEST: f64 = 0.005;
 
 /// Pieces of one log follow each other within this many sample periods.
 const FOLLOWS: f64 = 8.0;
+
+/// Part of a joint's travel that counts as its end.
+const NEAR_END: f64 = 0.12;
+
+/// Probability left to a push beside a remainder that nothing explains.
+const REMAINDER_DOUBT: f64 = 0.5;
 
 /// Shortest log that is judged, s.
 const SHORTEST_LOG: f64 = 1.5;
@@ -83,6 +89,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 self.set_pushes(&events);
             }
         }
+        let explained = (1.0 - left_over(&attribution.stages)).powi(REMAINDER_POWER);
+        for event in &mut events {
+            event.probability *= REMAINDER_DOUBT + (1.0 - REMAINDER_DOUBT) * explained;
+        }
         (attribution, events)
     }
 
@@ -116,8 +126,25 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 events.iter().filter(|e| e.place() == rough.place()).map(|e| e.push).collect();
             events.extend(self.sized(rough, state, &known));
         }
+        events.retain(|e| !self.meets_an_end(e, &found.bells));
         // So many are no rare events, but something that the arm does again and again.
         if events.len() < MOST { events } else { Vec::new() }
+    }
+
+    /// Whether a push and another one on its joint both drive it back from the same end of its travel: that is where it touches something.
+    fn meets_an_end(&self, event: &Event, bells: &[Bell]) -> bool {
+        let joint = event.push.joint;
+        let [from, to] = self.scales.travel[joint];
+        let end = |q: f64, height: f64| -> i8 {
+            let depth = (q - from) / (to - from);
+            i8::from(depth > 1.0 - NEAR_END && height < 0.0) - i8::from(depth < NEAR_END && height > 0.0)
+        };
+        let track = self.track(event.place());
+        let at = |t: f64| track.q[track.t.partition_point(|x| *x < t).min(track.len() - 1)][joint];
+        let own = end(at(event.push.p[1]), event.push.p[0]);
+        let inside =
+            |b: &&Bell| b.joint == joint && (track.t[0]..=track.t[track.len() - 1]).contains(&b.time);
+        own != 0 && bells.iter().filter(inside).filter(|b| end(at(b.time), b.height) == own).count() > 1
     }
 
     /// A push as the lacking torque shows it.
