@@ -2,7 +2,7 @@
 
 use crate::arm::ArmDescription;
 use crate::attribute::Contender;
-use crate::decide::{Attribution, CONSEQUENCE, left_over};
+use crate::decide::{Attribution, left_over};
 use crate::diagnose::Options;
 use crate::gap::{Errors, free_run_series, gap, rms};
 use crate::locate::{Lack, Lacks, lacking_torque, places, regimes, shares};
@@ -135,8 +135,7 @@ fn verdict<const N: usize, const P: usize>(attribution: &Attribution<N, P>, gap:
     if !attribution.causes.is_empty() {
         return "effect";
     }
-    let stage = &attribution.stages[attribution.stages.len() - 1];
-    if stage.excess() > UNEXPLAINED && stage.relative_error() > CONSEQUENCE {
+    if attribution.is_unexplained() {
         return "unexplained";
     }
     let steps = gap.before.iter().zip(&gap.refit).zip(&gap.floor);
@@ -145,9 +144,6 @@ fn verdict<const N: usize, const P: usize>(attribution: &Attribution<N, P>, gap:
         .any(|((before, refit), floor)| before - refit > 0.2 * before && *before > 2.0 * floor);
     if improved { "parameters" } else { "none" }
 }
-
-/// Cost above the floor, as a factor, beyond which a gap without a cause is called unexplained.
-pub const UNEXPLAINED: f64 = 4.0;
 
 fn cause(cause: &crate::decide::Cause, joints: usize, rotary: bool) -> Cause {
     let spec = cause.effect.law.spec();
@@ -315,8 +311,7 @@ fn notes<const N: usize, const P: usize>(attribution: &Attribution<N, P>) -> Vec
             "the logs fit friction smoothed over {smoothing:.3} rad/s better than dry friction"
         ));
     }
-    let last = &attribution.stages[attribution.stages.len() - 1];
-    if !attribution.causes.is_empty() && last.excess() > UNEXPLAINED && last.relative_error() > CONSEQUENCE {
+    if !attribution.causes.is_empty() && attribution.is_unexplained() {
         notes.push("a gap remains that no further effect in the library explains".to_owned());
     }
     notes

@@ -34,6 +34,9 @@ const TRUSTWORTHY: f64 = 0.01;
 /// Contenders whose distance from trusted values differs by less, in squared sigmas, are look-alikes.
 const ALIKE_TRUST: f64 = 6.0;
 
+/// Cost above the floor, as a factor, beyond which a gap without a cause is called unexplained.
+const UNEXPLAINED: f64 = 4.0;
+
 /// Error relative to the motion within a window below which a gap is of no consequence, whatever the encoders resolve.
 pub const CONSEQUENCE: f64 = 1e-3;
 
@@ -53,7 +56,7 @@ const REMAINDER_DOUBT: f64 = 0.2;
 
 /// How fast a remainder takes the probability from causes that leave it: effects that are in no library were seen to be imitated by
 /// two or three that are, for up to eight tenths of the gap.
-pub const REMAINDER_POWER: i32 = 6;
+const REMAINDER_POWER: i32 = 6;
 
 /// The same relative to the first gap: what lies below it is no cause of that gap.
 const NOTICEABLE: f64 = 0.02;
@@ -101,6 +104,14 @@ pub struct Attribution<const N: usize, const P: usize> {
     pub causes: Vec<Cause>,
     /// Every stage, the last one being the one that accepted nothing.
     pub stages: Vec<Stage<N, P>>,
+}
+
+impl<const N: usize, const P: usize> Attribution<N, P> {
+    /// Whether the final model leaves a gap of consequence that is more than noise.
+    pub fn is_unexplained(&self) -> bool {
+        let last = self.stages.last();
+        last.is_some_and(|s| s.excess() > UNEXPLAINED && s.relative_error() > CONSEQUENCE)
+    }
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
@@ -360,13 +371,15 @@ pub fn left_over<const N: usize, const P: usize>(stages: &[Stage<N, P>]) -> f64 
 /// Lowers the probabilities where a gap of consequence remains that no candidate explains: what leaves it may also be what the named
 /// causes stand in for.
 fn temper<const N: usize, const P: usize>(stages: &[Stage<N, P>], causes: &mut [Cause]) {
-    let left = left_over(stages);
-    if left == 0.0 {
-        return;
-    }
+    let belief = belief_beside(left_over(stages), REMAINDER_DOUBT);
     for cause in causes {
-        cause.probability *= REMAINDER_DOUBT + (1.0 - REMAINDER_DOUBT) * (1.0 - left).powi(REMAINDER_POWER);
+        cause.probability *= belief;
     }
+}
+
+/// What a probability is multiplied by beside a part `left` of the gap that nothing explains: one for none, `least` for all of it.
+pub fn belief_beside(left: f64, least: f64) -> f64 {
+    least + (1.0 - least) * (1.0 - left).powi(REMAINDER_POWER)
 }
 
 /// Values and standard deviations of the causes from the final model.

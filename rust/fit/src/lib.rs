@@ -30,6 +30,7 @@ pub mod screen;
 pub mod simulate;
 pub mod smooth;
 pub mod solve;
+mod starts;
 pub mod study;
 pub mod track;
 pub mod user;

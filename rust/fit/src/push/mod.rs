@@ -8,8 +8,7 @@ mod residual;
 mod scatter;
 mod search;
 
-use crate::compose::UNEXPLAINED;
-use crate::decide::{Attribution, CONSEQUENCE, REMAINDER_POWER, left_over, noticeable};
+use crate::decide::{Attribution, belief_beside, left_over, noticeable};
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Work;
 use crate::study::{Sample, Study};
@@ -51,12 +50,6 @@ pub struct Event {
     pub probability: f64,
 }
 
-/// Whether a model leaves more unexplained than noise.
-fn remains<const N: usize, const P: usize>(attribution: &Attribution<N, P>) -> bool {
-    let last = &attribution.stages[attribution.stages.len() - 1];
-    last.excess() > UNEXPLAINED && last.relative_error() > CONSEQUENCE
-}
-
 /// What pushes are judged against.
 struct State<'a, const N: usize, const P: usize> {
     /// The model with all named causes.
@@ -81,17 +74,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let mut attribution = self.attribute(max_causes, seed);
         let mut events = self.events(&attribution);
         if !events.is_empty() {
-            let settled = remains(&attribution);
+            let beside_remainder = attribution.is_unexplained();
             self.set_pushes(&events);
             attribution = self.attribute(max_causes, seed);
-            if !settled {
+            if !beside_remainder {
                 events = self.events(&attribution);
                 self.set_pushes(&events);
             }
         }
-        let explained = (1.0 - left_over(&attribution.stages)).powi(REMAINDER_POWER);
+        let belief = belief_beside(left_over(&attribution.stages), REMAINDER_DOUBT);
         for event in &mut events {
-            event.probability *= REMAINDER_DOUBT + (1.0 - REMAINDER_DOUBT) * explained;
+            event.probability *= belief;
         }
         (attribution, events)
     }
@@ -102,7 +95,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let state = State {
             model: &attribution.model.hypothesis,
             scale: last.weights.training.scale,
-            remainder: remains(attribution),
+            remainder: attribution.is_unexplained(),
             noticeable: noticeable(first.relative_error()),
         };
         let recordings = self.recordings();

@@ -1,0 +1,265 @@
+//! Changes of the friction modes inside a step: which comes first, and when.
+
+use super::{State, Step};
+use crate::arm::Arm;
+use crate::plant::{Mode, Motion};
+use crate::real::{Real, lit};
+use nalgebra::SVector;
+
+/// Corrections of the located instant; each squares the error of the last.
+const MAX_REFINEMENTS: usize = 4;
+
+/// A correction of this part of a step is as good on a straight line: what is left out is of the order of its square.
+const STRAIGHT: f64 = 1e-6;
+
+/// The same on a curve of constant rate of acceleration, whose error is of the order of its cube.
+const CURVED: f64 = 1e-3;
+
+/// Attempts at the instant of a release.
+const MAX_FALSE_POSITIONS: usize = 12;
+
+/// A release is found where holding takes more than friction gives, but by less than this part of what the step changes.
+const RELEASED: f64 = 1e-8;
+
+/// Attempts are made this part of a step beyond where the root is expected, so that they end on its far side.
+const BEYOND: f64 = 1e-9;
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N, P> {
+    /// The mode change that a trial step runs into first, if any.
+    #[inline]
+    pub(super) fn first_event(
+        &self,
+        state: &State<T, N>,
+        trial: &State<T, N>,
+        x: T,
+        dt: T,
+        k1: &Motion<T, N>,
+    ) -> Option<Event<T>> {
+        let reverses =
+            |j: usize| self.plant.is_dry(j) && trial.dq[j] * state.modes[j].direction() < T::zero();
+        let any_stuck = state.modes.contains(&Mode::Stuck);
+        if !any_stuck && !(0..N).any(reverses) {
+            return None;
+        }
+        let end = self.motion(x + dt, trial);
+        let mut first: Option<Event<T>> = None;
+        for j in 0..N {
+            let event = if reverses(j) {
+                let s = hermite_root(state.dq[j], k1.ddq[j] * dt, trial.dq[j], end.ddq[j] * dt);
+                Some(Event { joint: j, s, change: Change::Stop })
+            } else if state.modes[j] == Mode::Stuck {
+                self.release(j, state, trial, x, dt, &end)
+            } else {
+                None
+            };
+            if let Some(event) = event
+                && first.as_ref().is_none_or(|earliest| event.s < earliest.s)
+            {
+                first = Some(event);
+            }
+        }
+        first
+    }
+
+    /// When a stuck joint breaks away within the step, by linear interpolation of the torque that it lacks.
+    fn release(
+        &self,
+        j: usize,
+        state: &State<T, N>,
+        trial: &State<T, N>,
+        x: T,
+        dt: T,
+        end: &Motion<T, N>,
+    ) -> Option<Event<T>> {
+        let t = self.interval.t;
+        let tau_end = self.joint_torque(x + dt, trial);
+        let (after, direction) = self.plant.excess(j, t + x + dt, trial.q[j], tau_end[j], end.holding[j]);
+        if after <= T::zero() {
+            return None;
+        }
+        let start = self.motion(x, state);
+        let tau = self.joint_torque(x, state);
+        let (before, _) = self.plant.excess(j, t + x, state.q[j], tau[j], start.holding[j]);
+        let s = if before < T::zero() { before / (before - after) } else { T::zero() };
+        let change = Change::Release { mode: Mode::of(direction), excess: [before, after] };
+        Some(Event { joint: j, s, change })
+    }
+
+    /// Integrates up to the event.
+    #[inline(never)]
+    pub(super) fn locate(
+        &self,
+        state: &State<T, N>,
+        event: &Event<T>,
+        x: T,
+        dt: T,
+        k1: &Motion<T, N>,
+    ) -> Located<T, N> {
+        if event.joint >= N {
+            // No event has such a joint; said here so that no index below needs a panic.
+            return Located { length: dt, reached: *state };
+        }
+        match event.change {
+            Change::Stop => self.locate_stop(state, event, x, dt, k1),
+            Change::Release { excess: [before, after], .. } if before < T::zero() => {
+                self.locate_release(state, event.joint, [before, after], x, dt, k1)
+            }
+            Change::Release { .. } => Located { length: T::zero(), reached: *state },
+        }
+    }
+
+    /// Integrates to where a velocity vanishes: Newton's method, its last correction so small that a straight line is exact.
+    fn locate_stop(
+        &self,
+        state: &State<T, N>,
+        event: &Event<T>,
+        x: T,
+        dt: T,
+        k1: &Motion<T, N>,
+    ) -> Located<T, N> {
+        let mut s = event.s;
+        let mut reached = self.runge_kutta(state, x, s * dt, k1);
+        for _ in 0..MAX_REFINEMENTS {
+            let slope = self.motion(x + s * dt, &reached);
+            let correction = -reached.dq[event.joint] / (slope.ddq[event.joint] * dt);
+            let next = s + correction;
+            if !(next > T::zero() && next <= T::one()) {
+                break;
+            }
+            s = next;
+            if correction.abs() < lit(STRAIGHT) {
+                reached = self.moved(&reached, correction * dt, &reached, &slope);
+                break;
+            }
+            if correction.abs() < lit(CURVED) && !self.plant.is_driven() && s > lit(0.01) {
+                let rate = (slope.ddq - k1.ddq) / ((s - correction) * dt);
+                let (part, reached) = curved(&reached, event.joint, &slope.ddq, &rate);
+                return Located { length: (s - correction) * dt + part, reached };
+            }
+            reached = self.runge_kutta(state, x, s * dt, k1);
+        }
+        Located { length: s * dt, reached }
+    }
+
+    /// Integrates to just beyond where friction no longer holds joint `j`: false position in Illinois' way (Dowell and Jarratt 1971)
+    /// between the start of the step, where `excess[0] < 0`, and its end, where `excess[1] > 0`.
+    fn locate_release(
+        &self,
+        state: &State<T, N>,
+        j: usize,
+        excess: [T; 2],
+        x: T,
+        dt: T,
+        k1: &Motion<T, N>,
+    ) -> Located<T, N> {
+        let ([mut low, mut high], [mut before, mut after]) = ([T::zero(), T::one()], excess);
+        let enough = (after - before) * lit(RELEASED);
+        let mut last_high = None;
+        let mut reached = None;
+        for _ in 0..MAX_FALSE_POSITIONS {
+            let s = (high - after * (high - low) / (after - before) + lit(BEYOND)).min(high);
+            let there = self.runge_kutta(state, x, s * dt, k1);
+            let motion = self.motion(x + s * dt, &there);
+            let tau = self.joint_torque(x + s * dt, &there);
+            let (lacks, _) =
+                self.plant.excess(j, self.interval.t + x + s * dt, there.q[j], tau[j], motion.holding[j]);
+            let beyond = lacks > T::zero();
+            let again = last_high == Some(beyond);
+            last_high = Some(beyond);
+            if beyond {
+                (high, after, reached) = (s, lacks, Some(there));
+                before *= if again { lit(0.5) } else { T::one() };
+            } else {
+                (low, before) = (s, lacks);
+                after *= if again { lit(0.5) } else { T::one() };
+            }
+            if beyond && lacks < enough {
+                break;
+            }
+        }
+        let reached = reached.unwrap_or_else(|| self.runge_kutta(state, x, high * dt, k1));
+        Located { length: high * dt, reached }
+    }
+}
+
+/// The state where joint `j`'s velocity vanishes, close to `state` with these accelerations and their rates, and the time to there.
+fn curved<T: Real, const N: usize>(
+    state: &State<T, N>,
+    j: usize,
+    ddq: &SVector<T, N>,
+    rate: &SVector<T, N>,
+) -> (T, State<T, N>) {
+    let half: T = lit(0.5);
+    let first = -state.dq[j] / ddq[j];
+    let d = -(state.dq[j] + half * rate[j] * first * first) / ddq[j];
+    let mut next = *state;
+    next.q += (state.dq + (ddq + rate * (d / lit(3.0))) * (half * d)) * d;
+    next.dq += (ddq + rate * (half * d)) * d;
+    (d, next)
+}
+
+/// A change of one joint's mode at the fraction `s` of a step.
+pub(super) struct Event<T> {
+    joint: usize,
+    s: T,
+    change: Change<T>,
+}
+
+/// What happens at an event.
+enum Change<T> {
+    /// The velocity reaches zero.
+    Stop,
+    /// Friction no longer holds; by how much it lacks at the start and at the end of the step.
+    Release {
+        /// The mode it changes to.
+        mode: Mode,
+        /// What holding takes beyond friction's level at both ends of the step.
+        excess: [T; 2],
+    },
+}
+
+/// A state at a located event and the time it took to get there.
+pub(super) struct Located<T, const N: usize> {
+    /// Time, s.
+    pub(super) length: T,
+    /// State.
+    pub(super) reached: State<T, N>,
+}
+
+impl<T: Real> Event<T> {
+    /// The state just after the event.
+    pub(super) fn apply<const N: usize>(&self, mut state: State<T, N>) -> State<T, N> {
+        let j = self.joint;
+        match self.change {
+            Change::Stop => (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck),
+            Change::Release { mode, .. } => state.modes[j] = mode,
+        }
+        state
+    }
+}
+
+/// First root in `(0, 1)` of the cubic with values `v0, v1` and slopes `d0, d1` at the ends, where `v0 v1 <= 0` or the curve
+/// leaves zero first; found by bisection and Newton on the polynomial alone.
+fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
+    let (two, three) = (lit::<T>(2.0), lit::<T>(3.0));
+    let (c3, c2) = (two * (v0 - v1) + d0 + d1, three * (v1 - v0) - two * d0 - d1);
+    let value = |s: T| v0 + s * (d0 + s * (c2 + s * c3));
+    let slope = |s: T| d0 + s * (two * c2 + s * three * c3);
+    let (mut low, mut high) = (T::zero(), T::one());
+    let mut s = if v0 == T::zero() { lit(0.5) } else { v0 / (v0 - v1) };
+    for _ in 0..40 {
+        let f = value(s);
+        if f * v1 > T::zero() {
+            high = s;
+        } else {
+            low = s;
+        }
+        let newton = s - f / slope(s);
+        let next = if newton > low && newton < high { newton } else { (low + high) / two };
+        if (next - s).abs() < lit(1e-13) {
+            return next;
+        }
+        s = next;
+    }
+    s
+}
