@@ -72,3 +72,12 @@ def test_the_same_motion_without_pushes_shows_none() -> None:
     found = judged(run(3, pushed=False))
     assert found.causes == ()
     assert found.verdict == "unexplained"
+
+
+def test_an_end_that_is_met_again_and_again_is_no_push() -> None:
+    """A joint that hits something at one end of its travel: named as several pushes if each is looked at alone."""
+    free = run(4, pushed=False)
+    stop = {"position": float(np.quantile(free.q[:, 0], 0.9)), "stiffness": 60.0, "damping": 0.1}
+    met = [*UNMODELLED, Effect("contact", 1, stop)]
+    log = simulate(TRUE, free.t, free.tau, effects=met, noise=1e-4, seed=4, name="log", tolerance=1e-5)
+    assert judged(replace(log, tau=free.tau)).causes == ()
