@@ -43,31 +43,31 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> Rigid<V, 
         for j in 0..N {
             turns[j] = Turn::of(angles[j]);
         }
-        self.turned(place, angles, turns)
+        self.turned(place, turns)
     }
 
-    /// A place near a known pose, and how far its angles are from there.
+    /// The pose at a place which is `by` further on than a known pose, and how far its angles are from there.
     #[inline(always)]
-    pub fn near(&self, known: &Pose<V, N>, place: &Place<V, N>) -> (Pose<V, N>, V) {
-        let angles = self.arm.angles(&place.q, self.tilt);
-        let (mut turns, mut far) = (known.turns, V::of(lit(0.0)));
+    pub fn near(&self, known: &Pose<V, N>, place: &Place<V, N>, by: &[V; N]) -> (Pose<V, N>, V) {
+        let zero = V::of(lit(0.0));
+        let angles = self.arm.angles(by, zero);
+        let (mut turns, mut far) = (known.turns, zero);
         for j in 0..N {
-            let d = angles[j] - known.angles[j];
-            turns[j] = known.turns[j].by(d);
-            far = d.size().larger(far);
+            turns[j] = known.turns[j].by(angles[j]);
+            far = angles[j].size().larger(far);
         }
-        (self.turned(place, angles, turns), far)
+        (self.turned(place, turns), far)
     }
 
     #[inline(always)]
-    fn turned(&self, place: &Place<V, N>, angles: [V; N], turns: [Turn<V>; N]) -> Pose<V, N> {
+    fn turned(&self, place: &Place<V, N>, turns: [Turn<V>; N]) -> Pose<V, N> {
         let mut balance = self.arm.balance(&self.theta, &turns, &place.dq);
         for i in 0..N {
             for j in 0..N {
                 balance.inertia[i][j] = balance.inertia[i][j] + self.added[i][j];
             }
         }
-        Pose { place: *place, angles, turns, balance }
+        Pose { place: *place, turns, balance }
     }
 }
 
@@ -85,9 +85,7 @@ pub struct Place<V, const N: usize> {
 pub struct Pose<V, const N: usize> {
     /// Positions and velocities.
     pub place: Place<V, N>,
-    /// Angles that the arm's equation depends on.
-    pub angles: [V; N],
-    /// Their sines and cosines.
+    /// Sines and cosines of the angles that the arm's equation depends on.
     pub turns: [Turn<V>; N],
     /// Inertia and `C dq + g`.
     pub balance: Balance<V, N>,
@@ -106,8 +104,8 @@ pub struct Instant<'a, V, const N: usize> {
 
 /// What glides: an arm with its friction and effects, or several.
 pub trait Body<V: Number, const N: usize> {
-    /// A place near a known pose, and how far its angles are from there.
-    fn near(&self, known: &Pose<V, N>, place: &Place<V, N>) -> (Pose<V, N>, V);
+    /// The pose at a place which is `by` further on than a known pose, and how far its angles are from there.
+    fn near(&self, known: &Pose<V, N>, place: &Place<V, N>, by: &[V; N]) -> (Pose<V, N>, V);
 
     /// Torques that accelerate: `tau - C dq - g - f` and what effects add, friction in these directions.
     fn pull(&self, at: &Instant<'_, V, N>, direction: &[V; N]) -> [V; N];
@@ -154,13 +152,28 @@ pub struct Span<V, const N: usize> {
     pub tau: [[V; N]; 3],
 }
 
-/// A step's end.
+/// A step's end, and what it says of the modes on the way.
 #[derive(Debug, Clone, Copy)]
 pub struct Glided<V, const N: usize> {
     /// Where it ends.
     pub pose: Pose<V, N>,
-    /// Positive, or no number, where the modes are not those of the motion, or the motion is not finite or too far for one step.
+    /// Positive, or no number, where the modes are not those of the motion, or the step is too far.
     pub wrong: V,
+    /// Positive, or no number, where the motion is not finite or too far for one step.
+    pub far: V,
+    /// Accelerations at the start and, in the last stage's approximation, at the end.
+    pub ddq: [[V; N]; 2],
+    /// What holds stuck joints at the same two instants; of no meaning where none is stuck.
+    pub held: [Held<V, N>; 2],
+}
+
+/// What it takes to hold stuck joints.
+#[derive(Debug, Clone, Copy)]
+pub struct Held<V, const N: usize> {
+    /// Torques of friction.
+    pub holding: [V; N],
+    /// By how much they are more than friction gives, where a joint is stuck; anything not positive elsewhere.
+    pub excess: [V; N],
 }
 
 /// The torques that accelerate, and the accelerations.
@@ -192,37 +205,38 @@ fn motion<V: Number, B: Body<V, N>, const N: usize>(
     Motion { pull, ddq: solve_positive_definite(inertia, right) }
 }
 
-/// Positive where a stuck joint is not held.
+/// What holds stuck joints.
 #[inline(always)]
-fn released<V: Number, B: Body<V, N>, const N: usize>(
+fn held<V: Number, B: Body<V, N>, const N: usize>(
     body: &B,
     at: &Instant<'_, V, N>,
     motion: &Motion<V, N>,
     modes: &Modes<V, N>,
-) -> V {
+) -> Held<V, N> {
     let mut holding = motion.pull;
     for i in 0..N {
         for j in 0..N {
             holding[i] = (-at.pose.balance.inertia[i][j]).fused(motion.ddq[j], holding[i]);
         }
     }
-    let excess = body.excess(at, &holding, &modes.direction);
-    let mut worst = excess[0];
-    for j in 1..N {
-        worst = worst.larger(excess[j]);
-    }
-    worst
+    Held { holding, excess: body.excess(at, &holding, &modes.direction) }
 }
 
-/// `place` moved on by `dt` at these rates.
+/// `place` moved on by `dt` at these rates, and by how far.
 #[inline(always)]
-fn moved<V: Number, const N: usize>(place: &Place<V, N>, dt: V, dq: &[V; N], ddq: &[V; N]) -> Place<V, N> {
-    let mut next = *place;
+fn moved<V: Number, const N: usize>(
+    place: &Place<V, N>,
+    dt: V,
+    dq: &[V; N],
+    ddq: &[V; N],
+) -> (Place<V, N>, [V; N]) {
+    let (mut next, mut by) = (*place, *dq);
     for j in 0..N {
-        next.q[j] = dt.fused(dq[j], place.q[j]);
+        by[j] = dt * dq[j];
+        next.q[j] = place.q[j] + by[j];
         next.dq[j] = dt.fused(ddq[j], place.dq[j]);
     }
-    next
+    (next, by)
 }
 
 /// Positive where a joint's mode contradicts its velocity or its acceleration.
@@ -246,38 +260,39 @@ pub fn glide<V: Number, B: Body<V, N>, const N: usize>(
     let (zero, place) = (c(0.0), &start.place);
     let at = Instant { t: span.t, pose: start, tau: &span.tau[0] };
     let m1 = motion(body, &at, modes);
-    let mut wrong = -c(1.0);
-    for j in 0..N {
-        let off = contradiction(place.dq[j], m1.ddq[j], modes.direction[j], modes.slides[j]);
-        wrong = wrong.larger(off * body.dry(j));
-    }
+    let none = Held { holding: [zero; N], excess: [zero; N] };
+    let mut holds = [none; 2];
     if modes.held {
-        wrong = wrong.larger(released(body, &at, &m1, modes));
+        holds[0] = held(body, &at, &m1, modes);
     }
-    let s2 = moved(place, half, &place.dq, &m1.ddq);
-    let (pose, far2) = body.near(start, &s2);
+    let (s2, by) = moved(place, half, &place.dq, &m1.ddq);
+    let (pose, far2) = body.near(start, &s2, &by);
     let m2 = motion(body, &Instant { t: span.t + half, pose: &pose, tau: &span.tau[1] }, modes);
-    let s3 = moved(place, half, &s2.dq, &m2.ddq);
-    let (pose, far3) = body.near(start, &s3);
+    let (s3, by) = moved(place, half, &s2.dq, &m2.ddq);
+    let (pose, far3) = body.near(start, &s3, &by);
     let m3 = motion(body, &Instant { t: span.t + half, pose: &pose, tau: &span.tau[1] }, modes);
-    let s4 = moved(place, span.h, &s3.dq, &m3.ddq);
-    let (pose, far4) = body.near(start, &s4);
-    let t = span.t + span.h;
-    let m4 = motion(body, &Instant { t, pose: &pose, tau: &span.tau[2] }, modes);
-    let (mut end, mut finite) = (*place, zero);
+    let (s4, by) = moved(place, span.h, &s3.dq, &m3.ddq);
+    let (pose, far4) = body.near(start, &s4, &by);
+    let at = Instant { t: span.t + span.h, pose: &pose, tau: &span.tau[2] };
+    let m4 = motion(body, &at, modes);
+    if modes.held {
+        holds[1] = held(body, &at, &m4, modes);
+    }
+    let (mut end, mut by) = (*place, place.q);
+    let (mut wrong, mut finite) = (-c(1.0), zero);
     for j in 0..N {
         let (v, a) = (s2.dq[j] + s3.dq[j], m2.ddq[j] + m3.ddq[j]);
-        end.q[j] = sixth.fused(place.dq[j] + (v + v) + s4.dq[j], place.q[j]);
+        by[j] = sixth * (place.dq[j] + (v + v) + s4.dq[j]);
+        end.q[j] = place.q[j] + by[j];
         end.dq[j] = sixth.fused(m1.ddq[j] + (a + a) + m4.ddq[j], place.dq[j]);
-        wrong = wrong.larger(-(end.dq[j] * modes.direction[j]) * body.dry(j));
+        let direction = modes.direction[j];
+        let off = contradiction(place.dq[j], m1.ddq[j], direction, modes.slides[j]);
+        wrong = wrong.larger(off.larger(-(end.dq[j] * direction)) * body.dry(j));
+        wrong = wrong.larger(holds[0].excess[j].larger(holds[1].excess[j]));
         // What is not finite leaves its mark in this sum.
         finite = end.q[j].fused(zero, end.dq[j].fused(zero, finite));
     }
-    let (pose, far) = body.near(start, &end);
-    if modes.held {
-        let at = Instant { t, pose: &pose, tau: &span.tau[2] };
-        wrong = wrong.larger(released(body, &at, &motion(body, &at, modes), modes));
-    }
-    let far = far.larger(far2).larger(far3).larger(far4) - c(NEAR);
-    Glided { pose, wrong: wrong.larger(far) + finite }
+    let (pose, far) = body.near(start, &end, &by);
+    let far = far.larger(far2).larger(far3).larger(far4) - c(NEAR) + finite;
+    Glided { pose, wrong: wrong.larger(far) + finite, far, ddq: [m1.ddq, m4.ddq], held: holds }
 }

@@ -31,6 +31,18 @@ impl<T: Copy, C, const W: usize> Lanes<T, C, W> {
     }
 }
 
+impl<T: Real, C, const W: usize> Lanes<T, C, W> {
+    /// Whether every one is zero or negative; none of them is no number.
+    #[inline(always)]
+    pub fn none_positive(self) -> bool {
+        let mut none = true;
+        for l in 0..W {
+            none &= self.0[l] <= T::zero();
+        }
+        none
+    }
+}
+
 /// One operation, lane by lane.
 macro_rules! lane_by_lane {
     ($($operation:ident $function:ident),*) => {

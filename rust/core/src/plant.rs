@@ -434,8 +434,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Body<T, N> for Plant<T, A, N, P> {
     #[inline(always)]
-    fn near(&self, known: &Pose<T, N>, place: &Place<T, N>) -> (Pose<T, N>, T) {
-        self.rigid.near(known, place)
+    fn near(&self, known: &Pose<T, N>, place: &Place<T, N>, by: &[T; N]) -> (Pose<T, N>, T) {
+        self.rigid.near(known, place, by)
     }
 
     #[inline(always)]
@@ -448,12 +448,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Body<T, N> for Pl
         let Pose { place: Place { q, dq }, balance, .. } = at.pose;
         let mut pull = *at.tau;
         for j in 0..N {
-            pull[j] = pull[j] - balance.bias[j] - self.rigid.viscous[j] * dq[j];
+            // What is known first is subtracted first: the bias is not.
+            pull[j] -= self.rigid.viscous[j] * dq[j];
             let hooks = self.hooks[j];
             if !(hooks.coulomb || hooks.force) {
-                pull[j] -= self.rigid.coulomb[j].larger(T::zero()) * direction[j];
+                pull[j] = pull[j] - self.rigid.coulomb[j].larger(T::zero()) * direction[j] - balance.bias[j];
                 continue;
             }
+            pull[j] -= balance.bias[j];
             let mut x = self.point(j, at.t, q[j], dq[j], at.tau[j], balance.bias[j]);
             if direction[j] != T::zero() {
                 pull[j] -= self.level(j, &x, direction[j]) * direction[j];

@@ -1,19 +1,14 @@
 //! Changes of the friction modes inside a step: which comes first, and when.
 
+use super::root::{Close, STRAIGHT, hermite_root};
 use super::{State, Step};
 use crate::arm::Arm;
+use crate::glide::Place;
 use crate::plant::{Mode, Motion};
 use crate::real::{Real, lit};
-use nalgebra::SVector;
 
 /// Corrections of the located instant; each squares the error of the last.
 const MAX_REFINEMENTS: usize = 4;
-
-/// A correction of this part of a step is as good on a straight line: what is left out is of the order of its square.
-const STRAIGHT: f64 = 1e-6;
-
-/// The same on a curve of constant rate of acceleration, whose error is of the order of its cube.
-const CURVED: f64 = 1e-3;
 
 /// Attempts at the instant of a release.
 const MAX_FALSE_POSITIONS: usize = 12;
@@ -121,20 +116,24 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         let mut reached = self.runge_kutta(state, x, s * dt, k1);
         for _ in 0..MAX_REFINEMENTS {
             let slope = self.motion(x + s * dt, &reached);
-            let correction = -reached.dq[event.joint] / (slope.ddq[event.joint] * dt);
-            let next = s + correction;
+            let place = Place { q: reached.q.into(), dq: reached.dq.into() };
+            let ddq = [&k1.ddq.into(), &slope.ddq.into()];
+            let close = Close { place: &place, j: event.joint, length: s * dt, ddq };
+            let correction = close.correction();
+            let next = s + correction / dt;
             if !(next > T::zero() && next <= T::one()) {
                 break;
             }
-            s = next;
-            if correction.abs() < lit(STRAIGHT) {
-                reached = self.moved(&reached, correction * dt, &reached, &slope);
-                break;
+            if !self.plant.is_driven()
+                && let Some((more, place)) = close.reached(dt)
+            {
+                (reached.q, reached.dq) = (place.q.into(), place.dq.into());
+                return Located { length: s * dt + more, reached };
             }
-            if correction.abs() < lit(CURVED) && !self.plant.is_driven() && s > lit(0.01) {
-                let rate = (slope.ddq - k1.ddq) / ((s - correction) * dt);
-                let (part, reached) = curved(&reached, event.joint, &slope.ddq, &rate);
-                return Located { length: (s - correction) * dt + part, reached };
+            s = next;
+            if correction.abs() < lit::<T>(STRAIGHT) * dt {
+                reached = self.moved(&reached, correction, &reached, &slope);
+                break;
             }
             reached = self.runge_kutta(state, x, s * dt, k1);
         }
@@ -182,22 +181,6 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
     }
 }
 
-/// The state where joint `j`'s velocity vanishes, close to `state` with these accelerations and their rates, and the time to there.
-fn curved<T: Real, const N: usize>(
-    state: &State<T, N>,
-    j: usize,
-    ddq: &SVector<T, N>,
-    rate: &SVector<T, N>,
-) -> (T, State<T, N>) {
-    let half: T = lit(0.5);
-    let first = -state.dq[j] / ddq[j];
-    let d = -(state.dq[j] + half * rate[j] * first * first) / ddq[j];
-    let mut next = *state;
-    next.q += (state.dq + (ddq + rate * (d / lit(3.0))) * (half * d)) * d;
-    next.dq += (ddq + rate * (half * d)) * d;
-    (d, next)
-}
-
 /// A change of one joint's mode at the fraction `s` of a step.
 pub(super) struct Event<T> {
     joint: usize,
@@ -236,30 +219,4 @@ impl<T: Real> Event<T> {
         }
         state
     }
-}
-
-/// First root in `(0, 1)` of the cubic with values `v0, v1` and slopes `d0, d1` at the ends, where `v0 v1 <= 0` or the curve
-/// leaves zero first; found by bisection and Newton on the polynomial alone.
-fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
-    let (two, three) = (lit::<T>(2.0), lit::<T>(3.0));
-    let (c3, c2) = (two * (v0 - v1) + d0 + d1, three * (v1 - v0) - two * d0 - d1);
-    let value = |s: T| v0 + s * (d0 + s * (c2 + s * c3));
-    let slope = |s: T| d0 + s * (two * c2 + s * three * c3);
-    let (mut low, mut high) = (T::zero(), T::one());
-    let mut s = if v0 == T::zero() { lit(0.5) } else { v0 / (v0 - v1) };
-    for _ in 0..40 {
-        let f = value(s);
-        if f * v1 > T::zero() {
-            high = s;
-        } else {
-            low = s;
-        }
-        let newton = s - f / slope(s);
-        let next = if newton > low && newton < high { newton } else { (low + high) / two };
-        if (next - s).abs() < lit(1e-13) {
-            return next;
-        }
-        s = next;
-    }
-    s
 }

@@ -6,6 +6,7 @@
 //! level. So the arm left under a torque below that level does not creep, and a step across a reversal keeps its accuracy.
 
 mod crossing;
+pub(crate) mod root;
 
 use crate::arm::Arm;
 use crate::effect::Pulse;
@@ -59,7 +60,7 @@ pub struct Interval<'a, T, const N: usize> {
 impl<T: Real, const N: usize> Interval<'_, T, N> {
     /// Torque at `x` seconds after the sample.
     #[inline]
-    fn torque_at(&self, x: T) -> SVector<T, N> {
+    pub(crate) fn torque_at(&self, x: T) -> SVector<T, N> {
         let s = x / self.h;
         SVector::from_fn(|j, _| {
             let pulse = &self.torque[j];
@@ -109,7 +110,7 @@ fn glided<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
         direction[j] = state.modes[j].direction();
     }
     let start = plant.rigid().pose(&Place { q: state.q.into(), dq: state.dq.into() });
-    let Glided { pose, wrong } = glide(plant, &start, &Modes::new(direction), &span);
+    let Glided { pose, wrong, .. } = glide(plant, &start, &Modes::new(direction), &span);
     let right = wrong <= T::zero();
     if right {
         (state.q, state.dq) = (pose.place.q.into(), pose.place.dq.into());
@@ -117,14 +118,15 @@ fn glided<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     right
 }
 
-/// One sample interval with exact friction in one step, from mode change to mode change.
+/// The rest of a sample interval, of which `done` seconds are over, with exact friction, from mode change to mode change.
 #[inline(never)]
 pub(crate) fn exact<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     plant: &Plant<T, A, N, P>,
     state: &mut State<T, N>,
     interval: &Interval<T, N>,
+    done: T,
 ) {
-    Step::new(plant, interval, state).exact(state, T::zero(), interval.h);
+    Step::new(plant, interval, state).exact(state, done, interval.h - done);
 }
 
 /// One sub-step's surroundings.
@@ -145,7 +147,11 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
     #[inline]
     fn motion(&self, x: T, state: &State<T, N>) -> Motion<T, N> {
         let place = Place { q: state.q.into(), dq: state.dq.into() };
-        let (mut pose, far) = self.plant.rigid().near(&self.origin, &place);
+        let mut by = place.q;
+        for j in 0..N {
+            by[j] = place.q[j] - self.origin.place.q[j];
+        }
+        let (mut pose, far) = self.plant.rigid().near(&self.origin, &place, &by);
         if far > lit(NEAR) {
             pose = self.plant.rigid().pose(&place);
         }

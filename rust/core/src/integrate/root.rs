@@ -1,0 +1,81 @@
+//! Where a velocity vanishes within a step, from what is known at its ends.
+
+use crate::glide::Place;
+use crate::real::{Real, lit};
+
+/// A correction of this part of a step is as good on a straight line: what is left out is of the order of its square.
+pub(super) const STRAIGHT: f64 = 1e-6;
+
+/// The same on a curve of constant rate of acceleration, whose error is of the order of its cube.
+const CURVED: f64 = 1e-3;
+
+/// The rate of acceleration over less than this part of a step is not known well enough.
+const SHORT: f64 = 0.01;
+
+/// A place close to where joint `j`'s velocity vanishes, `length` after the start of a step, and the accelerations at both.
+pub(crate) struct Close<'a, T, const N: usize> {
+    pub(crate) place: &'a Place<T, N>,
+    pub(crate) j: usize,
+    pub(crate) length: T,
+    pub(crate) ddq: [&'a [T; N]; 2],
+}
+
+impl<T: Real, const N: usize> Close<'_, T, N> {
+    /// By how much the velocity vanishes later, by Newton's method.
+    #[inline]
+    pub(crate) fn correction(&self) -> T {
+        -self.place.dq[self.j] / self.ddq[1][self.j]
+    }
+
+    /// The place where the velocity vanishes and the time from here to there, if it is so close within a step of `whole` that no
+    /// further step is needed.
+    #[inline]
+    pub(crate) fn reached(&self, whole: T) -> Option<(T, Place<T, N>)> {
+        let correction = self.correction();
+        let curved = correction.abs() < whole * lit(CURVED) && self.length > whole * lit(SHORT);
+        if !curved && !(correction.abs() < whole * lit(STRAIGHT)) {
+            return None;
+        }
+        let [first, ddq] = self.ddq;
+        let mut rate = [T::zero(); N];
+        if curved {
+            for i in 0..N {
+                rate[i] = (ddq[i] - first[i]) / self.length;
+            }
+        }
+        let (j, half): (usize, T) = (self.j, lit(0.5));
+        let d = -(self.place.dq[j] + half * rate[j] * correction * correction) / ddq[j];
+        let mut next = *self.place;
+        for i in 0..N {
+            next.q[i] += (self.place.dq[i] + (ddq[i] + rate[i] * (d / lit(3.0))) * (half * d)) * d;
+            next.dq[i] += (ddq[i] + rate[i] * (half * d)) * d;
+        }
+        Some((d, next))
+    }
+}
+
+/// First root in `(0, 1)` of the cubic with values `v0, v1` and slopes `d0, d1` at the ends, where `v0 v1 <= 0` or the curve
+/// leaves zero first; found by bisection and Newton on the polynomial alone.
+#[inline]
+pub(crate) fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
+    let (two, three) = (lit::<T>(2.0), lit::<T>(3.0));
+    let (c3, c2) = (two * (v0 - v1) + d0 + d1, three * (v1 - v0) - two * d0 - d1);
+    let value = |s: T| v0 + s * (d0 + s * (c2 + s * c3));
+    let slope = |s: T| d0 + s * (two * c2 + s * three * c3);
+    let (mut low, mut high) = (T::zero(), T::one());
+    let mut s = if v0 == T::zero() { lit(0.5) } else { v0 / (v0 - v1) };
+    for _ in 0..40 {
+        let f = value(s);
+        if f * v1 > T::zero() {
+            high = s;
+        } else {
+            low = s;
+        }
+        let newton = s - f / slope(s);
+        if (newton - s).abs() < lit(1e-13) {
+            return newton.max(low).min(high);
+        }
+        s = if newton > low && newton < high { newton } else { (low + high) / two };
+    }
+    s
+}

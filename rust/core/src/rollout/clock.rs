@@ -1,0 +1,73 @@
+//! Where a lane is on its run, and what it is about.
+
+use crate::real::Real;
+
+/// Mode changes within one interval before the rest of it is taken alone.
+pub(super) const MAX_CHANGES: usize = 12;
+
+/// One lane's time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Clock<T, const N: usize> {
+    /// Interval.
+    pub(super) k: usize,
+    /// Intervals of the run; none is left once `k` gets there.
+    pub(super) rows: usize,
+    /// Part of the interval that is done, s.
+    pub(super) done: T,
+    /// Part of the interval that is left, s.
+    pub(super) left: T,
+    /// The reversal that the step shall end at.
+    pub(super) goal: Option<Reversal<T>>,
+    /// Joints that could not be released at this instant.
+    pub(super) tried: [bool; N],
+    /// Steps that ended short of the interval's end.
+    pub(super) changes: usize,
+}
+
+impl<T: Real, const N: usize> Clock<T, N> {
+    /// Before the first interval.
+    pub(super) fn new(rows: usize) -> Self {
+        Self { k: 0, rows, done: T::zero(), left: T::zero(), goal: None, tried: [false; N], changes: 0 }
+    }
+
+    /// Whether the run has ended.
+    #[inline(always)]
+    pub(super) fn is_over(&self) -> bool {
+        self.k >= self.rows
+    }
+
+    /// Whether the next step is the whole interval.
+    #[inline(always)]
+    pub(super) fn is_whole(&self) -> bool {
+        self.done == T::zero() && self.goal.is_none()
+    }
+
+    /// Goes on within the interval, at another instant.
+    #[inline]
+    pub(super) fn pass(&mut self, time: T) {
+        (self.done, self.left) = (self.done + time, self.left - time);
+        (self.goal, self.tried) = (None, [false; N]);
+        self.changes += 1;
+    }
+
+    /// Length of the next step.
+    #[inline(always)]
+    pub(super) fn length(&self) -> T {
+        self.goal.map_or(self.left, |goal| goal.length)
+    }
+
+    /// Goes on to the next interval.
+    #[inline(always)]
+    pub(super) fn next(&mut self) {
+        *self = Self { k: self.k + 1, ..Self::new(self.rows) };
+    }
+}
+
+/// A joint's reversal within a step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reversal<T> {
+    /// The joint.
+    pub(super) joint: usize,
+    /// When, s after the step's start.
+    pub(super) length: T,
+}

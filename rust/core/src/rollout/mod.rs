@@ -1,0 +1,67 @@
+//! Many runs together, one in each lane of a vector unit.
+//!
+//! Each run has its own plant, start, times and torques. A step is taken by all lanes at once with the friction modes they have
+//! ([`crate::glide`]), and every lane has its own clock: where a joint reverses within a step, that lane goes back to where the step
+//! started, and takes a shorter one to the reversal and another to the sample while the others go on. What is rarer (a joint that
+//! breaks away within a step, a step too far) a lane takes alone ([`crate::integrate`]). A run whose plant has more to it than
+//! friction modes is made alone from start to end.
+
+mod abreast;
+mod bundle;
+mod change;
+mod clock;
+
+use crate::arm::Arm;
+use crate::cpu::{Cpu, Level, Work};
+use crate::effect::Pulse;
+use crate::integrate::State;
+use crate::lanes::Lanes;
+use crate::plant::Plant;
+use crate::real::Real;
+use abreast::Abreast;
+
+/// Runs taken together.
+pub const WIDTH: usize = 8;
+
+type Wide<T, C> = Lanes<T, C, WIDTH>;
+
+/// One run: from `state` at the first of the times to the last.
+pub struct Run<'a, T: Real, A, const N: usize, const P: usize> {
+    /// What moves; [`Plant::glides`].
+    pub plant: &'a Plant<T, A, N, P>,
+    /// Sample times, s.
+    pub t: &'a [T],
+    /// Torques from each sample to the next.
+    pub torque: &'a [[Pulse<T>; N]],
+    /// State at the first sample; once the run is made, where it ended.
+    pub state: State<T, N>,
+    /// Positions at all further samples, `N` for each; those after a run has left the limit stay as they are.
+    pub positions: &'a mut [T],
+}
+
+/// Makes up to [`WIDTH`] runs; each ends where a position exceeds `limit` or is no number.
+pub struct Together<'r, 'a, T: Real, A, const N: usize, const P: usize> {
+    /// The runs.
+    pub runs: &'r mut [Run<'a, T, A, N, P>],
+    /// Largest position.
+    pub limit: T,
+}
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Together<'_, '_, T, A, N, P> {
+    /// Makes them with these instructions.
+    pub fn make(self, level: Level) {
+        level.run_wide(self);
+    }
+}
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Work for Together<'_, '_, T, A, N, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<C: Cpu>(self) {
+        let Some(mut lanes) = Abreast::<T, C, A, N, P>::new(self.runs, self.limit) else { return };
+        while lanes.are_moving() {
+            lanes.step(self.runs);
+        }
+    }
+}
