@@ -10,7 +10,7 @@ use armgap_core::cpu::Level;
 use armgap_core::effect::Pulse;
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
-use armgap_core::rollout::{Run, Together, WIDTH};
+use armgap_core::rollout::{Run, Together};
 use nalgebra::Vector2;
 use std::hint::black_box;
 use std::io::Write;
@@ -107,9 +107,7 @@ impl Case {
                 positions,
             })
             .collect();
-        for group in runs.chunks_mut(WIDTH) {
-            Together { runs: group, limit: 1e3 }.make(level);
-        }
+        Together { runs: &mut runs, limit: 1e3 }.make(level);
     }
 }
 

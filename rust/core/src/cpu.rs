@@ -14,6 +14,9 @@ use crate::real::Real;
 
 /// Arithmetic of a kind of processor.
 pub trait Cpu: Copy {
+    /// Doubles that it takes together.
+    const DOUBLES: usize;
+
     /// `a b + c`, rounded once where that is one instruction.
     fn fused<T: Real>(a: T, b: T, c: T) -> T;
 }
@@ -23,19 +26,23 @@ pub trait Cpu: Copy {
 pub struct Portable;
 
 impl Cpu for Portable {
+    const DOUBLES: usize = 2;
+
     #[inline(always)]
     fn fused<T: Real>(a: T, b: T, c: T) -> T {
         if cfg!(all(feature = "std", target_feature = "fma")) { a.mul_add(b, c) } else { a * b + c }
     }
 }
 
-/// A processor that multiplies and adds in one instruction.
+/// A processor that multiplies and adds in one instruction, so many doubles at once.
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[derive(Debug, Clone, Copy)]
-struct Fused;
+struct Fused<const DOUBLES: usize>;
 
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
-impl Cpu for Fused {
+impl<const DOUBLES: usize> Cpu for Fused<DOUBLES> {
+    const DOUBLES: usize = DOUBLES;
+
     #[inline(always)]
     fn fused<T: Real>(a: T, b: T, c: T) -> T {
         a.mul_add(b, c)
@@ -145,7 +152,7 @@ fn on_avx2<W: Work>(work: W) -> W::Output {
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[target_feature(enable = "avx2,fma")]
 fn avx2<W: Work>(work: W) -> W::Output {
-    work.run::<Fused>()
+    work.run::<Fused<4>>()
 }
 
 /// Runs the work compiled for AVX-512.
@@ -160,7 +167,7 @@ fn on_avx512<W: Work>(work: W) -> W::Output {
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[target_feature(enable = "avx2,fma,avx512f")]
 fn avx512<W: Work>(work: W) -> W::Output {
-    work.run::<Fused>()
+    work.run::<Fused<8>>()
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use crate::arm::{Arm, Balance};
 use crate::linear::solve_positive_definite;
 use crate::number::Number;
 use crate::real::lit;
-use crate::trig::{NEAR, Turn};
+use crate::trig::{NEAR, SLIGHT, Turn};
 
 /// An arm with numbers in the form its equation needs them.
 #[derive(Debug, Clone, Copy)]
@@ -46,17 +46,20 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> Rigid<V, 
         self.turned(place, turns)
     }
 
-    /// The pose at a place which is `by` further on than a known pose, and how far its angles are from there.
+    /// The pose at a place which is `by` further on than a known pose, and how far that is: beyond 1, too far.
     #[inline(always)]
-    pub fn near(&self, known: &Pose<V, N>, place: &Place<V, N>, by: &[V; N]) -> (Pose<V, N>, V) {
+    pub fn near(&self, known: &Pose<V, N>, place: &Place<V, N>, by: &[V; N], reach: Reach) -> (Pose<V, N>, V) {
         let zero = V::of(lit(0.0));
         let angles = self.arm.angles(by, zero);
         let (mut turns, mut far) = (known.turns, zero);
         for j in 0..N {
-            turns[j] = known.turns[j].by(angles[j]);
+            turns[j] = match reach {
+                Reach::Near => turns[j].by(angles[j]),
+                Reach::Beside => turns[j].slightly_by(angles[j]),
+            };
             far = angles[j].size().larger(far);
         }
-        (self.turned(place, turns), far)
+        (self.turned(place, turns), far * V::of(lit(1.0 / reach.largest())))
     }
 
     #[inline(always)]
@@ -91,6 +94,20 @@ pub struct Pose<V, const N: usize> {
     pub balance: Balance<V, N>,
 }
 
+impl<V: Number, const N: usize> Pose<V, N> {
+    /// All zero.
+    #[inline(always)]
+    pub(crate) fn none() -> Self {
+        let zero = V::of(lit(0.0));
+        let (zeros, inertia) = ([zero; N], [[zero; N]; N]);
+        Self {
+            place: Place { q: zeros, dq: zeros },
+            turns: [Turn { sine: zero, cosine: zero }; N],
+            balance: Balance { inertia, bias: zeros },
+        }
+    }
+}
+
 /// An instant of a step.
 #[derive(Debug, Clone, Copy)]
 pub struct Instant<'a, V, const N: usize> {
@@ -102,10 +119,30 @@ pub struct Instant<'a, V, const N: usize> {
     pub tau: &'a [V; N],
 }
 
+/// How far it can be from one pose to another; a shorter way takes shorter series.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reach {
+    /// As far as an arm gets in a step.
+    Near,
+    /// As far as the stages of a step are from each other.
+    Beside,
+}
+
+impl Reach {
+    /// Largest difference of angles, rad.
+    #[inline(always)]
+    pub fn largest(self) -> f64 {
+        match self {
+            Self::Near => NEAR,
+            Self::Beside => SLIGHT,
+        }
+    }
+}
+
 /// What glides: an arm with its friction and effects, or several.
 pub trait Body<V: Number, const N: usize> {
-    /// The pose at a place which is `by` further on than a known pose, and how far its angles are from there.
-    fn near(&self, known: &Pose<V, N>, place: &Place<V, N>, by: &[V; N]) -> (Pose<V, N>, V);
+    /// The pose at a place which is `by` further on than a known pose, and how far that is: beyond 1, too far.
+    fn near(&self, known: &Pose<V, N>, place: &Place<V, N>, by: &[V; N], reach: Reach) -> (Pose<V, N>, V);
 
     /// Torques that accelerate: `tau - C dq - g - f` and what effects add, friction in these directions.
     fn pull(&self, at: &Instant<'_, V, N>, direction: &[V; N]) -> [V; N];
@@ -125,7 +162,7 @@ pub struct Modes<V, const N: usize> {
     /// 1 for joints that slide, 0 for those that are stuck.
     slides: [V; N],
     /// Whether any is stuck.
-    held: bool,
+    pub(crate) held: bool,
 }
 
 impl<V: Number, const N: usize> Modes<V, N> {
@@ -152,11 +189,9 @@ pub struct Span<V, const N: usize> {
     pub tau: [[V; N]; 3],
 }
 
-/// A step's end, and what it says of the modes on the way.
+/// Whether a step's modes were those of the motion, and what tells which changed.
 #[derive(Debug, Clone, Copy)]
-pub struct Glided<V, const N: usize> {
-    /// Where it ends.
-    pub pose: Pose<V, N>,
+pub struct Signs<V, const N: usize> {
     /// Positive, or no number, where the modes are not those of the motion, or the step is too far.
     pub wrong: V,
     /// Positive, or no number, where the motion is not finite or too far for one step.
@@ -165,6 +200,16 @@ pub struct Glided<V, const N: usize> {
     pub ddq: [[V; N]; 2],
     /// What holds stuck joints at the same two instants; of no meaning where none is stuck.
     pub held: [Held<V, N>; 2],
+}
+
+impl<V: Number, const N: usize> Signs<V, N> {
+    /// Those of no step.
+    #[inline(always)]
+    pub fn none() -> Self {
+        let zero = V::of(lit(0.0));
+        let held = Held { holding: [zero; N], excess: [zero; N] };
+        Self { wrong: zero, far: zero, ddq: [[zero; N]; 2], held: [held; 2] }
+    }
 }
 
 /// What it takes to hold stuck joints.
@@ -247,52 +292,139 @@ fn contradiction<V: Number>(dq: V, ddq: V, direction: V, slides: V) -> V {
     dq.where_zero(released, dq.size() - dq * direction)
 }
 
-/// One step with these friction modes.
+/// Where the arm is at a stage, how it accelerates there, by how much that is further on than the start, and how far.
+#[derive(Clone, Copy)]
+struct Stage<V, const N: usize> {
+    pose: Pose<V, N>,
+    motion: Motion<V, N>,
+    by: [V; N],
+    far: V,
+}
+
+/// The stage `dt` after the start, moved there at the rates of the stage before, under the `tau`-th torques.
+#[inline(always)]
+fn stage<V: Number, B: Body<V, N>, const N: usize>(
+    step: &Step<'_, V, B, N>,
+    dt: V,
+    tau: usize,
+    before: Rates<'_, V, N>,
+    beside: Option<&Stage<V, N>>,
+) -> Stage<V, N> {
+    let Step { body, start, modes, span } = step;
+    let (place, by) = moved(&start.place, dt, before.dq, before.ddq);
+    let (pose, far) = match beside {
+        None => body.near(start, &place, &by, Reach::Near),
+        Some(stage) => stage.near(*body, &place, &by),
+    };
+    let motion = motion(*body, &Instant { t: span.t + dt, pose: &pose, tau: &span.tau[tau] }, modes);
+    Stage { pose, motion, by, far }
+}
+
+impl<V: Number, const N: usize> Stage<V, N> {
+    /// The pose at a place beside this one, `by` further on than the start.
+    #[inline(always)]
+    fn near<B: Body<V, N>>(&self, body: &B, place: &Place<V, N>, by: &[V; N]) -> (Pose<V, N>, V) {
+        let mut way = *by;
+        for j in 0..N {
+            way[j] = by[j] - self.by[j];
+        }
+        body.near(&self.pose, place, &way, Reach::Beside)
+    }
+}
+
+/// What a step is taken from.
+pub struct Step<'a, V, B, const N: usize> {
+    /// What moves.
+    pub body: &'a B,
+    /// Where it starts.
+    pub start: &'a Pose<V, N>,
+    /// Friction modes.
+    pub modes: &'a Modes<V, N>,
+    /// Times and torques.
+    pub span: &'a Span<V, N>,
+}
+
+/// Rates at a stage.
+#[derive(Clone, Copy)]
+struct Rates<'a, V, const N: usize> {
+    dq: &'a [V; N],
+    ddq: &'a [V; N],
+}
+
+impl<V, const N: usize> Stage<V, N> {
+    #[inline(always)]
+    fn rates(&self) -> Rates<'_, V, N> {
+        Rates { dq: &self.pose.place.dq, ddq: &self.motion.ddq }
+    }
+}
+
+impl<V: Number, B: Body<V, N>, const N: usize> Step<'_, V, B, N> {
+    /// How it moves at the start.
+    #[inline(always)]
+    fn first(&self) -> Motion<V, N> {
+        motion(self.body, &Instant { t: self.span.t, pose: self.start, tau: &self.span.tau[0] }, self.modes)
+    }
+
+    /// Its rates there.
+    #[inline(always)]
+    fn rates<'s>(&'s self, first: &'s Motion<V, N>) -> Rates<'s, V, N> {
+        Rates { dq: &self.start.place.dq, ddq: &first.ddq }
+    }
+}
+
+/// One step with these friction modes: where it ends. Its signs are written over `signs`.
 #[inline(always)]
 pub fn glide<V: Number, B: Body<V, N>, const N: usize>(
-    body: &B,
-    start: &Pose<V, N>,
-    modes: &Modes<V, N>,
-    span: &Span<V, N>,
-) -> Glided<V, N> {
+    step: &Step<'_, V, B, N>,
+    signs: &mut Signs<V, N>,
+) -> Pose<V, N> {
+    let half = step.span.h * V::of(lit(0.5));
+    let s1 = step.first();
+    let s2 = stage(step, half, 1, step.rates(&s1), None);
+    let s3 = stage(step, half, 1, s2.rates(), Some(&s2));
+    let s4 = stage(step, step.span.h, 2, s3.rates(), None);
+    end(step, &s1, [&s2, &s3, &s4], signs)
+}
+
+/// The end of a step with these stages.
+#[inline(always)]
+fn end<V: Number, B: Body<V, N>, const N: usize>(
+    step: &Step<'_, V, B, N>,
+    s1: &Motion<V, N>,
+    [s2, s3, s4]: [&Stage<V, N>; 3],
+    signs: &mut Signs<V, N>,
+) -> Pose<V, N> {
     let c = |x: f64| V::of(lit(x));
-    let (half, sixth) = (span.h * c(0.5), span.h * c(1.0 / 6.0));
-    let (zero, place) = (c(0.0), &start.place);
-    let at = Instant { t: span.t, pose: start, tau: &span.tau[0] };
-    let m1 = motion(body, &at, modes);
-    let none = Held { holding: [zero; N], excess: [zero; N] };
-    let mut holds = [none; 2];
+    let Step { body, start, modes, span } = step;
+    let (mut wrong, mut finite) = (-c(1.0), c(0.0));
     if modes.held {
-        holds[0] = held(body, &at, &m1, modes);
+        let at = Instant { t: span.t, pose: start, tau: &span.tau[0] };
+        let first = held(*body, &at, s1, modes);
+        let at = Instant { t: span.t + span.h, pose: &s4.pose, tau: &span.tau[2] };
+        let last = held(*body, &at, &s4.motion, modes);
+        for j in 0..N {
+            wrong = wrong.larger(first.excess[j].larger(last.excess[j]));
+        }
+        signs.held = [first, last];
     }
-    let (s2, by) = moved(place, half, &place.dq, &m1.ddq);
-    let (pose, far2) = body.near(start, &s2, &by);
-    let m2 = motion(body, &Instant { t: span.t + half, pose: &pose, tau: &span.tau[1] }, modes);
-    let (s3, by) = moved(place, half, &s2.dq, &m2.ddq);
-    let (pose, far3) = body.near(start, &s3, &by);
-    let m3 = motion(body, &Instant { t: span.t + half, pose: &pose, tau: &span.tau[1] }, modes);
-    let (s4, by) = moved(place, span.h, &s3.dq, &m3.ddq);
-    let (pose, far4) = body.near(start, &s4, &by);
-    let at = Instant { t: span.t + span.h, pose: &pose, tau: &span.tau[2] };
-    let m4 = motion(body, &at, modes);
-    if modes.held {
-        holds[1] = held(body, &at, &m4, modes);
-    }
+    let place = &start.place;
     let (mut end, mut by) = (*place, place.q);
-    let (mut wrong, mut finite) = (-c(1.0), zero);
+    let sixth = span.h * c(1.0 / 6.0);
+    let ddq = [s1.ddq, s4.motion.ddq];
     for j in 0..N {
-        let (v, a) = (s2.dq[j] + s3.dq[j], m2.ddq[j] + m3.ddq[j]);
-        by[j] = sixth * (place.dq[j] + (v + v) + s4.dq[j]);
+        // The velocities of the stages are `dq` and half, half and all of a step at the accelerations before.
+        let sum = s1.ddq[j] + s2.motion.ddq[j] + s3.motion.ddq[j];
+        by[j] = span.h * sixth.fused(sum, place.dq[j]);
         end.q[j] = place.q[j] + by[j];
-        end.dq[j] = sixth.fused(m1.ddq[j] + (a + a) + m4.ddq[j], place.dq[j]);
+        end.dq[j] = sixth.fused(sum + sum + (ddq[1][j] - ddq[0][j]), place.dq[j]);
         let direction = modes.direction[j];
-        let off = contradiction(place.dq[j], m1.ddq[j], direction, modes.slides[j]);
+        let off = contradiction(place.dq[j], ddq[0][j], direction, modes.slides[j]);
         wrong = wrong.larger(off.larger(-(end.dq[j] * direction)) * body.dry(j));
-        wrong = wrong.larger(holds[0].excess[j].larger(holds[1].excess[j]));
         // What is not finite leaves its mark in this sum.
-        finite = end.q[j].fused(zero, end.dq[j].fused(zero, finite));
+        finite = end.q[j].fused(c(0.0), end.dq[j].fused(c(0.0), finite));
     }
-    let (pose, far) = body.near(start, &end, &by);
-    let far = far.larger(far2).larger(far3).larger(far4) - c(NEAR) + finite;
-    Glided { pose, wrong: wrong.larger(far) + finite, far, ddq: [m1.ddq, m4.ddq], held: holds }
+    let (pose, far) = s4.near(*body, &end, &by);
+    let far = far.larger(s2.far).larger(s3.far).larger(s4.far) - c(1.0) + finite;
+    (signs.wrong, signs.far, signs.ddq) = (wrong.larger(far) + finite, far, ddq);
+    pose
 }

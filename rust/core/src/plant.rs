@@ -6,7 +6,7 @@
 
 use crate::arm::{Arm, Balance};
 use crate::effect::{Active, Hooks, JointPoint};
-use crate::glide::{Body, Instant, Place, Pose, Rigid};
+use crate::glide::{Body, Instant, Place, Pose, Reach, Rigid};
 use crate::linear::solve_positive_definite;
 use crate::number::Number;
 use crate::real::{Real, lit};
@@ -434,8 +434,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Body<T, N> for Plant<T, A, N, P> {
     #[inline(always)]
-    fn near(&self, known: &Pose<T, N>, place: &Place<T, N>, by: &[T; N]) -> (Pose<T, N>, T) {
-        self.rigid.near(known, place, by)
+    fn near(&self, known: &Pose<T, N>, place: &Place<T, N>, by: &[T; N], reach: Reach) -> (Pose<T, N>, T) {
+        self.rigid.near(known, place, by, reach)
     }
 
     #[inline(always)]

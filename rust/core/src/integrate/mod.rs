@@ -10,11 +10,10 @@ pub(crate) mod root;
 
 use crate::arm::Arm;
 use crate::effect::Pulse;
-use crate::glide::{Glided, Modes, Place, Pose, Span, glide};
+use crate::glide::{self, Modes, Place, Pose, Reach, Signs, Span, glide};
 use crate::plant::{Mode, Motion, Plant};
 use crate::real::{Real, lit};
 use crate::transmission::Hidden;
-use crate::trig::NEAR;
 use crossing::Located;
 use nalgebra::SVector;
 
@@ -110,8 +109,10 @@ fn glided<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
         direction[j] = state.modes[j].direction();
     }
     let start = plant.rigid().pose(&Place { q: state.q.into(), dq: state.dq.into() });
-    let Glided { pose, wrong, .. } = glide(plant, &start, &Modes::new(direction), &span);
-    let right = wrong <= T::zero();
+    let modes = Modes::new(direction);
+    let mut signs = Signs::none();
+    let pose = glide(&glide::Step { body: plant, start: &start, modes: &modes, span: &span }, &mut signs);
+    let right = signs.wrong <= T::zero();
     if right {
         (state.q, state.dq) = (pose.place.q.into(), pose.place.dq.into());
     }
@@ -151,8 +152,8 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
         for j in 0..N {
             by[j] = place.q[j] - self.origin.place.q[j];
         }
-        let (mut pose, far) = self.plant.rigid().near(&self.origin, &place, &by);
-        if far > lit(NEAR) {
+        let (mut pose, far) = self.plant.rigid().near(&self.origin, &place, &by, Reach::Near);
+        if far > T::one() {
             pose = self.plant.rigid().pose(&place);
         }
         let tau = self.interval.torque_at(x);

@@ -3,16 +3,17 @@
 use super::bundle::Bundle;
 use super::change::{Outcome, Taken};
 use super::clock::Clock;
-use super::{Run, WIDTH, Wide};
+use super::{Run, WIDTH};
 use crate::arm::Arm;
 use crate::cpu::Cpu;
 use crate::effect::Pulse;
-use crate::glide::{Glided, Held, Modes, Place, Pose, Span, glide};
+use crate::glide::{Held, Modes, Place, Pose, Reach, Signs, Span, Step, glide};
 use crate::integrate::{Interval, State, exact};
+use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::plant::Mode;
 use crate::real::{Real, lit};
-use crate::trig::NEAR;
+use core::array::from_fn;
 use nalgebra::SVector;
 
 /// Steps after which sines and cosines that were turned on step by step are computed afresh.
@@ -21,49 +22,80 @@ const AFRESH: usize = 64;
 /// Taken from what is wrong in lanes that have ended.
 const IDLE: f64 = 1e30;
 
+/// How the lanes go through a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Course {
+    /// All from sample to sample.
+    Even,
+    /// Some through the rest of an interval.
+    Parted,
+    /// Some to a reversal.
+    Aimed,
+}
+
+/// Where a lane is after a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum After {
+    /// Within an interval.
+    Within,
+    /// At its end.
+    There,
+    /// At its end, taken alone.
+    Alone,
+}
+
 /// The lanes' states on their way.
-pub(super) struct Abreast<'a, T: Real, C, A, const N: usize, const P: usize> {
-    bundle: Bundle<'a, T, C, A, N, P>,
-    pose: Pose<Wide<T, C>, N>,
-    modes: Modes<Wide<T, C>, N>,
+pub(super) struct Abreast<'a, T: Real, C, A, const W: usize, const H: usize, const N: usize, const P: usize> {
+    bundles: [Bundle<'a, T, C, A, W, N, P>; H],
+    poses: [Pose<Lanes<T, C, W>, N>; H],
+    modes: [Modes<Lanes<T, C, W>, N>; H],
+    spans: [Span<Lanes<T, C, W>, N>; H],
+    /// Where the last step started, and what it says.
+    starts: [Place<Lanes<T, C, W>, N>; H],
+    signs: [Signs<Lanes<T, C, W>, N>; H],
     clocks: [Clock<T, N>; WIDTH],
     /// Nothing in lanes that move, so much that nothing is wrong in those that have ended.
-    idle: Wide<T, C>,
+    idle: [Lanes<T, C, W>; H],
+    /// Which run is in which lane, and its times and torques.
+    runs: [usize; WIDTH],
+    times: [&'a [T]; WIDTH],
+    torques: [&'a [[Pulse<T>; N]]; WIDTH],
     /// Lanes that move.
     moving: usize,
-    /// Whether all lanes that move go from sample to sample.
-    even: bool,
+    /// The run that enters next.
+    waiting: usize,
+    course: Course,
     steps: usize,
     limit: T,
 }
 
-impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Abreast<'a, T, C, A, N, P> {
+impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const N: usize, const P: usize> Abreast<'a, T, C, A, W, H, N, P> {
     #[inline(always)]
-    pub(super) fn new(runs: &[Run<'a, T, A, N, P>], limit: T) -> Option<Self> {
-        let first = runs.first()?;
-        let of = |l: usize| runs.get(l).unwrap_or(first);
-        let bundle = Bundle::new(core::array::from_fn(|l| of(l).plant));
-        let zero = Wide::of(T::zero());
-        let mut place = Place { q: [zero; N], dq: [zero; N] };
-        let mut direction = [zero; N];
-        let mut clocks = [Clock::new(0); WIDTH];
+    pub(super) fn new(runs: &mut [Run<'a, T, A, N, P>], limit: T) -> Option<Self> {
+        let plant = runs.first()?.plant;
+        let zero = Lanes::of(T::zero());
+        let mut lanes = Self {
+            bundles: from_fn(|_| Bundle::new(plant)),
+            poses: [Pose::none(); H],
+            modes: [Modes::new([zero; N]); H],
+            spans: [Span { t: zero, h: zero, tau: [[zero; N]; 3] }; H],
+            starts: [Pose::none().place; H],
+            signs: [Signs::none(); H],
+            clocks: [Clock::new(0); WIDTH],
+            runs: [0; WIDTH],
+            times: [&[]; WIDTH],
+            torques: [&[]; WIDTH],
+            idle: [zero; H],
+            moving: WIDTH,
+            waiting: 0,
+            course: Course::Even,
+            steps: 0,
+            limit,
+        };
         for l in 0..WIDTH {
-            let state = &of(l).state;
-            put(&mut place, l, &Place { q: state.q.into(), dq: state.dq.into() });
-            for j in 0..N {
-                direction[j].0[l] = state.modes[j].direction();
-            }
-            let rows = |run: &Run<'a, T, A, N, P>| run.torque.len().min(run.positions.len() / N);
-            clocks[l] = Clock::new(runs.get(l).map_or(0, rows));
+            lanes.enter(runs, l);
         }
-        let pose = bundle.rigid.pose(&place);
-        let (modes, moving) = (Modes::new(direction), WIDTH);
-        let mut lanes = Self { bundle, pose, modes, clocks, idle: zero, moving, even: false, steps: 0, limit };
-        for l in 0..WIDTH {
-            if lanes.clocks[l].is_over() {
-                lanes.rest(l);
-            }
-        }
+        lanes.renew_modes();
         Some(lanes)
     }
 
@@ -76,134 +108,218 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Abrea
     /// One step of every lane.
     #[inline(always)]
     pub(super) fn step(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
-        let span = if self.even { self.intervals(runs) } else { self.parts(runs) };
-        let start = self.pose.place;
-        let glided = glide(&self.bundle, &self.pose, &self.modes, &span);
-        self.pose = glided.pose;
-        self.steps += 1;
-        let mut wrong = glided.wrong - self.idle;
-        for j in 0..N {
-            wrong = wrong.larger(self.pose.place.q[j].size() - Wide::of(self.limit));
+        self.intervals();
+        if self.course != Course::Even {
+            self.parts();
         }
-        if self.even && wrong.none_positive() {
-            for (l, run) in runs.iter_mut().enumerate().take(WIDTH) {
-                let Clock { k, rows, .. } = self.clocks[l];
-                if k < rows {
-                    write(run, k, &numbers(&self.pose.place.q, l));
-                    self.clocks[l].k = k + 1;
-                    if k + 1 == rows {
-                        self.end(run, l);
-                    }
+        self.glide();
+        let mut right = self.course != Course::Aimed;
+        for i in 0..H {
+            let mut wrong = self.signs[i].wrong - self.idle[i];
+            for j in 0..N {
+                wrong = wrong.larger(self.poses[i].place.q[j].size() - Lanes::of(self.limit));
+            }
+            right &= wrong.none_positive();
+        }
+        if right {
+            self.arrive_all(runs);
+        } else {
+            self.sort_out(runs);
+        }
+        self.steps += 1;
+        if self.steps >= AFRESH {
+            for i in 0..H {
+                self.poses[i] = self.bundles[i].rigid.pose(&self.poses[i].place);
+            }
+            self.steps = 0;
+        }
+    }
+
+    /// One step of every lane with the modes it has.
+    #[inline(always)]
+    fn glide(&mut self) {
+        for i in 0..H {
+            self.starts[i] = self.poses[i].place;
+            let step = Step {
+                body: &self.bundles[i],
+                start: &self.poses[i],
+                modes: &self.modes[i],
+                span: &self.spans[i],
+            };
+            self.poses[i] = glide(&step, &mut self.signs[i]);
+        }
+    }
+
+    /// Goes on from a step that was right in all lanes.
+    #[inline(always)]
+    fn arrive_all(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
+        let mut ended = false;
+        for l in 0..WIDTH {
+            let clock = &mut self.clocks[l];
+            if clock.is_over() {
+                continue;
+            }
+            write(&mut runs[self.runs[l]], clock.k, &lane_of(&self.poses[l / W].place, l % W).q);
+            if self.course == Course::Even {
+                clock.k += 1;
+            } else {
+                clock.next();
+            }
+            ended |= clock.is_over();
+        }
+        self.course = Course::Even;
+        if ended {
+            for l in 0..WIDTH {
+                if self.clocks[l].has_ended() {
+                    self.end(runs, l);
                 }
             }
-        } else {
-            self.sort_out(runs, &start, &glided);
-        }
-        if self.steps >= AFRESH {
-            self.pose = self.bundle.rigid.pose(&self.pose.place);
-            self.steps = 0;
+            self.renew_modes();
         }
     }
 
     /// Goes on from a step after which lanes go different ways.
     #[inline(always)]
-    fn sort_out(
-        &mut self,
-        runs: &mut [Run<'a, T, A, N, P>],
-        start: &Place<Wide<T, C>, N>,
-        glided: &Glided<Wide<T, C>, N>,
-    ) {
-        let (place, arrived) = self.judge(runs, start, glided);
-        self.modes = Modes::new(self.modes.direction);
-        let mut by = place.q;
-        for j in 0..N {
-            by[j] = place.q[j] - self.pose.place.q[j];
+    fn sort_out(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
+        let (places, after) = self.judge();
+        for i in 0..H {
+            let mut by = places[i].q;
+            for j in 0..N {
+                by[j] = places[i].q[j] - self.poses[i].place.q[j];
+            }
+            self.poses[i] = self.bundles[i].rigid.near(&self.poses[i], &places[i], &by, Reach::Near).0;
         }
-        let (pose, far) = self.bundle.rigid.near(&self.pose, &place, &by);
-        self.pose = pose;
-        if !(far - Wide::of(lit(NEAR))).none_positive() {
-            self.steps = AFRESH;
+        for l in 0..WIDTH {
+            if after[l] == After::Alone {
+                self.pose_afresh(l);
+            }
+            if after[l] != After::Within {
+                self.arrive(runs, l);
+            }
         }
-        for (l, run) in runs.iter_mut().enumerate().take(WIDTH).filter(|(l, _)| arrived[*l]) {
-            self.arrive(run, l);
+        self.renew_modes();
+    }
+
+    /// Modes of the directions as they are now.
+    #[inline(always)]
+    fn renew_modes(&mut self) {
+        for i in 0..H {
+            self.modes[i] = Modes::new(self.modes[i].direction);
         }
+    }
+
+    /// Lane `l`'s place.
+    #[inline(always)]
+    fn place(&self, l: usize) -> Place<T, N> {
+        lane_of(&self.poses[l / W].place, l % W)
     }
 
     /// Writes lane `l`'s positions after its interval, or ends it where they are beyond the limit.
     #[inline]
-    fn arrive(&mut self, run: &mut Run<'a, T, A, N, P>, l: usize) {
-        let q = numbers(&self.pose.place.q, l);
+    fn arrive(&mut self, runs: &mut [Run<'a, T, A, N, P>], l: usize) {
+        let q = self.place(l).q;
         let within = q.iter().all(|q| q.abs() <= self.limit);
         if within {
-            write(run, self.clocks[l].k, &q);
+            write(&mut runs[self.runs[l]], self.clocks[l].k, &q);
             self.clocks[l].next();
         }
         if !within || self.clocks[l].is_over() {
-            self.end(run, l);
+            self.end(runs, l);
         }
     }
 
-    /// Ends lane `l`.
-    #[inline]
-    fn end(&mut self, run: &mut Run<'a, T, A, N, P>, l: usize) {
-        run.state = state_of(&lane_of(&self.pose.place, l), &numbers(&self.modes.direction, l));
-        self.rest(l);
+    /// Ends lane `l`'s run; the next one enters, if any is left.
+    #[inline(never)]
+    fn end(&mut self, runs: &mut [Run<'a, T, A, N, P>], l: usize) {
+        runs[self.runs[l]].state = state_of(&self.place(l), &numbers(&self.modes[l / W].direction, l % W));
+        self.enter(runs, l);
     }
 
-    /// Puts a lane that has ended to rest.
-    #[inline]
-    fn rest(&mut self, l: usize) {
-        for j in 0..N {
-            self.pose.place.q[j].0[l] = T::zero();
-            self.pose.place.dq[j].0[l] = T::zero();
-            self.modes.direction[j].0[l] = T::one();
-        }
+    /// Puts the next run into lane `l`, or the lane to rest.
+    #[inline(never)]
+    fn enter(&mut self, runs: &mut [Run<'a, T, A, N, P>], l: usize) {
+        let mut state = State::new(SVector::zeros(), SVector::zeros());
         self.clocks[l] = Clock::new(0);
-        self.idle.0[l] = lit(IDLE);
-        self.moving -= 1;
-        self.steps = AFRESH;
+        while self.clocks[l].is_over() && self.waiting < runs.len() {
+            let run = &runs[self.waiting];
+            self.clocks[l] = Clock::new(run.torque.len().min(run.positions.len() / N));
+            (self.runs[l], self.times[l], self.torques[l]) = (self.waiting, run.t, run.torque);
+            state = run.state;
+            self.bundles[l / W].put(l % W, run.plant);
+            self.waiting += 1;
+        }
+        if self.clocks[l].is_over() {
+            // A step of no length, of which nothing is wrong.
+            self.spans[l / W].h.0[l % W] = T::zero();
+            self.idle[l / W].0[l % W] = lit(IDLE);
+            self.moving -= 1;
+            state.modes = [Mode::Forward; N];
+        }
+        let modes = &mut self.modes[l / W];
+        for j in 0..N {
+            self.poses[l / W].place.q[j].0[l % W] = state.q[j];
+            self.poses[l / W].place.dq[j].0[l % W] = state.dq[j];
+            modes.direction[j].0[l % W] = state.modes[j].direction();
+        }
+        self.pose_afresh(l);
     }
 
-    /// Times and torques of the lanes' intervals.
-    #[inline(always)]
-    fn intervals(&self, runs: &[Run<'a, T, A, N, P>]) -> Span<Wide<T, C>, N> {
-        let zero = Wide::of(T::zero());
-        let mut span = Span { t: zero, h: zero, tau: [[zero; N]; 3] };
-        for (l, run) in runs.iter().enumerate().take(WIDTH) {
+    /// Computes lane `l`'s pose from its place alone.
+    #[inline(never)]
+    fn pose_afresh(&mut self, l: usize) {
+        let pose = self.bundles[l / W].plants[l % W].rigid().pose(&self.place(l));
+        let Pose { turns, balance, .. } = &mut self.poses[l / W];
+        for j in 0..N {
+            turns[j].sine.0[l % W] = pose.turns[j].sine;
+            turns[j].cosine.0[l % W] = pose.turns[j].cosine;
+            balance.bias[j].0[l % W] = pose.balance.bias[j];
+            for k in 0..N {
+                balance.inertia[j][k].0[l % W] = pose.balance.inertia[j][k];
+            }
+        }
+    }
+
+    /// Lane `l`'s interval.
+    #[inline]
+    fn interval(&self, l: usize) -> Interval<'a, T, N> {
+        let k = self.clocks[l].k;
+        let (t, torque) = (&self.times[l][k..k + 2], &self.torques[l][k]);
+        Interval { t: t[0], h: t[1] - t[0], torque }
+    }
+
+    /// Gets times and torques of the lanes' intervals.
+    #[inline(never)]
+    fn intervals(&mut self) {
+        for l in 0..WIDTH {
             let Clock { k, rows, .. } = self.clocks[l];
             if k >= rows {
                 continue;
             }
-            let (t, end) = (run.t[k], run.t[k + 1]);
-            (span.t.0[l], span.h.0[l]) = (t, end - t);
+            let (t, torque) = (&self.times[l][k..k + 2], &self.torques[l][k]);
+            let (span, l) = (&mut self.spans[l / W], l % W);
+            (span.t.0[l], span.h.0[l]) = (t[0], t[1] - t[0]);
             for j in 0..N {
-                let Pulse { start, middle, end } = run.torque[k][j];
+                let Pulse { start, middle, end } = torque[j];
                 span.tau[0][j].0[l] = start;
                 span.tau[1][j].0[l] = middle;
                 span.tau[2][j].0[l] = end;
             }
         }
-        span
     }
 
-    /// Times and torques of the steps before the lanes, be they intervals or parts of them; of no length for lanes that have ended.
+    /// Gets those of lanes that only go a part of their interval.
     #[inline(never)]
-    fn parts(&mut self, runs: &[Run<'a, T, A, N, P>]) -> Span<Wide<T, C>, N> {
-        let zero = Wide::of(T::zero());
-        let mut span = Span { t: zero, h: zero, tau: [[zero; N]; 3] };
-        self.even = true;
-        for (l, run) in runs.iter().enumerate().take(WIDTH) {
-            let clock = &mut self.clocks[l];
-            if clock.is_over() {
+    fn parts(&mut self) {
+        self.course = Course::Even;
+        for l in 0..WIDTH {
+            let clock = &self.clocks[l];
+            if clock.is_over() || clock.is_whole() {
                 continue;
             }
-            let interval = interval(run, clock.k);
-            let whole = clock.is_whole();
-            if whole {
-                clock.left = interval.h;
-            }
-            self.even &= whole;
+            self.course = self.course.max(if clock.goal.is_some() { Course::Aimed } else { Course::Parted });
+            let interval = self.interval(l);
             let h = clock.length();
+            let (span, l) = (&mut self.spans[l / W], l % W);
             (span.t.0[l], span.h.0[l]) = (interval.t + clock.done, h);
             for (i, part) in [T::zero(), lit(0.5), T::one()].into_iter().enumerate() {
                 let tau = interval.torque_at(clock.done + h * part);
@@ -212,103 +328,104 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const N: usize, const P: usize> Abrea
                 }
             }
         }
-        span
     }
 
     /// Lane by lane, what comes of a step: where the lanes go on from, and which have got to the end of an interval.
     #[inline(never)]
-    fn judge(
-        &mut self,
-        runs: &[Run<'a, T, A, N, P>],
-        start: &Place<Wide<T, C>, N>,
-        glided: &Glided<Wide<T, C>, N>,
-    ) -> (Place<Wide<T, C>, N>, [bool; WIDTH]) {
-        let (mut place, mut arrived) = (glided.pose.place, [false; WIDTH]);
-        self.even = false;
-        for (l, run) in runs.iter().enumerate().take(WIDTH) {
-            let clock = &mut self.clocks[l];
+    fn judge(&mut self) -> ([Place<Lanes<T, C, W>, N>; H], [After; WIDTH]) {
+        let (mut places, mut after) = (from_fn(|i: usize| self.poses[i].place), [After::Within; WIDTH]);
+        self.course = Course::Parted;
+        for l in 0..WIDTH {
+            let clock = &self.clocks[l];
             if clock.is_over() {
                 continue;
             }
-            if glided.wrong.0[l] <= T::zero() && clock.goal.is_none() {
-                arrived[l] = true;
+            if clock.goal.is_none() && self.signs[l / W].wrong.0[l % W] <= T::zero() {
+                after[l] = After::There;
                 continue;
             }
-            if clock.is_whole() {
-                clock.left = interval(run, clock.k).h;
-            }
-            let taken = Taken {
-                places: [lane_of(start, l), lane_of(&place, l)],
-                ddq: [numbers(&glided.ddq[0], l), numbers(&glided.ddq[1], l)],
-                held: [held_in(&glided.held[0], l), held_in(&glided.held[1], l)],
-                far: glided.far.0[l],
-                dry: core::array::from_fn(|j| self.bundle.dry[j].0[l] != T::zero()),
-            };
-            let mut direction = numbers(&self.modes.direction, l);
-            match taken.judge(clock, &mut direction) {
-                Outcome::Right => arrived[l] = true,
-                Outcome::Again => put(&mut place, l, &taken.places[0]),
-                Outcome::Reversed(reached) => {
-                    put(&mut place, l, &reached);
-                    arrived[l] = clock.left <= T::zero();
-                }
-                Outcome::Alone => {
-                    let mut state = state_of(&taken.places[0], &direction);
-                    exact(run.plant, &mut state, &interval(run, clock.k), clock.done);
-                    direction = state.modes.map(Mode::direction);
-                    put(&mut place, l, &Place { q: state.q.into(), dq: state.dq.into() });
-                    (arrived[l], self.steps) = (true, AFRESH);
-                }
-            }
-            for j in 0..N {
-                self.modes.direction[j].0[l] = direction[j];
-            }
+            let place;
+            (place, after[l]) = self.judge_lane(l);
+            put(&mut places, l, &place);
         }
-        (place, arrived)
+        (places, after)
+    }
+
+    /// What comes of lane `l`'s step.
+    fn judge_lane(&mut self, l: usize) -> (Place<T, N>, After) {
+        let (i, lane, interval) = (l / W, l % W, self.interval(l));
+        if self.clocks[l].is_whole() {
+            self.clocks[l].left = interval.h;
+        }
+        let (signs, Pose { place: end, balance, .. }) = (&self.signs[i], &self.poses[i]);
+        let Bundle { rigid, dry, plants, .. } = &self.bundles[i];
+        let taken = Taken {
+            places: [lane_of(&self.starts[i], lane), lane_of(end, lane)],
+            ddq: [numbers(&signs.ddq[0], lane), numbers(&signs.ddq[1], lane)],
+            held: self.modes[i].held.then(|| signs.held.each_ref().map(|held| held_in(held, lane))),
+            far: signs.far.0[lane],
+            dry: numbers(dry, lane).map(|dry| dry != T::zero()),
+            coulomb: numbers(&rigid.coulomb, lane),
+            inertia: balance.inertia.each_ref().map(|row| numbers(row, lane)),
+        };
+        let clock = &mut self.clocks[l];
+        let mut direction = numbers(&self.modes[i].direction, lane);
+        let (place, after) = match taken.judge(clock, &mut direction) {
+            Outcome::Right => (taken.places[1], After::There),
+            Outcome::Again => (taken.places[0], After::Within),
+            Outcome::Reversed(place) if clock.left > T::zero() => (place, After::Within),
+            Outcome::Reversed(place) => (place, After::There),
+            Outcome::Alone => {
+                let mut state = state_of(&taken.places[0], &direction);
+                exact(plants[lane], &mut state, &interval, clock.done);
+                direction = state.modes.map(Mode::direction);
+                (Place { q: state.q.into(), dq: state.dq.into() }, After::Alone)
+            }
+        };
+        for j in 0..N {
+            self.modes[i].direction[j].0[lane] = direction[j];
+        }
+        (place, after)
     }
 }
 
 /// Writes the positions after interval `k`.
 #[inline(always)]
 fn write<T: Real, A, const N: usize, const P: usize>(run: &mut Run<'_, T, A, N, P>, k: usize, q: &[T; N]) {
-    for j in 0..N {
-        run.positions[k * N + j] = q[j];
+    if let Some(row) = run.positions.get_mut(k * N..k * N + N) {
+        row.copy_from_slice(q);
     }
-}
-
-/// Interval `k` of a run.
-#[inline]
-fn interval<'r, T: Real, A, const N: usize, const P: usize>(
-    run: &Run<'r, T, A, N, P>,
-    k: usize,
-) -> Interval<'r, T, N> {
-    Interval { t: run.t[k], h: run.t[k + 1] - run.t[k], torque: &run.torque[k] }
 }
 
 /// The numbers of lane `l`.
 #[inline]
-fn numbers<T: Real, C, const N: usize>(x: &[Wide<T, C>; N], l: usize) -> [T; N] {
-    core::array::from_fn(|j| x[j].0[l])
+fn numbers<T: Real, C, const W: usize, const N: usize>(x: &[Lanes<T, C, W>; N], l: usize) -> [T; N] {
+    from_fn(|j| x[j].0[l])
 }
 
 /// Lane `l`'s place.
 #[inline]
-fn lane_of<T: Real, C, const N: usize>(place: &Place<Wide<T, C>, N>, l: usize) -> Place<T, N> {
+fn lane_of<T: Real, C, const W: usize, const N: usize>(place: &Place<Lanes<T, C, W>, N>, l: usize) -> Place<T, N> {
     Place { q: numbers(&place.q, l), dq: numbers(&place.dq, l) }
 }
 
 /// Puts a place into lane `l`.
 #[inline]
-fn put<T: Real, C, const N: usize>(place: &mut Place<Wide<T, C>, N>, l: usize, of: &Place<T, N>) {
+fn put<T: Real, C, const W: usize, const H: usize, const N: usize>(
+    places: &mut [Place<Lanes<T, C, W>, N>; H],
+    l: usize,
+    of: &Place<T, N>,
+) {
+    let place = &mut places[l / W];
     for j in 0..N {
-        place.q[j].0[l] = of.q[j];
-        place.dq[j].0[l] = of.dq[j];
+        place.q[j].0[l % W] = of.q[j];
+        place.dq[j].0[l % W] = of.dq[j];
     }
 }
 
 /// What holds lane `l`.
 #[inline]
-fn held_in<T: Real, C, const N: usize>(held: &Held<Wide<T, C>, N>, l: usize) -> Held<T, N> {
+fn held_in<T: Real, C, const W: usize, const N: usize>(held: &Held<Lanes<T, C, W>, N>, l: usize) -> Held<T, N> {
     Held { holding: numbers(&held.holding, l), excess: numbers(&held.excess, l) }
 }
 

@@ -11,12 +11,16 @@ pub(super) struct Taken<T, const N: usize> {
     pub(super) places: [Place<T, N>; 2],
     /// Accelerations there.
     pub(super) ddq: [[T; N]; 2],
-    /// What it takes there to hold stuck joints.
-    pub(super) held: [Held<T, N>; 2],
+    /// What it takes there to hold stuck joints, if there are any.
+    pub(super) held: Option<[Held<T, N>; 2]>,
     /// Positive, or no number, where it went too far for one step.
     pub(super) far: T,
     /// Joints with dry friction.
     pub(super) dry: [bool; N],
+    /// Coulomb coefficients.
+    pub(super) coulomb: [T; N],
+    /// Inertia at the end.
+    pub(super) inertia: [[T; N]; N],
 }
 
 /// What to do about it.
@@ -58,19 +62,21 @@ impl<T: Real, const N: usize> Taken<T, N> {
                     return Some(Outcome::Again);
                 }
             } else if along == T::zero() {
-                if self.held[0].excess[j] > worst {
-                    (released, worst) = (Some(j), self.held[0].excess[j]);
+                if let Some([held, _]) = &self.held
+                    && held.excess[j] > worst
+                {
+                    (released, worst) = (Some((j, held.holding[j].signum())), held.excess[j]);
                 }
             } else if self.dry[j] && self.ddq[0][j] * along < T::zero() {
                 (direction[j], clock.tried[j]) = (T::zero(), true);
                 return Some(Outcome::Again);
             }
         }
-        let j = released?;
+        let (j, along) = released?;
         if clock.tried[j] {
             return Some(Outcome::Alone);
         }
-        direction[j] = self.held[0].holding[j].signum();
+        direction[j] = along;
         Some(Outcome::Again)
     }
 
@@ -79,7 +85,7 @@ impl<T: Real, const N: usize> Taken<T, N> {
         let [start, end] = &self.places;
         let mut first = None;
         for j in 0..N {
-            if direction[j] == T::zero() && self.held[1].excess[j] > T::zero() {
+            if direction[j] == T::zero() && self.held.as_ref().is_some_and(|held| held[1].excess[j] > T::zero()) {
                 return Outcome::Alone;
             }
             if self.dry[j] && end.dq[j] * direction[j] < T::zero() {
@@ -117,9 +123,21 @@ impl<T: Real, const N: usize> Taken<T, N> {
             _ => (T::zero(), *end),
         };
         place.dq[j] = T::zero();
-        // Most joints go on; one that does not is held by `settle`.
-        direction[j] = -direction[j];
+        // As it seems; `settle` puts right what is not so.
+        let goes_on = -(self.ddq[1][j] * direction[j]) > self.turn(j);
+        direction[j] = if goes_on { -direction[j] } else { T::zero() };
         clock.pass(length + more);
         Outcome::Reversed(place)
+    }
+
+    /// By how much the acceleration of joint `j` changes where its dry friction turns round, all other joints free to move.
+    fn turn(&self, j: usize) -> T {
+        let mut own = self.inertia[j][j];
+        for i in 0..N {
+            if i != j {
+                own -= self.inertia[j][i] * self.inertia[j][i] / self.inertia[i][i];
+            }
+        }
+        (self.coulomb[j] + self.coulomb[j]) / own
     }
 }

@@ -56,6 +56,12 @@ impl<T: Real, const N: usize> Clock<T, N> {
         self.goal.map_or(self.left, |goal| goal.length)
     }
 
+    /// Whether a run was in the lane and has ended.
+    #[inline(always)]
+    pub(super) fn has_ended(&self) -> bool {
+        self.rows > 0 && self.is_over()
+    }
+
     /// Goes on to the next interval.
     #[inline(always)]
     pub(super) fn next(&mut self) {

@@ -15,15 +15,12 @@ use crate::arm::Arm;
 use crate::cpu::{Cpu, Level, Work};
 use crate::effect::Pulse;
 use crate::integrate::State;
-use crate::lanes::Lanes;
 use crate::plant::Plant;
 use crate::real::Real;
 use abreast::Abreast;
 
 /// Runs taken together.
 pub const WIDTH: usize = 8;
-
-type Wide<T, C> = Lanes<T, C, WIDTH>;
 
 /// One run: from `state` at the first of the times to the last.
 pub struct Run<'a, T: Real, A, const N: usize, const P: usize> {
@@ -39,7 +36,7 @@ pub struct Run<'a, T: Real, A, const N: usize, const P: usize> {
     pub positions: &'a mut [T],
 }
 
-/// Makes up to [`WIDTH`] runs; each ends where a position exceeds `limit` or is no number.
+/// Makes runs, [`WIDTH`] at a time; each ends where a position exceeds `limit` or is no number.
 pub struct Together<'r, 'a, T: Real, A, const N: usize, const P: usize> {
     /// The runs.
     pub runs: &'r mut [Run<'a, T, A, N, P>],
@@ -52,6 +49,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Together<'_, '_, 
     pub fn make(self, level: Level) {
         level.run_wide(self);
     }
+
+    /// Makes them in so many vectors of so many numbers.
+    #[inline(always)]
+    fn abreast<C: Cpu, const W: usize, const H: usize>(self) {
+        let Some(mut lanes) = Abreast::<T, C, A, W, H, N, P>::new(self.runs, self.limit) else { return };
+        while lanes.are_moving() {
+            lanes.step(self.runs);
+        }
+    }
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Work for Together<'_, '_, T, A, N, P> {
@@ -59,9 +65,6 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Work for Together
 
     #[inline(always)]
     fn run<C: Cpu>(self) {
-        let Some(mut lanes) = Abreast::<T, C, A, N, P>::new(self.runs, self.limit) else { return };
-        while lanes.are_moving() {
-            lanes.step(self.runs);
-        }
+        if C::DOUBLES > 2 { self.abreast::<C, 8, 1>() } else { self.abreast::<C, 2, 4>() }
     }
 }
