@@ -163,6 +163,8 @@ pub struct Modes<V, const N: usize> {
     slides: [V; N],
     /// Whether any is stuck.
     pub(crate) held: bool,
+    /// Whether the last step did not end in these modes.
+    pub(crate) fresh: bool,
 }
 
 impl<V: Number, const N: usize> Modes<V, N> {
@@ -174,7 +176,7 @@ impl<V: Number, const N: usize> Modes<V, N> {
             slides[j] = direction[j] * direction[j];
             held |= direction[j].any_zero();
         }
-        Self { direction, slides, held }
+        Self { direction, slides, held, fresh: true }
     }
 }
 
@@ -396,7 +398,7 @@ fn end<V: Number, B: Body<V, N>, const N: usize>(
 ) -> Pose<V, N> {
     let c = |x: f64| V::of(lit(x));
     let Step { body, start, modes, span } = step;
-    let (mut wrong, mut finite) = (-c(1.0), c(0.0));
+    let (mut wrong, mut sum) = (-c(1.0), c(0.0));
     if modes.held {
         let at = Instant { t: span.t, pose: start, tau: &span.tau[0] };
         let first = held(*body, &at, s1, modes);
@@ -413,16 +415,19 @@ fn end<V: Number, B: Body<V, N>, const N: usize>(
     let ddq = [s1.ddq, s4.motion.ddq];
     for j in 0..N {
         // The velocities of the stages are `dq` and half, half and all of a step at the accelerations before.
-        let sum = s1.ddq[j] + s2.motion.ddq[j] + s3.motion.ddq[j];
-        by[j] = span.h * sixth.fused(sum, place.dq[j]);
+        let early = s1.ddq[j] + s2.motion.ddq[j] + s3.motion.ddq[j];
+        by[j] = span.h * sixth.fused(early, place.dq[j]);
         end.q[j] = place.q[j] + by[j];
-        end.dq[j] = sixth.fused(sum + sum + (ddq[1][j] - ddq[0][j]), place.dq[j]);
-        let direction = modes.direction[j];
-        let off = contradiction(place.dq[j], ddq[0][j], direction, modes.slides[j]);
-        wrong = wrong.larger(off.larger(-(end.dq[j] * direction)) * body.dry(j));
-        // What is not finite leaves its mark in this sum.
-        finite = end.q[j].fused(c(0.0), end.dq[j].fused(c(0.0), finite));
+        end.dq[j] = sixth.fused(early + early + (ddq[1][j] - ddq[0][j]), place.dq[j]);
+        wrong = wrong.larger(-(end.dq[j] * modes.direction[j]) * body.dry(j));
+        if modes.fresh {
+            let off = contradiction(place.dq[j], s1.ddq[j], modes.direction[j], modes.slides[j]);
+            wrong = wrong.larger(off * body.dry(j));
+        }
+        sum = sum + (end.q[j] + end.dq[j]);
     }
+    // What is not finite leaves its mark in this.
+    let finite = sum * c(0.0);
     let (pose, far) = s4.near(*body, &end, &by);
     let far = far.larger(s2.far).larger(s3.far).larger(s4.far) - c(1.0) + finite;
     (signs.wrong, signs.far, signs.ddq) = (wrong.larger(far) + finite, far, ddq);

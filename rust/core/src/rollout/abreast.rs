@@ -175,6 +175,10 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
                 }
             }
             self.renew_modes();
+        } else {
+            for i in 0..H {
+                self.modes[i].fresh = false;
+            }
         }
     }
 
