@@ -28,6 +28,7 @@ pub mod monitor;
 pub mod number;
 pub mod online;
 pub mod plant;
+pub mod pose;
 pub mod real;
 pub mod regression;
 pub mod rls;

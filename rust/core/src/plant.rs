@@ -6,9 +6,10 @@
 
 use crate::arm::{Arm, Balance};
 use crate::effect::{Active, Hooks, JointPoint};
-use crate::glide::{Body, Instant, Place, Pose, Reach, Rigid};
+use crate::glide::{Body, Instant};
 use crate::linear::solve_positive_definite;
 use crate::number::Number;
+use crate::pose::{Place, Pose, Reach, Rigid};
 use crate::real::{Real, lit};
 use crate::transmission::{Drive, Hidden};
 use nalgebra::SVector;

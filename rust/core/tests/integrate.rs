@@ -2,9 +2,9 @@
 
 use armgap_core::arm::{Arm, TwoLink};
 use armgap_core::effect::{Active, Pulse, Trial, find};
-use armgap_core::glide::Place;
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::{Mode, Plant};
+use armgap_core::pose::Place;
 use armgap_core::transmission::Hidden;
 use nalgebra::{SVector, Vector2};
 

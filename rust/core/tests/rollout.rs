@@ -115,3 +115,58 @@ fn every_effect_acts_in_its_lane() {
         }
     }
 }
+
+#[test]
+fn more_runs_than_lanes_of_different_lengths_move_as_each_does_alone() {
+    let plants = [seed(THETA), seed(std::array::from_fn(|i| 1.1 * THETA[i]))];
+    let (t, torques): (_, Vec<_>) = (times(), (0..3 * WIDTH + 3).map(torques).collect());
+    let length = |l: usize| (37 * l) % ROWS;
+    for level in [Level::PORTABLE, Level::detect(), Level::widest()] {
+        let mut out = vec![vec![f64::NAN; 2 * ROWS]; torques.len()];
+        let mut runs: Vec<_> = out
+            .iter_mut()
+            .enumerate()
+            .map(|(l, positions)| Run {
+                plant: &plants[l % 2],
+                t: &t[..=length(l)],
+                torque: &torques[l][..length(l)],
+                state: start(l % WIDTH),
+                positions: &mut positions[..2 * length(l)],
+            })
+            .collect();
+        Together { runs: &mut runs, limit: 1e3 }.make(level);
+        for l in 0..torques.len() {
+            let mut state = start(l % WIDTH);
+            let mut expected = vec![f64::NAN; 2 * ROWS];
+            for k in 0..length(l) {
+                let interval = Interval { t: t[k], h: t[k + 1] - t[k], torque: &torques[l][k] };
+                advance(&plants[l % 2], &mut state, &interval, 1);
+                expected[2 * k..2 * k + 2].copy_from_slice(state.q.as_slice());
+            }
+            let n = 2 * length(l);
+            assert!(apart(&out[l][..n], &expected[..n]) < 1e-10, "run {l}, {}", level.name());
+            assert!(out[l][n..].iter().all(|q| q.is_nan()), "run {l} went on");
+        }
+    }
+}
+
+#[test]
+fn a_run_that_leaves_the_limit_ends_and_leaves_its_neighbours_alone() {
+    let (plant, t) = (seed(THETA), times());
+    let mut torques: Vec<_> = (0..WIDTH).map(torques).collect();
+    torques[2][50][0] = Pulse::held(f64::NAN);
+    torques[5][20][1] = Pulse::held(1e9);
+    let mut out = vec![vec![f64::NAN; 2 * ROWS]; WIDTH];
+    let mut runs: Vec<_> = out
+        .iter_mut()
+        .zip(&torques)
+        .enumerate()
+        .map(|(l, (positions, torque))| Run { plant: &plant, t: &t, torque, state: start(l), positions })
+        .collect();
+    Together { runs: &mut runs, limit: 1e3 }.make(Level::widest());
+    assert!(out[2][99].is_finite() && out[2][100].is_nan());
+    assert!(out[5][2 * ROWS - 1].is_nan(), "what is thrown off goes on");
+    for l in [0, 1, 3, 4, 6, 7] {
+        assert!(apart(&out[l], &alone(&plant, l)) < 1e-10, "lane {l}");
+    }
+}

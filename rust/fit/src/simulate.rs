@@ -5,8 +5,8 @@ use crate::model::{Hypothesis, Placed};
 use crate::progress::{Watch, Work};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Pulse, interval};
-use armgap_core::glide::Place;
 use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::pose::Place;
 use nalgebra::SVector;
 
 /// Sub-steps per sample beyond which a tolerance is given up.

@@ -171,16 +171,17 @@ impl<const N: usize> Shift<N> {
     }
 }
 
+/// Runs that share the lanes of one vector unit: enough that few lanes are idle at the end.
+const GROUP: usize = 4 * WIDTH;
+
 /// Makes runs of one plant: together where nothing but friction modes can change during a step.
 fn make<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
-    let level = Level::widest();
-    runs.par_chunks_mut(WIDTH).for_each(|group| {
-        if group.iter().all(|run| run.plant.glides()) {
-            Together { runs: group, limit: DIVERGED }.make(level);
-        } else {
-            group.iter_mut().for_each(make_alone);
-        }
-    });
+    if runs.iter().all(|run| run.plant.glides()) {
+        let level = Level::widest();
+        runs.par_chunks_mut(GROUP).for_each(|group| Together { runs: group, limit: DIVERGED }.make(level));
+    } else {
+        runs.par_chunks_mut(WIDTH).for_each(|group| group.iter_mut().for_each(make_alone));
+    }
 }
 
 /// Makes one run, in as many steps per sample as its plant needs.

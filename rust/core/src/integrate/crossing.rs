@@ -3,8 +3,8 @@
 use super::root::{Close, STRAIGHT, hermite_root};
 use super::{State, Step};
 use crate::arm::Arm;
-use crate::glide::Place;
 use crate::plant::{Mode, Motion};
+use crate::pose::Place;
 use crate::real::{Real, lit};
 
 /// Corrections of the located instant; each squares the error of the last.

@@ -10,8 +10,9 @@ pub(crate) mod root;
 
 use crate::arm::Arm;
 use crate::effect::Pulse;
-use crate::glide::{self, Modes, Place, Pose, Reach, Signs, Span, glide};
+use crate::glide::{self, Modes, Signs, Span, glide};
 use crate::plant::{Mode, Motion, Plant};
+use crate::pose::{Place, Pose, Reach};
 use crate::real::{Real, lit};
 use crate::transmission::Hidden;
 use crossing::Located;

@@ -1,6 +1,6 @@
 //! Where a velocity vanishes within a step, from what is known at its ends.
 
-use crate::glide::Place;
+use crate::pose::Place;
 use crate::real::{Real, lit};
 
 /// A correction of this part of a step is as good on a straight line: what is left out is of the order of its square.
@@ -33,7 +33,8 @@ impl<T: Real, const N: usize> Close<'_, T, N> {
     pub(crate) fn reached(&self, whole: T) -> Option<(T, Place<T, N>)> {
         let correction = self.correction();
         let curved = correction.abs() < whole * lit(CURVED) && self.length > whole * lit(SHORT);
-        if !curved && !(correction.abs() < whole * lit(STRAIGHT)) {
+        let straight = correction.abs() < whole * lit(STRAIGHT);
+        if !curved && !straight {
             return None;
         }
         let [first, ddq] = self.ddq;

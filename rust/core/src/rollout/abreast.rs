@@ -3,15 +3,17 @@
 use super::bundle::Bundle;
 use super::change::{Outcome, Taken};
 use super::clock::Clock;
+use super::lane::{held_in, lane_of, numbers, put, state_of, write};
 use super::{Run, WIDTH};
 use crate::arm::Arm;
 use crate::cpu::Cpu;
 use crate::effect::Pulse;
-use crate::glide::{Held, Modes, Place, Pose, Reach, Signs, Span, Step, glide};
+use crate::glide::{Modes, Signs, Span, Step, glide};
 use crate::integrate::{Interval, State, exact};
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::plant::Mode;
+use crate::pose::{Place, Pose, Reach};
 use crate::real::{Real, lit};
 use core::array::from_fn;
 use nalgebra::SVector;
@@ -69,7 +71,9 @@ pub(super) struct Abreast<'a, T: Real, C, A, const W: usize, const H: usize, con
     limit: T,
 }
 
-impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const N: usize, const P: usize> Abreast<'a, T, C, A, W, H, N, P> {
+impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const N: usize, const P: usize>
+    Abreast<'a, T, C, A, W, H, N, P>
+{
     #[inline(always)]
     pub(super) fn new(runs: &mut [Run<'a, T, A, N, P>], limit: T) -> Option<Self> {
         let plant = runs.first()?.plant;
@@ -391,52 +395,4 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
         (place, after)
     }
-}
-
-/// Writes the positions after interval `k`.
-#[inline(always)]
-fn write<T: Real, A, const N: usize, const P: usize>(run: &mut Run<'_, T, A, N, P>, k: usize, q: &[T; N]) {
-    if let Some(row) = run.positions.get_mut(k * N..k * N + N) {
-        row.copy_from_slice(q);
-    }
-}
-
-/// The numbers of lane `l`.
-#[inline]
-fn numbers<T: Real, C, const W: usize, const N: usize>(x: &[Lanes<T, C, W>; N], l: usize) -> [T; N] {
-    from_fn(|j| x[j].0[l])
-}
-
-/// Lane `l`'s place.
-#[inline]
-fn lane_of<T: Real, C, const W: usize, const N: usize>(place: &Place<Lanes<T, C, W>, N>, l: usize) -> Place<T, N> {
-    Place { q: numbers(&place.q, l), dq: numbers(&place.dq, l) }
-}
-
-/// Puts a place into lane `l`.
-#[inline]
-fn put<T: Real, C, const W: usize, const H: usize, const N: usize>(
-    places: &mut [Place<Lanes<T, C, W>, N>; H],
-    l: usize,
-    of: &Place<T, N>,
-) {
-    let place = &mut places[l / W];
-    for j in 0..N {
-        place.q[j].0[l % W] = of.q[j];
-        place.dq[j].0[l % W] = of.dq[j];
-    }
-}
-
-/// What holds lane `l`.
-#[inline]
-fn held_in<T: Real, C, const W: usize, const N: usize>(held: &Held<Lanes<T, C, W>, N>, l: usize) -> Held<T, N> {
-    Held { holding: numbers(&held.holding, l), excess: numbers(&held.excess, l) }
-}
-
-/// A state of its own.
-#[inline]
-fn state_of<T: Real, const N: usize>(place: &Place<T, N>, direction: &[T; N]) -> State<T, N> {
-    let mut state = State::new(SVector::from(place.q), SVector::from(place.dq));
-    state.modes = direction.map(Mode::of);
-    state
 }

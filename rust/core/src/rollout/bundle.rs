@@ -3,10 +3,11 @@
 use crate::arm::Arm;
 use crate::cpu::Cpu;
 use crate::effect::{Hooks, JointPoint};
-use crate::glide::{Body, Instant, Place, Pose, Reach, Rigid};
+use crate::glide::{Body, Instant};
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::plant::Plant;
+use crate::pose::{Place, Pose, Reach, Rigid};
 use crate::real::Real;
 use core::array::from_fn;
 
@@ -40,7 +41,9 @@ pub(super) struct Bundle<'a, T: Real, C, A, const W: usize, const N: usize, cons
     pub(super) dry: [Lanes<T, C, W>; N],
 }
 
-impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: usize> Bundle<'a, T, C, A, W, N, P> {
+impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: usize>
+    Bundle<'a, T, C, A, W, N, P>
+{
     /// The same plant in all lanes.
     pub(super) fn new(plant: &'a Plant<T, A, N, P>) -> Self {
         let Rigid { arm, theta, viscous, coulomb, added, tilt } = plant.rigid();
@@ -170,8 +173,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         let mut excess = Lanes::of(T::zero());
         for l in 0..W {
             if direction.0[l] == T::zero() {
-                excess.0[l] =
-                    self.plants[l].excess(j, at.t.0[l], at.q.0[l], at.tau.0[l], holding.0[l]).0;
+                excess.0[l] = self.plants[l].excess(j, at.t.0[l], at.q.0[l], at.tau.0[l], holding.0[l]).0;
             }
         }
         excess
@@ -198,7 +200,11 @@ impl<T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: 
     }
 
     #[inline(always)]
-    fn pull(&self, at: &Instant<'_, Lanes<T, C, W>, N>, direction: &[Lanes<T, C, W>; N]) -> [Lanes<T, C, W>; N] {
+    fn pull(
+        &self,
+        at: &Instant<'_, Lanes<T, C, W>, N>,
+        direction: &[Lanes<T, C, W>; N],
+    ) -> [Lanes<T, C, W>; N] {
         let mut pull = *at.tau;
         for j in 0..N {
             let (mut level, viscous) = (self.rigid.coulomb[j], self.rigid.viscous[j]);

@@ -1,8 +1,9 @@
 //! What comes of a step in which a lane's friction modes may have changed.
 
 use super::clock::{Clock, MAX_CHANGES, Reversal};
-use crate::glide::{Held, Place};
+use crate::glide::Held;
 use crate::integrate::root::{Close, hermite_root};
+use crate::pose::Place;
 use crate::real::Real;
 
 /// One lane's part of a step.
@@ -38,7 +39,8 @@ pub(super) enum Outcome<T, const N: usize> {
 impl<T: Real, const N: usize> Taken<T, N> {
     /// Decides, and sets the lane's clock and its joints' directions accordingly.
     pub(super) fn judge(&self, clock: &mut Clock<T, N>, direction: &mut [T; N]) -> Outcome<T, N> {
-        if !(self.far <= T::zero()) || clock.changes >= MAX_CHANGES {
+        let near = self.far <= T::zero();
+        if !near || clock.changes >= MAX_CHANGES {
             return Outcome::Alone;
         }
         if let Some(goal) = clock.goal {
@@ -57,7 +59,7 @@ impl<T: Real, const N: usize> Taken<T, N> {
         for j in 0..N {
             let (dq, along) = (self.places[0].dq[j], direction[j]);
             if dq != T::zero() {
-                if (self.dry[j] || along == T::zero()) && !(dq * along > T::zero()) {
+                if (self.dry[j] || along == T::zero()) && dq * along <= T::zero() {
                     direction[j] = dq.signum();
                     return Some(Outcome::Again);
                 }
@@ -85,7 +87,9 @@ impl<T: Real, const N: usize> Taken<T, N> {
         let [start, end] = &self.places;
         let mut first = None;
         for j in 0..N {
-            if direction[j] == T::zero() && self.held.as_ref().is_some_and(|held| held[1].excess[j] > T::zero()) {
+            if direction[j] == T::zero()
+                && self.held.as_ref().is_some_and(|held| held[1].excess[j] > T::zero())
+            {
                 return Outcome::Alone;
             }
             if self.dry[j] && end.dq[j] * direction[j] < T::zero() {
@@ -102,12 +106,7 @@ impl<T: Real, const N: usize> Taken<T, N> {
     }
 
     /// Ends at a reversal, or comes closer to it in another step.
-    fn approach(
-        &self,
-        goal: Reversal<T>,
-        clock: &mut Clock<T, N>,
-        direction: &mut [T; N],
-    ) -> Outcome<T, N> {
+    fn approach(&self, goal: Reversal<T>, clock: &mut Clock<T, N>, direction: &mut [T; N]) -> Outcome<T, N> {
         let Reversal { joint: j, length } = goal;
         let end = &self.places[1];
         let close = Close { place: end, j, length, ddq: [&self.ddq[0], &self.ddq[1]] };

@@ -10,6 +10,7 @@ mod abreast;
 mod bundle;
 mod change;
 mod clock;
+mod lane;
 
 use crate::arm::Arm;
 use crate::cpu::{Cpu, Level, Work};
