@@ -54,7 +54,7 @@ def command(
     from armgap.arm import Arm
     from armgap.diagnosis import diagnose
     from armgap.log import gather
-    from armgap.report import check_report, diagnosis_report
+    from armgap.report import check_report, diagnosis_report, prepare_report
 
     check_outputs(json_file, report_file)
     check_report(report_file)
@@ -63,6 +63,7 @@ def command(
     with working("reading", quiet=quiet):
         training = gather(logs, arm, columns=mapping, units=declared)
         held = gather(holdout, arm, columns=mapping, units=declared) or None
+        prepare_report(report_file)
         result = diagnose(training, arm, holdout=held, horizon=horizon, max_causes=max_causes, seed=seed)
     if report_file is not None:
         write(report_file, diagnosis_report(result, report_file))

@@ -2,7 +2,7 @@
 
 from armgap.report.document import Document, diagnosis_document
 from armgap.report.html import render_html, write_html
-from armgap.report.output import check_report, diagnosis_report, render_report
+from armgap.report.output import check_report, diagnosis_report, prepare_report, render_report
 from armgap.report.terminal import summary_table
 
 __all__ = [
@@ -10,6 +10,7 @@ __all__ = [
     "check_report",
     "diagnosis_document",
     "diagnosis_report",
+    "prepare_report",
     "render_html",
     "render_report",
     "summary_table",

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from armgap.errors import OptionError
@@ -13,7 +15,7 @@ from armgap.report.document import Document, diagnosis_document
 if TYPE_CHECKING:
     from armgap.diagnosis import Diagnosis
 
-__all__ = ["FORMS", "check_report", "diagnosis_report", "render_report"]
+__all__ = ["FORMS", "check_report", "diagnosis_report", "prepare_report", "render_report"]
 
 STANDARD_STREAM = "-"
 
@@ -63,6 +65,12 @@ def check_report(path: str | Path | None) -> None:
     """
     if path is not None:
         _form(path)
+
+
+def prepare_report(path: str | Path | None) -> None:
+    """Load what a page's charts need on a thread of its own, while the work it will show is done in the core."""
+    if path is not None and _form(path) is _html:
+        Thread(target=import_module, args=("bokeh.plotting",), daemon=True).start()
 
 
 def render_report(document: Document, data: dict[str, Any], path: str | Path) -> str:

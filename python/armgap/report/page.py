@@ -153,9 +153,14 @@ def _embedded(charts: Sequence[Any]) -> tuple[str, str, Sequence[str]]:
     """Charts as (script, library, elements); without charts the page needs neither script nor library."""
     if not charts:
         return "", "", ()
+    from bokeh.document import Document
     from bokeh.embed import components
     from bokeh.resources import Resources
 
+    page = Document()
+    with page.models.freeze():  # what belongs to the page is looked up once, not once per chart
+        for chart in charts:
+            page.add_root(chart)
     script, divs = components(tuple(charts))
     return script, Resources(mode="inline", components=["bokeh"]).render_js(), divs
 

@@ -313,8 +313,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         let memory = if self.remembers { self.memory(&SVector::from(*q), hidden) } else { hidden.memory };
         let mut rhs = SVector::<T, N>::zeros();
         for j in 0..N {
+            let hooks = self.hooks[j];
+            if !(hooks.force || hooks.coulomb) {
+                let dry = self.rigid.coulomb[j].max(T::zero()) * self.sliding(j, dq, modes);
+                rhs[j] = tau[j] - bias[j] - self.rigid.viscous[j] * dq[j] - dry;
+                continue;
+            }
             let mut x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
-            if self.hooks[j].force {
+            if hooks.force {
                 x.other = self.sliding((j + 1) % N, dq, modes);
                 x.memory = memory[j];
             }

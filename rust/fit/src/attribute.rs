@@ -3,14 +3,18 @@
 use crate::decide::{ABOVE_FLOOR, CONSEQUENCE};
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Work;
+use crate::screen::Scored;
 use crate::solve::{Effort, Fit};
-use crate::study::{MAX_ROUNDS, Study, Weights};
+use crate::study::{Study, Weights};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{MAX_PARAMETERS, NEVER, Trial, find};
 use rayon::prelude::*;
 
 /// Candidates that are fitted again under the weights of the best.
 const FINALISTS: usize = 4;
+
+/// Candidates that are fitted with sensitivities of their own before the finalists are chosen.
+const TAKEN_ON: usize = 2 * FINALISTS;
 
 /// Rounds in which the finalists are fitted under weights of the best one's residual.
 const MAX_REWEIGHTINGS: usize = 3;
@@ -90,12 +94,23 @@ pub struct Stage<const N: usize, const P: usize> {
     pub contenders: Vec<Contender<P>>,
     /// Every candidate that was fitted, by the share of the gap it removes under the current model's own weights, best first.
     pub field: Vec<(Contender<P>, f64)>,
+    /// First-order tests of all candidates around the settled model, the open ones first; none if they were not made under the weights in
+    /// force.
+    pub screened: Vec<Scored>,
     /// Weights in force.
     pub weights: Weights<N>,
     /// Cost the measurement noise alone would leave on the holdout, under these weights.
     pub floor: f64,
     /// Cost that predicting no motion at all within each window would have on the holdout.
     pub motion: f64,
+}
+
+/// How the finalists and the current model end.
+struct FinalRound<const N: usize, const P: usize> {
+    base: Contender<P>,
+    contenders: Vec<Contender<P>>,
+    /// Weights by the best contender's residual, where that called for others.
+    weights: Option<Weights<N>>,
 }
 
 impl<const N: usize, const P: usize> Stage<N, P> {
@@ -130,17 +145,26 @@ impl<const N: usize, const P: usize> Stage<N, P> {
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// One stage around the current model; improvements below `noticeable`, relative to the motion, are not looked for.
     pub fn stage(&self, current: &Hypothesis<P>, scale: [f64; N], noticeable: f64) -> Stage<N, P> {
-        self.watch.begin(Work::Refit, MAX_ROUNDS + 1);
-        let (fit, weights) = self.settle(current, scale);
-        let starts = self.starts(&fit, &weights, noticeable);
+        self.stage_around(self.settle(current, scale), noticeable)
+    }
+
+    /// The same around a fit under weights of its own residual.
+    pub fn stage_around(&self, (fit, weights): (Fit<P>, Weights<N>), noticeable: f64) -> Stage<N, P> {
+        let (starts, screened) = self.starts(&fit, &weights, noticeable);
         self.watch.begin(Work::Candidates, starts.len());
-        let first = self.contend(&weights, &fit.hypothesis, starts, Effort::ROUGH);
+        let problem = self.problem(&weights.training);
+        let slopes = if starts.is_empty() { Vec::new() } else { problem.slopes(&fit.hypothesis) };
+        let first = self.contend(&weights, &fit.hypothesis, starts, Effort::ROUGH, &slopes);
+        let first = self.taken_on(&weights, &fit.hypothesis, first);
         let field = self.field(&weights, &fit, &first);
         self.watch.begin(Work::Finalists, 2 * FINALISTS + MAX_REWEIGHTINGS);
-        let (base, contenders, weights) = self.final_round(&fit.hypothesis, first, weights);
+        let final_round = self.final_round(&fit.hypothesis, first, &weights);
+        let screened = if final_round.weights.is_none() { screened } else { Vec::new() };
+        let FinalRound { base, contenders, weights: heavier } = final_round;
+        let weights = heavier.unwrap_or(weights);
         let floor = self.floor(&weights);
         let motion = self.motion(&weights);
-        Stage { settled: fit, base, contenders, field, weights, floor, motion }
+        Stage { settled: fit, base, contenders, field, screened, weights, floor, motion }
     }
 
     /// RMS error of a fit on the holdout relative to the motion.
@@ -164,33 +188,33 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         fitted.iter().filter(|c| c.effect.is_some()).map(|c| (c.clone(), share(c))).collect()
     }
 
-    /// Fits all starts and judges them, best first; what diverged or came down to nothing is left out.
+    /// Fits all starts and judges them, best first; `slopes` are the sensitivities of the model they add to, where they are known.
     fn contend(
         &self,
         weights: &Weights<N>,
         base: &Hypothesis<P>,
         starts: Vec<Hypothesis<P>>,
         effort: Effort,
+        slopes: &[Vec<f64>],
     ) -> Vec<Contender<P>> {
         let known = base.effects.len();
-        let mut contenders: Vec<Contender<P>> = starts
-            .into_par_iter()
-            .map(|start| self.contender(weights, &start, known, effort))
-            .filter(|c| c.score().is_finite() && !c.is_idle())
-            .collect();
-        contenders.sort_by(|a, b| a.score().total_cmp(&b.score()));
-        let mut best: Vec<Contender<P>> = Vec::new();
-        for contender in contenders {
-            let same = |c: &Contender<P>| match (&c.effect, &contender.effect) {
-                (Some(a), Some(b)) => a.same_place(b),
-                (None, None) => true,
-                _ => false,
-            };
-            if !best.iter().any(same) {
-                best.push(contender);
-            }
-        }
-        best
+        let fitted = |start: Hypothesis<P>| self.contender(weights, &start, known, effort, slopes);
+        ranked(starts.into_par_iter().map(fitted).collect())
+    }
+
+    /// The best contenders fitted with sensitivities of their own where they have used those of the model they add to.
+    fn taken_on(
+        &self,
+        weights: &Weights<N>,
+        base: &Hypothesis<P>,
+        contenders: Vec<Contender<P>>,
+    ) -> Vec<Contender<P>> {
+        let known = base.effects.len();
+        let on = |(i, c): (usize, Contender<P>)| {
+            let done = c.fit.own || i >= TAKEN_ON;
+            if done { c } else { self.contender(weights, &c.fit.hypothesis, known, Effort::ROUGH, &[]) }
+        };
+        ranked(contenders.into_par_iter().enumerate().map(on).collect())
     }
 
     /// A start fitted and judged; what it has beyond the `known` effects is the one under test.
@@ -200,9 +224,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         start: &Hypothesis<P>,
         known: usize,
         effort: Effort,
+        slopes: &[Vec<f64>],
     ) -> Contender<P> {
-        let fit = self.problem(&weights.training).solve(start, effort);
-        let training = self.problem(&weights.training).window_costs(&fit.hypothesis);
+        // Where an effect starts at neutral, the sensitivities of the model without it are nearly its own.
+        let near = start.effects.get(known).is_some_and(|e| e.law.spec().trial != Trial::Whole);
+        let slopes = if near { slopes } else { &[] };
+        let fit = self.problem(&weights.training).solve_beside(start, effort, slopes);
+        let training = fit.costs.iter().map(|cost| weights.training.tempered(*cost)).collect();
         let (holdout, error) = self.judged_on_holdout(weights, &fit);
         let effect = fit.hypothesis.effects.get(known).copied();
         let size = effect.as_ref().map_or(0.0, |e| self.relative_size(e));
@@ -220,29 +248,35 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         &self,
         current: &Hypothesis<P>,
         mut contenders: Vec<Contender<P>>,
-        mut weights: Weights<N>,
-    ) -> (Contender<P>, Vec<Contender<P>>, Weights<N>) {
+        given: &Weights<N>,
+    ) -> FinalRound<N, P> {
         let mut hopeless = f64::INFINITY;
+        let mut heavier: Option<Weights<N>> = None;
         for round in 1..=MAX_REWEIGHTINGS {
             let Some(best) = contenders.first() else { break };
+            let weights = heavier.as_ref().unwrap_or(given);
             let scale = self.residual_scale(&weights.training, &best.fit.hypothesis);
             let shrunk = (0..N).map(|j| weights.training.scale[j] / scale[j]).fold(0.0, f64::max);
             if shrunk > SHRUNK {
-                weights = self.weights(&best.fit.hypothesis, scale);
+                heavier = Some(self.weights(&best.fit.hypothesis, scale));
             }
+            let weights = heavier.as_ref().unwrap_or(given);
             let last = shrunk <= SHRUNK || round == MAX_REWEIGHTINGS;
             let mut starts = finalists(&contenders, hopeless);
             starts.extend(contenders.first().and_then(|best| simpler(current, best)));
-            contenders =
-                self.contend(&weights, current, starts, if last { Effort::FULL } else { Effort::ROUGH });
+            let effort = if last { Effort::FULL } else { Effort::ROUGH };
+            let base = || self.contender(weights, current, current.effects.len(), effort, &[]);
+            let (fitted, base) = rayon::join(|| self.contend(weights, current, starts, effort, &[]), base);
+            contenders = fitted;
             if last {
-                break;
+                return FinalRound { base, contenders, weights: heavier };
             }
-            let base = self.contender(&weights, current, current.effects.len(), Effort::ROUGH).score();
+            let base = base.score();
             hopeless = contenders.first().map_or(base, |best| 0.5 * (base + best.score()));
         }
-        let base = self.contender(&weights, current, current.effects.len(), Effort::FULL);
-        (base, contenders, weights)
+        let weights = heavier.as_ref().unwrap_or(given);
+        let base = self.contender(weights, current, current.effects.len(), Effort::FULL, &[]);
+        FinalRound { base, contenders, weights: heavier }
     }
 
     /// Cost of predicting that every joint stays where its window starts.
@@ -255,6 +289,24 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let per_row: f64 = (0..N).map(|j| (self.noise[j] / weights.holdout.scale[j]).powi(2)).sum();
         per_row * self.holdout.data.rows as f64
     }
+}
+
+/// Contenders, best first, none twice; what diverged or came down to nothing is left out.
+fn ranked<const P: usize>(mut contenders: Vec<Contender<P>>) -> Vec<Contender<P>> {
+    contenders.retain(|c| c.score().is_finite() && !c.is_idle());
+    contenders.sort_by(|a, b| a.score().total_cmp(&b.score()));
+    let mut best: Vec<Contender<P>> = Vec::new();
+    for contender in contenders {
+        let same = |c: &Contender<P>| match (&c.effect, &contender.effect) {
+            (Some(a), Some(b)) => a.same_place(b),
+            (None, None) => true,
+            _ => false,
+        };
+        if !best.iter().any(same) {
+            best.push(contender);
+        }
+    }
+    best
 }
 
 /// Hypotheses to be fitted to the end: the best by cost, of those that are not hopeless, and the best by closeness to trusted values.

@@ -4,8 +4,8 @@ use crate::arm::ArmDescription;
 use crate::attribute::Contender;
 use crate::decide::{Attribution, left_over};
 use crate::diagnose::Options;
-use crate::gap::{Errors, free_run_series, gap, rms};
-use crate::locate::{Lack, Lacks, lacking_torque, places, regimes, shares};
+use crate::gap::{Errors, FreeRuns, gap, rms};
+use crate::locate::{Lack, Lacks, lacking_torques, places, regimes, shares};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
 use crate::push::Event;
@@ -41,12 +41,20 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         refit: attribution.refit.hypothesis.clone(),
         after: attribution.model.hypothesis.clone(),
     };
-    let errors = Errors::new(study, &compared);
-    let gap = gap(study, &compared, &errors, description, options);
     let rotary = description.kind.rotary();
     let last = &attribution.stages[attribution.stages.len() - 1];
-    let lacks = lacks(study, &compared, &last.weights.holdout);
-    let regimes = regimes(&lacks, rotary);
+    let figures = || {
+        let (errors, free) = (Errors::new(study, &compared), FreeRuns::new(study, &compared));
+        (gap(study, &compared, &errors, &free, description, options), errors.series(study), free.series())
+    };
+    let residual = || {
+        let lacks = lacks(study, &compared, &last.weights.holdout);
+        let regimes = regimes(&lacks, rotary);
+        (lacks, regimes)
+    };
+    let candidates = || (ruled_out(study, attribution, rotary), ranking(study, attribution, rotary));
+    let ((absent, ranking), ((gap, series, free_run_series), (lacks, regimes))) =
+        rayon::join(candidates, || rayon::join(figures, residual));
     let verdict = if events.is_empty() { verdict(attribution, &gap) } else { "effect" };
     Diagnosis {
         schema: "armgap.diagnosis/1",
@@ -59,7 +67,7 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             .map(|c| cause(c, N, rotary))
             .chain(events.iter().map(|e| push(study, e, rotary)))
             .collect(),
-        ruled_out: ruled_out(study, attribution, rotary)
+        ruled_out: absent
             .into_iter()
             .filter(|r| {
                 !events.iter().any(|e| r.effect == "external_pulse" && r.joint == e.push.joint_number())
@@ -73,11 +81,11 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         arm: arm_summary(description),
         training: logs(&study.training),
         holdout: logs(&study.holdout),
-        ranking: ranking(study, attribution, rotary),
+        ranking,
         stages: stages(study, attribution),
         regimes,
-        series: errors.series(study),
-        free_run_series: free_run_series(study, &compared),
+        series,
+        free_run_series,
         noise: noise(study),
         options: OptionSummary {
             horizon_s: options.horizon,
@@ -97,8 +105,9 @@ fn lacks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     weights: &Metric<N>,
 ) -> Lacks<N> {
     let data = &study.holdout.data;
-    let of = |h: &Hypothesis<P>| lacking_torque(&study.arm, data, &weights.starts, h);
-    Lacks { before: of(&compared.before), refit: of(&compared.refit), after: of(&compared.after) }
+    let hypotheses = [&compared.before, &compared.refit, &compared.after];
+    let [before, refit, after] = lacking_torques(&study.arm, data, &weights.starts, hypotheses);
+    Lacks { before, refit, after }
 }
 
 /// Each joint's share of the gap: what causes explain lies where they sit, the rest where torque is lacking.

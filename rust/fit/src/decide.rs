@@ -119,7 +119,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     pub fn attribute(&self, max_causes: usize, seed: u64) -> Attribution<N, P> {
         let nominal = Hypothesis::rigid(self.prior.theta);
         let mut scale = self.rough_scale(&nominal);
-        let mut stage = self.stage(&nominal, scale, RELEVANT);
+        let settled = self.settle(&nominal, scale);
+        let mut stage = self.stage_around(settled.clone(), RELEVANT);
         let refit = stage.settled.clone();
         let mut model = refit.clone();
         let (mut causes, mut stages): (Vec<Cause>, Vec<Stage<N, P>>) = (Vec::new(), Vec::new());
@@ -127,7 +128,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let mut noticeable = noticeable(stage.relative_error());
         if is_faint(&stage) {
             noticeable = FAINTEST;
-            stage = self.stage(&nominal, scale, noticeable);
+            stage = self.stage_around(settled, noticeable);
         }
         while causes.len() < max_causes {
             let Some((choice, ground)) = choose(&stage, smoothed, noticeable) else {

@@ -5,11 +5,11 @@ use crate::compose::Compared;
 use crate::decide::Random;
 use crate::diagnose::Options;
 use crate::model::Hypothesis;
-use crate::push::without_pushes;
 use crate::report::{AtHorizon, FreeRun, FreeRunSeries, Gap, Series};
 use crate::study::Study;
 use crate::window::{Dataset, Shift, Window};
 use armgap_core::arm::Arm;
+use rayon::prelude::*;
 
 /// Points of a drawn curve at most.
 const DRAWN: usize = 2500;
@@ -43,12 +43,13 @@ impl<const N: usize> Errors<N> {
     pub fn new<A: Arm<f64, N, P>, const P: usize>(study: &Study<A, N, P>, compared: &Compared<P>) -> Self {
         let data = &study.holdout.data;
         let starts = data.measured_starts();
-        let bare = without_pushes(&study.holdout).data;
+        let bare = bare(data);
+        let after = data.predict(&study.arm, &compared.after, &starts);
         Self {
             before: bare.predict(&study.arm, &compared.before, &starts),
             refit: bare.predict(&study.arm, &compared.refit, &starts),
-            after: data.predict(&study.arm, &compared.after, &starts),
-            floor: floor(study, data, &compared.after),
+            floor: floor(study, data, &compared.after, &after),
+            after,
         }
     }
 
@@ -87,13 +88,16 @@ impl<const N: usize> Errors<N> {
     }
 }
 
-/// Variance of a perfect model's errors: noise of the sample itself, and of the measured start carried along the window.
+/// Variance of a perfect model's errors: noise of the sample itself, and of the measured start carried along the window, around what the
+/// model predicts.
 fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     study: &Study<A, N, P>,
     data: &Dataset<N>,
     model: &Hypothesis<P>,
+    predicted: &[f64],
 ) -> [f64; N] {
-    let columns = crate::metric::start_sensitivities(data, &study.arm, model, &data.measured_starts());
+    let starts = data.measured_starts();
+    let columns = crate::metric::start_sensitivities(data, &study.arm, model, &starts, predicted);
     let carried = |window: &Window<N>| -> [f64; N] {
         let mut sum = [0.0; N];
         for row in window.range().step_by(N) {
@@ -130,6 +134,7 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     study: &Study<A, N, P>,
     compared: &Compared<P>,
     errors: &Errors<N>,
+    free: &FreeRuns<N>,
     description: &ArmDescription,
     options: &Options,
 ) -> Gap {
@@ -143,10 +148,10 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         closed: closed(&before, &after, &floor),
         closed_ci: closed_interval(study, errors, &floor, options.seed),
         refit: rms::<N>(measured, &errors.refit),
-        horizons: HORIZONS.iter().filter_map(|h| at_horizon(study, compared, *h)).collect(),
+        horizons: HORIZONS.par_iter().filter_map(|h| at_horizon(study, compared, *h)).collect(),
         free_run: FreeRun {
-            before: free_run_rms(study, &without_pushes(&study.holdout).data, &compared.before),
-            after: free_run_rms(study, &study.holdout.data, &compared.after),
+            before: rms::<N>(&free.measured, &free.before),
+            after: rms::<N>(&free.measured, &free.after),
         },
         before,
         after,
@@ -164,17 +169,16 @@ fn at_horizon<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     if data.windows.len() < 2 * data.tracks.len() {
         return None;
     }
-    let bare = Dataset::new(without_pushes(&study.holdout).data.tracks, horizon);
+    let bare = bare(&data);
     let (measured, starts) = (data.measured(), data.measured_starts());
-    let missed = |data: &Dataset<N>, h: &Hypothesis<P>| {
-        rms::<N>(&measured, &limited(data, &data.predict(&study.arm, h, &starts)))
-    };
+    let missed = |predicted: &[f64]| rms::<N>(&measured, &limited(&measured, predicted));
+    let after = data.predict(&study.arm, &compared.after, &starts);
     Some(AtHorizon {
         horizon_s: horizon,
-        before: missed(&bare, &compared.before),
-        refit: missed(&bare, &compared.refit),
-        after: missed(&data, &compared.after),
-        floor: floor(study, &data, &compared.after).map(f64::sqrt).to_vec(),
+        before: missed(&bare.predict(&study.arm, &compared.before, &starts)),
+        refit: missed(&bare.predict(&study.arm, &compared.refit, &starts)),
+        floor: floor(study, &data, &compared.after, &after).map(f64::sqrt).to_vec(),
+        after: missed(&after),
     })
 }
 
@@ -235,49 +239,56 @@ fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
     Dataset { tracks: data.tracks.clone(), windows, rows }
 }
 
-fn free_run_rms<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    study: &Study<A, N, P>,
-    data: &Dataset<N>,
-    model: &Hypothesis<P>,
-) -> Vec<f64> {
-    let data = whole(data);
-    let predicted =
-        limited(&data, &data.predict(&study.arm, model, &vec![Shift::none(); data.windows.len()]));
-    rms::<N>(&data.measured(), &predicted)
+/// The same logs without any known pushes.
+fn bare<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
+    let mut bare = data.clone();
+    bare.tracks.iter_mut().for_each(|track| track.pushes.clear());
+    bare
 }
 
 /// Predictions kept within reach of the measurement, so that a diverged run stays a number.
-fn limited<const N: usize>(data: &Dataset<N>, predicted: &[f64]) -> Vec<f64> {
-    let measured = data.measured();
-    predicted.iter().zip(&measured).map(|(p, m)| m + (p - m).clamp(-FREE_RUN_LIMIT, FREE_RUN_LIMIT)).collect()
+fn limited(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
+    let within = |p: &f64, m: &f64| m + (p - m).clamp(-FREE_RUN_LIMIT, FREE_RUN_LIMIT);
+    predicted.iter().zip(measured).map(|(p, m)| within(p, m)).collect()
 }
 
-/// Free runs for drawing.
-pub fn free_run_series<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    study: &Study<A, N, P>,
-    compared: &Compared<P>,
-) -> Vec<FreeRunSeries> {
-    let data = whole(&study.holdout.data);
-    let starts = vec![Shift::none(); data.windows.len()];
-    let run = |data: &Dataset<N>, h: &Hypothesis<P>| limited(data, &data.predict(&study.arm, h, &starts));
-    let bare = whole(&without_pushes(&study.holdout).data);
-    let (before, after, measured) =
-        (run(&bare, &compared.before), run(&data, &compared.after), data.measured());
-    let mut all = Vec::new();
-    for window in data.windows.iter().take(DRAWN_LOGS) {
-        let track = &data.tracks[window.track];
-        let rows: Vec<usize> = (0..window.rows()).step_by(window.rows().div_ceil(DRAWN)).collect();
-        for j in 0..N {
-            let pick = |x: &[f64]| rows.iter().map(|i| x[(window.offset + i) * N + j]).collect();
-            all.push(FreeRunSeries {
-                log: track.name.clone(),
-                joint: j + 1,
-                t: rows.iter().map(|i| track.t[i + 1]).collect(),
-                measured: pick(&measured),
-                before: pick(&before),
-                after: pick(&after),
-            });
-        }
+/// Whole logs of the holdout from their first sample.
+pub struct FreeRuns<const N: usize> {
+    data: Dataset<N>,
+    measured: Vec<f64>,
+    before: Vec<f64>,
+    after: Vec<f64>,
+}
+
+impl<const N: usize> FreeRuns<N> {
+    /// Runs of the arm file as it is, and of the model with the causes.
+    pub fn new<A: Arm<f64, N, P>, const P: usize>(study: &Study<A, N, P>, compared: &Compared<P>) -> Self {
+        let data = whole(&study.holdout.data);
+        let (bare, measured) = (bare(&data), data.measured());
+        let starts = vec![Shift::none(); data.windows.len()];
+        let run = |data: &Dataset<N>, h| limited(&measured, &data.predict(&study.arm, h, &starts));
+        let (before, after) = rayon::join(|| run(&bare, &compared.before), || run(&data, &compared.after));
+        Self { data, measured, before, after }
     }
-    all
+
+    /// Curves for drawing.
+    pub fn series(&self) -> Vec<FreeRunSeries> {
+        let mut all = Vec::new();
+        for window in self.data.windows.iter().take(DRAWN_LOGS) {
+            let track = &self.data.tracks[window.track];
+            let rows: Vec<usize> = (0..window.rows()).step_by(window.rows().div_ceil(DRAWN)).collect();
+            for j in 0..N {
+                let pick = |x: &[f64]| rows.iter().map(|i| x[(window.offset + i) * N + j]).collect();
+                all.push(FreeRunSeries {
+                    log: track.name.clone(),
+                    joint: j + 1,
+                    t: rows.iter().map(|i| track.t[i + 1]).collect(),
+                    measured: pick(&self.measured),
+                    before: pick(&self.before),
+                    after: pick(&self.after),
+                });
+            }
+        }
+        all
+    }
 }

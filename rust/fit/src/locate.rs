@@ -5,9 +5,11 @@
 
 use crate::model::Hypothesis;
 use crate::smooth::local_cubic;
+use crate::track::Track;
 use crate::window::{Dataset, Shift};
 use armgap_core::arm::Arm;
 use nalgebra::SVector;
+use rayon::prelude::*;
 use serde::Serialize;
 
 /// Half width, in samples, of the cubic whose curvature is the missing acceleration.
@@ -41,42 +43,51 @@ pub struct Lack<const N: usize> {
     pub lack: SVector<f64, N>,
 }
 
-/// Lacking torque at every other sample of all windows under a hypothesis.
-pub fn lacking_torque<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+/// Lacking torque at every other sample of all windows under each of several hypotheses.
+pub fn lacking_torques<A: Arm<f64, N, P>, const N: usize, const P: usize, const H: usize>(
     arm: &A,
     data: &Dataset<N>,
     starts: &[Shift<N>],
-    hypothesis: &Hypothesis<P>,
-) -> Vec<Lack<N>> {
-    let predicted = data.predict(arm, hypothesis, starts);
-    let mut found = Vec::new();
-    for window in &data.windows {
-        let track = &data.tracks[window.track];
-        let rows = &predicted[window.range()];
-        let times = &track.t[window.first + 1..=window.last];
-        if times.len() < 2 * HALF_WIDTH + 1 {
-            continue;
-        }
-        for i in (0..times.len()).step_by(2) {
-            let k = window.first + 1 + i;
-            let curvature = SVector::<f64, N>::from_fn(|j, _| {
-                let error = |r: usize| track.q[window.first + 1 + r][j] - rows[r * N + j];
-                local_cubic(times, error, i, HALF_WIDTH).ddq
-            });
-            let dq = SVector::from_fn(|j, _| velocity(&track.t, |s| track.q[s][j], k));
-            let inertia = arm.inertia(&hypothesis.theta, &track.q[k]);
-            found.push(Lack {
-                track: window.track,
-                t: track.t[k] - track.t[0],
-                q: track.q[k],
-                dq,
-                tau: SVector::from_fn(|j, _| track.held[k][j].start),
-                reversal: std::array::from_fn(|j| reverses(&track.t, |s| track.q[s][j], k)),
-                lack: inertia * curvature,
-            });
-        }
+    hypotheses: [&Hypothesis<P>; H],
+) -> [Vec<Lack<N>>; H] {
+    let predicted = hypotheses.map(|h| data.predict(arm, h, starts));
+    let windows: Vec<Vec<[Lack<N>; H]>> = data
+        .windows
+        .par_iter()
+        .map(|window| {
+            let track = &data.tracks[window.track];
+            let times = &track.t[window.first + 1..=window.last];
+            let rows = if times.len() < 2 * HALF_WIDTH + 1 { 0..0 } else { 0..times.len() };
+            let lack = |i: usize, h: usize| {
+                let k = window.first + 1 + i;
+                let rows = &predicted[h][window.range()];
+                let curvature = SVector::<f64, N>::from_fn(|j, _| {
+                    let error = |r: usize| track.q[window.first + 1 + r][j] - rows[r * N + j];
+                    local_cubic(times, error, i, HALF_WIDTH).ddq
+                });
+                arm.inertia(&hypotheses[h].theta, &track.q[k]) * curvature
+            };
+            let under_all = |i: usize| {
+                let moving = moving(track, window.track, window.first + 1 + i);
+                std::array::from_fn(|h| Lack { lack: lack(i, h), ..moving })
+            };
+            rows.step_by(2).map(under_all).collect()
+        })
+        .collect();
+    std::array::from_fn(|h| windows.iter().flatten().map(|lacks| lacks[h]).collect())
+}
+
+/// The motion at sample `k` of a log, nothing lacking.
+fn moving<const N: usize>(track: &Track<N>, index: usize, k: usize) -> Lack<N> {
+    Lack {
+        track: index,
+        t: track.t[k] - track.t[0],
+        q: track.q[k],
+        dq: SVector::from_fn(|j, _| velocity(&track.t, |s| track.q[s][j], k)),
+        tau: SVector::from_fn(|j, _| track.held[k][j].start),
+        reversal: std::array::from_fn(|j| reverses(&track.t, |s| track.q[s][j], k)),
+        lack: SVector::zeros(),
     }
-    found
 }
 
 fn velocity(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> f64 {

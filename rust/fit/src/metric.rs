@@ -116,21 +116,22 @@ pub struct Gram {
 }
 
 impl<const N: usize> Metric<N> {
-    /// The metric around a hypothesis, with starts displaced by `starts`.
+    /// The metric around a hypothesis that predicts `predicted`, with starts displaced by `starts`.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         data: &Dataset<N>,
         arm: &A,
         hypothesis: &Hypothesis<P>,
         scale: [f64; N],
         starts: Vec<Shift<N>>,
+        predicted: &[f64],
     ) -> Self {
-        let sensitivities = start_sensitivities(data, arm, hypothesis, &starts);
+        let sensitivities = start_sensitivities(data, arm, hypothesis, &starts, predicted);
         let project = |(index, shift): (usize, &Shift<N>)| {
             let window = &data.windows[index];
             let columns: Vec<&[f64]> = sensitivities.iter().map(|c| &c[window.range()]).collect();
             projection(&columns, &scale, &window.start, shift)
         };
-        let projections = starts.iter().enumerate().map(project).collect();
+        let projections = starts.par_iter().enumerate().map(project).collect();
         let trust = vec![1.0; starts.len()];
         Self { scale, starts, trust, typical: 1.0, projections }
     }
@@ -154,6 +155,13 @@ impl<const N: usize> Metric<N> {
         costs.iter().zip(&self.trust).map(|(cost, trust)| cost * trust).sum()
     }
 
+    /// Whitened residual, measured minus predicted.
+    pub fn residual(&self, measured: &[f64], predicted: &[f64]) -> Vec<f64> {
+        let mut residual: Vec<f64> = measured.iter().zip(predicted).map(|(y, p)| y - p).collect();
+        self.whiten(&mut residual);
+        residual
+    }
+
     /// Divides a flat vector by the joints' scales.
     pub fn whiten(&self, column: &mut [f64]) {
         for row in column.chunks_exact_mut(N) {
@@ -164,12 +172,12 @@ impl<const N: usize> Metric<N> {
     }
 
     /// Inner products of whitened `columns` and, last, a whitened `residual`.
-    pub fn gram(&self, data: &Dataset<N>, columns: &[Vec<f64>], residual: &[f64]) -> Gram {
+    pub fn gram(&self, data: &Dataset<N>, columns: &[&[f64]], residual: &[f64]) -> Gram {
         self.gram_with(columns.len(), data, columns, residual)
     }
 
     /// The same without the products of two different columns after the first `lead`: they stay zero.
-    pub fn gram_with(&self, lead: usize, data: &Dataset<N>, columns: &[Vec<f64>], residual: &[f64]) -> Gram {
+    pub fn gram_with(&self, lead: usize, data: &Dataset<N>, columns: &[&[f64]], residual: &[f64]) -> Gram {
         let k = columns.len();
         let one = |(window, projection): (&crate::window::Window<N>, &Projection)| {
             let part: Vec<&[f64]> = columns.iter().map(|c| &c[window.range()]).collect();
@@ -235,14 +243,14 @@ impl<const N: usize> Metric<N> {
     }
 }
 
-/// Derivatives of all predictions by the starts' positions and velocities.
+/// Derivatives of all predictions by the starts' positions and velocities, around those of the starts themselves.
 pub fn start_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     data: &Dataset<N>,
     arm: &A,
     hypothesis: &Hypothesis<P>,
     starts: &[Shift<N>],
+    predicted: &[f64],
 ) -> Vec<Vec<f64>> {
-    let centre = data.predict(arm, hypothesis, starts);
     (0..2 * N)
         .into_par_iter()
         .map(|i| {
@@ -259,7 +267,7 @@ pub fn start_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: usize>(
                 })
                 .collect();
             let moved = data.predict(arm, hypothesis, &displaced);
-            moved.iter().zip(&centre).map(|(a, b)| ((a - b) / START_STEP).clamp(-1e4, 1e4)).collect()
+            moved.iter().zip(predicted).map(|(a, b)| ((a - b) / START_STEP).clamp(-1e4, 1e4)).collect()
         })
         .collect()
 }

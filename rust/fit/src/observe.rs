@@ -74,28 +74,92 @@ impl Swing<'_> {
         (q0 + s * (d0 + s * (c2 + s * c3)), (d0 + s * (2.0 * c2 + 3.0 * s * c3)) / self.h)
     }
 
-    /// Acceleration of the motor at the fraction `s` of the interval.
-    fn slope(&self, s: f64, at: f64, rate: f64) -> f64 {
+    /// Torque on the motor, and position and velocity of the link, at the fraction `s` of the interval.
+    fn drawn(&self, s: f64) -> [f64; 3] {
         let (q, dq) = self.link(s);
-        (self.torque.at(s) - self.drive.transmitted(at - q, rate - dq)) / self.drive.inertia
+        [self.torque.at(s), q, dq]
+    }
+
+    /// Acceleration of the motor beside this torque and link.
+    fn slope(&self, [torque, q, dq]: &[f64; 3], at: f64, rate: f64) -> f64 {
+        (torque - self.drive.transmitted(at - q, rate - dq)) / self.drive.inertia
+    }
+
+    /// What accelerates a motor on a shaft without play at the fraction `s` of the interval, if it stands still at zero.
+    fn push(&self, s: f64) -> f64 {
+        let (q, dq) = self.link(s);
+        (self.torque.at(s) + self.drive.stiffness * q + self.drive.damping * dq) / self.drive.inertia
+    }
+
+    /// Position and velocity of a motor on a shaft without play at the end of the interval: the same steps, where everything is linear.
+    fn swing(&self, mut e: f64, mut v: f64, count: usize) -> (f64, f64) {
+        let (dt, ds) = (self.h / count as f64, 1.0 / count as f64);
+        let (half, sixth) = (0.5 * dt, dt / 6.0);
+        let (pull, brake) =
+            (self.drive.stiffness / self.drive.inertia, self.drive.damping / self.drive.inertia);
+        let mut push = self.push(0.0);
+        for i in 0..count {
+            let s = i as f64 * ds;
+            let (middle, end) = (self.push(s + 0.5 * ds), self.push(s + ds));
+            let a1 = push - pull * e - brake * v;
+            let v2 = v + half * a1;
+            let a2 = middle - pull * (e + half * v) - brake * v2;
+            let v3 = v + half * a2;
+            let a3 = middle - pull * (e + half * v2) - brake * v3;
+            let v4 = v + dt * a3;
+            let a4 = end - pull * (e + dt * v3) - brake * v4;
+            e += sixth * (v + 2.0 * (v2 + v3) + v4);
+            v += sixth * (a1 + 2.0 * (a2 + a3) + a4);
+            push = end;
+        }
+        (e.clamp(-LIMIT, LIMIT), v.clamp(-LIMIT, LIMIT))
     }
 
     /// Position and velocity of the motor at the end of the interval, by Runge-Kutta.
     fn advance(&self, mut e: f64, mut v: f64) -> (f64, f64) {
         let count = ((self.h * self.drive.rate(f64::MAX) / STEP).ceil() as usize).clamp(1, MAX_STEPS);
+        if self.drive.gap <= 0.0 {
+            return self.swing(e, v, count);
+        }
         let (dt, ds) = (self.h / count as f64, 1.0 / count as f64);
+        let mut here = self.drawn(0.0);
         for i in 0..count {
             let s = i as f64 * ds;
-            let a1 = self.slope(s, e, v);
-            let (v2, half) = (v + 0.5 * dt * a1, s + 0.5 * ds);
-            let a2 = self.slope(half, e + 0.5 * dt * v, v2);
+            let (middle, end) = (self.drawn(s + 0.5 * ds), self.drawn(s + ds));
+            let a1 = self.slope(&here, e, v);
+            let v2 = v + 0.5 * dt * a1;
+            let a2 = self.slope(&middle, e + 0.5 * dt * v, v2);
             let v3 = v + 0.5 * dt * a2;
-            let a3 = self.slope(half, e + 0.5 * dt * v2, v3);
+            let a3 = self.slope(&middle, e + 0.5 * dt * v2, v3);
             let v4 = v + dt * a3;
-            let a4 = self.slope(s + ds, e + dt * v3, v4);
+            let a4 = self.slope(&end, e + dt * v3, v4);
             e += dt / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4);
             v += dt / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
+            here = end;
         }
         (e.clamp(-LIMIT, LIMIT), v.clamp(-LIMIT, LIMIT))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motor_behind_a_shaft_swings_as_its_equation_says() {
+        let (inertia, rate, torque, h) = (0.02, 150.0, 0.3, 0.002);
+        let stiffness = inertia * rate * rate;
+        let drive = Drive { inertia, stiffness, damping: 0.0, gap: 0.0, inside: false };
+        let (speed, pulse) = (0.4, Pulse::held(torque));
+        // Beside a link at constant speed: a motor that starts with it swings about the twist that carries the torque.
+        let (mut at, mut velocity) = (0.0, speed);
+        for k in 0..50 {
+            let t = f64::from(k) * h;
+            let ends = [(speed * t, speed), (speed * (t + h), speed)];
+            (at, velocity) = Swing { drive: &drive, torque: &pulse, h, ends }.advance(at, velocity);
+            let phase = rate * (t + h);
+            let twist = torque / stiffness * (1.0 - phase.cos());
+            assert!((at - speed * (t + h) - twist).abs() < 1e-3 * torque / stiffness, "{k}: {at} {twist}");
+        }
     }
 }

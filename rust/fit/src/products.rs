@@ -5,18 +5,27 @@ use armgap_core::cpu::{Cpu, Level, Work};
 /// Entries taken together.
 const LANES: usize = 8;
 
-/// `x . y`.
+/// Columns taken together: their sums need not wait for each other.
+const ABREAST: usize = 4;
+
+/// `x . y` for several `y` of the length of `x`.
 #[inline(always)]
-fn dot<C: Cpu>(x: &[f64], y: &[f64]) -> f64 {
-    let ((x_lead, x_tail), (y_lead, y_tail)) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>());
-    let mut sums = [0.0; LANES];
-    for (a, b) in x_lead.iter().zip(y_lead) {
-        for l in 0..LANES {
-            sums[l] = C::fused(a[l], b[l], sums[l]);
+fn dots<C: Cpu, const K: usize>(x: &[f64], y: [&[f64]; K]) -> [f64; K] {
+    let (lead, tail) = x.as_chunks::<LANES>();
+    let y = y.map(|y| y[..x.len()].as_chunks::<LANES>());
+    let mut sums = [[0.0; LANES]; K];
+    for (i, a) in lead.iter().enumerate() {
+        for k in 0..K {
+            let b = &y[k].0[i];
+            for l in 0..LANES {
+                sums[k][l] = C::fused(a[l], b[l], sums[k][l]);
+            }
         }
     }
-    let rest: f64 = x_tail.iter().zip(y_tail).map(|(a, b)| a * b).sum();
-    ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + rest
+    std::array::from_fn(|k| {
+        let (sums, rest) = (&sums[k], tail.iter().zip(y[k].1).map(|(a, b)| a * b).sum::<f64>());
+        ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + rest
+    })
 }
 
 /// Every product of a column of `left` with a column of `right`; row by row of `left`.
@@ -32,8 +41,12 @@ impl Work for Cross<'_> {
     fn run<C: Cpu>(self) -> Vec<f64> {
         let mut products = Vec::with_capacity(self.left.len() * self.right.len());
         for x in self.left {
-            for y in self.right {
-                products.push(dot::<C>(x, y));
+            let (groups, rest) = self.right.as_chunks::<ABREAST>();
+            for group in groups {
+                products.extend(dots::<C, ABREAST>(x, *group));
+            }
+            for y in rest {
+                products.extend(dots::<C, 1>(x, [y]));
             }
         }
         products
@@ -45,9 +58,27 @@ pub fn cross(left: &[&[f64]], right: &[&[f64]]) -> Vec<f64> {
     Level::detect().run(Cross { left, right })
 }
 
+/// One product.
+struct Pair<'a>(&'a [f64], &'a [f64]);
+
+impl Work for Pair<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<C: Cpu>(self) -> f64 {
+        dots::<C, 1>(self.0, [self.1])[0]
+    }
+}
+
+/// `x . y` over the shorter of the two.
+pub fn product(x: &[f64], y: &[f64]) -> f64 {
+    let count = x.len().min(y.len());
+    Level::detect().run(Pair(&x[..count], &y[..count]))
+}
+
 /// The squared length of every column.
 pub fn squares(columns: &[&[f64]]) -> Vec<f64> {
-    columns.iter().map(|column| cross(&[*column], &[*column])[0]).collect()
+    columns.iter().map(|column| product(column, column)).collect()
 }
 
 #[cfg(test)]
@@ -59,9 +90,9 @@ mod tests {
         let column = |n: usize, a: f64| -> Vec<f64> { (0..n).map(|i| (a * i as f64).sin()).collect() };
         for n in [0, 1, 7, 8, 9, 200] {
             let (x, y, z) = (column(n, 0.3), column(n, 1.1), column(n, 2.3));
-            let products = cross(&[&x, &y], &[&x, &y, &z]);
+            let products = cross(&[&x, &y], &[&x, &y, &z, &x, &z]);
             let plain = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-            let expected = [&x, &y].map(|a| [&x, &y, &z].map(|b| plain(a, b))).concat();
+            let expected = [&x, &y].map(|a| [&x, &y, &z, &x, &z].map(|b| plain(a, b))).concat();
             for (got, expected) in products.iter().zip(expected) {
                 assert!((got - expected).abs() < 1e-13 * (1.0 + n as f64), "{n}: {got} {expected}");
             }

@@ -27,7 +27,10 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let model = &attribution.model.hypothesis;
     let open = study.open_candidates(model);
     let problem = study.problem(&stage.weights.training);
-    let scored = screen(&problem, model, &open);
+    let unchanged = model.effects.len() == stage.settled.hypothesis.effects.len()
+        && model.values() == stage.settled.hypothesis.values();
+    let known = stage.screened.get(..open.len()).filter(|_| unchanged);
+    let scored = known.map_or_else(|| screen(&problem, model, &open), <[Scored]>::to_vec);
     let remains = problem.metric.total(&problem.raw_costs(model));
     let unexplained = stage.is_open();
     let mut list: Vec<(Placed, RuledOut)> = Vec::new();

@@ -8,6 +8,8 @@ use crate::model::Hypothesis;
 use crate::solve::Problem;
 use crate::window::{Dataset, Window};
 use armgap_core::arm::Arm;
+use armgap_core::cpu::{Cpu, Level, Work};
+use armgap_core::trig::sin_cos;
 use rayon::prelude::*;
 
 /// Step of the grid, in cycles over the joint's travel: half the width of a peak.
@@ -21,6 +23,9 @@ const FASTEST: f64 = 2.5;
 
 /// Most points of the grid.
 const MOST_POINTS: usize = 600;
+
+/// Points of the grid taken together.
+const TOGETHER: usize = 8;
 
 /// Peaks reported for a joint.
 const PEAKS: usize = 3;
@@ -54,11 +59,14 @@ pub fn repeats<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let points = (((highest - FEWEST) / RESOLUTION).max(0.0) as usize).min(MOST_POINTS);
     let residual = problem.residual(base);
     let paths = paths(problem, base, &residual, j);
-    let spectrum: Vec<Repeat> = (0..points)
-        .into_par_iter()
-        .map(|i| fitted(&paths, unit * (FEWEST + RESOLUTION * i as f64)))
-        .collect();
-    peaks(&spectrum)
+    let level = Level::detect();
+    let together = |group: usize| {
+        let first = unit * (FEWEST + RESOLUTION * (group * TOGETHER) as f64);
+        level.run(Spectrum { paths: &paths, first, step: unit * RESOLUTION })
+    };
+    let groups: Vec<[Repeat; TOGETHER]> =
+        (0..points.div_ceil(TOGETHER)).into_par_iter().map(together).collect();
+    peaks(&groups.as_flattened()[..points])
 }
 
 /// One window's motion of one joint, with what its residual asks for.
@@ -125,17 +133,90 @@ fn path<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     }
 }
 
-/// Least squares of both phases of one frequency over all windows.
-fn fitted(paths: &[Path], cycles: f64) -> Repeat {
-    let mut normal = [0.0; 3];
-    let mut right = [0.0; 2];
-    for path in paths {
-        let (n, b) = products(path, cycles);
-        for (sum, x) in normal.iter_mut().zip(n).chain(right.iter_mut().zip(b)) {
-            *sum += path.trust * x;
+/// Least squares of both phases, for several frequencies that follow each other.
+struct Spectrum<'a> {
+    paths: &'a [Path],
+    /// The first frequency, in cycles per radian or metre times 2 pi, and their distance.
+    first: f64,
+    step: f64,
+}
+
+/// One number for each frequency.
+type Each = [f64; TOGETHER];
+
+impl Work for Spectrum<'_> {
+    type Output = [Repeat; TOGETHER];
+
+    #[inline(always)]
+    fn run<C: Cpu>(self) -> Self::Output {
+        let (mut normal, mut right) = ([[0.0; TOGETHER]; 3], [[0.0; TOGETHER]; 2]);
+        for path in self.paths {
+            let (n, b) = self.products::<C>(path);
+            for (sum, x) in normal.iter_mut().zip(n).chain(right.iter_mut().zip(b)) {
+                for l in 0..TOGETHER {
+                    sum[l] += path.trust * x[l];
+                }
+            }
         }
+        std::array::from_fn(|l| {
+            let cycles = self.first + self.step * l as f64;
+            fitted(cycles, normal.map(|x| x[l]), right.map(|x| x[l]))
+        })
     }
-    let [ss, sc, cc] = normal;
+}
+
+impl Spectrum<'_> {
+    /// Inner products of the responses to `sin(n q)` and `cos(n q)` in one window, offset and drift removed, and with the residual.
+    #[inline(always)]
+    fn products<C: Cpu>(&self, path: &Path) -> ([Each; 3], [Each; 2]) {
+        let zero = [0.0; TOGETHER];
+        let (mut speed, mut bend) = ([zero; 2], [zero; 2]);
+        let (mut squares, mut right) = ([zero; 3], [zero; 2]);
+        let (mut offset, mut drift) = ([zero; 2], [zero; 2]);
+        for k in 0..path.q.len() {
+            let (h, gain) = (path.h[k], path.gain[k]);
+            let torque = self.phases::<C>(path.q[k]);
+            for i in 0..2 {
+                for l in 0..TOGETHER {
+                    let kick = h * gain * torque[i][l];
+                    bend[i][l] = C::fused(h, C::fused(0.5, kick, speed[i][l]), bend[i][l]);
+                    speed[i][l] += kick;
+                    right[i][l] = C::fused(bend[i][l], path.residual[k], right[i][l]);
+                    offset[i][l] += bend[i][l];
+                    drift[i][l] = C::fused(bend[i][l], path.drift[k], drift[i][l]);
+                }
+            }
+            for l in 0..TOGETHER {
+                squares[0][l] = C::fused(bend[0][l], bend[0][l], squares[0][l]);
+                squares[1][l] = C::fused(bend[0][l], bend[1][l], squares[1][l]);
+                squares[2][l] = C::fused(bend[1][l], bend[1][l], squares[2][l]);
+            }
+        }
+        let count = path.q.len() as f64;
+        for (square, (a, b)) in squares.iter_mut().zip([(0, 0), (0, 1), (1, 1)]) {
+            for l in 0..TOGETHER {
+                square[l] -= offset[a][l] * offset[b][l] / count + drift[a][l] * drift[b][l];
+            }
+        }
+        (squares, right)
+    }
+
+    /// Sines and cosines of all frequencies at `q`, each turned on from the one before.
+    #[inline(always)]
+    fn phases<C: Cpu>(&self, q: f64) -> [Each; 2] {
+        let (mut s, mut c) = sin_cos(self.first * q);
+        let (by_s, by_c) = sin_cos(self.step * q);
+        let mut phases = [[0.0; TOGETHER]; 2];
+        for l in 0..TOGETHER {
+            (phases[0][l], phases[1][l]) = (s, c);
+            (s, c) = (C::fused(s, by_c, c * by_s), C::fused(c, by_c, -s * by_s));
+        }
+        phases
+    }
+}
+
+/// The solution for one frequency.
+fn fitted(cycles: f64, [ss, sc, cc]: [f64; 3], right: [f64; 2]) -> Repeat {
     let determinant = ss * cc - sc * sc;
     if determinant.is_nan() || determinant <= 1e-9 * ss * cc {
         return Repeat { amplitude: 0.0, cycles, phase: 0.0, gain: 0.0 };
@@ -150,30 +231,6 @@ fn fitted(paths: &[Path], cycles: f64) -> Repeat {
     }
 }
 
-/// Inner products of the responses to `sin(n q)` and `cos(n q)` in one window, offset and drift removed, and with the residual.
-fn products(path: &Path, cycles: f64) -> ([f64; 3], [f64; 2]) {
-    let (mut speed, mut bend) = ([0.0; 2], [0.0; 2]);
-    let (mut squares, mut right) = ([0.0; 3], [0.0; 2]);
-    let (mut offset, mut drift) = ([0.0; 2], [0.0; 2]);
-    for k in 0..path.q.len() {
-        let (s, c) = armgap_core::trig::sin_cos(cycles * path.q[k]);
-        let (h, torque) = (path.h[k], [path.gain[k] * s, path.gain[k] * c]);
-        for i in 0..2 {
-            bend[i] += h * (speed[i] + 0.5 * h * torque[i]);
-            speed[i] += h * torque[i];
-            right[i] += bend[i] * path.residual[k];
-            offset[i] += bend[i];
-            drift[i] += bend[i] * path.drift[k];
-        }
-        squares[0] += bend[0] * bend[0];
-        squares[1] += bend[0] * bend[1];
-        squares[2] += bend[1] * bend[1];
-    }
-    let count = path.q.len() as f64;
-    let free = |a: usize, b: usize| offset[a] * offset[b] / count + drift[a] * drift[b];
-    ([squares[0] - free(0, 0), squares[1] - free(0, 1), squares[2] - free(1, 1)], right)
-}
-
 /// The highest local maxima.
 fn peaks(spectrum: &[Repeat]) -> Vec<Repeat> {
     let gain = |i: usize| spectrum.get(i).map_or(0.0, |r| r.gain);
@@ -182,4 +239,49 @@ fn peaks(spectrum: &[Repeat]) -> Vec<Repeat> {
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     found.truncate(PEAKS);
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armgap_core::cpu::Portable;
+
+    #[test]
+    fn sines_turned_on_from_frequency_to_frequency_are_those_of_each() {
+        let spectrum = Spectrum { paths: &[], first: 7.3, step: 0.41 };
+        for q in [-2.9, 0.0, 0.3, 11.0] {
+            let [sines, cosines] = spectrum.phases::<Portable>(q);
+            for l in 0..TOGETHER {
+                let (s, c) = ((7.3 + 0.41 * l as f64) * q).sin_cos();
+                assert!((sines[l] - s).abs() < 1e-13 && (cosines[l] - c).abs() < 1e-13, "{q} {l}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ripple_is_found_with_its_size_and_phase() {
+        let (cycles, amplitude, phase) = (9.0, 0.4, 0.7);
+        let count = 100;
+        let q: Vec<f64> = (0..count).map(|k| 0.02 * k as f64).collect();
+        let middle = (count - 1) as f64 / 2.0;
+        let length = (0..count).map(|k| (k as f64 - middle).powi(2)).sum::<f64>().sqrt();
+        let drift: Vec<f64> = (0..count).map(|k| (k as f64 - middle) / length).collect();
+        let (mut speed, mut bend) = (0.0, 0.0);
+        let mut residual: Vec<f64> = Vec::new();
+        for q in &q {
+            let kick = 0.01 * amplitude * (cycles * q + phase).sin();
+            bend += 0.01 * (speed + 0.5 * kick);
+            speed += kick;
+            residual.push(bend);
+        }
+        let mean = residual.iter().sum::<f64>() / count as f64;
+        let slope: f64 = residual.iter().zip(&drift).map(|(r, d)| r * d).sum();
+        residual.iter_mut().zip(&drift).for_each(|(r, d)| *r -= mean + slope * d);
+        let path = Path { q, gain: vec![1.0; count], h: vec![0.01; count], residual, drift, trust: 1.0 };
+        let found = Level::detect().run(Spectrum { paths: &[path], first: 8.0, step: 0.5 });
+        let at = found[2];
+        assert_eq!(at.cycles, cycles);
+        assert!((at.amplitude - amplitude).abs() < 1e-6 && (at.phase - phase).abs() < 1e-6, "{at:?}");
+        assert!(found.iter().all(|other| other.gain <= at.gain));
+    }
 }

@@ -77,6 +77,7 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         candidates.par_iter().map(|c| trace(problem, base, &residual, before, c)).collect();
     let (traces, direct): (Vec<Vec<f64>>, Vec<Option<f64>>) = traced.into_iter().unzip();
     columns.extend(traces);
+    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
     let gram = problem.metric.gram_with(k, problem.data, &columns, &residual);
     let last = gram.total.nrows() - 1;
     let mut own = gram.total.view((0, 0), (k, k)).into_owned();

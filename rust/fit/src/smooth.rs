@@ -24,17 +24,22 @@ pub fn local_cubic(t: &[f64], q: impl Fn(usize) -> f64, at: usize, half: usize) 
     let count = (2 * half + 1).min(t.len());
     let first = at.saturating_sub(half).min(t.len() - count);
     let scale = (t[first + count - 1] - t[first]).max(f64::MIN_POSITIVE) / 2.0;
-    let row = |k: usize| {
-        let x = (t[k] - t[at]) / scale;
-        Vector4::new(1.0, x, x * x, x * x * x)
-    };
-    let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    let place = |k: usize| (t[k] - t[at]) / scale;
+    // The normal matrix of powers holds their sums only.
+    let (mut powers, mut right) = ([0.0; 7], Vector4::zeros());
     let base = q(at);
     for k in first..first + count {
-        let phi = row(k);
-        normal += phi * phi.transpose();
-        right += phi * (q(k) - base);
+        let (x, y) = (place(k), q(k) - base);
+        let mut power = 1.0;
+        for (i, sum) in powers.iter_mut().enumerate() {
+            *sum += power;
+            if i < 4 {
+                right[i] += power * y;
+            }
+            power *= x;
+        }
     }
+    let normal = Matrix4::from_fn(|i, j| powers[i + j]);
     let Some(inverse) = normal.try_inverse() else {
         return Local {
             q: base,
@@ -46,7 +51,11 @@ pub fn local_cubic(t: &[f64], q: impl Fn(usize) -> f64, at: usize, half: usize) 
         };
     };
     let c = inverse * right;
-    let squares: f64 = (first..first + count).map(|k| (q(k) - base - row(k).dot(&c)).powi(2)).sum();
+    let left = |k: usize| {
+        let x = place(k);
+        q(k) - base - (c[0] + x * (c[1] + x * (c[2] + x * c[3])))
+    };
+    let squares: f64 = (first..first + count).map(|k| left(k).powi(2)).sum();
     let freedom = count.saturating_sub(4);
     Local {
         q: base + c[0],

@@ -16,6 +16,18 @@ use rayon::prelude::*;
 /// Relative displacement for sensitivities; events are located to 1e-12, so a forward difference is good to 1e-6.
 const RELATIVE_STEP: f64 = 1e-6;
 
+/// Where the cost falls as foreseen to within this part of what ends a search, the sensitivities still hold where the step has led.
+const FORESEEN: f64 = 0.5;
+
+/// Sensitivities that still hold end a search if they foresee a fall of less than this part of what ends it.
+const LEAST: f64 = 0.1;
+
+/// Sensitivities taken over from a neighbour serve on where the cost falls as foreseen to within this part of the fall.
+const SERVES: f64 = 0.25;
+
+/// A value of whose sensitivity the others leave less than this part needs theirs from where it stands itself.
+const APART: f64 = 0.05;
+
 /// How far a search is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
@@ -23,13 +35,15 @@ pub struct Effort {
     pub iterations: usize,
     /// A decrease of the cost by less than this part of it ends the search.
     pub enough: f64,
+    /// Whether the sensitivities of an earlier point may end it.
+    pub thrifty: bool,
 }
 
 impl Effort {
     /// Far enough to rank candidates.
-    pub const ROUGH: Self = Self { iterations: 4, enough: 1e-2 };
+    pub const ROUGH: Self = Self { iterations: 4, enough: 1e-2, thrifty: true };
     /// To the minimum.
-    pub const FULL: Self = Self { iterations: 15, enough: 1e-4 };
+    pub const FULL: Self = Self { iterations: 15, enough: 1e-4, thrifty: false };
 }
 
 /// Trusted values of the arm's parameters.
@@ -79,6 +93,10 @@ pub struct Fit<const P: usize> {
     pub prior_cost: f64,
     /// Covariance of the free values, with each window as one independent observation.
     pub covariance: DMatrix<f64>,
+    /// Cost of every window as it is.
+    pub costs: Vec<f64>,
+    /// Whether it was taken to its end with sensitivities of its own.
+    pub own: bool,
 }
 
 impl<const P: usize> Fit<P> {
@@ -93,9 +111,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
     pub fn residual(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
         self.watch.check();
         let predicted = self.data.predict(self.arm, hypothesis, &self.metric.starts);
-        let mut residual: Vec<f64> = self.measured.iter().zip(&predicted).map(|(y, p)| y - p).collect();
-        self.metric.whiten(&mut residual);
-        residual
+        self.metric.residual(self.measured, &predicted)
     }
 
     /// Tempered cost of every window.
@@ -126,6 +142,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
                 residual.iter().zip(&there).map(|(here, there)| (here - there) / steps[i]).collect()
             })
             .collect()
+    }
+
+    /// Whitened sensitivities of the prediction to all free values.
+    pub fn slopes(&self, hypothesis: &Hypothesis<P>) -> Vec<Vec<f64>> {
+        let all: Vec<usize> = (0..hypothesis.values().len()).collect();
+        self.sensitivities(hypothesis, &self.residual(hypothesis), &all)
     }
 
     /// Displacements for sensitivities, inward at an upper bound.
@@ -168,39 +190,60 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
 
     /// Minimises the cost from `start`, over all free values.
     pub fn solve(&self, start: &Hypothesis<P>, effort: Effort) -> Fit<P> {
-        let all: Vec<usize> = (0..start.values().len()).collect();
+        self.solve_beside(start, effort, &[])
+    }
+
+    /// The same beside a neighbour, whose sensitivities to the first values serve as long as the cost falls as they foresee.
+    pub fn solve_beside(&self, start: &Hypothesis<P>, effort: Effort, known: &[Vec<f64>]) -> Fit<P> {
         let (lower, upper) = self.bounds(start);
         let mut at = Point::new(self, start.clone());
         let mut damping = 1e-4;
-        let mut gram = self.gram(&at, &all);
-        for _ in 0..effort.iterations {
-            let (normal, gradient) = self.normal_equations(&gram, &at.hypothesis);
-            let mut improved = false;
+        let mut slopes = Slopes::beside(self, &at, known);
+        'search: for _ in 0..effort.iterations {
+            let (normal, gradient) = self.normal_equations(&slopes.gram, &at.hypothesis);
+            let now = at.hypothesis.values();
+            let mut fall = None;
             for _ in 0..6 {
-                let now = at.hypothesis.values();
                 let values = inside(&now, step(&normal, &gradient, damping, &now, &lower, &upper), &lower, P);
+                let change = DVector::from_fn(now.len(), |i, _| values[i] - now[i]);
+                let foreseen = change.dot(&(2.0 * &gradient - &normal * &change));
+                if slopes.followed && foreseen < LEAST * effort.enough * at.cost() {
+                    break 'search;
+                }
                 let trial = Point::new(self, at.hypothesis.with_values(&values));
                 if trial.cost() < at.cost() {
-                    improved = at.cost() - trial.cost() > effort.enough * at.cost();
+                    fall = Some((at.cost() - trial.cost(), foreseen));
                     at = trial;
                     damping = (damping * 0.1).max(1e-9);
                     break;
                 }
+                if !slopes.are_own() {
+                    break;
+                }
                 damping = (damping * 10.0).min(1e6);
             }
-            if !improved {
-                break;
+            let enough = effort.enough * at.cost();
+            match fall {
+                None if !slopes.are_own() => slopes = Slopes::new(self, &at),
+                Some((fall, foreseen)) if fall > enough => {
+                    let missed = (fall - foreseen).abs();
+                    if effort.thrifty && missed < FORESEEN * enough {
+                        slopes.follow(self, &at);
+                        continue;
+                    }
+                    slopes = if missed < SERVES * foreseen && slopes.lent() > 0 {
+                        Slopes::beside(self, &at, known)
+                    } else {
+                        Slopes::new(self, &at)
+                    };
+                }
+                _ => break,
             }
-            gram = self.gram(&at, &all);
         }
         self.watch.unit();
-        let covariance = self.covariance(&gram, &at);
-        Fit { hypothesis: at.hypothesis, data_cost: at.data_cost, prior_cost: at.prior_cost, covariance }
-    }
-
-    fn gram(&self, at: &Point<P>, which: &[usize]) -> Gram {
-        let columns = self.sensitivities(&at.hypothesis, &at.residual, which);
-        self.metric.gram(self.data, &columns, &at.residual)
+        let covariance = self.covariance(&slopes.gram, &at);
+        let Point { hypothesis, data_cost, prior_cost, costs, .. } = at;
+        Fit { hypothesis, data_cost, prior_cost, covariance, costs, own: slopes.lent() == 0 }
     }
 
     /// Normal matrix and right-hand side, the prior included.
@@ -243,10 +286,86 @@ fn spent(windows: usize, drawn: f64) -> f64 {
     (n / (n - drawn).max(1.0)).powi(2)
 }
 
+/// Sensitivities of the free values, the first of them perhaps on loan from a neighbour, and their inner products.
+struct Slopes<'a> {
+    lent: &'a [Vec<f64>],
+    own: Vec<Vec<f64>>,
+    gram: Gram,
+    /// Whether they are those of an earlier point.
+    followed: bool,
+}
+
+impl<'a> Slopes<'a> {
+    /// Of all values where they stand.
+    fn new<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        problem: &Problem<A, N, P>,
+        at: &Point<P>,
+    ) -> Self {
+        Self::with(problem, at, &[])
+    }
+
+    /// With those of the first values on loan, if they can be told from the others by them.
+    fn beside<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        problem: &Problem<A, N, P>,
+        at: &Point<P>,
+        known: &'a [Vec<f64>],
+    ) -> Self {
+        let slopes = Self::with(problem, at, known);
+        let apart = slopes.lent() == 0 || slopes.are_apart();
+        if apart { slopes } else { Self::new(problem, at) }
+    }
+
+    fn with<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        problem: &Problem<A, N, P>,
+        at: &Point<P>,
+        lent: &'a [Vec<f64>],
+    ) -> Self {
+        let rest: Vec<usize> = (lent.len()..at.hypothesis.values().len()).collect();
+        let own = problem.sensitivities(&at.hypothesis, &at.residual, &rest);
+        let gram = Gram { total: DMatrix::zeros(0, 0), scores: Vec::new() };
+        let mut slopes = Self { lent, own, gram, followed: false };
+        slopes.follow(problem, at);
+        slopes.followed = false;
+        slopes
+    }
+
+    /// Whether the others leave enough of each of those that are not on loan.
+    fn are_apart(&self) -> bool {
+        let count = self.lent() + self.own.len();
+        let normal = self.gram.total.view((0, 0), (count, count)).into_owned();
+        scaled_inverse(&normal).is_some_and(|inverse| {
+            let left = |i: usize| 1.0 / (inverse[(i, i)] * normal[(i, i)]);
+            (self.lent()..count).all(|i| normal[(i, i)] <= 0.0 || left(i) > APART)
+        })
+    }
+
+    /// Whether all are those of the point they are used at.
+    fn are_own(&self) -> bool {
+        self.lent() == 0 && !self.followed
+    }
+
+    /// How many are on loan.
+    fn lent(&self) -> usize {
+        self.lent.len()
+    }
+
+    /// Goes on to serve at another point.
+    fn follow<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        &mut self,
+        problem: &Problem<A, N, P>,
+        at: &Point<P>,
+    ) {
+        let columns: Vec<&[f64]> = self.lent.iter().chain(&self.own).map(Vec::as_slice).collect();
+        self.gram = problem.metric.gram(problem.data, &columns, &at.residual);
+        self.followed = true;
+    }
+}
+
 /// A hypothesis with its residual and cost.
 struct Point<const P: usize> {
     hypothesis: Hypothesis<P>,
     residual: Vec<f64>,
+    costs: Vec<f64>,
     data_cost: f64,
     prior_cost: f64,
 }
@@ -254,9 +373,10 @@ struct Point<const P: usize> {
 impl<const P: usize> Point<P> {
     fn new<A: Arm<f64, N, P>, const N: usize>(problem: &Problem<A, N, P>, hypothesis: Hypothesis<P>) -> Self {
         let residual = problem.residual(&hypothesis);
-        let data_cost = problem.metric.total(&problem.metric.costs(problem.data, &residual));
+        let costs = problem.metric.costs(problem.data, &residual);
+        let data_cost = problem.metric.total(&costs);
         let prior_cost = problem.prior.cost(&hypothesis.theta);
-        Self { hypothesis, residual, data_cost, prior_cost }
+        Self { hypothesis, residual, costs, data_cost, prior_cost }
     }
 
     fn cost(&self) -> f64 {

@@ -33,12 +33,18 @@ const WORTH_SMOOTHING: f64 = 2.0;
 const SMOOTHING: [f64; 2] = [0.03, 0.1];
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// Hypotheses that are worth a full fit: one candidate more than the fitted model, or smoother friction.
-    pub(crate) fn starts(&self, fit: &Fit<P>, weights: &Weights<N>, noticeable: f64) -> Vec<Hypothesis<P>> {
+    /// Hypotheses that are worth a full fit: one candidate more than the fitted model, or smoother friction. Beside them the tests of
+    /// all candidates, the open ones first, where they were made.
+    pub(crate) fn starts(
+        &self,
+        fit: &Fit<P>,
+        weights: &Weights<N>,
+        noticeable: f64,
+    ) -> (Vec<Hypothesis<P>>, Vec<Scored>) {
         let size = self.relative_gap(weights, fit);
         let gap = size > noticeable;
         if !gap && is_plausible::<P>(fit.prior_cost) {
-            return Vec::new();
+            return (Vec::new(), Vec::new());
         }
         let mut all = self.open_candidates(&fit.hypothesis);
         all.extend(self.repeating(&all, weights, fit));
@@ -55,7 +61,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         if gap {
             starts.extend(self.smoother(&fit.hypothesis, weights, training));
         }
-        starts
+        (starts, screened)
     }
 
     /// Candidates not yet in the model.

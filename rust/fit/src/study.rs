@@ -2,14 +2,14 @@
 
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
-use crate::progress::Watch;
+use crate::progress::{Watch, Work};
 use crate::scale::Scales;
 use crate::solve::{Effort, Fit, Prior, Problem};
 use crate::window::{Dataset, Shift};
 use armgap_core::arm::Arm;
 
 /// Rounds of re-weighting at most.
-pub const MAX_ROUNDS: usize = 5;
+const MAX_ROUNDS: usize = 5;
 
 /// A round that changes every joint's scale by less than this factor is the last.
 const SETTLED: f64 = 1.1;
@@ -63,6 +63,7 @@ impl<const N: usize> Sample<N> {
 }
 
 /// Weights for training and holdout windows, taken around one hypothesis.
+#[derive(Debug, Clone)]
 pub struct Weights<const N: usize> {
     /// Weights of the training windows.
     pub training: Metric<N>,
@@ -95,25 +96,29 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
     /// Weights around a hypothesis: starts are fitted to it and the scales are those given.
     pub fn weights(&self, hypothesis: &Hypothesis<P>, scale: [f64; N]) -> Weights<N> {
-        Weights {
-            training: self.metric(&self.training, hypothesis, scale),
-            holdout: self.metric(&self.holdout, hypothesis, scale),
-        }
+        let around = |sample| self.metric(sample, hypothesis, scale);
+        let (training, holdout) = rayon::join(|| around(&self.training), || around(&self.holdout));
+        Weights { training, holdout }
     }
 
     /// A metric whose starts have been fitted to the hypothesis once and relinearised there.
     pub fn metric(&self, sample: &Sample<N>, hypothesis: &Hypothesis<P>, scale: [f64; N]) -> Metric<N> {
         self.watch.check();
-        let rough = Metric::new(&sample.data, &self.arm, hypothesis, scale, sample.data.measured_starts());
-        let residual = self.on(sample, &rough).residual(hypothesis);
+        let around = |starts: Vec<Shift<N>>| {
+            let predicted = sample.data.predict(&self.arm, hypothesis, &starts);
+            let metric = Metric::new(&sample.data, &self.arm, hypothesis, scale, starts, &predicted);
+            let residual = metric.residual(&sample.measured, &predicted);
+            (metric, residual)
+        };
+        let (rough, residual) = around(sample.data.measured_starts());
         let starts = bounded(&sample.data, rough.refit_starts(&sample.data, &residual));
-        let metric = Metric::new(&sample.data, &self.arm, hypothesis, scale, starts);
-        let residual = self.on(sample, &metric).residual(hypothesis);
+        let (metric, residual) = around(starts);
         metric.robust(&sample.data, &residual)
     }
 
     /// Fits with scales that follow the residual, from rough scales down to the residual's own.
     pub fn settle(&self, start: &Hypothesis<P>, scale: [f64; N]) -> (Fit<P>, Weights<N>) {
+        self.watch.begin(Work::Refit, MAX_ROUNDS + 1);
         let mut scale = scale;
         let mut hypothesis = start.clone();
         loop_rounds(|round| {

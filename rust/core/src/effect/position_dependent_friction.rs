@@ -2,6 +2,7 @@
 
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
+use crate::trig::sin_cos;
 
 /// Friction that varies with position.
 #[derive(Debug)]
@@ -30,7 +31,7 @@ impl<T: Real> Effect<T> for PositionDependentFriction {
     }
 
     fn coulomb(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>, _direction: T) -> T {
-        let (s, c) = x.q.sin_cos();
+        let (s, c) = sin_cos(x.q);
         p[0] * c + p[1] * s
     }
 }

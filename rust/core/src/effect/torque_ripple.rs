@@ -2,6 +2,7 @@
 
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
+use crate::trig::sin_cos;
 
 /// Torque ripple (cogging).
 #[derive(Debug)]
@@ -45,6 +46,6 @@ impl<T: Real> Effect<T> for TorqueRipple {
     }
 
     fn force(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>) -> T {
-        p[0] * (p[1] * x.q + p[2]).sin()
+        p[0] * sin_cos(p[1] * x.q + p[2]).0
     }
 }

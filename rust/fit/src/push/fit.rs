@@ -55,7 +55,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let least = state.noticeable.powi(2) * sample.motion(&state.scale);
         let usual = self.metric(&sample, state.model, state.scale).typical * data.windows.len() as f64;
         let starts = vec![Shift::none(); data.windows.len()];
-        let metric = Metric::new(&data, &self.arm, state.model, state.scale, starts);
+        let predicted = data.predict(&self.arm, state.model, &starts);
+        let metric = Metric::new(&data, &self.arm, state.model, state.scale, starts, &predicted);
         let sample = Sample::new(data);
         let touched = Touched { arm: &self.arm, model: state.model, sample, metric, known, push: rough.push };
         let p = Vector3::from(rough.push.p);
@@ -89,9 +90,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         let mut data = self.sample.data.clone();
         data.tracks[0].pushes = self.known.iter().copied().chain([push]).collect();
         let predicted = data.predict(self.arm, self.model, &self.metric.starts);
-        let mut r: Vec<f64> = self.sample.measured.iter().zip(&predicted).map(|(y, x)| y - x).collect();
-        self.metric.whiten(&mut r);
-        r
+        self.metric.residual(&self.sample.measured, &predicted)
     }
 
     fn cost(&self, r: &[f64]) -> f64 {
@@ -103,7 +102,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         let (mut p, mut r) = (p, self.residual_of(&p));
         let (mut cost, mut damping, mut inverse) = (self.cost(&r), 1e-2, DMatrix::zeros(3, 3));
         for _ in 0..ITERATIONS {
-            let gram = self.metric.gram(&self.sample.data, &self.slopes(&p, &r), &r).total;
+            let slopes = self.slopes(&p, &r);
+            let gram = self.metric.gram(&self.sample.data, &slopes.each_ref().map(Vec::as_slice), &r).total;
             let before = cost;
             for _ in 0..ATTEMPTS {
                 let Some((next, shape)) = damped_step(&p, &gram, damping) else { return (p, inverse, cost) };
@@ -125,14 +125,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
     }
 
     /// Derivatives of the prediction by impulse, time and duration.
-    fn slopes(&self, p: &Vector3<f64>, r: &[f64]) -> Vec<Vec<f64>> {
+    fn slopes(&self, p: &Vector3<f64>, r: &[f64]) -> [Vec<f64>; 3] {
         let steps = [1e-4 * p[0].abs().max(1e-12), 1e-5, 1e-5];
         let slope = |i: usize| {
             let mut moved = *p;
             moved[i] += steps[i];
             r.iter().zip(&self.residual_of(&moved)).map(|(a, b)| (a - b) / steps[i]).collect()
         };
-        (0..3).map(slope).collect()
+        std::array::from_fn(slope)
     }
 }
 

@@ -15,6 +15,7 @@ use crate::study::{Sample, Study};
 use crate::track::Track;
 use armgap_core::arm::Arm;
 use armgap_core::effect::find;
+use rayon::prelude::*;
 use residual::Residual;
 use search::{Bell, MOST, search};
 
@@ -100,11 +101,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         };
         let recordings = self.recordings();
         self.watch.begin(Work::Pushes, recordings.len());
-        let found = recordings.iter().flat_map(|places| {
-            self.watch.unit();
-            self.in_recording(places, &state)
-        });
-        found.collect()
+        let found: Vec<Vec<Event>> = recordings
+            .par_iter()
+            .map(|places| {
+                self.watch.unit();
+                self.in_recording(places, &state)
+            })
+            .collect();
+        found.into_iter().flatten().collect()
     }
 
     fn in_recording(&self, places: &[Place], state: &State<'_, N, P>) -> Vec<Event> {

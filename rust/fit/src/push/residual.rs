@@ -6,10 +6,12 @@
 
 use crate::model::Hypothesis;
 use crate::observe::hidden_states;
+use crate::products::product;
 use crate::smooth::{Local, local_cubic};
 use crate::solve::Prior;
 use crate::track::Track;
 use armgap_core::arm::Arm;
+use armgap_core::transmission::Hidden;
 use nalgebra::{SMatrix, SVector};
 
 /// Standard deviation of the low-pass, s: what elastic parts and delays do is faster, a push by hand slower.
@@ -194,7 +196,8 @@ fn rows<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let half = half_width(track);
     let held = model.command(&track.t, &track.held, &[], &track.tables).unwrap_or_else(|| track.held.clone());
     let plant = model.plant(arm)?;
-    let hidden = hidden_states(track, &plant, &held, track.len() - 1);
+    let hides = plant.is_driven() || plant.remembers();
+    let hidden = hides.then(|| hidden_states(track, &plant, &held, track.len() - 1));
     let widths = slow.iter().copied().fold(f64::INFINITY, f64::min);
     let soft = plant.with_smoothing(widths.max(model.smoothing));
     let low: [f64; N] = std::array::from_fn(|j| LOW_SPEED / SLOW * slow[j]);
@@ -208,7 +211,8 @@ fn rows<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         ];
         let tau = SVector::from_fn(|j, _| 0.5 * (held[k.saturating_sub(1)][j].mean() + held[k][j].mean()));
         let [q, dq, ddq] = &motion;
-        let lack = soft.lacking(track.t[k], [q, dq, ddq], &tau, &hidden[k]);
+        let hidden = hidden.as_ref().map_or_else(|| Hidden::none(*q), |hidden| hidden[k]);
+        let lack = soft.lacking(track.t[k], [q, dq, ddq], &tau, &hidden);
         Row {
             t: track.t[k],
             lack,
@@ -259,10 +263,7 @@ impl LowPass {
 
     /// Means around every grid point.
     fn apply(&self, x: &[f64]) -> Vec<f64> {
-        let mean = |(first, weights): &(usize, Vec<f64>)| {
-            weights.iter().zip(&x[*first..]).map(|(weight, x)| weight * x).sum()
-        };
-        self.kernels.iter().map(mean).collect()
+        self.kernels.iter().map(|(first, weights)| product(weights, &x[*first..])).collect()
     }
 }
 

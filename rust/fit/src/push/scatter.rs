@@ -59,26 +59,27 @@ fn by_activity<const N: usize>(
     let near_rest: Vec<f64> = residual.joints[j].rest.iter().map(|r| 4.0 * r * (1.0 - r)).collect();
     let even = vec![1.0; left.len()];
     let features: Vec<&Vec<f64>> = [&even, &near_rest].into_iter().chain(residual.activity.iter()).collect();
-    let variance = |a: &[f64], i: usize| {
-        a.iter().zip(&features).map(|(a, f)| a * f[i]).sum::<f64>().max(1e-3 * typical * typical)
-    };
+    let least = 1e-3 * typical * typical;
+    let sum = |a: &[f64], at: &[f64]| a.iter().zip(at).map(|(a, f)| a * f).sum::<f64>().max(least);
     let rows: Vec<usize> = (0..left.len()).filter(|&i| moves[i]).collect();
+    let flat: Vec<f64> = rows.iter().flat_map(|&i| features.iter().map(move |f| f[i])).collect();
     let mut a = vec![typical * typical / features.len() as f64; features.len()];
     for _ in 0..UPDATES {
         let (mut up, mut down) = (vec![0.0; a.len()], vec![1e-300; a.len()]);
-        for &i in &rows {
-            let v = variance(&a, i);
-            let square = left[i] * left[i];
-            let weight = (FREEDOM + 1.0) / (FREEDOM + square / v);
-            for (k, feature) in features.iter().enumerate() {
-                up[k] += feature[i] * weight * square / (v * v);
-                down[k] += feature[i] / v;
+        for (at, &i) in flat.chunks_exact(a.len()).zip(&rows) {
+            let precision = 1.0 / sum(&a, at);
+            let square = left[i] * left[i] * precision;
+            let weight = (FREEDOM + 1.0) / (FREEDOM + square) * square * precision;
+            for ((up, down), feature) in up.iter_mut().zip(&mut down).zip(at) {
+                *up += feature * weight;
+                *down += feature * precision;
             }
         }
         for k in 0..a.len() {
             a[k] = (a[k] * (up[k] / down[k]).sqrt()).max(1e-8 * typical * typical);
         }
     }
+    let variance = |i: usize| a.iter().zip(&features).map(|(a, f)| a * f[i]).sum::<f64>().max(least);
     let (least, most) = ((QUIET * typical).powi(2), (VIOLENT * typical).powi(2));
-    (0..left.len()).map(|i| variance(&a, i).clamp(least, most)).collect()
+    (0..left.len()).map(|i| variance(i).clamp(least, most)).collect()
 }

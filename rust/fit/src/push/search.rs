@@ -6,9 +6,11 @@
 
 use super::residual::{LOW_PASS, Residual};
 use super::scatter::scatter;
+use crate::products::{cross, product};
 use crate::solve::scaled_inverse;
 use crate::track::median;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Standard deviations of bells that are looked for, as they appear behind the low-pass, s.
 const WIDTHS: [f64; 7] = [0.045, 0.055, 0.07, 0.09, 0.115, 0.145, 0.18];
@@ -108,6 +110,8 @@ struct Fitted {
     inverse: DMatrix<f64>,
     /// Bells in the fit.
     bells: Vec<Bell>,
+    /// Weights per joint and point: those that bells are judged with, and those that the columns are fitted with.
+    weights: Vec<[Vec<f64>; 2]>,
 }
 
 struct Search<'a, const N: usize> {
@@ -171,7 +175,8 @@ impl<const N: usize> Search<'_, N> {
     fn settle(&mut self, bells: &[Bell]) -> Option<Fitted> {
         let mut fitted = self.fit(bells)?;
         for _ in 0..ROUNDS {
-            self.scatter = (0..N).map(|j| scatter(self.residual, j, &fitted.left[j])).collect();
+            self.scatter =
+                (0..N).into_par_iter().map(|j| scatter(self.residual, j, &fitted.left[j])).collect();
             fitted = self.fit(bells)?;
         }
         Some(fitted)
@@ -180,7 +185,6 @@ impl<const N: usize> Search<'_, N> {
     fn fit(&self, bells: &[Bell]) -> Option<Fitted> {
         let residual = self.residual;
         let (c, k) = (residual.prior.len(), residual.prior.len() + bells.len());
-        let tempering = residual.step / MODEL_TIME;
         let (mut normal, mut right) = (DMatrix::<f64>::zeros(k, k), DVector::<f64>::zeros(k));
         for (i, (expected, sigma)) in residual.prior.iter().enumerate() {
             let precision = sigma.powi(-2).min(1e24);
@@ -191,14 +195,17 @@ impl<const N: usize> Search<'_, N> {
             normal[(c + i, c + i)] += (LARGEST * residual.joints[bell.joint].typical.max(1e-9)).powi(-2);
         }
         let rows: Vec<DMatrix<f64>> = (0..N).map(|j| self.rows(j, bells)).collect();
+        let weights: Vec<[Vec<f64>; 2]> = (0..N).map(|j| self.weights(j)).collect();
         for j in 0..N {
-            let weights = DVector::from_fn(residual.t.len(), |i, _| tempering * self.heed(j, i));
+            let count = residual.t.len();
+            let columns: Vec<&[f64]> = rows[j].as_slice().chunks_exact(count).collect();
             let mut weighted = rows[j].clone();
-            for (mut row, w) in weighted.row_iter_mut().zip(weights.iter()) {
-                row *= *w;
+            for column in weighted.as_mut_slice().chunks_exact_mut(count) {
+                column.iter_mut().zip(&weights[j][1]).for_each(|(x, weight)| *x *= weight);
             }
-            normal += weighted.tr_mul(&rows[j]);
-            right -= weighted.tr_mul(&DVector::from_column_slice(&residual.joints[j].lack));
+            let weighted: Vec<&[f64]> = weighted.as_slice().chunks_exact(count).collect();
+            normal += DMatrix::from_column_slice(k, k, &cross(&weighted, &columns));
+            right -= DVector::from_column_slice(&cross(&weighted, &[&residual.joints[j].lack]));
         }
         let inverse = scaled_inverse(&normal)?;
         let values = &inverse * right;
@@ -210,13 +217,17 @@ impl<const N: usize> Search<'_, N> {
             lack.zip(held).map(|(r, held)| r.signum() * (r.abs() - held).max(0.0)).collect()
         });
         let left = left.collect();
-        Some(Fitted { left, inverse, bells: bells.to_vec() })
+        Some(Fitted { left, inverse, bells: bells.to_vec(), weights })
     }
 
-    /// Weight of a point where the columns are fitted.
-    fn heed(&self, j: usize, i: usize) -> f64 {
+    /// Weights of joint `j`'s points where bells are judged, and where the columns are fitted.
+    fn weights(&self, j: usize) -> [Vec<f64>; 2] {
+        let tempering = self.residual.step / MODEL_TIME;
         let least = MODEL_SCATTER * self.residual.joints[j].typical;
-        self.moving[j][i] / self.scatter[j][i].max(least).powi(2)
+        [0.0, least].map(|least| {
+            let points = self.moving[j].iter().zip(&self.scatter[j]);
+            points.map(|(moving, scatter)| tempering * moving / scatter.max(least).powi(2)).collect()
+        })
     }
 
     /// Torque of joint `j` per unit of every column, then of every bell, which the model does not have.
@@ -233,28 +244,26 @@ impl<const N: usize> Search<'_, N> {
     /// Size of a bell beside those of a fit, in standard deviations of a calm log, with its best height; zero where it is not distinct.
     fn weigh(&self, fitted: &Fitted, bell: &Bell) -> Bell {
         let (residual, j) = (self.residual, bell.joint);
-        let tempering = residual.step / MODEL_TIME;
         let (first, last) = self.reach(bell);
-        let k = residual.prior.len() + fitted.bells.len();
-        let (mut along, mut full) = (0.0, 0.0);
-        // What the bell shares with the columns, by the weights it is judged with and by those they are fitted with.
-        let mut shared = DMatrix::<f64>::zeros(k, 2);
+        let shape = bell.over(&residual.t[first..last], residual.step);
+        let weighted = |weights: &Vec<f64>| -> Vec<f64> {
+            shape.iter().zip(&weights[first..last]).map(|(shape, weight)| shape * weight).collect()
+        };
+        let [judged, heeded] = [0, 1].map(|w| weighted(&fitted.weights[j][w]));
         let columns = &residual.joints[j].columns;
-        for i in first..last {
-            let shape = bell.at(residual.t[i]);
-            let weight = tempering * self.moving[j][i] / self.scatter[j][i].powi(2);
-            along += shape * weight * fitted.left[j][i];
-            full += shape * shape * weight;
-            let both = [shape * weight, shape * tempering * self.heed(j, i)];
-            for (s, weight) in both.into_iter().enumerate() {
-                for (c, column) in columns.iter().enumerate() {
-                    shared[(c, s)] += weight * column[i];
-                }
-                for (b, other) in fitted.bells.iter().enumerate().filter(|(_, b)| b.joint == j) {
-                    shared[(columns.len() + b, s)] -= weight * other.at(residual.t[i]);
-                }
+        let parts: Vec<&[f64]> = columns.iter().chain([&fitted.left[j]]).map(|x| &x[first..last]).collect();
+        let (c, k) = (columns.len(), columns.len() + fitted.bells.len());
+        // What the bell shares with the columns, by the weights it is judged with and by those they are fitted with.
+        let products = cross(&[&judged, &heeded], &parts);
+        let mut shared = DMatrix::<f64>::zeros(k, 2);
+        for (s, weighted) in [&judged, &heeded].into_iter().enumerate() {
+            shared.column_mut(s).rows_mut(0, c).copy_from_slice(&products[s * (c + 1)..][..c]);
+            for (b, other) in fitted.bells.iter().enumerate().filter(|(_, b)| b.joint == j) {
+                let times = residual.t[first..last].iter();
+                shared[(c + b, s)] = -times.zip(weighted).map(|(t, w)| w * other.at(*t)).sum::<f64>();
             }
         }
+        let (along, full) = (products[c], product(&judged, &shape));
         let imitated = shared.column(0).dot(&(&fitted.inverse * shared.column(1)));
         let own = (full - imitated).max(0.02 * full).max(1e-300);
         let size = along / own.sqrt() * (MODEL_TIME / JUDGED_TIME).sqrt();
@@ -279,29 +288,32 @@ impl<const N: usize> Search<'_, N> {
 
     /// Bells of all widths over the log; keeps what their sizes typically are, and gives the largest.
     fn scan(&mut self, fitted: &Fitted) -> Option<Bell> {
-        let residual = self.residual;
+        let moves = |j: usize| self.moving[j].iter().sum::<f64>() * self.residual.step > MOVES;
+        let kinds: Vec<(usize, usize)> =
+            (0..N).filter(|&j| moves(j)).flat_map(|j| (0..WIDTHS.len()).map(move |w| (j, w))).collect();
+        let scanned: Vec<(f64, Option<Bell>)> =
+            kinds.par_iter().map(|(joint, w)| self.scan_kind(fitted, *joint, WIDTHS[*w])).collect();
         let mut largest: Option<Bell> = None;
-        for joint in (0..N).filter(|&j| self.moving[j].iter().sum::<f64>() * residual.step > MOVES) {
-            for (w, &width) in WIDTHS.iter().enumerate() {
-                let (from, to) = self.span(width);
-                let count = ((to - from) / COARSE).floor().max(0.0) as usize;
-                let tried: Vec<Bell> = (0..count)
-                    .map(|i| from + i as f64 * COARSE)
-                    .map(|time| Bell { joint, time, width, height: 0.0, sigma: 0.0, z: 0.0 })
-                    .map(|bell| self.weigh(fitted, &bell))
-                    .collect();
-                self.chance[joint][w] = self.typical(joint, &tried);
-                let best = tried
-                    .into_iter()
-                    .filter(|b| fitted.bells.iter().all(|o| !b.touches(o)))
-                    .max_by(|a, b| a.z.total_cmp(&b.z));
-                if let Some(best) = best {
-                    let best = Bell { z: best.z / self.chance[joint][w], ..best };
-                    largest = largest.filter(|l| l.z >= best.z).or(Some(best));
-                }
-            }
+        for ((joint, w), (chance, best)) in kinds.into_iter().zip(scanned) {
+            self.chance[joint][w] = chance;
+            largest = largest.filter(|l| best.is_none_or(|b| l.z >= b.z)).or(best);
         }
         largest
+    }
+
+    /// Bells of one width on one joint: what their sizes typically are, and the largest in units of that.
+    fn scan_kind(&self, fitted: &Fitted, joint: usize, width: f64) -> (f64, Option<Bell>) {
+        let (from, to) = self.span(width);
+        let count = ((to - from) / COARSE).floor().max(0.0) as usize;
+        let tried: Vec<Bell> = (0..count)
+            .map(|i| from + i as f64 * COARSE)
+            .map(|time| Bell { joint, time, width, height: 0.0, sigma: 0.0, z: 0.0 })
+            .map(|bell| self.weigh(fitted, &bell))
+            .collect();
+        let chance = self.typical(joint, &tried);
+        let apart = |b: &Bell| fitted.bells.iter().all(|o| !b.touches(o));
+        let best = tried.into_iter().filter(apart).max_by(|a, b| a.z.total_cmp(&b.z));
+        (chance, best.map(|best| Bell { z: best.z / chance, ..best }))
     }
 
     /// Size that bells of one kind have by chance in this log, where the joint moves; at least one.
@@ -344,7 +356,39 @@ impl<const N: usize> Search<'_, N> {
 }
 
 impl Bell {
+    /// The bell at points of a regular grid, each from the one before: its logarithm is a parabola.
+    fn over(&self, t: &[f64], step: f64) -> Vec<f64> {
+        let step = step / self.width;
+        let from = t.first().map_or(0.0, |t| (t - self.time) / self.width);
+        let (mut value, bend) = ((-0.5 * from * from).exp(), (-step * step).exp());
+        let mut ratio = (-step * (from + 0.5 * step)).exp();
+        let next = |_| {
+            let here = value;
+            value *= ratio;
+            ratio *= bend;
+            here
+        };
+        t.iter().map(next).collect()
+    }
+
     fn touches(&self, other: &Self) -> bool {
         self.joint == other.joint && (self.time - other.time).abs() < APART
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bell_over_a_grid_is_the_bell_at_its_points() {
+        for (time, width) in [(3.004, 0.045), (2.7, 0.18)] {
+            let bell = Bell { joint: 0, time, width, height: 0.0, sigma: 0.0, z: 0.0 };
+            let t: Vec<f64> = (0..144).map(|i| time - 4.0 * width + 0.01 * f64::from(i)).collect();
+            let near: Vec<f64> = t.into_iter().filter(|t| (t - time).abs() < 4.0 * width).collect();
+            for (t, value) in near.iter().zip(bell.over(&near, 0.01)) {
+                assert!((value / bell.at(*t) - 1.0).abs() < 1e-11, "{t}: {value}");
+            }
+        }
     }
 }
