@@ -173,3 +173,34 @@ def test_wrong_values_give_parameters(arm):
     result = diagnose(simulate(arm, t, seed_torque(t)), wrong, holdout=simulate(arm, t, other))
     assert result.verdict == "parameters"
     assert result.parameters["refit"]["theta4"].value == pytest.approx(arm.theta[3], rel=0.01)
+
+
+def hidden_in(arm: Arm, *hidden: Effect, tolerance: float = 1e-9) -> Diagnosis:
+    """The diagnosis of this arm with these effects, from two noisy logs."""
+    noise = np.random.default_rng(5)
+    t = np.arange(1600) * arm.sample_period
+    other = np.column_stack([45 * np.sin(9 * t) + 20 * np.sin(17 * t), 6 * np.sin(15 * t + 1) + 4 * np.sin(31 * t)])
+    clean = [simulate(arm, t, tau, effects=list(hidden), tolerance=tolerance) for tau in (seed_torque(t), other)]
+    training, holdout = (Log(x.name, x.t, x.q + noise.normal(0, 1e-5, x.q.shape), x.tau) for x in clean)
+    return diagnose(training, arm, holdout=holdout)
+
+
+def test_a_second_cause_that_is_small_beside_the_first_is_found(arm):
+    warmup = Effect("friction_warmup", 1, {"amplitude": 6.0, "time_constant": 1.0})
+    result = hidden_in(arm, warmup, Effect("torque_gain", 2, {"gain": 1.02}))
+    assert [(c.effect, c.joint) for c in result.causes] == [("friction_warmup", 1), ("torque_gain", 2)]
+    assert result.causes[1].parameters["gain"].value == pytest.approx(1.02, abs=1e-3)
+
+
+def test_friction_that_falls_up_to_the_highest_speeds_is_sized(arm):
+    result = hidden_in(arm, Effect("stribeck", 2, {"amplitude": 1.5, "velocity": 4.0}))
+    assert [(c.effect, c.joint) for c in result.causes] == [("stribeck", 2)]
+    assert result.causes[0].parameters["velocity"].value == pytest.approx(4.0, rel=0.01)
+
+
+def test_a_hard_stop_is_no_push(arm):
+    stop = Effect("contact", 2, {"position": 0.1, "stiffness": 2000.0, "damping": 2.0})
+    result = hidden_in(arm, stop, tolerance=1e-4)
+    assert [(c.effect, c.joint) for c in result.causes] == [("contact", 2)]
+    assert result.causes[0].probability > 0.9
+    assert result.causes[0].parameters["stiffness"].value == pytest.approx(2000.0, rel=0.1)

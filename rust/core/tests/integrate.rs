@@ -154,33 +154,58 @@ fn a_smoothed_sign_tends_to_dry_friction() {
 }
 
 #[test]
-fn a_delayed_command_keeps_its_impulse() {
+fn a_delayed_command_keeps_its_impulse_and_its_moment() {
     let t: Vec<f64> = (0..50).map(|k| f64::from(k) * H + 1e-4 * f64::from(k % 3)).collect();
     let u: Vec<f64> = t.iter().map(|&t| seed_torque(t)[0]).collect();
-    for (name, p) in [("actuator_delay", 0.0061), ("actuator_lag", 0.004), ("actuator_lag", 1e-5)] {
+    let laws = [
+        ("actuator_delay", 0.0061),
+        ("actuator_delay", 2e-4),
+        ("actuator_lag", 0.004),
+        ("actuator_lag", 2e-4),
+    ];
+    for (name, p) in laws {
         let mut pulses: Vec<_> = u.iter().map(|&u| Pulse::held(u)).collect();
         find::<f64>(name).expect("in the catalogue").command(&[p, 0.0, 0.0], &t, &mut pulses);
-        let shifted: f64 =
-            pulses.iter().zip(t.windows(2)).map(|(pulse, t)| pulse.mean() * (t[1] - t[0])).sum();
-        let fine = 20_000;
-        let (span, mut y, mut exact) = (t[49] - t[0], u[0], 0.0);
-        for i in 0..fine {
-            let now = t[0] + (f64::from(i) + 0.5) * span / f64::from(fine);
+        let (fine, mut y) = (2000, u[0]);
+        for k in 0..49 {
+            let h = t[k + 1] - t[k];
+            let dt = h / f64::from(fine);
             let held = |now: f64| u[t.partition_point(|&x| x <= now).max(1) - 1];
-            let dt = span / f64::from(fine);
-            let value = if name == "actuator_delay" {
-                held(now - p)
-            } else {
-                let mean = held(now) + (y - held(now)) * (1.0 - (-dt / p).exp()) * p / dt;
-                y = held(now) + (y - held(now)) * (-dt / p).exp();
-                mean
-            };
-            exact += value * dt;
+            let (mut mean, mut moment, mut middle, mut line) = (0.0, 0.0, 0.0, 0.0);
+            for i in 0..fine {
+                let s = (f64::from(i) + 0.5) / f64::from(fine);
+                let value = if name == "actuator_delay" {
+                    held(t[k] + s * h - p)
+                } else {
+                    let decay = (-dt / p).exp();
+                    let mean = u[k] + (y - u[k]) * (1.0 - decay) * p / dt;
+                    y = u[k] + (y - u[k]) * decay;
+                    mean
+                };
+                mean += value * dt;
+                moment += value * dt * (s - 0.5) * h;
+                middle += pulses[k].at(s) * dt;
+                line += pulses[k].at(s) * dt * (s - 0.5) * h;
+            }
+            let size = u.iter().fold(0.0, |a: f64, b| a.max(b.abs())) * h;
+            assert!((mean - middle).abs() < 1e-3 * size, "{name} {p}: {middle} against {mean}");
+            assert!((moment - line).abs() < 1e-3 * size * h, "{name} {p}: moment {line} against {moment}");
         }
-        assert!(
-            (shifted - exact).abs() < 1e-3 * exact.abs().max(0.01),
-            "{name} {p}: {shifted} against {exact}"
-        );
+    }
+}
+
+/// A shift in time grows from nothing: no step where it begins.
+#[test]
+fn a_short_lag_is_like_a_short_delay() {
+    let t: Vec<f64> = (0..20).map(|k| f64::from(k) * H).collect();
+    let shifted = |name: &str, p: f64| {
+        let mut pulses: Vec<_> = t.iter().map(|&t| Pulse::held(seed_torque(t)[0])).collect();
+        find::<f64>(name).expect("in the catalogue").command(&[p, 0.0, 0.0], &t, &mut pulses);
+        pulses
+    };
+    let [lag, delay] = ["actuator_lag", "actuator_delay"].map(|name| shifted(name, 1e-4 * H));
+    for (a, b) in lag.iter().zip(&delay) {
+        assert!((a.start - b.start).abs() < 1e-6 && (a.end - b.end).abs() < 1e-6, "{a:?} against {b:?}");
     }
 }
 

@@ -3,11 +3,12 @@
 use crate::decide::{ABOVE_FLOOR, CONSEQUENCE};
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Work;
+use crate::scale::Scales;
 use crate::screen::Scored;
 use crate::solve::{Effort, Fit};
 use crate::study::{Study, Weights};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{MAX_PARAMETERS, NEVER, Trial, find};
+use armgap_core::effect::{MAX_PARAMETERS, NEVER, Trial, catalogue, find};
 use rayon::prelude::*;
 
 /// Candidates that are fitted again under the weights of the best.
@@ -27,6 +28,9 @@ const TRUSTED: f64 = 10.0;
 
 /// Size relative to the largest possible below which nothing is left of an effect.
 const IDLE: f64 = 2e-5;
+
+/// Size, relative to the typical one, that a parameter starts from which a simpler law lacks.
+const LITTLE: f64 = 0.1;
 
 /// Share of windows that are left out where only the size of a gap is in question.
 const SPOILT: f64 = 0.02;
@@ -85,6 +89,7 @@ fn z_score(x: &[f64]) -> f64 {
 }
 
 /// One stage: the current model and its alternatives, under common weights.
+#[derive(Debug, Clone)]
 pub struct Stage<const N: usize, const P: usize> {
     /// The current model, fitted under weights of its own residual.
     pub settled: Fit<P>,
@@ -136,6 +141,11 @@ impl<const N: usize, const P: usize> Stage<N, P> {
         self.relative_error() > CONSEQUENCE && self.excess() > ABOVE_FLOOR
     }
 
+    /// Whether the current model leaves a gap above the floor in which an improvement of `noticeable` size can lie.
+    pub fn is_worth_more(&self, noticeable: f64) -> bool {
+        self.relative_error() > noticeable && self.excess() > ABOVE_FLOOR
+    }
+
     /// How far the current model's cost lies above the floor, as a factor.
     pub fn excess(&self) -> f64 {
         self.base.holdout.iter().sum::<f64>() / self.floor
@@ -164,7 +174,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let weights = heavier.unwrap_or(weights);
         let floor = self.floor(&weights);
         let motion = self.motion(&weights);
-        Stage { settled: fit, base, contenders, field, screened, weights, floor, motion }
+        self.duel(Stage { settled: fit, base, contenders, field, screened, weights, floor, motion })
     }
 
     /// RMS error of a fit on the holdout relative to the motion.
@@ -188,8 +198,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         fitted.iter().filter(|c| c.effect.is_some()).map(|c| (c.clone(), share(c))).collect()
     }
 
-    /// Fits all starts and judges them, best first; `slopes` are the sensitivities of the model they add to, where they are known.
-    fn contend(
+    /// Fits all starts and judges them, best first; `slopes` are the sensitivities of the model they add to, where they are known. What
+    /// diverged or came down to nothing is left out.
+    pub(crate) fn contend(
         &self,
         weights: &Weights<N>,
         base: &Hypothesis<P>,
@@ -218,7 +229,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     /// A start fitted and judged; what it has beyond the `known` effects is the one under test.
-    fn contender(
+    pub(crate) fn contender(
         &self,
         weights: &Weights<N>,
         start: &Hypothesis<P>,
@@ -264,6 +275,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let last = shrunk <= SHRUNK || round == MAX_REWEIGHTINGS;
             let mut starts = finalists(&contenders, hopeless);
             starts.extend(contenders.first().and_then(|best| simpler(current, best)));
+            starts.extend(contenders.first().and_then(|best| richer(current, best, &self.scales)));
             let effort = if last { Effort::FULL } else { Effort::ROUGH };
             let base = || self.contender(weights, current, current.effects.len(), effort, &[]);
             let (fitted, base) = rayon::join(|| self.contend(weights, current, starts, effort, &[]), base);
@@ -280,12 +292,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     /// Cost of predicting that every joint stays where its window starts.
-    fn motion(&self, weights: &Weights<N>) -> f64 {
+    pub(crate) fn motion(&self, weights: &Weights<N>) -> f64 {
         self.holdout.motion(&weights.holdout.scale)
     }
 
     /// Cost that measurement noise alone leaves on the holdout.
-    fn floor(&self, weights: &Weights<N>) -> f64 {
+    pub(crate) fn floor(&self, weights: &Weights<N>) -> f64 {
         let per_row: f64 = (0..N).map(|j| (self.noise[j] / weights.holdout.scale[j]).powi(2)).sum();
         per_row * self.holdout.data.rows as f64
     }
@@ -344,6 +356,28 @@ fn simpler<const P: usize>(model: &Hypothesis<P>, contender: &Contender<P>) -> O
     let mut p = [0.0; MAX_PARAMETERS];
     for (slot, parameter) in p.iter_mut().zip(law.spec().parameters) {
         *slot = value(parameter.name)?;
+    }
+    let taken = model.effects.iter().any(|e| e.law.spec().name == law.spec().name && e.joint == effect.joint);
+    let theta = contender.fit.hypothesis.theta;
+    (!taken).then(|| Hypothesis { theta, ..model.with(Placed { law, joint: effect.joint, p }) })
+}
+
+/// The model with the law of which a contender's effect is the simplest case, with a little of what the simple one lacks.
+fn richer<const N: usize, const P: usize>(
+    model: &Hypothesis<P>,
+    contender: &Contender<P>,
+    scales: &Scales<N>,
+) -> Option<Hypothesis<P>> {
+    let effect = contender.effect?;
+    let name = effect.law.spec().name;
+    let law = *catalogue::<f64>().iter().find(|law| law.simpler() == Some(name))?;
+    let known = |wanted: &str| effect.law.spec().parameters.iter().position(|p| p.name == wanted);
+    let mut p = [0.0; MAX_PARAMETERS];
+    for (slot, parameter) in p.iter_mut().zip(law.spec().parameters) {
+        *slot = match known(parameter.name) {
+            Some(i) => effect.p[i],
+            None => LITTLE * scales.size(parameter.quantity, effect.joint),
+        };
     }
     let taken = model.effects.iter().any(|e| e.law.spec().name == law.spec().name && e.joint == effect.joint);
     let theta = contender.fit.hypothesis.theta;

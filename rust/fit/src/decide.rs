@@ -4,26 +4,34 @@
 //! windows' own scatter. After every addition all causes are fitted together again, and one that has become idle is dropped.
 
 use crate::attribute::{Contender, Stage, is_plausible};
+use crate::equivalent;
 use crate::model::{Hypothesis, Placed};
 use crate::solve::{Effort, Fit};
-use crate::study::Study;
+use crate::study::{Study, Weights};
 use armgap_core::arm::Arm;
-use armgap_core::effect::Trial;
+use armgap_core::effect::{Quantity, Trial};
 
 /// Mean advantage per window, in standard errors, below which a cause is not accepted.
-const CERTAIN: f64 = 3.5;
+pub const CERTAIN: f64 = 3.5;
 
 /// The same on the holdout alone, where a cause must at least not fail.
 const HOLDOUT_CERTAIN: f64 = 1.0;
 
 /// Share of the gap above the floor below which an improvement does not matter.
-const MATTERS: f64 = 0.1;
+pub const MATTERS: f64 = 0.1;
 
 /// The same where the gap itself is of no consequence: only an effect that explains most of it counts.
 const MATTERS_IN_SMALL: f64 = 0.5;
 
 /// Cost above the floor, as a factor, below which there is nothing left to explain.
 pub const ABOVE_FLOOR: f64 = 1.25;
+
+/// Cost of a typical window, relative to what noise alone leaves, up to which a gap is that of a few windows.
+const AT_FLOOR: f64 = 1.5;
+
+/// What a contender must take off those few, in costs of a typical window, and what others may lose by it, as a part of that.
+const OUTLYING: f64 = 25.0;
+const HARMLESS: f64 = 0.05;
 
 /// Decrease of the distance from trusted values, in squared sigmas, that makes a cause on its own.
 const TRUST_GAIN: f64 = 16.0;
@@ -43,7 +51,7 @@ pub const CONSEQUENCE: f64 = 1e-3;
 /// Improvement relative to the motion within a window below which an effect is of no consequence.
 const RELEVANT: f64 = 1e-4;
 
-/// A gap below [`RELEVANT`] is looked into down to this size if it stands this far above the floor.
+/// A gap that is not worth a name by itself is looked into down to this size if it stands this far above the floor.
 const FAINTEST: f64 = 5e-6;
 const CLEAR: f64 = 2.75;
 
@@ -86,10 +94,12 @@ pub struct Cause {
     pub effect: Placed,
     /// Standard deviations of its values.
     pub sigma: Vec<f64>,
-    /// Probability that it, or one of its look-alikes, is what the windows show.
+    /// Probability that it, or an effect that no motion tells from it, is what the windows show.
     pub probability: f64,
     /// Share of the holdout's gap above the floor that it removed when it was added.
     pub share: f64,
+    /// RMS improvement on the holdout when it was added, relative to the motion.
+    pub relevance: f64,
     /// Effects that this log does not tell from it.
     pub look_alikes: Vec<Placed>,
 }
@@ -125,14 +135,26 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let mut model = refit.clone();
         let (mut causes, mut stages): (Vec<Cause>, Vec<Stage<N, P>>) = (Vec::new(), Vec::new());
         let mut smoothed = false;
-        let mut noticeable = noticeable(stage.relative_error());
-        if is_faint(&stage) {
-            noticeable = FAINTEST;
-            stage = self.stage_around(settled, noticeable);
-        }
+        let noticeable = noticeable(stage.relative_error());
+        let mut threshold = self.look_closer(&mut stage, settled, noticeable, CLEAR);
         while causes.len() < max_causes {
-            let Some((choice, ground)) = choose(&stage, smoothed, noticeable) else {
-                break;
+            let Some((choice, ground)) = choose(&stage, smoothed, threshold) else {
+                let Some(both) = (causes.len() + 2 <= max_causes)
+                    .then(|| self.together(&stage, threshold, seed))
+                    .flatten()
+                else {
+                    break;
+                };
+                model = both.stage.contenders[both.choice].fit.clone();
+                causes.extend(both.causes);
+                stages.push(stage);
+                scale = both.stage.weights.training.scale;
+                stages.push(both.stage);
+                let settled = self.settle(&model.hypothesis, scale);
+                stage = self.stage_around(settled.clone(), noticeable);
+                threshold = self.look_closer(&mut stage, settled, noticeable, UNEXPLAINED);
+                model = stage.settled.clone();
+                continue;
             };
             let best = &stage.contenders[choice];
             model = best.fit.clone();
@@ -141,8 +163,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 None => smoothed = true,
             }
             scale = stage.weights.training.scale;
-            let next = self.stage(&model.hypothesis, scale, noticeable);
+            let settled = self.settle(&model.hypothesis, scale);
+            let next = self.stage_around(settled.clone(), noticeable);
             stages.push(std::mem::replace(&mut stage, next));
+            threshold = self.look_closer(&mut stage, settled, noticeable, UNEXPLAINED);
             model = stage.settled.clone();
         }
         self.prune(&mut model, &mut causes, &stage);
@@ -151,6 +175,22 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         refresh(&model, &mut causes);
         temper(&stages, &mut causes);
         Attribution { refit, model, causes, stages }
+    }
+
+    /// Looks into a gap that is too small to matter by itself, and yet stands above the floor by the factor `clear`; returns which
+    /// improvements count. `settled` is what the stage was made around.
+    fn look_closer(
+        &self,
+        stage: &mut Stage<N, P>,
+        settled: (Fit<P>, Weights<N>),
+        noticeable: f64,
+        clear: f64,
+    ) -> f64 {
+        if !(FAINTEST..=noticeable).contains(&stage.relative_error()) || stage.excess() <= clear {
+            return noticeable;
+        }
+        *stage = self.stage_around(settled, FAINTEST);
+        FAINTEST
     }
 
     /// Drops causes that the others have made idle.
@@ -187,22 +227,53 @@ pub fn noticeable(first_gap: f64) -> f64 {
     (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENCE)
 }
 
-/// Whether a gap is too small to matter by itself, and yet clearly there.
-fn is_faint<const N: usize, const P: usize>(stage: &Stage<N, P>) -> bool {
-    (FAINTEST..=RELEVANT).contains(&stage.relative_error()) && stage.excess() > CLEAR
-}
+impl<const N: usize, const P: usize> Stage<N, P> {
+    /// Whether the data hardly prefer `best` to another contender.
+    pub fn is_alike(&self, best: &Contender<P>, other: &Contender<P>) -> bool {
+        let advantage = self.base.score() - best.score();
+        other.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0) || best.z_over(other) < 1.0
+    }
 
-/// Whether an effect can be told from the errors of an integrator: a torque at the joint can, a shift in time or a stiff spring cannot.
-fn is_tangible(effect: Option<&Placed>) -> bool {
-    effect.is_some_and(|e| {
-        let spec = e.law.spec();
-        (spec.hooks.force || spec.hooks.coulomb) && spec.trial != Trial::Whole
-    })
+    /// Whether a contender explains windows that stand far out of noise, in training and holdout, at no cost to any other.
+    ///
+    /// An effect that shows in a few windows, such as a stop that is hardly touched, never has a mean advantage of many standard errors.
+    /// Where all other windows are at the floor, it needs none: their noise is known, and it is not noise that it takes away.
+    fn settles_outliers(&self, contender: &Contender<P>) -> bool {
+        let windows = self.base.holdout.len() as f64;
+        let typical = self.weights.holdout.typical;
+        let settles = |mine: &[f64], base: &[f64]| {
+            let gains = || base.iter().zip(mine).map(|(b, m)| b - m);
+            let gain: f64 = gains().filter(|g| *g > 0.0).sum();
+            let loss: f64 = gains().filter(|g| *g < 0.0).sum();
+            gain > OUTLYING * typical && -loss < HARMLESS * gain
+        };
+        typical < AT_FLOOR * self.floor / windows
+            && self.share(contender) > MOST
+            && settles(&contender.training, &self.base.training)
+            && settles(&contender.holdout, &self.base.holdout)
+    }
+
+    /// Whether no log of motion tells the effects of two contenders apart.
+    fn are_equivalent(&self, a: usize, b: usize) -> bool {
+        match (self.contenders[a].effect, self.contenders[b].effect) {
+            (Some(a), Some(b)) => equivalent::are(&a, &b, N),
+            _ => false,
+        }
+    }
+
+    /// Whether an effect would show in this gap: a small one may be an integrator's error, which is like a shift in time or a stiff shaft.
+    pub fn shows(&self, effect: Option<&Placed>) -> bool {
+        self.relative_error() > RELEVANT
+            || effect.is_some_and(|e| {
+                let spec = e.law.spec();
+                spec.trial != Trial::Whole && spec.parameters[0].quantity != Quantity::Time
+            })
+    }
 }
 
 /// Why a contender deserves to be adopted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Ground {
+pub enum Ground {
     /// It moves predictions closer to the measurement.
     Motion,
     /// It brings the parameters back to their trusted values.
@@ -212,22 +283,35 @@ enum Ground {
 /// Index of the contender to adopt, and why, if any deserves it; smoother friction is adopted once.
 ///
 /// Improvements below `noticeable`, relative to the motion, do not count.
-fn choose<const N: usize, const P: usize>(
+pub fn choose<const N: usize, const P: usize>(
     stage: &Stage<N, P>,
     smoothed: bool,
     noticeable: f64,
 ) -> Option<(usize, Ground)> {
-    let open = |c: &Contender<P>| c.effect.is_some() || !smoothed;
-    let by_motion =
-        stage.contenders.iter().position(open).filter(|i| moves(stage, &stage.contenders[*i], noticeable));
+    let by_motion = best(stage, smoothed).filter(|i| moves(stage, &stage.contenders[*i], noticeable));
     if let Some(best) = by_motion {
         return Some((simplest(stage, best, noticeable), Ground::Motion));
     }
-    let trust = |i: &usize| stage.contenders[*i].fit.prior_cost;
+    let free = |i: usize| stage.contenders[i].effect.as_ref().map_or(0, Placed::len) as f64;
+    let trust = |i: &usize| stage.contenders[*i].fit.prior_cost + free(*i);
     (0..stage.contenders.len())
         .filter(|i| restores(stage, &stage.contenders[*i]))
         .min_by(|a, b| trust(a).total_cmp(&trust(b)))
         .map(|index| (index, Ground::Trust))
+}
+
+/// The best contender that describes an arm; one with a value at its bound gives way to one that does almost as well without.
+pub fn best<const N: usize, const P: usize>(stage: &Stage<N, P>, smoothed: bool) -> Option<usize> {
+    let open = |i: &usize| stage.contenders[*i].effect.is_some() || !smoothed;
+    let first = (0..stage.contenders.len()).find(open)?;
+    let advantage = |i: usize| stage.base.score() - stage.contenders[i].score();
+    let as_good = |i: &usize| open(i) && advantage(*i) >= ALMOST * advantage(first);
+    (first..stage.contenders.len()).filter(as_good).find(|i| is_possible(&stage.contenders[*i]))
+}
+
+/// Whether a contender's effect is neither idle nor at the largest size.
+pub fn is_possible<const P: usize>(contender: &Contender<P>) -> bool {
+    contender.size < AT_BOUND && !contender.is_idle()
 }
 
 /// The contender with the fewest parameters among those that do almost as well as the best: a spring with a far-off rest position is
@@ -246,24 +330,31 @@ fn simplest<const N: usize, const P: usize>(stage: &Stage<N, P>, best: usize, no
 }
 
 /// Whether a contender closes a part of the gap that matters, on the holdout too.
-fn moves<const N: usize, const P: usize>(
+pub fn moves<const N: usize, const P: usize>(
     stage: &Stage<N, P>,
     contender: &Contender<P>,
     noticeable: f64,
 ) -> bool {
-    let possible = contender.size < AT_BOUND && !contender.is_idle();
     let (matters, certain) = match stage.relative_error() {
+        _ if noticeable <= FAINTEST => (MATTERS_IF_FAINT, CERTAIN_IF_FAINT),
         error if error > CONSEQUENCE => (MATTERS, CERTAIN),
-        error if error > RELEVANT => (MATTERS_IN_SMALL, CERTAIN),
-        _ => (MATTERS_IF_FAINT, CERTAIN_IF_FAINT),
+        _ => (MATTERS_IN_SMALL, CERTAIN),
     };
     stage.excess() > ABOVE_FLOOR
-        && (stage.relative_error() > RELEVANT || is_tangible(contender.effect.as_ref()))
-        && possible
+        && stage.shows(contender.effect.as_ref())
+        && is_possible(contender)
         && stage.share(contender) > matters
         && stage.relevance(contender) > noticeable
-        && contender.z_over(&stage.base) > certain
-        && contender.holdout_z_over(&stage.base) > HOLDOUT_CERTAIN
+        && (is_certain(stage, contender, certain) || stage.settles_outliers(contender))
+}
+
+/// Whether a contender's advantage exceeds the windows' scatter, on the holdout alone too.
+fn is_certain<const N: usize, const P: usize>(
+    stage: &Stage<N, P>,
+    contender: &Contender<P>,
+    certain: f64,
+) -> bool {
+    contender.z_over(&stage.base) > certain && contender.holdout_z_over(&stage.base) > HOLDOUT_CERTAIN
 }
 
 /// Whether a contender explains implausible parameters by one effect.
@@ -278,18 +369,15 @@ fn restores<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Con
 }
 
 /// The chosen contender as a cause, with its look-alikes and probability.
-fn name<const N: usize, const P: usize>(
+pub fn name<const N: usize, const P: usize>(
     stage: &Stage<N, P>,
     choice: usize,
     ground: Ground,
     seed: u64,
 ) -> Cause {
     let best = &stage.contenders[choice];
-    let advantage = stage.base.score() - best.score();
     let alike = |c: &&Contender<P>| match ground {
-        Ground::Motion => {
-            c.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0) || best.z_over(c) < 1.0
-        }
+        Ground::Motion => stage.is_alike(best, c),
         Ground::Trust => restores(stage, c) && c.fit.prior_cost - best.fit.prior_cost < ALIKE_TRUST,
     };
     let others = stage.contenders.iter().enumerate().filter(|(i, c)| *i != choice && c.effect.is_some());
@@ -300,28 +388,25 @@ fn name<const N: usize, const P: usize>(
         effect,
         sigma: Vec::new(),
         probability: match ground {
-            Ground::Motion => probability(stage, choice, &look_alikes, seed),
-            Ground::Trust => trust_probability(stage, choice, &look_alikes),
+            Ground::Motion => probability(stage, choice, seed),
+            Ground::Trust => trust_probability(stage, choice),
         },
         share: stage.share(best).clamp(0.0, 1.0),
+        relevance: stage.relevance(best),
         look_alikes,
     }
 }
 
-/// How often the chosen contender, or a look-alike, has the lowest cost when the windows are drawn again.
-fn probability<const N: usize, const P: usize>(
-    stage: &Stage<N, P>,
-    choice: usize,
-    look_alikes: &[Placed],
-    seed: u64,
-) -> f64 {
+/// How often the chosen contender, or one that no motion tells from it, has the lowest cost when the windows are drawn again.
+fn probability<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usize, seed: u64) -> f64 {
     let advantages: Vec<Vec<f64>> = stage.contenders.iter().map(|c| c.advantages(&stage.base)).collect();
     let own: Vec<f64> =
         stage.contenders.iter().map(|c| stage.base.fit.prior_cost - c.fit.prior_cost).collect();
-    let ours = |i: usize| {
-        i == choice
-            || stage.contenders[i].effect.is_some_and(|e| look_alikes.iter().any(|l| l.same_place(&e)))
-    };
+    // A law with more values that does no better is no evidence against one with fewer.
+    let size = |i: usize| stage.contenders[i].effect.as_ref().map_or(0, Placed::len);
+    let richer =
+        |i: usize| size(i) > size(choice) && stage.is_alike(&stage.contenders[choice], &stage.contenders[i]);
+    let ours = |i: usize| i == choice || stage.are_equivalent(i, choice) || richer(i);
     let windows = advantages[choice].len();
     let mut random = Random(seed);
     let mut wins = 0;
@@ -336,21 +421,19 @@ fn probability<const N: usize, const P: usize>(
     (f64::from(wins) + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
-/// Probability of the chosen contender, or a look-alike, among all effects that would restore the trusted values, from their distances.
-fn trust_probability<const N: usize, const P: usize>(
-    stage: &Stage<N, P>,
-    choice: usize,
-    look_alikes: &[Placed],
-) -> f64 {
+/// Probability of the chosen contender, or one that no motion tells from it, among all effects that would restore the trusted values, from their distances.
+fn trust_probability<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usize) -> f64 {
     let best = stage.contenders[choice].fit.prior_cost;
-    let mass = |c: &Contender<P>| (-0.5 * (c.fit.prior_cost - best)).exp();
+    let free = |c: &Contender<P>| c.effect.as_ref().map_or(0, Placed::len) as f64;
+    // Every value of its own takes one squared sigma of the distance off by chance.
+    let mass = |c: &Contender<P>| (-0.5 * (c.fit.prior_cost + free(c) - best)).exp();
     let (mut ours, mut all) = (0.0, 0.0);
     for (i, contender) in stage.contenders.iter().enumerate() {
-        let Some(effect) = contender.effect else {
+        if contender.effect.is_none() {
             continue;
-        };
+        }
         all += mass(contender);
-        if i == choice || look_alikes.iter().any(|l| l.same_place(&effect)) {
+        if i == choice || stage.are_equivalent(i, choice) {
             ours += mass(contender);
         }
     }
@@ -359,14 +442,18 @@ fn trust_probability<const N: usize, const P: usize>(
     (ours / all) * plausible
 }
 
-/// Part of the first gap that the final model leaves without explanation; zero where what is left is of no consequence.
+/// Part of the first gap that the final model leaves without explanation.
 pub fn left_over<const N: usize, const P: usize>(stages: &[Stage<N, P>]) -> f64 {
     let (Some(first), Some(last)) = (stages.first(), stages.last()) else { return 0.0 };
-    if !last.is_open() {
+    if last.excess() < if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED } {
         return 0.0;
     }
-    // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them.
-    (last.relative_error() / first.relative_error()).powi(2).max(last.excess() / first.excess()).min(1.0)
+    // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them. Where it is of no
+    // consequence by itself, both must say so.
+    let as_it_is = (last.relative_error() / first.relative_error()).powi(2);
+    let cut = last.excess() / first.excess();
+    let left = if last.is_open() { as_it_is.max(cut) } else { as_it_is.min(cut) };
+    left.min(1.0)
 }
 
 /// Lowers the probabilities where a gap of consequence remains that no candidate explains: what leaves it may also be what the named
@@ -395,7 +482,7 @@ fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
             first += effect.len();
         }
     }
-    causes.sort_by(|a, b| b.share.total_cmp(&a.share));
+    causes.sort_by(|a, b| b.relevance.total_cmp(&a.relevance));
 }
 
 /// A small generator of uniform numbers (splitmix64, Steele, Lea and Flood 2014), so that a seed gives the same result everywhere.

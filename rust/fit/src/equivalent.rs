@@ -54,6 +54,15 @@ pub fn known(effect: &Placed, joints: usize) -> Vec<Equivalent> {
     }
 }
 
+/// Whether two effects are the same, or the same whatever the motion, on an arm with `joints` joints.
+pub fn are(a: &Placed, b: &Placed, joints: usize) -> bool {
+    let among = |a: &Placed, b: &Placed| {
+        let (name, joint) = (b.law.spec().name, b.joint_number());
+        known(a, joints).iter().any(|e| e.effect == name && e.joint == joint)
+    };
+    a.same_place(b) || among(a, b) || among(b, a)
+}
+
 /// The known equivalents and the look-alikes found in the data, none twice.
 pub fn all(effect: &Placed, look_alikes: &[Placed], joints: usize) -> Vec<Equivalent> {
     let mut list = known(effect, joints);
@@ -65,4 +74,28 @@ pub fn all(effect: &Placed, look_alikes: &[Placed], joints: usize) -> Vec<Equiva
         }
     }
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armgap_core::effect::find;
+
+    fn placed(name: &str, joint: usize) -> Placed {
+        Placed { law: find::<f64>(name).expect("in the catalogue"), joint, p: [0.0; 3] }
+    }
+
+    #[test]
+    fn only_what_no_motion_tells_apart_is_the_same() {
+        let same = [("torque_offset", 1, "coulomb_asymmetry", 1), ("base_tilt", 0, "encoder_offset", 0)];
+        let other = [("torque_offset", 1, "coulomb_asymmetry", 0), ("actuator_lag", 0, "actuator_delay", 0)];
+        for (a, i, b, j) in same {
+            assert!(are(&placed(a, i), &placed(b, j), 2) && are(&placed(b, j), &placed(a, i), 2), "{a} {b}");
+        }
+        for (a, i, b, j) in other {
+            assert!(!are(&placed(a, i), &placed(b, j), 2), "{a} {b}");
+        }
+        assert!(are(&placed("torque_gain", 0), &placed("torque_gain", 1), 2));
+        assert!(are(&placed("payload", 0), &placed("payload", 0), 2));
+    }
 }

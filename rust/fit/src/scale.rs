@@ -33,8 +33,11 @@ const LARGEST: f64 = 50.0;
 /// Times are measured in sample periods; this many of them are possible.
 const LONGEST_TIME: f64 = 1000.0;
 
+/// A stop is soft if the joint's torque moves it by a share of the travel, hard if by this part of it.
+const HARDEST: f64 = 1e4;
+
 /// Laws that change with speed do so below this many times the RMS speed, or they are other laws.
-const FASTEST: f64 = 1.0;
+const FASTEST: f64 = 2.5;
 
 /// Natural frequency, 1/s, damping ratio, and the motor's share of the joint's inertia, of a typical elastic joint.
 const SHAFT_RATE: f64 = 100.0;
@@ -75,8 +78,8 @@ impl<const N: usize> Scales<N> {
             Quantity::Inertia => self.inertia[j],
             Quantity::Drag => self.torque[j] / (self.speed[j] * self.speed[j]),
             Quantity::CubicDrag => self.torque[j] / self.speed[j].powi(3),
-            Quantity::Damping => self.torque[j] / self.speed[j],
-            Quantity::Stiffness => self.torque[j] / self.position[j],
+            Quantity::Damping | Quantity::StopDamping => self.torque[j] / self.speed[j],
+            Quantity::Stiffness | Quantity::StopStiffness => self.torque[j] / self.position[j],
             Quantity::Impulse => self.inertia[j] * self.speed[j],
             Quantity::Hardening => self.torque[j] / self.position[j].powi(3),
             Quantity::ShaftStiffness => self.inertia[j] * SHAFT_RATE * SHAFT_RATE * MOTOR_SHARE,
@@ -110,6 +113,7 @@ impl<const N: usize> Scales<N> {
         let most = match quantity {
             Quantity::Time => LONGEST_TIME,
             Quantity::Speed => FASTEST,
+            Quantity::StopStiffness | Quantity::StopDamping => HARDEST,
             _ => LARGEST,
         };
         most * self.size(quantity, j)

@@ -1,10 +1,10 @@
 //! Pure delay of the torque: `tau_joint(t) = tau(t - delay)`.
 //!
 //! A delay that is no whole number of samples puts a step of the held command inside an interval; the interval then
-//! carries its exact mean. Before the log begins, the first command is taken to have been held.
+//! carries its exact mean and first moment. Before the log begins, the first command is taken to have been held.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
-use crate::real::Real;
+use crate::real::{Real, lit};
 
 /// Transport delay of the command.
 #[derive(Debug)]
@@ -33,29 +33,32 @@ impl<T: Real> Effect<T> for ActuatorDelay {
         for k in (0..torque.len()).rev() {
             let h = super::interval(t, k);
             let Some(&start) = t.get(k) else { continue };
-            let mean = held_mean(t, torque, k, start - p[0], start - p[0] + h);
+            let (mean, moment) = held(t, torque, k, start - p[0], start - p[0] + h);
             if let Some(pulse) = torque.get_mut(k) {
-                *pulse = Pulse::held(mean);
+                *pulse = Pulse::with_moment(mean, moment, h);
             }
         }
     }
 }
 
-/// Mean over `[from, to]` of the held command; intervals up to `last` are read, and none is after it.
-fn held_mean<T: Real>(t: &[T], torque: &[Pulse<T>], last: usize, from: T, to: T) -> T {
-    let length = to - from;
-    let (mut upper, mut sum, mut i) = (to, T::zero(), last);
+/// Mean over `[from, to]` of the held command, and its first moment about the middle; intervals up to `last` are read, and none is after
+/// it.
+fn held<T: Real>(t: &[T], torque: &[Pulse<T>], last: usize, from: T, to: T) -> (T, T) {
+    let (length, middle) = (to - from, lit::<T>(0.5) * (from + to));
+    let (mut upper, mut sum, mut moment, mut i) = (to, T::zero(), T::zero(), last);
     loop {
         let (Some(&begin), Some(pulse)) = (t.get(i), torque.get(i)) else {
-            return T::zero();
+            return (T::zero(), T::zero());
         };
         let lower = if i == 0 { from } else { begin.max(from) };
         if upper > lower {
-            sum += (upper - lower) * pulse.mean();
+            let piece = (upper - lower) * pulse.mean();
+            sum += piece;
+            moment += piece * (lit::<T>(0.5) * (upper + lower) - middle);
             upper = lower;
         }
         if i == 0 || begin <= from {
-            return if length > T::zero() { sum / length } else { pulse.mean() };
+            return if length > T::zero() { (sum / length, moment) } else { (pulse.mean(), T::zero()) };
         }
         i -= 1;
     }

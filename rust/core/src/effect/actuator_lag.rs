@@ -1,10 +1,10 @@
 //! First-order lag of the torque: `time_constant dtau_joint/dt + tau_joint = tau`.
 //!
 //! With the command held over an interval of length `h`, the torque goes exponentially from its old value to the
-//! command. Start, end and mean of that are exact for every time constant down to zero.
+//! command. Its mean over the interval and its first moment are exact for every time constant down to zero.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
-use crate::real::Real;
+use crate::real::{Real, lit};
 
 /// First-order actuator.
 #[derive(Debug)]
@@ -31,16 +31,17 @@ impl<T: Real> Effect<T> for ActuatorLag {
 
     fn command(&self, p: &[T; MAX_PARAMETERS], t: &[T], torque: &mut [Pulse<T>]) {
         let Some(first) = torque.first() else { return };
-        let mut y = first.start;
+        let mut lag = first.start;
         for (k, pulse) in torque.iter_mut().enumerate() {
             let h = super::interval(t, k);
-            let u = pulse.mean();
-            let ratio = if p[0] > T::zero() { h / p[0] } else { T::zero() };
-            let decay = if p[0] > T::zero() { (-ratio).exp() } else { T::zero() };
-            let end = u + (y - u) * decay;
-            let held = if ratio > T::zero() { (T::one() - decay) / ratio } else { T::zero() };
-            *pulse = Pulse::with_mean(y, u + (y - u) * held, end);
-            y = end;
+            let (u, constant) = (pulse.mean(), p[0]);
+            let behind = lag - u;
+            let decay = if constant > T::zero() { (-h / constant).exp() } else { T::zero() };
+            let held = if h > T::zero() { constant * (T::one() - decay) / h } else { T::zero() };
+            let half = lit::<T>(0.5) * h;
+            let moment = constant * (constant * (T::one() - decay) - half * (T::one() + decay));
+            *pulse = Pulse::with_moment(u + behind * held, behind * moment, h);
+            lag = u + behind * decay;
         }
     }
 }

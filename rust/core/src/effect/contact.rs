@@ -17,8 +17,8 @@ static SPEC: Spec = Spec {
     least_joints: 1,
     parameters: &[
         EffectParameter::threshold("position", Quantity::Reach, f64::NEG_INFINITY),
-        EffectParameter::bounded("stiffness", Quantity::Stiffness, 0.0, f64::INFINITY),
-        EffectParameter::bounded("damping", Quantity::Damping, 0.0, f64::INFINITY),
+        EffectParameter::bounded("stiffness", Quantity::StopStiffness, 0.0, f64::INFINITY),
+        EffectParameter::bounded("damping", Quantity::StopDamping, 0.0, f64::INFINITY),
     ],
     // Shares of the reach on either side.
     starts: &[

@@ -36,7 +36,7 @@ mod torque_ripple;
 mod torque_saturation;
 mod viscous_asymmetry;
 
-use crate::real::Real;
+use crate::real::{Real, lit};
 use crate::transmission::Drive;
 
 /// Most parameters an effect may have.
@@ -109,6 +109,10 @@ pub enum Quantity {
     ShaftStiffness,
     /// Torque per rate of twist of a shaft.
     ShaftDamping,
+    /// Torque per depth behind a stop.
+    StopStiffness,
+    /// Torque per speed behind a stop.
+    StopDamping,
     /// Torque per cubed position.
     Hardening,
     /// Torque times time.
@@ -149,10 +153,10 @@ impl Quantity {
             (Self::Inertia, false) | (Self::Mass, _) => "kg",
             (Self::Drag, true) => "N m s^2/rad^2",
             (Self::Drag, false) => "N s^2/m^2",
-            (Self::Stiffness | Self::ShaftStiffness, true) => "N m/rad",
-            (Self::Stiffness | Self::ShaftStiffness, false) => "N/m",
-            (Self::Damping | Self::ShaftDamping, true) => "N m s/rad",
-            (Self::Damping | Self::ShaftDamping, false) => "N s/m",
+            (Self::Stiffness | Self::ShaftStiffness | Self::StopStiffness, true) => "N m/rad",
+            (Self::Stiffness | Self::ShaftStiffness | Self::StopStiffness, false) => "N/m",
+            (Self::Damping | Self::ShaftDamping | Self::StopDamping, true) => "N m s/rad",
+            (Self::Damping | Self::ShaftDamping | Self::StopDamping, false) => "N s/m",
             (Self::CubicDrag, true) => "N m s^3/rad^3",
             (Self::CubicDrag, false) => "N s^3/m^3",
             (Self::Impulse, true) => "N m s",
@@ -381,8 +385,8 @@ pub trait Effect<T: Real>: Sync {
 
 /// Torque over one sample interval: its values at the start, the middle and the end.
 ///
-/// Between them it is quadratic, so Simpson's rule gives its mean. Laws that smear a step choose the middle value such
-/// that the mean, and with it the impulse, is exact however fast they are.
+/// Between them it is quadratic, so Simpson's rule gives its mean. Laws that smear or shift a step choose the three values such that the
+/// mean and the first moment, and with them the speed and the way a mass gains, are exact however fast they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pulse<T> {
     /// At the sample.
@@ -400,23 +404,24 @@ impl<T: Real> Pulse<T> {
         Self { start: tau, middle: tau, end: tau }
     }
 
-    /// A torque from `start` to `end` with the given mean.
-    pub fn with_mean(start: T, mean: T, end: T) -> Self {
-        let (four, six) = (crate::real::lit::<T>(4.0), crate::real::lit::<T>(6.0));
-        Self { start, middle: (six * mean - start - end) / four, end }
+    /// The straight line with the given mean and first moment about the middle of an interval of length `h`: what moves a mass by the
+    /// same speed and the same way as the torque that has them.
+    pub fn with_moment(mean: T, moment: T, h: T) -> Self {
+        let rise = if h > T::zero() { lit::<T>(6.0) * moment / (h * h) } else { T::zero() };
+        Self { start: mean - rise, middle: mean, end: mean + rise }
     }
 
     /// Mean over the interval (Simpson's rule, exact here).
     #[inline]
     pub fn mean(&self) -> T {
-        let (four, six) = (crate::real::lit::<T>(4.0), crate::real::lit::<T>(6.0));
+        let (four, six) = (lit::<T>(4.0), lit::<T>(6.0));
         (self.start + four * self.middle + self.end) / six
     }
 
     /// Value at the fraction `s` of the interval, from 0 to 1.
     #[inline]
     pub fn at(&self, s: T) -> T {
-        let two = crate::real::lit::<T>(2.0);
+        let two = lit::<T>(2.0);
         let one = T::one();
         let (l0, l1, l2) = ((two * s - one) * (s - one), two * two * s * (one - s), s * (two * s - one));
         l0 * self.start + l1 * self.middle + l2 * self.end

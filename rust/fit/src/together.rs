@@ -1,0 +1,84 @@
+//! Two causes at once: either leaves so much of the gap to the other that neither is accepted alone.
+//!
+//! A cause is judged by the part of the gap it removes. Of two of the same size each removes a half of it at most, and if the windows
+//! weigh by the worse of the two, much less. So before a search ends beside an open gap, the best contenders are each taken on trust:
+//! if another then closes nearly all of the gap, and neither can be spared, both are causes.
+
+use crate::attribute::{Contender, Stage};
+use crate::decide::{CERTAIN, Cause, Ground, best, choose, is_possible, moves, name};
+use crate::solve::Effort;
+use crate::study::Study;
+use armgap_core::arm::Arm;
+
+/// Part of the gap above the floor that two effects must explain to be accepted together.
+const NEARLY_ALL: f64 = 0.9;
+
+/// Contenders that are taken on trust.
+const TRIED: usize = 2;
+
+/// Mean advantage, in standard errors, below which a contender is not worth that.
+const HOPEFUL: f64 = 2.0;
+
+/// Two causes and the stage in which the second was found.
+pub struct Both<const N: usize, const P: usize> {
+    /// Both, in the order in which they were found.
+    pub causes: [Cause; 2],
+    /// The stage beside the first cause.
+    pub stage: Stage<N, P>,
+    /// The second cause in it.
+    pub choice: usize,
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+    /// The two effects that explain together what none explains alone.
+    pub fn together(&self, alone: &Stage<N, P>, noticeable: f64, seed: u64) -> Option<Both<N, P>> {
+        if !alone.is_worth_more(noticeable) {
+            return None;
+        }
+        let hopeful = |c: &&Contender<P>| {
+            alone.shows(c.effect.as_ref()) && is_possible(c) && c.z_over(&alone.base) > HOPEFUL
+        };
+        alone
+            .contenders
+            .iter()
+            .filter(hopeful)
+            .take(TRIED)
+            .find_map(|first| self.beside(alone, first, noticeable, seed))
+    }
+
+    /// The effect that explains the rest beside `first`, if both are needed.
+    fn beside(
+        &self,
+        alone: &Stage<N, P>,
+        first: &Contender<P>,
+        noticeable: f64,
+        seed: u64,
+    ) -> Option<Both<N, P>> {
+        let stage = self.stage(&first.fit.hypothesis, alone.weights.training.scale, noticeable);
+        let (choice, ground) = choose(&stage, true, noticeable)?;
+        let pair = &stage.contenders[choice];
+        let none = &alone.settled.hypothesis;
+        let base = self.contender(&stage.weights, none, none.effects.len(), Effort::FULL, &[]);
+        let whole = Stage {
+            settled: alone.settled.clone(),
+            base,
+            contenders: Vec::new(),
+            field: Vec::new(),
+            screened: Vec::new(),
+            weights: stage.weights.clone(),
+            floor: stage.floor,
+            motion: stage.motion,
+        };
+        if ground != Ground::Motion || whole.share(pair) < NEARLY_ALL || !moves(&whole, pair, noticeable) {
+            return None;
+        }
+        let mut without = pair.fit.hypothesis.clone();
+        without.effects.remove(none.effects.len());
+        let again = self.stage(&without, stage.weights.training.scale, noticeable);
+        let found = best(&again, true)?;
+        let same = again.contenders[found].effect?.same_place(&first.effect?);
+        let needed = again.contenders[found].z_over(&again.base) > CERTAIN;
+        let causes = [name(&again, found, ground, seed), name(&stage, choice, ground, seed)];
+        (same && needed).then_some(Both { causes, stage, choice })
+    }
+}
