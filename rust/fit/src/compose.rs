@@ -2,7 +2,8 @@
 
 use crate::arm::ArmDescription;
 use crate::attribute::Contender;
-use crate::decide::{Attribution, left_over};
+use crate::belief::left_over;
+use crate::course::Attribution;
 use crate::diagnose::Options;
 use crate::gap::{Errors, FreeRuns, gap, rms};
 use crate::locate::{Lack, Lacks, lacking_torques, places, regimes, shares};
@@ -154,7 +155,7 @@ fn verdict<const N: usize, const P: usize>(attribution: &Attribution<N, P>, gap:
     if improved { "parameters" } else { "none" }
 }
 
-fn cause(cause: &crate::decide::Cause, joints: usize, rotary: bool) -> Cause {
+fn cause(cause: &crate::belief::Cause, joints: usize, rotary: bool) -> Cause {
     let spec = cause.effect.law.spec();
     let equivalents = crate::equivalent::all(&cause.effect, &cause.look_alikes, joints);
     Cause {

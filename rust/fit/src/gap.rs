@@ -2,9 +2,9 @@
 
 use crate::arm::ArmDescription;
 use crate::compose::Compared;
-use crate::decide::Random;
 use crate::diagnose::Options;
 use crate::model::Hypothesis;
+use crate::random::Random;
 use crate::report::{AtHorizon, FreeRun, FreeRunSeries, Gap, Series};
 use crate::study::Study;
 use crate::window::{Dataset, Shift, Window};

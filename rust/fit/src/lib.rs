@@ -8,7 +8,9 @@
 mod agreement;
 pub mod arm;
 pub mod attribute;
+pub mod belief;
 pub mod compose;
+pub mod course;
 pub mod decide;
 pub mod diagnose;
 mod duel;
@@ -23,6 +25,7 @@ pub mod output_error;
 mod products;
 pub mod progress;
 pub mod push;
+mod random;
 pub mod report;
 mod ruled_out;
 pub mod scale;

@@ -1,6 +1,6 @@
 //! What was looked for and not found: a status for every candidate that is no cause.
 
-use crate::decide::Attribution;
+use crate::course::Attribution;
 use crate::model::Placed;
 use crate::report::{Bound, RuledOut};
 use crate::screen::{Scored, screen};

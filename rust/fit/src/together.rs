@@ -5,7 +5,8 @@
 //! if another then closes nearly all of the gap, and neither can be spared, both are causes.
 
 use crate::attribute::{Contender, Stage};
-use crate::decide::{CERTAIN, Cause, Ground, best, choose, is_possible, moves, name};
+use crate::belief::{Cause, name};
+use crate::decide::{CERTAIN, Ground, best, choose, is_possible, moves};
 use crate::solve::Effort;
 use crate::study::Study;
 use armgap_core::arm::Arm;

@@ -8,7 +8,9 @@ mod residual;
 mod scatter;
 mod search;
 
-use crate::decide::{Attribution, belief_beside, left_over, noticeable};
+use crate::belief::{belief_beside, left_over};
+use crate::course::Attribution;
+use crate::decide::noticeable;
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Work;
 use crate::study::{Sample, Study};

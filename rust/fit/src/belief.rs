@@ -1,0 +1,138 @@
+//! A cause by name, and how sure that is.
+
+use crate::attribute::{Contender, Stage};
+use crate::decide::{
+    ABOVE_FLOOR, ALIKE_TRUST, Ground, REMAINDER_DOUBT, REMAINDER_POWER, RESAMPLES, UNEXPLAINED, restores,
+};
+use crate::equivalent;
+use crate::model::Placed;
+use crate::random::Random;
+
+/// A cause that was accepted.
+#[derive(Debug, Clone)]
+pub struct Cause {
+    /// The effect with its values in the final model.
+    pub effect: Placed,
+    /// Standard deviations of its values.
+    pub sigma: Vec<f64>,
+    /// Probability that it, or an effect that no motion tells from it, is what the windows show.
+    pub probability: f64,
+    /// Share of the holdout's gap above the floor that it removed when it was added.
+    pub share: f64,
+    /// RMS improvement on the holdout when it was added, relative to the motion.
+    pub relevance: f64,
+    /// Effects that this log does not tell from it.
+    pub look_alikes: Vec<Placed>,
+}
+
+impl<const N: usize, const P: usize> Stage<N, P> {
+    /// Whether no log of motion tells the effects of two contenders apart.
+    fn are_equivalent(&self, a: usize, b: usize) -> bool {
+        match (self.contenders[a].effect, self.contenders[b].effect) {
+            (Some(a), Some(b)) => equivalent::are(&a, &b, N),
+            _ => false,
+        }
+    }
+}
+
+/// The chosen contender as a cause, with its look-alikes and probability.
+pub fn name<const N: usize, const P: usize>(
+    stage: &Stage<N, P>,
+    choice: usize,
+    ground: Ground,
+    seed: u64,
+) -> Cause {
+    let best = &stage.contenders[choice];
+    let alike = |c: &&Contender<P>| match ground {
+        Ground::Motion => stage.is_alike(best, c),
+        Ground::Trust => restores(stage, c) && c.fit.prior_cost - best.fit.prior_cost < ALIKE_TRUST,
+    };
+    let others = stage.contenders.iter().enumerate().filter(|(i, c)| *i != choice && c.effect.is_some());
+    let look_alikes: Vec<Placed> =
+        others.map(|(_, c)| c).filter(alike).filter_map(|c| c.effect).take(3).collect();
+    let effect = best.effect.unwrap_or_else(|| unreachable!("only effects are named"));
+    Cause {
+        effect,
+        sigma: Vec::new(),
+        probability: match ground {
+            Ground::Motion => probability(stage, choice, seed),
+            Ground::Trust => trust_probability(stage, choice),
+        },
+        share: stage.share(best).clamp(0.0, 1.0),
+        relevance: stage.relevance(best),
+        look_alikes,
+    }
+}
+
+/// How often the chosen contender, or one that no motion tells from it, has the lowest cost when the windows are drawn again.
+fn probability<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usize, seed: u64) -> f64 {
+    let advantages: Vec<Vec<f64>> = stage.contenders.iter().map(|c| c.advantages(&stage.base)).collect();
+    let own: Vec<f64> =
+        stage.contenders.iter().map(|c| stage.base.fit.prior_cost - c.fit.prior_cost).collect();
+    // A law with more values that does no better is no evidence against one with fewer.
+    let size = |i: usize| stage.contenders[i].effect.as_ref().map_or(0, Placed::len);
+    let richer =
+        |i: usize| size(i) > size(choice) && stage.is_alike(&stage.contenders[choice], &stage.contenders[i]);
+    let ours = |i: usize| i == choice || stage.are_equivalent(i, choice) || richer(i);
+    let windows = advantages[choice].len();
+    let mut random = Random(seed);
+    let mut wins = 0;
+    for _ in 0..RESAMPLES {
+        let draw: Vec<usize> = (0..windows).map(|_| random.below(windows)).collect();
+        let gain = |i: usize| own[i] + draw.iter().map(|&w| advantages[i][w]).sum::<f64>();
+        let winner = (0..advantages.len()).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
+        if winner.is_some_and(|w| ours(w) && gain(w) > 0.0) {
+            wins += 1;
+        }
+    }
+    (f64::from(wins) + 0.5) / (RESAMPLES as f64 + 1.0)
+}
+
+/// Probability of the chosen contender, or one that no motion tells from it, among all effects that would restore the trusted values, from their distances.
+fn trust_probability<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usize) -> f64 {
+    let best = stage.contenders[choice].fit.prior_cost;
+    let free = |c: &Contender<P>| c.effect.as_ref().map_or(0, Placed::len) as f64;
+    // Every value of its own takes one squared sigma of the distance off by chance.
+    let mass = |c: &Contender<P>| (-0.5 * (c.fit.prior_cost + free(c) - best)).exp();
+    let (mut ours, mut all) = (0.0, 0.0);
+    for (i, contender) in stage.contenders.iter().enumerate() {
+        if contender.effect.is_none() {
+            continue;
+        }
+        all += mass(contender);
+        if i == choice || stage.are_equivalent(i, choice) {
+            ours += mass(contender);
+        }
+    }
+    // What is left over by the best effect must itself be plausible, or the values are simply wrong.
+    let plausible = (-0.5 * (best - P as f64).max(0.0) / (2.0 * P as f64).sqrt()).exp();
+    (ours / all) * plausible
+}
+
+/// Part of the first gap that the final model leaves without explanation.
+pub fn left_over<const N: usize, const P: usize>(stages: &[Stage<N, P>]) -> f64 {
+    let (Some(first), Some(last)) = (stages.first(), stages.last()) else { return 0.0 };
+    if last.excess() < if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED } {
+        return 0.0;
+    }
+    // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them. Where it is of no
+    // consequence by itself, both must say so.
+    let as_it_is = (last.relative_error() / first.relative_error()).powi(2);
+    let cut = last.excess() / first.excess();
+    let left = if last.is_open() { as_it_is.max(cut) } else { as_it_is.min(cut) };
+    left.min(1.0)
+}
+
+/// Lowers the probabilities where a gap of consequence remains that no candidate explains: what leaves it may also be what the named
+/// causes stand in for.
+pub fn temper<const N: usize, const P: usize>(stages: &[Stage<N, P>], causes: &mut [Cause]) {
+    let belief = belief_beside(left_over(stages), REMAINDER_DOUBT);
+    for cause in causes {
+        cause.probability *= belief;
+    }
+}
+
+/// What a probability is multiplied by beside a part `left` of the gap that nothing explains: one for none, `least` for all of it.
+pub fn belief_beside(left: f64, least: f64) -> f64 {
+    least + (1.0 - least) * (1.0 - left).powi(REMAINDER_POWER)
+}
