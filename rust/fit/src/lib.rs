@@ -32,6 +32,7 @@ pub mod scale;
 mod scan;
 pub mod screen;
 pub mod simulate;
+mod slopes;
 pub mod smooth;
 pub mod solve;
 mod starts;

@@ -7,6 +7,7 @@ use crate::metric::{Gram, Metric};
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Watch;
 use crate::scale::Scales;
+use crate::slopes::{Point, Slopes};
 use crate::window::Dataset;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{NEVER, Trial};
@@ -24,9 +25,6 @@ const LEAST: f64 = 0.1;
 
 /// Sensitivities taken over from a neighbour serve on where the cost falls as foreseen to within this part of the fall.
 const SERVES: f64 = 0.25;
-
-/// A value of whose sensitivity the others leave less than this part needs theirs from where it stands itself.
-const APART: f64 = 0.05;
 
 /// How far a search is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -284,104 +282,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
 fn spent(windows: usize, drawn: f64) -> f64 {
     let n = windows as f64;
     (n / (n - drawn).max(1.0)).powi(2)
-}
-
-/// Sensitivities of the free values, the first of them perhaps on loan from a neighbour, and their inner products.
-struct Slopes<'a> {
-    lent: &'a [Vec<f64>],
-    own: Vec<Vec<f64>>,
-    gram: Gram,
-    /// Whether they are those of an earlier point.
-    followed: bool,
-}
-
-impl<'a> Slopes<'a> {
-    /// Of all values where they stand.
-    fn new<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-        problem: &Problem<A, N, P>,
-        at: &Point<P>,
-    ) -> Self {
-        Self::with(problem, at, &[])
-    }
-
-    /// With those of the first values on loan, if they can be told from the others by them.
-    fn beside<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-        problem: &Problem<A, N, P>,
-        at: &Point<P>,
-        known: &'a [Vec<f64>],
-    ) -> Self {
-        let slopes = Self::with(problem, at, known);
-        let apart = slopes.lent() == 0 || slopes.are_apart();
-        if apart { slopes } else { Self::new(problem, at) }
-    }
-
-    fn with<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-        problem: &Problem<A, N, P>,
-        at: &Point<P>,
-        lent: &'a [Vec<f64>],
-    ) -> Self {
-        let rest: Vec<usize> = (lent.len()..at.hypothesis.values().len()).collect();
-        let own = problem.sensitivities(&at.hypothesis, &at.residual, &rest);
-        let gram = Gram { total: DMatrix::zeros(0, 0), scores: Vec::new() };
-        let mut slopes = Self { lent, own, gram, followed: false };
-        slopes.follow(problem, at);
-        slopes.followed = false;
-        slopes
-    }
-
-    /// Whether the others leave enough of each of those that are not on loan.
-    fn are_apart(&self) -> bool {
-        let count = self.lent() + self.own.len();
-        let normal = self.gram.total.view((0, 0), (count, count)).into_owned();
-        scaled_inverse(&normal).is_some_and(|inverse| {
-            let left = |i: usize| 1.0 / (inverse[(i, i)] * normal[(i, i)]);
-            (self.lent()..count).all(|i| normal[(i, i)] <= 0.0 || left(i) > APART)
-        })
-    }
-
-    /// Whether all are those of the point they are used at.
-    fn are_own(&self) -> bool {
-        self.lent() == 0 && !self.followed
-    }
-
-    /// How many are on loan.
-    fn lent(&self) -> usize {
-        self.lent.len()
-    }
-
-    /// Goes on to serve at another point.
-    fn follow<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-        &mut self,
-        problem: &Problem<A, N, P>,
-        at: &Point<P>,
-    ) {
-        let columns: Vec<&[f64]> = self.lent.iter().chain(&self.own).map(Vec::as_slice).collect();
-        self.gram = problem.metric.gram(problem.data, &columns, &at.residual);
-        self.followed = true;
-    }
-}
-
-/// A hypothesis with its residual and cost.
-struct Point<const P: usize> {
-    hypothesis: Hypothesis<P>,
-    residual: Vec<f64>,
-    costs: Vec<f64>,
-    data_cost: f64,
-    prior_cost: f64,
-}
-
-impl<const P: usize> Point<P> {
-    fn new<A: Arm<f64, N, P>, const N: usize>(problem: &Problem<A, N, P>, hypothesis: Hypothesis<P>) -> Self {
-        let residual = problem.residual(&hypothesis);
-        let costs = problem.metric.costs(problem.data, &residual);
-        let data_cost = problem.metric.total(&costs);
-        let prior_cost = problem.prior.cost(&hypothesis.theta);
-        Self { hypothesis, residual, costs, data_cost, prior_cost }
-    }
-
-    fn cost(&self) -> f64 {
-        self.data_cost + self.prior_cost
-    }
 }
 
 /// A step that takes no value after the first `free` more than nine tenths of the way to its lower bound: an effect that is switched
