@@ -204,3 +204,18 @@ def test_a_hard_stop_is_no_push(arm):
     assert [(c.effect, c.joint) for c in result.causes] == [("contact", 2)]
     assert result.causes[0].probability > 0.9
     assert result.causes[0].parameters["stiffness"].value == pytest.approx(2000.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameters", "kind"),
+    [("quadratic_drag", {"c": 0.05}, "takes"), ("joint_spring", {"k": 4.0, "q0": 0.0}, "both")],
+)
+def test_a_missing_loss_takes_energy_and_a_missing_spring_gives_it_back(arm, effect, parameters, kind):
+    t = np.arange(1600) * arm.sample_period
+    log = simulate(arm, t, seed_torque(t), effects=[Effect(effect, 2, parameters)], name="log")
+    energy = json.loads(diagnose(log, arm).to_json())["energy"]
+    assert [(e["joint"], e["model"]) for e in energy] == [(j, m) for m in ("before", "refit", "after") for j in (1, 2)]
+    own = energy[1]
+    assert own["kind"] == kind
+    assert own["balance"] == pytest.approx(own["power"] / own["exchanged"])
+    assert 0 < own["exchanged"] < own["commanded"]

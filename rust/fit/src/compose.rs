@@ -5,6 +5,7 @@ use crate::attribute::Contender;
 use crate::belief::left_over;
 use crate::course::Attribution;
 use crate::diagnose::Options;
+use crate::energy::energy;
 use crate::gap::{Errors, FreeRuns, gap, rms};
 use crate::locate::{Lack, Lacks, lacking_torques, places, regimes, shares};
 use crate::metric::Metric;
@@ -61,6 +62,7 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         schema: "armgap.diagnosis/1",
         verdict,
         places: places(&joint_shares(study, (attribution, events), &lacks, verdict), &regimes),
+        energy: energy(&lacks),
         gap,
         causes: attribution
             .causes

@@ -14,6 +14,7 @@ pub mod course;
 pub mod decide;
 pub mod diagnose;
 mod duel;
+pub mod energy;
 pub mod equivalent;
 mod gap;
 pub mod identify;

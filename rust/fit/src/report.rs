@@ -1,5 +1,6 @@
 //! The diagnosis as data: the schema `armgap.diagnosis/1` and what a report draws besides.
 
+use crate::energy::Energy;
 use crate::locate::{Place, Regime};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -30,6 +31,8 @@ pub struct Diagnosis {
     /// Where.
     #[serde(rename = "where")]
     pub places: Vec<Place>,
+    /// What the torque lacking on each joint does with energy.
+    pub energy: Vec<Energy>,
     /// Which.
     pub causes: Vec<Cause>,
     /// What was looked for and not found.

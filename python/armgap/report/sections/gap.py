@@ -9,7 +9,7 @@ from itertools import pairwise
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Heat, Section, Table, Tile
 from armgap.report.sections.steps import Data, length_unit, load_text, steps, torque_unit
-from armgap.report.words import error_text, figure, variable_text
+from armgap.report.words import error_text, figure, percent, variable_text
 
 __all__ = ["first_picture", "gap_map"]
 
@@ -116,8 +116,40 @@ def gap_map(data: Data) -> Section | None:
         "left; the table below has them in figures. A right cause empties the map where it acts."
     )
     wanted = [(f"{label[:1].upper()}{label[1:]} [RMS, {torque_unit(data)}]", key) for label, key, _ in steps(data)]
-    return Section(
-        "The gap by joint and regime", text=[text], heats=_heats(data, wanted), tables=[_table(data)], columns=2
+    tables = [_table(data)]
+    if data.get("energy"):
+        tables.append(_energy(data))
+    return Section("The gap by joint and regime", text=[text], heats=_heats(data, wanted), tables=tables, columns=2)
+
+
+def _energy(data: Data) -> Table:
+    """What the missing torque does with energy, per joint and model."""
+    does = {"takes": "takes energy", "gives": "gives energy", "both": "takes and gives back"}
+    labels = {key: label for label, key, _ in steps(data)}
+    rows = [
+        [
+            f"joint {e['joint']}",
+            labels[e["model"]],
+            figure(e["power"], 2),
+            figure(e["exchanged"], 2),
+            percent(e["exchanged"] / e["commanded"]) if e["commanded"] > 0 else "–",
+            f"{e['balance']:+.2f}",
+            does[e["kind"]],
+        ]
+        for e in data["energy"]
+        if e["model"] in labels
+    ]
+    head = (
+        "joint",
+        "model",
+        "power [W]",
+        "exchanged [W]",
+        "of the commanded",
+        "balance",
+        f"the missing {load_text(data)}",
+    )
+    return Table(
+        head, rows, fold=f"What the missing {load_text(data)} does with energy: friction takes, a spring gives back"
     )
 
 
