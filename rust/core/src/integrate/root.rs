@@ -12,6 +12,9 @@ const CURVED: f64 = 1e-3;
 /// The rate of acceleration over less than this part of a step is not known well enough.
 const SHORT: f64 = 0.01;
 
+/// A root of the curve through both ends is found to this part of the step: the motion is not that curve.
+const ROOT: f64 = 1e-6;
+
 /// A place close to where joint `j`'s velocity vanishes, `length` after the start of a step, and the accelerations at both.
 pub(crate) struct Close<'a, T, const N: usize> {
     pub(crate) place: &'a Place<T, N>,
@@ -73,7 +76,7 @@ pub(crate) fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
             low = s;
         }
         let newton = s - f / slope(s);
-        if (newton - s).abs() < lit(1e-13) {
+        if (newton - s).abs() < lit(ROOT) {
             return newton.max(low).min(high);
         }
         s = if newton > low && newton < high { newton } else { (low + high) / two };

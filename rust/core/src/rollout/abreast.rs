@@ -3,7 +3,7 @@
 use super::bundle::Bundle;
 use super::change::{Outcome, Taken};
 use super::clock::Clock;
-use super::lane::{held_in, lane_of, numbers, put, state_of, write};
+use super::lane::{held_in, lane_of, numbers, state_of, write};
 use super::{Run, WIDTH};
 use crate::arm::Arm;
 use crate::cpu::Cpu;
@@ -13,7 +13,7 @@ use crate::integrate::{Interval, State, exact};
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::plant::Mode;
-use crate::pose::{Place, Pose, Reach};
+use crate::pose::{Place, Pose};
 use crate::real::{Real, lit};
 use core::array::from_fn;
 use nalgebra::SVector;
@@ -33,17 +33,6 @@ enum Course {
     Parted,
     /// Some to a reversal.
     Aimed,
-}
-
-/// Where a lane is after a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum After {
-    /// Within an interval.
-    Within,
-    /// At its end.
-    There,
-    /// At its end, taken alone.
-    Alone,
 }
 
 /// The lanes' states on their way.
@@ -189,19 +178,14 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     /// Goes on from a step after which lanes go different ways.
     #[inline(always)]
     fn sort_out(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
-        let (places, after) = self.judge();
-        for i in 0..H {
-            let mut by = places[i].q;
-            for j in 0..N {
-                by[j] = places[i].q[j] - self.poses[i].place.q[j];
-            }
-            self.poses[i] = self.bundles[i].rigid.near(&self.poses[i], &places[i], &by, Reach::Near).0;
-        }
+        self.course = Course::Parted;
         for l in 0..WIDTH {
-            if after[l] == After::Alone {
-                self.pose_afresh(l);
+            let clock = &self.clocks[l];
+            if clock.is_over() {
+                continue;
             }
-            if after[l] != After::Within {
+            let right = clock.goal.is_none() && self.signs[l / W].wrong.0[l % W] <= T::zero();
+            if right || self.judge(l) {
                 self.arrive(runs, l);
             }
         }
@@ -263,26 +247,23 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
             self.moving -= 1;
             state.modes = [Mode::Forward; N];
         }
-        let modes = &mut self.modes[l / W];
         for j in 0..N {
-            self.poses[l / W].place.q[j].0[l % W] = state.q[j];
-            self.poses[l / W].place.dq[j].0[l % W] = state.dq[j];
-            modes.direction[j].0[l % W] = state.modes[j].direction();
+            self.modes[l / W].direction[j].0[l % W] = state.modes[j].direction();
         }
-        self.pose_afresh(l);
+        self.put(l, &Place { q: state.q.into(), dq: state.dq.into() });
     }
 
-    /// Computes lane `l`'s pose from its place alone.
+    /// Puts lane `l` to a place.
     #[inline(never)]
-    fn pose_afresh(&mut self, l: usize) {
-        let pose = self.bundles[l / W].plants[l % W].rigid().pose(&self.place(l));
-        let Pose { turns, balance, .. } = &mut self.poses[l / W];
+    fn put(&mut self, l: usize, place: &Place<T, N>) {
+        let (own, l, i) = (self.bundles[l / W].plants[l % W].rigid().pose(place), l % W, l / W);
+        let Pose { place, turns, balance } = &mut self.poses[i];
         for j in 0..N {
-            turns[j].sine.0[l % W] = pose.turns[j].sine;
-            turns[j].cosine.0[l % W] = pose.turns[j].cosine;
-            balance.bias[j].0[l % W] = pose.balance.bias[j];
+            (place.q[j].0[l], place.dq[j].0[l]) = (own.place.q[j], own.place.dq[j]);
+            (turns[j].sine.0[l], turns[j].cosine.0[l]) = (own.turns[j].sine, own.turns[j].cosine);
+            balance.bias[j].0[l] = own.balance.bias[j];
             for k in 0..N {
-                balance.inertia[j][k].0[l % W] = pose.balance.inertia[j][k];
+                balance.inertia[j][k].0[l] = own.balance.inertia[j][k];
             }
         }
     }
@@ -338,29 +319,9 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
     }
 
-    /// Lane by lane, what comes of a step: where the lanes go on from, and which have got to the end of an interval.
+    /// What comes of lane `l`'s step; whether it is at the end of its interval.
     #[inline(never)]
-    fn judge(&mut self) -> ([Place<Lanes<T, C, W>, N>; H], [After; WIDTH]) {
-        let (mut places, mut after) = (from_fn(|i: usize| self.poses[i].place), [After::Within; WIDTH]);
-        self.course = Course::Parted;
-        for l in 0..WIDTH {
-            let clock = &self.clocks[l];
-            if clock.is_over() {
-                continue;
-            }
-            if clock.goal.is_none() && self.signs[l / W].wrong.0[l % W] <= T::zero() {
-                after[l] = After::There;
-                continue;
-            }
-            let place;
-            (place, after[l]) = self.judge_lane(l);
-            put(&mut places, l, &place);
-        }
-        (places, after)
-    }
-
-    /// What comes of lane `l`'s step.
-    fn judge_lane(&mut self, l: usize) -> (Place<T, N>, After) {
+    fn judge(&mut self, l: usize) -> bool {
         let (i, lane, interval) = (l / W, l % W, self.interval(l));
         if self.clocks[l].is_whole() {
             self.clocks[l].left = interval.h;
@@ -378,21 +339,21 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         };
         let clock = &mut self.clocks[l];
         let mut direction = numbers(&self.modes[i].direction, lane);
-        let (place, after) = match taken.judge(clock, &mut direction) {
-            Outcome::Right => (taken.places[1], After::There),
-            Outcome::Again => (taken.places[0], After::Within),
-            Outcome::Reversed(place) if clock.left > T::zero() => (place, After::Within),
-            Outcome::Reversed(place) => (place, After::There),
+        let (place, arrived) = match taken.judge(clock, &mut direction) {
+            Outcome::Right => return true,
+            Outcome::Again => (taken.places[0], false),
+            Outcome::Reversed(place) => (place, clock.left <= T::zero()),
             Outcome::Alone => {
                 let mut state = state_of(&taken.places[0], &direction);
                 exact(plants[lane], &mut state, &interval, clock.done);
                 direction = state.modes.map(Mode::direction);
-                (Place { q: state.q.into(), dq: state.dq.into() }, After::Alone)
+                (Place { q: state.q.into(), dq: state.dq.into() }, true)
             }
         };
         for j in 0..N {
             self.modes[i].direction[j].0[lane] = direction[j];
         }
-        (place, after)
+        self.put(l, &place);
+        arrived
     }
 }

@@ -40,20 +40,6 @@ pub(super) fn lane_of<T: Real, C, const W: usize, const N: usize>(
     Place { q: numbers(&place.q, l), dq: numbers(&place.dq, l) }
 }
 
-/// Puts a place into lane `l`.
-#[inline]
-pub(super) fn put<T: Real, C, const W: usize, const H: usize, const N: usize>(
-    places: &mut [Place<Lanes<T, C, W>, N>; H],
-    l: usize,
-    of: &Place<T, N>,
-) {
-    let place = &mut places[l / W];
-    for j in 0..N {
-        place.q[j].0[l % W] = of.q[j];
-        place.dq[j].0[l % W] = of.dq[j];
-    }
-}
-
 /// What holds lane `l`.
 #[inline]
 pub(super) fn held_in<T: Real, C, const W: usize, const N: usize>(
