@@ -79,9 +79,9 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// The arm without effects and with exact Coulomb friction.
     pub fn new(arm: A, theta: [T; P]) -> Self {
         let (viscous, coulomb) = (arm.viscous(&theta).into(), arm.coulomb(&theta).into());
-        let (added, tilt) = ([[T::zero(); N]; N], T::zero());
+        let (steady, tilt) = (arm.steady_inertia(&theta), T::zero());
         Self {
-            rigid: Rigid { arm, theta, viscous, coulomb, added, tilt },
+            rigid: Rigid { arm, theta, viscous, coulomb, steady, tilt },
             drives: [None; N],
             driven: false,
             smoothing: T::zero(),
@@ -109,12 +109,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.remembers |= hooks.memory;
         let rigid = &mut self.rigid;
         let own = *rigid.arm.inertia(&rigid.theta, &SVector::zeros()).get((joint, joint))?;
-        *rigid.added.get_mut(joint)?.get_mut(joint)? += effect.law.inertia(&effect.p);
+        *rigid.steady.get_mut(joint)?.get_mut(joint)? += effect.law.inertia(&effect.p);
         if let Some(drive) = effect.law.drive(&effect.p, own) {
             *self.drives.get_mut(joint)? = Some(drive);
             self.driven = true;
             if drive.inside {
-                *rigid.added.get_mut(joint)?.get_mut(joint)? -= drive.inertia;
+                *rigid.steady.get_mut(joint)?.get_mut(joint)? -= drive.inertia;
             }
         }
         rigid.tilt += effect.law.tilt(&effect.p);
@@ -125,6 +125,10 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             for (value, change) in rigid.theta.iter_mut().zip(delta) {
                 *value += change;
             }
+            let more = rigid.arm.steady_inertia(&delta);
+            for (value, change) in rigid.steady.iter_mut().flatten().zip(more.iter().flatten()) {
+                *value += *change;
+            }
         }
         Some(self)
     }
@@ -132,7 +136,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// Adds to the inertia between the first two joints.
     fn couple(&mut self, inertia: T) {
         for (row, column) in [(0, 1), (1, 0)] {
-            if let Some(entry) = self.rigid.added.get_mut(row).and_then(|row| row.get_mut(column)) {
+            if let Some(entry) = self.rigid.steady.get_mut(row).and_then(|row| row.get_mut(column)) {
                 *entry += inertia;
             }
         }

@@ -18,8 +18,8 @@ pub struct Rigid<V, A, const N: usize, const P: usize> {
     pub viscous: [V; N],
     /// Coulomb coefficients.
     pub coulomb: [V; N],
-    /// Inertia added by effects.
-    pub added: [[V; N]; N],
+    /// Inertia that is the same everywhere, that added by effects included.
+    pub steady: [[V; N]; N],
     /// Angle by which the base is turned.
     pub tilt: V,
 }
@@ -66,12 +66,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> Rigid<V, 
 
     #[inline(always)]
     fn turned(&self, place: &Place<V, N>, turns: [Turn<V>; N]) -> Pose<V, N> {
-        let mut balance = self.arm.balance(&self.theta, &turns, &place.dq);
-        for i in 0..N {
-            for j in 0..N {
-                balance.inertia[i][j] = balance.inertia[i][j] + self.added[i][j];
-            }
-        }
+        let balance = self.arm.balance(&self.theta, &self.steady, &turns, &place.dq);
         Pose { place: *place, turns, balance }
     }
 }

@@ -20,7 +20,7 @@ fn check<A: Arm<f64, N, P>, const N: usize, const P: usize>(arm: &A, theta: [f64
     // Y theta = tau, and the integrator's shared terms are the same mathematics.
     assert!((arm.regressor(&q, &dq, &ddq) * vector - torque).amax() < 1e-12 * scale);
     let turns = arm.angles(&q.into(), 0.0).map(Turn::of);
-    let Balance { inertia, bias } = arm.balance(&theta, &turns, &dq.into());
+    let Balance { inertia, bias } = arm.balance(&theta, &arm.steady_inertia(&theta), &turns, &dq.into());
     assert!((SMatrix::from_fn(|i, j| inertia[i][j]) - m).amax() < 1e-12 * scale);
     assert!((SVector::from(bias) - c * dq - arm.gravity(&theta, &q, 0.0)).amax() < 1e-12 * scale);
 

@@ -41,15 +41,21 @@ impl<T: Real> Arm<T, 1, 4> for Axis<T> {
         [tilt]
     }
 
+    #[inline]
+    fn steady_inertia(&self, theta: &[T; 4]) -> [[T; 1]; 1] {
+        [[theta[0]]]
+    }
+
     #[inline(always)]
     fn balance<V: Number<Real = T>>(
         &self,
         theta: &[V; 4],
+        steady: &[[V; 1]; 1],
         turns: &[Turn<V>; 1],
         _: &[V; 1],
     ) -> Balance<V, 1> {
         let along = theta[0] * V::of(self.gravity) * turns[0].sine;
-        Balance { inertia: [[theta[0]]], bias: [theta[1].fused(turns[0].cosine, along)] }
+        Balance { inertia: *steady, bias: [theta[1].fused(turns[0].cosine, along)] }
     }
 
     #[inline(always)]

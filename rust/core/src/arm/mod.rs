@@ -143,10 +143,14 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Angles whose sines and cosines [`Arm::balance`] needs, with the base turned by `tilt`.
     fn angles<V: Number<Real = T>>(&self, q: &[V; N], tilt: V) -> [V; N];
 
-    /// Inertia matrix and `C dq + g` together, for the integrator: of one arm, or of several side by side.
+    /// The part of the inertia matrix that is the same everywhere.
+    fn steady_inertia(&self, theta: &[T; P]) -> [[T; N]; N];
+
+    /// Inertia matrix, given its steady part, and `C dq + g` together, for the integrator: of one arm, or of several side by side.
     fn balance<V: Number<Real = T>>(
         &self,
         theta: &[V; P],
+        steady: &[[V; N]; N],
         turns: &[Turn<V>; N],
         dq: &[V; N],
     ) -> Balance<V, N>;

@@ -41,14 +41,20 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
         [q[0] + tilt]
     }
 
+    #[inline]
+    fn steady_inertia(&self, theta: &[T; 4]) -> [[T; 1]; 1] {
+        [[theta[0]]]
+    }
+
     #[inline(always)]
     fn balance<V: Number<Real = T>>(
         &self,
         theta: &[V; 4],
+        steady: &[[V; 1]; 1],
         turns: &[Turn<V>; 1],
         _: &[V; 1],
     ) -> Balance<V, 1> {
-        Balance { inertia: [[theta[0]]], bias: [theta[1] * turns[0].sine] }
+        Balance { inertia: *steady, bias: [theta[1] * turns[0].sine] }
     }
 
     #[inline(always)]

@@ -94,18 +94,25 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
         [q[0] + tilt, q[1]]
     }
 
+    #[inline]
+    fn steady_inertia(&self, theta: &[T; 9]) -> [[T; 2]; 2] {
+        [[theta[0], theta[2]], [theta[2], theta[2]]]
+    }
+
     #[inline(always)]
     fn balance<V: Number<Real = T>>(
         &self,
         theta: &[V; 9],
+        steady: &[[V; 2]; 2],
         turns: &[Turn<V>; 2],
         dq: &[V; 2],
     ) -> Balance<V, 2> {
         let [Turn { sine: s1, cosine: c1 }, Turn { sine: s2, cosine: c2 }] = *turns;
         let outer = theta[4] * s1.fused(c2, c1 * s2);
         let (kc, ks) = (theta[1] * c2, theta[1] * s2);
-        let coupled = theta[2] + kc;
-        let inertia = [[theta[0] + kc + kc, coupled], [coupled, theta[2]]];
+        let [[own, coupled], [_, outer_own]] = *steady;
+        let coupled = coupled + kc;
+        let inertia = [[own + kc + kc, coupled], [coupled, outer_own]];
         let bias1 = theta[3].fused(s1, outer) - ks * dq[1] * (dq[0] + dq[0] + dq[1]);
         Balance { inertia, bias: [bias1, (ks * dq[0]).fused(dq[0], outer)] }
     }

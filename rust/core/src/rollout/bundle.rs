@@ -46,13 +46,13 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
 {
     /// The same plant in all lanes.
     pub(super) fn new(plant: &'a Plant<T, A, N, P>) -> Self {
-        let Rigid { arm, theta, viscous, coulomb, added, tilt } = plant.rigid();
+        let Rigid { arm, theta, viscous, coulomb, steady, tilt } = plant.rigid();
         let rigid = Rigid {
             arm: arm.clone(),
             theta: theta.map(Lanes::of),
             viscous: viscous.map(Lanes::of),
             coulomb: coulomb.map(|level| Lanes::of(level.max(T::zero()))),
-            added: added.map(|row| row.map(Lanes::of)),
+            steady: steady.map(|row| row.map(Lanes::of)),
             tilt: Lanes::of(*tilt),
         };
         let (hooks, dry) = (from_fn(|j| plant.hooks(j)), from_fn(|j| Lanes::of(plant.dry(j))));
@@ -74,7 +74,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
             rigid.viscous[j].0[l] = own.viscous[j];
             rigid.coulomb[j].0[l] = own.coulomb[j].max(T::zero());
             for k in 0..N {
-                rigid.added[j][k].0[l] = own.added[j][k];
+                rigid.steady[j][k].0[l] = own.steady[j][k];
             }
             self.dry[j].0[l] = plant.dry(j);
             self.hooks[j].force = self.plants.iter().any(|plant| plant.hooks(j).force);
@@ -213,7 +213,7 @@ impl<T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: 
                 (level, pull[j]) = (own, pull[j] + force);
             }
             // What is known first is subtracted first: the bias is not.
-            let driven = (-level).fused(direction[j], (-viscous).fused(at.pose.place.dq[j], pull[j]));
+            let driven = (-viscous).fused(at.pose.place.dq[j], pull[j] - level * direction[j]);
             pull[j] = driven - at.pose.balance.bias[j];
         }
         pull
