@@ -185,17 +185,17 @@ struct Stage<V, const N: usize> {
     far: V,
 }
 
-/// The stage `dt` after the start, moved there at the rates of the stage before, under the `tau`-th torques.
+/// The stage `dt` after the start, moved there at the velocities and accelerations of the stage before, under the `tau`-th torques.
 #[inline(always)]
 fn stage<V: Number, B: Body<V, N>, const N: usize>(
     step: &Step<'_, V, B, N>,
     dt: V,
     tau: usize,
-    before: Rates<'_, V, N>,
+    [dq, ddq]: [&[V; N]; 2],
     beside: Option<&Stage<V, N>>,
 ) -> Stage<V, N> {
     let Step { body, start, modes, span } = step;
-    let (place, by) = moved(&start.place, dt, before.dq, before.ddq);
+    let (place, by) = moved(&start.place, dt, dq, ddq);
     let (pose, far) = match beside {
         None => body.near(start, &place, &by, Reach::Near),
         Some(stage) => stage.near(*body, &place, &by),
@@ -228,45 +228,18 @@ pub struct Step<'a, V, B, const N: usize> {
     pub span: &'a Span<V, N>,
 }
 
-/// Rates at a stage.
-#[derive(Clone, Copy)]
-struct Rates<'a, V, const N: usize> {
-    dq: &'a [V; N],
-    ddq: &'a [V; N],
-}
-
-impl<V, const N: usize> Stage<V, N> {
-    #[inline(always)]
-    fn rates(&self) -> Rates<'_, V, N> {
-        Rates { dq: &self.pose.place.dq, ddq: &self.motion.ddq }
-    }
-}
-
-impl<V: Number, B: Body<V, N>, const N: usize> Step<'_, V, B, N> {
-    /// How it moves at the start.
-    #[inline(always)]
-    fn first(&self) -> Motion<V, N> {
-        motion(self.body, &Instant { t: self.span.t, pose: self.start, tau: &self.span.tau[0] }, self.modes)
-    }
-
-    /// Its rates there.
-    #[inline(always)]
-    fn rates<'s>(&'s self, first: &'s Motion<V, N>) -> Rates<'s, V, N> {
-        Rates { dq: &self.start.place.dq, ddq: &first.ddq }
-    }
-}
-
 /// One step with these friction modes: where it ends. Its signs are written over `signs`.
 #[inline(always)]
 pub fn glide<V: Number, B: Body<V, N>, const N: usize>(
     step: &Step<'_, V, B, N>,
     signs: &mut Signs<V, N>,
 ) -> Pose<V, N> {
-    let half = step.span.h * V::of(lit(0.5));
-    let s1 = step.first();
-    let s2 = stage(step, half, 1, step.rates(&s1), None);
-    let s3 = stage(step, half, 1, s2.rates(), Some(&s2));
-    let s4 = stage(step, step.span.h, 2, s3.rates(), None);
+    let Step { body, start, modes, span } = step;
+    let half = span.h * V::of(lit(0.5));
+    let s1 = motion(*body, &Instant { t: span.t, pose: start, tau: &span.tau[0] }, modes);
+    let s2 = stage(step, half, 1, [&start.place.dq, &s1.ddq], None);
+    let s3 = stage(step, half, 1, [&s2.pose.place.dq, &s2.motion.ddq], Some(&s2));
+    let s4 = stage(step, span.h, 2, [&s3.pose.place.dq, &s3.motion.ddq], None);
     end(step, &s1, [&s2, &s3, &s4], signs)
 }
 

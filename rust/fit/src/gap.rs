@@ -43,7 +43,7 @@ impl<const N: usize> Errors<N> {
     pub fn new<A: Arm<f64, N, P>, const P: usize>(study: &Study<A, N, P>, compared: &Compared<P>) -> Self {
         let data = &study.holdout.data;
         let starts = data.measured_starts();
-        let bare = bare(data);
+        let bare = data.without_pushes();
         let after = data.predict(&study.arm, &compared.after, &starts);
         Self {
             before: bare.predict(&study.arm, &compared.before, &starts),
@@ -169,7 +169,7 @@ fn at_horizon<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     if data.windows.len() < 2 * data.tracks.len() {
         return None;
     }
-    let bare = bare(&data);
+    let bare = data.without_pushes();
     let (measured, starts) = (data.measured(), data.measured_starts());
     let missed = |predicted: &[f64]| rms::<N>(&measured, &limited(&measured, predicted));
     let after = data.predict(&study.arm, &compared.after, &starts);
@@ -239,13 +239,6 @@ fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
     Dataset { tracks: data.tracks.clone(), windows, rows }
 }
 
-/// The same logs without any known pushes.
-fn bare<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
-    let mut bare = data.clone();
-    bare.tracks.iter_mut().for_each(|track| track.pushes.clear());
-    bare
-}
-
 /// Predictions kept within reach of the measurement, so that a diverged run stays a number.
 fn limited(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
     let within = |p: &f64, m: &f64| m + (p - m).clamp(-FREE_RUN_LIMIT, FREE_RUN_LIMIT);
@@ -264,7 +257,7 @@ impl<const N: usize> FreeRuns<N> {
     /// Runs of the arm file as it is, and of the model with the causes.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(study: &Study<A, N, P>, compared: &Compared<P>) -> Self {
         let data = whole(&study.holdout.data);
-        let (bare, measured) = (bare(&data), data.measured());
+        let (bare, measured) = (data.without_pushes(), data.measured());
         let starts = vec![Shift::none(); data.windows.len()];
         let run = |data: &Dataset<N>, h| limited(&measured, &data.predict(&study.arm, h, &starts));
         let (before, after) = rayon::join(|| run(&bare, &compared.before), || run(&data, &compared.after));

@@ -91,50 +91,41 @@ impl Swing<'_> {
         (self.torque.at(s) + self.drive.stiffness * q + self.drive.damping * dq) / self.drive.inertia
     }
 
-    /// Position and velocity of a motor on a shaft without play at the end of the interval: the same steps, where everything is linear.
-    fn swing(&self, mut e: f64, mut v: f64, count: usize) -> (f64, f64) {
-        let (dt, ds) = (self.h / count as f64, 1.0 / count as f64);
-        let (half, sixth) = (0.5 * dt, dt / 6.0);
-        let (pull, brake) =
-            (self.drive.stiffness / self.drive.inertia, self.drive.damping / self.drive.inertia);
-        let mut push = self.push(0.0);
-        for i in 0..count {
-            let s = i as f64 * ds;
-            let (middle, end) = (self.push(s + 0.5 * ds), self.push(s + ds));
-            let a1 = push - pull * e - brake * v;
-            let v2 = v + half * a1;
-            let a2 = middle - pull * (e + half * v) - brake * v2;
-            let v3 = v + half * a2;
-            let a3 = middle - pull * (e + half * v2) - brake * v3;
-            let v4 = v + dt * a3;
-            let a4 = end - pull * (e + dt * v3) - brake * v4;
-            e += sixth * (v + 2.0 * (v2 + v3) + v4);
-            v += sixth * (a1 + 2.0 * (a2 + a3) + a4);
-            push = end;
+    /// Position and velocity of the motor at the end of the interval.
+    fn advance(&self, e: f64, v: f64) -> (f64, f64) {
+        if self.drive.gap > 0.0 {
+            return self.steps((e, v), |s| self.drawn(s), |here, e, v| self.slope(here, e, v));
         }
-        (e.clamp(-LIMIT, LIMIT), v.clamp(-LIMIT, LIMIT))
+        // Without play everything is linear.
+        let Drive { stiffness, damping, inertia, .. } = self.drive;
+        let (pull, brake) = (stiffness / inertia, damping / inertia);
+        self.steps((e, v), |s| self.push(s), |push, e, v| push - pull * e - brake * v)
     }
 
-    /// Position and velocity of the motor at the end of the interval, by Runge-Kutta.
-    fn advance(&self, mut e: f64, mut v: f64) -> (f64, f64) {
+    /// The same by Runge-Kutta, given what drives the motor at a fraction of the interval and how that accelerates it.
+    #[inline(always)]
+    fn steps<D>(
+        &self,
+        (mut e, mut v): (f64, f64),
+        drawn: impl Fn(f64) -> D,
+        slope: impl Fn(&D, f64, f64) -> f64,
+    ) -> (f64, f64) {
         let count = ((self.h * self.drive.rate(f64::MAX) / STEP).ceil() as usize).clamp(1, MAX_STEPS);
-        if self.drive.gap <= 0.0 {
-            return self.swing(e, v, count);
-        }
         let (dt, ds) = (self.h / count as f64, 1.0 / count as f64);
-        let mut here = self.drawn(0.0);
+        let (half, sixth) = (0.5 * dt, dt / 6.0);
+        let mut here = drawn(0.0);
         for i in 0..count {
             let s = i as f64 * ds;
-            let (middle, end) = (self.drawn(s + 0.5 * ds), self.drawn(s + ds));
-            let a1 = self.slope(&here, e, v);
-            let v2 = v + 0.5 * dt * a1;
-            let a2 = self.slope(&middle, e + 0.5 * dt * v, v2);
-            let v3 = v + 0.5 * dt * a2;
-            let a3 = self.slope(&middle, e + 0.5 * dt * v2, v3);
+            let (middle, end) = (drawn(s + 0.5 * ds), drawn(s + ds));
+            let a1 = slope(&here, e, v);
+            let v2 = v + half * a1;
+            let a2 = slope(&middle, e + half * v, v2);
+            let v3 = v + half * a2;
+            let a3 = slope(&middle, e + half * v2, v3);
             let v4 = v + dt * a3;
-            let a4 = self.slope(&end, e + dt * v3, v4);
-            e += dt / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4);
-            v += dt / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
+            let a4 = slope(&end, e + dt * v3, v4);
+            e += sixth * (v + 2.0 * (v2 + v3) + v4);
+            v += sixth * (a1 + 2.0 * (a2 + a3) + a4);
             here = end;
         }
         (e.clamp(-LIMIT, LIMIT), v.clamp(-LIMIT, LIMIT))

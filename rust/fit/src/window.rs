@@ -64,6 +64,13 @@ pub struct Dataset<const N: usize> {
 }
 
 impl<const N: usize> Dataset<N> {
+    /// The same windows of logs without any known pushes.
+    pub fn without_pushes(&self) -> Self {
+        let mut bare = self.clone();
+        bare.tracks.iter_mut().for_each(|track| track.pushes.clear());
+        bare
+    }
+
     /// Cuts every track into windows of `horizon` seconds; a gap in the samples ends a window.
     pub fn new(tracks: Vec<Track<N>>, horizon: f64) -> Self {
         let mut windows = Vec::new();

@@ -22,14 +22,8 @@ const BEYOND: f64 = 1e-9;
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N, P> {
     /// The mode change that a trial step runs into first, if any.
     #[inline]
-    pub(super) fn first_event(
-        &self,
-        state: &State<T, N>,
-        trial: &State<T, N>,
-        x: T,
-        dt: T,
-        k1: &Motion<T, N>,
-    ) -> Option<Event<T>> {
+    pub(super) fn first_event(&self, leap: &Leap<'_, T, N>, trial: &State<T, N>) -> Option<Event<T>> {
+        let &Leap { state, x, dt, k1 } = leap;
         let reverses =
             |j: usize| self.plant.is_dry(j) && trial.dq[j] * state.modes[j].direction() < T::zero();
         let any_stuck = state.modes.contains(&Mode::Stuck);
@@ -43,7 +37,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
                 let s = hermite_root(state.dq[j], k1.ddq[j] * dt, trial.dq[j], end.ddq[j] * dt);
                 Some(Event { joint: j, s, change: Change::Stop })
             } else if state.modes[j] == Mode::Stuck {
-                self.release(j, state, trial, x, dt, &end)
+                self.release(j, leap, trial, &end)
             } else {
                 None
             };
@@ -60,21 +54,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
     fn release(
         &self,
         j: usize,
-        state: &State<T, N>,
+        &Leap { state, x, dt, .. }: &Leap<'_, T, N>,
         trial: &State<T, N>,
-        x: T,
-        dt: T,
         end: &Motion<T, N>,
     ) -> Option<Event<T>> {
-        let t = self.interval.t;
-        let tau_end = self.joint_torque(x + dt, trial);
-        let (after, direction) = self.plant.excess(j, t + x + dt, trial.q[j], tau_end[j], end.holding[j]);
+        let (after, direction) = self.excess(j, x + dt, trial, end);
         if after <= T::zero() {
             return None;
         }
-        let start = self.motion(x, state);
-        let tau = self.joint_torque(x, state);
-        let (before, _) = self.plant.excess(j, t + x, state.q[j], tau[j], start.holding[j]);
+        let (before, _) = self.excess(j, x, state, &self.motion(x, state));
         let s = if before < T::zero() { before / (before - after) } else { T::zero() };
         let change = Change::Release { mode: Mode::of(direction), excess: [before, after] };
         Some(Event { joint: j, s, change })
@@ -82,36 +70,23 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
 
     /// Integrates up to the event.
     #[inline(never)]
-    pub(super) fn locate(
-        &self,
-        state: &State<T, N>,
-        event: &Event<T>,
-        x: T,
-        dt: T,
-        k1: &Motion<T, N>,
-    ) -> Located<T, N> {
+    pub(super) fn locate(&self, leap: &Leap<'_, T, N>, event: &Event<T>) -> Located<T, N> {
         if event.joint >= N {
             // No event has such a joint; said here so that no index below needs a panic.
-            return Located { length: dt, reached: *state };
+            return Located { length: leap.dt, reached: *leap.state };
         }
         match event.change {
-            Change::Stop => self.locate_stop(state, event, x, dt, k1),
+            Change::Stop => self.locate_stop(leap, event),
             Change::Release { excess: [before, after], .. } if before < T::zero() => {
-                self.locate_release(state, event.joint, [before, after], x, dt, k1)
+                self.locate_release(leap, event.joint, [before, after])
             }
-            Change::Release { .. } => Located { length: T::zero(), reached: *state },
+            Change::Release { .. } => Located { length: T::zero(), reached: *leap.state },
         }
     }
 
     /// Integrates to where a velocity vanishes: Newton's method, its last correction so small that a straight line is exact.
-    fn locate_stop(
-        &self,
-        state: &State<T, N>,
-        event: &Event<T>,
-        x: T,
-        dt: T,
-        k1: &Motion<T, N>,
-    ) -> Located<T, N> {
+    fn locate_stop(&self, leap: &Leap<'_, T, N>, event: &Event<T>) -> Located<T, N> {
+        let &Leap { state, x, dt, k1 } = leap;
         let mut s = event.s;
         let mut reached = self.runge_kutta(state, x, s * dt, k1);
         for _ in 0..MAX_REFINEMENTS {
@@ -142,15 +117,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
 
     /// Integrates to just beyond where friction no longer holds joint `j`: false position in Illinois' way (Dowell and Jarratt 1971)
     /// between the start of the step, where `excess[0] < 0`, and its end, where `excess[1] > 0`.
-    fn locate_release(
-        &self,
-        state: &State<T, N>,
-        j: usize,
-        excess: [T; 2],
-        x: T,
-        dt: T,
-        k1: &Motion<T, N>,
-    ) -> Located<T, N> {
+    fn locate_release(&self, leap: &Leap<'_, T, N>, j: usize, excess: [T; 2]) -> Located<T, N> {
+        let &Leap { state, x, dt, k1 } = leap;
         let ([mut low, mut high], [mut before, mut after]) = ([T::zero(), T::one()], excess);
         let enough = (after - before) * lit(RELEASED);
         let mut last_high = None;
@@ -159,9 +127,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
             let s = (high - after * (high - low) / (after - before) + lit(BEYOND)).min(high);
             let there = self.runge_kutta(state, x, s * dt, k1);
             let motion = self.motion(x + s * dt, &there);
-            let tau = self.joint_torque(x + s * dt, &there);
-            let (lacks, _) =
-                self.plant.excess(j, self.interval.t + x + s * dt, there.q[j], tau[j], motion.holding[j]);
+            let (lacks, _) = self.excess(j, x + s * dt, &there, &motion);
             let beyond = lacks > T::zero();
             let again = last_high == Some(beyond);
             last_high = Some(beyond);
@@ -179,6 +145,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         let reached = reached.unwrap_or_else(|| self.runge_kutta(state, x, high * dt, k1));
         Located { length: high * dt, reached }
     }
+}
+
+/// A step that may be cut short: where it starts, when, how long it is, and how the arm moves at its start.
+pub(super) struct Leap<'a, T, const N: usize> {
+    pub(super) state: &'a State<T, N>,
+    pub(super) x: T,
+    pub(super) dt: T,
+    pub(super) k1: &'a Motion<T, N>,
 }
 
 /// A change of one joint's mode at the fraction `s` of a step.

@@ -15,7 +15,7 @@ use crate::plant::{Mode, Motion, Plant};
 use crate::pose::{Place, Pose, Reach};
 use crate::real::{Real, lit};
 use crate::transmission::Hidden;
-use crossing::Located;
+use crossing::{Leap, Located};
 use nalgebra::SVector;
 
 /// Mode changes located within one sub-step before the rest of it is taken with all crossing joints held.
@@ -212,11 +212,12 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
         for _ in 0..MAX_EVENTS {
             let k1 = self.settle(state, x);
             let trial = self.runge_kutta(state, x, left, &k1);
-            let Some(event) = self.first_event(state, &trial, x, left, &k1) else {
+            let leap = Leap { state, x, dt: left, k1: &k1 };
+            let Some(event) = self.first_event(&leap, &trial) else {
                 *state = trial;
                 return;
             };
-            let Located { length, reached } = self.locate(state, &event, x, left, &k1);
+            let Located { length, reached } = self.locate(&leap, &event);
             *state = event.apply(reached);
             x += length;
             left -= length;
@@ -255,10 +256,11 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
         motion
     }
 
-    /// Torque that reaches the joints.
+    /// By how much holding joint `j` takes more than friction gives, and the direction it would slide in.
     #[inline]
-    fn joint_torque(&self, x: T, state: &State<T, N>) -> SVector<T, N> {
-        self.plant.transmitted(&self.interval.torque_at(x), &state.hidden)
+    fn excess(&self, j: usize, x: T, state: &State<T, N>, motion: &Motion<T, N>) -> (T, T) {
+        let tau = self.plant.transmitted(&self.interval.torque_at(x), &state.hidden);
+        self.plant.excess(j, self.interval.t + x, state.q[j], tau[j], motion.holding[j])
     }
 
     /// The joint whose mode contradicts the motion most, and the mode it should have.
@@ -278,9 +280,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
                     return Some((j, Mode::of(state.dq[j])));
                 }
             } else if state.modes[j] == Mode::Stuck {
-                let tau = self.joint_torque(x, state);
-                let (excess, direction) =
-                    self.plant.excess(j, self.interval.t + x, state.q[j], tau[j], motion.holding[j]);
+                let (excess, direction) = self.excess(j, x, state, motion);
                 if excess > worst && !tried[j] {
                     (found, worst) = (Some((j, Mode::of(direction))), excess);
                 }

@@ -1,6 +1,6 @@
 //! Sizes of a push by output error over the windows it touches: the push under which their predictions miss least.
 
-use super::{Event, SHORTEST, State, without_pushes};
+use super::{Event, SHORTEST, State};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
 use crate::solve::scaled_inverse;
@@ -47,7 +47,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// Beside a remainder it stays as it was where output error explains too little to be believed, if it helps at all; without one, it
     /// then is none.
     pub(super) fn sized(&self, rough: Event, state: &State<'_, N, P>, known: &[Placed]) -> Option<Event> {
-        let sample = without_pushes(if rough.holdout { &self.holdout } else { &self.training });
+        let whole = if rough.holdout { &self.holdout } else { &self.training };
+        let sample = Sample { data: whole.data.without_pushes(), measured: whole.measured.clone() };
         let data = around(&sample, &rough);
         if data.windows.is_empty() {
             return state.remainder.then_some(rough);

@@ -13,7 +13,7 @@ use crate::course::Attribution;
 use crate::decide::noticeable;
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Work;
-use crate::study::{Sample, Study};
+use crate::study::Study;
 use crate::track::Track;
 use armgap_core::arm::Arm;
 use armgap_core::effect::find;
@@ -210,11 +210,4 @@ impl Event {
 /// Name of a log without what says which part of it this is.
 fn stem(name: &str) -> &str {
     name.split(" (").next().unwrap_or(name)
-}
-
-/// The same windows without any known pushes.
-pub fn without_pushes<const N: usize>(sample: &Sample<N>) -> Sample<N> {
-    let mut data = sample.data.clone();
-    data.tracks.iter_mut().for_each(|track| track.pushes.clear());
-    Sample { data, measured: sample.measured.clone() }
 }
