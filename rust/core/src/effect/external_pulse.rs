@@ -1,6 +1,7 @@
 //! A push from outside: a constant torque of the given impulse for `duration` around `time`. It belongs to one log.
 //!
-//! Each interval carries the exact mean of the push over it, so the impulse is exact whatever the sample times.
+//! Each interval carries the exact mean and first moment of the push over it, so the speed and the way that a mass gains are exact whatever
+//! the sample times.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
 use crate::real::{Real, lit};
@@ -37,10 +38,11 @@ impl<T: Real> Effect<T> for ExternalPulse {
         let (from, to) = (p[1] - half, p[1] + half);
         for (k, (&start, pulse)) in t.iter().zip(torque.iter_mut()).enumerate() {
             let h = super::interval(t, k);
-            let overlap = (start + h).min(to) - start.max(from);
-            if overlap > T::zero() && h > T::zero() && p[2] > T::zero() {
-                let push = p[0] / p[2] * overlap / h;
-                *pulse = pulse.map(|tau| tau + push);
+            let (begin, end) = (start.max(from), (start + h).min(to));
+            if end > begin && h > T::zero() && p[2] > T::zero() {
+                let part = p[0] / p[2] * (end - begin);
+                let behind = lit::<T>(0.5) * (begin + end - h) - start;
+                *pulse = pulse.plus(Pulse::with_moment(part / h, part * behind, h));
             }
         }
     }

@@ -427,6 +427,16 @@ impl<T: Real> Pulse<T> {
         l0 * self.start + l1 * self.middle + l2 * self.end
     }
 
+    /// Both torques together.
+    #[inline]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            start: self.start + other.start,
+            middle: self.middle + other.middle,
+            end: self.end + other.end,
+        }
+    }
+
     /// The same law applied to each of the three values.
     pub fn map(self, f: impl Fn(T) -> T) -> Self {
         Self { start: f(self.start), middle: f(self.middle), end: f(self.end) }

@@ -31,6 +31,12 @@ const ITERATIONS: usize = 12;
 const ATTEMPTS: usize = 6;
 const SETTLED: f64 = 1e-4;
 
+/// Times that the windows' starts and weights are made anew around the push.
+const ROUNDS: usize = 2;
+
+/// Part of a standard deviation by which a model's values are displaced for sensitivities.
+const AXIS_STEP: f64 = 0.01;
+
 /// The windows that a push touches, and the residual they have under any push.
 struct Touched<'a, A, const N: usize, const P: usize> {
     arm: &'a A,
@@ -59,17 +65,23 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let predicted = data.predict(&self.arm, state.model, &starts);
         let metric = Metric::new(&data, &self.arm, state.model, state.scale, starts, &predicted);
         let sample = Sample::new(data);
-        let touched = Touched { arm: &self.arm, model: state.model, sample, metric, known, push: rough.push };
+        let mut touched =
+            Touched { arm: &self.arm, model: state.model, sample, metric, known, push: rough.push };
         let p = Vector3::from(rough.push.p);
         let bare = touched.cost(&touched.residual_of(&Vector3::new(0.0, p[1], p[2])));
         let seen = touched.cost(&touched.residual_of(&p));
-        let (fitted, inverse, left) = touched.minimise(p);
+        // Beside a remainder a search from elsewhere would take the remainder for the push.
+        let (mut fitted, left) = if state.remainder { touched.minimise(p) } else { touched.least(p) };
         let share = |left: f64| (bare - left) / (bare - usual.min(0.5 * bare)).max(1e-300);
-        let noise = (left / (touched.sample.data.rows * N) as f64).max(1.0);
         let believed = share(left) > EXPLAINS && bare - left > least;
         if believed && close(&fitted, &p, state.remainder) {
+            for _ in 0..ROUNDS {
+                touched.sample.data.tracks[0].pushes = touched.with(&fitted);
+                touched.metric = self.metric(&touched.sample, state.model, state.scale);
+                (fitted, _) = touched.minimise(fitted);
+            }
             let push = Placed { p: fitted.into(), ..rough.push };
-            let sigma = std::array::from_fn(|i| (inverse[(i, i)] * noise).sqrt());
+            let sigma = touched.sigma(&fitted, state.covariance)?;
             return Some(Event { push, sigma, share: share(left), ..rough });
         }
         (state.remainder && share(seen) > HELPS).then(|| Event { share: share(seen), ..rough })
@@ -85,30 +97,45 @@ fn close(fitted: &Vector3<f64>, seen: &Vector3<f64>, remainder: bool) -> bool {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
+    /// The known pushes and one of these values.
+    fn with(&self, p: &Vector3<f64>) -> Vec<Placed> {
+        self.known.iter().copied().chain([Placed { p: (*p).into(), ..self.push }]).collect()
+    }
+
     /// Whitened residual under a push of these values.
     fn residual_of(&self, p: &Vector3<f64>) -> Vec<f64> {
-        let push = Placed { p: (*p).into(), ..self.push };
+        self.residual_under(self.model, p)
+    }
+
+    /// The same under another model.
+    fn residual_under(&self, model: &Hypothesis<P>, p: &Vector3<f64>) -> Vec<f64> {
         let mut data = self.sample.data.clone();
-        data.tracks[0].pushes = self.known.iter().copied().chain([push]).collect();
-        let predicted = data.predict(self.arm, self.model, &self.metric.starts);
+        data.tracks[0].pushes = self.with(p);
+        let predicted = data.predict(self.arm, model, &self.metric.starts);
         self.metric.residual(&self.sample.measured, &predicted)
     }
 
     fn cost(&self, r: &[f64]) -> f64 {
-        self.metric.costs(&self.sample.data, r).iter().sum()
+        self.metric.total(&self.metric.costs(&self.sample.data, r))
     }
 
-    /// Levenberg and Marquardt's method from a first guess: values, inverse of the last normal matrix, cost.
-    fn minimise(&self, p: Vector3<f64>) -> (Vector3<f64>, DMatrix<f64>, f64) {
+    /// The best of the minima that are reached from a first guess and from longer pushes around the same time.
+    fn least(&self, p: Vector3<f64>) -> (Vector3<f64>, f64) {
+        let starts = [p[2], 0.04, 0.12].into_iter().map(|duration| Vector3::new(p[0], p[1], duration));
+        let minima = starts.map(|start| self.minimise(start));
+        minima.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_else(|| self.minimise(p))
+    }
+
+    /// Levenberg and Marquardt's method from a first guess: values and cost.
+    fn minimise(&self, p: Vector3<f64>) -> (Vector3<f64>, f64) {
         let (mut p, mut r) = (p, self.residual_of(&p));
-        let (mut cost, mut damping, mut inverse) = (self.cost(&r), 1e-2, DMatrix::zeros(3, 3));
+        let (mut cost, mut damping) = (self.cost(&r), 1e-2);
         for _ in 0..ITERATIONS {
             let slopes = self.slopes(&p, &r);
             let gram = self.metric.gram(&self.sample.data, &slopes.each_ref().map(Vec::as_slice), &r).total;
             let before = cost;
             for _ in 0..ATTEMPTS {
-                let Some((next, shape)) = damped_step(&p, &gram, damping) else { return (p, inverse, cost) };
-                inverse = shape;
+                let Some(next) = damped_step(&p, &gram, damping) else { return (p, cost) };
                 let there = self.residual_of(&next);
                 let lower = self.cost(&there);
                 if lower < cost {
@@ -122,7 +149,46 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
                 break;
             }
         }
-        (p, inverse, cost)
+        (p, cost)
+    }
+
+    /// Standard deviations of a push's values, for noise as large as what is left and a model known up to `covariance`.
+    fn sigma(&self, p: &Vector3<f64>, covariance: &DMatrix<f64>) -> Option<[f64; 3]> {
+        let r = self.residual_of(p);
+        let noise = (self.cost(&r) / (self.sample.data.rows * N) as f64).max(1.0);
+        let doubts = self.doubts(p, &r, covariance);
+        let own = self.slopes(p, &r);
+        let columns: Vec<&[f64]> = own.iter().chain(&doubts).map(Vec::as_slice).collect();
+        let k = columns.len();
+        let gram = self.metric.gram(&self.sample.data, &columns, &r).total;
+        let mut normal = gram.view((0, 0), (k, k)).into_owned() / noise;
+        for i in 3..k {
+            normal[(i, i)] += 1.0;
+        }
+        let inverse = scaled_inverse(&normal)?;
+        Some(std::array::from_fn(|i| inverse[(i, i)].sqrt()))
+    }
+
+    /// How predictions change along the principal axes of what is not known of the model, each by its standard deviation.
+    fn doubts(&self, p: &Vector3<f64>, r: &[f64], covariance: &DMatrix<f64>) -> Vec<Vec<f64>> {
+        let values = self.model.values();
+        let scale = covariance.diagonal().map(|v| if v > 0.0 && v.is_finite() { v.sqrt() } else { 0.0 });
+        let known = |i: usize| if scale[i] > 0.0 { 1.0 / scale[i] } else { 0.0 };
+        let correlation = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
+            if scale[i] > 0.0 && scale[j] > 0.0 { covariance[(i, j)] * known(i) * known(j) } else { 0.0 }
+        });
+        let axes = correlation.symmetric_eigen();
+        let column = |k: usize| {
+            let along = AXIS_STEP * axes.eigenvalues[k].max(0.0).sqrt();
+            let moved: Vec<f64> = values
+                .iter()
+                .enumerate()
+                .map(|(i, v)| v + along * scale[i] * axes.eigenvectors[(i, k)])
+                .collect();
+            let there = self.residual_under(&self.model.with_values(&moved), p);
+            r.iter().zip(&there).map(|(a, b)| (a - b) / AXIS_STEP).collect()
+        };
+        (0..scale.len()).filter(|k| axes.eigenvalues[*k] > 1e-9).map(column).collect()
     }
 
     /// Derivatives of the prediction by impulse, time and duration.
@@ -137,8 +203,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
     }
 }
 
-/// One damped step and the inverse of its normal matrix.
-fn damped_step(p: &Vector3<f64>, gram: &DMatrix<f64>, damping: f64) -> Option<(Vector3<f64>, DMatrix<f64>)> {
+/// One damped step.
+fn damped_step(p: &Vector3<f64>, gram: &DMatrix<f64>, damping: f64) -> Option<Vector3<f64>> {
     let mut normal = gram.view((0, 0), (3, 3)).into_owned();
     for i in 0..3 {
         normal[(i, i)] *= 1.0 + damping;
@@ -146,7 +212,7 @@ fn damped_step(p: &Vector3<f64>, gram: &DMatrix<f64>, damping: f64) -> Option<(V
     let inverse = scaled_inverse(&normal)?;
     let change = &inverse * DVector::from_fn(3, |i, _| gram[(i, 3)]);
     let duration = (p[2] + change[2]).clamp(SHORTEST, LONGEST);
-    Some((Vector3::new(p[0] + change[0], p[1] + change[1], duration), inverse))
+    Some(Vector3::new(p[0] + change[0], p[1] + change[1], duration))
 }
 
 /// Windows of a push's log that it touches, as a dataset of that log alone.

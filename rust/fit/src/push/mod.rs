@@ -17,6 +17,7 @@ use crate::study::Study;
 use crate::track::Track;
 use armgap_core::arm::Arm;
 use armgap_core::effect::find;
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use residual::Residual;
 use search::{Bell, MOST, search};
@@ -57,6 +58,8 @@ pub struct Event {
 struct State<'a, const N: usize, const P: usize> {
     /// The model with all named causes.
     model: &'a Hypothesis<P>,
+    /// Covariance of its values.
+    covariance: &'a DMatrix<f64>,
     /// Scales of the residuals under it.
     scale: [f64; N],
     /// Whether it leaves more unexplained than noise.
@@ -97,6 +100,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let (first, last) = (&attribution.stages[0], &attribution.stages[attribution.stages.len() - 1]);
         let state = State {
             model: &attribution.model.hypothesis,
+            covariance: &attribution.model.covariance,
             scale: last.weights.training.scale,
             remainder: attribution.is_unexplained(),
             noticeable: noticeable(first.relative_error()),
