@@ -114,7 +114,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             *self.drives.get_mut(joint)? = Some(drive);
             self.driven = true;
             if drive.inside {
-                *rigid.steady.get_mut(joint)?.get_mut(joint)? -= drive.inertia;
+                load(&mut rigid.steady, -drive.inertia, &drive.lever(joint));
             }
         }
         rigid.tilt += effect.law.tilt(&effect.p);
@@ -162,10 +162,16 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// What reaches the joints of the motors' torque `tau`.
     #[inline]
     pub fn transmitted(&self, tau: &SVector<T, N>, hidden: &Hidden<T, N>) -> SVector<T, N> {
-        SVector::from_fn(|j, _| match &self.drives[j] {
-            Some(drive) => drive.transmitted(hidden.twist[j], hidden.dtwist[j]),
-            None => tau[j],
-        })
+        let mut reaching = *tau;
+        for (j, drive) in self.drives.iter().enumerate() {
+            if let Some(drive) = drive {
+                let kept = tau[j] - drive.transmitted(hidden.twist[j], hidden.dtwist[j]);
+                for (k, part) in drive.lever::<N>(j).into_iter().enumerate() {
+                    reaching[k] -= part * kept;
+                }
+            }
+        }
+        reaching
     }
 
     /// What the joints remember at `q`.
@@ -293,11 +299,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         if !self.is_driven() {
             return self.undriven(t, pose, tau, modes, hidden);
         }
-        let transmitted = self.transmitted(tau, hidden);
-        let mut motion = self.undriven(t, pose, &transmitted, modes, hidden);
+        let mut motion = self.undriven(t, pose, &self.transmitted(tau, hidden), modes, hidden);
         for j in 0..N {
             if let Some(drive) = &self.drives[j] {
-                motion.ddtwist[j] = (tau[j] - transmitted[j]) / drive.inertia - motion.ddq[j];
+                let kept = tau[j] - drive.transmitted(hidden.twist[j], hidden.dtwist[j]);
+                motion.ddtwist[j] =
+                    kept / drive.inertia - SVector::from(drive.lever::<N>(j)).dot(&motion.ddq);
             }
         }
         motion
@@ -347,7 +354,9 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         let place = Place { q: core::array::from_fn(|j| q[j]), dq: core::array::from_fn(|j| dq[j]) };
         let Balance { mut inertia, bias } = self.rigid.balance(&place);
         for (j, drive) in self.drives.iter().enumerate() {
-            inertia[j][j] += drive.as_ref().map_or_else(T::zero, |d| d.inertia);
+            if let Some(drive) = drive {
+                load(&mut inertia, drive.inertia, &drive.lever(j));
+            }
         }
         let memory = self.memory(q, hidden);
         let modes: [Mode; N] = core::array::from_fn(|j| Mode::of(dq[j]));
@@ -440,6 +449,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             }
         }
         fastest
+    }
+}
+
+/// Adds the inertia of a rotor that turns by `lever` per unit of the joints.
+fn load<T: Real, const N: usize>(matrix: &mut [[T; N]; N], inertia: T, lever: &[T; N]) {
+    for (row, a) in matrix.iter_mut().zip(lever) {
+        for (entry, b) in row.iter_mut().zip(lever) {
+            *entry += inertia * *a * *b;
+        }
     }
 }
 

@@ -3,10 +3,11 @@
 //! A rigid joint has neither. A joint driven through a spring, or through play, has a motor side of its own,
 //!
 //! ```text
-//! inertia d2(q + twist)/dt2 = tau - transmitted,      transmitted = stiffness twist + damping dtwist
+//! inertia d2(u q + twist)/dt2 = tau - transmitted,      transmitted = stiffness twist + damping dtwist
 //! ```
 //!
-//! (Spong 1987), where within a play of width `gap` nothing is transmitted and outside it the flanks push and never pull. A joint
+//! (Spong 1987), with `u q` the joint's own position, and beside it that of the joints before as far as the rotor rides on them. On those
+//! the motor reacts with what it does not transmit: as much of it as the rotor rides on them. Where within a play of width `gap` nothing is transmitted and outside it the flanks push and never pull. A joint
 //! with hysteresis remembers a quantity that changes with the distance travelled and with nothing else.
 
 use crate::real::{Real, lit};
@@ -25,6 +26,9 @@ pub struct Drive<T> {
     pub gap: T,
     /// Whether the inertia is a part of the link's nominal inertia rather than an addition to it.
     pub inside: bool,
+    /// Part of the turning of the joints before it that the rotor takes part in beside its own: one for a motor that sits on the link before,
+    /// next to nothing behind a high gear.
+    pub riding: T,
 }
 
 impl<T: Real> Drive<T> {
@@ -40,6 +44,16 @@ impl<T: Real> Drive<T> {
         }
         let side = if twist < T::zero() { -T::one() } else { T::one() };
         side * (self.stiffness * depth + self.damping * side * dtwist).max(T::zero())
+    }
+
+    /// How the rotor of joint `j` turns as the joints of a planar chain do, per unit of each.
+    #[inline]
+    pub fn lever<const N: usize>(&self, j: usize) -> [T; N] {
+        core::array::from_fn(|k| match k.cmp(&j) {
+            core::cmp::Ordering::Less => self.riding,
+            core::cmp::Ordering::Equal => T::one(),
+            core::cmp::Ordering::Greater => T::zero(),
+        })
     }
 
     /// Natural frequency against a link of this inertia, 1/s.

@@ -47,7 +47,10 @@ pub fn hidden_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             if let Some(drive) = plant.drive(j) {
                 let h = interval(&track.t, k);
                 let ends = [(path[k].q[j], path[k].dq[j]), (next.q[j], next.dq[j])];
-                let swing = Swing { drive, torque: &torque[k][j], h, ends };
+                let carried: f64 = (0..j).map(|i| next.dq[i] - path[k].dq[i]).sum();
+                let held = drive.riding * drive.inertia * carried / h.max(f64::MIN_POSITIVE);
+                let torque = torque[k][j].map(|tau| tau - held);
+                let swing = Swing { drive, torque: &torque, h, ends };
                 let (at, rate) = swing.advance(ends[0].0 + now.twist[j], ends[0].1 + now.dtwist[j]);
                 (now.twist[j], now.dtwist[j]) = (at - ends[1].0, rate - ends[1].1);
             }
@@ -140,7 +143,7 @@ mod tests {
     fn a_motor_behind_a_shaft_swings_as_its_equation_says() {
         let (inertia, rate, torque, h) = (0.02, 150.0, 0.3, 0.002);
         let stiffness = inertia * rate * rate;
-        let drive = Drive { inertia, stiffness, damping: 0.0, gap: 0.0, inside: false };
+        let drive = Drive { inertia, stiffness, damping: 0.0, gap: 0.0, inside: false, riding: 0.0 };
         let (speed, pulse) = (0.4, Pulse::held(torque));
         // Beside a link at constant speed: a motor that starts with it swings about the twist that carries the torque.
         let (mut at, mut velocity) = (0.0, speed);

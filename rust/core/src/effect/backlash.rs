@@ -55,6 +55,7 @@ impl<T: Real> Effect<T> for Backlash {
             damping: lit::<T>(2.0 * FLANK_DAMPING) * rotor * rate,
             gap: p[0],
             inside: true,
+            riding: T::one(),
         })
     }
 }

@@ -57,6 +57,7 @@ impl<T: Real> Effect<T> for JointElasticity {
             damping: p[1],
             gap: T::zero(),
             inside: false,
+            riding: T::zero(),
         })
     }
 }
