@@ -17,7 +17,7 @@ TOLERANCE = 5e-5  # rad, over eight seconds: flanks that meet and part converge 
 CASES = {
     "presliding": {"amplitude": 0.06, "stiffness": 2.0},
     "joint_elasticity": {"stiffness": 14.0, "damping": 0.02, "rotor_inertia": 0.003},
-    "backlash": {"gap": 0.006, "rotor_share": 0.08},
+    "backlash": {"gap": 0.006, "rotor_share": 0.08, "riding": 1.0},
 }
 
 

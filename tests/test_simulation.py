@@ -103,7 +103,7 @@ def test_asymmetric_friction_is_an_offset_while_the_joint_moves(arm):
 #: Motors that swing on a shaft of a real arm's stiffness, and play of a real gear.
 STIFF = {
     "joint_elasticity": {"stiffness": 5e3, "damping": 5.0, "rotor_inertia": 0.1},
-    "backlash": {"gap": 2e-3, "rotor_share": 0.1},
+    "backlash": {"gap": 2e-3, "rotor_share": 0.1, "riding": 1.0},
 }
 
 

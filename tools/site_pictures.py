@@ -71,7 +71,7 @@ SIGNATURES: dict[str, Signature] = {
     "cross_friction": Signature({"level": 0.08}, "other dq", kind="two-link"),
     "gear_efficiency": Signature({"loss": 0.2}, "tau"),
     "joint_elasticity": Signature({"stiffness": 40.0, "damping": 0.02, "rotor_inertia": 0.01}, "t"),
-    "backlash": Signature({"gap": 0.05, "rotor_share": 0.2}, "t", tolerance=5e-3),
+    "backlash": Signature({"gap": 0.05, "rotor_share": 0.2, "riding": 1.0}, "t", tolerance=5e-3),
     "torque_gain": Signature({"gain": 1.25}, "tau"),
     "actuator_lag": Signature({"time_constant": 0.02}, "dtau"),
     "actuator_delay": Signature({"delay": 0.02}, "dtau"),

@@ -6,9 +6,10 @@
 //! inertia d2(u q + twist)/dt2 = tau - transmitted,      transmitted = stiffness twist + damping dtwist
 //! ```
 //!
-//! (Spong 1987), with `u q` the joint's own position, and beside it that of the joints before as far as the rotor rides on them. On those
-//! the motor reacts with what it does not transmit: as much of it as the rotor rides on them. Where within a play of width `gap` nothing is transmitted and outside it the flanks push and never pull. A joint
-//! with hysteresis remembers a quantity that changes with the distance travelled and with nothing else.
+//! (Spong 1987), where `u q` is the joint's own position and, as far as the rotor rides on them, that of the joints before, on which the
+//! motor reacts with as much of the torque that it does not transmit. Within a play of width `gap` nothing is transmitted, and
+//! outside it the flanks push and never pull. A joint with hysteresis remembers a quantity that changes with the distance travelled and
+//! with nothing else.
 
 use crate::real::{Real, lit};
 use nalgebra::SVector;

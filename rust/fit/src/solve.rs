@@ -258,23 +258,37 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
     }
 
     /// Sandwich covariance: curvature inside, the windows' own scatter of scores between (White 1982), which the fit has made smaller by
-    /// the values it has drawn from the windows (`MacKinnon` and White 1985).
+    /// the values it has drawn from the windows (`MacKinnon` and White 1985). A value that changes no prediction is as likely anywhere
+    /// between its bounds.
     fn covariance(&self, gram: &Gram, at: &Point<P>) -> DMatrix<f64> {
         let (normal, _) = self.normal_equations(gram, &at.hypothesis);
         let k = normal.nrows();
-        let Some(inverse) = scaled_inverse(&normal) else {
+        let (seen, unseen): (Vec<usize>, Vec<usize>) = (0..k).partition(|&i| normal[(i, i)] > 0.0);
+        let of = |matrix: &DMatrix<f64>| matrix.select_rows(&seen).select_columns(&seen);
+        let Some(inverse) = scaled_inverse(&of(&normal)) else {
             return DMatrix::from_diagonal_element(k, k, f64::INFINITY);
         };
-        let mut scatter = DMatrix::zeros(k, k);
+        let mut scatter = DMatrix::zeros(seen.len(), seen.len());
         for score in &gram.scores {
-            let s = score.rows(0, k);
-            scatter += s * s.transpose();
+            let s = score.select_rows(&seen);
+            scatter += &s * s.transpose();
         }
-        scatter *= spent(gram.scores.len(), (&inverse * gram.total.view((0, 0), (k, k))).trace());
+        scatter *= spent(gram.scores.len(), (&inverse * of(&gram.total)).trace());
         for i in 0..P {
             scatter[(i, i)] += 1.0 / self.prior.sigma[i].powi(2);
         }
-        &inverse * scatter * &inverse
+        let known = &inverse * scatter * &inverse;
+        let (lower, upper) = self.bounds(&at.hypothesis);
+        let mut covariance = DMatrix::zeros(k, k);
+        for (a, &i) in seen.iter().enumerate() {
+            for (b, &j) in seen.iter().enumerate() {
+                covariance[(i, j)] = known[(a, b)];
+            }
+        }
+        for i in unseen {
+            covariance[(i, i)] = (upper[i] - lower[i]).powi(2) / 12.0;
+        }
+        covariance
     }
 }
 

@@ -1,7 +1,8 @@
 //! Backlash: play between motor and link. While it is crossed the motor turns alone and the link is not driven.
 //!
-//! The motor side carries a share of the joint's nominal inertia, so with the play closed the arm is the nominal one. The flanks
-//! are springs just stiff enough, and damped, to take up the motor within about a millisecond without a rebound.
+//! The motor side carries a share of the joint's nominal inertia, so with the play closed the arm is the nominal one. It rides on the joints
+//! before it: a motor that sits on the link before turns with it (`riding = 1`), of one behind a gear of ratio n next to nothing does
+//! (`riding = 1 / n`). On the first joint that is of no consequence. The flanks are springs just stiff enough, and damped, to take up the motor within about a millisecond without a rebound.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::{Real, lit};
@@ -20,7 +21,7 @@ pub struct Backlash;
 static SPEC: Spec = Spec {
     name: "backlash",
     title: "backlash",
-    equation: "rotor d2(q + twist)/dt2 = tau - T, T = 0 while |twist| < gap/2",
+    equation: "rotor d2(q + riding q_before + twist)/dt2 = tau - T, T = 0 while |twist| < gap/2",
     source: "Nordin and Gutman 2002",
     excited_by: "a transmitted torque that changes sign",
     scope: Scope::Joint,
@@ -28,14 +29,15 @@ static SPEC: Spec = Spec {
     parameters: &[
         EffectParameter::bounded("gap", Quantity::Position, 0.0, f64::INFINITY),
         EffectParameter::shape("rotor_share", Quantity::Ratio, 0.005, 0.35),
+        EffectParameter::shape("riding", Quantity::Ratio, 0.0, 1.0),
     ],
     starts: &[
-        [0.005, 0.03, 0.0],
-        [0.01, 0.1, 0.0],
-        [0.02, 0.03, 0.0],
-        [0.04, 0.1, 0.0],
-        [0.08, 0.03, 0.0],
-        [0.16, 0.1, 0.0],
+        [0.005, 0.03, 0.5],
+        [0.01, 0.1, 0.5],
+        [0.02, 0.03, 0.5],
+        [0.04, 0.1, 0.5],
+        [0.08, 0.03, 0.5],
+        [0.16, 0.1, 0.5],
     ],
     trial: Trial::Whole,
     hooks: Hooks::NONE,
@@ -55,7 +57,7 @@ impl<T: Real> Effect<T> for Backlash {
             damping: lit::<T>(2.0 * FLANK_DAMPING) * rotor * rate,
             gap: p[0],
             inside: true,
-            riding: T::one(),
+            riding: p[2],
         })
     }
 }
