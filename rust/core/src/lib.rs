@@ -17,6 +17,7 @@ mod readme {}
 
 pub mod arm;
 pub mod cpu;
+pub mod drives;
 pub mod effect;
 pub mod filter;
 pub mod glide;

@@ -5,13 +5,14 @@
 //! [`crate::integrate`] decides when one does.
 
 use crate::arm::{Arm, Balance};
+use crate::drives::Drives;
 use crate::effect::{Active, Hooks, JointPoint};
 use crate::glide::{Body, Instant};
 use crate::linear::solve_positive_definite;
 use crate::number::Number;
 use crate::pose::{Place, Pose, Reach, Rigid};
 use crate::real::{Real, lit};
-use crate::transmission::{Drive, Hidden};
+use crate::transmission::Hidden;
 use nalgebra::SVector;
 
 /// Most effects one plant can carry.
@@ -67,8 +68,7 @@ pub struct Motion<T, const N: usize> {
 #[derive(Clone)]
 pub struct Plant<T: Real, A, const N: usize, const P: usize> {
     rigid: Rigid<T, A, N, P>,
-    drives: [Option<Drive<T>>; N],
-    driven: bool,
+    drives: Drives<T, N>,
     smoothing: T,
     effects: [Option<Active<T>>; MAX_EFFECTS],
     hooks: [Hooks; N],
@@ -82,8 +82,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         let (steady, tilt) = (arm.steady_inertia(&theta), T::zero());
         Self {
             rigid: Rigid { arm, theta, viscous, coulomb, steady, tilt },
-            drives: [None; N],
-            driven: false,
+            drives: Drives::none(),
             smoothing: T::zero(),
             effects: [None; MAX_EFFECTS],
             hooks: [Hooks::NONE; N],
@@ -111,11 +110,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         let own = *rigid.arm.inertia(&rigid.theta, &SVector::zeros()).get((joint, joint))?;
         *rigid.steady.get_mut(joint)?.get_mut(joint)? += effect.law.inertia(&effect.p);
         if let Some(drive) = effect.law.drive(&effect.p, own) {
-            *self.drives.get_mut(joint)? = Some(drive);
-            self.driven = true;
-            if drive.inside {
-                load(&mut rigid.steady, -drive.inertia, &drive.lever(joint));
-            }
+            self.drives.add(joint, drive, &mut rigid.steady)?;
         }
         rigid.tilt += effect.law.tilt(&effect.p);
         self.couple(effect.law.coupling(&effect.p));
@@ -142,36 +137,16 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         }
     }
 
-    /// Whether a joint has a motor side of its own.
+    /// The motor sides of its joints.
     #[inline]
-    pub fn is_driven(&self) -> bool {
-        self.driven
+    pub fn drives(&self) -> &Drives<T, N> {
+        &self.drives
     }
 
     /// Whether a joint remembers its path.
     #[inline]
     pub fn remembers(&self) -> bool {
         self.remembers
-    }
-
-    /// The motor side of joint `j`.
-    pub fn drive(&self, j: usize) -> Option<&Drive<T>> {
-        self.drives.get(j)?.as_ref()
-    }
-
-    /// What reaches the joints of the motors' torque `tau`.
-    #[inline]
-    pub fn transmitted(&self, tau: &SVector<T, N>, hidden: &Hidden<T, N>) -> SVector<T, N> {
-        let mut reaching = *tau;
-        for (j, drive) in self.drives.iter().enumerate() {
-            if let Some(drive) = drive {
-                let kept = tau[j] - drive.transmitted(hidden.twist[j], hidden.dtwist[j]);
-                for (k, part) in drive.lever::<N>(j).into_iter().enumerate() {
-                    reaching[k] -= part * kept;
-                }
-            }
-        }
-        reaching
     }
 
     /// What the joints remember at `q`.
@@ -202,7 +177,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// Whether nothing but friction modes can change during a step: exact friction, and no states that no encoder shows.
     #[inline]
     pub fn glides(&self) -> bool {
-        self.smoothing == T::zero() && !self.driven && !self.remembers
+        self.smoothing == T::zero() && !self.drives.any() && !self.remembers
     }
 
     /// Whether effects add a torque to joint `j`, and whether they change its Coulomb level.
@@ -296,18 +271,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         modes: &[Mode; N],
         hidden: &Hidden<T, N>,
     ) -> Motion<T, N> {
-        if !self.is_driven() {
+        if !self.drives.any() {
             return self.undriven(t, pose, tau, modes, hidden);
         }
-        let mut motion = self.undriven(t, pose, &self.transmitted(tau, hidden), modes, hidden);
-        for j in 0..N {
-            if let Some(drive) = &self.drives[j] {
-                let kept = tau[j] - drive.transmitted(hidden.twist[j], hidden.dtwist[j]);
-                motion.ddtwist[j] =
-                    kept / drive.inertia - SVector::from(drive.lever::<N>(j)).dot(&motion.ddq);
-            }
-        }
-        motion
+        let mut closed = *pose;
+        self.drives.close(&mut closed.balance.inertia, hidden);
+        let motion = self.undriven(t, &closed, &self.drives.reaching(tau, hidden), modes, hidden);
+        Motion { ddtwist: self.drives.twisting(tau, &motion.ddq, hidden), ..motion }
     }
 
     /// The same for given torques at the joints.
@@ -353,11 +323,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         let [q, dq, ddq] = motion;
         let place = Place { q: core::array::from_fn(|j| q[j]), dq: core::array::from_fn(|j| dq[j]) };
         let Balance { mut inertia, bias } = self.rigid.balance(&place);
-        for (j, drive) in self.drives.iter().enumerate() {
-            if let Some(drive) = drive {
-                load(&mut inertia, drive.inertia, &drive.lever(j));
-            }
-        }
+        self.drives.ride(&mut inertia);
         let memory = self.memory(q, hidden);
         let modes: [Mode; N] = core::array::from_fn(|j| Mode::of(dq[j]));
         let mut lack = -tau;
@@ -434,7 +400,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// a rigid arm with exact friction.
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
         let mut fastest = T::zero();
-        if self.smoothing == T::zero() && !self.is_driven() {
+        if self.smoothing == T::zero() && !self.drives.any() {
             return fastest;
         }
         let inertia = self.rigid.balance(&Place { q: (*q).into(), dq: [T::zero(); N] }).inertia;
@@ -444,20 +410,11 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
                 let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
                 fastest = fastest.max(self.level(j, &x, T::one()) / (self.smoothing * free));
             }
-            if let Some(drive) = &self.drives[j] {
+            if let Some(drive) = self.drives.get(j).filter(|d| d.gap <= T::zero()) {
                 fastest = fastest.max(drive.rate(free));
             }
         }
         fastest
-    }
-}
-
-/// Adds the inertia of a rotor that turns by `lever` per unit of the joints.
-fn load<T: Real, const N: usize>(matrix: &mut [[T; N]; N], inertia: T, lever: &[T; N]) {
-    for (row, a) in matrix.iter_mut().zip(lever) {
-        for (entry, b) in row.iter_mut().zip(lever) {
-            *entry += inertia * *a * *b;
-        }
     }
 }
 

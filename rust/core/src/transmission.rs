@@ -57,6 +57,12 @@ impl<T: Real> Drive<T> {
         })
     }
 
+    /// How far the rotor may turn to either side of the middle of its play.
+    #[inline]
+    pub fn half_gap(&self) -> T {
+        self.gap * lit(0.5)
+    }
+
     /// Natural frequency against a link of this inertia, 1/s.
     pub fn rate(&self, link: T) -> T {
         let spread = T::one() / self.inertia + T::one() / link;
@@ -75,12 +81,14 @@ pub struct Hidden<T, const N: usize> {
     pub twist: SVector<T, N>,
     /// Its rate.
     pub dtwist: SVector<T, N>,
+    /// The flank that carries where a play is closed, -1 or 1; zero where none does.
+    pub side: SVector<T, N>,
 }
 
 impl<T: Real, const N: usize> Hidden<T, N> {
     /// Nothing remembered and nothing twisted at `q`.
     pub fn none(q: SVector<T, N>) -> Self {
         let zero = SVector::zeros();
-        Self { memory: zero, anchor: q, twist: zero, dtwist: zero }
+        Self { memory: zero, anchor: q, twist: zero, dtwist: zero, side: zero }
     }
 }

@@ -41,10 +41,10 @@ pub fn hidden_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     for k in 0..=last {
         now.memory = plant.memory(&path[k].q, &now);
         now.anchor = path[k].q;
-        all.push(now);
+        all.push(rigid(&now, plant));
         let next = path.get(k + 1).unwrap_or(&path[k]);
         for j in 0..N {
-            if let Some(drive) = plant.drive(j) {
+            if let Some(drive) = plant.drives().get(j) {
                 let h = interval(&track.t, k);
                 let ends = [(path[k].q[j], path[k].dq[j]), (next.q[j], next.dq[j])];
                 let carried: f64 = (0..j).map(|i| next.dq[i] - path[k].dq[i]).sum();
@@ -57,6 +57,21 @@ pub fn hidden_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         }
     }
     all
+}
+
+/// The same with flanks that do not give.
+fn rigid<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    state: &Hidden<f64, N>,
+    plant: &Plant<f64, A, N, P>,
+) -> Hidden<f64, N> {
+    let mut rigid = *state;
+    for (j, drive) in plant.drives().iter().filter(|(_, drive)| drive.gap > 0.0) {
+        if state.twist[j].abs() >= drive.half_gap() {
+            rigid.side[j] = state.twist[j].signum();
+            (rigid.twist[j], rigid.dtwist[j]) = (rigid.side[j] * drive.half_gap(), 0.0);
+        }
+    }
+    rigid
 }
 
 /// One motor over one sample interval.

@@ -152,7 +152,7 @@ impl<const N: usize> Dataset<N> {
     ) -> Vec<Option<Vec<Hidden<f64, N>>>> {
         let of = |(index, track): (usize, &Track<N>)| {
             let last = self.windows.iter().filter(|w| w.track == index).map(|w| w.first).max()?;
-            if !plant.is_driven() && !plant.remembers() {
+            if !plant.drives().any() && !plant.remembers() {
                 return None;
             }
             let torque = commands[index].as_deref().unwrap_or(&track.held);
@@ -193,7 +193,7 @@ fn make<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f
 
 /// Makes one run, in as many steps per sample as its plant needs.
 fn make_alone<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
-    let most = if run.plant.is_driven() { MAX_SUBSTEPS_DRIVEN } else { MAX_SUBSTEPS };
+    let most = if run.plant.drives().any() { MAX_SUBSTEPS_DRIVEN } else { MAX_SUBSTEPS };
     let state = &mut run.state;
     for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
         let h = run.t[k + 1] - run.t[k];

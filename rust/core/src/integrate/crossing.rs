@@ -1,4 +1,4 @@
-//! Changes of the friction modes inside a step: which comes first, and when.
+//! Changes inside a step, of friction modes and of plays: which comes first, and when.
 
 use super::root::{Close, STRAIGHT, hermite_root};
 use super::{State, Step};
@@ -20,14 +20,16 @@ const RELEASED: f64 = 1e-8;
 const BEYOND: f64 = 1e-9;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N, P> {
-    /// The mode change that a trial step runs into first, if any.
+    /// The change that a trial step runs into first, if any.
     #[inline]
     pub(super) fn first_event(&self, leap: &Leap<'_, T, N>, trial: &State<T, N>) -> Option<Event<T>> {
         let &Leap { state, x, dt, k1 } = leap;
+        let exact = self.plant.smoothing() == T::zero();
         let reverses =
-            |j: usize| self.plant.is_dry(j) && trial.dq[j] * state.modes[j].direction() < T::zero();
-        let any_stuck = state.modes.contains(&Mode::Stuck);
-        if !any_stuck && !(0..N).any(reverses) {
+            |j: usize| exact && self.plant.is_dry(j) && trial.dq[j] * state.modes[j].direction() < T::zero();
+        let sticks = |j: usize| exact && state.modes[j] == Mode::Stuck;
+        let play = self.plant.drives().play();
+        if !play && !(0..N).any(|j| sticks(j) || reverses(j)) {
             return None;
         }
         let end = self.motion(x + dt, trial);
@@ -36,15 +38,16 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
             let event = if reverses(j) {
                 let s = hermite_root(state.dq[j], k1.ddq[j] * dt, trial.dq[j], end.ddq[j] * dt);
                 Some(Event { joint: j, s, change: Change::Stop })
-            } else if state.modes[j] == Mode::Stuck {
+            } else if sticks(j) {
                 self.release(j, leap, trial, &end)
             } else {
                 None
             };
-            if let Some(event) = event
-                && first.as_ref().is_none_or(|earliest| event.s < earliest.s)
-            {
-                first = Some(event);
+            let flank = if play { self.flank(j, leap, trial, &end) } else { None };
+            for event in [event, flank].into_iter().flatten() {
+                if first.as_ref().is_none_or(|earliest| event.s < earliest.s) {
+                    first = Some(event);
+                }
             }
         }
         first
@@ -77,11 +80,39 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         }
         match event.change {
             Change::Stop => self.locate_stop(leap, event),
-            Change::Release { excess: [before, after], .. } if before < T::zero() => {
-                self.locate_release(leap, event.joint, [before, after])
+            Change::Release { excess, .. } if excess[0] < T::zero() => {
+                let lacks = |x: T, there: &State<T, N>, motion: &Motion<T, N>| {
+                    self.excess(event.joint, x, there, motion).0
+                };
+                self.locate_beyond(leap, excess, lacks)
             }
-            Change::Release { .. } => Located { length: T::zero(), reached: *leap.state },
+            Change::Open { pull } if pull[0] < T::zero() => {
+                let lacks = |x: T, there: &State<T, N>, motion: &Motion<T, N>| {
+                    let tau = self.interval.torque_at(x)[event.joint];
+                    self.plant
+                        .drives()
+                        .pull(event.joint, tau, &motion.ddq, &there.hidden)
+                        .unwrap_or_else(T::zero)
+                };
+                self.locate_beyond(leap, pull, lacks)
+            }
+            Change::Meet => self.locate_meeting(leap, event.joint, event.s),
+            Change::Release { .. } | Change::Open { .. } => {
+                Located { length: T::zero(), reached: *leap.state }
+            }
         }
+    }
+
+    /// The state just after an event.
+    pub(super) fn applied(&self, event: &Event<T>, mut state: State<T, N>) -> State<T, N> {
+        let j = event.joint;
+        match event.change {
+            Change::Stop => (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck),
+            Change::Release { mode, .. } => state.modes[j] = mode,
+            Change::Open { .. } => state.hidden.side[j] = T::zero(),
+            Change::Meet => return self.met(j, state),
+        }
+        state
     }
 
     /// Integrates to where a velocity vanishes: Newton's method, its last correction so small that a straight line is exact.
@@ -99,7 +130,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
             if !(next > T::zero() && next <= T::one()) {
                 break;
             }
-            if !self.plant.is_driven()
+            if !self.plant.drives().any()
                 && let Some((more, place)) = close.reached(dt)
             {
                 (reached.q, reached.dq) = (place.q.into(), place.dq.into());
@@ -115,11 +146,16 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         Located { length: s * dt, reached }
     }
 
-    /// Integrates to just beyond where friction no longer holds joint `j`: false position in Illinois' way (Dowell and Jarratt 1971)
-    /// between the start of the step, where `excess[0] < 0`, and its end, where `excess[1] > 0`.
-    fn locate_release(&self, leap: &Leap<'_, T, N>, j: usize, excess: [T; 2]) -> Located<T, N> {
+    /// Integrates to just beyond where friction, or a flank, no longer holds: false position in Illinois' way (Dowell and Jarratt
+    /// 1971) between the start of the step, where it lacks `ends[0] < 0`, and its end, where it lacks `ends[1] > 0`.
+    fn locate_beyond(
+        &self,
+        leap: &Leap<'_, T, N>,
+        ends: [T; 2],
+        lacks: impl Fn(T, &State<T, N>, &Motion<T, N>) -> T,
+    ) -> Located<T, N> {
         let &Leap { state, x, dt, k1 } = leap;
-        let ([mut low, mut high], [mut before, mut after]) = ([T::zero(), T::one()], excess);
+        let ([mut low, mut high], [mut before, mut after]) = ([T::zero(), T::one()], ends);
         let enough = (after - before) * lit(RELEASED);
         let mut last_high = None;
         let mut reached = None;
@@ -127,18 +163,18 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
             let s = (high - after * (high - low) / (after - before) + lit(BEYOND)).min(high);
             let there = self.runge_kutta(state, x, s * dt, k1);
             let motion = self.motion(x + s * dt, &there);
-            let (lacks, _) = self.excess(j, x + s * dt, &there, &motion);
-            let beyond = lacks > T::zero();
+            let lack = lacks(x + s * dt, &there, &motion);
+            let beyond = lack > T::zero();
             let again = last_high == Some(beyond);
             last_high = Some(beyond);
             if beyond {
-                (high, after, reached) = (s, lacks, Some(there));
+                (high, after, reached) = (s, lack, Some(there));
                 before *= if again { lit(0.5) } else { T::one() };
             } else {
-                (low, before) = (s, lacks);
+                (low, before) = (s, lack);
                 after *= if again { lit(0.5) } else { T::one() };
             }
-            if beyond && lacks < enough {
+            if beyond && lack < enough {
                 break;
             }
         }
@@ -157,13 +193,13 @@ pub(super) struct Leap<'a, T, const N: usize> {
 
 /// A change of one joint's mode at the fraction `s` of a step.
 pub(super) struct Event<T> {
-    joint: usize,
-    s: T,
-    change: Change<T>,
+    pub(super) joint: usize,
+    pub(super) s: T,
+    pub(super) change: Change<T>,
 }
 
 /// What happens at an event.
-enum Change<T> {
+pub(super) enum Change<T> {
     /// The velocity reaches zero.
     Stop,
     /// Friction no longer holds; by how much it lacks at the start and at the end of the step.
@@ -173,6 +209,13 @@ enum Change<T> {
         /// What holding takes beyond friction's level at both ends of the step.
         excess: [T; 2],
     },
+    /// A rotor meets the flank of its play.
+    Meet,
+    /// A flank no longer pushes; by how much it would have to pull at both ends of the step.
+    Open {
+        /// The pull.
+        pull: [T; 2],
+    },
 }
 
 /// A state at a located event and the time it took to get there.
@@ -181,16 +224,4 @@ pub(super) struct Located<T, const N: usize> {
     pub(super) length: T,
     /// State.
     pub(super) reached: State<T, N>,
-}
-
-impl<T: Real> Event<T> {
-    /// The state just after the event.
-    pub(super) fn apply<const N: usize>(&self, mut state: State<T, N>) -> State<T, N> {
-        let j = self.joint;
-        match self.change {
-            Change::Stop => (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck),
-            Change::Release { mode, .. } => state.modes[j] = mode,
-        }
-        state
-    }
 }

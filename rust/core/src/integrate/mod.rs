@@ -3,9 +3,11 @@
 //! While no joint reverses, sticks or breaks away the right-hand side is smooth and the step is of order four. A joint whose
 //! velocity would change sign is stopped at the instant it reaches zero; there it either sticks, if friction can hold it, or
 //! goes on in the direction of the torque. A stuck joint breaks away at the instant the torque it needs exceeds its Coulomb
-//! level. So the arm left under a torque below that level does not creep, and a step across a reversal keeps its accuracy.
+//! level. So the arm left under a torque below that level does not creep, and a step across a reversal keeps its accuracy. In the same way
+//! a rotor meets the flank of its play, and leaves it, at an instant of its own.
 
 mod crossing;
+mod play;
 pub(crate) mod root;
 
 use crate::arm::Arm;
@@ -87,7 +89,7 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     let dt = interval.h / lit(count as f64);
     for i in 0..count {
         let from = dt * lit(i as f64);
-        if plant.smoothing() > T::zero() {
+        if plant.smoothing() > T::zero() && !plant.drives().play() {
             *state = Step::new(plant, interval, state).smooth(state, from, dt);
         } else {
             Step::new(plant, interval, state).exact(state, from, dt);
@@ -167,7 +169,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
         let mut next = *state;
         next.q = state.q + at.dq * dt;
         next.dq = state.dq + slope.ddq * dt;
-        if self.plant.is_driven() {
+        if self.plant.drives().any() {
             next.hidden.twist = state.hidden.twist + at.hidden.dtwist * dt;
             next.hidden.dtwist = state.hidden.dtwist + slope.ddtwist * dt;
         }
@@ -187,7 +189,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
         let mut next = *state;
         next.q = state.q + (state.dq + (s2.dq + s3.dq) * two + s4.dq) * sixth;
         next.dq = state.dq + (k1.ddq + (k2.ddq + k3.ddq) * two + k4.ddq) * sixth;
-        if self.plant.is_driven() {
+        if self.plant.drives().any() {
             let rates = [&state.hidden.dtwist, &s2.hidden.dtwist, &s3.hidden.dtwist, &s4.hidden.dtwist];
             next.hidden.twist += (rates[0] + (rates[1] + rates[2]) * two + rates[3]) * sixth;
             next.hidden.dtwist += (k1.ddtwist + (k2.ddtwist + k3.ddtwist) * two + k4.ddtwist) * sixth;
@@ -218,7 +220,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
                 return;
             };
             let Located { length, reached } = self.locate(&leap, &event);
-            *state = event.apply(reached);
+            *state = self.applied(&event, reached);
             x += length;
             left -= length;
             if left <= T::zero() {
@@ -228,12 +230,14 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
         let k1 = self.settle(state, x);
         let mut last = self.runge_kutta(state, x, left, &k1);
         self.hold_reversed(&mut last);
+        self.close_crossed(&mut last);
         *state = last;
     }
 
     /// Holds every joint with dry friction whose velocity contradicts its mode.
     fn hold_reversed(&self, state: &mut State<T, N>) {
-        for j in (0..N).filter(|j| self.plant.is_dry(*j)) {
+        let exact = self.plant.smoothing() == T::zero();
+        for j in (0..N).filter(|j| exact && self.plant.is_dry(*j)) {
             if state.dq[j] * state.modes[j].direction() < T::zero() {
                 (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck);
             }
@@ -244,6 +248,9 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
     #[inline]
     fn settle(&self, state: &mut State<T, N>, x: T) -> Motion<T, N> {
         let mut motion = self.motion(x, state);
+        if self.plant.drives().play() && self.open(x, state, &motion) {
+            motion = self.motion(x, state);
+        }
         let mut tried = [false; N];
         for _ in 0..2 * N {
             let Some((j, mode)) = self.unsettled(state, &motion, x, &tried) else {
@@ -259,7 +266,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
     /// By how much holding joint `j` takes more than friction gives, and the direction it would slide in.
     #[inline]
     fn excess(&self, j: usize, x: T, state: &State<T, N>, motion: &Motion<T, N>) -> (T, T) {
-        let tau = self.plant.transmitted(&self.interval.torque_at(x), &state.hidden);
+        let tau = self.plant.drives().reaching(&self.interval.torque_at(x), &state.hidden);
         self.plant.excess(j, self.interval.t + x, state.q[j], tau[j], motion.holding[j])
     }
 

@@ -196,7 +196,7 @@ fn rows<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let half = half_width(track);
     let held = model.command(&track.t, &track.held, &[], &track.tables).unwrap_or_else(|| track.held.clone());
     let plant = model.plant(arm)?;
-    let hides = plant.is_driven() || plant.remembers();
+    let hides = plant.drives().any() || plant.remembers();
     let hidden = hides.then(|| hidden_states(track, &plant, &held, track.len() - 1));
     let widths = slow.iter().copied().fold(f64::INFINITY, f64::min);
     let soft = plant.with_smoothing(widths.max(model.smoothing));
