@@ -37,6 +37,7 @@ mod slopes;
 pub mod smooth;
 pub mod solve;
 mod starts;
+mod stops;
 pub mod study;
 mod together;
 pub mod track;

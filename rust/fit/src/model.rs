@@ -40,6 +40,11 @@ impl Placed {
         self.law.spec().name == other.law.spec().name && self.joint == other.joint
     }
 
+    /// Whether it acts beyond a position: its parameters are that, stiffness and damping.
+    pub fn is_stop(&self) -> bool {
+        self.law.spec().parameters.first().is_some_and(|p| p.quantity == Quantity::Reach)
+    }
+
     /// Whether it repeats with position: its parameters are amplitude, cycles per turn and phase.
     pub fn is_periodic(&self) -> bool {
         self.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Cycles)

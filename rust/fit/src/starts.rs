@@ -7,6 +7,7 @@ use crate::progress::Work;
 use crate::scan::repeats;
 use crate::screen::{Scored, candidates, screen};
 use crate::solve::Fit;
+use crate::stops::stops;
 use crate::study::{Study, Weights};
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
@@ -48,6 +49,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         }
         let mut all = self.open_candidates(&fit.hypothesis);
         all.extend(self.repeating(&all, weights, fit));
+        all.extend(self.stopping(&all, &fit.hypothesis));
         self.watch.begin(Work::Screen, all.len());
         let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
         let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
@@ -58,6 +60,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             self.loaded(&fit.hypothesis, effect).unwrap_or_else(|| self.compensated(&fit.hypothesis, found))
         });
         let mut starts: Vec<Hypothesis<P>> = more.collect();
+        if !is_plausible::<P>(fit.prior_cost) {
+            // What bears a part of the load, always, has spoilt the values that are fitted without it.
+            let trusted = Hypothesis { theta: self.prior.theta, ..fit.hypothesis.clone() };
+            starts.extend(self.stopping(&all, &trusted).into_iter().map(|stop| trusted.with(stop)));
+        }
         if gap {
             starts.extend(self.smoother(&fit.hypothesis, weights, training));
         }
@@ -82,6 +89,22 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 .into_iter()
                 .map(|r| Placed { p: [r.amplitude, r.cycles, r.phase], ..*effect })
                 .collect::<Vec<_>>()
+        };
+        open.iter().flat_map(starts).collect()
+    }
+
+    /// Further starts of candidates that act beyond a position, where the torque that a model lacks does.
+    fn stopping(&self, all: &[Placed], model: &Hypothesis<P>) -> Vec<Placed> {
+        let mut open: Vec<Placed> = all.iter().filter(|c| c.is_stop()).copied().collect();
+        open.sort_by_key(|c| c.joint);
+        open.dedup_by(|a, b| a.same_place(b));
+        if open.is_empty() {
+            return Vec::new();
+        }
+        let found = stops(&self.training.data.tracks, &self.arm, model, &self.scales.speed);
+        let starts = |effect: &Placed| {
+            let effect = *effect;
+            found[effect.joint].iter().map(move |stop| Placed { p: *stop, ..effect }).collect::<Vec<_>>()
         };
         open.iter().flat_map(starts).collect()
     }
