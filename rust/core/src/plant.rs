@@ -73,6 +73,7 @@ pub struct Plant<T: Real, A, const N: usize, const P: usize> {
     effects: [Option<Active<T>>; MAX_EFFECTS],
     hooks: [Hooks; N],
     remembers: bool,
+    jumps: bool,
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
@@ -87,6 +88,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             effects: [None; MAX_EFFECTS],
             hooks: [Hooks::NONE; N],
             remembers: false,
+            jumps: false,
         }
     }
 
@@ -106,6 +108,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         on_joint.force |= hooks.force;
         on_joint.coulomb |= hooks.coulomb;
         self.remembers |= hooks.memory;
+        self.jumps |= effect.law.edge(&effect.p).is_some();
         let rigid = &mut self.rigid;
         let own = *rigid.arm.inertia(&rigid.theta, &SVector::zeros()).get((joint, joint))?;
         *rigid.steady.get_mut(joint)?.get_mut(joint)? += effect.law.inertia(&effect.p);
@@ -174,10 +177,36 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         &self.rigid.theta
     }
 
-    /// Whether nothing but friction modes can change during a step: exact friction, and no states that no encoder shows.
+    /// Whether nothing but friction modes can change during a step: exact friction, no states that no encoder shows, and no torque that
+    /// jumps at a position.
     #[inline]
     pub fn glides(&self) -> bool {
+        self.is_plain() && !self.jumps
+    }
+
+    /// The same but for torques that jump.
+    #[inline]
+    pub(crate) fn is_plain(&self) -> bool {
         self.smoothing == T::zero() && !self.drives.any() && !self.remembers
+    }
+
+    /// Whether a torque jumps at a position.
+    #[inline]
+    pub(crate) fn jumps(&self) -> bool {
+        self.jumps
+    }
+
+    /// The first position between two of joint `j`, at neither, at which a torque jumps.
+    pub(crate) fn edge_between(&self, j: usize, from: T, to: T) -> Option<T> {
+        if !self.jumps {
+            return None;
+        }
+        let edges = self.effects.iter().flatten().filter(|e| e.joint == j).filter_map(|e| e.law.edge(&e.p));
+        let between = edges.filter(|edge| (from - *edge) * (to - *edge) < T::zero());
+        between.fold(None, |first: Option<T>, edge| match first {
+            Some(first) if (first - from).abs() <= (edge - from).abs() => Some(first),
+            _ => Some(edge),
+        })
     }
 
     /// Whether effects add a torque to joint `j`, and whether they change its Coulomb level.

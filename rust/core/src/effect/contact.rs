@@ -42,6 +42,10 @@ impl<T: Real> Effect<T> for Contact {
         &SPEC
     }
 
+    fn edge(&self, p: &[T; MAX_PARAMETERS]) -> Option<T> {
+        Some(p[0])
+    }
+
     fn force(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>) -> T {
         let side = if p[0] < T::zero() { -T::one() } else { T::one() };
         let depth = side * (x.q - p[0]);

@@ -319,6 +319,11 @@ pub trait Effect<T: Real>: Sync {
         T::zero()
     }
 
+    /// Position of the joint at which [`Effect::force`] jumps; a step is cut there.
+    fn edge(&self, _p: &[T; MAX_PARAMETERS]) -> Option<T> {
+        None
+    }
+
     /// Addition to the Coulomb level while the joint slides, or is about to slide, in `direction` (+1 or -1).
     fn coulomb(&self, _p: &[T; MAX_PARAMETERS], _x: &JointPoint<T>, _direction: T) -> T {
         T::zero()

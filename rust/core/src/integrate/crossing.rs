@@ -1,4 +1,4 @@
-//! Changes inside a step, of friction modes and of plays: which comes first, and when.
+//! Changes inside a step, of friction modes, plays and torques that jump: which comes first, and when.
 
 use super::root::{Close, STRAIGHT, hermite_root};
 use super::{State, Step};
@@ -16,6 +16,9 @@ const MAX_FALSE_POSITIONS: usize = 12;
 /// A release is found where holding takes more than friction gives, but by less than this part of what the step changes.
 const RELEASED: f64 = 1e-8;
 
+/// A joint that has crossed a position at which its torque jumps is put this far beyond it, rad or m.
+const BESIDE: f64 = 1e-13;
+
 /// Attempts are made this part of a step beyond where the root is expected, so that they end on its far side.
 const BEYOND: f64 = 1e-9;
 
@@ -29,7 +32,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
             |j: usize| exact && self.plant.is_dry(j) && trial.dq[j] * state.modes[j].direction() < T::zero();
         let sticks = |j: usize| exact && state.modes[j] == Mode::Stuck;
         let play = self.plant.drives().play();
-        if !play && !(0..N).any(|j| sticks(j) || reverses(j)) {
+        let edge = |j: usize| self.plant.edge_between(j, state.q[j], trial.q[j]);
+        if !play && !(0..N).any(|j| edge(j).is_some()) && !(0..N).any(|j| sticks(j) || reverses(j)) {
             return None;
         }
         let end = self.motion(x + dt, trial);
@@ -44,7 +48,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
                 None
             };
             let flank = if play { self.flank(j, leap, trial, &end) } else { None };
-            for event in [event, flank].into_iter().flatten() {
+            let crossing = edge(j).map(|at| {
+                let (from, to) = (state.q[j] - at, trial.q[j] - at);
+                let s = hermite_root(from, state.dq[j] * dt, to, trial.dq[j] * dt);
+                Event { joint: j, s, change: Change::Cross { at } }
+            });
+            for event in [event, flank, crossing].into_iter().flatten() {
                 if first.as_ref().is_none_or(|earliest| event.s < earliest.s) {
                     first = Some(event);
                 }
@@ -97,6 +106,10 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
                 self.locate_beyond(leap, pull, lacks)
             }
             Change::Meet => self.locate_meeting(leap, event.joint, event.s),
+            Change::Cross { at } => {
+                let beyond = |there: &State<T, N>| Some((there.q[event.joint] - at, there.dq[event.joint]));
+                self.locate_crossing(leap, event.s, beyond)
+            }
             Change::Release { .. } | Change::Open { .. } => {
                 Located { length: T::zero(), reached: *leap.state }
             }
@@ -111,6 +124,10 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
             Change::Release { mode, .. } => state.modes[j] = mode,
             Change::Open { .. } => state.hidden.side[j] = T::zero(),
             Change::Meet => return self.met(j, state),
+            Change::Cross { at } => {
+                let ahead = if state.dq[j] < T::zero() { -T::one() } else { T::one() };
+                state.q[j] = at + ahead * lit(BESIDE);
+            }
         }
         state
     }
@@ -141,6 +158,27 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
                 reached = self.moved(&reached, correction, &reached, &slope);
                 break;
             }
+            reached = self.runge_kutta(state, x, s * dt, k1);
+        }
+        Located { length: s * dt, reached }
+    }
+
+    /// Integrates to where a distance vanishes, by Newton's method; `beyond` gives it and its rate.
+    pub(super) fn locate_crossing(
+        &self,
+        &Leap { state, x, dt, k1 }: &Leap<'_, T, N>,
+        mut s: T,
+        beyond: impl Fn(&State<T, N>) -> Option<(T, T)>,
+    ) -> Located<T, N> {
+        let mut reached = self.runge_kutta(state, x, s * dt, k1);
+        for _ in 0..MAX_REFINEMENTS {
+            let Some((distance, rate)) = beyond(&reached) else { break };
+            let correction = -distance / rate;
+            let next = s + correction / dt;
+            if !(next > T::zero() && next <= T::one()) || correction.abs() < lit::<T>(STRAIGHT) * dt {
+                break;
+            }
+            s = next;
             reached = self.runge_kutta(state, x, s * dt, k1);
         }
         Located { length: s * dt, reached }
@@ -211,6 +249,11 @@ pub(super) enum Change<T> {
     },
     /// A rotor meets the flank of its play.
     Meet,
+    /// A joint crosses a position at which its torque jumps.
+    Cross {
+        /// The position.
+        at: T,
+    },
     /// A flank no longer pushes; by how much it would have to pull at both ends of the step.
     Open {
         /// The pull.

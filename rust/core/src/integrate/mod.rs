@@ -83,7 +83,7 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
         return;
     }
     let count = substeps.max(1);
-    if count == 1 && plant.glides() && glided(plant, state, interval) {
+    if count == 1 && plant.is_plain() && glided(plant, state, interval) {
         return;
     }
     let dt = interval.h / lit(count as f64);
@@ -115,7 +115,8 @@ fn glided<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     let modes = Modes::new(direction);
     let mut signs = Signs::none();
     let pose = glide(&glide::Step { body: plant, start: &start, modes: &modes, span: &span }, &mut signs);
-    let right = signs.wrong <= T::zero();
+    let crosses = |j: usize| plant.edge_between(j, state.q[j], pose.place.q[j]).is_some();
+    let right = signs.wrong <= T::zero() && !(plant.jumps() && (0..N).any(crosses));
     if right {
         (state.q, state.dq) = (pose.place.q.into(), pose.place.dq.into());
     }

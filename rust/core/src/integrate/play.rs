@@ -1,15 +1,12 @@
 //! Plays that close and open inside a step.
 
 use super::crossing::{Change, Event, Leap, Located};
-use super::root::{STRAIGHT, hermite_root};
+use super::root::hermite_root;
 use super::{State, Step};
 use crate::arm::Arm;
 use crate::plant::Motion;
 use crate::pose::Place;
-use crate::real::{Real, lit};
-
-/// Corrections of the instant at which a play closes; each squares the error of the last.
-const MAX_REFINEMENTS: usize = 4;
+use crate::real::Real;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N, P> {
     /// Opens the plays whose flank would have to pull; whether any was.
@@ -50,28 +47,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         (after > T::zero()).then_some(Event { joint: j, s, change: Change::Open { pull: [before, after] } })
     }
 
-    /// Integrates to where joint `j`'s rotor meets its flank, by Newton's method.
-    pub(super) fn locate_meeting(
-        &self,
-        &Leap { state, x, dt, k1 }: &Leap<'_, T, N>,
-        j: usize,
-        mut s: T,
-    ) -> Located<T, N> {
-        let mut reached = self.runge_kutta(state, x, s * dt, k1);
-        for _ in 0..MAX_REFINEMENTS {
-            let Some(depth) = self.plant.drives().depth(j, &reached.hidden) else { break };
-            let outward = reached.hidden.dtwist[j] * reached.hidden.twist[j] > T::zero();
-            let correction = -depth / reached.hidden.dtwist[j].abs();
-            let next = s + correction / dt;
-            if !(outward && next > T::zero() && next <= T::one())
-                || correction.abs() < lit::<T>(STRAIGHT) * dt
-            {
-                break;
-            }
-            s = next;
-            reached = self.runge_kutta(state, x, s * dt, k1);
-        }
-        Located { length: s * dt, reached }
+    /// Integrates to where joint `j`'s rotor meets its flank.
+    pub(super) fn locate_meeting(&self, leap: &Leap<'_, T, N>, j: usize, s: T) -> Located<T, N> {
+        let beyond = |there: &State<T, N>| {
+            let depth = self.plant.drives().depth(j, &there.hidden)?;
+            let side = if there.hidden.twist[j] < T::zero() { -T::one() } else { T::one() };
+            Some((depth, side * there.hidden.dtwist[j])).filter(|(_, rate)| *rate > T::zero())
+        };
+        self.locate_crossing(leap, s, beyond)
     }
 
     /// The state just after joint `j`'s rotor has met its flank.
