@@ -6,7 +6,7 @@
 
 use crate::arm::{Arm, Balance};
 use crate::drives::Drives;
-use crate::effect::{Active, Hooks, JointPoint};
+use crate::effect::{Active, Edge, Hooks, JointPoint};
 use crate::glide::{Body, Instant};
 use crate::linear::solve_positive_definite;
 use crate::number::Number;
@@ -17,6 +17,9 @@ use nalgebra::SVector;
 
 /// Most effects one plant can carry.
 pub const MAX_EFFECTS: usize = 8;
+
+/// How much shorter the steps of a knock are than those that only keep it stable.
+const FOLLOWED: f64 = 4.0;
 
 /// What a joint's dry friction does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -192,8 +195,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
     /// Whether a torque jumps at a position.
     #[inline]
-    pub(crate) fn jumps(&self) -> bool {
+    pub fn jumps(&self) -> bool {
         self.jumps
+    }
+
+    /// Positions of joint `j` at which a torque jumps.
+    fn edges(&self, j: usize) -> impl Iterator<Item = Edge<T>> {
+        let on_joint = self.effects.iter().flatten().filter(move |e| e.joint == j);
+        on_joint.filter_map(|e| e.law.edge(&e.p))
     }
 
     /// The first position between two of joint `j`, at neither, at which a torque jumps.
@@ -201,7 +210,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         if !self.jumps {
             return None;
         }
-        let edges = self.effects.iter().flatten().filter(|e| e.joint == j).filter_map(|e| e.law.edge(&e.p));
+        let edges = self.edges(j).map(|edge| edge.position);
         let between = edges.filter(|edge| (from - *edge) * (to - *edge) < T::zero());
         between.fold(None, |first: Option<T>, edge| match first {
             Some(first) if (first - from).abs() <= (edge - from).abs() => Some(first),
@@ -425,11 +434,11 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         least.max(lit(1e-9))
     }
 
-    /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, or a motor swings against its link. Zero for
-    /// a rigid arm with exact friction.
+    /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, a motor swings against its link, or a joint knocks
+    /// against a stop, which is to be followed and not only survived. Zero for a rigid arm with exact friction.
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
         let mut fastest = T::zero();
-        if self.smoothing == T::zero() && !self.drives.any() {
+        if self.smoothing == T::zero() && !self.drives.any() && !self.jumps {
             return fastest;
         }
         let inertia = self.rigid.balance(&Place { q: (*q).into(), dq: [T::zero(); N] }).inertia;
@@ -441,6 +450,10 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             }
             if let Some(drive) = self.drives.get(j).filter(|d| d.gap <= T::zero()) {
                 fastest = fastest.max(drive.rate(free));
+            }
+            if self.jumps {
+                let met = self.edges(j).filter(|edge| edge.is_behind(q[j]));
+                fastest = met.fold(fastest, |rate, edge| rate.max(edge.rate(free) * lit(FOLLOWED)));
             }
         }
         fastest

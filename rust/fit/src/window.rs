@@ -25,6 +25,9 @@ const MAX_SUBSTEPS: usize = 4;
 /// The same for motors that swing against their links.
 const MAX_SUBSTEPS_DRIVEN: usize = 5;
 
+/// The same for joints that knock against a stop.
+const MAX_SUBSTEPS_KNOCKING: usize = 12;
+
 /// Samples `first ..= last` of one track; row 0 is sample `first + 1`.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<const N: usize> {
@@ -193,11 +196,19 @@ fn make<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f
 
 /// Makes one run, in as many steps per sample as its plant needs.
 fn make_alone<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
-    let most = if run.plant.drives().any() { MAX_SUBSTEPS_DRIVEN } else { MAX_SUBSTEPS };
+    let most = match (run.plant.jumps(), run.plant.drives().any()) {
+        (true, _) => MAX_SUBSTEPS_KNOCKING,
+        (false, true) => MAX_SUBSTEPS_DRIVEN,
+        (false, false) => MAX_SUBSTEPS,
+    };
     let state = &mut run.state;
     for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
         let h = run.t[k + 1] - run.t[k];
-        let substeps = substeps(h * run.plant.fastest(&state.q)).min(most);
+        let mut rate = run.plant.fastest(&state.q);
+        if run.plant.jumps() {
+            rate = rate.max(run.plant.fastest(&(state.q + state.dq * h)));
+        }
+        let substeps = substeps(h * rate).min(most);
         advance(run.plant, state, &Interval { t: run.t[k], h, torque: &run.torque[k] }, substeps);
         if !state.is_finite() || state.q.amax() > DIVERGED {
             break;

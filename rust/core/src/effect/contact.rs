@@ -1,6 +1,6 @@
 //! A stop: beyond a position, on the side away from zero, a spring and damper push back and never pull.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Edge, Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Contact with a stop.
@@ -42,8 +42,8 @@ impl<T: Real> Effect<T> for Contact {
         &SPEC
     }
 
-    fn edge(&self, p: &[T; MAX_PARAMETERS]) -> Option<T> {
-        Some(p[0])
+    fn edge(&self, p: &[T; MAX_PARAMETERS]) -> Option<Edge<T>> {
+        Some(Edge { position: p[0], stiffness: p[1], damping: p[2] })
     }
 
     fn force(&self, p: &[T; MAX_PARAMETERS], x: &JointPoint<T>) -> T {

@@ -304,6 +304,30 @@ pub struct JointPoint<T> {
     pub memory: T,
 }
 
+/// A position at which a joint's torque jumps, and what it meets beyond, on the side away from zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edge<T> {
+    /// Position.
+    pub position: T,
+    /// Stiffness beyond.
+    pub stiffness: T,
+    /// Damping beyond.
+    pub damping: T,
+}
+
+impl<T: Real> Edge<T> {
+    /// Whether `q` lies beyond.
+    #[inline]
+    pub fn is_behind(&self, q: T) -> bool {
+        (q - self.position) * self.position > T::zero()
+    }
+
+    /// Fastest rate, 1/s, of an inertia that has met it.
+    pub fn rate(&self, inertia: T) -> T {
+        (self.stiffness / inertia).sqrt().max(self.damping / inertia)
+    }
+}
+
 /// One unmodelled effect: a law with up to [`MAX_PARAMETERS`] parameters `p`.
 pub trait Effect<T: Real>: Sync {
     /// Name, parameters, hooks.
@@ -319,8 +343,8 @@ pub trait Effect<T: Real>: Sync {
         T::zero()
     }
 
-    /// Position of the joint at which [`Effect::force`] jumps; a step is cut there.
-    fn edge(&self, _p: &[T; MAX_PARAMETERS]) -> Option<T> {
+    /// Where [`Effect::force`] jumps, if it does; a step is cut there.
+    fn edge(&self, _p: &[T; MAX_PARAMETERS]) -> Option<Edge<T>> {
         None
     }
 
