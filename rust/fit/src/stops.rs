@@ -40,7 +40,10 @@ struct Sample {
     lack: f64,
 }
 
-/// Stops of every joint that logs show under a model, at most one on either side.
+/// How much harder a stop is taken to be as well: a knock that is over before the cubic has passed it seems softer than it is.
+const HARDER: f64 = 8.0;
+
+/// Stops of every joint that logs show under a model, at most one on either side, each as it seems and harder.
 pub fn stops<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     tracks: &[Track<N>],
     arm: &A,
@@ -51,7 +54,7 @@ pub fn stops<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     for track in tracks {
         lacking(track, arm, model, speed, &mut samples);
     }
-    samples.map(|mut joint| [1.0, -1.0].into_iter().filter_map(|side| hinge(&mut joint, side)).collect())
+    samples.map(|mut joint| [1.0, -1.0].into_iter().flat_map(|side| both(&mut joint, side)).collect())
 }
 
 /// Adds what every joint lacks at each sample of a log but those at its ends.
@@ -82,6 +85,15 @@ fn lacking<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             joint.push(Sample { q: q[j], dq: dq[j], lack: lack[j] });
         }
     }
+}
+
+/// The stop on one side of zero as it seems, and a harder one that a knock goes as much less deep into.
+fn both(samples: &mut [Sample], side: f64) -> Vec<Stop> {
+    let Some(stop) = hinge(samples, side) else { return Vec::new() };
+    let [position, stiffness, damping] = stop;
+    let depth = samples[0].q - position;
+    let shallower = depth / HARDER.sqrt();
+    vec![stop, [position + depth - shallower, HARDER * stiffness, HARDER.sqrt() * damping]]
 }
 
 /// The hinge on one side of zero that explains most.
