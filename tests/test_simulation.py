@@ -115,12 +115,10 @@ def test_effects_of_the_format_exist_and_each_changes_the_motion(arm, seed_log):
     for name, effect in known.items():
         values = {p["name"]: _typical(p) for p in effect["parameters"]} | STIFF.get(name, {})
         joint = 1 if effect["scope"] == "joint" else None
-        # Flanks that meet and part make a kink each time: first-order convergence.
-        accuracy = 1e-4 if name == "backlash" else 1e-6
         changed = simulate(
-            arm, seed_log.t, seed_log.tau, effects=[Effect(name, joint, values)], encoder=False, tolerance=accuracy
+            arm, seed_log.t, seed_log.tau, effects=[Effect(name, joint, values)], encoder=False, tolerance=1e-6
         ).q
-        assert np.abs(changed - plain).max() > 10 * accuracy, name
+        assert np.abs(changed - plain).max() > 1e-5, name
 
 
 def _typical(parameter: dict[str, float]) -> float:

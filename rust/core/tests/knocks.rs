@@ -13,7 +13,12 @@ fn law(name: &str) -> &'static dyn Effect<f64> {
     find(name).expect("a known effect")
 }
 
-fn two_link(theta: [f64; 9], name: &str, joint: usize, p: [f64; MAX_PARAMETERS]) -> Plant<f64, TwoLink<f64>, 2, 9> {
+fn two_link(
+    theta: [f64; 9],
+    name: &str,
+    joint: usize,
+    p: [f64; MAX_PARAMETERS],
+) -> Plant<f64, TwoLink<f64>, 2, 9> {
     let plant = Plant::new(TwoLink::new(9.81, Some(0.45), &theta), theta);
     plant.with_effect(Active { law: law(name), joint, p }).expect("room")
 }
