@@ -12,6 +12,7 @@ use crate::number::Number;
 use crate::pose::{Place, Pose, Reach, Rigid};
 use crate::real::{Real, lit};
 use crate::transmission::{Drive, Hidden};
+use crate::trig::{Rotation, Turn};
 use nalgebra::SVector;
 
 /// Most effects one plant can carry.
@@ -445,8 +446,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Body<T, N> for Plant<T, A, N, P> {
     #[inline(always)]
-    fn near(&self, known: &Pose<T, N>, place: &Place<T, N>, by: &[T; N], reach: Reach) -> (Pose<T, N>, T) {
-        self.rigid.near(known, place, by, reach)
+    fn rotations(&self, by: &[T; N], reach: Reach) -> ([Rotation<T>; N], T) {
+        self.rigid.rotations(by, reach)
+    }
+
+    #[inline(always)]
+    fn turned(&self, place: &Place<T, N>, turns: [Turn<T>; N]) -> Pose<T, N> {
+        self.rigid.turned(place, turns)
     }
 
     #[inline(always)]

@@ -149,14 +149,8 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
     #[inline]
     fn motion(&self, x: T, state: &State<T, N>) -> Motion<T, N> {
         let place = Place { q: state.q.into(), dq: state.dq.into() };
-        let mut by = place.q;
-        for j in 0..N {
-            by[j] = place.q[j] - self.origin.place.q[j];
-        }
-        let (mut pose, far) = self.plant.rigid().near(&self.origin, &place, &by, Reach::Near);
-        if far > T::one() {
-            pose = self.plant.rigid().pose(&place);
-        }
+        let origin = &self.origin;
+        let pose = self.plant.rigid().near(&place, &origin.place.q, &origin.turns, Reach::Near);
         let tau = self.interval.torque_at(x);
         self.plant.acceleration(self.interval.t + x, &pose, &tau, &state.modes, &state.hidden)
     }

@@ -1,9 +1,9 @@
 //! The lanes on their way.
 
-use super::bundle::Bundle;
+use super::bundle::{Bundle, Gliding};
 use super::change::{Outcome, Taken};
 use super::clock::Clock;
-use super::lane::{held_in, lane_of, numbers, state_of, write};
+use super::lane::{held_in, lane_of, numbers, state_of, turns_of, write};
 use super::{Run, WIDTH};
 use crate::arm::Arm;
 use crate::cpu::Cpu;
@@ -13,8 +13,9 @@ use crate::integrate::{Interval, State, exact};
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::plant::Mode;
-use crate::pose::{Place, Pose};
+use crate::pose::{Place, Pose, Reach};
 use crate::real::{Real, lit};
+use crate::trig::Turn;
 use core::array::from_fn;
 use nalgebra::SVector;
 
@@ -41,8 +42,8 @@ pub(super) struct Abreast<'a, T: Real, C, A, const W: usize, const H: usize, con
     poses: [Pose<Lanes<T, C, W>, N>; H],
     modes: [Modes<Lanes<T, C, W>, N>; H],
     spans: [Span<Lanes<T, C, W>, N>; H],
-    /// Where the last step started, and what it says.
-    starts: [Place<Lanes<T, C, W>, N>; H],
+    /// Where the last step started, with sines and cosines, and what it says.
+    starts: [(Place<Lanes<T, C, W>, N>, [Turn<Lanes<T, C, W>>; N]); H],
     signs: [Signs<Lanes<T, C, W>, N>; H],
     clocks: [Clock<T, N>; WIDTH],
     /// Nothing in lanes that move, so much that nothing is wrong in those that have ended.
@@ -63,6 +64,9 @@ pub(super) struct Abreast<'a, T: Real, C, A, const W: usize, const H: usize, con
 impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const N: usize, const P: usize>
     Abreast<'a, T, C, A, W, H, N, P>
 {
+    /// How many lanes there are.
+    const LANES: usize = W * H;
+
     #[inline(always)]
     pub(super) fn new(runs: &mut [Run<'a, T, A, N, P>], limit: T) -> Option<Self> {
         let plant = runs.first()?.plant;
@@ -72,20 +76,20 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
             poses: [Pose::none(); H],
             modes: [Modes::new([zero; N]); H],
             spans: [Span { t: zero, h: zero, tau: [[zero; N]; 3] }; H],
-            starts: [Pose::none().place; H],
+            starts: [(Pose::none().place, Pose::none().turns); H],
             signs: [Signs::none(); H],
             clocks: [Clock::new(0); WIDTH],
             runs: [0; WIDTH],
             times: [&[]; WIDTH],
             torques: [&[]; WIDTH],
             idle: [zero; H],
-            moving: WIDTH,
+            moving: Self::LANES,
             waiting: 0,
             course: Course::Even,
             steps: 0,
             limit,
         };
-        for l in 0..WIDTH {
+        for l in 0..Self::LANES {
             lanes.enter(runs, l);
         }
         lanes.renew_modes();
@@ -105,15 +109,13 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         if self.course != Course::Even {
             self.parts();
         }
-        self.glide();
-        let mut right = self.course != Course::Aimed;
-        for i in 0..H {
-            let mut wrong = self.signs[i].wrong - self.idle[i];
-            for j in 0..N {
-                wrong = wrong.larger(self.poses[i].place.q[j].size() - Lanes::of(self.limit));
-            }
-            right &= wrong.none_positive();
-        }
+        let right = if self.bundles.iter().any(Bundle::has_effects) {
+            self.glide::<true, true>()
+        } else if self.modes.iter().any(|modes| modes.held) {
+            self.glide::<false, true>()
+        } else {
+            self.glide::<false, false>()
+        };
         if right {
             self.arrive_all(runs);
         } else {
@@ -128,26 +130,33 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
     }
 
-    /// One step of every lane with the modes it has.
+    /// One step of every lane with the modes it has; whether it was right in all of them.
     #[inline(always)]
-    fn glide(&mut self) {
+    fn glide<const EFFECTS: bool, const HELD: bool>(&mut self) -> bool {
+        let mut right = self.course != Course::Aimed;
         for i in 0..H {
-            self.starts[i] = self.poses[i].place;
+            self.starts[i] = (self.poses[i].place, self.poses[i].turns);
             let step = Step {
-                body: &self.bundles[i],
+                body: &Gliding::<_, EFFECTS, HELD>(&self.bundles[i]),
                 start: &self.poses[i],
                 modes: &self.modes[i],
                 span: &self.spans[i],
             };
             self.poses[i] = glide(&step, &mut self.signs[i]);
+            let mut wrong = self.signs[i].wrong - self.idle[i];
+            for j in 0..N {
+                wrong = wrong.larger(self.poses[i].place.q[j].size() - Lanes::of(self.limit));
+            }
+            right &= wrong.none_positive();
         }
+        right
     }
 
     /// Goes on from a step that was right in all lanes.
     #[inline(always)]
     fn arrive_all(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
         let mut ended = false;
-        for l in 0..WIDTH {
+        for l in 0..Self::LANES {
             let clock = &mut self.clocks[l];
             if clock.is_over() {
                 continue;
@@ -162,7 +171,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
         self.course = Course::Even;
         if ended {
-            for l in 0..WIDTH {
+            for l in 0..Self::LANES {
                 if self.clocks[l].has_ended() {
                     self.end(runs, l);
                 }
@@ -179,7 +188,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     #[inline(always)]
     fn sort_out(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
         self.course = Course::Parted;
-        for l in 0..WIDTH {
+        for l in 0..Self::LANES {
             let clock = &self.clocks[l];
             if clock.is_over() {
                 continue;
@@ -250,13 +259,14 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         for j in 0..N {
             self.modes[l / W].direction[j].0[l % W] = state.modes[j].direction();
         }
-        self.put(l, &Place { q: state.q.into(), dq: state.dq.into() });
+        let rigid = self.bundles[l / W].plants[l % W].rigid();
+        self.put(l, &rigid.pose(&Place { q: state.q.into(), dq: state.dq.into() }));
     }
 
-    /// Puts lane `l` to a place.
-    #[inline(never)]
-    fn put(&mut self, l: usize, place: &Place<T, N>) {
-        let (own, l, i) = (self.bundles[l / W].plants[l % W].rigid().pose(place), l % W, l / W);
+    /// Puts lane `l` into a pose.
+    #[inline]
+    fn put(&mut self, l: usize, own: &Pose<T, N>) {
+        let (l, i) = (l % W, l / W);
         let Pose { place, turns, balance } = &mut self.poses[i];
         for j in 0..N {
             (place.q[j].0[l], place.dq[j].0[l]) = (own.place.q[j], own.place.dq[j]);
@@ -279,7 +289,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     /// Gets times and torques of the lanes' intervals.
     #[inline(never)]
     fn intervals(&mut self) {
-        for l in 0..WIDTH {
+        for l in 0..Self::LANES {
             let Clock { k, rows, .. } = self.clocks[l];
             if k >= rows {
                 continue;
@@ -300,7 +310,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     #[inline(never)]
     fn parts(&mut self) {
         self.course = Course::Even;
-        for l in 0..WIDTH {
+        for l in 0..Self::LANES {
             let clock = &self.clocks[l];
             if clock.is_over() || clock.is_whole() {
                 continue;
@@ -326,34 +336,38 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         if self.clocks[l].is_whole() {
             self.clocks[l].left = interval.h;
         }
-        let (signs, Pose { place: end, balance, .. }) = (&self.signs[i], &self.poses[i]);
+        let (signs, (start, turns), end) = (&self.signs[i], &self.starts[i], &self.poses[i]);
         let Bundle { rigid, dry, plants, .. } = &self.bundles[i];
         let taken = Taken {
-            places: [lane_of(&self.starts[i], lane), lane_of(end, lane)],
+            places: [lane_of(start, lane), lane_of(&end.place, lane)],
             ddq: [numbers(&signs.ddq[0], lane), numbers(&signs.ddq[1], lane)],
             held: self.modes[i].held.then(|| signs.held.each_ref().map(|held| held_in(held, lane))),
             far: signs.far.0[lane],
             dry: numbers(dry, lane).map(|dry| dry != T::zero()),
             coulomb: numbers(&rigid.coulomb, lane),
-            inertia: balance.inertia.each_ref().map(|row| numbers(row, lane)),
+            inertia: end.balance.inertia.each_ref().map(|row| numbers(row, lane)),
         };
         let clock = &mut self.clocks[l];
         let mut direction = numbers(&self.modes[i].direction, lane);
-        let (place, arrived) = match taken.judge(clock, &mut direction) {
+        let own = plants[lane].rigid();
+        let (pose, arrived) = match taken.judge(clock, &mut direction) {
             Outcome::Right => return true,
-            Outcome::Again => (taken.places[0], false),
-            Outcome::Reversed(place) => (place, clock.left <= T::zero()),
+            Outcome::Again => (own.turned(&taken.places[0], turns_of(turns, lane)), false),
+            Outcome::Reversed(place) => {
+                let turns = turns_of(&end.turns, lane);
+                (own.near(&place, &taken.places[1].q, &turns, Reach::Beside), clock.left <= T::zero())
+            }
             Outcome::Alone => {
                 let mut state = state_of(&taken.places[0], &direction);
                 exact(plants[lane], &mut state, &interval, clock.done);
                 direction = state.modes.map(Mode::direction);
-                (Place { q: state.q.into(), dq: state.dq.into() }, true)
+                (own.pose(&Place { q: state.q.into(), dq: state.dq.into() }), true)
             }
         };
         for j in 0..N {
             self.modes[i].direction[j].0[lane] = direction[j];
         }
-        self.put(l, &place);
+        self.put(l, &pose);
         arrived
     }
 }

@@ -7,6 +7,7 @@ use crate::lanes::Lanes;
 use crate::plant::Mode;
 use crate::pose::Place;
 use crate::real::Real;
+use crate::trig::Turn;
 use core::array::from_fn;
 use nalgebra::SVector;
 
@@ -38,6 +39,15 @@ pub(super) fn lane_of<T: Real, C, const W: usize, const N: usize>(
     l: usize,
 ) -> Place<T, N> {
     Place { q: numbers(&place.q, l), dq: numbers(&place.dq, l) }
+}
+
+/// Lane `l`'s sines and cosines.
+#[inline]
+pub(super) fn turns_of<T: Real, C, const W: usize, const N: usize>(
+    turns: &[Turn<Lanes<T, C, W>>; N],
+    l: usize,
+) -> [Turn<T>; N] {
+    from_fn(|j| Turn { sine: turns[j].sine.0[l], cosine: turns[j].cosine.0[l] })
 }
 
 /// What holds lane `l`.
