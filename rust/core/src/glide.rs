@@ -1,8 +1,8 @@
 //! A step over which no friction mode changes: the arm glides, some of its joints held.
 //!
 //! Classical Runge-Kutta on `M(q) ddq = tau - C dq - g - f` with the direction of every joint's dry friction given as a number, -1, 0
-//! (stuck) or 1. A stuck joint's row and column are taken out by factors of zero, so one and the same arithmetic serves every mode,
-//! one arm or several side by side. [`glide`] also says whether the modes it was given are those the motion has: if not, the step is
+//! (stuck) or 1. What couples a stuck joint to others is taken out by factors of zero, so one and the same arithmetic serves every
+//! mode, one arm or several side by side. [`glide`] also says whether the modes it was given are those the motion has: if not, the step is
 //! worth nothing and [`crate::integrate`] finds the instant of the change.
 
 use crate::linear::solve_positive_definite;
@@ -24,7 +24,7 @@ pub struct Instant<'a, V, const N: usize> {
 
 /// What glides: an arm with its friction and effects, or several.
 pub trait Body<V: Number, const N: usize> {
-    /// What turns the arm's angles on where its joints move by so much, and how far that is: beyond 1, too far.
+    /// What turns the arm's angles on where its joints move by so much, and the largest of these angles.
     fn rotations(&self, by: &[V; N], reach: Reach) -> ([Rotation<V>; N], V);
 
     /// A place whose angles have these sines and cosines, with all that follows from it.
@@ -39,9 +39,6 @@ pub trait Body<V: Number, const N: usize> {
         modes.held
     }
 
-    /// 1 for a joint with dry friction; 0 for one that reverses without noticing.
-    fn dry(&self, j: usize) -> V;
-
     /// By how much holding each joint takes more than friction can give, where it is stuck; anything not positive elsewhere.
     fn excess(&self, at: &Instant<'_, V, N>, holding: &[V; N], direction: &[V; N]) -> [V; N];
 }
@@ -53,6 +50,10 @@ pub struct Modes<V, const N: usize> {
     pub direction: [V; N],
     /// 1 for joints that slide, 0 for those that are stuck.
     slides: [V; N],
+    /// 1 for joints with dry friction; 0 for those that reverse without noticing.
+    dry: [V; N],
+    /// Against the direction where dry friction notices.
+    against: [V; N],
     /// Whether any is stuck.
     pub(crate) held: bool,
     /// Whether the last step did not end in these modes.
@@ -60,15 +61,16 @@ pub struct Modes<V, const N: usize> {
 }
 
 impl<V: Number, const N: usize> Modes<V, N> {
-    /// Modes of these directions.
+    /// Modes of these directions; `dry` is 1 for joints with dry friction, 0 for those that reverse without noticing.
     #[inline(always)]
-    pub fn new(direction: [V; N]) -> Self {
-        let (mut slides, mut held) = (direction, false);
+    pub fn new(direction: [V; N], dry: [V; N]) -> Self {
+        let (mut slides, mut against, mut held) = (direction, direction, false);
         for j in 0..N {
             slides[j] = direction[j] * direction[j];
+            against[j] = -(direction[j] * dry[j]);
             held |= direction[j].any_zero();
         }
-        Self { direction, slides, held, fresh: true }
+        Self { direction, slides, dry, against, held, fresh: true }
     }
 }
 
@@ -131,14 +133,13 @@ fn motion<V: Number, B: Body<V, N>, const N: usize>(
     let pull = body.pull(at, &modes.direction);
     let (mut inertia, mut right) = (at.pose.balance.inertia, pull);
     if body.holds(modes) {
-        let one = V::of(lit(1.0));
+        // What does not push a stuck joint and is not coupled to it leaves it at rest.
         for i in 0..N {
-            for j in 0..N {
-                let both = modes.slides[i] * modes.slides[j];
-                let kept = inertia[i][j] * both;
-                inertia[i][j] = if i == j { kept + (one - both) } else { kept };
-            }
             right[i] = right[i] * modes.slides[i];
+            for j in 0..i {
+                let kept = inertia[i][j] * (modes.slides[i] * modes.slides[j]);
+                (inertia[i][j], inertia[j][i]) = (kept, kept);
+            }
         }
     }
     Motion { pull, ddq: solve_positive_definite(inertia, right) }
@@ -236,7 +237,7 @@ pub fn glide<V: Number, B: Body<V, N>, const N: usize>(
     let Step { body, start, modes, span } = step;
     let half = span.h * V::of(lit(0.5));
     let square = half * span.h;
-    let (half_way, far) = body.rotations(&times(half, &start.place.dq), Reach::Near);
+    let (half_way, near) = body.rotations(&times(half, &start.place.dq), Reach::Near);
     let s1 = motion(*body, &Instant { t: span.t, pose: start, tau: &span.tau[0] }, modes);
     let s2 = stage(step, half, 1, [&start.place.dq, &s1.ddq], turned(&start.turns, &half_way));
     let by = times(half * half, &s1.ddq);
@@ -254,21 +255,43 @@ pub fn glide<V: Number, B: Body<V, N>, const N: usize>(
         [&s3.pose.place.dq, &s3.motion.ddq],
         turned(&turned(&s3.pose.turns, &half_way), &aside),
     );
-    end(step, &s1, [&s2, &s3, &s4], far.larger(far3).larger(far4), signs)
+    let far = [Reach::Near.part(near), far3.larger(far4)];
+    end(step, &s1, [&s2, &s3, &s4], far, signs)
 }
 
-/// The end of a step with these stages.
+/// The end of a step with these stages, between which the longest way is so far, and the longest that has to be short.
 #[inline(always)]
 fn end<V: Number, B: Body<V, N>, const N: usize>(
     step: &Step<'_, V, B, N>,
     s1: &Motion<V, N>,
     [s2, s3, s4]: [&Stage<V, N>; 3],
-    far: V,
+    [far, aside_far]: [V; 2],
     signs: &mut Signs<V, N>,
 ) -> Pose<V, N> {
     let c = |x: f64| V::of(lit(x));
     let Step { body, start, modes, span } = step;
-    let (mut wrong, mut sum) = (-c(1.0), c(0.0));
+    let place = &start.place;
+    // Adding -0 is the one sum that a compiler may leave out.
+    let (mut end, mut by, mut sum) = (*place, place.q, c(-0.0));
+    let sixth = span.h * c(1.0 / 6.0);
+    let ddq = [s1.ddq, s4.motion.ddq];
+    for j in 0..N {
+        // The velocities of the stages are `dq` and half, half and all of a step at the accelerations before.
+        let early = s1.ddq[j] + s2.motion.ddq[j] + s3.motion.ddq[j];
+        by[j] = span.h * sixth * (-c(3.0)).fused(s2.motion.ddq[j], early);
+        end.q[j] = span.h.fused(sixth.fused(early, place.dq[j]), place.q[j]);
+        end.dq[j] = sixth.fused(early + early + (ddq[1][j] - ddq[0][j]), place.dq[j]);
+        sum = sum + end.dq[j];
+    }
+    let (aside, last) = body.rotations(&by, Reach::Beside);
+    let pose = body.turned(&end, turned(&s4.pose.turns, &aside));
+    // An acceleration that is not finite leaves its mark in this.
+    let finite = sum * c(0.0);
+    let far = Reach::Beside.part(aside_far.larger(last)).larger(far) - c(1.0) + finite;
+    let mut wrong = far;
+    for j in 0..N {
+        wrong = wrong.larger(end.dq[j] * modes.against[j]);
+    }
     if body.holds(modes) {
         let at = Instant { t: span.t, pose: start, tau: &span.tau[0] };
         let first = held(*body, &at, s1, modes);
@@ -279,28 +302,12 @@ fn end<V: Number, B: Body<V, N>, const N: usize>(
         }
         signs.held = [first, last];
     }
-    let place = &start.place;
-    let (mut end, mut by) = (*place, place.q);
-    let sixth = span.h * c(1.0 / 6.0);
-    let ddq = [s1.ddq, s4.motion.ddq];
-    for j in 0..N {
-        // The velocities of the stages are `dq` and half, half and all of a step at the accelerations before.
-        let early = s1.ddq[j] + s2.motion.ddq[j] + s3.motion.ddq[j];
-        by[j] = span.h * sixth * (-c(3.0)).fused(s2.motion.ddq[j], early);
-        end.q[j] = span.h.fused(sixth.fused(early, place.dq[j]), place.q[j]);
-        end.dq[j] = sixth.fused(early + early + (ddq[1][j] - ddq[0][j]), place.dq[j]);
-        wrong = wrong.larger(-(end.dq[j] * modes.direction[j]) * body.dry(j));
-        if modes.fresh {
+    if modes.fresh {
+        for j in 0..N {
             let off = contradiction(place.dq[j], s1.ddq[j], modes.direction[j], modes.slides[j]);
-            wrong = wrong.larger(off * body.dry(j));
+            wrong = wrong.larger(off * modes.dry[j]);
         }
-        sum = sum + (end.q[j] + end.dq[j]);
     }
-    // What is not finite leaves its mark in this.
-    let finite = sum * c(0.0);
-    let (aside, last) = body.rotations(&by, Reach::Beside);
-    let pose = body.turned(&end, turned(&s4.pose.turns, &aside));
-    let far = far.larger(last) - c(1.0) + finite;
-    (signs.wrong, signs.far, signs.ddq) = (wrong.larger(far) + finite, far, ddq);
+    (signs.wrong, signs.far, signs.ddq) = (wrong + finite, far, ddq);
     pose
 }

@@ -217,6 +217,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.rigid.coulomb[j] > T::zero() || self.hooks.iter().any(|on| on.force || on.coulomb)
     }
 
+    /// 1 for a joint with dry friction, 0 for one that reverses without noticing.
+    #[inline]
+    pub(crate) fn dry(&self, j: usize) -> T {
+        if self.is_dry(j) { T::one() } else { T::zero() }
+    }
+
     /// Width of the smoothed sign, zero for exact dry friction.
     pub fn smoothing(&self) -> T {
         self.smoothing
@@ -453,11 +459,6 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Body<T, N> for Pl
     #[inline(always)]
     fn turned(&self, place: &Place<T, N>, turns: [Turn<T>; N]) -> Pose<T, N> {
         self.rigid.turned(place, turns)
-    }
-
-    #[inline(always)]
-    fn dry(&self, j: usize) -> T {
-        if self.is_dry(j) { T::one() } else { T::zero() }
     }
 
     #[inline(always)]

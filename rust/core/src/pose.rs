@@ -42,7 +42,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> Rigid<V, 
         self.turned(place, turns)
     }
 
-    /// What turns the arm's angles on where its joints move by so much, and how far that is: beyond 1, too far.
+    /// What turns the arm's angles on where its joints move by so much, and the largest of these angles.
     #[inline(always)]
     pub fn rotations(&self, by: &[V; N], reach: Reach) -> ([Rotation<V>; N], V) {
         // Adding -0 is the one sum that a compiler may leave out.
@@ -52,7 +52,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> Rigid<V, 
             rotations[j] = reach.rotation(angles[j]);
             far = angles[j].size().larger(far);
         }
-        (rotations, far * V::of(lit(1.0 / reach.largest())))
+        (rotations, far)
     }
 
     /// A place whose angles have these sines and cosines, with all that follows from it.
@@ -72,7 +72,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Rigid<T, A, N, P>
             by[j] -= q[j];
         }
         let (rotations, far) = self.rotations(&by, reach);
-        if far > T::one() {
+        if reach.part(far) > T::one() {
             return self.pose(place);
         }
         self.turned(place, turned(turns, &rotations))
@@ -135,11 +135,17 @@ pub enum Reach {
 impl Reach {
     /// Largest difference of angles, rad.
     #[inline(always)]
-    pub fn largest(self) -> f64 {
+    fn largest(self) -> f64 {
         match self {
             Self::Near => NEAR,
             Self::Beside => SLIGHT,
         }
+    }
+
+    /// An angle as a part of the largest: beyond 1, too far.
+    #[inline(always)]
+    pub fn part<V: Number>(self, angle: V) -> V {
+        angle * V::of(lit(1.0 / self.largest()))
     }
 
     /// What turns on by an angle within reach.

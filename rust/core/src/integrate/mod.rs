@@ -103,14 +103,14 @@ fn glided<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     interval: &Interval<T, N>,
 ) -> bool {
     let mut span = Span { t: interval.t, h: interval.h, tau: [[T::zero(); N]; 3] };
-    let mut direction = [T::zero(); N];
+    let (mut direction, mut dry) = ([T::zero(); N], [T::zero(); N]);
     for j in 0..N {
         let Pulse { start, middle, end } = interval.torque[j];
         (span.tau[0][j], span.tau[1][j], span.tau[2][j]) = (start, middle, end);
-        direction[j] = state.modes[j].direction();
+        (direction[j], dry[j]) = (state.modes[j].direction(), plant.dry(j));
     }
     let start = plant.rigid().pose(&Place { q: state.q.into(), dq: state.dq.into() });
-    let modes = Modes::new(direction);
+    let modes = Modes::new(direction, dry);
     let mut signs = Signs::none();
     let pose = glide(&glide::Step { body: plant, start: &start, modes: &modes, span: &span }, &mut signs);
     let right = signs.wrong <= T::zero();

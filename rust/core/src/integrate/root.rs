@@ -14,7 +14,7 @@ const SHORT: f64 = 0.01;
 
 /// Newton's step towards a root of the curve through both ends is the last if it is no more than this part of the step: the motion is not
 /// that curve.
-const ROOT: f64 = 1e-4;
+const ROOT: f64 = 1e-3;
 
 /// A place close to where joint `j`'s velocity vanishes, `length` after the start of a step, and the accelerations at both.
 pub(crate) struct Close<'a, T, const N: usize> {

@@ -3,13 +3,12 @@
 use super::bundle::{Bundle, Gliding};
 use super::change::{Outcome, Taken};
 use super::clock::Clock;
-use super::lane::{held_in, lane_of, numbers, state_of, turns_of, write};
+use super::lane::{Way, held_in, lane_of, numbers, set_out, state_of, turns_of};
 use super::{Run, WIDTH};
 use crate::arm::Arm;
 use crate::cpu::Cpu;
-use crate::effect::Pulse;
 use crate::glide::{Modes, Signs, Span, Step, glide};
-use crate::integrate::{Interval, State, exact};
+use crate::integrate::{State, exact};
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::plant::Mode;
@@ -48,10 +47,9 @@ pub(super) struct Abreast<'a, T: Real, C, A, const W: usize, const H: usize, con
     clocks: [Clock<T, N>; WIDTH],
     /// Nothing in lanes that move, so much that nothing is wrong in those that have ended.
     idle: [Lanes<T, C, W>; H],
-    /// Which run is in which lane, and its times and torques.
+    /// Which run is in which lane, and its way; none in lanes that have ended.
     runs: [usize; WIDTH],
-    times: [&'a [T]; WIDTH],
-    torques: [&'a [[Pulse<T>; N]]; WIDTH],
+    ways: [Option<Way<'a, T, N>>; WIDTH],
     /// Lanes that move.
     moving: usize,
     /// The run that enters next.
@@ -74,14 +72,13 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         let mut lanes = Self {
             bundles: from_fn(|_| Bundle::new(plant)),
             poses: [Pose::none(); H],
-            modes: [Modes::new([zero; N]); H],
+            modes: [Modes::new([zero; N], [zero; N]); H],
             spans: [Span { t: zero, h: zero, tau: [[zero; N]; 3] }; H],
             starts: [(Pose::none().place, Pose::none().turns); H],
             signs: [Signs::none(); H],
-            clocks: [Clock::new(0); WIDTH],
+            clocks: [Clock::new(); WIDTH],
             runs: [0; WIDTH],
-            times: [&[]; WIDTH],
-            torques: [&[]; WIDTH],
+            ways: from_fn(|_| None),
             idle: [zero; H],
             moving: Self::LANES,
             waiting: 0,
@@ -105,7 +102,6 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     /// One step of every lane.
     #[inline(always)]
     pub(super) fn step(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
-        self.intervals();
         if self.course != Course::Even {
             self.parts();
         }
@@ -155,24 +151,23 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     /// Goes on from a step that was right in all lanes.
     #[inline(always)]
     fn arrive_all(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
+        if self.course != Course::Even {
+            self.clocks = [Clock::new(); WIDTH];
+        }
         let mut ended = false;
         for l in 0..Self::LANES {
-            let clock = &mut self.clocks[l];
-            if clock.is_over() {
-                continue;
+            if let Some(way) = &mut self.ways[l] {
+                way.arrive(lane_of(&self.poses[l / W].place, l % W).q);
+                match &way.interval {
+                    Some(interval) => set_out(&mut self.spans[l / W], l % W, interval),
+                    None => ended = true,
+                }
             }
-            write(&mut runs[self.runs[l]], clock.k, &lane_of(&self.poses[l / W].place, l % W).q);
-            if self.course == Course::Even {
-                clock.k += 1;
-            } else {
-                clock.next();
-            }
-            ended |= clock.is_over();
         }
         self.course = Course::Even;
         if ended {
             for l in 0..Self::LANES {
-                if self.clocks[l].has_ended() {
+                if self.ways[l].as_ref().is_some_and(|way| way.interval.is_none()) {
                     self.end(runs, l);
                 }
             }
@@ -189,11 +184,10 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     fn sort_out(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
         self.course = Course::Parted;
         for l in 0..Self::LANES {
-            let clock = &self.clocks[l];
-            if clock.is_over() {
+            if self.ways[l].is_none() {
                 continue;
             }
-            let right = clock.goal.is_none() && self.signs[l / W].wrong.0[l % W] <= T::zero();
+            let right = self.clocks[l].goal.is_none() && self.signs[l / W].wrong.0[l % W] <= T::zero();
             if right || self.judge(l) {
                 self.arrive(runs, l);
             }
@@ -205,7 +199,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     #[inline(always)]
     fn renew_modes(&mut self) {
         for i in 0..H {
-            self.modes[i] = Modes::new(self.modes[i].direction);
+            self.modes[i] = Modes::new(self.modes[i].direction, self.bundles[i].dry);
         }
     }
 
@@ -220,13 +214,16 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     fn arrive(&mut self, runs: &mut [Run<'a, T, A, N, P>], l: usize) {
         let q = self.place(l).q;
         let within = q.iter().all(|q| q.abs() <= self.limit);
-        if within {
-            write(&mut runs[self.runs[l]], self.clocks[l].k, &q);
-            self.clocks[l].next();
+        self.clocks[l] = Clock::new();
+        if let Some(way) = &mut self.ways[l]
+            && within
+        {
+            way.arrive(q);
+            if let Some(interval) = &way.interval {
+                return set_out(&mut self.spans[l / W], l % W, interval);
+            }
         }
-        if !within || self.clocks[l].is_over() {
-            self.end(runs, l);
-        }
+        self.end(runs, l);
     }
 
     /// Ends lane `l`'s run; the next one enters, if any is left.
@@ -240,21 +237,22 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     #[inline(never)]
     fn enter(&mut self, runs: &mut [Run<'a, T, A, N, P>], l: usize) {
         let mut state = State::new(SVector::zeros(), SVector::zeros());
-        self.clocks[l] = Clock::new(0);
-        while self.clocks[l].is_over() && self.waiting < runs.len() {
-            let run = &runs[self.waiting];
-            self.clocks[l] = Clock::new(run.torque.len().min(run.positions.len() / N));
-            (self.runs[l], self.times[l], self.torques[l]) = (self.waiting, run.t, run.torque);
+        (self.clocks[l], self.ways[l]) = (Clock::new(), None);
+        while self.ways[l].is_none() && self.waiting < runs.len() {
+            let run = &mut runs[self.waiting];
+            (self.runs[l], self.ways[l]) = (self.waiting, Way::of(run));
             state = run.state;
             self.bundles[l / W].put(l % W, run.plant);
             self.waiting += 1;
         }
-        if self.clocks[l].is_over() {
+        if let Some(Way { interval: Some(interval), .. }) = &self.ways[l] {
+            set_out(&mut self.spans[l / W], l % W, interval);
+        } else {
             // A step of no length, of which nothing is wrong.
             self.spans[l / W].h.0[l % W] = T::zero();
             self.idle[l / W].0[l % W] = lit(IDLE);
             self.moving -= 1;
-            state.modes = [Mode::Forward; N];
+            state = State { modes: [Mode::Forward; N], ..State::new(SVector::zeros(), SVector::zeros()) };
         }
         for j in 0..N {
             self.modes[l / W].direction[j].0[l % W] = state.modes[j].direction();
@@ -278,45 +276,17 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
     }
 
-    /// Lane `l`'s interval.
-    #[inline]
-    fn interval(&self, l: usize) -> Interval<'a, T, N> {
-        let k = self.clocks[l].k;
-        let (t, torque) = (&self.times[l][k..k + 2], &self.torques[l][k]);
-        Interval { t: t[0], h: t[1] - t[0], torque }
-    }
-
-    /// Gets times and torques of the lanes' intervals.
-    #[inline(never)]
-    fn intervals(&mut self) {
-        for l in 0..Self::LANES {
-            let Clock { k, rows, .. } = self.clocks[l];
-            if k >= rows {
-                continue;
-            }
-            let (t, torque) = (&self.times[l][k..k + 2], &self.torques[l][k]);
-            let (span, l) = (&mut self.spans[l / W], l % W);
-            (span.t.0[l], span.h.0[l]) = (t[0], t[1] - t[0]);
-            for j in 0..N {
-                let Pulse { start, middle, end } = torque[j];
-                span.tau[0][j].0[l] = start;
-                span.tau[1][j].0[l] = middle;
-                span.tau[2][j].0[l] = end;
-            }
-        }
-    }
-
-    /// Gets those of lanes that only go a part of their interval.
+    /// Sets lanes that only go a part of their interval to that.
     #[inline(never)]
     fn parts(&mut self) {
         self.course = Course::Even;
         for l in 0..Self::LANES {
-            let clock = &self.clocks[l];
-            if clock.is_over() || clock.is_whole() {
+            let (clock, way) = (&self.clocks[l], &self.ways[l]);
+            let Some(Way { interval: Some(interval), .. }) = way else { continue };
+            if clock.is_whole() {
                 continue;
             }
             self.course = self.course.max(if clock.goal.is_some() { Course::Aimed } else { Course::Parted });
-            let interval = self.interval(l);
             let h = clock.length();
             let (span, l) = (&mut self.spans[l / W], l % W);
             (span.t.0[l], span.h.0[l]) = (interval.t + clock.done, h);
@@ -332,7 +302,8 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     /// What comes of lane `l`'s step; whether it is at the end of its interval.
     #[inline(never)]
     fn judge(&mut self, l: usize) -> bool {
-        let (i, lane, interval) = (l / W, l % W, self.interval(l));
+        let (i, lane) = (l / W, l % W);
+        let Some(Way { interval: Some(interval), .. }) = &self.ways[l] else { return false };
         if self.clocks[l].is_whole() {
             self.clocks[l].left = interval.h;
         }
@@ -359,7 +330,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
             }
             Outcome::Alone => {
                 let mut state = state_of(&taken.places[0], &direction);
-                exact(plants[lane], &mut state, &interval, clock.done);
+                exact(plants[lane], &mut state, interval, clock.done);
                 direction = state.modes.map(Mode::direction);
                 (own.pose(&Place { q: state.q.into(), dq: state.dq.into() }), true)
             }

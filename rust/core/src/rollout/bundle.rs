@@ -229,11 +229,6 @@ impl<
     }
 
     #[inline(always)]
-    fn dry(&self, j: usize) -> Lanes<T, C, W> {
-        self.0.dry[j]
-    }
-
-    #[inline(always)]
     fn pull(
         &self,
         at: &Instant<'_, Lanes<T, C, W>, N>,
