@@ -271,27 +271,7 @@ fn end<V: Number, B: Body<V, N>, const N: usize>(
     let c = |x: f64| V::of(lit(x));
     let Step { body, start, modes, span } = step;
     let place = &start.place;
-    // Adding -0 is the one sum that a compiler may leave out.
-    let (mut end, mut by, mut sum) = (*place, place.q, c(-0.0));
-    let sixth = span.h * c(1.0 / 6.0);
-    let ddq = [s1.ddq, s4.motion.ddq];
-    for j in 0..N {
-        // The velocities of the stages are `dq` and half, half and all of a step at the accelerations before.
-        let early = s1.ddq[j] + s2.motion.ddq[j] + s3.motion.ddq[j];
-        by[j] = span.h * sixth * (-c(3.0)).fused(s2.motion.ddq[j], early);
-        end.q[j] = span.h.fused(sixth.fused(early, place.dq[j]), place.q[j]);
-        end.dq[j] = sixth.fused(early + early + (ddq[1][j] - ddq[0][j]), place.dq[j]);
-        sum = sum + end.dq[j];
-    }
-    let (aside, last) = body.rotations(&by, Reach::Beside);
-    let pose = body.turned(&end, turned(&s4.pose.turns, &aside));
-    // An acceleration that is not finite leaves its mark in this.
-    let finite = sum * c(0.0);
-    let far = Reach::Beside.part(aside_far.larger(last)).larger(far) - c(1.0) + finite;
-    let mut wrong = far;
-    for j in 0..N {
-        wrong = wrong.larger(end.dq[j] * modes.against[j]);
-    }
+    let mut wrong = -c(1.0);
     if body.holds(modes) {
         let at = Instant { t: span.t, pose: start, tau: &span.tau[0] };
         let first = held(*body, &at, s1, modes);
@@ -308,6 +288,24 @@ fn end<V: Number, B: Body<V, N>, const N: usize>(
             wrong = wrong.larger(off * modes.dry[j]);
         }
     }
-    (signs.wrong, signs.far, signs.ddq) = (wrong + finite, far, ddq);
+    // Adding -0 is the one sum that a compiler may leave out.
+    let (mut end, mut by, mut sum) = (*place, place.q, c(-0.0));
+    let sixth = span.h * c(1.0 / 6.0);
+    let ddq = [s1.ddq, s4.motion.ddq];
+    for j in 0..N {
+        // The velocities of the stages are `dq` and half, half and all of a step at the accelerations before.
+        let early = s1.ddq[j] + s2.motion.ddq[j] + s3.motion.ddq[j];
+        by[j] = span.h * sixth * (-c(3.0)).fused(s2.motion.ddq[j], early);
+        end.q[j] = span.h.fused(sixth.fused(early, place.dq[j]), place.q[j]);
+        end.dq[j] = sixth.fused(early + early + (ddq[1][j] - ddq[0][j]), place.dq[j]);
+        wrong = wrong.larger(end.dq[j] * modes.against[j]);
+        sum = sum + end.dq[j];
+    }
+    let (aside, last) = body.rotations(&by, Reach::Beside);
+    let pose = body.turned(&end, turned(&s4.pose.turns, &aside));
+    // An acceleration that is not finite leaves its mark in this.
+    let finite = sum * c(0.0);
+    let far = Reach::Beside.part(aside_far.larger(last)).larger(far) - c(1.0) + finite;
+    (signs.wrong, signs.far, signs.ddq) = (wrong.larger(far) + finite, far, ddq);
     pose
 }
