@@ -42,7 +42,8 @@ pub(super) struct Abreast<'a, T: Real, C, A, const W: usize, const H: usize, con
     modes: [Modes<Lanes<T, C, W>, N>; H],
     spans: [Span<Lanes<T, C, W>, N>; H],
     /// Where the last step started, with sines and cosines, and what it says.
-    starts: [(Place<Lanes<T, C, W>, N>, [Turn<Lanes<T, C, W>>; N]); H],
+    starts: [Place<Lanes<T, C, W>, N>; H],
+    turns: [[Turn<Lanes<T, C, W>>; N]; H],
     signs: [Signs<Lanes<T, C, W>, N>; H],
     clocks: [Clock<T, N>; WIDTH],
     /// Nothing in lanes that move, so much that nothing is wrong in those that have ended.
@@ -55,6 +56,8 @@ pub(super) struct Abreast<'a, T: Real, C, A, const W: usize, const H: usize, con
     /// The run that enters next.
     waiting: usize,
     course: Course,
+    /// Whether a lane has other directions than the modes say.
+    turned: bool,
     steps: usize,
     limit: T,
 }
@@ -74,7 +77,8 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
             poses: [Pose::none(); H],
             modes: [Modes::new([zero; N], [zero; N]); H],
             spans: [Span { t: zero, h: zero, tau: [[zero; N]; 3] }; H],
-            starts: [(Pose::none().place, Pose::none().turns); H],
+            starts: [Pose::none().place; H],
+            turns: [Pose::none().turns; H],
             signs: [Signs::none(); H],
             clocks: [Clock::new(); WIDTH],
             runs: [0; WIDTH],
@@ -83,6 +87,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
             moving: Self::LANES,
             waiting: 0,
             course: Course::Even,
+            turned: true,
             steps: 0,
             limit,
         };
@@ -131,7 +136,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     fn glide<const EFFECTS: bool, const HELD: bool>(&mut self) -> bool {
         let mut right = self.course != Course::Aimed;
         for i in 0..H {
-            self.starts[i] = (self.poses[i].place, self.poses[i].turns);
+            (self.starts[i], self.turns[i]) = (self.poses[i].place, self.poses[i].turns);
             let step = Step {
                 body: &Gliding::<_, EFFECTS, HELD>(&self.bundles[i]),
                 start: &self.poses[i],
@@ -171,12 +176,8 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
                     self.end(runs, l);
                 }
             }
-            self.renew_modes();
-        } else {
-            for i in 0..H {
-                self.modes[i].fresh = false;
-            }
         }
+        self.renew_modes();
     }
 
     /// Goes on from a step after which lanes go different ways.
@@ -199,8 +200,13 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     #[inline(always)]
     fn renew_modes(&mut self) {
         for i in 0..H {
-            self.modes[i] = Modes::new(self.modes[i].direction, self.bundles[i].dry);
+            if self.turned {
+                self.modes[i] = Modes::new(self.modes[i].direction, self.bundles[i].dry);
+            } else {
+                self.modes[i].fresh = false;
+            }
         }
+        self.turned = false;
     }
 
     /// Lane `l`'s place.
@@ -254,11 +260,18 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
             self.moving -= 1;
             state = State { modes: [Mode::Forward; N], ..State::new(SVector::zeros(), SVector::zeros()) };
         }
-        for j in 0..N {
-            self.modes[l / W].direction[j].0[l % W] = state.modes[j].direction();
-        }
+        self.turn(l, &state.modes.map(Mode::direction));
         let rigid = self.bundles[l / W].plants[l % W].rigid();
         self.put(l, &rigid.pose(&Place { q: state.q.into(), dq: state.dq.into() }));
+    }
+
+    /// Gives lane `l` other directions.
+    #[inline]
+    fn turn(&mut self, l: usize, direction: &[T; N]) {
+        for j in 0..N {
+            self.modes[l / W].direction[j].0[l % W] = direction[j];
+        }
+        self.turned = true;
     }
 
     /// Puts lane `l` into a pose.
@@ -307,7 +320,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         if self.clocks[l].is_whole() {
             self.clocks[l].left = interval.h;
         }
-        let (signs, (start, turns), end) = (&self.signs[i], &self.starts[i], &self.poses[i]);
+        let (signs, start, end) = (&self.signs[i], &self.starts[i], &self.poses[i]);
         let Bundle { rigid, dry, plants, .. } = &self.bundles[i];
         let taken = Taken {
             places: [lane_of(start, lane), lane_of(&end.place, lane)],
@@ -319,11 +332,12 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
             inertia: end.balance.inertia.each_ref().map(|row| numbers(row, lane)),
         };
         let clock = &mut self.clocks[l];
-        let mut direction = numbers(&self.modes[i].direction, lane);
+        let before = numbers(&self.modes[i].direction, lane);
+        let mut direction = before;
         let own = plants[lane].rigid();
         let (pose, arrived) = match taken.judge(clock, &mut direction) {
             Outcome::Right => return true,
-            Outcome::Again => (own.turned(&taken.places[0], turns_of(turns, lane)), false),
+            Outcome::Again => (own.turned(&taken.places[0], turns_of(&self.turns[i], lane)), false),
             Outcome::Reversed(place) => {
                 let turns = turns_of(&end.turns, lane);
                 (own.near(&place, &taken.places[1].q, &turns, Reach::Beside), clock.left <= T::zero())
@@ -335,8 +349,8 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
                 (own.pose(&Place { q: state.q.into(), dq: state.dq.into() }), true)
             }
         };
-        for j in 0..N {
-            self.modes[i].direction[j].0[lane] = direction[j];
+        if direction != before {
+            self.turn(l, &direction);
         }
         self.put(l, &pose);
         arrived
