@@ -33,7 +33,7 @@ pub struct Run<'a, T: Real, A, const N: usize, const P: usize> {
     pub torque: &'a [[Pulse<T>; N]],
     /// State at the first sample; once the run is made, where it ended.
     pub state: State<T, N>,
-    /// Positions at all further samples, `N` for each; those after a run has left the limit stay as they are.
+    /// Positions at all further samples, `N` for each; those after a run has left the limit stay as they are. Making the run takes them.
     pub positions: &'a mut [T],
 }
 
