@@ -13,6 +13,7 @@ use crate::number::Number;
 use crate::pose::{Place, Pose, Reach, Rigid};
 use crate::real::{Real, lit};
 use crate::transmission::Hidden;
+use crate::trig::{Rotation, Turn};
 use nalgebra::SVector;
 
 /// Most effects one plant can carry.
@@ -233,6 +234,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     #[inline]
     pub fn is_dry(&self, j: usize) -> bool {
         self.rigid.coulomb[j] > T::zero() || self.hooks.iter().any(|on| on.force || on.coulomb)
+    }
+
+    /// 1 for a joint with dry friction, 0 for one that reverses without noticing.
+    #[inline]
+    pub(crate) fn dry(&self, j: usize) -> T {
+        if self.is_dry(j) { T::one() } else { T::zero() }
     }
 
     /// Width of the smoothed sign, zero for exact dry friction.
@@ -462,13 +469,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Body<T, N> for Plant<T, A, N, P> {
     #[inline(always)]
-    fn near(&self, known: &Pose<T, N>, place: &Place<T, N>, by: &[T; N], reach: Reach) -> (Pose<T, N>, T) {
-        self.rigid.near(known, place, by, reach)
+    fn rotations(&self, by: &[T; N], reach: Reach) -> ([Rotation<T>; N], T) {
+        self.rigid.rotations(by, reach)
     }
 
     #[inline(always)]
-    fn dry(&self, j: usize) -> T {
-        if self.is_dry(j) { T::one() } else { T::zero() }
+    fn turned(&self, place: &Place<T, N>, turns: [Turn<T>; N]) -> Pose<T, N> {
+        self.rigid.turned(place, turns)
     }
 
     #[inline(always)]

@@ -1,11 +1,11 @@
 //! Where an arm is, how it moves, and what of its equation follows from that.
 //!
-//! Sines and cosines of a place near a known one are those of the known one turned on by the difference ([`crate::trig::Turn`]).
+//! Sines and cosines of a place near a known one are those of the known one turned on by the difference ([`crate::trig::Rotation`]).
 
 use crate::arm::{Arm, Balance};
 use crate::number::Number;
-use crate::real::lit;
-use crate::trig::{NEAR, SLIGHT, Turn};
+use crate::real::{Real, lit};
+use crate::trig::{NEAR, Rotation, SLIGHT, Turn};
 
 /// An arm with numbers in the form its equation needs them.
 #[derive(Debug, Clone, Copy)]
@@ -42,32 +42,40 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> Rigid<V, 
         self.turned(place, turns)
     }
 
-    /// The pose at a place which is `by` further on than a known pose, and how far that is: beyond 1, too far.
+    /// What turns the arm's angles on where its joints move by so much, and the largest of these angles.
     #[inline(always)]
-    pub fn near(
-        &self,
-        known: &Pose<V, N>,
-        place: &Place<V, N>,
-        by: &[V; N],
-        reach: Reach,
-    ) -> (Pose<V, N>, V) {
-        let zero = V::of(lit(0.0));
-        let angles = self.arm.angles(by, zero);
-        let (mut turns, mut far) = (known.turns, zero);
-        for j in 0..N {
-            turns[j] = match reach {
-                Reach::Near => turns[j].by(angles[j]),
-                Reach::Beside => turns[j].slightly_by(angles[j]),
-            };
+    pub fn rotations(&self, by: &[V; N], reach: Reach) -> ([Rotation<V>; N], V) {
+        // Adding -0 is the one sum that a compiler may leave out.
+        let angles = self.arm.angles(by, V::of(lit(-0.0)));
+        let (mut rotations, mut far) = ([reach.rotation(angles[0]); N], angles[0].size());
+        for j in 1..N {
+            rotations[j] = reach.rotation(angles[j]);
             far = angles[j].size().larger(far);
         }
-        (self.turned(place, turns), far * V::of(lit(1.0 / reach.largest())))
+        (rotations, far)
     }
 
+    /// A place whose angles have these sines and cosines, with all that follows from it.
     #[inline(always)]
-    fn turned(&self, place: &Place<V, N>, turns: [Turn<V>; N]) -> Pose<V, N> {
+    pub fn turned(&self, place: &Place<V, N>, turns: [Turn<V>; N]) -> Pose<V, N> {
         let balance = self.arm.balance(&self.theta, &self.steady, &turns, &place.dq);
         Pose { place: *place, turns, balance }
+    }
+}
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Rigid<T, A, N, P> {
+    /// A place with all that follows from it, turned on from positions with known sines and cosines if it is within reach of them.
+    #[inline(always)]
+    pub fn near(&self, place: &Place<T, N>, q: &[T; N], turns: &[Turn<T>; N], reach: Reach) -> Pose<T, N> {
+        let mut by = place.q;
+        for j in 0..N {
+            by[j] -= q[j];
+        }
+        let (rotations, far) = self.rotations(&by, reach);
+        if reach.part(far) > T::one() {
+            return self.pose(place);
+        }
+        self.turned(place, turned(turns, &rotations))
     }
 }
 
@@ -105,10 +113,20 @@ impl<V: Number, const N: usize> Pose<V, N> {
     }
 }
 
+/// The sines and cosines of angles turned on, each by its rotation.
+#[inline(always)]
+pub fn turned<V: Number, const N: usize>(turns: &[Turn<V>; N], by: &[Rotation<V>; N]) -> [Turn<V>; N] {
+    let mut turned = *turns;
+    for j in 0..N {
+        turned[j] = turns[j].by(&by[j]);
+    }
+    turned
+}
+
 /// How far it can be from one pose to another; a shorter way takes shorter series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
-    /// As far as an arm gets in a step.
+    /// As far as an arm gets in half a step.
     Near,
     /// As far as the stages of a step are from each other.
     Beside,
@@ -117,10 +135,25 @@ pub enum Reach {
 impl Reach {
     /// Largest difference of angles, rad.
     #[inline(always)]
-    pub fn largest(self) -> f64 {
+    fn largest(self) -> f64 {
         match self {
             Self::Near => NEAR,
             Self::Beside => SLIGHT,
+        }
+    }
+
+    /// An angle as a part of the largest: beyond 1, too far.
+    #[inline(always)]
+    pub fn part<V: Number>(self, angle: V) -> V {
+        angle * V::of(lit(1.0 / self.largest()))
+    }
+
+    /// What turns on by an angle within reach.
+    #[inline(always)]
+    fn rotation<V: Number>(self, angle: V) -> Rotation<V> {
+        match self {
+            Self::Near => Rotation::near(angle),
+            Self::Beside => Rotation::slight(angle),
         }
     }
 }

@@ -134,15 +134,47 @@ pub struct Turn<V> {
     pub cosine: V,
 }
 
-/// Differences of angles up to this, rad, turn on by [`Turn::by`] with errors below 1e-15; a step of 2.5 ms at 80 rad/s.
-pub const NEAR: f64 = 0.2;
+/// Angles up to this, rad, have a [`Rotation::near`] with errors below 1e-16; half a step of 2.5 ms at 80 rad/s.
+pub const NEAR: f64 = 0.1;
 
-/// Differences of angles up to this, rad, turn on by [`Turn::slightly_by`] with errors below 5e-16.
-pub const SLIGHT: f64 = 0.02;
+/// Angles up to this, rad, have a [`Rotation::slight`] with errors below 7e-16.
+pub const SLIGHT: f64 = 0.0125;
 
-/// `(-1)^n / (2 n + 1)!` and `(-1)^n / (2 n)!` from `n = 1` on.
-const NEAR_SINE: [f64; 4] = [-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0];
-const NEAR_COSINE: [f64; 5] = [-0.5, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40_320.0, -1.0 / 3_628_800.0];
+/// `(sin r - r)/r^3` and `(cos r - 1)/r^2` in powers of `r^2`, up to [`NEAR`] and up to [`SLIGHT`].
+const NEAR_SINE: [f64; 3] =
+    [-0.166_666_666_666_580_56, 0.008_333_333_178_343_767, -0.000_198_371_366_661_129_7];
+const NEAR_COSINE: [f64; 4] =
+    [-0.5, 0.041_666_666_666_597_78, -0.001_388_888_854_446_936_4, 2.479_607_641_181_604_4e-5];
+const SLIGHT_SINE: [f64; 2] = [-0.166_666_666_666_061_17, 0.008_333_302_331_408_075];
+const SLIGHT_COSINE: [f64; 2] = [-0.499_999_999_995_761_45, 0.041_666_449_653_307_6];
+
+/// Sine of a small angle, and its cosine less one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rotation<V> {
+    sine: V,
+    less: V,
+}
+
+impl<V: Number> Rotation<V> {
+    /// By `d` rad, at most [`NEAR`].
+    #[inline(always)]
+    pub fn near(d: V) -> Self {
+        let (z, [s0, s1, s2], [c0, c1, c2, c3]) = (d * d, NEAR_SINE, NEAR_COSINE);
+        let pair = |a: f64, b: f64| z.fused(V::of(lit(b)), V::of(lit(a)));
+        let z2 = z * z;
+        let sine = z2.fused(V::of(lit(s2)), pair(s0, s1));
+        let cosine = z2.fused(pair(c2, c3), pair(c0, c1));
+        Self { sine: (d * z).fused(sine, d), less: z * cosine }
+    }
+
+    /// By `d` rad, at most [`SLIGHT`].
+    #[inline(always)]
+    pub fn slight(d: V) -> Self {
+        let ([s0, s1], [c0, c1], z) = (SLIGHT_SINE, SLIGHT_COSINE, d * d);
+        let pair = |a: f64, b: f64| z.fused(V::of(lit(b)), V::of(lit(a)));
+        Self { sine: (d * z).fused(pair(s0, s1), d), less: z * pair(c0, c1) }
+    }
+}
 
 impl<V: Number> Turn<V> {
     /// Of an angle, rad.
@@ -152,33 +184,13 @@ impl<V: Number> Turn<V> {
         Self { sine, cosine }
     }
 
-    /// Of an angle further on by `d` rad, at most [`NEAR`]: two short series and the theorems of addition.
+    /// Of an angle further on, by the theorems of addition: only the change is rounded anew.
     #[inline(always)]
-    pub fn by(&self, d: V) -> Self {
-        let (z, [s0, s1, s2, s3], [c0, c1, c2, c3, c4]) = (d * d, NEAR_SINE, NEAR_COSINE);
-        let pair = |a: f64, b: f64| z.fused(V::of(lit(b)), V::of(lit(a)));
-        let z2 = z * z;
-        let sine = z2.fused(pair(s2, s3), pair(s0, s1));
-        let cosine = z2.fused(z2.fused(V::of(lit(c4)), pair(c2, c3)), pair(c0, c1));
-        self.turned((d * z).fused(sine, d), z * cosine)
-    }
-
-    /// The same for at most [`SLIGHT`].
-    #[inline(always)]
-    pub fn slightly_by(&self, d: V) -> Self {
-        let ([s0, s1, ..], [c0, c1, c2, ..]) = (NEAR_SINE, NEAR_COSINE);
-        let (z, c) = (d * d, |c: f64| V::of(lit(c)));
-        let sine = z.fused(c(s1), c(s0));
-        let cosine = z.fused(z.fused(c(c2), c(c1)), c(c0));
-        self.turned((d * z).fused(sine, d), z * cosine)
-    }
-
-    /// Further on by an angle with this sine and, less one, this cosine: only the change is rounded anew.
-    #[inline(always)]
-    fn turned(&self, s: V, c: V) -> Self {
+    pub fn by(&self, rotation: &Rotation<V>) -> Self {
+        let Rotation { sine, less } = *rotation;
         Self {
-            sine: self.sine.fused(c, self.cosine.fused(s, self.sine)),
-            cosine: self.cosine.fused(c, (-self.sine).fused(s, self.cosine)),
+            sine: self.sine.fused(less, self.cosine.fused(sine, self.sine)),
+            cosine: self.cosine.fused(less, (-self.sine).fused(sine, self.cosine)),
         }
     }
 }
@@ -220,12 +232,13 @@ mod tests {
     fn turning_on_is_turning_there() {
         for i in 0..1000 {
             let (x, part) = (0.01 * f64::from(i) - 5.0, f64::from(i % 41 - 20) / 20.0);
-            let ways = [(NEAR, Turn::by as fn(&Turn<f64>, f64) -> Turn<f64>), (SLIGHT, Turn::slightly_by)];
-            for (largest, by) in ways {
-                let (there, exact) = (by(&Turn::of(x), largest * part), Turn::of(x + largest * part));
+            let ways = [(NEAR, Rotation::near as fn(f64) -> Rotation<f64>), (SLIGHT, Rotation::slight)];
+            for (largest, rotation) in ways {
+                let way = largest * part;
+                let (there, exact) = (Turn::of(x).by(&rotation(way)), Turn::of(x + way));
                 let off = (there.sine - exact.sine).abs().max((there.cosine - exact.cosine).abs());
                 // The sum of the angles is rounded too.
-                assert!(off < 1.5e-15, "{x} by {}: {off:e}", largest * part);
+                assert!(off < 1.5e-15, "{x} by {way}: {off:e}");
             }
         }
     }

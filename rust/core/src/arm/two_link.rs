@@ -109,11 +109,11 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
     ) -> Balance<V, 2> {
         let [Turn { sine: s1, cosine: c1 }, Turn { sine: s2, cosine: c2 }] = *turns;
         let outer = theta[4] * s1.fused(c2, c1 * s2);
-        let (kc, ks) = (theta[1] * c2, theta[1] * s2);
+        let (kc, ks, twice) = (theta[1] * c2, theta[1] * s2, V::of(lit(2.0)));
         let [[own, coupled], [_, outer_own]] = *steady;
         let coupled = coupled + kc;
-        let inertia = [[own + kc + kc, coupled], [coupled, outer_own]];
-        let bias1 = theta[3].fused(s1, outer) - ks * dq[1] * (dq[0] + dq[0] + dq[1]);
+        let inertia = [[twice.fused(kc, own), coupled], [coupled, outer_own]];
+        let bias1 = (-(ks * dq[1])).fused(twice.fused(dq[0], dq[1]), theta[3].fused(s1, outer));
         Balance { inertia, bias: [bias1, (ks * dq[0]).fused(dq[0], outer)] }
     }
 

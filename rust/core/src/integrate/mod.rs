@@ -105,14 +105,14 @@ fn glided<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     interval: &Interval<T, N>,
 ) -> bool {
     let mut span = Span { t: interval.t, h: interval.h, tau: [[T::zero(); N]; 3] };
-    let mut direction = [T::zero(); N];
+    let (mut direction, mut dry) = ([T::zero(); N], [T::zero(); N]);
     for j in 0..N {
         let Pulse { start, middle, end } = interval.torque[j];
         (span.tau[0][j], span.tau[1][j], span.tau[2][j]) = (start, middle, end);
-        direction[j] = state.modes[j].direction();
+        (direction[j], dry[j]) = (state.modes[j].direction(), plant.dry(j));
     }
     let start = plant.rigid().pose(&Place { q: state.q.into(), dq: state.dq.into() });
-    let modes = Modes::new(direction);
+    let modes = Modes::new(direction, dry);
     let mut signs = Signs::none();
     let pose = glide(&glide::Step { body: plant, start: &start, modes: &modes, span: &span }, &mut signs);
     let crosses = |j: usize| plant.edge_between(j, state.q[j], pose.place.q[j]).is_some();
@@ -152,14 +152,8 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
     #[inline]
     fn motion(&self, x: T, state: &State<T, N>) -> Motion<T, N> {
         let place = Place { q: state.q.into(), dq: state.dq.into() };
-        let mut by = place.q;
-        for j in 0..N {
-            by[j] = place.q[j] - self.origin.place.q[j];
-        }
-        let (mut pose, far) = self.plant.rigid().near(&self.origin, &place, &by, Reach::Near);
-        if far > T::one() {
-            pose = self.plant.rigid().pose(&place);
-        }
+        let origin = &self.origin;
+        let pose = self.plant.rigid().near(&place, &origin.place.q, &origin.turns, Reach::Near);
         let tau = self.interval.torque_at(x);
         self.plant.acceleration(self.interval.t + x, &pose, &tau, &state.modes, &state.hidden)
     }

@@ -12,8 +12,9 @@ const CURVED: f64 = 1e-3;
 /// The rate of acceleration over less than this part of a step is not known well enough.
 const SHORT: f64 = 0.01;
 
-/// A root of the curve through both ends is found to this part of the step: the motion is not that curve.
-const ROOT: f64 = 1e-6;
+/// Newton's step towards a root of the curve through both ends is the last if it is no more than this part of the step: the motion is not
+/// that curve.
+const ROOT: f64 = 1e-3;
 
 /// A place close to where joint `j`'s velocity vanishes, `length` after the start of a step, and the accelerations at both.
 pub(crate) struct Close<'a, T, const N: usize> {

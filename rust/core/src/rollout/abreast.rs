@@ -1,20 +1,20 @@
 //! The lanes on their way.
 
-use super::bundle::Bundle;
+use super::bundle::{Bundle, Gliding};
 use super::change::{Outcome, Taken};
 use super::clock::Clock;
-use super::lane::{held_in, lane_of, numbers, state_of, write};
+use super::lane::{Way, held_in, lane_of, numbers, set_out, state_of, turns_of};
 use super::{Run, WIDTH};
 use crate::arm::Arm;
 use crate::cpu::Cpu;
-use crate::effect::Pulse;
 use crate::glide::{Modes, Signs, Span, Step, glide};
-use crate::integrate::{Interval, State, exact};
+use crate::integrate::{State, exact};
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::plant::Mode;
-use crate::pose::{Place, Pose};
+use crate::pose::{Place, Pose, Reach};
 use crate::real::{Real, lit};
+use crate::trig::Turn;
 use core::array::from_fn;
 use nalgebra::SVector;
 
@@ -41,21 +41,23 @@ pub(super) struct Abreast<'a, T: Real, C, A, const W: usize, const H: usize, con
     poses: [Pose<Lanes<T, C, W>, N>; H],
     modes: [Modes<Lanes<T, C, W>, N>; H],
     spans: [Span<Lanes<T, C, W>, N>; H],
-    /// Where the last step started, and what it says.
+    /// Where the last step started, with sines and cosines, and what it says.
     starts: [Place<Lanes<T, C, W>, N>; H],
+    turns: [[Turn<Lanes<T, C, W>>; N]; H],
     signs: [Signs<Lanes<T, C, W>, N>; H],
     clocks: [Clock<T, N>; WIDTH],
     /// Nothing in lanes that move, so much that nothing is wrong in those that have ended.
     idle: [Lanes<T, C, W>; H],
-    /// Which run is in which lane, and its times and torques.
+    /// Which run is in which lane, and its way; none in lanes that have ended.
     runs: [usize; WIDTH],
-    times: [&'a [T]; WIDTH],
-    torques: [&'a [[Pulse<T>; N]]; WIDTH],
+    ways: [Option<Way<'a, T, N>>; WIDTH],
     /// Lanes that move.
     moving: usize,
     /// The run that enters next.
     waiting: usize,
     course: Course,
+    /// Whether a lane has other directions than the modes say.
+    turned: bool,
     steps: usize,
     limit: T,
 }
@@ -63,6 +65,9 @@ pub(super) struct Abreast<'a, T: Real, C, A, const W: usize, const H: usize, con
 impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const N: usize, const P: usize>
     Abreast<'a, T, C, A, W, H, N, P>
 {
+    /// How many lanes there are.
+    const LANES: usize = W * H;
+
     #[inline(always)]
     pub(super) fn new(runs: &mut [Run<'a, T, A, N, P>], limit: T) -> Option<Self> {
         let plant = runs.first()?.plant;
@@ -70,22 +75,23 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         let mut lanes = Self {
             bundles: from_fn(|_| Bundle::new(plant)),
             poses: [Pose::none(); H],
-            modes: [Modes::new([zero; N]); H],
+            modes: [Modes::new([zero; N], [zero; N]); H],
             spans: [Span { t: zero, h: zero, tau: [[zero; N]; 3] }; H],
             starts: [Pose::none().place; H],
+            turns: [Pose::none().turns; H],
             signs: [Signs::none(); H],
-            clocks: [Clock::new(0); WIDTH],
+            clocks: [Clock::new(); WIDTH],
             runs: [0; WIDTH],
-            times: [&[]; WIDTH],
-            torques: [&[]; WIDTH],
+            ways: from_fn(|_| None),
             idle: [zero; H],
-            moving: WIDTH,
+            moving: Self::LANES,
             waiting: 0,
             course: Course::Even,
+            turned: true,
             steps: 0,
             limit,
         };
-        for l in 0..WIDTH {
+        for l in 0..Self::LANES {
             lanes.enter(runs, l);
         }
         lanes.renew_modes();
@@ -101,19 +107,16 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     /// One step of every lane.
     #[inline(always)]
     pub(super) fn step(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
-        self.intervals();
         if self.course != Course::Even {
             self.parts();
         }
-        self.glide();
-        let mut right = self.course != Course::Aimed;
-        for i in 0..H {
-            let mut wrong = self.signs[i].wrong - self.idle[i];
-            for j in 0..N {
-                wrong = wrong.larger(self.poses[i].place.q[j].size() - Lanes::of(self.limit));
-            }
-            right &= wrong.none_positive();
-        }
+        let right = if self.bundles.iter().any(Bundle::has_effects) {
+            self.glide::<true, true>()
+        } else if self.modes.iter().any(|modes| modes.held) {
+            self.glide::<false, true>()
+        } else {
+            self.glide::<false, false>()
+        };
         if right {
             self.arrive_all(runs);
         } else {
@@ -128,63 +131,64 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
     }
 
-    /// One step of every lane with the modes it has.
+    /// One step of every lane with the modes it has; whether it was right in all of them.
     #[inline(always)]
-    fn glide(&mut self) {
+    fn glide<const EFFECTS: bool, const HELD: bool>(&mut self) -> bool {
+        let mut right = self.course != Course::Aimed;
         for i in 0..H {
-            self.starts[i] = self.poses[i].place;
+            (self.starts[i], self.turns[i]) = (self.poses[i].place, self.poses[i].turns);
             let step = Step {
-                body: &self.bundles[i],
+                body: &Gliding::<_, EFFECTS, HELD>(&self.bundles[i]),
                 start: &self.poses[i],
                 modes: &self.modes[i],
                 span: &self.spans[i],
             };
             self.poses[i] = glide(&step, &mut self.signs[i]);
+            let mut wrong = self.signs[i].wrong - self.idle[i];
+            for j in 0..N {
+                wrong = wrong.larger(self.poses[i].place.q[j].size() - Lanes::of(self.limit));
+            }
+            right &= wrong.none_positive();
         }
+        right
     }
 
     /// Goes on from a step that was right in all lanes.
     #[inline(always)]
     fn arrive_all(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
+        if self.course != Course::Even {
+            self.clocks = [Clock::new(); WIDTH];
+        }
         let mut ended = false;
-        for l in 0..WIDTH {
-            let clock = &mut self.clocks[l];
-            if clock.is_over() {
-                continue;
+        for l in 0..Self::LANES {
+            if let Some(way) = &mut self.ways[l] {
+                way.arrive(lane_of(&self.poses[l / W].place, l % W).q);
+                match &way.interval {
+                    Some(interval) => set_out(&mut self.spans[l / W], l % W, interval),
+                    None => ended = true,
+                }
             }
-            write(&mut runs[self.runs[l]], clock.k, &lane_of(&self.poses[l / W].place, l % W).q);
-            if self.course == Course::Even {
-                clock.k += 1;
-            } else {
-                clock.next();
-            }
-            ended |= clock.is_over();
         }
         self.course = Course::Even;
         if ended {
-            for l in 0..WIDTH {
-                if self.clocks[l].has_ended() {
+            for l in 0..Self::LANES {
+                if self.ways[l].as_ref().is_some_and(|way| way.interval.is_none()) {
                     self.end(runs, l);
                 }
             }
-            self.renew_modes();
-        } else {
-            for i in 0..H {
-                self.modes[i].fresh = false;
-            }
         }
+        self.renew_modes();
     }
 
     /// Goes on from a step after which lanes go different ways.
     #[inline(always)]
     fn sort_out(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
         self.course = Course::Parted;
-        for l in 0..WIDTH {
-            let clock = &self.clocks[l];
-            if clock.is_over() {
+        for l in 0..Self::LANES {
+            if self.ways[l].is_none() {
                 continue;
             }
-            let right = clock.goal.is_none() && self.signs[l / W].wrong.0[l % W] <= T::zero();
+            let right = self.clocks[l].goal.is_none() && self.signs[l / W].wrong.0[l % W] <= T::zero();
             if right || self.judge(l) {
                 self.arrive(runs, l);
             }
@@ -196,8 +200,13 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     #[inline(always)]
     fn renew_modes(&mut self) {
         for i in 0..H {
-            self.modes[i] = Modes::new(self.modes[i].direction);
+            if self.turned {
+                self.modes[i] = Modes::new(self.modes[i].direction, self.bundles[i].dry);
+            } else {
+                self.modes[i].fresh = false;
+            }
         }
+        self.turned = false;
     }
 
     /// Lane `l`'s place.
@@ -211,13 +220,16 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     fn arrive(&mut self, runs: &mut [Run<'a, T, A, N, P>], l: usize) {
         let q = self.place(l).q;
         let within = q.iter().all(|q| q.abs() <= self.limit);
-        if within {
-            write(&mut runs[self.runs[l]], self.clocks[l].k, &q);
-            self.clocks[l].next();
+        self.clocks[l] = Clock::new();
+        if let Some(way) = &mut self.ways[l]
+            && within
+        {
+            way.arrive(q);
+            if let Some(interval) = &way.interval {
+                return set_out(&mut self.spans[l / W], l % W, interval);
+            }
         }
-        if !within || self.clocks[l].is_over() {
-            self.end(runs, l);
-        }
+        self.end(runs, l);
     }
 
     /// Ends lane `l`'s run; the next one enters, if any is left.
@@ -231,32 +243,41 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     #[inline(never)]
     fn enter(&mut self, runs: &mut [Run<'a, T, A, N, P>], l: usize) {
         let mut state = State::new(SVector::zeros(), SVector::zeros());
-        self.clocks[l] = Clock::new(0);
-        while self.clocks[l].is_over() && self.waiting < runs.len() {
-            let run = &runs[self.waiting];
-            self.clocks[l] = Clock::new(run.torque.len().min(run.positions.len() / N));
-            (self.runs[l], self.times[l], self.torques[l]) = (self.waiting, run.t, run.torque);
+        (self.clocks[l], self.ways[l]) = (Clock::new(), None);
+        while self.ways[l].is_none() && self.waiting < runs.len() {
+            let run = &mut runs[self.waiting];
+            (self.runs[l], self.ways[l]) = (self.waiting, Way::of(run));
             state = run.state;
             self.bundles[l / W].put(l % W, run.plant);
             self.waiting += 1;
         }
-        if self.clocks[l].is_over() {
+        if let Some(Way { interval: Some(interval), .. }) = &self.ways[l] {
+            set_out(&mut self.spans[l / W], l % W, interval);
+        } else {
             // A step of no length, of which nothing is wrong.
             self.spans[l / W].h.0[l % W] = T::zero();
             self.idle[l / W].0[l % W] = lit(IDLE);
             self.moving -= 1;
-            state.modes = [Mode::Forward; N];
+            state = State { modes: [Mode::Forward; N], ..State::new(SVector::zeros(), SVector::zeros()) };
         }
-        for j in 0..N {
-            self.modes[l / W].direction[j].0[l % W] = state.modes[j].direction();
-        }
-        self.put(l, &Place { q: state.q.into(), dq: state.dq.into() });
+        self.turn(l, &state.modes.map(Mode::direction));
+        let rigid = self.bundles[l / W].plants[l % W].rigid();
+        self.put(l, &rigid.pose(&Place { q: state.q.into(), dq: state.dq.into() }));
     }
 
-    /// Puts lane `l` to a place.
-    #[inline(never)]
-    fn put(&mut self, l: usize, place: &Place<T, N>) {
-        let (own, l, i) = (self.bundles[l / W].plants[l % W].rigid().pose(place), l % W, l / W);
+    /// Gives lane `l` other directions.
+    #[inline]
+    fn turn(&mut self, l: usize, direction: &[T; N]) {
+        for j in 0..N {
+            self.modes[l / W].direction[j].0[l % W] = direction[j];
+        }
+        self.turned = true;
+    }
+
+    /// Puts lane `l` into a pose.
+    #[inline]
+    fn put(&mut self, l: usize, own: &Pose<T, N>) {
+        let (l, i) = (l % W, l / W);
         let Pose { place, turns, balance } = &mut self.poses[i];
         for j in 0..N {
             (place.q[j].0[l], place.dq[j].0[l]) = (own.place.q[j], own.place.dq[j]);
@@ -268,45 +289,17 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
     }
 
-    /// Lane `l`'s interval.
-    #[inline]
-    fn interval(&self, l: usize) -> Interval<'a, T, N> {
-        let k = self.clocks[l].k;
-        let (t, torque) = (&self.times[l][k..k + 2], &self.torques[l][k]);
-        Interval { t: t[0], h: t[1] - t[0], torque }
-    }
-
-    /// Gets times and torques of the lanes' intervals.
-    #[inline(never)]
-    fn intervals(&mut self) {
-        for l in 0..WIDTH {
-            let Clock { k, rows, .. } = self.clocks[l];
-            if k >= rows {
-                continue;
-            }
-            let (t, torque) = (&self.times[l][k..k + 2], &self.torques[l][k]);
-            let (span, l) = (&mut self.spans[l / W], l % W);
-            (span.t.0[l], span.h.0[l]) = (t[0], t[1] - t[0]);
-            for j in 0..N {
-                let Pulse { start, middle, end } = torque[j];
-                span.tau[0][j].0[l] = start;
-                span.tau[1][j].0[l] = middle;
-                span.tau[2][j].0[l] = end;
-            }
-        }
-    }
-
-    /// Gets those of lanes that only go a part of their interval.
+    /// Sets lanes that only go a part of their interval to that.
     #[inline(never)]
     fn parts(&mut self) {
         self.course = Course::Even;
-        for l in 0..WIDTH {
-            let clock = &self.clocks[l];
-            if clock.is_over() || clock.is_whole() {
+        for l in 0..Self::LANES {
+            let (clock, way) = (&self.clocks[l], &self.ways[l]);
+            let Some(Way { interval: Some(interval), .. }) = way else { continue };
+            if clock.is_whole() {
                 continue;
             }
             self.course = self.course.max(if clock.goal.is_some() { Course::Aimed } else { Course::Parted });
-            let interval = self.interval(l);
             let h = clock.length();
             let (span, l) = (&mut self.spans[l / W], l % W);
             (span.t.0[l], span.h.0[l]) = (interval.t + clock.done, h);
@@ -322,38 +315,44 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
     /// What comes of lane `l`'s step; whether it is at the end of its interval.
     #[inline(never)]
     fn judge(&mut self, l: usize) -> bool {
-        let (i, lane, interval) = (l / W, l % W, self.interval(l));
+        let (i, lane) = (l / W, l % W);
+        let Some(Way { interval: Some(interval), .. }) = &self.ways[l] else { return false };
         if self.clocks[l].is_whole() {
             self.clocks[l].left = interval.h;
         }
-        let (signs, Pose { place: end, balance, .. }) = (&self.signs[i], &self.poses[i]);
+        let (signs, start, end) = (&self.signs[i], &self.starts[i], &self.poses[i]);
         let Bundle { rigid, dry, plants, .. } = &self.bundles[i];
         let taken = Taken {
-            places: [lane_of(&self.starts[i], lane), lane_of(end, lane)],
+            places: [lane_of(start, lane), lane_of(&end.place, lane)],
             ddq: [numbers(&signs.ddq[0], lane), numbers(&signs.ddq[1], lane)],
             held: self.modes[i].held.then(|| signs.held.each_ref().map(|held| held_in(held, lane))),
             far: signs.far.0[lane],
             dry: numbers(dry, lane).map(|dry| dry != T::zero()),
             coulomb: numbers(&rigid.coulomb, lane),
-            inertia: balance.inertia.each_ref().map(|row| numbers(row, lane)),
+            inertia: end.balance.inertia.each_ref().map(|row| numbers(row, lane)),
         };
         let clock = &mut self.clocks[l];
-        let mut direction = numbers(&self.modes[i].direction, lane);
-        let (place, arrived) = match taken.judge(clock, &mut direction) {
+        let before = numbers(&self.modes[i].direction, lane);
+        let mut direction = before;
+        let own = plants[lane].rigid();
+        let (pose, arrived) = match taken.judge(clock, &mut direction) {
             Outcome::Right => return true,
-            Outcome::Again => (taken.places[0], false),
-            Outcome::Reversed(place) => (place, clock.left <= T::zero()),
+            Outcome::Again => (own.turned(&taken.places[0], turns_of(&self.turns[i], lane)), false),
+            Outcome::Reversed(place) => {
+                let turns = turns_of(&end.turns, lane);
+                (own.near(&place, &taken.places[1].q, &turns, Reach::Beside), clock.left <= T::zero())
+            }
             Outcome::Alone => {
                 let mut state = state_of(&taken.places[0], &direction);
-                exact(plants[lane], &mut state, &interval, clock.done);
+                exact(plants[lane], &mut state, interval, clock.done);
                 direction = state.modes.map(Mode::direction);
-                (Place { q: state.q.into(), dq: state.dq.into() }, true)
+                (own.pose(&Place { q: state.q.into(), dq: state.dq.into() }), true)
             }
         };
-        for j in 0..N {
-            self.modes[i].direction[j].0[lane] = direction[j];
+        if direction != before {
+            self.turn(l, &direction);
         }
-        self.put(l, &place);
+        self.put(l, &pose);
         arrived
     }
 }

@@ -3,12 +3,13 @@
 use crate::arm::Arm;
 use crate::cpu::Cpu;
 use crate::effect::{Hooks, JointPoint};
-use crate::glide::{Body, Instant};
+use crate::glide::{Body, Instant, Modes};
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::plant::Plant;
 use crate::pose::{Place, Pose, Reach, Rigid};
 use crate::real::Real;
+use crate::trig::{Rotation, Turn};
 use core::array::from_fn;
 
 /// A joint at an instant. What an effect gets is a copy, made where there is one: whatever a function outside can see has to be kept in
@@ -57,6 +58,16 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         };
         let (hooks, dry) = (from_fn(|j| plant.hooks(j)), from_fn(|j| Lanes::of(plant.dry(j))));
         Self { plants: [plant; W], rigid, alike: true, hooks, dry }
+    }
+
+    /// Whether any joint in any lane has effects.
+    #[inline(always)]
+    pub(super) fn has_effects(&self) -> bool {
+        let mut any = false;
+        for j in 0..N {
+            any |= self.hooks[j].force | self.hooks[j].coulomb;
+        }
+        any
     }
 
     /// Puts a plant into lane `l`.
@@ -180,23 +191,41 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
     }
 }
 
-impl<T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: usize> Body<Lanes<T, C, W>, N>
-    for Bundle<'_, T, C, A, W, N, P>
+/// A bundle on its way. Without effects it is known whether any joint is held, and a step is one piece of code without a branch.
+pub(super) struct Gliding<'b, B, const EFFECTS: bool, const HELD: bool>(pub(super) &'b B);
+
+impl<
+    T: Real,
+    C: Cpu,
+    A: Arm<T, N, P>,
+    const W: usize,
+    const N: usize,
+    const P: usize,
+    const EFFECTS: bool,
+    const HELD: bool,
+> Body<Lanes<T, C, W>, N> for Gliding<'_, Bundle<'_, T, C, A, W, N, P>, EFFECTS, HELD>
 {
     #[inline(always)]
-    fn near(
+    fn rotations(
         &self,
-        known: &Pose<Lanes<T, C, W>, N>,
-        place: &Place<Lanes<T, C, W>, N>,
         by: &[Lanes<T, C, W>; N],
         reach: Reach,
-    ) -> (Pose<Lanes<T, C, W>, N>, Lanes<T, C, W>) {
-        self.rigid.near(known, place, by, reach)
+    ) -> ([Rotation<Lanes<T, C, W>>; N], Lanes<T, C, W>) {
+        self.0.rigid.rotations(by, reach)
     }
 
     #[inline(always)]
-    fn dry(&self, j: usize) -> Lanes<T, C, W> {
-        self.dry[j]
+    fn turned(
+        &self,
+        place: &Place<Lanes<T, C, W>, N>,
+        turns: [Turn<Lanes<T, C, W>>; N],
+    ) -> Pose<Lanes<T, C, W>, N> {
+        self.0.rigid.turned(place, turns)
+    }
+
+    #[inline(always)]
+    fn holds(&self, modes: &Modes<Lanes<T, C, W>, N>) -> bool {
+        if EFFECTS { modes.held } else { HELD }
     }
 
     #[inline(always)]
@@ -207,13 +236,13 @@ impl<T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: 
     ) -> [Lanes<T, C, W>; N] {
         let mut pull = *at.tau;
         for j in 0..N {
-            let (mut level, viscous) = (self.rigid.coulomb[j], self.rigid.viscous[j]);
-            if self.hooks[j].force || self.hooks[j].coulomb {
-                let [own, force] = self.laws(&Here::of(at, j), direction, j);
+            let (mut level, viscous) = (self.0.rigid.coulomb[j], self.0.rigid.viscous[j]);
+            if EFFECTS && (self.0.hooks[j].force || self.0.hooks[j].coulomb) {
+                let [own, force] = self.0.laws(&Here::of(at, j), direction, j);
                 (level, pull[j]) = (own, pull[j] + force);
             }
             // What is known first is subtracted first: the bias is not.
-            let driven = (-viscous).fused(at.pose.place.dq[j], pull[j] - level * direction[j]);
+            let driven = (-viscous).fused(at.pose.place.dq[j], (-level).fused(direction[j], pull[j]));
             pull[j] = driven - at.pose.balance.bias[j];
         }
         pull
@@ -228,11 +257,11 @@ impl<T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: 
     ) -> [Lanes<T, C, W>; N] {
         let mut excess = *holding;
         for j in 0..N {
-            excess[j] = if self.hooks[j].coulomb {
-                self.excesses(&Here::of(at, j), holding[j], direction[j], j)
+            excess[j] = if EFFECTS && self.0.hooks[j].coulomb {
+                self.0.excesses(&Here::of(at, j), holding[j], direction[j], j)
             } else {
                 let slides = direction[j] * direction[j];
-                (holding[j].size() - self.rigid.coulomb[j]) * (Lanes::of(T::one()) - slides)
+                (holding[j].size() - self.0.rigid.coulomb[j]) * (Lanes::of(T::one()) - slides)
             };
         }
         excess

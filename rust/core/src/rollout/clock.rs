@@ -1,4 +1,4 @@
-//! Where a lane is on its run, and what it is about.
+//! Where a lane is within an interval, and what it is about.
 
 use crate::real::Real;
 
@@ -8,10 +8,6 @@ pub(super) const MAX_CHANGES: usize = 12;
 /// One lane's time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Clock<T, const N: usize> {
-    /// Interval.
-    pub(super) k: usize,
-    /// Intervals of the run; none is left once `k` gets there.
-    pub(super) rows: usize,
     /// Part of the interval that is done, s.
     pub(super) done: T,
     /// Part of the interval that is left, s.
@@ -25,15 +21,10 @@ pub(super) struct Clock<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Clock<T, N> {
-    /// Before the first interval.
-    pub(super) fn new(rows: usize) -> Self {
-        Self { k: 0, rows, done: T::zero(), left: T::zero(), goal: None, tried: [false; N], changes: 0 }
-    }
-
-    /// Whether the run has ended.
+    /// At the start of an interval.
     #[inline(always)]
-    pub(super) fn is_over(&self) -> bool {
-        self.k >= self.rows
+    pub(super) fn new() -> Self {
+        Self { done: T::zero(), left: T::zero(), goal: None, tried: [false; N], changes: 0 }
     }
 
     /// Whether the next step is the whole interval.
@@ -54,18 +45,6 @@ impl<T: Real, const N: usize> Clock<T, N> {
     #[inline(always)]
     pub(super) fn length(&self) -> T {
         self.goal.map_or(self.left, |goal| goal.length)
-    }
-
-    /// Whether a run was in the lane and has ended.
-    #[inline(always)]
-    pub(super) fn has_ended(&self) -> bool {
-        self.rows > 0 && self.is_over()
-    }
-
-    /// Goes on to the next interval.
-    #[inline(always)]
-    pub(super) fn next(&mut self) {
-        *self = Self { k: self.k + 1, ..Self::new(self.rows) };
     }
 }
 

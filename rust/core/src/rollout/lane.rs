@@ -1,24 +1,74 @@
 //! One lane's part of what is side by side.
 
 use super::Run;
-use crate::glide::Held;
-use crate::integrate::State;
+use crate::cpu::Cpu;
+use crate::effect::Pulse;
+use crate::glide::{Held, Span};
+use crate::integrate::{Interval, State};
 use crate::lanes::Lanes;
 use crate::plant::Mode;
 use crate::pose::Place;
 use crate::real::Real;
+use crate::trig::Turn;
 use core::array::from_fn;
+use core::iter::Zip;
+use core::slice::{Iter, IterMut};
 use nalgebra::SVector;
 
-/// Writes the positions after interval `k`.
+/// Sample times, one more than there are intervals, their torques, and the positions after them: one count for all of them.
+type Rows<'a, T, const N: usize> =
+    Zip<Zip<Zip<Iter<'a, T>, Iter<'a, T>>, Iter<'a, [Pulse<T>; N]>>, IterMut<'a, [T; N]>>;
+
+/// A run on its way through a lane.
+pub(super) struct Way<'a, T, const N: usize> {
+    rows: Rows<'a, T, N>,
+    /// The interval it is in; none at the end.
+    pub(super) interval: Option<Interval<'a, T, N>>,
+    /// Positions after it.
+    after: &'a mut [T; N],
+}
+
+impl<'a, T: Real, const N: usize> Way<'a, T, N> {
+    /// That of a run, at its first interval.
+    pub(super) fn of<A, const P: usize>(run: &mut Run<'a, T, A, N, P>) -> Option<Self> {
+        let ends = run.t.get(1..)?;
+        let positions = core::mem::take(&mut run.positions).as_chunks_mut().0;
+        let mut rows = run.t.iter().zip(ends).zip(run.torque).zip(positions);
+        let (row, after) = rows.next()?;
+        Some(Self { rows, interval: Some(interval(row)), after })
+    }
+
+    /// Writes the positions after an interval, and goes on to the next.
+    #[inline(always)]
+    pub(super) fn arrive(&mut self, q: [T; N]) {
+        *self.after = q;
+        self.interval = None;
+        if let Some((row, after)) = self.rows.next() {
+            (self.interval, self.after) = (Some(interval(row)), after);
+        }
+    }
+}
+
 #[inline(always)]
-pub(super) fn write<T: Real, A, const N: usize, const P: usize>(
-    run: &mut Run<'_, T, A, N, P>,
-    k: usize,
-    q: &[T; N],
+fn interval<'a, T: Real, const N: usize>(
+    ((&t, &end), torque): ((&T, &T), &'a [Pulse<T>; N]),
+) -> Interval<'a, T, N> {
+    Interval { t, h: end - t, torque }
+}
+
+/// Sets lane `l` to an interval.
+#[inline(always)]
+pub(super) fn set_out<T: Real, C: Cpu, const W: usize, const N: usize>(
+    span: &mut Span<Lanes<T, C, W>, N>,
+    l: usize,
+    interval: &Interval<'_, T, N>,
 ) {
-    if let Some(row) = run.positions.get_mut(k * N..k * N + N) {
-        row.copy_from_slice(q);
+    (span.t.0[l], span.h.0[l]) = (interval.t, interval.h);
+    for j in 0..N {
+        let Pulse { start, middle, end } = interval.torque[j];
+        span.tau[0][j].0[l] = start;
+        span.tau[1][j].0[l] = middle;
+        span.tau[2][j].0[l] = end;
     }
 }
 
@@ -38,6 +88,15 @@ pub(super) fn lane_of<T: Real, C, const W: usize, const N: usize>(
     l: usize,
 ) -> Place<T, N> {
     Place { q: numbers(&place.q, l), dq: numbers(&place.dq, l) }
+}
+
+/// Lane `l`'s sines and cosines.
+#[inline]
+pub(super) fn turns_of<T: Real, C, const W: usize, const N: usize>(
+    turns: &[Turn<Lanes<T, C, W>>; N],
+    l: usize,
+) -> [Turn<T>; N] {
+    from_fn(|j| Turn { sine: turns[j].sine.0[l], cosine: turns[j].cosine.0[l] })
 }
 
 /// What holds lane `l`.

@@ -33,7 +33,7 @@ pub struct Run<'a, T: Real, A, const N: usize, const P: usize> {
     pub torque: &'a [[Pulse<T>; N]],
     /// State at the first sample; once the run is made, where it ended.
     pub state: State<T, N>,
-    /// Positions at all further samples, `N` for each; those after a run has left the limit stay as they are.
+    /// Positions at all further samples, `N` for each; those after a run has left the limit stay as they are. Making the run takes them.
     pub positions: &'a mut [T],
 }
 
@@ -45,18 +45,18 @@ pub struct Together<'r, 'a, T: Real, A, const N: usize, const P: usize> {
     pub limit: T,
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Together<'_, '_, T, A, N, P> {
+impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Together<'_, 'a, T, A, N, P> {
     /// Makes them with these instructions.
     pub fn make(self, level: Level) {
         level.run_wide(self);
     }
 
-    /// Makes them in so many vectors of so many numbers.
+    /// Makes runs in so many vectors of so many numbers.
     #[inline(always)]
-    fn abreast<C: Cpu, const W: usize, const H: usize>(self) {
-        let Some(mut lanes) = Abreast::<T, C, A, W, H, N, P>::new(self.runs, self.limit) else { return };
+    fn abreast<C: Cpu, const W: usize, const H: usize>(runs: &mut [Run<'a, T, A, N, P>], limit: T) {
+        let Some(mut lanes) = Abreast::<T, C, A, W, H, N, P>::new(runs, limit) else { return };
         while lanes.are_moving() {
-            lanes.step(self.runs);
+            lanes.step(runs);
         }
     }
 }
@@ -66,6 +66,17 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Work for Together
 
     #[inline(always)]
     fn run<C: Cpu>(self) {
-        if C::DOUBLES > 2 { self.abreast::<C, 8, 1>() } else { self.abreast::<C, 2, 4>() }
+        let Self { runs, limit } = self;
+        if C::DOUBLES == 2 {
+            return Self::abreast::<C, 2, 4>(runs, limit);
+        }
+        if C::DOUBLES == WIDTH {
+            return Self::abreast::<C, 8, 1>(runs, limit);
+        }
+        // Half the lanes take half the time.
+        let over = runs.len() % WIDTH;
+        let (most, few) = runs.split_at_mut(if over <= WIDTH / 2 { runs.len() - over } else { runs.len() });
+        Self::abreast::<C, 8, 1>(most, limit);
+        Self::abreast::<C, 4, 1>(few, limit);
     }
 }
