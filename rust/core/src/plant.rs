@@ -190,7 +190,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
     /// The same but for torques that jump.
     #[inline]
-    pub(crate) fn is_plain(&self) -> bool {
+    pub fn is_plain(&self) -> bool {
         self.smoothing == T::zero() && !self.drives.any() && !self.remembers
     }
 
@@ -201,7 +201,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     }
 
     /// Positions of joint `j` at which a torque jumps.
-    fn edges(&self, j: usize) -> impl Iterator<Item = Edge<T>> {
+    pub fn edges(&self, j: usize) -> impl Iterator<Item = Edge<T>> {
         let on_joint = self.effects.iter().flatten().filter(move |e| e.joint == j);
         on_joint.filter_map(|e| e.law.edge(&e.p))
     }
@@ -445,7 +445,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// against a stop, which is to be followed and not only survived. Zero for a rigid arm with exact friction.
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
         let mut fastest = T::zero();
-        if self.smoothing == T::zero() && !self.drives.any() && !self.jumps {
+        let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));
+        if self.smoothing == T::zero() && !self.drives.any() && !behind {
             return fastest;
         }
         let inertia = self.rigid.balance(&Place { q: (*q).into(), dq: [T::zero(); N] }).inertia;
@@ -458,7 +459,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             if let Some(drive) = self.drives.get(j).filter(|d| d.gap <= T::zero()) {
                 fastest = fastest.max(drive.rate(free));
             }
-            if self.jumps {
+            if behind {
                 let met = self.edges(j).filter(|edge| edge.is_behind(q[j]));
                 fastest = met.fold(fastest, |rate, edge| rate.max(edge.rate(free) * lit(FOLLOWED)));
             }

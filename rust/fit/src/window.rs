@@ -122,7 +122,7 @@ impl<const N: usize> Dataset<N> {
             .map(|track| hypothesis.command(&track.t, &track.held, &track.pushes, &track.tables))
             .collect();
         let hidden = self.hidden(&plant, &commands);
-        let mut runs = Vec::with_capacity(self.windows.len());
+        let (mut together, mut alone) = (Vec::with_capacity(self.windows.len()), Vec::new());
         let mut rest = predicted.as_mut_slice();
         for (window, shift) in self.windows.iter().zip(starts) {
             let (positions, after) = rest.split_at_mut(window.rows() * N);
@@ -134,9 +134,18 @@ impl<const N: usize> Dataset<N> {
                 state.hidden = Hidden { anchor: state.q, ..states[window.first] };
             }
             let (t, torque) = (&track.t[window.first..=window.last], &torque[window.first..window.last]);
+            let runs = if plant.glides() || (plant.is_plain() && !self.is_near_edge(window, &plant)) {
+                &mut together
+            } else {
+                &mut alone
+            };
             runs.push(Run { plant: &plant, t, torque, state, positions });
         }
-        make(&mut runs);
+        let level = Level::widest();
+        together
+            .par_chunks_mut(GROUP)
+            .for_each(|group| Together { runs: group, limit: DIVERGED }.make(level));
+        alone.par_chunks_mut(WIDTH).for_each(|group| group.iter_mut().for_each(make_alone));
         if hypothesis.distorts() {
             for row in predicted.chunks_exact_mut(N) {
                 for (j, q) in row.iter_mut().enumerate().filter(|(_, q)| **q < DIVERGED) {
@@ -145,6 +154,21 @@ impl<const N: usize> Dataset<N> {
             }
         }
         predicted
+    }
+
+    /// Whether a joint comes close to where a torque jumps, within a window.
+    fn is_near_edge<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        window: &Window<N>,
+        plant: &Plant<f64, A, N, P>,
+    ) -> bool {
+        let q = &self.tracks[window.track].q[window.first..=window.last];
+        (0..N).filter(|j| plant.edges(*j).next().is_some()).any(|j| {
+            let low = q.iter().map(|q| q[j]).fold(f64::INFINITY, f64::min);
+            let high = q.iter().map(|q| q[j]).fold(f64::NEG_INFINITY, f64::max);
+            let margin = NEAR_EDGE * (high - low);
+            plant.edges(j).any(|edge| (low - margin..=high + margin).contains(&edge.position))
+        })
     }
 
     /// Hidden states of every track's samples, up to the start of its last window; none for a plant without any.
@@ -181,18 +205,11 @@ impl<const N: usize> Shift<N> {
     }
 }
 
+/// A position this part of a window's travel beyond it is one that a prediction may reach.
+const NEAR_EDGE: f64 = 0.3;
+
 /// Runs that share the lanes of one vector unit: enough that few lanes are idle at the end.
 const GROUP: usize = 4 * WIDTH;
-
-/// Makes runs of one plant: together where nothing but friction modes can change during a step.
-fn make<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
-    if runs.iter().all(|run| run.plant.glides()) {
-        let level = Level::widest();
-        runs.par_chunks_mut(GROUP).for_each(|group| Together { runs: group, limit: DIVERGED }.make(level));
-    } else {
-        runs.par_chunks_mut(WIDTH).for_each(|group| group.iter_mut().for_each(make_alone));
-    }
-}
 
 /// Makes one run, in as many steps per sample as its plant needs.
 fn make_alone<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
