@@ -23,9 +23,15 @@ fn dots<C: Cpu, const K: usize>(x: &[f64], y: [&[f64]; K]) -> [f64; K] {
         }
     }
     std::array::from_fn(|k| {
-        let (sums, rest) = (&sums[k], tail.iter().zip(y[k].1).map(|(a, b)| a * b).sum::<f64>());
-        ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + rest
+        let rest = tail.iter().zip(y[k].1).map(|(a, b)| a * b).sum::<f64>();
+        total(&sums[k]) + rest
     })
+}
+
+/// The sum of all lanes. Where it is inlined, compilers arrange the lanes in pairs to suit it, and every step before pays for that.
+#[inline(never)]
+fn total(sums: &[f64; LANES]) -> f64 {
+    ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
 }
 
 /// Every product of a column of `left` with a column of `right`; row by row of `left`.
