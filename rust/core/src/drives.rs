@@ -74,7 +74,8 @@ impl<T: Real, const N: usize> Drives<T, N> {
     #[inline]
     pub fn reaching(&self, tau: &SVector<T, N>, hidden: &Hidden<T, N>) -> SVector<T, N> {
         let mut reaching = *tau;
-        for (j, drive) in self.iter() {
+        for j in 0..N {
+            let Some(drive) = &self.of[j] else { continue };
             let kept = Self::kept(j, drive, tau[j], hidden);
             for (torque, part) in reaching.iter_mut().zip(drive.lever::<N>(j)) {
                 *torque -= part * kept;
@@ -86,7 +87,8 @@ impl<T: Real, const N: usize> Drives<T, N> {
     /// Adds the rotors that move with their links because their play is closed.
     #[inline]
     pub(crate) fn close(&self, inertia: &mut Inertia<T, N>, hidden: &Hidden<T, N>) {
-        for (j, drive) in self.iter() {
+        for j in 0..N {
+            let Some(drive) = &self.of[j] else { continue };
             if hidden.side[j] != T::zero() {
                 load(inertia, drive.inertia, &drive.lever(j));
             }
@@ -109,7 +111,8 @@ impl<T: Real, const N: usize> Drives<T, N> {
         hidden: &Hidden<T, N>,
     ) -> SVector<T, N> {
         let mut ddtwist = SVector::zeros();
-        for (j, drive) in self.iter() {
+        for j in 0..N {
+            let Some(drive) = &self.of[j] else { continue };
             if hidden.side[j] == T::zero() {
                 let kept = Self::kept(j, drive, tau[j], hidden);
                 ddtwist[j] = kept / drive.inertia - SVector::from(drive.lever::<N>(j)).dot(ddq);
@@ -121,16 +124,17 @@ impl<T: Real, const N: usize> Drives<T, N> {
     /// By how much the flank of joint `j`'s closed play would have to pull; positive where it opens. None for other joints.
     #[inline]
     pub(crate) fn pull(&self, j: usize, tau: T, ddq: &SVector<T, N>, hidden: &Hidden<T, N>) -> Option<T> {
-        let side = hidden.side[j];
-        let drive = self.get(j).filter(|_| side != T::zero())?;
+        let drive = self.get(j)?;
+        let side = *hidden.side.get(j).filter(|side| **side != T::zero())?;
         Some((drive.inertia * SVector::from(drive.lever::<N>(j)).dot(ddq) - tau) * side)
     }
 
     /// Depth of joint `j`'s rotor behind the nearer flank of its open play. None for other joints.
     #[inline]
     pub(crate) fn depth(&self, j: usize, hidden: &Hidden<T, N>) -> Option<T> {
-        let drive = self.get(j).filter(|d| d.gap > T::zero() && hidden.side[j] == T::zero())?;
-        Some(hidden.twist[j].abs() - drive.half_gap())
+        let drive = self.get(j).filter(|d| d.gap > T::zero())?;
+        let open = *hidden.side.get(j)? == T::zero();
+        open.then(|| hidden.twist[j].abs() - drive.half_gap())
     }
 
     /// Joint `j`'s rotor meets the flank it is at, in an arm with this inertia: the velocities and the twists' rates change at once.
@@ -141,7 +145,7 @@ impl<T: Real, const N: usize> Drives<T, N> {
         dq: &mut SVector<T, N>,
         hidden: &mut Hidden<T, N>,
     ) {
-        let Some(drive) = self.get(j) else { return };
+        let Some(drive) = self.get(j).filter(|_| j < N) else { return };
         let side = if hidden.twist[j] < T::zero() { -T::one() } else { T::one() };
         let rate = hidden.dtwist[j];
         (hidden.side[j], hidden.twist[j]) = (side, side * drive.half_gap());
@@ -150,7 +154,8 @@ impl<T: Real, const N: usize> Drives<T, N> {
         let gained = drive.lever::<N>(j).map(|part| part * drive.inertia * rate);
         let change = SVector::from(solve_positive_definite(together, gained));
         *dq += change;
-        for (k, other) in self.iter() {
+        for k in 0..N {
+            let Some(other) = &self.of[k] else { continue };
             if hidden.side[k] == T::zero() {
                 hidden.dtwist[k] -= SVector::from(other.lever::<N>(k)).dot(&change);
             }

@@ -119,6 +119,9 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
     /// The state just after an event.
     pub(super) fn applied(&self, event: &Event<T>, mut state: State<T, N>) -> State<T, N> {
         let j = event.joint;
+        if j >= N {
+            return state;
+        }
         match event.change {
             Change::Stop => (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck),
             Change::Release { mode, .. } => state.modes[j] = mode,
