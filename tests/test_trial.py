@@ -25,9 +25,10 @@ from armgap.trial import (
     possible,
 )
 from armgap.trial.arms import AXIS, DIRECT_DRIVE, GEARED, PENDULUM, TrialArm, random_arm
-from armgap.trial.case import build_rig
+from armgap.trial.case import NoMotionError, _one, build_rig
 from armgap.trial.chain import Actuator, DeadZone, Delay, Encoder, Lag, Saturation
 from armgap.trial.effects import REGISTRY, Draw, usage
+from armgap.trial.effects.base import Use
 from armgap.trial.excitation import draw_excitation
 from armgap.trial.key import Hidden, Key
 from armgap.trial.plant import Build, Flexure, Plant, Rotor
@@ -297,6 +298,13 @@ def test_impossible_wishes_are_refused():
     for wish in (("stribeck", 3), ("payload", 1), ("no_such_effect", 1)):
         with pytest.raises(ValueError, match=wish[0]):
             make_case(1, [wish])
+
+
+def test_logs_that_move_on_different_sides_are_refused():
+    use = Use(torque=1.0, peak=1.0, slew=1.0, speed=1.0, low=0.0, high=0.0, duration=10.0)
+    draw = Draw(np.random.default_rng(0), 0.5, random_arm(np.random.default_rng(0), "pendulum"), 0, use)
+    with pytest.raises(NoMotionError, match="in common"):
+        _one(draw, "presliding", 1)
 
 
 def test_missing_engine_is_one_clear_line(monkeypatch):

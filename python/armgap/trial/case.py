@@ -258,7 +258,12 @@ def _draw_hidden(
 
 
 def _one(d: Draw, name: str, joint: int | None, log: str | None = None) -> Hidden:
-    drawn = {key: float(f"{value:.6g}") for key, value in REGISTRY[name].draw(d).items()}
+    try:
+        drawn = {key: float(f"{value:.6g}") for key, value in REGISTRY[name].draw(d).items()}
+    except ZeroDivisionError:
+        raise NoMotionError(
+            f"the logs have no position of joint {joint} in common", remedy="take another seed"
+        ) from None
     return Hidden(name, joint, drawn, log, REGISTRY[name].family)
 
 
