@@ -12,7 +12,7 @@ use nalgebra::SVector;
 /// An inertia matrix, by rows.
 type Inertia<T, const N: usize> = [[T; N]; N];
 
-/// The motor sides of all joints; a rigid joint has none.
+/// The motor sides of all joints; a rigid joint has none. Loops count joints by their index, so that compilers see none out of range.
 #[derive(Debug, Clone, Copy)]
 pub struct Drives<T, const N: usize> {
     of: [Option<Drive<T>>; N],
@@ -145,7 +145,10 @@ impl<T: Real, const N: usize> Drives<T, N> {
         dq: &mut SVector<T, N>,
         hidden: &mut Hidden<T, N>,
     ) {
-        let Some(drive) = self.get(j).filter(|_| j < N) else { return };
+        if j >= N {
+            return;
+        }
+        let Some(drive) = &self.of[j] else { return };
         let side = if hidden.twist[j] < T::zero() { -T::one() } else { T::one() };
         let rate = hidden.dtwist[j];
         (hidden.side[j], hidden.twist[j]) = (side, side * drive.half_gap());

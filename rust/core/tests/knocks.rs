@@ -27,6 +27,10 @@ fn axis(mass: f64) -> Plant<f64, Axis<f64>, 1, 4> {
     Plant::new(Axis { gravity: 0.0 }, [mass, 0.0, 0.0, 0.0])
 }
 
+fn axis_with_play(mass: f64, gap: f64, share: f64) -> Plant<f64, Axis<f64>, 1, 4> {
+    axis(mass).with_effect(Active { law: law("backlash"), joint: 0, p: [gap, share, 1.0] }).expect("room")
+}
+
 fn swing(t: f64) -> [f64; 2] {
     [38.0 * (5.0 * t).sin() + 20.0 * (11.0 * t).sin(), 4.0 * (9.0 * t).sin() + 2.0 * (17.0 * t + 0.3).sin()]
 }
@@ -50,9 +54,7 @@ fn largest(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> f64 {
 #[test]
 fn a_rotor_that_meets_its_flank_shares_its_momentum() {
     let (mass, share, gap) = (2.0, 0.25, 0.01);
-    let plant = axis(mass)
-        .with_effect(Active { law: law("backlash"), joint: 0, p: [gap, share, 1.0] })
-        .expect("room");
+    let plant = axis_with_play(mass, gap, share);
     let mut state = State::new(Vector1::zeros(), Vector1::new(0.3));
     state.hidden.dtwist[0] = 1.0;
     // It has half the gap to go: 5 ms at 1 m/s.
@@ -69,9 +71,7 @@ fn a_rotor_that_meets_its_flank_shares_its_momentum() {
 #[test]
 fn a_rotor_leaves_its_flank_when_its_torque_turns() {
     let (mass, share, gap) = (2.0, 0.25, 0.01);
-    let plant = axis(mass)
-        .with_effect(Active { law: law("backlash"), joint: 0, p: [gap, share, 1.0] })
-        .expect("room");
+    let plant = axis_with_play(mass, gap, share);
     let mut state = State::new(Vector1::zeros(), Vector1::new(0.5));
     (state.hidden.side[0], state.hidden.twist[0]) = (1.0, 0.5 * gap);
     let torque = -3.0;

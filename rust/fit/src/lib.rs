@@ -18,6 +18,7 @@ pub mod energy;
 pub mod equivalent;
 mod gap;
 pub mod identify;
+mod lacking;
 pub mod locate;
 pub mod metric;
 pub mod model;

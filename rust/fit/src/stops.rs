@@ -3,13 +3,10 @@
 //! Beyond a stop the torque that the model lacks is a hinge: it grows with depth and with speed and pushes back. The position is found by
 //! trying, stiffness and damping for each by least squares.
 
+use crate::lacking::{Lacking, lacking};
 use crate::model::Hypothesis;
-use crate::observe::hidden_states;
-use crate::smooth::{Local, local_cubic};
 use crate::track::Track;
 use armgap_core::arm::Arm;
-use armgap_core::transmission::Hidden;
-use nalgebra::SVector;
 
 /// Half width, in samples, of the local cubic that accelerations are taken from: a knock is short.
 const HALF_WIDTH: usize = 3;
@@ -50,41 +47,19 @@ pub fn stops<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     model: &Hypothesis<P>,
     speed: &[f64; N],
 ) -> [Vec<Stop>; N] {
-    let mut samples: [Vec<Sample>; N] = std::array::from_fn(|_| Vec::new());
-    for track in tracks {
-        lacking(track, arm, model, speed, &mut samples);
-    }
-    samples.map(|mut joint| [1.0, -1.0].into_iter().flat_map(|side| both(&mut joint, side)).collect())
-}
-
-/// Adds what every joint lacks at each sample of a log but those at its ends.
-fn lacking<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    track: &Track<N>,
-    arm: &A,
-    model: &Hypothesis<P>,
-    speed: &[f64; N],
-    samples: &mut [Vec<Sample>; N],
-) {
-    let held = model.command(&track.t, &track.held, &track.pushes, &track.tables);
-    let held = held.as_deref().unwrap_or(&track.held);
-    let Some(plant) = model.plant(arm) else { return };
-    let hides = plant.drives().any() || plant.remembers();
-    let hidden = hides.then(|| hidden_states(track, &plant, held, track.len() - 1));
-    let slowest = speed.iter().copied().fold(f64::INFINITY, f64::min);
-    let soft = plant.with_smoothing((SLOW * slowest).max(model.smoothing));
-    for k in HALF_WIDTH..track.len().saturating_sub(HALF_WIDTH) {
-        let at: [Local; N] =
-            std::array::from_fn(|j| local_cubic(&track.t, |i| model.actual(j, track.q[i][j]), k, HALF_WIDTH));
-        let q = SVector::from_fn(|j, _| at[j].q);
-        let dq = SVector::from_fn(|j, _| at[j].dq);
-        let ddq = SVector::from_fn(|j, _| at[j].ddq);
-        let tau = SVector::from_fn(|j, _| 0.5 * (held[k - 1][j].mean() + held[k][j].mean()));
-        let hidden = hidden.as_ref().map_or_else(|| Hidden::none(q), |hidden| hidden[k]);
-        let lack = soft.lacking(track.t[k], [&q, &dq, &ddq], &tau, &hidden);
-        for (j, joint) in samples.iter_mut().enumerate() {
-            joint.push(Sample { q: q[j], dq: dq[j], lack: lack[j] });
-        }
-    }
+    let slow = SLOW * speed.iter().copied().fold(f64::INFINITY, f64::min);
+    let rows: Vec<Lacking<N>> = tracks
+        .iter()
+        .filter_map(|track| lacking(arm, track, model, &track.pushes, HALF_WIDTH, slow))
+        .flatten()
+        .collect();
+    let of = |j: usize| {
+        rows.iter().map(move |r| Sample { q: r.motion[0][j], dq: r.motion[1][j], lack: r.lack[j] })
+    };
+    std::array::from_fn(|j| {
+        let mut samples: Vec<Sample> = of(j).collect();
+        [1.0, -1.0].into_iter().flat_map(|side| both(&mut samples, side)).collect()
+    })
 }
 
 /// The stop on one side of zero as it seems, and a harder one that a knock goes as much less deep into.

@@ -2,13 +2,14 @@
 //!
 //! The motor side carries a share of the joint's nominal inertia, so with the play closed the arm is the nominal one. It rides on the joints
 //! before it: a motor that sits on the link before turns with it (`riding = 1`), of one behind a gear of ratio n next to nothing does
-//! (`riding = 1 / n`). On the first joint that is of no consequence. The flanks are springs just stiff enough, and damped, to take up the motor within about a millisecond without a rebound.
+//! (`riding = 1 / n`). On the first joint that is of no consequence. Its flanks do not
+//! give ([`crate::drives`]); the stiffness and damping below hold a motor to a link that is only measured.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::{Real, lit};
 use crate::transmission::Drive;
 
-/// Natural frequency of the motor side on its flanks, 1/s.
+/// Natural frequency of the motor side on the flanks of a measured link, 1/s.
 const FLANK_RATE: f64 = 800.0;
 
 /// Damping ratio of the flanks: no rebound.

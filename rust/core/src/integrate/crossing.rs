@@ -259,7 +259,7 @@ pub(super) enum Change<T> {
     },
     /// A flank no longer pushes; by how much it would have to pull at both ends of the step.
     Open {
-        /// The pull.
+        /// That pull.
         pull: [T; 2],
     },
 }

@@ -31,6 +31,9 @@ const ITERATIONS: usize = 12;
 const ATTEMPTS: usize = 6;
 const SETTLED: f64 = 1e-4;
 
+/// Durations that the search starts from beside the one seen, s.
+const LONGER: [f64; 2] = [0.04, 0.12];
+
 /// Times that the windows' starts and weights are made anew around the push.
 const ROUNDS: usize = 2;
 
@@ -121,9 +124,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
 
     /// The best of the minima that are reached from a first guess and from longer pushes around the same time.
     fn least(&self, p: Vector3<f64>) -> (Vector3<f64>, f64) {
-        let starts = [p[2], 0.04, 0.12].into_iter().map(|duration| Vector3::new(p[0], p[1], duration));
-        let minima = starts.map(|start| self.minimise(start));
-        minima.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_else(|| self.minimise(p))
+        LONGER.iter().fold(self.minimise(p), |best, duration| {
+            let other = self.minimise(Vector3::new(p[0], p[1], *duration));
+            if other.1 < best.1 { other } else { best }
+        })
     }
 
     /// Levenberg and Marquardt's method from a first guess: values and cost.

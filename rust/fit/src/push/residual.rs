@@ -4,14 +4,13 @@
 //! it, goes through the same low-pass, so that neither a lag nor the noise of the acceleration enters one of them alone. A push is
 //! what no combination of the columns explains: it does not come back with the state.
 
+use crate::lacking::{Lacking, lacking};
 use crate::model::Hypothesis;
-use crate::observe::hidden_states;
 use crate::products::product;
-use crate::smooth::{Local, local_cubic};
+use crate::smooth::local_cubic;
 use crate::solve::Prior;
 use crate::track::Track;
 use armgap_core::arm::Arm;
-use armgap_core::transmission::Hidden;
 use nalgebra::{SMatrix, SVector};
 
 /// Standard deviation of the low-pass, s: what elastic parts and delays do is faster, a push by hand slower.
@@ -193,37 +192,16 @@ fn rows<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     model: &Hypothesis<P>,
     slow: &[f64; N],
 ) -> Option<Vec<Row<N>>> {
-    let half = half_width(track);
-    let held = model.command(&track.t, &track.held, &[], &track.tables).unwrap_or_else(|| track.held.clone());
-    let plant = model.plant(arm)?;
-    let hides = plant.drives().any() || plant.remembers();
-    let hidden = hides.then(|| hidden_states(track, &plant, &held, track.len() - 1));
-    let widths = slow.iter().copied().fold(f64::INFINITY, f64::min);
-    let soft = plant.with_smoothing(widths.max(model.smoothing));
+    let slowest = slow.iter().copied().fold(f64::INFINITY, f64::min);
     let low: [f64; N] = std::array::from_fn(|j| LOW_SPEED / SLOW * slow[j]);
-    let row = |k: usize| {
-        let at: [Local; N] =
-            std::array::from_fn(|j| local_cubic(&track.t, |i| model.actual(j, track.q[i][j]), k, half));
-        let motion = [
-            SVector::from_fn(|j, _| at[j].q),
-            SVector::from_fn(|j, _| at[j].dq),
-            SVector::from_fn(|j, _| at[j].ddq),
-        ];
-        let tau = SVector::from_fn(|j, _| 0.5 * (held[k.saturating_sub(1)][j].mean() + held[k][j].mean()));
+    let row = |Lacking { t, motion, tau, lack }: Lacking<N>| {
         let [q, dq, ddq] = &motion;
-        let hidden = hidden.as_ref().map_or_else(|| Hidden::none(*q), |hidden| hidden[k]);
-        let lack = soft.lacking(track.t[k], [q, dq, ddq], &tau, &hidden);
-        Row {
-            t: track.t[k],
-            lack,
-            needed: lack + tau,
-            columns: columns(arm, [q, dq, ddq], &tau, slow, &low),
-            rest: SVector::from_fn(|j, _| f64::from(u8::from(dq[j].abs() < slow[j]))),
-            motion,
-            tau,
-        }
+        let columns = columns(arm, [q, dq, ddq], &tau, slow, &low);
+        let rest = SVector::from_fn(|j, _| f64::from(u8::from(dq[j].abs() < slow[j])));
+        Row { t, lack, needed: lack + tau, columns, rest, motion, tau }
     };
-    Some((half..track.len().saturating_sub(half)).map(row).collect())
+    let samples = lacking(arm, track, model, &[], half_width(track), slowest)?;
+    Some(samples.into_iter().map(row).collect())
 }
 
 /// Squared rates of torque, accelerations and speeds of all joints around every grid point, relative to their means.

@@ -4,23 +4,21 @@
 //! its velocity exactly zero and whatever friction torque that takes. [`Plant::acceleration`] is smooth while no mode changes;
 //! [`crate::integrate`] decides when one does.
 
+mod body;
+mod laws;
+mod rates;
+
 use crate::arm::{Arm, Balance};
 use crate::drives::Drives;
-use crate::effect::{Active, Edge, Hooks, JointPoint};
-use crate::glide::{Body, Instant};
+use crate::effect::{Active, Hooks};
 use crate::linear::solve_positive_definite;
-use crate::number::Number;
-use crate::pose::{Place, Pose, Reach, Rigid};
-use crate::real::{Real, lit};
+use crate::pose::{Place, Pose, Rigid};
+use crate::real::Real;
 use crate::transmission::Hidden;
-use crate::trig::{Rotation, Turn};
 use nalgebra::SVector;
 
 /// Most effects one plant can carry.
 pub const MAX_EFFECTS: usize = 8;
-
-/// How much shorter the steps of a knock are than those that only keep it stable.
-const FOLLOWED: f64 = 4.0;
 
 /// What a joint's dry friction does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -194,31 +192,6 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.smoothing == T::zero() && !self.drives.any() && !self.remembers
     }
 
-    /// Whether a torque jumps at a position.
-    #[inline]
-    pub fn jumps(&self) -> bool {
-        self.jumps
-    }
-
-    /// Positions of joint `j` at which a torque jumps.
-    pub fn edges(&self, j: usize) -> impl Iterator<Item = Edge<T>> {
-        let on_joint = self.effects.iter().flatten().filter(move |e| e.joint == j);
-        on_joint.filter_map(|e| e.law.edge(&e.p))
-    }
-
-    /// The first position between two of joint `j`, at neither, at which a torque jumps.
-    pub(crate) fn edge_between(&self, j: usize, from: T, to: T) -> Option<T> {
-        if !self.jumps {
-            return None;
-        }
-        let edges = self.edges(j).map(|edge| edge.position);
-        let between = edges.filter(|edge| (from - *edge) * (to - *edge) < T::zero());
-        between.fold(None, |first: Option<T>, edge| match first {
-            Some(first) if (first - from).abs() <= (edge - from).abs() => Some(first),
-            _ => Some(edge),
-        })
-    }
-
     /// Whether effects add a torque to joint `j`, and whether they change its Coulomb level.
     #[inline]
     pub(crate) fn hooks(&self, j: usize) -> Hooks {
@@ -250,60 +223,6 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// A plant none of whose numbers is infinite or undefined.
     pub fn is_finite(&self) -> bool {
         self.rigid.theta.iter().all(nalgebra::ComplexField::is_finite)
-    }
-
-    /// Joint `j` at an instant.
-    #[inline]
-    pub(crate) fn point(&self, j: usize, t: T, q: T, dq: T, tau: T, load: T) -> JointPoint<T> {
-        let friction = self.rigid.viscous[j] * dq.abs() + self.rigid.coulomb[j];
-        JointPoint { t, q, dq, tau, load, friction, other: T::zero(), memory: T::zero() }
-    }
-
-    /// Direction in which joint `j` slides, between -1 and 1 where friction is smoothed.
-    #[inline]
-    fn sliding(&self, j: usize, dq: &[T; N], modes: &[Mode; N]) -> T {
-        if self.smoothing > T::zero() { (dq[j] / self.smoothing).tanh() } else { modes[j].direction() }
-    }
-
-    /// Coulomb level of joint `j` in a direction, never negative.
-    #[inline]
-    pub(crate) fn level(&self, j: usize, x: &JointPoint<T>, direction: T) -> T {
-        let mut level = self.rigid.coulomb[j];
-        if self.hooks[j].coulomb {
-            for effect in self.effects.iter().flatten() {
-                if effect.joint == j && effect.law.spec().hooks.coulomb {
-                    level += effect.law.coulomb(&effect.p, x, direction);
-                }
-            }
-        }
-        level.max(T::zero())
-    }
-
-    /// Torque of the force effects on joint `j`.
-    #[inline]
-    pub(crate) fn force(&self, j: usize, x: &JointPoint<T>) -> T {
-        let mut sum = T::zero();
-        if self.hooks[j].force {
-            for effect in self.effects.iter().flatten() {
-                if effect.joint == j && effect.law.spec().hooks.force {
-                    sum += effect.law.force(&effect.p, x);
-                }
-            }
-        }
-        sum
-    }
-
-    /// Dry friction torque of a joint that is not stuck.
-    #[inline]
-    fn dry_friction(&self, j: usize, x: &JointPoint<T>, mode: Mode) -> T {
-        if self.smoothing > T::zero() {
-            let soft = (x.dq / self.smoothing).tanh();
-            return self.level(j, x, if soft < T::zero() { -T::one() } else { T::one() }) * soft;
-        }
-        match mode {
-            Mode::Stuck => T::zero(),
-            slides => self.level(j, x, slides.direction()) * slides.direction(),
-        }
     }
 
     /// Equation (1) solved for `ddq` under the motors' torque `tau`, with stuck joints held at rest.
@@ -428,88 +347,5 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         // At rest the load of a joint is what has to be held.
         let x = self.point(j, t, q, T::zero(), tau, holding - tau);
         (holding.abs() - self.level(j, &x, direction), direction)
-    }
-
-    /// Inertia of joint `j` at `q` with all other joints free to move.
-    fn free_inertia(j: usize, inertia: &[[T; N]; N]) -> T {
-        let mut least = inertia[j][j];
-        for k in 0..N {
-            if k != j {
-                least -= inertia[j][k] * inertia[j][k] / inertia[k][k];
-            }
-        }
-        least.max(lit(1e-9))
-    }
-
-    /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, a motor swings against its link, or a joint knocks
-    /// against a stop, which is to be followed and not only survived. Zero for a rigid arm with exact friction.
-    pub fn fastest(&self, q: &SVector<T, N>) -> T {
-        let mut fastest = T::zero();
-        let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));
-        if self.smoothing == T::zero() && !self.drives.any() && !behind {
-            return fastest;
-        }
-        let inertia = self.rigid.balance(&Place { q: (*q).into(), dq: [T::zero(); N] }).inertia;
-        for j in 0..N {
-            let free = Self::free_inertia(j, &inertia);
-            if self.smoothing > T::zero() {
-                let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
-                fastest = fastest.max(self.level(j, &x, T::one()) / (self.smoothing * free));
-            }
-            if let Some(drive) = self.drives.get(j).filter(|d| d.gap <= T::zero()) {
-                fastest = fastest.max(drive.rate(free));
-            }
-            if behind {
-                let met = self.edges(j).filter(|edge| edge.is_behind(q[j]));
-                fastest = met.fold(fastest, |rate, edge| rate.max(edge.rate(free) * lit(FOLLOWED)));
-            }
-        }
-        fastest
-    }
-}
-
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Body<T, N> for Plant<T, A, N, P> {
-    #[inline(always)]
-    fn rotations(&self, by: &[T; N], reach: Reach) -> ([Rotation<T>; N], T) {
-        self.rigid.rotations(by, reach)
-    }
-
-    #[inline(always)]
-    fn turned(&self, place: &Place<T, N>, turns: [Turn<T>; N]) -> Pose<T, N> {
-        self.rigid.turned(place, turns)
-    }
-
-    #[inline(always)]
-    fn pull(&self, at: &Instant<'_, T, N>, direction: &[T; N]) -> [T; N] {
-        let Pose { place: Place { q, dq }, balance, .. } = at.pose;
-        let mut pull = *at.tau;
-        for j in 0..N {
-            // What is known first is subtracted first: the bias is not.
-            pull[j] -= self.rigid.viscous[j] * dq[j];
-            let hooks = self.hooks[j];
-            if !(hooks.coulomb || hooks.force) {
-                pull[j] = pull[j] - self.rigid.coulomb[j].larger(T::zero()) * direction[j] - balance.bias[j];
-                continue;
-            }
-            pull[j] -= balance.bias[j];
-            let mut x = self.point(j, at.t, q[j], dq[j], at.tau[j], balance.bias[j]);
-            if direction[j] != T::zero() {
-                pull[j] -= self.level(j, &x, direction[j]) * direction[j];
-            }
-            x.other = direction[(j + 1) % N];
-            pull[j] += self.force(j, &x);
-        }
-        pull
-    }
-
-    #[inline(always)]
-    fn excess(&self, at: &Instant<'_, T, N>, holding: &[T; N], direction: &[T; N]) -> [T; N] {
-        let mut excess = [T::zero(); N];
-        for j in 0..N {
-            if direction[j] == T::zero() {
-                excess[j] = self.excess(j, at.t, at.pose.place.q[j], at.tau[j], holding[j]).0;
-            }
-        }
-        excess
     }
 }

@@ -1,0 +1,62 @@
+//! What friction and effects say at one joint and instant.
+
+use super::{Mode, Plant};
+use crate::arm::Arm;
+use crate::effect::JointPoint;
+use crate::real::Real;
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
+    /// Joint `j` at an instant.
+    #[inline]
+    pub(crate) fn point(&self, j: usize, t: T, q: T, dq: T, tau: T, load: T) -> JointPoint<T> {
+        let friction = self.rigid.viscous[j] * dq.abs() + self.rigid.coulomb[j];
+        JointPoint { t, q, dq, tau, load, friction, other: T::zero(), memory: T::zero() }
+    }
+
+    /// Direction in which joint `j` slides, between -1 and 1 where friction is smoothed.
+    #[inline]
+    pub(super) fn sliding(&self, j: usize, dq: &[T; N], modes: &[Mode; N]) -> T {
+        if self.smoothing > T::zero() { (dq[j] / self.smoothing).tanh() } else { modes[j].direction() }
+    }
+
+    /// Coulomb level of joint `j` in a direction, never negative.
+    #[inline]
+    pub(crate) fn level(&self, j: usize, x: &JointPoint<T>, direction: T) -> T {
+        let mut level = self.rigid.coulomb[j];
+        if self.hooks[j].coulomb {
+            for effect in self.effects.iter().flatten() {
+                if effect.joint == j && effect.law.spec().hooks.coulomb {
+                    level += effect.law.coulomb(&effect.p, x, direction);
+                }
+            }
+        }
+        level.max(T::zero())
+    }
+
+    /// Torque of the force effects on joint `j`.
+    #[inline]
+    pub(crate) fn force(&self, j: usize, x: &JointPoint<T>) -> T {
+        let mut sum = T::zero();
+        if self.hooks[j].force {
+            for effect in self.effects.iter().flatten() {
+                if effect.joint == j && effect.law.spec().hooks.force {
+                    sum += effect.law.force(&effect.p, x);
+                }
+            }
+        }
+        sum
+    }
+
+    /// Dry friction torque of a joint that is not stuck.
+    #[inline]
+    pub(super) fn dry_friction(&self, j: usize, x: &JointPoint<T>, mode: Mode) -> T {
+        if self.smoothing > T::zero() {
+            let soft = (x.dq / self.smoothing).tanh();
+            return self.level(j, x, if soft < T::zero() { -T::one() } else { T::one() }) * soft;
+        }
+        match mode {
+            Mode::Stuck => T::zero(),
+            slides => self.level(j, x, slides.direction()) * slides.direction(),
+        }
+    }
+}

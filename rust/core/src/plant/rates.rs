@@ -1,0 +1,75 @@
+//! What happens fast in a plant, and where: torques that jump at a position, and rates that call for short steps.
+
+use super::Plant;
+use crate::arm::Arm;
+use crate::effect::Edge;
+use crate::pose::Place;
+use crate::real::{Real, lit};
+use nalgebra::SVector;
+
+/// How much shorter the steps of a knock are than those that only keep it stable.
+const FOLLOWED: f64 = 4.0;
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
+    /// Whether a torque jumps at a position.
+    #[inline]
+    pub fn jumps(&self) -> bool {
+        self.jumps
+    }
+
+    /// Positions of joint `j` at which a torque jumps.
+    pub fn edges(&self, j: usize) -> impl Iterator<Item = Edge<T>> {
+        let on_joint = self.effects.iter().flatten().filter(move |e| e.joint == j);
+        on_joint.filter_map(|e| e.law.edge(&e.p))
+    }
+
+    /// The first position between two of joint `j`, at neither, at which a torque jumps.
+    pub(crate) fn edge_between(&self, j: usize, from: T, to: T) -> Option<T> {
+        if !self.jumps {
+            return None;
+        }
+        let edges = self.edges(j).map(|edge| edge.position);
+        let between = edges.filter(|edge| (from - *edge) * (to - *edge) < T::zero());
+        between.fold(None, |first: Option<T>, edge| match first {
+            Some(first) if (first - from).abs() <= (edge - from).abs() => Some(first),
+            _ => Some(edge),
+        })
+    }
+
+    /// Inertia of joint `j` at `q` with all other joints free to move.
+    fn free_inertia(j: usize, inertia: &[[T; N]; N]) -> T {
+        let mut least = inertia[j][j];
+        for k in 0..N {
+            if k != j {
+                least -= inertia[j][k] * inertia[j][k] / inertia[k][k];
+            }
+        }
+        least.max(lit(1e-9))
+    }
+
+    /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, a motor swings against its link, or a joint knocks
+    /// against a stop, which is to be followed and not only survived. Zero for a rigid arm with exact friction.
+    pub fn fastest(&self, q: &SVector<T, N>) -> T {
+        let mut fastest = T::zero();
+        let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));
+        if self.smoothing == T::zero() && !self.drives.any() && !behind {
+            return fastest;
+        }
+        let inertia = self.rigid.balance(&Place { q: (*q).into(), dq: [T::zero(); N] }).inertia;
+        for j in 0..N {
+            let free = Self::free_inertia(j, &inertia);
+            if self.smoothing > T::zero() {
+                let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
+                fastest = fastest.max(self.level(j, &x, T::one()) / (self.smoothing * free));
+            }
+            if let Some(drive) = self.drives.get(j).filter(|d| d.gap <= T::zero()) {
+                fastest = fastest.max(drive.rate(free));
+            }
+            if behind {
+                let met = self.edges(j).filter(|edge| edge.is_behind(q[j]));
+                fastest = met.fold(fastest, |rate, edge| rate.max(edge.rate(free) * lit(FOLLOWED)));
+            }
+        }
+        fastest
+    }
+}
