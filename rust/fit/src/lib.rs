@@ -37,6 +37,7 @@ pub mod simulate;
 mod slopes;
 pub mod smooth;
 pub mod solve;
+pub mod spread;
 mod starts;
 mod stops;
 pub mod study;

@@ -107,12 +107,33 @@ pub struct Metric<const N: usize> {
 }
 
 /// Inner products of columns under the metric, the residual last.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Gram {
     /// Sum over windows.
     pub total: DMatrix<f64>,
     /// Per window, the products of every column with the residual.
     pub scores: Vec<DVector<f64>>,
+    products: Vec<Vec<f64>>,
+    trust: Vec<f64>,
+}
+
+impl Gram {
+    /// From the products of `k` columns and, last, the residual within each window.
+    #[cfg(test)]
+    pub fn of(products: Vec<Vec<f64>>, k: usize) -> Self {
+        let windows = products.iter().map(|p| DMatrix::from_row_slice(k + 1, k + 1, p));
+        let total = windows.fold(DMatrix::zeros(k + 1, k + 1), |sum, window| sum + window);
+        let scores = products.iter().map(|p| DVector::from_column_slice(&p[k * (k + 1)..])).collect();
+        Self { total, scores, trust: vec![1.0; products.len()], products }
+    }
+
+    /// Products of the columns `of` with each other within one window, each column in its `unit`; all of them have to have been taken.
+    pub fn within(&self, window: usize, of: &[usize], unit: &[f64]) -> DMatrix<f64> {
+        let columns = self.total.nrows();
+        let (products, trust) = (&self.products[window], self.trust[window]);
+        let entry = |a: usize, b: usize| products[of[a] * columns + of[b]] * unit[a] * unit[b] * trust;
+        DMatrix::from_fn(of.len(), of.len(), entry)
+    }
 }
 
 impl<const N: usize> Metric<N> {
@@ -203,7 +224,7 @@ impl<const N: usize> Metric<N> {
                 total[(i, c)] = total[(c, i)];
             }
         }
-        Gram { total, scores }
+        Gram { total, scores, products: windows, trust: self.trust.clone() }
     }
 
     /// Cost of every window for a whitened residual.

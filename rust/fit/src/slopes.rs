@@ -4,7 +4,6 @@ use crate::metric::Gram;
 use crate::model::Hypothesis;
 use crate::solve::{Problem, scaled_inverse};
 use armgap_core::arm::Arm;
-use nalgebra::DMatrix;
 
 /// A value of whose sensitivity the others leave less than this part needs theirs from where it stands itself.
 const APART: f64 = 0.05;
@@ -45,7 +44,7 @@ impl<'a> Slopes<'a> {
     ) -> Self {
         let rest: Vec<usize> = (lent.len()..at.hypothesis.values().len()).collect();
         let own = problem.sensitivities(&at.hypothesis, &at.residual, &rest);
-        let gram = Gram { total: DMatrix::zeros(0, 0), scores: Vec::new() };
+        let gram = Gram::default();
         let mut slopes = Self { lent, own, gram, followed: false };
         slopes.follow(problem, at);
         slopes.followed = false;

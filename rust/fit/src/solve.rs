@@ -8,6 +8,7 @@ use crate::model::{Hypothesis, Placed};
 use crate::progress::Watch;
 use crate::scale::Scales;
 use crate::slopes::{Point, Slopes};
+use crate::spread::Spread;
 use crate::window::Dataset;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{NEVER, Trial};
@@ -89,8 +90,8 @@ pub struct Fit<const P: usize> {
     pub data_cost: f64,
     /// Cost of the distance from trusted values.
     pub prior_cost: f64,
-    /// Covariance of the free values, with each window as one independent observation.
-    pub covariance: DMatrix<f64>,
+    /// How far the free values may be off.
+    pub spread: Spread,
     /// Cost of every window as it is.
     pub costs: Vec<f64>,
     /// Whether it was taken to its end with sensitivities of its own.
@@ -100,7 +101,7 @@ pub struct Fit<const P: usize> {
 impl<const P: usize> Fit<P> {
     /// Standard deviation of the free value `i`.
     pub fn sigma(&self, i: usize) -> f64 {
-        self.covariance[(i, i)].max(0.0).sqrt()
+        self.spread.covariance[(i, i)].max(0.0).sqrt()
     }
 }
 
@@ -239,9 +240,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
             }
         }
         self.watch.unit();
-        let covariance = self.covariance(&slopes.gram, &at);
+        let spread = self.spread(&slopes.gram, &at);
         let Point { hypothesis, data_cost, prior_cost, costs, .. } = at;
-        Fit { hypothesis, data_cost, prior_cost, covariance, costs, own: slopes.lent() == 0 }
+        Fit { hypothesis, data_cost, prior_cost, spread, costs, own: slopes.lent() == 0 }
     }
 
     /// Normal matrix and right-hand side, the prior included.
@@ -257,45 +258,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
         (normal, gradient)
     }
 
-    /// Sandwich covariance: curvature inside, the windows' own scatter of scores between (White 1982), which the fit has made smaller by
-    /// the values it has drawn from the windows (`MacKinnon` and White 1985). A value that changes no prediction is as likely anywhere
-    /// between its bounds.
-    fn covariance(&self, gram: &Gram, at: &Point<P>) -> DMatrix<f64> {
-        let (normal, _) = self.normal_equations(gram, &at.hypothesis);
-        let k = normal.nrows();
-        let (seen, unseen): (Vec<usize>, Vec<usize>) = (0..k).partition(|&i| normal[(i, i)] > 0.0);
-        let of = |matrix: &DMatrix<f64>| matrix.select_rows(&seen).select_columns(&seen);
-        let Some(inverse) = scaled_inverse(&of(&normal)) else {
-            return DMatrix::from_diagonal_element(k, k, f64::INFINITY);
-        };
-        let mut scatter = DMatrix::zeros(seen.len(), seen.len());
-        for score in &gram.scores {
-            let s = score.select_rows(&seen);
-            scatter += &s * s.transpose();
-        }
-        scatter *= spent(gram.scores.len(), (&inverse * of(&gram.total)).trace());
-        for i in 0..P {
-            scatter[(i, i)] += 1.0 / self.prior.sigma[i].powi(2);
-        }
-        let known = &inverse * scatter * &inverse;
+    /// How far the values may be off.
+    fn spread(&self, gram: &Gram, at: &Point<P>) -> Spread {
         let (lower, upper) = self.bounds(&at.hypothesis);
-        let mut covariance = DMatrix::zeros(k, k);
-        for (a, &i) in seen.iter().enumerate() {
-            for (b, &j) in seen.iter().enumerate() {
-                covariance[(i, j)] = known[(a, b)];
-            }
-        }
-        for i in unseen {
-            covariance[(i, i)] = (upper[i] - lower[i]).powi(2) / 12.0;
-        }
-        covariance
+        let trust: Vec<f64> =
+            (0..lower.len()).map(|i| if i < P { self.prior.sigma[i].powi(-2) } else { 0.0 }).collect();
+        let range: Vec<f64> = lower.iter().zip(&upper).map(|(l, u)| u - l).collect();
+        Spread::new(gram, &trust, &range)
     }
-}
-
-/// Factor by which scores of `windows` scatter less once `drawn` values have been fitted to them.
-fn spent(windows: usize, drawn: f64) -> f64 {
-    let n = windows as f64;
-    (n / (n - drawn).max(1.0)).powi(2)
 }
 
 /// A step that takes no value after the first `free` more than nine tenths of the way to its lower bound: an effect that is switched
