@@ -1,6 +1,6 @@
 //! Which effect: screening, full fits of what passes, and the holdout's decision, one cause after another.
 
-use crate::decide::{ABOVE_FLOOR, CONSEQUENCE};
+use crate::decide::{ABOVE_FLOOR, CONSEQUENCE, UNEXPLAINED};
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Work;
 use crate::scale::Scales;
@@ -139,6 +139,11 @@ impl<const N: usize, const P: usize> Stage<N, P> {
     /// Whether the current model leaves a gap of consequence above the floor.
     pub fn is_open(&self) -> bool {
         self.relative_error() > CONSEQUENCE && self.excess() > ABOVE_FLOOR
+    }
+
+    /// Whether the current model leaves a gap of consequence that is more than noise.
+    pub fn is_unexplained(&self) -> bool {
+        self.relative_error() > CONSEQUENCE && self.excess() > UNEXPLAINED
     }
 
     /// Whether the current model leaves a gap above the floor in which an improvement of `noticeable` size can lie.

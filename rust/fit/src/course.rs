@@ -4,12 +4,11 @@
 
 use crate::attribute::{Contender, Stage};
 use crate::belief::{Cause, name, temper};
-use crate::decide::{
-    CERTAIN, CLEAR, CONSEQUENCE, FAINTEST, RELEVANT, TRUST_GAIN, UNEXPLAINED, choose, noticeable,
-};
+use crate::decide::{CERTAIN, CLEAR, FAINTEST, RELEVANT, TRUST_GAIN, UNEXPLAINED, choose, noticeable};
 use crate::model::{Hypothesis, Placed};
 use crate::solve::{Effort, Fit};
 use crate::study::{Study, Weights};
+use crate::together::Both;
 use armgap_core::arm::Arm;
 
 /// The whole course of an attribution.
@@ -25,10 +24,36 @@ pub struct Attribution<const N: usize, const P: usize> {
 }
 
 impl<const N: usize, const P: usize> Attribution<N, P> {
+    /// RMS error of the final model on the holdout relative to the motion.
+    pub fn error(&self) -> f64 {
+        self.stages.last().map_or(f64::INFINITY, Stage::relative_error)
+    }
+
     /// Whether the final model leaves a gap of consequence that is more than noise.
     pub fn is_unexplained(&self) -> bool {
-        let last = self.stages.last();
-        last.is_some_and(|s| s.excess() > UNEXPLAINED && s.relative_error() > CONSEQUENCE)
+        self.stages.last().is_some_and(Stage::is_unexplained)
+    }
+}
+
+/// Where a search stands.
+struct Course<const N: usize, const P: usize> {
+    model: Fit<P>,
+    causes: Vec<Cause>,
+    /// The stages before this one.
+    stages: Vec<Stage<N, P>>,
+    stage: Stage<N, P>,
+    smoothed: bool,
+    /// Improvements of this size count, relative to the motion.
+    threshold: f64,
+}
+
+impl<const N: usize, const P: usize> Course<N, P> {
+    /// Takes up two causes; returns the fit with both.
+    fn take_up(&mut self, both: Both<N, P>) -> Fit<P> {
+        let fit = both.stage.contenders[both.choice].fit.clone();
+        self.causes.extend(both.causes);
+        self.stages.push(std::mem::replace(&mut self.stage, both.stage));
+        fit
     }
 }
 
@@ -36,53 +61,75 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// Attributes the gap to at most `max_causes` effects.
     pub fn attribute(&self, max_causes: usize, seed: u64) -> Attribution<N, P> {
         let nominal = Hypothesis::rigid(self.prior.theta);
-        let mut scale = self.rough_scale(&nominal);
+        let scale = self.rough_scale(&nominal);
         let settled = self.settle(&nominal, scale);
         let mut stage = self.stage_around(settled.clone(), RELEVANT);
         let refit = stage.settled.clone();
-        let mut model = refit.clone();
-        let (mut causes, mut stages): (Vec<Cause>, Vec<Stage<N, P>>) = (Vec::new(), Vec::new());
-        let mut smoothed = false;
         let noticeable = noticeable(stage.relative_error());
-        let mut threshold = self.look_closer(&mut stage, settled, noticeable, CLEAR);
-        while causes.len() < max_causes {
-            let Some((choice, ground)) = choose(&stage, smoothed, threshold) else {
-                let Some(both) = (causes.len() + 2 <= max_causes)
-                    .then(|| self.together(&stage, threshold, seed))
-                    .flatten()
-                else {
-                    break;
-                };
-                model = both.stage.contenders[both.choice].fit.clone();
-                causes.extend(both.causes);
-                stages.push(stage);
-                scale = both.stage.weights.training.scale;
-                stages.push(both.stage);
-                let settled = self.settle(&model.hypothesis, scale);
-                stage = self.stage_around(settled.clone(), noticeable);
-                threshold = self.look_closer(&mut stage, settled, noticeable, UNEXPLAINED);
-                model = stage.settled.clone();
-                continue;
-            };
-            let best = &stage.contenders[choice];
-            model = best.fit.clone();
-            match best.effect {
-                Some(_) => causes.push(name(&stage, choice, ground, seed)),
-                None => smoothed = true,
-            }
-            scale = stage.weights.training.scale;
-            let settled = self.settle(&model.hypothesis, scale);
-            let next = self.stage_around(settled.clone(), noticeable);
-            stages.push(std::mem::replace(&mut stage, next));
-            threshold = self.look_closer(&mut stage, settled, noticeable, UNEXPLAINED);
-            model = stage.settled.clone();
+        let threshold = self.look_closer(&mut stage, settled, noticeable, CLEAR);
+        let (causes, stages, model) = (Vec::new(), Vec::new(), refit.clone());
+        let mut course = Course { model, causes, stages, stage, smoothed: false, threshold };
+        self.pursue(&mut course, noticeable, max_causes, seed);
+        if course.stage.is_unexplained() && !course.causes.is_empty() && max_causes > 1 {
+            course = self.retraced(course, noticeable, max_causes, seed);
         }
+        let Course { mut model, mut causes, mut stages, stage, .. } = course;
         self.prune(&mut model, &mut causes, &stage);
         self.widen(&mut model, &stage.weights);
         stages.push(stage);
         refresh(&model, &mut causes);
         temper(&stages, &mut causes);
         Attribution { refit, model, causes, stages }
+    }
+
+    /// Takes up one cause after another, or two at once, until nothing more deserves it.
+    fn pursue(&self, course: &mut Course<N, P>, noticeable: f64, max_causes: usize, seed: u64) {
+        while course.causes.len() < max_causes {
+            let stage = &course.stage;
+            let next = if let Some((choice, ground)) = choose(stage, course.smoothed, course.threshold) {
+                match stage.contenders[choice].effect {
+                    Some(_) => course.causes.push(name(stage, choice, ground, seed)),
+                    None => course.smoothed = true,
+                }
+                stage.contenders[choice].fit.clone()
+            } else {
+                let room = course.causes.len() + 2 <= max_causes;
+                let pair = room.then(|| self.together(stage, None, course.threshold, seed)).flatten();
+                let Some(both) = pair else { break };
+                course.take_up(both)
+            };
+            self.advance(course, &next, noticeable);
+        }
+    }
+
+    /// The same from the first stage by another pair of causes, where a search has ended beside a gap: the first cause may have stood in
+    /// for both. Only a pair that explains nearly all of the gap counts.
+    fn retraced(
+        &self,
+        mut course: Course<N, P>,
+        noticeable: f64,
+        max_causes: usize,
+        seed: u64,
+    ) -> Course<N, P> {
+        let first = &course.stages[0];
+        let taken = course.causes[0].effect;
+        let Some(both) = self.together(first, Some(&taken), noticeable, seed) else { return course };
+        course.stage = course.stages.swap_remove(0);
+        course.stages.clear();
+        course.causes.clear();
+        let next = course.take_up(both);
+        self.advance(&mut course, &next, noticeable);
+        self.pursue(&mut course, noticeable, max_causes, seed);
+        course
+    }
+
+    /// Goes on to the stage around `next`.
+    fn advance(&self, course: &mut Course<N, P>, next: &Fit<P>, noticeable: f64) {
+        let settled = self.settle(&next.hypothesis, course.stage.weights.training.scale);
+        let stage = self.stage_around(settled.clone(), noticeable);
+        course.stages.push(std::mem::replace(&mut course.stage, stage));
+        course.threshold = self.look_closer(&mut course.stage, settled, noticeable, UNEXPLAINED);
+        course.model = course.stage.settled.clone();
     }
 
     /// Looks into a gap that is too small to matter by itself, and yet stands above the floor by the factor `clear`; returns which

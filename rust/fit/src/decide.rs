@@ -214,10 +214,15 @@ fn is_certain<const N: usize, const P: usize>(
 
 /// Whether a contender explains implausible parameters by one effect.
 pub fn restores<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Contender<P>) -> bool {
-    let before = stage.base.fit.prior_cost;
     contender.effect.is_some()
         && (stage.relative_error() < TRUSTWORTHY || !stage.is_open())
-        && !is_plausible::<P>(before)
+        && brings_back(stage, contender)
+}
+
+/// Whether a contender brings implausible parameters back towards their trusted values, at no cost.
+pub fn brings_back<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Contender<P>) -> bool {
+    let before = stage.base.fit.prior_cost;
+    !is_plausible::<P>(before)
         && before - contender.fit.prior_cost > TRUST_GAIN
         && contender.fit.prior_cost < 0.4 * before
         && contender.score() < stage.base.score()

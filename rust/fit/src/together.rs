@@ -6,7 +6,8 @@
 
 use crate::attribute::{Contender, Stage};
 use crate::belief::{Cause, name};
-use crate::decide::{CERTAIN, Ground, best, choose, is_possible, moves};
+use crate::decide::{CERTAIN, Ground, best, brings_back, choose, is_possible, moves};
+use crate::model::Placed;
 use crate::solve::Effort;
 use crate::study::Study;
 use armgap_core::arm::Arm;
@@ -15,9 +16,10 @@ use armgap_core::arm::Arm;
 const NEARLY_ALL: f64 = 0.9;
 
 /// Contenders that are taken on trust.
-const TRIED: usize = 2;
+const TRIED: usize = 3;
 
-/// Mean advantage, in standard errors, below which a contender is not worth that.
+/// Mean advantage, in standard errors, below which a contender is not worth that, unless it brings implausible parameters back to
+/// their trusted values.
 const HOPEFUL: f64 = 2.0;
 
 /// Two causes and the stage in which the second was found.
@@ -31,13 +33,23 @@ pub struct Both<const N: usize, const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// The two effects that explain together what none explains alone.
-    pub fn together(&self, alone: &Stage<N, P>, noticeable: f64, seed: u64) -> Option<Both<N, P>> {
+    /// The two effects that explain together what none explains alone; the first of them is not `but`.
+    pub fn together(
+        &self,
+        alone: &Stage<N, P>,
+        but: Option<&Placed>,
+        noticeable: f64,
+        seed: u64,
+    ) -> Option<Both<N, P>> {
         if !alone.is_worth_more(noticeable) {
             return None;
         }
+        let other = |e: &Placed| but.is_none_or(|but| !e.same_place(but));
         let hopeful = |c: &&Contender<P>| {
-            alone.shows(c.effect.as_ref()) && is_possible(c) && c.z_over(&alone.base) > HOPEFUL
+            c.effect.as_ref().is_some_and(other)
+                && alone.shows(c.effect.as_ref())
+                && is_possible(c)
+                && (c.z_over(&alone.base) > HOPEFUL || brings_back(alone, c))
         };
         alone
             .contenders

@@ -34,6 +34,9 @@ const NEAR_END: f64 = 0.12;
 /// Probability left to a push beside a remainder that nothing explains.
 const REMAINDER_DOUBT: f64 = 0.5;
 
+/// Predictions that miss by more than this factor are much worse.
+const MUCH_WORSE: f64 = 1.5;
+
 /// Shortest log that is judged, s.
 const SHORTEST_LOG: f64 = 1.5;
 
@@ -75,14 +78,21 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// The attribution with all pushes accounted for.
     ///
     /// Where that model describes the arm, pushes are looked for again under it. Beside a remainder they are kept as they were found: there
-    /// the second model was seen to take up a part of the pushes, and the second search to find fewer.
+    /// the second model was seen to take up a part of the pushes, and the second search to find fewer. Pushes beside which predictions miss
+    /// by much more than without are none.
     pub fn conclude(&mut self, max_causes: usize, seed: u64) -> (Attribution<N, P>, Vec<Event>) {
         let mut attribution = self.attribute(max_causes, seed);
         let mut events = self.events(&attribution);
         if !events.is_empty() {
-            let beside_remainder = attribution.is_unexplained();
             self.set_pushes(&events);
-            attribution = self.attribute(max_causes, seed);
+            let beside = self.attribute(max_causes, seed);
+            if beside.error() > MUCH_WORSE * attribution.error() {
+                events.clear();
+                self.set_pushes(&events);
+                return (attribution, events);
+            }
+            let beside_remainder = attribution.is_unexplained();
+            attribution = beside;
             if !beside_remainder {
                 events = self.events(&attribution);
                 self.set_pushes(&events);
