@@ -88,10 +88,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let mut without = pair.fit.hypothesis.clone();
         without.effects.remove(none.effects.len());
         let again = self.stage(&without, stage.weights.training.scale, noticeable);
-        let found = best(&again, true)?;
+        let (found, needed) = match choose(&again, true, noticeable) {
+            Some((found, Ground::Trust)) => (found, Ground::Trust),
+            _ => (best(&again, true)?, Ground::Motion),
+        };
+        let certain = needed == Ground::Trust || again.contenders[found].z_over(&again.base) > CERTAIN;
         let same = again.contenders[found].effect?.same_place(&first.effect?);
-        let needed = again.contenders[found].z_over(&again.base) > CERTAIN;
-        let causes = [name(&again, found, ground, seed), name(&stage, choice, ground, seed)];
-        (same && needed).then_some(Both { causes, stage, choice })
+        let causes = [name(&again, found, needed, seed), name(&stage, choice, ground, seed)];
+        (same && certain).then_some(Both { causes, stage, choice })
     }
 }
