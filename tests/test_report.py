@@ -9,6 +9,7 @@ import re
 
 import numpy as np
 import pytest
+from bokeh.core.validation.check import check_integrity
 
 import report_cases as cases
 from armgap import Arm, diagnose, simulate
@@ -55,6 +56,15 @@ def test_a_free_run_that_runs_away_leaves_the_picture_not_the_scale() -> None:
     series = {"t": [0.0, 1.0, 2.0], "measured": [0.0, 1.0, 0.5], "before": [0.0, 2.0, 90.0], "after": [0.0, 1.0, None]}
     chart = _whole_run(series, "with the causes")
     assert (chart.y_range.start, chart.y_range.end) == (-1.0, 2.0)
+
+
+@EVERY_CASE
+def test_charts_lack_nothing_that_bokeh_looks_for(case) -> None:
+    sections = diagnosis_document(case()).sections
+    models = [model for s in sections for drawing in s.figures for model in drawing.chart.references()]
+    assert models
+    found = check_integrity(models)
+    assert (found.error, found.warning) == ([], [])
 
 
 @EVERY_CASE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import sys
 from importlib import import_module
@@ -31,6 +33,9 @@ COMMANDS = {
 
 UNUSABLE_INPUT = 2
 INTERRUPTED = 130
+
+_GARBAGE_EVERY = 50_000
+"""Objects between two searches for garbage: most of what a command makes, modules and charts, stays until it ends."""
 
 
 class LazyGroup(click.Group):
@@ -66,6 +71,8 @@ def cli() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; unusable input ends it with status 2 and one line on standard error."""
+    gc.set_threshold(_GARBAGE_EVERY)
+    atexit.register(gc.freeze)  # what is left at the end goes with the process, without being searched
     try:
         status = cli.main(args=arguments, prog_name="armgap", standalone_mode=False)
     except ArmgapError as error:
