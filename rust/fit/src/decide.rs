@@ -73,7 +73,7 @@ const AT_BOUND: f64 = 0.98;
 pub const RESAMPLES: usize = 400;
 
 /// A contender with fewer parameters is preferred if it reaches this part of the best one's advantage.
-const ALMOST: f64 = 0.95;
+pub const ALMOST: f64 = 0.95;
 
 /// The same where even the best leaves most of the gap: there, further parameters are taken up by what they are not about.
 const ALMOST_IN_DOUBT: f64 = 0.6;

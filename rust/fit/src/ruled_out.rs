@@ -1,6 +1,8 @@
 //! What was looked for and not found: a status for every candidate that is no cause.
 
+use crate::attribute::Stage;
 use crate::course::Attribution;
+use crate::decide::{ALMOST, MATTERS, restores};
 use crate::model::Placed;
 use crate::report::{Bound, RuledOut};
 use crate::screen::{Scored, screen};
@@ -44,6 +46,13 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             Some((_, known)) if weaker(&entry, known) => *known = entry,
             Some(_) => {}
             None => list.push((test.effect, entry)),
+        }
+    }
+    let stages: Vec<_> =
+        attribution.stages.windows(2).filter_map(|s| Some((&s[0], adopted(&s[0], &s[1])?))).collect();
+    for (place, entry) in &mut list {
+        if let Some(instead) = stages.iter().find_map(|(stage, choice)| rivalled(stage, *choice, place)) {
+            leave_open(entry, &instead);
         }
     }
     let mut entries: Vec<RuledOut> = list.into_iter().map(|(_, entry)| entry).collect();
@@ -108,6 +117,39 @@ fn status<A, const N: usize, const P: usize>(
         why: traced.then(|| {
             "it leaves a trace in the training logs, but does not reduce the gap on the holdout".to_owned()
         }),
+    }
+}
+
+/// The contender that was adopted between two stages.
+fn adopted<const N: usize, const P: usize>(stage: &Stage<N, P>, next: &Stage<N, P>) -> Option<usize> {
+    let among = |effects: &[Placed], e: &Placed| effects.iter().any(|x| x.same_place(e));
+    let (before, after) = (&stage.settled.hypothesis.effects, &next.settled.hypothesis.effects);
+    let new = |e: &Placed| among(after, e) && !among(before, e);
+    stage.contenders.iter().position(|c| c.effect.as_ref().is_some_and(new))
+}
+
+/// What was adopted in a stage in which another effect would have done nearly as well, by the motion or by what it makes of the
+/// parameters.
+fn rivalled<const N: usize, const P: usize>(
+    stage: &Stage<N, P>,
+    choice: usize,
+    place: &Placed,
+) -> Option<Placed> {
+    let named = &stage.contenders[choice];
+    let rival = stage.contenders.iter().find(|c| c.effect.is_some_and(|e| e.same_place(place)))?;
+    let by_motion = stage.share(named) > MATTERS && stage.share(rival) > ALMOST * stage.share(named);
+    (by_motion || (restores(stage, named) && restores(stage, rival))).then_some(named.effect?)
+}
+
+/// What would do nearly as well in place of a named cause is absent only if that is right.
+fn leave_open(entry: &mut RuledOut, instead: &Placed) {
+    if entry.status == "absent" {
+        (entry.status, entry.bound) = ("undecided", None);
+        let joint = instead.joint_number().map_or(String::new(), |j| format!(", joint {j}"));
+        entry.why = Some(format!(
+            "beside the named causes there is none of it, but in place of {}{joint} it would do nearly as well",
+            instead.law.spec().title
+        ));
     }
 }
 

@@ -42,8 +42,8 @@ def ruled_out(data: Data) -> Section | None:
         return None
     count = {status: sum(r["status"] == status for r in found) for status in ("absent", "undecided", "not excited")}
     text = (
-        f"{len(found)} candidates are not named: {count['absent']} absent (no larger than the bound), {count['undecided']} undecided (a trace in "
-        f"training that held-out motion does not confirm), {count['not excited']} not excited."
+        f"{len(found)} candidates are not named: {count['absent']} absent (no larger than the bound), {count['undecided']} undecided (the last "
+        f"column says why), {count['not excited']} not excited."
     )
     rows = [(named(r), r["status"], bound_text(r), r.get("why") or "") for r in found]
     table = Table(("candidate", "status", "bound (95 %)", "why"), rows, fold=f"All {len(found)} candidates")
