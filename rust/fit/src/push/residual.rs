@@ -38,6 +38,10 @@ const UNKNOWN: f64 = 0.05;
 const ROTOR: f64 = 0.1;
 const COUPLING: f64 = 0.05;
 
+/// Zero of an encoder that is taken for possible, rad, and the turn over which its torque is taken.
+const ZERO: f64 = 0.05;
+const TURN: f64 = 1e-3;
+
 /// Lag of the torque that is taken for possible, s.
 const LAG: f64 = 0.01;
 
@@ -74,7 +78,7 @@ pub struct Residual<const N: usize> {
     pub joints: [Joint; N],
     /// Expected value and standard deviation of every column's coefficient.
     pub prior: Vec<(f64, f64)>,
-    /// How violent the motion is around each point, by squared accelerations, speeds and rates of torque; mean about one.
+    /// How violent the motion is around each point, by squared accelerations, speeds, torques and rates of torque; mean about one.
     pub activity: Vec<Vec<f64>>,
 }
 
@@ -144,18 +148,20 @@ fn expected<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     if N > 1 {
         all.push((0.0, COUPLING * own[(0, 0)].min(own[(1, 1)])));
     }
+    all.extend([(0.0, ZERO); N]);
     all.extend([(0.0, LAG); N]);
     all
 }
 
 /// Torques that a model could be wrong by at one instant: its own parameters, then per joint a rotor, an offset, drag, friction at low
-/// speed, two springs or tilts, and friction under load; last the coupling of a rotor.
+/// speed, two springs or tilts, and friction under load; last the coupling of a rotor and the encoders' zeros.
 fn columns<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     [q, dq, ddq]: [&SVector<f64, N>; 3],
     tau: &SVector<f64, N>,
     slow: &[f64; N],
     low: &[f64; N],
+    theta: &[f64; P],
 ) -> Vec<SVector<f64, N>> {
     let sign = SVector::<f64, N>::from_fn(|j, _| (dq[j] / slow[j]).tanh());
     let mut y: SMatrix<f64, N, P> = arm.regressor(q, dq, ddq);
@@ -182,6 +188,13 @@ fn columns<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         (column[0], column[1]) = (ddq[1], ddq[0]);
         all.push(column);
     }
+    let rigid: SMatrix<f64, N, P> = arm.regressor(q, dq, ddq);
+    for j in 0..N {
+        let mut turned = *q;
+        turned[j] += TURN;
+        let change: SMatrix<f64, N, P> = arm.regressor(&turned, dq, ddq) - rigid;
+        all.push(change * SVector::from(*theta) / TURN);
+    }
     all
 }
 
@@ -196,7 +209,7 @@ fn rows<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let low: [f64; N] = std::array::from_fn(|j| LOW_SPEED / SLOW * slow[j]);
     let row = |Lacking { t, motion, tau, lack }: Lacking<N>| {
         let [q, dq, ddq] = &motion;
-        let columns = columns(arm, [q, dq, ddq], &tau, slow, &low);
+        let columns = columns(arm, [q, dq, ddq], &tau, slow, &low, &model.theta);
         let rest = SVector::from_fn(|j, _| f64::from(u8::from(dq[j].abs() < slow[j])));
         Row { t, lack, needed: lack + tau, columns, rest, motion, tau }
     };
@@ -204,13 +217,14 @@ fn rows<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     Some(samples.into_iter().map(row).collect())
 }
 
-/// Squared rates of torque, accelerations and speeds of all joints around every grid point, relative to their means.
+/// Squared torques, rates of torque, accelerations and speeds of all joints around every grid point, relative to their means.
 fn activity<const N: usize>(rows: &[Row<N>], low: &LowPass) -> Vec<Vec<f64>> {
     let mut all = Vec::new();
     for j in 0..N {
         let of = |f: &dyn Fn(&Row<N>) -> f64| low.apply(&rows.iter().map(f).collect::<Vec<f64>>());
-        let rate = slope(&of(&|r| r.tau[j]), low.step);
-        for series in [rate, of(&|r| r.motion[2][j]), of(&|r| r.motion[1][j])] {
+        let tau = of(&|r| r.tau[j]);
+        let rate = slope(&tau, low.step);
+        for series in [tau, rate, of(&|r| r.motion[2][j]), of(&|r| r.motion[1][j])] {
             let squares: Vec<f64> = series.iter().map(|x| x * x).collect();
             let smooth = moving_mean(&squares, (0.5 * ACTIVE / low.step).round() as usize);
             let mean = smooth.iter().sum::<f64>() / smooth.len().max(1) as f64;

@@ -2,7 +2,8 @@
 //!
 //! Parameters, unknown laws and pushes are fitted together, linearly; what a bell at one time, of one width, on one joint would gain is
 //! weighed against the scatter there and against how much of the bell the other columns could imitate (a generalised likelihood ratio).
-//! The largest are added one by one, for one push hides another by raising the scatter, and then the doubtful are taken out again.
+//! The largest are added one by one, for one push hides another by raising the scatter, and then the doubtful are taken out again; beside a
+//! remainder also those that stand out only as long as they are fitted.
 
 use super::residual::{LOW_PASS, Residual};
 use super::scatter::scatter;
@@ -38,8 +39,9 @@ const LIKELY: f64 = 5.0;
 const ABOVE_REMAINDER: f64 = 3.9;
 const CERTAIN: f64 = 12.0;
 
-/// A log whose largest bell is smaller than this holds no push, not even ones that hide each other.
-const WORTH_A_SEARCH: f64 = 3.9;
+/// Size that a bell has to have while what it consists of still counts as scatter. A log whose largest bell is smaller holds no push, not
+/// even ones that hide each other.
+const STANDS_OUT: f64 = 3.9;
 
 /// Height, relative to the joint's friction at rest, from which a push exceeds it.
 const ABOVE_FRICTION: f64 = 1.2;
@@ -138,7 +140,7 @@ pub fn search<const N: usize>(residual: &Residual<N>, remainder: bool) -> Option
     loop {
         let fitted = search.settle(&bells)?;
         let largest = search.scan(&fitted);
-        if bells.is_empty() && largest.is_none_or(|b| b.z < WORTH_A_SEARCH) {
+        if bells.is_empty() && largest.is_none_or(|b| b.z < STANDS_OUT) {
             return Some(Found { bells, rest: TRIED });
         }
         bells = search.refine(bells)?;
@@ -161,6 +163,19 @@ pub fn search<const N: usize>(residual: &Residual<N>, remainder: bool) -> Option
         }
         rest = f64::max(rest, bells.remove(weakest).z.min(LIKELY));
     }
+    // Beside a remainder a bell that is fitted takes what the model lacks there for its own, and so seems to stand in a calm place.
+    while remainder && !bells.is_empty() {
+        let unaided = |i| if search.stands(&bells[i]) { search.unaided(&bells, i) } else { Some(0.0) };
+        let unaided: Vec<f64> = (0..bells.len()).map(unaided).collect::<Option<_>>()?;
+        let weakest = (0..bells.len()).min_by(|&a, &b| unaided[a].total_cmp(&unaided[b]))?;
+        if unaided[weakest] > STANDS_OUT {
+            break;
+        }
+        rest = f64::max(rest, bells.remove(weakest).z.min(LIKELY));
+        let fitted = search.settle(&bells)?;
+        search.scan(&fitted);
+        bells = search.refine(bells)?;
+    }
     Some(Found { bells, rest })
 }
 
@@ -169,6 +184,14 @@ impl<const N: usize> Search<'_, N> {
     fn stands(&self, bell: &Bell) -> bool {
         let above = bell.height.abs() > ABOVE_FRICTION * self.residual.joints[bell.joint].holding;
         if self.remainder { bell.z > CERTAIN || (bell.z > ABOVE_REMAINDER && above) } else { bell.z > LIKELY }
+    }
+
+    /// Size of a bell beside the others where it has to stand out of a scatter that it raises itself.
+    fn unaided(&mut self, bells: &[Bell], i: usize) -> Option<f64> {
+        let others = all_but(bells, i);
+        let fitted = self.settle(&others)?;
+        self.scan(&fitted);
+        Some(self.best_near(&fitted, &bells[i], true).z)
     }
 
     /// All columns and bells fitted, with the scatter that follows from what is left.
@@ -333,26 +356,37 @@ impl<const N: usize> Search<'_, N> {
     fn refine(&self, bells: Vec<Bell>) -> Option<Vec<Bell>> {
         let mut bells = bells;
         for i in 0..bells.len() {
-            let others: Vec<Bell> =
-                bells.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, b)| *b).collect();
-            let fitted = self.fit(&others)?;
-            let mut best = Bell { z: -1.0, ..bells[i] };
-            let mut chance = 1.0;
-            let steps = (REFINED / FINE).round() as i32;
-            for (w, &width) in WIDTHS.iter().enumerate() {
-                let (from, to) = self.span(width);
-                for step in -steps..=steps {
-                    let time = (bells[i].time + f64::from(step) * FINE).max(from).min(to);
-                    let tried = self.weigh(&fitted, &Bell { time, width, ..bells[i] });
-                    if tried.z > best.z && others.iter().all(|o| !tried.touches(o)) {
-                        (best, chance) = (tried, self.chance[bells[i].joint][w]);
-                    }
-                }
-            }
-            bells[i] = Bell { z: best.z / chance, sigma: best.sigma * chance, ..best };
+            let fitted = self.fit(&all_but(&bells, i))?;
+            bells[i] = self.best_near(&fitted, &bells[i], false);
         }
         Some(bells)
     }
+
+    /// The bell that fits best near one that the fit leaves out, or the one that stands out most.
+    fn best_near(&self, fitted: &Fitted, bell: &Bell, stands_out: bool) -> Bell {
+        let mut best = Bell { z: -1.0, ..*bell };
+        let mut largest = -1.0;
+        let steps = (REFINED / FINE).round() as i32;
+        for (w, &width) in WIDTHS.iter().enumerate() {
+            let (from, to) = self.span(width);
+            let chance = self.chance[bell.joint][w];
+            for step in -steps..=steps {
+                let time = (bell.time + f64::from(step) * FINE).max(from).min(to);
+                let tried = self.weigh(fitted, &Bell { time, width, ..*bell });
+                let size = if stands_out { tried.z / chance } else { tried.z };
+                if size > largest && fitted.bells.iter().all(|o| !tried.touches(o)) {
+                    best = Bell { z: tried.z / chance, sigma: tried.sigma * chance, ..tried };
+                    largest = size;
+                }
+            }
+        }
+        best
+    }
+}
+
+/// All bells but one.
+fn all_but(bells: &[Bell], i: usize) -> Vec<Bell> {
+    bells.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, b)| *b).collect()
 }
 
 impl Bell {
