@@ -41,7 +41,7 @@ const CERTAIN: f64 = 12.0;
 
 /// Size that a bell has to have while what it consists of still counts as scatter. A log whose largest bell is smaller holds no push, not
 /// even ones that hide each other.
-const STANDS_OUT: f64 = 3.9;
+const STANDS_OUT: f64 = 3.6;
 
 /// Height, relative to the joint's friction at rest, from which a push exceeds it.
 const ABOVE_FRICTION: f64 = 1.2;
