@@ -113,6 +113,7 @@ pub struct Gram {
     pub total: DMatrix<f64>,
     /// Per window, the products of every column with the residual.
     pub scores: Vec<DVector<f64>>,
+    /// Per window, row by row, if all were taken.
     products: Vec<Vec<f64>>,
     trust: Vec<f64>,
 }
@@ -224,7 +225,8 @@ impl<const N: usize> Metric<N> {
                 total[(i, c)] = total[(c, i)];
             }
         }
-        Gram { total, scores, products: windows, trust: self.trust.clone() }
+        let products = if lead == k { windows } else { Vec::new() };
+        Gram { total, scores, products, trust: self.trust.clone() }
     }
 
     /// Cost of every window for a whitened residual.

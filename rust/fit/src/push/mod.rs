@@ -3,7 +3,9 @@
 //! [`residual`] is the torque that a log lacks under a model, beside everything the model could be wrong by; [`search`] finds in it what
 //! comes once and does not follow from the state; [`fit`] sizes it by output error, where the model is good enough for that.
 
+mod bell;
 mod fit;
+mod linear;
 mod residual;
 mod scatter;
 mod search;
@@ -17,10 +19,11 @@ use crate::study::Study;
 use crate::track::Track;
 use armgap_core::arm::Arm;
 use armgap_core::effect::find;
+use bell::Bell;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use residual::Residual;
-use search::{Bell, MOST, search};
+use search::{MOST, search};
 
 /// Shortest push that is reported, s.
 const SHORTEST: f64 = 0.005;

@@ -1,0 +1,83 @@
+//! A push as the low-passed torque shows it: a bell over time.
+
+use super::residual::LOW_PASS;
+
+/// Two bells on the same joint are apart by this, s.
+const APART: f64 = 0.3;
+
+/// A bell on one joint.
+#[derive(Debug, Clone, Copy)]
+pub struct Bell {
+    /// 0-based joint.
+    pub joint: usize,
+    /// Time of the centre, s.
+    pub time: f64,
+    /// Standard deviation as it appears behind the low-pass, s.
+    pub width: f64,
+    /// Height, N m.
+    pub height: f64,
+    /// Standard deviation of the height.
+    pub sigma: f64,
+    /// Size in standard deviations of what bells of its kind have elsewhere in the log.
+    pub z: f64,
+}
+
+impl Bell {
+    /// Impulse, N m s.
+    pub fn impulse(&self) -> f64 {
+        self.height * self.width * std::f64::consts::TAU.sqrt()
+    }
+
+    /// Length of the rectangle that is spread as far as the bell before the low-pass, s.
+    pub fn duration(&self) -> f64 {
+        12.0_f64.sqrt() * (self.width.powi(2) - LOW_PASS.powi(2)).max(0.0).sqrt()
+    }
+
+    /// Its value at a time, per unit of height.
+    pub fn at(&self, t: f64) -> f64 {
+        let x = (t - self.time) / self.width;
+        if x.abs() > 5.0 { 0.0 } else { (-0.5 * x * x).exp() }
+    }
+
+    /// The bell at points of a regular grid, each from the one before: its logarithm is a parabola.
+    pub fn over(&self, t: &[f64], step: f64) -> Vec<f64> {
+        let step = step / self.width;
+        let from = t.first().map_or(0.0, |t| (t - self.time) / self.width);
+        let (mut value, bend) = ((-0.5 * from * from).exp(), (-step * step).exp());
+        let mut ratio = (-step * (from + 0.5 * step)).exp();
+        let next = |_| {
+            let here = value;
+            value *= ratio;
+            ratio *= bend;
+            here
+        };
+        t.iter().map(next).collect()
+    }
+
+    /// Whether two cannot both be pushes.
+    pub fn touches(&self, other: &Self) -> bool {
+        self.joint == other.joint && (self.time - other.time).abs() < APART
+    }
+}
+
+/// All bells but one.
+pub fn all_but(bells: &[Bell], i: usize) -> Vec<Bell> {
+    bells.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, b)| *b).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bell_over_a_grid_is_the_bell_at_its_points() {
+        for (time, width) in [(3.004, 0.045), (2.7, 0.18)] {
+            let bell = Bell { joint: 0, time, width, height: 0.0, sigma: 0.0, z: 0.0 };
+            let t: Vec<f64> = (0..144).map(|i| time - 4.0 * width + 0.01 * f64::from(i)).collect();
+            let near: Vec<f64> = t.into_iter().filter(|t| (t - time).abs() < 4.0 * width).collect();
+            for (t, value) in near.iter().zip(bell.over(&near, 0.01)) {
+                assert!((value / bell.at(*t) - 1.0).abs() < 1e-11, "{t}: {value}");
+            }
+        }
+    }
+}
