@@ -35,13 +35,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         // What the arm file says of a value is no narrower for being told apart worse by the logs.
         let widest = |i: usize| if i < P { self.prior.sigma[i] } else { f64::INFINITY };
         let scale: Vec<f64> = (0..factor.len())
-            .map(|i| (factor[i] * fit.spread().widening(i)).min((widest(i) / fit.sigma(i)).max(1.0)))
+            .map(|i| (factor[i] * fit.spread.widening(i)).min((widest(i) / fit.sigma(i)).max(1.0)))
             .collect();
-        let mut spread = fit.spread().clone();
-        for ((i, j), value) in indices(factor.len()).zip(spread.covariance.iter_mut()) {
+        for ((i, j), value) in indices(factor.len()).zip(fit.spread.covariance.iter_mut()) {
             *value *= scale[i] * scale[j];
         }
-        fit.set_spread(spread);
     }
 
     /// Squared difference of every determined value in units of its variance.

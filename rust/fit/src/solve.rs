@@ -14,7 +14,6 @@ use armgap_core::arm::Arm;
 use armgap_core::effect::{NEVER, Trial};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::sync::OnceLock;
 
 /// Relative displacement for sensitivities; events are located to 1e-12, so a forward difference is good to 1e-6.
 const RELATIVE_STEP: f64 = 1e-6;
@@ -91,38 +90,18 @@ pub struct Fit<const P: usize> {
     pub data_cost: f64,
     /// Cost of the distance from trusted values.
     pub prior_cost: f64,
-    /// What tells how far the free values may be off.
-    evidence: Evidence,
-    spread: OnceLock<Spread>,
+    /// How far the free values may be off.
+    pub spread: Spread,
     /// Cost of every window as it is.
     pub costs: Vec<f64>,
     /// Whether it was taken to its end with sensitivities of its own.
     pub own: bool,
 }
 
-/// What the spread of fitted values is made from.
-#[derive(Debug, Clone)]
-struct Evidence {
-    gram: Gram,
-    trust: Vec<f64>,
-    range: Vec<f64>,
-}
-
 impl<const P: usize> Fit<P> {
-    /// How far the free values may be off, found out when it is first asked for.
-    pub fn spread(&self) -> &Spread {
-        let Evidence { gram, trust, range } = &self.evidence;
-        self.spread.get_or_init(|| Spread::new(gram, trust, range))
-    }
-
-    /// Replaces what is known of that.
-    pub fn set_spread(&mut self, spread: Spread) {
-        self.spread = spread.into();
-    }
-
     /// Standard deviation of the free value `i`.
     pub fn sigma(&self, i: usize) -> f64 {
-        self.spread().covariance[(i, i)].max(0.0).sqrt()
+        self.spread.covariance[(i, i)].max(0.0).sqrt()
     }
 }
 
@@ -261,10 +240,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
             }
         }
         self.watch.unit();
-        let own = slopes.lent() == 0;
-        let evidence = self.evidence(slopes.gram, &at.hypothesis);
+        let spread = self.spread(&slopes.gram, &at);
         let Point { hypothesis, data_cost, prior_cost, costs, .. } = at;
-        Fit { hypothesis, data_cost, prior_cost, evidence, spread: OnceLock::new(), costs, own }
+        Fit { hypothesis, data_cost, prior_cost, spread, costs, own: slopes.lent() == 0 }
     }
 
     /// Normal matrix and right-hand side, the prior included.
@@ -280,11 +258,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
         (normal, gradient)
     }
 
-    fn evidence(&self, gram: Gram, hypothesis: &Hypothesis<P>) -> Evidence {
-        let (lower, upper) = self.bounds(hypothesis);
-        let trust = |i: usize| if i < P { self.prior.sigma[i].powi(-2) } else { 0.0 };
-        let range = lower.iter().zip(&upper).map(|(lower, upper)| upper - lower).collect();
-        Evidence { gram, trust: (0..lower.len()).map(trust).collect(), range }
+    /// How far the values may be off.
+    fn spread(&self, gram: &Gram, at: &Point<P>) -> Spread {
+        let (lower, upper) = self.bounds(&at.hypothesis);
+        let trust: Vec<f64> =
+            (0..lower.len()).map(|i| if i < P { self.prior.sigma[i].powi(-2) } else { 0.0 }).collect();
+        let range: Vec<f64> = lower.iter().zip(&upper).map(|(l, u)| u - l).collect();
+        Spread::new(gram, &trust, &range)
     }
 }
 

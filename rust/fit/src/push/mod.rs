@@ -113,7 +113,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let (first, last) = (&attribution.stages[0], &attribution.stages[attribution.stages.len() - 1]);
         let state = State {
             model: &attribution.model.hypothesis,
-            covariance: &attribution.model.spread().covariance,
+            covariance: &attribution.model.spread.covariance,
             scale: last.weights.training.scale,
             remainder: attribution.is_unexplained(),
             noticeable: noticeable(first.relative_error()),
