@@ -24,13 +24,14 @@ fn dots<C: Cpu, const K: usize>(x: &[f64], y: [&[f64]; K]) -> [f64; K] {
     }
     std::array::from_fn(|k| {
         let rest = tail.iter().zip(y[k].1).map(|(a, b)| a * b).sum::<f64>();
-        total(&sums[k]) + rest
+        total(sums[k]) + rest
     })
 }
 
-/// The sum of all lanes. Where it is inlined, compilers arrange the lanes in pairs to suit it, and every step before pays for that.
+/// The sum of all lanes. Where it is inlined, compilers arrange the lanes in pairs to suit it, and every step before pays for that; where it
+/// is shown the lanes instead of a copy, they may be kept in memory all along.
 #[inline(never)]
-fn total(sums: &[f64; LANES]) -> f64 {
+fn total(sums: [f64; LANES]) -> f64 {
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
 }
 
