@@ -1,0 +1,66 @@
+"""Causes beside each other: what would do as well in another's place, and two that share a gap."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from armgap import Arm, Diagnosis, Log, diagnose, seed_torque, simulate
+from armgap.simulation import Effect
+
+PENDULUM = """\
+name = "Pendulum"
+kind = "pendulum"
+gravity = 9.81
+sample_period = 0.004
+
+[inertial]
+theta = [0.05, 0.6]
+
+[friction]
+viscous = [0.02]
+coulomb = [0.1]
+"""
+SIZES = {"actuator_lag": "time_constant", "actuator_delay": "delay"}
+
+
+def swing(arm: Arm, seed: int, effect: Effect) -> Log:
+    """Eight seconds under five sines drawn from a seed."""
+    t = np.arange(2000) * arm.sample_period
+    height, speed, phase = np.array([[0.1], [1.0], [0.0]]) + np.array([[0.3], [17.0], [6.0]]) * np.random.default_rng(
+        seed
+    ).uniform(size=(3, 5))
+    tau = (height * np.sin(np.outer(t, speed) + phase)).sum(axis=1)
+    return simulate(arm, t, tau, effects=[effect], name=f"run {seed}")
+
+
+@pytest.mark.parametrize(("hidden", "other"), [("actuator_lag", "actuator_delay"), ("actuator_delay", "actuator_lag")])
+@pytest.mark.parametrize(("size", "status"), [(0.0005, "undecided"), (0.002, "absent")])
+def test_what_would_do_nearly_as_well_is_not_called_absent(tmp_path, hidden, other, size, status):
+    (tmp_path / "arm.toml").write_text(PENDULUM, encoding="utf-8")
+    arm = Arm.read(tmp_path / "arm.toml")
+    effect = Effect(hidden, 1, {SIZES[hidden]: size})
+    result = diagnose(swing(arm, 1, effect), arm, holdout=swing(arm, 2, effect))
+    assert [c.effect for c in result.causes] == [hidden]
+    [rival] = [r for r in result.ruled_out if r.effect == other]
+    assert rival.status == status
+    if status == "undecided":
+        assert rival.bound is None
+        assert "in place of" in rival.why
+    else:
+        assert rival.bound.value < size / 100
+
+
+@pytest.fixture(scope="module")
+def pair(arm: Arm) -> Diagnosis:
+    """An encoder that is off at joint 1 and a gear at joint 2; each leaves the other's share of the gap."""
+    t = np.arange(2400) * arm.sample_period
+    hidden = [Effect("encoder_offset", 1, {"offset": -0.05}), Effect("gear_efficiency", 2, {"loss": 0.2})]
+    other = np.column_stack([45 * np.sin(9 * t) + 20 * np.sin(17 * t), 6 * np.sin(15 * t + 1) + 4 * np.sin(31 * t)])
+    training = simulate(arm, t, seed_torque(t), effects=hidden, name="training")
+    return diagnose(training, arm, holdout=simulate(arm, t, other, effects=hidden, name="holdout"))
+
+
+def test_both_of_a_pair_are_named(pair):
+    assert {(c.effect, c.joint) for c in pair.causes} == {("encoder_offset", 1), ("gear_efficiency", 2)}
+    assert all(c.probability > 0.5 for c in pair.causes)
