@@ -10,6 +10,7 @@ import polars as pl
 import pytest
 
 from armgap import Arm, Log, seed_torque, simulate
+from swings import PENDULUM
 
 # Reyes and Kelly (1997), Table I, with the encoders and torque limits of section 5; friction of joint 1 at its mean.
 TABLE_ONE = """\
@@ -46,6 +47,13 @@ def arm_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def arm(arm_file: Path) -> Arm:
     return Arm.read(arm_file)
+
+
+@pytest.fixture(scope="session")
+def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Arm:
+    path = tmp_path_factory.mktemp("pendulum") / "pendulum.toml"
+    path.write_text(PENDULUM)
+    return Arm.read(path)
 
 
 @pytest.fixture(scope="session")

@@ -11,24 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armgap import Arm, Diagnosis, Log, diagnose, simulate
+from armgap import Arm, Diagnosis, Log, diagnose
 from armgap.errors import LogShapeError, OptionError
 from armgap.simulation import Effect
+from swings import swing
 
-PENDULUM = """\
-name = "Pendulum"
-kind = "pendulum"
-gravity = 9.81
-sample_period = 0.004
-
-[inertial]
-theta = [0.05, 0.6]
-
-[friction]
-viscous = [0.02]
-coulomb = [0.1]
-"""
-NOISE_RAD = 2e-4
 STRIBECK = Effect("stribeck", 1, {"amplitude": 0.15, "velocity": 0.3})
 
 NUMBER = (int, float)
@@ -76,22 +63,6 @@ def conforms(value: object, shape: object, place: str = "$") -> None:
     else:
         assert isinstance(value, shape), place
         assert not isinstance(value, float) or math.isfinite(value), place
-
-
-@pytest.fixture(scope="module")
-def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Arm:
-    path = tmp_path_factory.mktemp("pendulum") / "pendulum.toml"
-    path.write_text(PENDULUM)
-    return Arm.read(path)
-
-
-def swing(arm: Arm, seed: int, *effects: Effect) -> Log:
-    """Eight seconds under five sines drawn from a seed."""
-    t = np.arange(2000) * arm.sample_period
-    draw = np.random.default_rng(seed).uniform(size=(3, 5))
-    height, speed, phase = 0.1 + 0.3 * draw[0], 0.5 + 8.5 * draw[1], 6 * draw[2]
-    tau = (height * np.sin(np.outer(t, speed) + phase)).sum(axis=1)
-    return simulate(arm, t, tau, effects=effects, noise=NOISE_RAD, seed=seed, name=f"run {seed}")
 
 
 @pytest.fixture(scope="module")

@@ -5,42 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from armgap import Arm, Diagnosis, Log, diagnose, seed_torque, simulate
+from armgap import Arm, Diagnosis, diagnose, seed_torque, simulate
 from armgap.simulation import Effect
+from swings import swing
 
-PENDULUM = """\
-name = "Pendulum"
-kind = "pendulum"
-gravity = 9.81
-sample_period = 0.004
-
-[inertial]
-theta = [0.05, 0.6]
-
-[friction]
-viscous = [0.02]
-coulomb = [0.1]
-"""
+NOISE_RAD = 1e-5
 SIZES = {"actuator_lag": "time_constant", "actuator_delay": "delay"}
-
-
-def swing(arm: Arm, seed: int, effect: Effect) -> Log:
-    """Eight seconds under five sines drawn from a seed."""
-    t = np.arange(2000) * arm.sample_period
-    height, speed, phase = np.array([[0.1], [1.0], [0.0]]) + np.array([[0.3], [17.0], [6.0]]) * np.random.default_rng(
-        seed
-    ).uniform(size=(3, 5))
-    tau = (height * np.sin(np.outer(t, speed) + phase)).sum(axis=1)
-    return simulate(arm, t, tau, effects=[effect], name=f"run {seed}")
 
 
 @pytest.mark.parametrize(("hidden", "other"), [("actuator_lag", "actuator_delay"), ("actuator_delay", "actuator_lag")])
 @pytest.mark.parametrize(("size", "status"), [(0.0005, "undecided"), (0.002, "absent")])
-def test_what_would_do_nearly_as_well_is_not_called_absent(tmp_path, hidden, other, size, status):
-    (tmp_path / "arm.toml").write_text(PENDULUM, encoding="utf-8")
-    arm = Arm.read(tmp_path / "arm.toml")
+def test_what_would_do_nearly_as_well_is_not_called_absent(pendulum, hidden, other, size, status):
     effect = Effect(hidden, 1, {SIZES[hidden]: size})
-    result = diagnose(swing(arm, 1, effect), arm, holdout=swing(arm, 2, effect))
+    training, holdout = (swing(pendulum, seed, effect, noise=NOISE_RAD) for seed in (1, 2))
+    result = diagnose(training, pendulum, holdout=holdout)
     assert [c.effect for c in result.causes] == [hidden]
     [rival] = [r for r in result.ruled_out if r.effect == other]
     assert rival.status == status

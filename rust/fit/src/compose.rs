@@ -242,18 +242,13 @@ fn stages<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 ) -> Vec<StageSummary> {
     let data = &study.holdout.data;
     let starts = data.measured_starts();
-    let added = |i: usize| {
-        let next = attribution.stages.get(i + 1)?;
-        let effect =
-            next.base.fit.hypothesis.effects.get(attribution.stages[i].base.fit.hypothesis.effects.len())?;
-        Some(EquivalentSummary {
-            effect: effect.law.spec().name,
-            joint: effect.joint_number(),
-            why: String::new(),
-        })
+    let summary_of = |effect: &Placed| EquivalentSummary {
+        effect: effect.law.spec().name,
+        joint: effect.joint_number(),
+        why: String::new(),
     };
     let summary = |(i, stage): (usize, &crate::attribute::Stage<N, P>)| StageSummary {
-        added: added(i),
+        added: attribution.added(i).map(summary_of),
         rms: rms::<N>(&study.holdout.measured, &data.predict(&study.arm, &stage.settled.hypothesis, &starts)),
         excess: stage.excess(),
         relative_error: stage.relative_error(),

@@ -24,6 +24,13 @@ pub struct Attribution<const N: usize, const P: usize> {
 }
 
 impl<const N: usize, const P: usize> Attribution<N, P> {
+    /// The effect that was taken up after a stage.
+    pub fn added(&self, stage: usize) -> Option<&Placed> {
+        let effects = |i: usize| self.stages.get(i).map(|s| &s.settled.hypothesis.effects);
+        let before = effects(stage)?;
+        effects(stage + 1)?.iter().find(|e| !before.iter().any(|known| known.same_place(e)))
+    }
+
     /// RMS error of the final model on the holdout relative to the motion.
     pub fn error(&self) -> f64 {
         self.stages.last().map_or(f64::INFINITY, Stage::relative_error)
@@ -37,7 +44,6 @@ impl<const N: usize, const P: usize> Attribution<N, P> {
 
 /// Where a search stands.
 struct Course<const N: usize, const P: usize> {
-    model: Fit<P>,
     causes: Vec<Cause>,
     /// The stages before this one.
     stages: Vec<Stage<N, P>>,
@@ -67,13 +73,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let refit = stage.settled.clone();
         let noticeable = noticeable(stage.relative_error());
         let threshold = self.look_closer(&mut stage, settled, noticeable, CLEAR);
-        let (causes, stages, model) = (Vec::new(), Vec::new(), refit.clone());
-        let mut course = Course { model, causes, stages, stage, smoothed: false, threshold };
+        let mut course = Course { causes: Vec::new(), stages: Vec::new(), stage, smoothed: false, threshold };
         self.pursue(&mut course, noticeable, max_causes, seed);
         if course.stage.is_unexplained() && !course.causes.is_empty() && max_causes > 1 {
             course = self.retraced(course, noticeable, max_causes, seed);
         }
-        let Course { mut model, mut causes, mut stages, stage, .. } = course;
+        let Course { mut causes, mut stages, stage, .. } = course;
+        let mut model = stage.settled.clone();
         self.prune(&mut model, &mut causes, &stage);
         self.widen(&mut model, &stage.weights);
         stages.push(stage);
@@ -117,6 +123,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         course.stage = course.stages.swap_remove(0);
         course.stages.clear();
         course.causes.clear();
+        course.smoothed = false;
         let next = course.take_up(both);
         self.advance(&mut course, &next, noticeable);
         self.pursue(&mut course, noticeable, max_causes, seed);
@@ -129,7 +136,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let stage = self.stage_around(settled.clone(), noticeable);
         course.stages.push(std::mem::replace(&mut course.stage, stage));
         course.threshold = self.look_closer(&mut course.stage, settled, noticeable, UNEXPLAINED);
-        course.model = course.stage.settled.clone();
     }
 
     /// Looks into a gap that is too small to matter by itself, and yet stands above the floor by the factor `clear`; returns which

@@ -1,20 +1,17 @@
 //! What was looked for and not found: a status for every candidate that is no cause.
 
-use crate::attribute::Stage;
 use crate::course::Attribution;
 use crate::decide::{ALMOST, MATTERS, restores};
 use crate::model::Placed;
 use crate::report::{Bound, RuledOut};
 use crate::screen::{Scored, screen};
+use crate::spread::NORMAL_95;
 use crate::study::Study;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Spec, Trial, catalogue};
 
 /// An effect whose size this log pins down to no better than this part of a typical size has not been excited.
 const PINNED: f64 = 0.5;
-
-/// Two-sided 95 % of the normal distribution.
-const NORMAL_95: f64 = 1.96;
 
 /// An effect that could be behind more than this part of what remains unexplained is not absent.
 const COULD_BE: f64 = 0.1;
@@ -48,10 +45,8 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             None => list.push((test.effect, entry)),
         }
     }
-    let stages: Vec<_> =
-        attribution.stages.windows(2).filter_map(|s| Some((&s[0], adopted(&s[0], &s[1])?))).collect();
     for (place, entry) in &mut list {
-        if let Some(instead) = stages.iter().find_map(|(stage, choice)| rivalled(stage, *choice, place)) {
+        if let Some(instead) = rivalled(attribution, place) {
             leave_open(entry, &instead);
         }
     }
@@ -120,25 +115,20 @@ fn status<A, const N: usize, const P: usize>(
     }
 }
 
-/// The contender that was adopted between two stages.
-fn adopted<const N: usize, const P: usize>(stage: &Stage<N, P>, next: &Stage<N, P>) -> Option<usize> {
-    let among = |effects: &[Placed], e: &Placed| effects.iter().any(|x| x.same_place(e));
-    let (before, after) = (&stage.settled.hypothesis.effects, &next.settled.hypothesis.effects);
-    let new = |e: &Placed| among(after, e) && !among(before, e);
-    stage.contenders.iter().position(|c| c.effect.as_ref().is_some_and(new))
-}
-
-/// What was adopted in a stage in which another effect would have done nearly as well, by the motion or by what it makes of the
-/// parameters.
+/// The named cause in whose place another effect would have done nearly as well, by the motion or by what it makes of the parameters.
 fn rivalled<const N: usize, const P: usize>(
-    stage: &Stage<N, P>,
-    choice: usize,
+    attribution: &Attribution<N, P>,
     place: &Placed,
 ) -> Option<Placed> {
-    let named = &stage.contenders[choice];
-    let rival = stage.contenders.iter().find(|c| c.effect.is_some_and(|e| e.same_place(place)))?;
-    let by_motion = stage.share(named) > MATTERS && stage.share(rival) > ALMOST * stage.share(named);
-    (by_motion || (restores(stage, named) && restores(stage, rival))).then_some(named.effect?)
+    let named = |e: &&Placed| attribution.causes.iter().any(|c| c.effect.same_place(e));
+    attribution.stages.iter().enumerate().find_map(|(i, stage)| {
+        let adopted = attribution.added(i).filter(named)?;
+        let at =
+            |place: &Placed| stage.contenders.iter().find(|c| c.effect.is_some_and(|e| e.same_place(place)));
+        let (cause, rival) = (at(adopted)?, at(place)?);
+        let by_motion = stage.share(cause) > MATTERS && stage.share(rival) > ALMOST * stage.share(cause);
+        (by_motion || (restores(stage, cause) && restores(stage, rival))).then_some(*adopted)
+    })
 }
 
 /// What would do nearly as well in place of a named cause is absent only if that is right.

@@ -29,7 +29,7 @@ const JITTER: f64 = 1e-12;
 const NORMAL: f64 = 1e3;
 
 /// Two-sided 95 % of the normal distribution.
-const NORMAL_95: f64 = 1.96;
+pub const NORMAL_95: f64 = 1.96;
 
 /// Covariance of fitted values and what it rests on.
 #[derive(Debug, Clone)]

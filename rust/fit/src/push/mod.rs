@@ -90,9 +90,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             self.set_pushes(&events);
             let beside = self.attribute(max_causes, seed);
             if beside.error() > MUCH_WORSE * attribution.error() {
-                events.clear();
-                self.set_pushes(&events);
-                return (attribution, events);
+                self.set_pushes(&[]);
+                return (attribution, Vec::new());
             }
             let beside_remainder = attribution.is_unexplained();
             attribution = beside;

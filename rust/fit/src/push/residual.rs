@@ -164,7 +164,8 @@ fn columns<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     theta: &[f64; P],
 ) -> Vec<SVector<f64, N>> {
     let sign = SVector::<f64, N>::from_fn(|j, _| (dq[j] / slow[j]).tanh());
-    let mut y: SMatrix<f64, N, P> = arm.regressor(q, dq, ddq);
+    let rigid: SMatrix<f64, N, P> = arm.regressor(q, dq, ddq);
+    let mut y = rigid;
     for j in 0..N {
         y[(j, A::INERTIAL + N + j)] = sign[j];
     }
@@ -188,7 +189,6 @@ fn columns<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         (column[0], column[1]) = (ddq[1], ddq[0]);
         all.push(column);
     }
-    let rigid: SMatrix<f64, N, P> = arm.regressor(q, dq, ddq);
     for j in 0..N {
         let mut turned = *q;
         turned[j] += TURN;

@@ -48,7 +48,8 @@ pub struct Found {
 }
 
 impl Found {
-    fn drop(&mut self, bell: usize) {
+    /// Takes a bell out as no push.
+    fn dismiss(&mut self, bell: usize) {
         self.rest = f64::max(self.rest, self.bells.remove(bell).z.min(LIKELY));
     }
 }
@@ -104,7 +105,7 @@ impl<const N: usize> Search<'_, N> {
             if self.stands(&found.bells[weakest]) {
                 break;
             }
-            found.drop(weakest);
+            found.dismiss(weakest);
         }
         Some(())
     }
@@ -120,7 +121,7 @@ impl<const N: usize> Search<'_, N> {
             if sizes[weakest] > STANDS_OUT {
                 break;
             }
-            found.drop(weakest);
+            found.dismiss(weakest);
             self.settle(&mut found.bells)?;
         }
         Some(())
