@@ -5,9 +5,10 @@ use crate::attribute::Contender;
 use crate::belief::left_over;
 use crate::course::Attribution;
 use crate::diagnose::Options;
+use crate::disturbance::shares;
 use crate::energy::energy;
 use crate::gap::{Errors, FreeRuns, gap, rms};
-use crate::locate::{Lack, Lacks, lacking_torques, places, regimes, shares};
+use crate::locate::{Lacks, lacking_torques, places, regimes};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
 use crate::push::Event;
@@ -61,7 +62,7 @@ pub fn compose<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     Diagnosis {
         schema: "armgap.diagnosis/1",
         verdict,
-        places: places(&joint_shares(study, (attribution, events), &lacks, verdict), &regimes),
+        places: places(&joint_shares(study, (attribution, events), &compared, verdict), &regimes),
         energy: energy(&lacks),
         gap,
         causes: attribution
@@ -113,33 +114,37 @@ fn lacks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     Lacks { before, refit, after }
 }
 
-/// Each joint's share of the gap: what causes explain lies where they sit, the rest where torque is lacking.
+/// Each joint's share of the gap: what causes explain lies where they sit, as far as they are sure; the rest where torque is lacking.
 ///
 /// A torque that is lacking on one joint bends the motion of all, and an error of its coupling shows on the others; so where a cause
 /// is known, its own joint says more than the lacking torque does.
-fn joint_shares<A, const N: usize, const P: usize>(
+fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     study: &Study<A, N, P>,
     (attribution, events): (&Attribution<N, P>, &[Event]),
-    lacks: &Lacks<N>,
+    compared: &Compared<P>,
     verdict: &str,
 ) -> [f64; N] {
-    let of = |gap: &[Lack<N>]| shares(gap, &study.scales.torque);
-    let placed = attribution.causes.iter().map(|c| (c.effect.joint_number(), c.share));
-    let placed: Vec<(Option<usize>, f64)> =
-        placed.chain(events.iter().map(|e| (e.push.joint_number(), e.share.clamp(0.0, 1.0)))).collect();
-    let total: f64 = placed.iter().map(|(_, share)| share).sum();
+    let last = &attribution.stages[attribution.stages.len() - 1];
+    let of =
+        |hypothesis: &Hypothesis<P>| shares(study, &study.holdout, hypothesis, &last.weights.holdout.starts);
+    let causes = attribution.causes.iter().map(|c| (c.effect.joint_number(), c.share, c.probability));
+    let pushes = events.iter().map(|e| (e.push.joint_number(), e.share.clamp(0.0, 1.0), e.probability));
+    let placed: Vec<(Option<usize>, f64, f64)> = causes.chain(pushes).collect();
+    let total: f64 = placed.iter().map(|(_, share, _)| share).sum();
     if total <= 0.0 {
-        return of(if verdict == "parameters" { &lacks.before } else { &lacks.refit });
+        return of(if verdict == "parameters" { &compared.before } else { &compared.refit });
     }
     let left = left_over(&attribution.stages);
-    let (whole_arm, rest) = (of(&lacks.refit), of(&lacks.after));
-    std::array::from_fn(|j| {
-        let own = |(joint, share): &(Option<usize>, f64)| match joint {
-            Some(number) => share * f64::from(u8::from(*number == j + 1)),
-            None => share * whole_arm[j],
-        };
-        (1.0 - left) * placed.iter().map(own).sum::<f64>() / total + left * rest[j]
-    })
+    let mut told = [0.0; N];
+    for (joint, share, probability) in placed {
+        if let Some(number) = joint {
+            told[number - 1] += (1.0 - left) * probability * share / total;
+        }
+    }
+    let open = (1.0 - left - told.iter().sum::<f64>()).max(0.0);
+    let whole = if open > 1e-3 { of(&compared.refit) } else { [0.0; N] };
+    let rest = if left > 1e-3 { of(&compared.after) } else { [0.0; N] };
+    std::array::from_fn(|j| told[j] + open * whole[j] + left * rest[j])
 }
 
 /// What the figures amount to.

@@ -13,6 +13,7 @@ pub mod compose;
 pub mod course;
 pub mod decide;
 pub mod diagnose;
+mod disturbance;
 mod duel;
 pub mod energy;
 pub mod equivalent;

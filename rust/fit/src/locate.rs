@@ -278,14 +278,6 @@ pub fn places<const N: usize>(shares: &[f64; N], regimes: &[Regime]) -> Vec<Plac
     places
 }
 
-/// Each joint's share of the mean square lacking torque, in units of its typical torque.
-pub fn shares<const N: usize>(gap: &[Lack<N>], torque: &[f64; N]) -> [f64; N] {
-    let mean_square = |j: usize| gap.iter().map(|x| x.lack[j].powi(2)).sum::<f64>() / gap.len().max(1) as f64;
-    let weight: [f64; N] = std::array::from_fn(|j| mean_square(j) / torque[j].powi(2).max(1e-300));
-    let whole: f64 = weight.iter().sum();
-    weight.map(|w| if whole > 0.0 { w / whole } else { 0.0 })
-}
-
 /// The regime of joint `j` in which the mean square residual exceeds the joint's own most.
 fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Place {
     let mut best: Option<(f64, &Regime, usize)> = None;
