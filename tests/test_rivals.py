@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from armgap import Arm, Diagnosis, diagnose, seed_torque, simulate
+from armgap import Arm, Diagnosis, Log, diagnose, seed_torque, simulate
+from armgap.cli.demo import CASE_FOLDER
 from armgap.simulation import Effect
 from swings import swing
 
@@ -58,3 +60,33 @@ def pair(arm: Arm) -> Diagnosis:
 def test_both_of_a_pair_are_named(pair):
     assert {(c.effect, c.joint) for c in pair.causes} == {("encoder_offset", 1), ("gear_efficiency", 2)}
     assert all(c.probability > 0.5 for c in pair.causes)
+
+
+ROUNDED_RAD_S = 0.05
+
+
+def rounded(arm: Arm, tau: np.ndarray, level: float, seed: int) -> Log:
+    """Joint 1 rubs by ``level tanh(dq2 / width)``, which the library knows only without the rounding."""
+    part = np.array([0.0, arm.sample_period / 4])
+    q, dq, positions = np.zeros(2), np.zeros(2), []
+    for row in tau:
+        positions.append(q)
+        for _ in range(4):
+            given = row - [level * np.tanh(dq[1] / ROUNDED_RAD_S), 0.0]
+            end = simulate(arm, part, np.tile(given, (2, 1)), q0=q, dq0=dq, encoder=False, sensor=True, tolerance=1e-8)
+            q, dq = end.q[-1], end.dq[-1]
+    t = np.arange(len(tau)) * arm.sample_period
+    measured = np.array(positions) + 1e-6 * np.random.default_rng(seed).standard_normal(tau.shape)
+    return replace(simulate(arm, t, tau), q=measured, name=f"run {seed}")
+
+
+def test_a_stand_in_for_the_form_of_a_cause_is_less_sure():
+    arm = Arm.read(CASE_FOLDER / "arm.toml")
+    t = np.arange(2000) * arm.sample_period
+    other = np.column_stack([45 * np.sin(9 * t) + 20 * np.sin(17 * t), 6 * np.sin(15 * t + 1) + 4 * np.sin(31 * t)])
+    training, holdout = (rounded(arm, tau, 4.0, seed) for seed, tau in enumerate([seed_torque(t), other]))
+    first, *further = diagnose(training, arm, holdout=holdout).causes
+    assert (first.effect, first.joint) == ("cross_friction", 1)
+    assert first.probability > 0.95
+    assert [(c.effect, c.joint) for c in further] == [("stribeck", 2)]
+    assert further[0].probability < 0.9

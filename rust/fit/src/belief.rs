@@ -115,20 +115,32 @@ pub fn left_over<const N: usize, const P: usize>(stages: &[Stage<N, P>]) -> f64 
     if last.excess() < if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED } {
         return 0.0;
     }
+    left_of(first, last)
+}
+
+/// Part of one stage's gap that is left in a later one.
+fn left_of<const N: usize, const P: usize>(earlier: &Stage<N, P>, last: &Stage<N, P>) -> f64 {
     // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them. Where it is of no
     // consequence by itself, both must say so.
-    let as_it_is = (last.relative_error() / first.relative_error()).powi(2);
-    let cut = last.excess() / first.excess();
+    let as_it_is = (last.relative_error() / earlier.relative_error()).powi(2);
+    let cut = last.excess() / earlier.excess();
     let left = if last.is_open() { as_it_is.max(cut) } else { as_it_is.min(cut) };
     left.min(1.0)
 }
 
 /// Lowers the probabilities where a gap of consequence remains that no candidate explains: what leaves it may also be what the named
-/// causes stand in for.
+/// causes stand in for. A further cause is measured by the gap that was left when it was taken up: a small one may be no more than what the
+/// form of the first gets wrong.
 pub fn temper<const N: usize, const P: usize>(stages: &[Stage<N, P>], causes: &mut [Cause]) {
-    let belief = belief_beside(left_over(stages), REMAINDER_DOUBT);
+    let Some(last) = stages.last() else { return };
+    let of_all = belief_beside(left_over(stages), REMAINDER_DOUBT);
     for cause in causes {
-        cause.probability *= belief;
+        let without =
+            |s: &&Stage<N, P>| !s.settled.hypothesis.effects.iter().any(|e| e.same_place(&cause.effect));
+        let further =
+            stages.iter().take_while(without).skip(1).last().filter(|_| last.excess() > ABOVE_FLOOR);
+        let of_its_own = further.map_or(1.0, |before| belief_beside(left_of(before, last), REMAINDER_DOUBT));
+        cause.probability *= of_all.min(of_its_own);
     }
 }
 
