@@ -49,6 +49,8 @@ struct Course<const N: usize, const P: usize> {
     stages: Vec<Stage<N, P>>,
     stage: Stage<N, P>,
     smoothed: bool,
+    /// Whether friction's rounding has been fitted.
+    rounded: bool,
     /// Improvements of this size count, relative to the motion.
     threshold: f64,
 }
@@ -73,7 +75,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let refit = stage.settled.clone();
         let noticeable = noticeable(stage.relative_error());
         let threshold = self.look_closer(&mut stage, settled, noticeable, CLEAR);
-        let mut course = Course { causes: Vec::new(), stages: Vec::new(), stage, smoothed: false, threshold };
+        let (causes, stages) = (Vec::new(), Vec::new());
+        let mut course = Course { causes, stages, stage, smoothed: false, rounded: false, threshold };
         self.pursue(&mut course, noticeable, max_causes, seed);
         if course.stage.is_unexplained() && !course.causes.is_empty() && max_causes > 1 {
             course = self.retraced(course, noticeable, max_causes, seed);
@@ -98,6 +101,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                     None => course.smoothed = true,
                 }
                 stage.contenders[choice].fit.clone()
+            } else if let Some(fit) = (!course.rounded).then(|| self.rounded(stage)).flatten() {
+                (course.smoothed, course.rounded) = (true, true);
+                fit
             } else {
                 let room = course.causes.len() + 2 <= max_causes;
                 let pair = room.then(|| self.together(stage, None, course.threshold, seed)).flatten();
@@ -123,7 +129,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         course.stage = course.stages.swap_remove(0);
         course.stages.clear();
         course.causes.clear();
-        course.smoothed = false;
+        (course.smoothed, course.rounded) = (false, false);
         let next = course.take_up(both);
         self.advance(&mut course, &next, noticeable);
         self.pursue(&mut course, noticeable, max_causes, seed);

@@ -10,7 +10,10 @@ use armgap_core::effect::{Quantity, Trial};
 /// Mean advantage per window, in standard errors, below which a cause is not accepted.
 pub const CERTAIN: f64 = 3.5;
 
-/// The same on the holdout alone, where a cause must at least not fail.
+/// The same for a nuisance, which claims nothing.
+const CERTAIN_ENOUGH: f64 = 2.5;
+
+/// The same as for a cause on the holdout alone, where a cause must at least not fail.
 const HOLDOUT_CERTAIN: f64 = 1.0;
 
 /// Share of the gap above the floor below which an improvement does not matter.
@@ -210,6 +213,11 @@ fn is_certain<const N: usize, const P: usize>(
     certain: f64,
 ) -> bool {
     contender.z_over(&stage.base) > certain && contender.holdout_z_over(&stage.base) > HOLDOUT_CERTAIN
+}
+
+/// Whether rounded friction, a nuisance without a name, explains most of the gap.
+pub fn is_rounded<const N: usize, const P: usize>(stage: &Stage<N, P>, contender: &Contender<P>) -> bool {
+    stage.share(contender) > MOST && is_certain(stage, contender, CERTAIN_ENOUGH)
 }
 
 /// Whether a contender explains implausible parameters by one effect.

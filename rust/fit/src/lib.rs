@@ -30,6 +30,7 @@ pub mod progress;
 pub mod push;
 mod random;
 pub mod report;
+mod rounding;
 mod ruled_out;
 pub mod scale;
 mod scan;
