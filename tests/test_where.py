@@ -1,0 +1,44 @@
+"""On which joint a gap lies that nothing in the library explains."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armgap import Arm, Diagnosis, Log, diagnose, simulate
+from armgap.cli.demo import CASE_FOLDER
+
+
+def wavy(tau: np.ndarray) -> np.ndarray:
+    """A drive whose gain rises and falls with the command."""
+    return tau * (1 - 0.1 * np.cos(10 * tau / np.abs(tau).max()))
+
+
+def diagnosed(joint: int, noise: float, counts: bool) -> Diagnosis:
+    """An arm with such a drive on one joint and slightly other values than its file's."""
+    arm = Arm.read(CASE_FOLDER / "arm.toml")
+    arm = arm if counts else replace(arm, counts_per_rev=None)
+    real = replace(arm, theta=arm.theta * np.random.default_rng(5).uniform(0.95, 1.05, len(arm.theta)))
+
+    def log(seed: int) -> Log:
+        t = np.arange(4000) * arm.sample_period
+        draw = np.random.default_rng(seed)
+        speed, phase = 2 * np.pi * draw.uniform(0.4, 2.6, (2, 5)), draw.uniform(0, 6.28, (2, 5))
+        commanded = np.sin(t[:, None, None] * speed + phase).sum(axis=2) * [18.0, 2.1]
+        given = commanded.copy()
+        given[:, joint - 1] = wavy(commanded[:, joint - 1])
+        moved = simulate(real, t, given, noise=noise, encoder=counts, seed=seed, name=f"run {seed}")
+        return replace(moved, tau=commanded)
+
+    return diagnose(log(1), arm, holdout=log(2))
+
+
+@pytest.mark.parametrize("joint", [1, 2])
+@pytest.mark.parametrize(("noise", "counts"), [(0.0, True), (2e-5, True), (0.0, False)])
+def test_the_joint_that_lacks_torque_is_the_first_place(joint, noise, counts):
+    result = diagnosed(joint, noise, counts)
+    assert result.verdict == "unexplained"
+    assert result.where[0].joint == joint
+    assert sum(place.share for place in result.where) == pytest.approx(1.0)
