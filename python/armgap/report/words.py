@@ -235,7 +235,7 @@ def _where(data: Data) -> tuple[str, str]:
     ranged = bool(first.get("range"))
     headline = f"Joint {first['joint']}, {_regime(first)}"
     load = "force" if data["gap"].get("unit") == "m" else "torque"
-    text = f"{percent(first['share'])} of the {load} that is missing from the model acts on joint {first['joint']}"
+    text = f"{percent(first['share'])} of what is missing from the model acts on joint {first['joint']}"
     if len(data["gap"]["before"]) == 1:
         text = f"The {load} that is missing from the model acts throughout"
     if ranged:
