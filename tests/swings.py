@@ -1,6 +1,8 @@
-"""A pendulum and its swings, for tests that need a small arm."""
+"""Motions for tests: a pendulum's swings, and a two-link arm of other values than its file's under sines."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,3 +32,15 @@ def swing(arm: Arm, seed: int, *effects: Effect, noise: float = NOISE_RAD) -> Lo
     height, speed, phase = 0.1 + 0.3 * draw[0], 0.5 + 8.5 * draw[1], 6 * draw[2]
     tau = (height * np.sin(np.outer(t, speed) + phase)).sum(axis=1)
     return simulate(arm, t, tau, effects=effects, noise=noise, seed=seed, name=f"run {seed}")
+
+
+def off(arm: Arm) -> Arm:
+    """The arm with values up to 5 % from those of its file."""
+    return replace(arm, theta=arm.theta * np.random.default_rng(5).uniform(0.95, 1.05, len(arm.theta)))
+
+
+def sines(t: np.ndarray, seed: int) -> np.ndarray:
+    """Torques of a two-link arm [N m]: five sines on each joint, drawn from a seed."""
+    draw = np.random.default_rng(seed)
+    speed, phase = 2 * np.pi * draw.uniform(0.4, 2.6, (2, 5)), draw.uniform(0, 6.28, (2, 5))
+    return np.sin(t[:, None, None] * speed + phase).sum(axis=2) * [18.0, 2.1]

@@ -9,6 +9,7 @@ import pytest
 
 from armgap import Arm, Diagnosis, Log, diagnose, simulate
 from armgap.cli.demo import CASE_FOLDER
+from swings import off, sines
 
 
 def wavy(tau: np.ndarray) -> np.ndarray:
@@ -20,13 +21,10 @@ def diagnosed(joint: int, noise: float, counts: bool) -> Diagnosis:
     """An arm with such a drive on one joint and slightly other values than its file's."""
     arm = Arm.read(CASE_FOLDER / "arm.toml")
     arm = arm if counts else replace(arm, counts_per_rev=None)
-    real = replace(arm, theta=arm.theta * np.random.default_rng(5).uniform(0.95, 1.05, len(arm.theta)))
+    real, t = off(arm), np.arange(4000) * arm.sample_period
 
     def log(seed: int) -> Log:
-        t = np.arange(4000) * arm.sample_period
-        draw = np.random.default_rng(seed)
-        speed, phase = 2 * np.pi * draw.uniform(0.4, 2.6, (2, 5)), draw.uniform(0, 6.28, (2, 5))
-        commanded = np.sin(t[:, None, None] * speed + phase).sum(axis=2) * [18.0, 2.1]
+        commanded = sines(t, seed)
         given = commanded.copy()
         given[:, joint - 1] = wavy(commanded[:, joint - 1])
         moved = simulate(real, t, given, noise=noise, encoder=counts, seed=seed, name=f"run {seed}")

@@ -22,6 +22,9 @@ use crate::study::{Sample, Study};
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
 
+/// A part of the gap that is not worth a search for the joint it lies on.
+const TRIFLE: f64 = 1e-3;
+
 /// The three hypotheses a report compares.
 pub struct Compared<const P: usize> {
     /// The arm file as it is.
@@ -125,8 +128,7 @@ fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     verdict: &str,
 ) -> [f64; N] {
     let last = &attribution.stages[attribution.stages.len() - 1];
-    let of =
-        |hypothesis: &Hypothesis<P>| shares(study, &study.holdout, hypothesis, &last.weights.holdout.starts);
+    let of = |hypothesis: &Hypothesis<P>| shares(study, hypothesis, &last.weights.holdout.starts);
     let causes = attribution.causes.iter().map(|c| (c.effect.joint_number(), c.share, c.probability));
     let pushes = events.iter().map(|e| (e.push.joint_number(), e.share.clamp(0.0, 1.0), e.probability));
     let placed: Vec<(Option<usize>, f64, f64)> = causes.chain(pushes).collect();
@@ -142,8 +144,8 @@ fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         }
     }
     let open = (1.0 - left - told.iter().sum::<f64>()).max(0.0);
-    let whole = if open > 1e-3 { of(&compared.refit) } else { [0.0; N] };
-    let rest = if left > 1e-3 { of(&compared.after) } else { [0.0; N] };
+    let whole = if open > TRIFLE { of(&compared.refit) } else { [0.0; N] };
+    let rest = if left > TRIFLE { of(&compared.after) } else { [0.0; N] };
     std::array::from_fn(|j| told[j] + open * whole[j] + left * rest[j])
 }
 

@@ -11,7 +11,7 @@
 
 use crate::model::Hypothesis;
 use crate::scale::Scales;
-use crate::study::{Sample, Study};
+use crate::study::Study;
 use crate::window::{Shift, Window};
 use argmin::core::{CostFunction, Error, Executor, State};
 use argmin::solver::neldermead::NelderMead;
@@ -55,19 +55,19 @@ struct Misses<const N: usize> {
     faintest: [f64; N],
 }
 
-/// Each joint's share of the kinetic energy that lacking torques feed into the arm under a hypothesis: `w_j (M^-1)_jj`.
+/// Each joint's share of the kinetic energy that lacking torques feed into the arm over the holdout, under a hypothesis: `w_j (M^-1)_jj`.
 ///
 /// The measure is that of Gauss's principle of least constraint, in which torques of unlike joints compare; shares add to one.
 pub fn shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     study: &Study<A, N, P>,
-    sample: &Sample<N>,
     hypothesis: &Hypothesis<P>,
     starts: &[Shift<N>],
 ) -> [f64; N] {
-    let predicted = sample.data.predict(&study.arm, hypothesis, starts);
+    let data = &study.holdout.data;
+    let predicted = data.predict(&study.arm, hypothesis, starts);
     let mobility = |q: &Vector<N>| study.arm.inertia(&hypothesis.theta, q).try_inverse();
     let open = |window: &Window<N>| -> Option<(Filter<N>, Vec<Miss<N>>)> {
-        let track = &sample.data.tracks[window.track];
+        let track = &data.tracks[window.track];
         let rows = predicted[window.range()].chunks_exact(N).enumerate();
         let miss = |(r, row): (usize, &[f64])| {
             let k = window.first + 1 + r;
@@ -79,7 +79,7 @@ pub fn shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         };
         Some((Filter::open(window), rows.map(miss).collect::<Option<_>>()?))
     };
-    let windows: Vec<_> = sample.data.windows.par_iter().filter_map(open).collect();
+    let windows: Vec<_> = data.windows.par_iter().filter_map(open).collect();
     let unit = |part: f64| intensities(&study.scales, part);
     let mean = windows.iter().flat_map(|(_, w)| w).map(|m| m.mobility.diagonal()).sum::<Vector<N>>();
     let noise = Matrix::from_diagonal(&Vector::from(study.noise.map(|s| s * s)));

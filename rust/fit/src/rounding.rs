@@ -7,13 +7,19 @@ use crate::attribute::Stage;
 use crate::decide::{ABOVE_FLOOR, is_rounded};
 use crate::model::Hypothesis;
 use crate::solve::{Effort, Fit, Problem};
-use crate::study::Study;
+use crate::study::{Study, Weights};
 use argmin::core::{CostFunction, Error, Executor, State};
 use argmin::solver::brent::BrentOpt;
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
 
-/// Widths that are fitted first, relative to the slowest joint's RMS speed.
+/// Smoother friction is fitted only if it does not raise the cost by more than this factor as it stands.
+const WORTH_SMOOTHING: f64 = 2.0;
+
+/// Widths that compete with the candidates of every stage, relative to the slowest joint's RMS speed.
+const SMOOTHING: [f64; 2] = [0.03, 0.1];
+
+/// Where nothing is accepted, widths that are fitted first, relative to the slowest joint's RMS speed.
 const WIDTHS: [f64; 6] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
 
 /// A short fit keeps some of the values that suit the width they come from, which has been too small so far: the search goes down from the
@@ -50,6 +56,22 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> CostFunction for ByWidth
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+    /// The model with smoother friction, or with exact friction if it is smoothed now, where that is not plainly worse.
+    pub fn smoother(&self, model: &Hypothesis<P>, weights: &Weights<N>, cost: f64) -> Vec<Hypothesis<P>> {
+        let widths = SMOOTHING.iter().map(|w| w * self.slowest()).chain([0.0]);
+        let other = widths.filter(|w| *w != model.smoothing);
+        let problem = self.problem(&weights.training);
+        other
+            .map(|smoothing| Hypothesis { smoothing, ..model.clone() })
+            .filter(|h| problem.window_costs(h).iter().sum::<f64>() < WORTH_SMOOTHING * cost)
+            .collect()
+    }
+
+    /// RMS speed of the slowest joint.
+    fn slowest(&self) -> f64 {
+        self.scales.speed.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
     /// The current model with friction rounded over the best width, if that explains most of the gap.
     pub fn rounded(&self, stage: &Stage<N, P>) -> Option<Fit<P>> {
         if stage.excess() < ABOVE_FLOOR {
@@ -58,7 +80,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let (base, model) = (&stage.base.fit, &stage.base.fit.hypothesis);
         let problem = self.problem(&stage.weights.training);
         let by_width = ByWidth { problem: &problem, model };
-        let slowest = self.scales.speed.iter().copied().fold(f64::INFINITY, f64::min);
+        let slowest = self.slowest();
         let fitted: Vec<(f64, f64)> =
             WIDTHS.par_iter().map(|part| (by_width.cost_of(part * slowest), part * slowest)).collect();
         let (least, width) = fitted.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;

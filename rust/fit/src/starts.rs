@@ -27,12 +27,6 @@ const TRACE: f64 = 0.01;
 /// The same where the gap is of no consequence and only an effect that explains most of it would be named.
 const TRACE_IN_SMALL: f64 = 0.1;
 
-/// Smoother friction is fitted only if it does not raise the cost by more than this factor as it stands.
-const WORTH_SMOOTHING: f64 = 2.0;
-
-/// Widths of smoothed friction that are tried as a nuisance, relative to the slowest joint's RMS speed.
-const SMOOTHING: [f64; 2] = [0.03, 0.1];
-
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// Hypotheses that are worth a full fit: one candidate more than the fitted model, or smoother friction. Beside them the tests of
     /// all candidates, the open ones first, where they were made.
@@ -161,18 +155,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let size = if along > 0.0 { off / along } else { 0.0 };
         effect.p[found.tested] = (parameter.neutral + size).clamp(parameter.lower, parameter.upper);
         (effect, effect.p[found.tested] - parameter.neutral)
-    }
-
-    /// The model with smoother friction, or with exact friction if it is smoothed now, where that is not plainly worse.
-    fn smoother(&self, model: &Hypothesis<P>, weights: &Weights<N>, cost: f64) -> Vec<Hypothesis<P>> {
-        let slowest = self.scales.speed.iter().copied().fold(f64::INFINITY, f64::min);
-        let widths = SMOOTHING.iter().map(|w| w * slowest).chain([0.0]);
-        let other = widths.filter(|w| *w != model.smoothing);
-        let problem = self.problem(&weights.training);
-        other
-            .map(|smoothing| Hypothesis { smoothing, ..model.clone() })
-            .filter(|h| problem.window_costs(h).iter().sum::<f64>() < WORTH_SMOOTHING * cost)
-            .collect()
     }
 }
 
