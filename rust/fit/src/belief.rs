@@ -111,11 +111,24 @@ fn trust_probability<const N: usize, const P: usize>(stage: &Stage<N, P>, choice
 
 /// Part of the first gap that the final model leaves without explanation.
 pub fn left_over<const N: usize, const P: usize>(stages: &[Stage<N, P>]) -> f64 {
-    let (Some(first), Some(last)) = (stages.first(), stages.last()) else { return 0.0 };
+    unexplained_of(stages.first(), stages.last())
+}
+
+/// Part of the gap that a first attribution ends with that a second one leaves without explanation.
+pub fn left_beside<const N: usize, const P: usize>(first: &[Stage<N, P>], second: &[Stage<N, P>]) -> f64 {
+    unexplained_of(first.last(), second.last())
+}
+
+/// Part of one stage's gap that is left in a later one, where that is more than noise.
+fn unexplained_of<const N: usize, const P: usize>(
+    earlier: Option<&Stage<N, P>>,
+    last: Option<&Stage<N, P>>,
+) -> f64 {
+    let (Some(earlier), Some(last)) = (earlier, last) else { return 0.0 };
     if last.excess() < if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED } {
         return 0.0;
     }
-    left_of(first, last)
+    left_of(earlier, last)
 }
 
 /// Part of one stage's gap that is left in a later one.

@@ -66,8 +66,8 @@ impl<const N: usize, const P: usize> Course<N, P> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// Attributes the gap to at most `max_causes` effects.
-    pub fn attribute(&self, max_causes: usize, seed: u64) -> Attribution<N, P> {
+    /// Attributes the gap to at most `max_causes` effects, one of which may be known beforehand.
+    pub fn attribute(&self, max_causes: usize, seed: u64, known: Option<Cause>) -> Attribution<N, P> {
         let nominal = Hypothesis::rigid(self.prior.theta);
         let scale = self.rough_scale(&nominal);
         let settled = self.settle(&nominal, scale);
@@ -77,6 +77,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let threshold = self.look_closer(&mut stage, settled, noticeable, CLEAR);
         let (causes, stages) = (Vec::new(), Vec::new());
         let mut course = Course { causes, stages, stage, smoothed: false, rounded: false, threshold };
+        if let Some(cause) = known {
+            let with = course.stage.settled.hypothesis.with(cause.effect);
+            let fit = self.problem(&course.stage.weights.training).solve(&with, Effort::FULL);
+            course.causes.push(cause);
+            self.advance(&mut course, &fit, noticeable);
+        }
         self.pursue(&mut course, noticeable, max_causes, seed);
         if course.stage.is_unexplained() && !course.causes.is_empty() && max_causes > 1 {
             course = self.retraced(course, noticeable, max_causes, seed);
@@ -169,8 +175,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             without.effects.remove(i);
             let fit = self.problem(&stage.weights.training).solve(&without, Effort::FULL);
             let reduced = self.judged(stage, fit, None);
-            let idle =
-                full.z_over(&reduced) < CERTAIN && reduced.fit.prior_cost - full.fit.prior_cost < TRUST_GAIN;
+            let idle = full.z_over(&reduced) < CERTAIN
+                && !stage.takes_outliers(&full, &reduced)
+                && reduced.fit.prior_cost - full.fit.prior_cost < TRUST_GAIN;
             if idle {
                 *model = reduced.fit;
                 causes.remove(i);

@@ -106,17 +106,23 @@ impl<const N: usize, const P: usize> Stage<N, P> {
     /// Where all other windows are at the floor, it needs none: their noise is known, and it is not noise that it takes away.
     fn settles_outliers(&self, contender: &Contender<P>) -> bool {
         let windows = self.base.holdout.len() as f64;
-        let typical = self.weights.holdout.typical;
-        let settles = |mine: &[f64], base: &[f64]| {
-            let gains = || base.iter().zip(mine).map(|(b, m)| b - m);
-            let gain: f64 = gains().filter(|g| *g > 0.0).sum();
-            let loss: f64 = gains().filter(|g| *g < 0.0).sum();
-            gain > OUTLYING * typical && -loss < HARMLESS * gain
-        };
-        typical < AT_FLOOR * self.floor / windows
+        self.weights.holdout.typical < AT_FLOOR * self.floor / windows
             && self.share(contender) > MOST
-            && settles(&contender.training, &self.base.training)
-            && settles(&contender.holdout, &self.base.holdout)
+            && self.settles(&contender.training, &self.base.training)
+            && self.settles(&contender.holdout, &self.base.holdout)
+    }
+
+    /// Whether one fit explains windows of the training or of the holdout that stand far out of noise under another, at no cost to any of
+    /// the rest.
+    pub fn takes_outliers(&self, fit: &Contender<P>, other: &Contender<P>) -> bool {
+        self.settles(&fit.training, &other.training) || self.settles(&fit.holdout, &other.holdout)
+    }
+
+    fn settles(&self, mine: &[f64], base: &[f64]) -> bool {
+        let gains = || base.iter().zip(mine).map(|(b, m)| b - m);
+        let gain: f64 = gains().filter(|g| *g > 0.0).sum();
+        let loss: f64 = gains().filter(|g| *g < 0.0).sum();
+        gain > OUTLYING * self.weights.holdout.typical && -loss < HARMLESS * gain
     }
 
     /// Whether an effect would show in this gap: a small one may be an integrator's error, which is like a shift in time or a stiff shaft.

@@ -123,6 +123,12 @@ impl Watch {
         }
     }
 
+    /// A count of work that is not told: the observer sees how far this one was, and may stop it.
+    pub fn aside(&self) -> Self {
+        let (observer, now) = (Arc::clone(&self.observer), self.progress());
+        Self::new(Arc::new(move |_| observer(now)))
+    }
+
     /// Begins work of about so many units; what came before is over.
     pub fn begin(&self, work: Work, units: usize) {
         let from = f64::from_bits(self.to.load(Relaxed));

@@ -74,6 +74,26 @@ impl<const N: usize> Dataset<N> {
         bare
     }
 
+    /// The windows of one track that are wanted, as a dataset of that track alone.
+    pub fn of_track(&self, track: usize, wanted: impl Fn(&Window<N>) -> bool) -> Self {
+        let (mut windows, mut rows) = (Vec::new(), 0);
+        for window in self.windows.iter().filter(|w| w.track == track && wanted(w)) {
+            windows.push(Window { track: 0, offset: rows, ..*window });
+            rows += window.rows();
+        }
+        Self { tracks: vec![self.tracks[track].clone()], windows, rows }
+    }
+
+    /// The windows of both.
+    pub fn and(mut self, other: Self) -> Self {
+        let (tracks, rows) = (self.tracks.len(), self.rows);
+        let moved = |w: Window<N>| Window { track: w.track + tracks, offset: w.offset + rows, ..w };
+        self.windows.extend(other.windows.into_iter().map(moved));
+        self.tracks.extend(other.tracks);
+        self.rows += other.rows;
+        self
+    }
+
     /// Cuts every track into windows of `horizon` seconds; a gap in the samples ends a window.
     pub fn new(tracks: Vec<Track<N>>, horizon: f64) -> Self {
         let mut windows = Vec::new();

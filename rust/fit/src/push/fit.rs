@@ -5,7 +5,7 @@ use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
 use crate::solve::scaled_inverse;
 use crate::study::{Sample, Study};
-use crate::window::{Dataset, Shift, Window};
+use crate::window::{Dataset, Shift};
 use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -55,7 +55,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     ///
     /// Beside a remainder it stays as it was where output error explains too little to be believed, if it helps at all; without one, it
     /// then is none.
-    pub(super) fn sized(&self, rough: Event, state: &State<'_, N, P>, known: &[Placed]) -> Option<Event> {
+    pub(super) fn sized(
+        &self,
+        rough: Event,
+        state: &State<'_, N, P>,
+        own: Option<&Hypothesis<P>>,
+        known: &[Placed],
+    ) -> Option<Event> {
         let whole = if rough.holdout { &self.holdout } else { &self.training };
         let sample = Sample { data: whole.data.without_pushes(), measured: whole.measured.clone() };
         let data = around(&sample, &rough);
@@ -72,6 +78,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             Touched { arm: &self.arm, model: state.model, sample, metric, known, push: rough.push };
         let p = Vector3::from(rough.push.p);
         let bare = touched.cost(&touched.residual_of(&Vector3::new(0.0, p[1], p[2])));
+        let bare = own.map_or(bare, |own| touched.cost_under(self, own, &p).min(bare));
         let seen = touched.cost(&touched.residual_of(&p));
         // Beside a remainder a search from elsewhere would take the remainder for the push.
         let (mut fitted, left) = if state.remainder { touched.minimise(p) } else { touched.least(p) };
@@ -116,6 +123,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         data.tracks[0].pushes = self.with(p);
         let predicted = data.predict(self.arm, model, &self.metric.starts);
         self.metric.residual(&self.sample.measured, &predicted)
+    }
+
+    /// Cost without the push under a model of the log's own, its starts fitted to it.
+    fn cost_under(&self, study: &Study<A, N, P>, own: &Hypothesis<P>, p: &Vector3<f64>) -> f64 {
+        let sample = Sample { data: self.sample.data.clone(), measured: self.sample.measured.clone() };
+        let metric = study.metric(&sample, own, self.metric.scale);
+        let there = Touched { arm: self.arm, model: own, sample, metric, known: self.known, push: self.push };
+        let residual = there.residual_of(&Vector3::new(0.0, p[1], p[2]));
+        there.metric.costs(&there.sample.data, &residual).iter().sum()
     }
 
     fn cost(&self, r: &[f64]) -> f64 {
@@ -224,13 +240,5 @@ fn around<const N: usize>(sample: &Sample<N>, event: &Event) -> Dataset<N> {
     let track = &sample.data.tracks[event.track];
     let [_, time, duration] = event.push.p;
     let reach = 0.75 * duration + AROUND;
-    let touches = |w: &&Window<N>| {
-        w.track == event.track && track.t[w.first] < time + reach && track.t[w.last] > time - reach
-    };
-    let (mut windows, mut rows) = (Vec::new(), 0);
-    for window in sample.data.windows.iter().filter(touches) {
-        windows.push(Window { track: 0, offset: rows, ..*window });
-        rows += window.rows();
-    }
-    Dataset { tracks: vec![track.clone()], windows, rows }
+    sample.data.of_track(event.track, |w| track.t[w.first] < time + reach && track.t[w.last] > time - reach)
 }

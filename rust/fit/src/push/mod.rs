@@ -1,22 +1,25 @@
 //! Pushes from outside: torques that no log shows, at one time of one log, judged inside that log.
 //!
 //! [`residual`] is the torque that a log lacks under a model, beside everything the model could be wrong by; [`search`] finds in it what
-//! comes once and does not follow from the state; [`fit`] sizes it by output error, where the model is good enough for that.
+//! comes once and does not follow from the state; [`fit`] sizes it by output error, where the model is good enough for that; [`limit`] tells it
+//! from what a drive does not give.
 
 mod bell;
 mod fit;
+mod limit;
 mod linear;
 mod residual;
 mod scatter;
 mod search;
 
-use crate::belief::{belief_beside, left_over};
+use crate::belief::{belief_beside, left_beside, left_over};
 use crate::course::Attribution;
 use crate::decide::noticeable;
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Work;
-use crate::study::Study;
+use crate::study::{Sample, Study};
 use crate::track::Track;
+use crate::window::Dataset;
 use armgap_core::arm::Arm;
 use armgap_core::effect::find;
 use bell::Bell;
@@ -39,6 +42,9 @@ const REMAINDER_DOUBT: f64 = 0.5;
 
 /// Predictions that miss by more than this factor are much worse.
 const MUCH_WORSE: f64 = 1.5;
+
+/// A push's impulse exceeds its standard deviation by this factor.
+const KNOWN: f64 = 2.0;
 
 /// Shortest log that is judged, s.
 const SHORTEST_LOG: f64 = 1.5;
@@ -84,27 +90,34 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// the second model was seen to take up a part of the pushes, and the second search to find fewer. Pushes beside which predictions miss
     /// by much more than without are none.
     pub fn conclude(&mut self, max_causes: usize, seed: u64) -> (Attribution<N, P>, Vec<Event>) {
-        let mut attribution = self.attribute(max_causes, seed);
-        let mut events = self.events(&attribution);
-        if !events.is_empty() {
-            self.set_pushes(&events);
-            let beside = self.attribute(max_causes, seed);
-            if beside.error() > MUCH_WORSE * attribution.error() {
-                self.set_pushes(&[]);
-                return (attribution, Vec::new());
-            }
-            let beside_remainder = attribution.is_unexplained();
-            attribution = beside;
-            if !beside_remainder {
-                events = self.events(&attribution);
-                self.set_pushes(&events);
-            }
+        let mut alone = self.attribute(max_causes, seed, None);
+        let mut events = self.events(&alone);
+        if let Some(limit) = self.limit(&alone, &events) {
+            alone = self.attribute(max_causes, seed, Some(limit));
+            events = self.events(&alone);
         }
-        let belief = belief_beside(left_over(&attribution.stages), REMAINDER_DOUBT);
+        if events.is_empty() {
+            return (alone, events);
+        }
+        self.set_pushes(&events);
+        let beside = self.attribute(max_causes, seed, None);
+        let harmful = beside.error() > MUCH_WORSE * alone.error();
+        if harmful {
+            events.clear();
+        } else if !alone.is_unexplained() {
+            events = self.events(&beside);
+        }
+        self.set_pushes(&events);
+        if events.is_empty() {
+            return (alone, events);
+        }
+        // Like a further cause, a push answers for the gap it was taken up for.
+        let left = left_over(&beside.stages).max(left_beside(&alone.stages, &beside.stages));
+        let belief = belief_beside(left, REMAINDER_DOUBT);
         for event in &mut events {
             event.probability *= belief;
         }
-        (attribution, events)
+        (beside, events)
     }
 
     /// Pushes that the model of an attribution leaves unexplained, log by log.
@@ -134,14 +147,19 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let whole = Track::joined(&pieces).filter(|t| t.t[t.len() - 1] - t.t[0] > SHORTEST_LOG);
         let residual = whole.and_then(|track| Residual::new(&self.arm, &track, state.model, &self.prior));
         let Some(found) = residual.and_then(|r| search(&r, state.remainder)) else { return Vec::new() };
+        if found.bells.is_empty() {
+            return Vec::new();
+        }
+        let own = (!state.remainder)
+            .then(|| self.of_recording(places).settle(state.model, state.scale).0.hypothesis);
         let mut events: Vec<Event> = Vec::new();
         for bell in &found.bells {
             let Some(rough) = self.rough(places, bell, found.rest) else { continue };
             let known: Vec<Placed> =
                 events.iter().filter(|e| e.place() == rough.place()).map(|e| e.push).collect();
-            events.extend(self.sized(rough, state, &known));
+            events.extend(self.sized(rough, state, own.as_ref(), &known));
         }
-        events.retain(|e| !self.meets_an_end(e, &found.bells));
+        events.retain(|e| e.is_known() && !self.meets_an_end(e, &found.bells));
         // So many are no rare events, but something that the arm does again and again.
         if events.len() < MOST { events } else { Vec::new() }
     }
@@ -178,6 +196,24 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             share: 0.0,
             probability: 1.0 - 0.5 * (rest / bell.z).powi(2).min(1.0),
         })
+    }
+
+    /// A study of one recording alone, without pushes.
+    fn of_recording(&self, places: &[Place]) -> Self {
+        let piece =
+            |(set, index): &Place| [&self.training, &self.holdout][*set].data.of_track(*index, |_| true);
+        let whole = places.iter().map(piece).reduce(Dataset::and).map(|data| data.without_pushes());
+        let sample = || Sample::new(whole.clone().unwrap_or_else(|| unreachable!("a recording has pieces")));
+        Self {
+            arm: self.arm.clone(),
+            prior: self.prior,
+            scales: self.scales.clone(),
+            training: sample(),
+            holdout: sample(),
+            noise: self.noise,
+            own: self.own.clone(),
+            watch: self.watch.aside(),
+        }
     }
 
     /// Logs as they were recorded: pieces of the same log that follow each other in time belong together.
@@ -218,6 +254,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 }
 
 impl Event {
+    /// Whether its impulse is known not to be zero.
+    fn is_known(&self) -> bool {
+        self.push.p[0].abs() > KNOWN * self.sigma[0]
+    }
+
     fn place(&self) -> Place {
         (usize::from(self.holdout), self.track)
     }

@@ -1,0 +1,124 @@
+//! Pushes that a drive makes itself: one that does not give all the torque it is asked for lacks it at a few instants, as if something pushed.
+//!
+//! A cause shows in the typical window; a limit that is reached once or twice in one log does not, and is found as pushes against the command.
+//! One level that explains what all of them explain needs fewer values than they do.
+
+use super::Event;
+use crate::belief::Cause;
+use crate::course::Attribution;
+use crate::model::{Hypothesis, Placed};
+use crate::study::{Study, Weights};
+use crate::track::Track;
+use argmin::core::{CostFunction, Error, Executor, State};
+use argmin::solver::brent::BrentOpt;
+use armgap_core::arm::Arm;
+use armgap_core::effect::find;
+
+/// Part of what pushes explain that a limit must explain in their place.
+const AS_MUCH: f64 = 0.9;
+
+/// The level is looked for within this part of what the pushes' impulses say, by so many evaluations.
+const NEAR: f64 = 0.1;
+const EVALUATIONS: u64 = 14;
+
+/// Halvings that find the level of one push.
+const HALVINGS: usize = 40;
+
+/// What all windows miss by under a model that gives no more than a level, by that level.
+struct ByLevel<'a, A, const N: usize, const P: usize> {
+    study: &'a Study<A, N, P>,
+    weights: &'a Weights<N>,
+    model: &'a Hypothesis<P>,
+    joint: usize,
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> ByLevel<'_, A, N, P> {
+    fn limited_to(&self, level: f64) -> Option<Placed> {
+        find::<f64>("torque_saturation").map(|law| Placed { law, joint: self.joint, p: [level, 0.0, 0.0] })
+    }
+
+    fn cost_of(&self, level: f64) -> f64 {
+        self.limited_to(level)
+            .map_or(f64::INFINITY, |limit| cost(self.study, self.weights, &self.model.with(limit)))
+    }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> CostFunction for ByLevel<'_, A, N, P> {
+    type Param = f64;
+    type Output = f64;
+
+    fn cost(&self, level: &f64) -> Result<f64, Error> {
+        Ok(self.cost_of(*level))
+    }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+    /// The limit of a joint's torque that explains what its pushes explain, if there is one.
+    pub(super) fn limit(&mut self, alone: &Attribution<N, P>, events: &[Event]) -> Option<Cause> {
+        (0..N).find_map(|joint| {
+            let own: Vec<Event> = events.iter().filter(|e| e.push.joint == joint).cloned().collect();
+            self.limit_of(joint, alone, &own)
+        })
+    }
+
+    fn limit_of(&mut self, joint: usize, alone: &Attribution<N, P>, events: &[Event]) -> Option<Cause> {
+        let levels: Vec<f64> =
+            events.iter().map(|e| level(self.track(e.place()), &e.push)).collect::<Option<_>>()?;
+        let model = &alone.model.hypothesis;
+        let weights = &alone.stages.last()?.weights;
+        self.set_pushes(events);
+        let pushed = cost(self, weights, model);
+        self.set_pushes(&[]);
+        let bare = cost(self, weights, model);
+        let by_level = ByLevel { study: self, weights, model, joint };
+        let guess =
+            levels.into_iter().min_by(|a, b| by_level.cost_of(*a).total_cmp(&by_level.cost_of(*b)))?;
+        let search = BrentOpt::new((1.0 - NEAR) * guess, (1.0 + NEAR) * guess);
+        let found = Executor::new(ByLevel { ..by_level }, search)
+            .configure(|state| state.max_iters(EVALUATIONS))
+            .timer(false)
+            .run()
+            .ok()?;
+        let best = *found.state.get_best_param()?;
+        let share = (bare - by_level.cost_of(best)) / bare;
+        if share * bare < AS_MUCH * (bare - pushed) {
+            return None;
+        }
+        let probability = events.iter().map(|e| e.probability).fold(0.0, f64::max);
+        let effect = by_level.limited_to(best)?;
+        Some(Cause { effect, sigma: Vec::new(), probability, share, relevance: 0.0, look_alikes: Vec::new() })
+    }
+}
+
+/// What all windows miss by, none of them trusted less than others.
+fn cost<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    study: &Study<A, N, P>,
+    weights: &Weights<N>,
+    model: &Hypothesis<P>,
+) -> f64 {
+    let (training, holdout) = rayon::join(
+        || study.problem(&weights.training).raw_costs(model),
+        || study.judge(&weights.holdout).raw_costs(model),
+    );
+    training.iter().chain(&holdout).sum()
+}
+
+/// Level beyond which the command around a push against it amounts to the push's impulse.
+fn level<const N: usize>(track: &Track<N>, push: &Placed) -> Option<f64> {
+    let [impulse, time, duration] = push.p;
+    let first = track.t.partition_point(|t| *t < time - duration);
+    let last = track.t.partition_point(|t| *t <= time + duration).min(track.len() - 1);
+    let torque = |k: usize| -impulse.signum() * track.held[k][push.joint].mean();
+    let beyond = |level: f64| -> f64 {
+        (first..last).map(|k| (torque(k) - level).max(0.0) * (track.t[k + 1] - track.t[k])).sum()
+    };
+    let (mut low, mut high) = (0.0, (first..last).map(torque).fold(0.0, f64::max));
+    if beyond(low) < impulse.abs() {
+        return None;
+    }
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if beyond(middle) > impulse.abs() { low = middle } else { high = middle }
+    }
+    Some(low)
+}
