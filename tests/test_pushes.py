@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from armgap import Arm, Diagnosis, Log, diagnose, simulate
 from armgap.simulation import Effect
+from swings import off, sines
 
 REAL = np.array([0.105, 0.031, 0.049, 2.1, 1.5, 0.004, 0.004, 0.2, 0.15])
 SIGMA = np.array([0.011, 0.004, 0.005, 0.23, 0.16, 0.01, 0.01, 0.08, 0.06])
@@ -81,3 +82,28 @@ def test_an_end_that_is_met_again_and_again_is_no_push() -> None:
     met = [*UNMODELLED, Effect("contact", 1, stop)]
     log = simulate(TRUE, free.t, free.tau, effects=met, noise=1e-4, seed=4, name="log", tolerance=1e-5)
     assert judged(replace(log, tau=free.tau)).causes == ()
+
+
+@pytest.mark.parametrize("reached_in", ["training", "holdout"])
+def test_a_limit_that_one_log_reaches_once_or_twice_is_not_taken_for_pushes(arm: Arm, reached_in: str) -> None:
+    t = np.arange(3000) * arm.sample_period
+    strong, weak = sines(t, 21), 0.7 * sines(t, 22)
+    level = 0.85 * np.abs(strong[:, 1]).max()
+    assert level > np.abs(weak[:, 1]).max()
+    limit = [Effect("torque_saturation", 2, {"level": level})]
+    logs = [simulate(off(arm), t, tau, effects=limit, noise=1e-5, seed=k) for k, tau in enumerate((strong, weak))]
+    training, holdout = logs if reached_in == "training" else logs[::-1]
+    trusted = replace(arm, sigma=arm.theta * np.repeat([0.05, 0.2], [5, 4]))
+    [cause] = diagnose(training, trusted, holdout=holdout).causes
+    assert (cause.effect, cause.joint) == ("torque_saturation", 2)
+    assert cause.parameters["level"].value == pytest.approx(level, rel=1e-3)
+    assert cause.parameters["level"].sigma < 1e-3 * level
+
+
+def test_values_of_one_log_that_differ_are_not_taken_for_pushes(arm: Arm) -> None:
+    """Friction that grew between two logs."""
+    t = np.arange(3000) * arm.sample_period
+    grown = replace(arm, theta=arm.theta * np.r_[np.ones(len(arm.theta) - 4), np.full(4, 1.3)])
+    training = simulate(arm, t, sines(t, 13), noise=1e-5, seed=1)
+    holdout = simulate(grown, t, sines(t, 14), noise=1e-5, seed=2)
+    assert "external_pulse" not in {c.effect for c in diagnose(training, arm, holdout=holdout).causes}

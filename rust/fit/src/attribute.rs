@@ -8,7 +8,7 @@ use crate::screen::Scored;
 use crate::solve::{Effort, Fit};
 use crate::study::{Study, Weights};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{MAX_PARAMETERS, NEVER, Trial, catalogue, find};
+use armgap_core::effect::{MAX_PARAMETERS, Trial, catalogue, find};
 use rayon::prelude::*;
 
 /// Candidates that are fitted again under the weights of the best.
@@ -191,7 +191,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// Deviation of an effect's first parameter from neutral, relative to the largest possible.
     fn relative_size(&self, effect: &Placed) -> f64 {
         let parameter = &effect.law.spec().parameters[0];
-        let centre = if parameter.neutral < NEVER { parameter.neutral } else { 0.0 };
+        let centre = self.scales.centre(parameter, effect.joint);
         (effect.p[0] - centre).abs() / self.scales.largest(parameter.quantity, effect.joint)
     }
 

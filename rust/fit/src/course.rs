@@ -202,7 +202,10 @@ fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
         for effect in &model.hypothesis.effects {
             if effect.same_place(&cause.effect) {
                 cause.effect = *effect;
-                cause.sigma = (first..first + effect.len()).map(|i| model.sigma(i)).collect();
+                // A value that the training windows do not show may be known from those of the holdout.
+                let known = cause.sigma.iter().copied().chain(std::iter::repeat(f64::INFINITY));
+                let fitted = (first..first + effect.len()).map(|i| model.sigma(i));
+                cause.sigma = fitted.zip(known).map(|(fitted, known)| fitted.min(known)).collect();
             }
             first += effect.len();
         }

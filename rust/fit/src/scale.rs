@@ -3,7 +3,7 @@
 use crate::model::Placed;
 use crate::track::Track;
 use armgap_core::arm::Arm;
-use armgap_core::effect::Quantity;
+use armgap_core::effect::{EffectParameter, NEVER, Quantity};
 use nalgebra::SVector;
 
 /// Typical sizes per joint.
@@ -85,7 +85,7 @@ impl<const N: usize> Scales<N> {
             Quantity::ShaftStiffness => self.inertia[j] * SHAFT_RATE * SHAFT_RATE * MOTOR_SHARE,
             Quantity::ShaftDamping => self.inertia[j] * SHAFT_RATE * MOTOR_SHARE * SHAFT_DAMPING,
             Quantity::Speed => self.speed[j],
-            Quantity::Position => self.position[j],
+            Quantity::Position | Quantity::Rest => self.position[j],
             Quantity::Reach => self.travel[j][0].abs().max(self.travel[j][1].abs()),
             Quantity::Cycles => std::f64::consts::TAU / (self.travel[j][1] - self.travel[j][0]),
             Quantity::Angle | Quantity::Count | Quantity::Ratio | Quantity::Duration => 1.0,
@@ -96,10 +96,17 @@ impl<const N: usize> Scales<N> {
         if value.is_finite() && value > 0.0 { value } else { 1.0 }
     }
 
+    /// Middle of a joint's travel.
+    fn middle(&self, j: usize) -> f64 {
+        let [from, to] = self.travel[j];
+        0.5 * (from + to)
+    }
+
     /// Start value of a parameter of joint `j`, given in units of its size; none where the joint never gets there.
     pub fn start(&self, quantity: Quantity, j: usize, value: f64) -> Option<f64> {
         match quantity {
             Quantity::Ratio => Some(value),
+            Quantity::Rest => Some(self.middle(j) + value * self.size(quantity, j)),
             Quantity::Reach => {
                 let side = self.travel[j][usize::from(value > 0.0)];
                 (side * value > 0.0).then_some(value.abs() * side)
@@ -108,7 +115,16 @@ impl<const N: usize> Scales<N> {
         }
     }
 
-    /// Largest deviation from neutral that a parameter of joint `j` can have.
+    /// Value that a parameter's size is counted from: neutral, or zero where none is; of a rest position the middle of the travel.
+    pub fn centre(&self, parameter: &EffectParameter, j: usize) -> f64 {
+        match parameter.quantity {
+            Quantity::Rest => self.middle(j),
+            _ if parameter.neutral < NEVER => parameter.neutral,
+            _ => 0.0,
+        }
+    }
+
+    /// Largest deviation from that centre that a parameter of joint `j` can have.
     pub fn largest(&self, quantity: Quantity, j: usize) -> f64 {
         let most = match quantity {
             Quantity::Time => LONGEST_TIME,

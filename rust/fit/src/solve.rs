@@ -11,7 +11,7 @@ use crate::slopes::{Point, Slopes};
 use crate::spread::Spread;
 use crate::window::Dataset;
 use armgap_core::arm::Arm;
-use armgap_core::effect::{NEVER, Trial};
+use armgap_core::effect::Trial;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -179,7 +179,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
         for effect in &hypothesis.effects {
             for parameter in effect.law.spec().parameters {
                 let reach = self.scales.largest(parameter.quantity, effect.joint);
-                let centre = if parameter.neutral < NEVER { parameter.neutral } else { 0.0 };
+                let centre = self.scales.centre(parameter, effect.joint);
                 lower.push(parameter.lower.max(centre - reach));
                 upper.push(parameter.upper.min(centre + reach));
             }

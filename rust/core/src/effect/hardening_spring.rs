@@ -18,7 +18,7 @@ static SPEC: Spec = Spec {
     parameters: &[
         EffectParameter::signed("cubic", Quantity::Hardening),
         EffectParameter::signed("k", Quantity::Stiffness),
-        EffectParameter::shape("q0", Quantity::Position, f64::NEG_INFINITY, f64::INFINITY),
+        EffectParameter::shape("q0", Quantity::Rest, f64::NEG_INFINITY, f64::INFINITY),
     ],
     starts: &[[0.1, 0.0, 0.0], [0.1, 0.0, 1.0], [0.1, 0.0, -1.0]],
     trial: Trial::Amplitudes(2),

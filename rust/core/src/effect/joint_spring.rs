@@ -17,7 +17,7 @@ static SPEC: Spec = Spec {
     least_joints: 1,
     parameters: &[
         EffectParameter::signed("k", Quantity::Stiffness),
-        EffectParameter::shape("q0", Quantity::Position, f64::NEG_INFINITY, f64::INFINITY),
+        EffectParameter::shape("q0", Quantity::Rest, f64::NEG_INFINITY, f64::INFINITY),
     ],
     starts: &[[0.05, 0.0, 0.0], [0.05, 1.5, 0.0], [0.05, -1.5, 0.0], [0.02, 6.0, 0.0], [0.02, -6.0, 0.0]],
     trial: Trial::Amplitudes(1),

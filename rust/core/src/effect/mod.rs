@@ -123,6 +123,8 @@ pub enum Quantity {
     Speed,
     /// Joint position.
     Position,
+    /// Joint position where something rests, measured from the middle of the joint's travel.
+    Rest,
     /// Joint position, measured in the farthest position reached on either side of zero.
     Reach,
     /// Cycles per revolution (per metre on a linear joint, times 2 pi), measured in cycles over the joint's travel.
@@ -165,8 +167,8 @@ impl Quantity {
             (Self::Hardening, false) => "N/m^3",
             (Self::Speed, true) => "rad/s",
             (Self::Speed, false) => "m/s",
-            (Self::Position | Self::Reach, true) | (Self::Angle, _) => "rad",
-            (Self::Position | Self::Reach, false) | (Self::Length, _) => "m",
+            (Self::Position | Self::Rest | Self::Reach, true) | (Self::Angle, _) => "rad",
+            (Self::Position | Self::Rest | Self::Reach, false) | (Self::Length, _) => "m",
             (Self::Count | Self::Cycles | Self::Ratio, _) => "1",
             (Self::Time | Self::Duration, _) => "s",
         }

@@ -21,6 +21,9 @@ const AS_MUCH: f64 = 0.9;
 const NEAR: f64 = 0.1;
 const EVALUATIONS: u64 = 14;
 
+/// Step of the second derivative by the level, as a part of it.
+const STEP: f64 = 1e-3;
+
 /// Halvings that find the level of one push.
 const HALVINGS: usize = 40;
 
@@ -40,6 +43,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> ByLevel<'_, A, N, P> {
     fn cost_of(&self, level: f64) -> f64 {
         self.limited_to(level)
             .map_or(f64::INFINITY, |limit| cost(self.study, self.weights, &self.model.with(limit)))
+    }
+
+    /// Standard deviation of the best level, if what is left is one error per window.
+    fn sigma(&self, best: f64) -> Option<f64> {
+        let step = STEP * best;
+        let [below, least, above] = [-step, 0.0, step].map(|h| self.cost_of(best + h));
+        let curvature = (below - 2.0 * least + above) / step.powi(2);
+        let windows = self.study.training.data.windows.len() + self.study.holdout.data.windows.len();
+        (curvature > 0.0).then(|| (2.0 * least / windows as f64 / curvature).sqrt())
     }
 }
 
@@ -84,9 +96,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         if share * bare < AS_MUCH * (bare - pushed) {
             return None;
         }
+        let sigma = vec![by_level.sigma(best)?];
         let probability = events.iter().map(|e| e.probability).fold(0.0, f64::max);
         let effect = by_level.limited_to(best)?;
-        Some(Cause { effect, sigma: Vec::new(), probability, share, relevance: 0.0, look_alikes: Vec::new() })
+        Some(Cause { effect, sigma, probability, share, relevance: 0.0, look_alikes: Vec::new() })
     }
 }
 
