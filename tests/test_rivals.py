@@ -90,3 +90,21 @@ def test_a_stand_in_for_the_form_of_a_cause_is_less_sure():
     assert first.probability > 0.95
     assert [(c.effect, c.joint) for c in further] == [("stribeck", 2)]
     assert further[0].probability < 0.9
+
+
+def test_a_spring_that_hardens_is_found_where_the_joint_moves_not_around_zero(pendulum: Arm) -> None:
+    """A travel of half a turn on one side of zero; taken for a linear spring and a ripple if its rest is looked for around zero."""
+    spring = Effect("hardening_spring", 1, {"cubic": 60.0, "k": 0.5, "q0": 1.6})
+    t = np.arange(2000) * pendulum.sample_period
+
+    def run(seed: int) -> Log:
+        height, speed, phase = np.random.default_rng(seed).uniform([[0.02], [0.5], [0]], [[0.07], [9], [6]], (3, 5))
+        tau = 0.47 + (height * np.sin(np.outer(t, speed) + phase)).sum(axis=1)
+        return simulate(pendulum, t, tau, q0=[0.9], effects=[spring], noise=NOISE_RAD, seed=seed)
+
+    training, holdout = run(1), run(2)
+    assert min(training.q.min(), holdout.q.min()) > 0.8
+    [cause] = diagnose(training, pendulum, holdout=holdout).causes
+    assert cause.effect == "hardening_spring"
+    assert cause.parameters["cubic"].value == pytest.approx(60.0, rel=1e-3)
+    assert cause.parameters["q0"].value == pytest.approx(1.6, abs=1e-3)
