@@ -77,7 +77,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let threshold = self.look_closer(&mut stage, settled, noticeable, CLEAR);
         let (causes, stages) = (Vec::new(), Vec::new());
         let mut course = Course { causes, stages, stage, smoothed: false, rounded: false, threshold };
-        if let Some(cause) = known {
+        if let Some(cause) = known.filter(|_| max_causes > 0) {
             let with = course.stage.settled.hypothesis.with(cause.effect);
             let fit = self.problem(&course.stage.weights.training).solve(&with, Effort::FULL);
             course.causes.push(cause);

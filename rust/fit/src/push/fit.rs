@@ -53,7 +53,8 @@ struct Touched<'a, A, const N: usize, const P: usize> {
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// The push with the values that output error gives it, and what it explains.
     ///
-    /// Beside a remainder it stays as it was where output error explains too little to be believed, if it helps at all; without one, it
+    /// What it explains is counted from what the model misses, or the model fitted to its log alone, `own`, if that misses less. Beside a
+    /// remainder it stays as it was where output error explains too little to be believed, if it helps at all; without one, it
     /// then is none.
     pub(super) fn sized(
         &self,

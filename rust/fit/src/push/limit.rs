@@ -14,6 +14,9 @@ use argmin::solver::brent::BrentOpt;
 use armgap_core::arm::Arm;
 use armgap_core::effect::find;
 
+/// The law of a limit.
+const LAW: &str = "torque_saturation";
+
 /// Part of what pushes explain that a limit must explain in their place.
 const AS_MUCH: f64 = 0.9;
 
@@ -37,7 +40,7 @@ struct ByLevel<'a, A, const N: usize, const P: usize> {
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> ByLevel<'_, A, N, P> {
     fn limited_to(&self, level: f64) -> Option<Placed> {
-        find::<f64>("torque_saturation").map(|law| Placed { law, joint: self.joint, p: [level, 0.0, 0.0] })
+        find::<f64>(LAW).map(|law| Placed { law, joint: self.joint, p: [level, 0.0, 0.0] })
     }
 
     fn cost_of(&self, level: f64) -> f64 {
@@ -67,9 +70,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> CostFunction for ByLevel
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// The limit of a joint's torque that explains what its pushes explain, if there is one.
     pub(super) fn limit(&mut self, alone: &Attribution<N, P>, events: &[Event]) -> Option<Cause> {
-        (0..N).find_map(|joint| {
+        let effects = &alone.model.hypothesis.effects;
+        let limited = |j: usize| effects.iter().any(|e| e.joint == j && e.law.spec().name == LAW);
+        (0..N).filter(|j| !limited(*j)).find_map(|joint| {
             let own: Vec<Event> = events.iter().filter(|e| e.push.joint == joint).cloned().collect();
-            self.limit_of(joint, alone, &own)
+            if own.is_empty() { None } else { self.limit_of(joint, alone, &own) }
         })
     }
 
@@ -82,6 +87,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let pushed = cost(self, weights, model);
         self.set_pushes(&[]);
         let bare = cost(self, weights, model);
+        if pushed >= bare {
+            return None;
+        }
         let by_level = ByLevel { study: self, weights, model, joint };
         let guess =
             levels.into_iter().min_by(|a, b| by_level.cost_of(*a).total_cmp(&by_level.cost_of(*b)))?;
@@ -92,10 +100,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             .run()
             .ok()?;
         let best = *found.state.get_best_param()?;
-        let share = (bare - by_level.cost_of(best)) / bare;
-        if share * bare < AS_MUCH * (bare - pushed) {
+        let explained = bare - by_level.cost_of(best);
+        if explained < AS_MUCH * (bare - pushed) {
             return None;
         }
+        let share = explained / bare;
         let sigma = vec![by_level.sigma(best)?];
         let probability = events.iter().map(|e| e.probability).fold(0.0, f64::max);
         let effect = by_level.limited_to(best)?;
