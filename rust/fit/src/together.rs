@@ -13,14 +13,14 @@ use crate::study::Study;
 use armgap_core::arm::Arm;
 
 /// Part of the gap above the floor that two effects must explain to be accepted together.
-const NEARLY_ALL: f64 = 0.9;
+const NEARLY_ALL: f64 = 0.85;
 
 /// Contenders that are taken on trust.
 const TRIED: usize = 3;
 
 /// Mean advantage, in standard errors, below which a contender is not worth that, unless it brings implausible parameters back to
 /// their trusted values.
-const HOPEFUL: f64 = 2.0;
+const HOPEFUL: f64 = 1.5;
 
 /// Two causes and the stage in which the second was found.
 pub struct Both<const N: usize, const P: usize> {
