@@ -84,20 +84,37 @@ def test_an_end_that_is_met_again_and_again_is_no_push() -> None:
     assert judged(replace(log, tau=free.tau)).causes == ()
 
 
-@pytest.mark.parametrize("reached_in", ["training", "holdout"])
-def test_a_limit_that_one_log_reaches_once_or_twice_is_not_taken_for_pushes(arm: Arm, reached_in: str) -> None:
+def limited(arm: Arm, reached_in: str, *pushes: Effect) -> tuple[Diagnosis, float]:
+    """A limit of joint 2's torque that one log of two reaches once or twice, with `pushes` in that log; and its level [N m]."""
     t = np.arange(3000) * arm.sample_period
     strong, weak = sines(t, 21), 0.7 * sines(t, 22)
     level = 0.85 * np.abs(strong[:, 1]).max()
     assert level > np.abs(weak[:, 1]).max()
-    limit = [Effect("torque_saturation", 2, {"level": level})]
-    logs = [simulate(off(arm), t, tau, effects=limit, noise=1e-5, seed=k) for k, tau in enumerate((strong, weak))]
-    training, holdout = logs if reached_in == "training" else logs[::-1]
+    limit = Effect("torque_saturation", 2, {"level": level})
+    reaches = simulate(off(arm), t, strong, effects=[limit, *pushes], noise=1e-5, seed=0)
+    other = simulate(off(arm), t, weak, effects=[limit], noise=1e-5, seed=1)
+    training, holdout = (reaches, other) if reached_in == "training" else (other, reaches)
     trusted = replace(arm, sigma=arm.theta * np.repeat([0.05, 0.2], [5, 4]))
-    [cause] = diagnose(training, trusted, holdout=holdout).causes
+    return diagnose(training, trusted, holdout=holdout), level
+
+
+@pytest.mark.parametrize("reached_in", ["training", "holdout"])
+def test_a_limit_that_one_log_reaches_once_or_twice_is_not_taken_for_pushes(arm: Arm, reached_in: str) -> None:
+    found, level = limited(arm, reached_in)
+    [cause] = found.causes
     assert (cause.effect, cause.joint) == ("torque_saturation", 2)
     assert cause.parameters["level"].value == pytest.approx(level, rel=1e-3)
     assert cause.parameters["level"].sigma < 1e-3 * level
+
+
+@pytest.mark.parametrize("reached_in", ["training", "holdout"])
+def test_such_a_limit_is_named_beside_a_push(arm: Arm, reached_in: str) -> None:
+    push = Effect("external_pulse", 1, {"impulse": 1.5, "time": 3.0, "duration": 0.06})
+    found, level = limited(arm, reached_in, push)
+    causes = {(c.effect, c.joint): c.parameters for c in found.causes}
+    assert set(causes) == {("torque_saturation", 2), ("external_pulse", 1)}
+    assert causes["torque_saturation", 2]["level"].value == pytest.approx(level, rel=1e-3)
+    assert causes["external_pulse", 1]["impulse"].value == pytest.approx(1.5, rel=1e-2)
 
 
 def test_values_of_one_log_that_differ_are_not_taken_for_pushes(arm: Arm) -> None:

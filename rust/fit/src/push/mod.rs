@@ -88,19 +88,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     ///
     /// Where that model describes the arm, pushes are looked for again under it. Beside a remainder they are kept as they were found: there
     /// the second model was seen to take up a part of the pushes, and the second search to find fewer. Pushes beside which predictions miss
-    /// by much more than without are none.
+    /// by much more than without are none. A limit that explains some of them in their place stays beside the rest.
     pub fn conclude(&mut self, max_causes: usize, seed: u64) -> (Attribution<N, P>, Vec<Event>) {
         let mut alone = self.attribute(max_causes, seed, None);
         let mut events = self.events(&alone);
-        if let Some(limit) = self.limit(&alone, &events) {
-            alone = self.attribute(max_causes, seed, Some(limit));
+        let limit = self.limit(&alone, &events);
+        if limit.is_some() {
+            alone = self.attribute(max_causes, seed, limit.clone());
             events = self.events(&alone);
         }
         if events.is_empty() {
             return (alone, events);
         }
         self.set_pushes(&events);
-        let beside = self.attribute(max_causes, seed, None);
+        let beside = self.attribute(max_causes, seed, limit);
         let harmful = beside.error() > MUCH_WORSE * alone.error();
         if harmful {
             events.clear();
