@@ -22,6 +22,7 @@ pub mod identify;
 mod lacking;
 pub mod locate;
 pub mod metric;
+mod minimum;
 pub mod model;
 mod observe;
 pub mod output_error;

@@ -5,11 +5,10 @@
 
 use crate::attribute::Stage;
 use crate::decide::{ABOVE_FLOOR, is_rounded};
+use crate::minimum::minimum;
 use crate::model::Hypothesis;
 use crate::solve::{Effort, Fit, Problem};
 use crate::study::{Study, Weights};
-use argmin::core::{CostFunction, Error, Executor, State};
-use argmin::solver::brent::BrentOpt;
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
 
@@ -29,7 +28,7 @@ const REACH: [f64; 2] = [4.0, 16.0];
 /// Evaluations of the search, each a fit of the parameters.
 const EVALUATIONS: u64 = 9;
 
-/// The cost of the data and of trust, parameters fitted, by the logarithm of the width.
+/// The cost of the data and of trust, parameters fitted, by the width.
 struct ByWidth<'a, A, const N: usize, const P: usize> {
     problem: &'a Problem<'a, A, N, P>,
     model: &'a Hypothesis<P>,
@@ -43,15 +42,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> ByWidth<'_, A, N, P> {
     fn cost_of(&self, width: f64) -> f64 {
         let fit = self.problem.solve(&self.rounded_over(width), Effort::ROUGH);
         fit.data_cost + fit.prior_cost
-    }
-}
-
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> CostFunction for ByWidth<'_, A, N, P> {
-    type Param = f64;
-    type Output = f64;
-
-    fn cost(&self, logarithm: &f64) -> Result<f64, Error> {
-        Ok(self.cost_of(logarithm.exp()))
     }
 }
 
@@ -87,13 +77,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         if least >= base.data_cost + base.prior_cost {
             return None;
         }
-        let search = BrentOpt::new((width / REACH[0]).ln(), (width * REACH[1]).ln());
-        let found = Executor::new(ByWidth { ..by_width }, search)
-            .configure(|state| state.max_iters(EVALUATIONS))
-            .timer(false)
-            .run()
-            .ok()?;
-        let start = by_width.rounded_over(found.state.get_best_param()?.exp());
+        let within = [(width / REACH[0]).ln(), (width * REACH[1]).ln()];
+        let best = minimum(|logarithm| by_width.cost_of(logarithm.exp()), within, EVALUATIONS)?;
+        let start = by_width.rounded_over(best.exp());
         let contender = self.contender(&stage.weights, &start, model.effects.len(), Effort::FULL, &[]);
         is_rounded(stage, &contender).then_some(contender.fit)
     }

@@ -6,11 +6,10 @@
 use super::Event;
 use crate::belief::Cause;
 use crate::course::Attribution;
+use crate::minimum::minimum;
 use crate::model::{Hypothesis, Placed};
 use crate::study::{Study, Weights};
 use crate::track::Track;
-use argmin::core::{CostFunction, Error, Executor, State};
-use argmin::solver::brent::BrentOpt;
 use armgap_core::arm::Arm;
 use armgap_core::effect::find;
 
@@ -58,15 +57,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> ByLevel<'_, A, N, P> {
     }
 }
 
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> CostFunction for ByLevel<'_, A, N, P> {
-    type Param = f64;
-    type Output = f64;
-
-    fn cost(&self, level: &f64) -> Result<f64, Error> {
-        Ok(self.cost_of(*level))
-    }
-}
-
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// The limit of a joint's torque that explains what its pushes explain, if there is one.
     pub(super) fn limit(&mut self, alone: &Attribution<N, P>, events: &[Event]) -> Option<Cause> {
@@ -93,13 +83,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let by_level = ByLevel { study: self, weights, model, joint };
         let guess =
             levels.into_iter().min_by(|a, b| by_level.cost_of(*a).total_cmp(&by_level.cost_of(*b)))?;
-        let search = BrentOpt::new((1.0 - NEAR) * guess, (1.0 + NEAR) * guess);
-        let found = Executor::new(ByLevel { ..by_level }, search)
-            .configure(|state| state.max_iters(EVALUATIONS))
-            .timer(false)
-            .run()
-            .ok()?;
-        let best = *found.state.get_best_param()?;
+        let near = [(1.0 - NEAR) * guess, (1.0 + NEAR) * guess];
+        let best = minimum(|level| by_level.cost_of(level), near, EVALUATIONS)?;
         let explained = bare - by_level.cost_of(best);
         if explained < AS_MUCH * (bare - pushed) {
             return None;
