@@ -1,6 +1,6 @@
 //! Sizes of a push by output error over the windows it touches: the push under which their predictions miss least.
 
-use super::{Event, SHORTEST, State};
+use super::{Event, Place, SHORTEST, State};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
 use crate::solve::scaled_inverse;
@@ -51,6 +51,25 @@ struct Touched<'a, A, const N: usize, const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+    /// Whether a log misses by so much that a push in it could be of consequence. Beside a remainder that is no condition.
+    pub(super) fn could_hold_a_push(&self, (set, track): Place, state: &State<'_, N, P>) -> bool {
+        if state.remainder {
+            return true;
+        }
+        let whole = [&self.training, &self.holdout][set];
+        let data = whole.data.of_track(track, |_| true).without_pushes();
+        let (metric, predicted) = self.from_measured_starts(&data, state);
+        let residual = metric.residual(&data.measured(), &predicted);
+        metric.costs(&data, &residual).iter().sum::<f64>() > least_gain(whole, state)
+    }
+
+    /// Weights around the model, every window from its measured start, and what it predicts.
+    fn from_measured_starts(&self, data: &Dataset<N>, state: &State<'_, N, P>) -> (Metric<N>, Vec<f64>) {
+        let starts = vec![Shift::none(); data.windows.len()];
+        let predicted = data.predict(&self.arm, state.model, &starts);
+        (Metric::new(data, &self.arm, state.model, state.scale, starts, &predicted), predicted)
+    }
+
     /// The push with the values that output error gives it, and what it explains.
     ///
     /// What it explains is counted from what the model misses, or the model fitted to its log alone, `own`, if that misses less. Beside a
@@ -69,11 +88,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         if data.windows.is_empty() {
             return state.remainder.then_some(rough);
         }
-        let least = state.noticeable.powi(2) * sample.motion(&state.scale);
+        let least = least_gain(&sample, state);
         let usual = self.metric(&sample, state.model, state.scale).typical * data.windows.len() as f64;
-        let starts = vec![Shift::none(); data.windows.len()];
-        let predicted = data.predict(&self.arm, state.model, &starts);
-        let metric = Metric::new(&data, &self.arm, state.model, state.scale, starts, &predicted);
+        let (metric, _) = self.from_measured_starts(&data, state);
         let sample = Sample::new(data);
         let mut touched =
             Touched { arm: &self.arm, model: state.model, sample, metric, known, push: rough.push };
@@ -97,6 +114,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         }
         (state.remainder && share(seen) > HELPS).then(|| Event { share: share(seen), ..rough })
     }
+}
+
+/// What a push of consequence lowers the cost of its windows by, at least.
+fn least_gain<const N: usize, const P: usize>(sample: &Sample<N>, state: &State<'_, N, P>) -> f64 {
+    state.noticeable.powi(2) * sample.motion(&state.scale)
 }
 
 /// Whether output error has found the same push; beside a remainder also its size must be much the same, for the remainder may have

@@ -144,6 +144,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     fn in_recording(&self, places: &[Place], state: &State<'_, N, P>) -> Vec<Event> {
+        if !places.iter().any(|place| self.could_hold_a_push(*place, state)) {
+            return Vec::new();
+        }
         let pieces: Vec<&Track<N>> = places.iter().map(|p| self.track(*p)).collect();
         let whole = Track::joined(&pieces).filter(|t| t.t[t.len() - 1] - t.t[0] > SHORTEST_LOG);
         let residual = whole.and_then(|track| Residual::new(&self.arm, &track, state.model, &self.prior));
