@@ -1,5 +1,6 @@
 //! Sizes of a push by output error over the windows it touches: the push under which their predictions miss least.
 
+use super::own::Own;
 use super::{Event, Place, SHORTEST, State};
 use crate::metric::Metric;
 use crate::model::{Hypothesis, Placed};
@@ -17,6 +18,9 @@ const LONGEST: f64 = 2.5;
 
 /// A push that lowers the cost of the windows it touches by less than this share is not seen there.
 const HELPS: f64 = 0.01;
+
+/// The same, beside a remainder, where the model fitted to the recording with the push is compared to that fitted without it.
+const HELPS_OWN: f64 = 0.02;
 
 /// Least share of the cost of the windows it touches that a push must explain before its size by output error is believed.
 const EXPLAINS: f64 = 0.5;
@@ -72,15 +76,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
     /// The push with the values that output error gives it, and what it explains.
     ///
-    /// What it explains is counted from what the model misses, or the model fitted to its log alone, `own`, if that misses less. Beside a
-    /// remainder it stays as it was where output error explains too little to be believed, if it helps at all; without one, it
-    /// then is none.
+    /// What it explains is counted from what the model misses, or the model fitted to its recording alone, if that misses less. Beside a
+    /// remainder it stays as it was where output error explains too little to be believed, if it helps at all, or helps that model;
+    /// without one, it then is none. `known` are the recording's other pushes.
     pub(super) fn sized(
         &self,
         rough: Event,
         state: &State<'_, N, P>,
-        own: Option<&Hypothesis<P>>,
-        known: &[Placed],
+        own: &Own<'_, A, N, P>,
+        known: &[Event],
     ) -> Option<Event> {
         let whole = if rough.holdout { &self.holdout } else { &self.training };
         let sample = Sample { data: whole.data.without_pushes(), measured: whole.measured.clone() };
@@ -92,11 +96,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let usual = self.metric(&sample, state.model, state.scale).typical * data.windows.len() as f64;
         let (metric, _) = self.from_measured_starts(&data, state);
         let sample = Sample::new(data);
+        let here: Vec<Placed> = known.iter().filter(|e| e.place() == rough.place()).map(|e| e.push).collect();
         let mut touched =
-            Touched { arm: &self.arm, model: state.model, sample, metric, known, push: rough.push };
+            Touched { arm: &self.arm, model: state.model, sample, metric, known: &here, push: rough.push };
         let p = Vector3::from(rough.push.p);
-        let bare = touched.cost(&touched.residual_of(&Vector3::new(0.0, p[1], p[2])));
-        let bare = own.map_or(bare, |own| touched.cost_under(self, own, &p).min(bare));
+        let none = Vector3::new(0.0, p[1], p[2]);
+        let mut bare = touched.cost(&touched.residual_of(&none));
+        if !state.remainder {
+            bare = touched.cost_under(self, own.bare(), &none).min(bare);
+        }
         let seen = touched.cost(&touched.residual_of(&p));
         // Beside a remainder a search from elsewhere would take the remainder for the push.
         let (mut fitted, left) = if state.remainder { touched.minimise(p) } else { touched.least(p) };
@@ -112,7 +120,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let sigma = touched.sigma(&fitted, state.covariance)?;
             return Some(Event { push, sigma, share: share(left), ..rough });
         }
-        (state.remainder && share(seen) > HELPS).then(|| Event { share: share(seen), ..rough })
+        if !state.remainder {
+            return None;
+        }
+        if share(seen) > HELPS {
+            return Some(Event { share: share(seen), ..rough });
+        }
+        let others: Vec<&Event> = known.iter().collect();
+        let with: Vec<&Event> = known.iter().chain([&rough]).collect();
+        let without = touched.cost_under(self, &own.beside(&others), &none);
+        let share = 1.0 - touched.cost_under(self, &own.beside(&with), &p) / without;
+        (share > HELPS_OWN).then_some(Event { share, ..rough })
     }
 }
 
@@ -148,12 +166,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         self.metric.residual(&self.sample.measured, &predicted)
     }
 
-    /// Cost without the push under a model of the log's own, its starts fitted to it.
+    /// Cost of a push under another model, whose starts are fitted to it.
     fn cost_under(&self, study: &Study<A, N, P>, own: &Hypothesis<P>, p: &Vector3<f64>) -> f64 {
-        let sample = Sample { data: self.sample.data.clone(), measured: self.sample.measured.clone() };
+        let mut data = self.sample.data.clone();
+        data.tracks[0].pushes = self.with(p);
+        let sample = Sample { data, measured: self.sample.measured.clone() };
         let metric = study.metric(&sample, own, self.metric.scale);
         let there = Touched { arm: self.arm, model: own, sample, metric, known: self.known, push: self.push };
-        let residual = there.residual_of(&Vector3::new(0.0, p[1], p[2]));
+        let residual = there.residual_of(p);
         there.metric.costs(&there.sample.data, &residual).iter().sum()
     }
 

@@ -8,6 +8,7 @@ mod bell;
 mod fit;
 mod limit;
 mod linear;
+mod own;
 mod residual;
 mod scatter;
 mod search;
@@ -17,13 +18,13 @@ use crate::course::Attribution;
 use crate::decide::noticeable;
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Work;
-use crate::study::{Sample, Study};
+use crate::study::Study;
 use crate::track::Track;
-use crate::window::Dataset;
 use armgap_core::arm::Arm;
 use armgap_core::effect::find;
 use bell::Bell;
 use nalgebra::DMatrix;
+use own::Own;
 use rayon::prelude::*;
 use residual::Residual;
 use search::{MOST, search};
@@ -154,14 +155,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         if found.bells.is_empty() {
             return Vec::new();
         }
-        let own = (!state.remainder)
-            .then(|| self.of_recording(places).settle(state.model, state.scale).0.hypothesis);
+        let own = Own::new(self, places, state);
         let mut events: Vec<Event> = Vec::new();
         for bell in &found.bells {
             let Some(rough) = self.rough(places, bell, found.rest) else { continue };
-            let known: Vec<Placed> =
-                events.iter().filter(|e| e.place() == rough.place()).map(|e| e.push).collect();
-            events.extend(self.sized(rough, state, own.as_ref(), &known));
+            events.extend(self.sized(rough, state, &own, &events));
         }
         events.retain(|e| e.is_known() && !self.meets_an_end(e, &found.bells));
         // So many are no rare events, but something that the arm does again and again.
@@ -200,24 +198,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             share: 0.0,
             probability: 1.0 - 0.5 * (rest / bell.z).powi(2).min(1.0),
         })
-    }
-
-    /// A study of one recording alone, without pushes.
-    fn of_recording(&self, places: &[Place]) -> Self {
-        let piece =
-            |(set, index): &Place| [&self.training, &self.holdout][*set].data.of_track(*index, |_| true);
-        let whole = places.iter().map(piece).reduce(Dataset::and).map(|data| data.without_pushes());
-        let sample = || Sample::new(whole.clone().unwrap_or_else(|| unreachable!("a recording has pieces")));
-        Self {
-            arm: self.arm.clone(),
-            prior: self.prior,
-            scales: self.scales.clone(),
-            training: sample(),
-            holdout: sample(),
-            noise: self.noise,
-            own: self.own.clone(),
-            watch: self.watch.aside(),
-        }
     }
 
     /// Logs as they were recorded: pieces of the same log that follow each other in time belong together.
