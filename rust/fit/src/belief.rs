@@ -88,6 +88,18 @@ fn probability<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usiz
     (f64::from(wins) + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
+/// How often one contender has a lower cost than another when the windows are drawn again.
+pub fn probability_over<const P: usize>(one: &Contender<P>, other: &Contender<P>, seed: u64) -> f64 {
+    let advantages = one.advantages(other);
+    let own = other.fit.prior_cost - one.fit.prior_cost;
+    let mut random = Random(seed);
+    let gain = |random: &mut Random| -> f64 {
+        own + (0..advantages.len()).map(|_| advantages[random.below(advantages.len())]).sum::<f64>()
+    };
+    let wins = (0..RESAMPLES).filter(|_| gain(&mut random) > 0.0).count();
+    (wins as f64 + 0.5) / (RESAMPLES as f64 + 1.0)
+}
+
 /// Probability of the chosen contender, or one that no motion tells from it, among all effects that would restore the trusted values, from their distances.
 fn trust_probability<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usize) -> f64 {
     let best = stage.contenders[choice].fit.prior_cost;

@@ -26,9 +26,7 @@ pub struct Attribution<const N: usize, const P: usize> {
 impl<const N: usize, const P: usize> Attribution<N, P> {
     /// The effect that was taken up after a stage.
     pub fn added(&self, stage: usize) -> Option<&Placed> {
-        let effects = |i: usize| self.stages.get(i).map(|s| &s.settled.hypothesis.effects);
-        let before = effects(stage)?;
-        effects(stage + 1)?.iter().find(|e| !before.iter().any(|known| known.same_place(e)))
+        added(&self.stages.iter().collect::<Vec<_>>(), stage)
     }
 
     /// RMS error of the final model on the holdout relative to the motion.
@@ -42,17 +40,27 @@ impl<const N: usize, const P: usize> Attribution<N, P> {
     }
 }
 
+/// The effect that was taken up after one of these stages.
+pub(crate) fn added<'a, const N: usize, const P: usize>(
+    stages: &[&'a Stage<N, P>],
+    stage: usize,
+) -> Option<&'a Placed> {
+    let effects = |i: usize| stages.get(i).map(|s| &s.settled.hypothesis.effects);
+    let before = effects(stage)?;
+    effects(stage + 1)?.iter().find(|e| !before.iter().any(|known| known.same_place(e)))
+}
+
 /// Where a search stands.
-struct Course<const N: usize, const P: usize> {
-    causes: Vec<Cause>,
+pub(crate) struct Course<const N: usize, const P: usize> {
+    pub causes: Vec<Cause>,
     /// The stages before this one.
-    stages: Vec<Stage<N, P>>,
-    stage: Stage<N, P>,
-    smoothed: bool,
+    pub stages: Vec<Stage<N, P>>,
+    pub stage: Stage<N, P>,
+    pub smoothed: bool,
     /// Whether friction's rounding has been fitted.
-    rounded: bool,
+    pub rounded: bool,
     /// Improvements of this size count, relative to the motion.
-    threshold: f64,
+    pub threshold: f64,
 }
 
 impl<const N: usize, const P: usize> Course<N, P> {
@@ -87,6 +95,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         if course.stage.is_unexplained() && !course.causes.is_empty() && max_causes > 1 {
             course = self.retraced(course, noticeable, max_causes, seed);
         }
+        course = self.reconsidered(course, noticeable, max_causes, seed);
         let Course { mut causes, mut stages, stage, .. } = course;
         let mut model = stage.settled.clone();
         self.prune(&mut model, &mut causes, &stage);
@@ -98,7 +107,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     /// Takes up one cause after another, or two at once, until nothing more deserves it.
-    fn pursue(&self, course: &mut Course<N, P>, noticeable: f64, max_causes: usize, seed: u64) {
+    pub(crate) fn pursue(&self, course: &mut Course<N, P>, noticeable: f64, max_causes: usize, seed: u64) {
         while course.causes.len() < max_causes {
             let stage = &course.stage;
             let next = if let Some((choice, ground)) = choose(stage, course.smoothed, course.threshold) {
@@ -143,7 +152,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     /// Goes on to the stage around `next`.
-    fn advance(&self, course: &mut Course<N, P>, next: &Fit<P>, noticeable: f64) {
+    pub(crate) fn advance(&self, course: &mut Course<N, P>, next: &Fit<P>, noticeable: f64) {
         let settled = self.settle(&next.hypothesis, course.stage.weights.training.scale);
         let stage = self.stage_around(settled.clone(), noticeable);
         course.stages.push(std::mem::replace(&mut course.stage, stage));
@@ -167,7 +176,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     /// Drops causes that the others have made idle.
-    fn prune(&self, model: &mut Fit<P>, causes: &mut Vec<Cause>, stage: &Stage<N, P>) {
+    pub(crate) fn prune(&self, model: &mut Fit<P>, causes: &mut Vec<Cause>, stage: &Stage<N, P>) {
         let mut i = 0;
         while causes.len() > 1 && i < causes.len() {
             let full = self.judged(stage, model.clone(), None);

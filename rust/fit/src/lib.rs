@@ -30,6 +30,7 @@ mod products;
 pub mod progress;
 pub mod push;
 mod random;
+mod reconsider;
 pub mod report;
 mod rounding;
 mod ruled_out;

@@ -62,13 +62,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         }
         let whole = [&self.training, &self.holdout][set];
         let data = whole.data.of_track(track, |_| true).without_pushes();
-        let (metric, predicted) = self.from_measured_starts(&data, state);
+        let (metric, predicted) = self.at_measured_starts(&data, state);
         let residual = metric.residual(&data.measured(), &predicted);
         metric.costs(&data, &residual).iter().sum::<f64>() > least_gain(whole, state)
     }
 
     /// Weights around the model, every window from its measured start, and what it predicts.
-    fn from_measured_starts(&self, data: &Dataset<N>, state: &State<'_, N, P>) -> (Metric<N>, Vec<f64>) {
+    fn at_measured_starts(&self, data: &Dataset<N>, state: &State<'_, N, P>) -> (Metric<N>, Vec<f64>) {
         let starts = vec![Shift::none(); data.windows.len()];
         let predicted = data.predict(&self.arm, state.model, &starts);
         (Metric::new(data, &self.arm, state.model, state.scale, starts, &predicted), predicted)
@@ -94,7 +94,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         }
         let least = least_gain(&sample, state);
         let usual = self.metric(&sample, state.model, state.scale).typical * data.windows.len() as f64;
-        let (metric, _) = self.from_measured_starts(&data, state);
+        let (metric, _) = self.at_measured_starts(&data, state);
         let sample = Sample::new(data);
         let here: Vec<Placed> = known.iter().filter(|e| e.place() == rough.place()).map(|e| e.push).collect();
         let mut touched =

@@ -29,7 +29,8 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> Own<'a, A, N, P> {
     /// The model fitted with these pushes in their pieces.
     pub fn beside(&self, events: &[&Event]) -> Hypothesis<P> {
         let piece = |place: &Place| {
-            let mut data = [&self.whole.training, &self.whole.holdout][place.0].data.of_track(place.1, |_| true);
+            let mut data =
+                [&self.whole.training, &self.whole.holdout][place.0].data.of_track(place.1, |_| true);
             let here = events.iter().filter(|e| e.place() == *place);
             data.tracks[0].pushes = here.map(|e| e.push).collect::<Vec<Placed>>();
             data

@@ -1,0 +1,140 @@
+//! The way back to a choice between rivals that was made too early.
+//!
+//! Of two effects that look alike, such as a lag and a delay, the better one may show only once the other causes are known: beside a gap
+//! ten times as large, what tells them apart is noise. And what a law with more values explained beyond one with fewer may have been the
+//! doing of a cause that was found later. So where several causes were found, each rival takes the place of its cause beside all
+//! others; if it does better, or as well with fewer values, the search goes on from there again. The better end counts, if it is reached
+//! with no more causes and, unless it is the floor, no more values: beside a gap, more are taken up by what they are not about.
+
+use crate::attribute::{Contender, Stage};
+use crate::belief::{Cause, name, probability_over};
+use crate::course::{Course, added};
+use crate::decide::{ABOVE_FLOOR, Ground, MATTERS, is_possible};
+use crate::equivalent;
+use crate::model::{Hypothesis, Placed};
+use crate::solve::Effort;
+use crate::study::Study;
+use armgap_core::arm::Arm;
+
+/// A rival explains at least this part of what its cause explained when that was taken up.
+const RIVALS: f64 = 0.5;
+
+/// Rivals that are tried for each cause.
+const TRIED: usize = 3;
+
+/// Mean advantage, in standard errors, from which a rival is better beside the other causes.
+const BETTER: f64 = 2.0;
+
+/// A search from a rival with fewer values may end with predictions that miss by this factor more.
+const AS_WELL: f64 = 1.05;
+
+/// A rival that does better beside the other causes than the cause it could have been taken up for.
+struct Rival {
+    /// The stage in which it was passed over.
+    stage: usize,
+    /// Which of the stage's contenders it is.
+    choice: usize,
+    /// The effect that was taken up.
+    instead_of: Placed,
+    /// How sure it is that this one is better; none where it has fewer values and does as well.
+    better: Option<f64>,
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+    /// The course, or the one that takes up a better rival of one of its causes in that one's place.
+    pub(crate) fn reconsidered(
+        &self,
+        course: Course<N, P>,
+        noticeable: f64,
+        max_causes: usize,
+        seed: u64,
+    ) -> Course<N, P> {
+        if course.causes.len() < 2 {
+            return course;
+        }
+        let Some(rival) = self.better_rival(&course, seed) else { return course };
+        let mut other = self.back_to(&course, &rival, noticeable, seed);
+        self.pursue(&mut other, noticeable, max_causes, seed);
+        let allowed = if rival.better.is_some() { 1.0 } else { AS_WELL };
+        let as_good = other.stage.relative_error() < allowed * course.stage.relative_error();
+        let ([causes, values], [other_causes, other_values]) = (self.needed(&course), self.needed(&other));
+        let at_floor = other.stage.excess() < ABOVE_FLOOR;
+        let no_more = other_causes <= causes && (other_values <= values || at_floor);
+        if as_good && no_more { other } else { course }
+    }
+
+    /// The first rival that does better than its cause beside the others.
+    fn better_rival(&self, course: &Course<N, P>, seed: u64) -> Option<Rival> {
+        let all: Vec<&Stage<N, P>> = course.stages.iter().chain([&course.stage]).collect();
+        (0..course.stages.len()).find_map(|index| self.better_in(&all, index, &course.stage, seed))
+    }
+
+    /// The same among those that were passed over in one stage.
+    fn better_in(&self, all: &[&Stage<N, P>], index: usize, last: &Stage<N, P>, seed: u64) -> Option<Rival> {
+        let (stage, adopted) = (all[index], added(all, index)?);
+        let model = &last.settled.hypothesis;
+        let place = model.effects.iter().position(|e| e.same_place(adopted))?;
+        let cause = stage.contenders.iter().find(|c| c.effect.is_some_and(|e| e.same_place(adopted)))?;
+        let open = last.excess() > ABOVE_FLOOR;
+        let size = |c: &Contender<P>| c.effect.map_or(0, |e| e.len());
+        let is_rival = |c: &Contender<P>| {
+            let Some(effect) = c.effect else { return false };
+            let known = model.effects.iter().any(|e| e.same_place(&effect));
+            !known
+                && (open || size(c) < size(cause))
+                && !equivalent::are(&effect, adopted, N)
+                && is_possible(c)
+                && stage.share(c) > (RIVALS * stage.share(cause)).max(MATTERS)
+        };
+        let rivals: Vec<usize> =
+            (0..stage.contenders.len()).filter(|i| is_rival(&stage.contenders[*i])).collect();
+        if rivals.is_empty() {
+            return None;
+        }
+        let beside = |effects: Vec<Placed>| {
+            let start = Hypothesis { effects, ..model.clone() };
+            self.contender(&last.weights, &start, place, Effort::FULL, &[])
+        };
+        let full = beside(model.effects.clone());
+        let tried = rivals.into_iter().take(TRIED).filter_map(|choice| {
+            let mut effects = model.effects.clone();
+            effects[place] = stage.contenders[choice].effect?;
+            let swapped = beside(effects);
+            let better = (swapped.z_over(&full) > BETTER).then(|| probability_over(&swapped, &full, seed));
+            let as_well = size(&swapped) < size(cause) && swapped.error < AS_WELL.powi(2) * full.error;
+            let rival = Rival { stage: index, choice, instead_of: *adopted, better };
+            (is_possible(&swapped) && (better.is_some() || as_well)).then_some((swapped.score(), rival))
+        });
+        tried.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, rival)| rival)
+    }
+
+    /// The course up to the stage in which a rival was passed over, and the stage after it instead.
+    fn back_to(&self, course: &Course<N, P>, rival: &Rival, noticeable: f64, seed: u64) -> Course<N, P> {
+        let stage = course.stages[rival.stage].clone();
+        let before = &stage.settled.hypothesis;
+        let known = |c: &&Cause| before.effects.iter().any(|e| e.same_place(&c.effect));
+        let mut causes: Vec<Cause> = course.causes.iter().filter(known).cloned().collect();
+        let named = name(&stage, rival.choice, Ground::Motion, seed);
+        let replaced = course.causes.iter().find(|c| c.effect.same_place(&rival.instead_of));
+        let as_sure = replaced.map_or(named.probability, |c| c.probability);
+        causes.push(Cause { probability: rival.better.unwrap_or(as_sure), ..named });
+        let next = stage.contenders[rival.choice].fit.clone();
+        let mut other = Course {
+            causes,
+            stages: course.stages[..rival.stage].to_vec(),
+            smoothed: before.smoothing > 0.0,
+            rounded: false,
+            threshold: course.threshold,
+            stage,
+        };
+        self.advance(&mut other, &next, noticeable);
+        other
+    }
+
+    /// Causes that a course ends with once the idle are dropped, and how many values they have.
+    fn needed(&self, course: &Course<N, P>) -> [usize; 2] {
+        let (mut model, mut causes) = (course.stage.settled.clone(), course.causes.clone());
+        self.prune(&mut model, &mut causes, &course.stage);
+        [causes.len(), model.hypothesis.effects.iter().map(Placed::len).sum()]
+    }
+}
