@@ -61,6 +61,8 @@ pub(crate) struct Course<const N: usize, const P: usize> {
     pub rounded: bool,
     /// Improvements of this size count, relative to the motion.
     pub threshold: f64,
+    /// Whether it has gone back to a rival before.
+    pub turned: bool,
 }
 
 impl<const N: usize, const P: usize> Course<N, P> {
@@ -84,7 +86,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let noticeable = noticeable(stage.relative_error());
         let threshold = self.look_closer(&mut stage, settled, noticeable, CLEAR);
         let (causes, stages) = (Vec::new(), Vec::new());
-        let mut course = Course { causes, stages, stage, smoothed: false, rounded: false, threshold };
+        let mut course =
+            Course { causes, stages, stage, smoothed: false, rounded: false, threshold, turned: false };
         if let Some(cause) = known.filter(|_| max_causes > 0) {
             let with = course.stage.settled.hypothesis.with(cause.effect);
             let fit = self.problem(&course.stage.weights.training).solve(&with, Effort::FULL);
@@ -95,7 +98,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         if course.stage.is_unexplained() && !course.causes.is_empty() && max_causes > 1 {
             course = self.retraced(course, noticeable, max_causes, seed);
         }
-        course = self.reconsidered(course, noticeable, max_causes, seed);
         let Course { mut causes, mut stages, stage, .. } = course;
         let mut model = stage.settled.clone();
         self.prune(&mut model, &mut causes, &stage);
@@ -108,7 +110,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
     /// Takes up one cause after another, or two at once, until nothing more deserves it.
     pub(crate) fn pursue(&self, course: &mut Course<N, P>, noticeable: f64, max_causes: usize, seed: u64) {
-        while course.causes.len() < max_causes {
+        loop {
+            // A cause that stands in for its rival leaves a gap that others would be taken up for.
+            if let Some(other) = self.reconsidered(course, false, noticeable, max_causes, seed) {
+                *course = other;
+                return;
+            }
+            if course.causes.len() >= max_causes {
+                break;
+            }
             let stage = &course.stage;
             let next = if let Some((choice, ground)) = choose(stage, course.smoothed, course.threshold) {
                 match stage.contenders[choice].effect {
@@ -126,6 +136,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 course.take_up(both)
             };
             self.advance(course, &next, noticeable);
+        }
+        if let Some(other) = self.reconsidered(course, true, noticeable, max_causes, seed) {
+            *course = other;
         }
     }
 

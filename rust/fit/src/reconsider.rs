@@ -2,7 +2,7 @@
 //!
 //! Of two effects that look alike, such as a lag and a delay, the better one may show only once the other causes are known: beside a gap
 //! ten times as large, what tells them apart is noise. And what a law with more values explained beyond one with fewer may have been the
-//! doing of a cause that was found later. So where several causes were found, each rival takes the place of its cause beside all
+//! doing of a cause that was found later. So before a further cause is looked for, each rival takes the place of its cause beside all
 //! others; if it does better, or as well with fewer values, the search goes on from there again. The better end counts, if it is reached
 //! with no more causes and, unless it is the floor, no more values: beside a gap, more are taken up by what they are not about.
 
@@ -41,37 +41,39 @@ struct Rival {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// The course, or the one that takes up a better rival of one of its causes in that one's place.
+    /// The course that takes up a better rival of one of the causes in that one's place, if it ends better. Before a search has `ended`, what
+    /// a rival with more values explains may still be the doing of another cause.
     pub(crate) fn reconsidered(
         &self,
-        course: Course<N, P>,
+        course: &Course<N, P>,
+        ended: bool,
         noticeable: f64,
         max_causes: usize,
         seed: u64,
-    ) -> Course<N, P> {
-        if course.causes.len() < 2 {
-            return course;
+    ) -> Option<Course<N, P>> {
+        if course.causes.len() < 2 || course.turned {
+            return None;
         }
-        let Some(rival) = self.better_rival(&course, seed) else { return course };
-        let mut other = self.back_to(&course, &rival, noticeable, seed);
+        let rival = self.better_rival(course, ended, seed)?;
+        let mut other = self.back_to(course, &rival, noticeable, seed);
         self.pursue(&mut other, noticeable, max_causes, seed);
         let allowed = if rival.better.is_some() { 1.0 } else { AS_WELL };
         let as_good = other.stage.relative_error() < allowed * course.stage.relative_error();
-        let ([causes, values], [other_causes, other_values]) = (self.needed(&course), self.needed(&other));
+        let ([causes, values], [other_causes, other_values]) = (self.needed(course), self.needed(&other));
         let at_floor = other.stage.excess() < ABOVE_FLOOR;
         let no_more = other_causes <= causes && (other_values <= values || at_floor);
-        if as_good && no_more { other } else { course }
+        (as_good && no_more).then_some(other)
     }
 
     /// The first rival that does better than its cause beside the others.
-    fn better_rival(&self, course: &Course<N, P>, seed: u64) -> Option<Rival> {
+    fn better_rival(&self, course: &Course<N, P>, ended: bool, seed: u64) -> Option<Rival> {
         let all: Vec<&Stage<N, P>> = course.stages.iter().chain([&course.stage]).collect();
-        (0..course.stages.len()).find_map(|index| self.better_in(&all, index, &course.stage, seed))
+        (0..course.stages.len()).find_map(|index| self.better_in(&all, index, ended, seed))
     }
 
     /// The same among those that were passed over in one stage.
-    fn better_in(&self, all: &[&Stage<N, P>], index: usize, last: &Stage<N, P>, seed: u64) -> Option<Rival> {
-        let (stage, adopted) = (all[index], added(all, index)?);
+    fn better_in(&self, all: &[&Stage<N, P>], index: usize, ended: bool, seed: u64) -> Option<Rival> {
+        let (stage, last, adopted) = (all[index], *all.last()?, added(all, index)?);
         let model = &last.settled.hypothesis;
         let place = model.effects.iter().position(|e| e.same_place(adopted))?;
         let cause = stage.contenders.iter().find(|c| c.effect.is_some_and(|e| e.same_place(adopted)))?;
@@ -81,7 +83,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let Some(effect) = c.effect else { return false };
             let known = model.effects.iter().any(|e| e.same_place(&effect));
             !known
-                && (open || size(c) < size(cause))
+                && (size(c) < size(cause) || (open && (ended || size(c) == size(cause))))
                 && !equivalent::are(&effect, adopted, N)
                 && is_possible(c)
                 && stage.share(c) > (RIVALS * stage.share(cause)).max(MATTERS)
@@ -101,11 +103,15 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             effects[place] = stage.contenders[choice].effect?;
             let swapped = beside(effects);
             let better = (swapped.z_over(&full) > BETTER).then(|| probability_over(&swapped, &full, seed));
-            let as_well = size(&swapped) < size(cause) && swapped.error < AS_WELL.powi(2) * full.error;
+            let does = better.is_some() || (size(&swapped) < size(cause) && as_well(&swapped, &full));
             let rival = Rival { stage: index, choice, instead_of: *adopted, better };
-            (is_possible(&swapped) && (better.is_some() || as_well)).then_some((swapped.score(), rival))
+            (is_possible(&swapped) && does).then_some((swapped, rival))
         });
-        tried.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, rival)| rival)
+        let found: Vec<(Contender<P>, Rival)> = tried.collect();
+        let (best, _) = found.iter().min_by(|a, b| a.0.score().total_cmp(&b.0.score()))?;
+        let best = best.clone();
+        let as_good = found.into_iter().filter(|(swapped, _)| as_well(swapped, &best));
+        as_good.min_by_key(|(swapped, _)| size(swapped)).map(|(_, rival)| rival)
     }
 
     /// The course up to the stage in which a rival was passed over, and the stage after it instead.
@@ -126,6 +132,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             rounded: false,
             threshold: course.threshold,
             stage,
+            turned: true,
         };
         self.advance(&mut other, &next, noticeable);
         other
@@ -137,4 +144,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         self.prune(&mut model, &mut causes, &course.stage);
         [causes.len(), model.hypothesis.effects.iter().map(Placed::len).sum()]
     }
+}
+
+/// Whether predictions of one contender miss by hardly more than those of another.
+fn as_well<const P: usize>(one: &Contender<P>, other: &Contender<P>) -> bool {
+    one.error < AS_WELL.powi(2) * other.error
 }
