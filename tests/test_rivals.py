@@ -62,6 +62,27 @@ def test_both_of_a_pair_are_named(pair):
     assert all(c.probability > 0.5 for c in pair.causes)
 
 
+LATE_S = 0.0035
+
+
+@pytest.mark.parametrize("limit", [6.0, 7.0])
+def test_a_rival_passed_over_is_tried_again_beside_the_causes_found_later(limit: float) -> None:
+    """Before the limit is known the lag does better than the delay; beside it, it leaves ten times the floor."""
+    arm = Arm.read(CASE_FOLDER / "arm.toml")
+    hidden = [Effect("torque_saturation", 2, {"level": limit}), Effect("actuator_delay", 1, {"delay": LATE_S})]
+    t = np.arange(2000) * arm.sample_period
+    other = np.column_stack([45 * np.sin(9 * t) + 20 * np.sin(17 * t), 6 * np.sin(15 * t + 1) + 4 * np.sin(31 * t)])
+    training, holdout = (
+        simulate(arm, t, tau, effects=hidden, noise=NOISE_RAD, seed=seed, name=f"run {seed}")
+        for seed, tau in enumerate([seed_torque(t), other], start=1)
+    )
+    causes = {(c.effect, c.joint): c for c in diagnose(training, arm, holdout=holdout).causes}
+    assert set(causes) == {("torque_saturation", 2), ("actuator_delay", 1)}
+    late = causes["actuator_delay", 1]
+    assert late.probability > 0.95
+    assert late.parameters["delay"].value == pytest.approx(LATE_S, rel=1e-3)
+
+
 ROUNDED_RAD_S = 0.05
 
 
