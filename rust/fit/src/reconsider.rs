@@ -4,7 +4,7 @@
 //! ten times as large, what tells them apart is noise. And what a law with more values explained beyond one with fewer may have been the
 //! doing of a cause that was found later. So before a further cause is looked for, each rival takes the place of its cause beside all
 //! others; if it does better, or as well with fewer values, the search goes on from there again. The better end counts, if it is reached
-//! with no more causes and, unless it is the floor, no more values: beside a gap, more are taken up by what they are not about.
+//! with no more causes: beside a gap, more are taken up by what they are not about.
 
 use crate::attribute::{Contender, Stage};
 use crate::belief::{Cause, name, probability_over};
@@ -59,10 +59,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         self.pursue(&mut other, noticeable, max_causes, seed);
         let allowed = if rival.better.is_some() { 1.0 } else { AS_WELL };
         let as_good = other.stage.relative_error() < allowed * course.stage.relative_error();
-        let ([causes, values], [other_causes, other_values]) = (self.needed(course), self.needed(&other));
-        let at_floor = other.stage.excess() < ABOVE_FLOOR;
-        let no_more = other_causes <= causes && (other_values <= values || at_floor);
-        (as_good && no_more).then_some(other)
+        (as_good && self.needed(&other) <= self.needed(course)).then_some(other)
     }
 
     /// The first rival that does better than its cause beside the others.
@@ -83,7 +80,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let Some(effect) = c.effect else { return false };
             let known = model.effects.iter().any(|e| e.same_place(&effect));
             !known
-                && (size(c) < size(cause) || (open && (ended || size(c) == size(cause))))
+                && (size(c) <= size(cause) || (open && ended))
                 && !equivalent::are(&effect, adopted, N)
                 && is_possible(c)
                 && stage.share(c) > (RIVALS * stage.share(cause)).max(MATTERS)
@@ -138,11 +135,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         other
     }
 
-    /// Causes that a course ends with once the idle are dropped, and how many values they have.
-    fn needed(&self, course: &Course<N, P>) -> [usize; 2] {
+    /// Causes that a course ends with once the idle are dropped.
+    fn needed(&self, course: &Course<N, P>) -> usize {
         let (mut model, mut causes) = (course.stage.settled.clone(), course.causes.clone());
         self.prune(&mut model, &mut causes, &course.stage);
-        [causes.len(), model.hypothesis.effects.iter().map(Placed::len).sum()]
+        causes.len()
     }
 }
 
