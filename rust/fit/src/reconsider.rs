@@ -42,11 +42,13 @@ struct Rival {
     instead_of: Placed,
     /// How sure it is that this one is better; none where it has fewer values and does as well.
     better: Option<f64>,
+    /// By what factor the predictions of a search from it may miss more than those of the other's.
+    allowed: f64,
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// The course that takes up a better rival of one of the causes in that one's place, if it ends better. Before a search has `ended`, what
-    /// a rival with more values explains may still be the doing of another cause.
+    /// The course that takes up a better rival of one of the causes in that one's place, if it ends better. Those with more values are tried
+    /// once a search has `ended`: before, what they explain beyond may still be the doing of another cause. The others have been tried by then.
     pub(crate) fn reconsidered(
         &self,
         course: &Course<N, P>,
@@ -61,10 +63,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         let rival = self.better_rival(course, ended, seed)?;
         let mut other = self.back_to(course, &rival, noticeable, seed);
         self.pursue(&mut other, noticeable, max_causes, seed);
-        let more = course.stages[rival.stage].contenders[rival.choice].effect.map_or(0, |e| e.len())
-            > rival.instead_of.len();
-        let allowed = if more { RICHER } else { rival.better.map_or(AS_WELL, |_| 1.0) };
-        let as_good = other.stage.relative_error() < allowed * course.stage.relative_error();
+        let as_good = other.stage.relative_error() < rival.allowed * course.stage.relative_error();
         (as_good && self.needed(&other) <= self.needed(course)).then_some(other)
     }
 
@@ -86,7 +85,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let Some(effect) = c.effect else { return false };
             let known = model.effects.iter().any(|e| e.same_place(&effect));
             !known
-                && (size(c) <= size(cause) || (open && ended))
+                && if ended { open && size(c) > size(cause) } else { size(c) <= size(cause) }
                 && !equivalent::are(&effect, adopted, N)
                 && is_possible(c)
                 && stage.share(c) > (RIVALS * stage.share(cause)).max(MATTERS)
@@ -107,7 +106,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let swapped = beside(effects);
             let better = (swapped.z_over(&full) > BETTER).then(|| probability_over(&swapped, &full, seed));
             let does = better.is_some() || (size(&swapped) < size(cause) && as_well(&swapped, &full));
-            let rival = Rival { stage: index, choice, instead_of: *adopted, better };
+            let allowed = if ended { RICHER } else { better.map_or(AS_WELL, |_| 1.0) };
+            let rival = Rival { stage: index, choice, instead_of: *adopted, better, allowed };
             (is_possible(&swapped) && does).then_some((swapped, rival))
         });
         let found: Vec<(Contender<P>, Rival)> = tried.collect();
