@@ -301,7 +301,7 @@ def test_impossible_wishes_are_refused():
 
 
 def test_logs_that_move_on_different_sides_are_refused():
-    use = Use(torque=1.0, peak=1.0, slew=1.0, speed=1.0, low=0.0, high=0.0, duration=10.0)
+    use = Use(torque=1.0, peak=1.0, slew=1.0, speed=1.0, low=0.0, high=0.1, span=1.0, duration=10.0)
     draw = Draw(np.random.default_rng(0), 0.5, random_arm(np.random.default_rng(0), "pendulum"), 0, use)
     with pytest.raises(NoMotionError, match="in common"):
         _one(draw, "presliding", 1)

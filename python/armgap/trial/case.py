@@ -13,7 +13,7 @@ import numpy as np
 from armgap.errors import ArmgapError
 from armgap.trial.armfile import arm_toml, draw_nominal
 from armgap.trial.arms import TrialArm, random_arm
-from armgap.trial.effects import REGISTRY, Draw, usage
+from armgap.trial.effects import REGISTRY, Draw, NoTravelError, usage
 from armgap.trial.engine import mujoco
 from armgap.trial.excitation import STYLES, Excitation, Tracked, acceptable, draw_excitation, rings
 from armgap.trial.key import KEY_FILE, Hidden, Key
@@ -260,9 +260,9 @@ def _draw_hidden(
 def _one(d: Draw, name: str, joint: int | None, log: str | None = None) -> Hidden:
     try:
         drawn = {key: float(f"{value:.6g}") for key, value in REGISTRY[name].draw(d).items()}
-    except ZeroDivisionError:
+    except NoTravelError:
         raise NoMotionError(
-            f"the logs have no position of joint {joint} in common", remedy="take another seed"
+            f"the logs have next to no positions of joint {joint} in common", remedy="take another seed"
         ) from None
     return Hidden(name, joint, drawn, log, REGISTRY[name].family)
 

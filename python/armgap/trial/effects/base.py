@@ -11,6 +11,12 @@ from armgap.trial.arms import TrialArm
 from armgap.trial.rig import Array, Rig, Trace
 
 Parameters = dict[str, float]
+#: Logs have a travel in common if it is at least this share of the smallest range of any of them.
+COMMON = 0.2
+
+
+class NoTravelError(ValueError):
+    """A joint's positions in the logs of a case hardly overlap."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +33,8 @@ class Use:
         95th percentile of the speed, rad/s.
     low, high : float
         Positions reached in every log, rad.
+    span : float
+        Range of positions of the log that has the smallest, rad.
     duration : float
         s.
     """
@@ -37,11 +45,20 @@ class Use:
     speed: float
     low: float
     high: float
+    span: float
     duration: float
 
     @property
     def travel(self) -> float:
-        """``high - low``."""
+        """``high - low``.
+
+        Raises
+        ------
+        NoTravelError
+            It is next to nothing: the logs are of different places, and a size stated against it would be without bound.
+        """
+        if self.high - self.low < COMMON * self.span:
+            raise NoTravelError
         return self.high - self.low
 
 
@@ -56,6 +73,7 @@ def usage(traces: list[Trace], joint: int) -> Use:
         speed=float(np.quantile(np.abs(dq), 0.95)),
         low=max(float(np.min(x.q_true[:, joint])) for x in traces),
         high=min(float(np.max(x.q_true[:, joint])) for x in traces),
+        span=min(float(np.ptp(x.q_true[:, joint])) for x in traces),
         duration=min(float(x.t[-1]) for x in traces),
     )
 
