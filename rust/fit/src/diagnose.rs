@@ -1,6 +1,7 @@
 //! The diagnosis: where the gap lies, which effect causes it, how far it shrinks.
 
 use crate::arm::{ArmDescription, WithArm};
+use crate::crosswise::{crosswise, explains};
 use crate::model::Placed;
 use crate::progress::{Observer, Watch, Work, guarded};
 use crate::report::Diagnosis;
@@ -100,6 +101,10 @@ impl std::error::Error for DiagnoseError {}
 /// Windows without which nothing can be said.
 const FEWEST_WINDOWS: usize = 4;
 
+/// What is said where logs were cut crosswise.
+const CROSSWISE: &str = "the training logs do not show what the holdout does: every log was cut into stretches that were learnt from and \
+     judged on by turns";
+
 /// Diagnoses the gap between an arm and its logs; `observer` is told how far it is and may stop it.
 pub fn diagnose(
     arm: &ArmDescription,
@@ -149,12 +154,27 @@ impl WithArm for Request<'_> {
         theta: [f64; P],
     ) -> Self::Output {
         let started = Instant::now();
-        let mut study = self.study::<A, N, P>(arm, theta)?;
-        let conclusion = study.conclude(self.options.max_causes, self.options.seed);
+        let mut study = self.study::<A, N, P>(arm.clone(), theta, self.training, self.holdout)?;
+        let Options { max_causes, seed, .. } = *self.options;
+        let mut conclusion = study.conclude(study.attribute(max_causes, seed, None), max_causes, seed);
+        let mut notes = Vec::new();
+        if conclusion.0.is_unexplained()
+            && let Some([training, holdout]) = crosswise(self.training, self.holdout, self.options.horizon)
+            && let Ok(mut other) = self.study::<A, N, P>(arm, theta, &training, &holdout)
+        {
+            let attribution = other.attribute(max_causes, seed, None);
+            if explains(&attribution, &conclusion.0) {
+                conclusion = other.conclude(attribution, max_causes, seed);
+                study = other;
+                notes.push(CROSSWISE.to_owned());
+            }
+        }
         let attribution = &conclusion.0;
         let open = study.open_candidates(&attribution.model.hypothesis).len();
         study.watch.begin(Work::Result, open + attribution.stages[0].field.len());
         let mut diagnosis = crate::compose::compose(&study, &conclusion, self.arm, self.options);
+        notes.append(&mut diagnosis.notes);
+        diagnosis.notes = notes;
         diagnosis.seconds = started.elapsed().as_secs_f64();
         Ok(diagnosis)
     }
@@ -165,9 +185,11 @@ impl Request<'_> {
         &self,
         arm: A,
         theta: [f64; P],
+        training: &[LogData<'_>],
+        holdout: &[LogData<'_>],
     ) -> Result<Study<A, N, P>, DiagnoseError> {
-        let training = self.sample::<N>("training", self.training)?;
-        let holdout = self.sample::<N>("holdout", self.holdout)?;
+        let training = self.sample::<N>("training", training)?;
+        let holdout = self.sample::<N>("holdout", holdout)?;
         let length = self.arm.link_length.as_ref().and_then(|l| l.last().copied());
         let scales = Scales::new(&arm, &theta, &training.data.tracks, self.arm.gravity, length);
         let sigma = std::array::from_fn(|i| self.arm.sigma[i]);

@@ -11,6 +11,7 @@ pub mod attribute;
 pub mod belief;
 pub mod compose;
 pub mod course;
+mod crosswise;
 pub mod decide;
 pub mod diagnose;
 mod disturbance;

@@ -85,13 +85,17 @@ struct State<'a, const N: usize, const P: usize> {
 type Place = (usize, usize);
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// The attribution with all pushes accounted for.
+    /// An attribution of the logs as they are, with all pushes accounted for.
     ///
     /// Where that model describes the arm, pushes are looked for again under it. Beside a remainder they are kept as they were found: there
     /// the second model was seen to take up a part of the pushes, and the second search to find fewer. Pushes beside which predictions miss
     /// by much more than without are none. A limit that explains some of them in their place stays beside the rest.
-    pub fn conclude(&mut self, max_causes: usize, seed: u64) -> (Attribution<N, P>, Vec<Event>) {
-        let mut alone = self.attribute(max_causes, seed, None);
+    pub fn conclude(
+        &mut self,
+        mut alone: Attribution<N, P>,
+        max_causes: usize,
+        seed: u64,
+    ) -> (Attribution<N, P>, Vec<Event>) {
         let mut events = self.events(&alone);
         let limit = self.limit(&alone, &events);
         if limit.is_some() {
