@@ -63,6 +63,15 @@ impl<const P: usize> Contender<P> {
         self.effect.is_some_and(|e| e.law.spec().trial == Trial::Whole) && self.size < IDLE
     }
 
+    /// Whether two are of the same effect on the same joint, or both of none.
+    pub fn is_same(&self, other: &Self) -> bool {
+        match (&self.effect, &other.effect) {
+            (Some(a), Some(b)) => a.same_place(b),
+            (None, None) => true,
+            _ => false,
+        }
+    }
+
     /// Advantage over `other` of every window, training first.
     pub fn advantages(&self, other: &Self) -> Vec<f64> {
         let here = self.training.iter().chain(&self.holdout);
@@ -314,12 +323,7 @@ fn ranked<const P: usize>(mut contenders: Vec<Contender<P>>) -> Vec<Contender<P>
     contenders.sort_by(|a, b| a.score().total_cmp(&b.score()));
     let mut best: Vec<Contender<P>> = Vec::new();
     for contender in contenders {
-        let same = |c: &Contender<P>| match (&c.effect, &contender.effect) {
-            (Some(a), Some(b)) => a.same_place(b),
-            (None, None) => true,
-            _ => false,
-        };
-        if !best.iter().any(same) {
+        if !best.iter().any(|c| c.is_same(&contender)) {
             best.push(contender);
         }
     }

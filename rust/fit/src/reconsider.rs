@@ -33,11 +33,11 @@ const AS_WELL: f64 = 1.05;
 const RICHER: f64 = 0.9;
 
 /// A rival that does better beside the other causes than the cause it could have been taken up for.
-struct Rival {
+struct Rival<const P: usize> {
     /// The stage in which it was passed over.
     stage: usize,
-    /// Which of the stage's contenders it is.
-    choice: usize,
+    /// The rival as it was fitted there.
+    fitted: Contender<P>,
     /// The effect that was taken up.
     instead_of: Placed,
     /// How sure it is that this one is better; none where it has fewer values and does as well.
@@ -68,30 +68,37 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     /// The first rival that does better than its cause beside the others.
-    fn better_rival(&self, course: &Course<N, P>, ended: bool, seed: u64) -> Option<Rival> {
+    fn better_rival(&self, course: &Course<N, P>, ended: bool, seed: u64) -> Option<Rival<P>> {
         let all: Vec<&Stage<N, P>> = course.stages.iter().chain([&course.stage]).collect();
         (0..course.stages.len()).find_map(|index| self.better_in(&all, index, ended, seed))
     }
 
     /// The same among those that were passed over in one stage.
-    fn better_in(&self, all: &[&Stage<N, P>], index: usize, ended: bool, seed: u64) -> Option<Rival> {
+    fn better_in(&self, all: &[&Stage<N, P>], index: usize, ended: bool, seed: u64) -> Option<Rival<P>> {
         let (stage, last, adopted) = (all[index], *all.last()?, added(all, index)?);
         let model = &last.settled.hypothesis;
         let place = model.effects.iter().position(|e| e.same_place(adopted))?;
         let cause = stage.contenders.iter().find(|c| c.effect.is_some_and(|e| e.same_place(adopted)))?;
         let open = last.excess() > ABOVE_FLOOR;
         let size = |c: &Contender<P>| c.effect.map_or(0, |e| e.len());
-        let is_rival = |c: &Contender<P>| {
+        let is_rival = |c: &Contender<P>, share: f64, of_cause: f64| {
             let Some(effect) = c.effect else { return false };
             let known = model.effects.iter().any(|e| e.same_place(&effect));
             !known
                 && if ended { open && size(c) > size(cause) } else { size(c) <= size(cause) }
                 && !equivalent::are(&effect, adopted, N)
                 && is_possible(c)
-                && stage.share(c) > (RIVALS * stage.share(cause)).max(MATTERS)
+                && share > (RIVALS * of_cause).max(MATTERS)
         };
-        let rivals: Vec<usize> =
-            (0..stage.contenders.len()).filter(|i| is_rival(&stage.contenders[*i])).collect();
+        let finalists =
+            stage.contenders.iter().filter(|c| is_rival(c, stage.share(c), stage.share(cause))).take(TRIED);
+        // One with fewer values may have fallen behind just for what they are not about.
+        let of_cause = stage.field.iter().find(|(c, _)| c.effect.is_some_and(|e| e.same_place(adopted)));
+        let is_final = |c: &Contender<P>| stage.contenders.iter().any(|f| f.is_same(c));
+        let passed_over = stage.field.iter().filter(|(c, share)| {
+            size(c) < size(cause) && !is_final(c) && is_rival(c, *share, of_cause.map_or(0.0, |x| x.1))
+        });
+        let rivals: Vec<&Contender<P>> = finalists.chain(passed_over.map(|(c, _)| c).take(TRIED)).collect();
         if rivals.is_empty() {
             return None;
         }
@@ -100,17 +107,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             self.contender(&last.weights, &start, place, Effort::FULL, &[])
         };
         let full = beside(model.effects.clone());
-        let tried = rivals.into_iter().take(TRIED).filter_map(|choice| {
+        let tried = rivals.into_iter().filter_map(|rival| {
             let mut effects = model.effects.clone();
-            effects[place] = stage.contenders[choice].effect?;
+            effects[place] = rival.effect?;
             let swapped = beside(effects);
             let better = (swapped.z_over(&full) > BETTER).then(|| probability_over(&swapped, &full, seed));
             let does = better.is_some() || (size(&swapped) < size(cause) && as_well(&swapped, &full));
             let allowed = if ended { RICHER } else { better.map_or(AS_WELL, |_| 1.0) };
-            let rival = Rival { stage: index, choice, instead_of: *adopted, better, allowed };
+            let rival = Rival { stage: index, fitted: rival.clone(), instead_of: *adopted, better, allowed };
             (is_possible(&swapped) && does).then_some((swapped, rival))
         });
-        let found: Vec<(Contender<P>, Rival)> = tried.collect();
+        let found: Vec<(Contender<P>, Rival<P>)> = tried.collect();
         let (best, _) = found.iter().min_by(|a, b| a.0.score().total_cmp(&b.0.score()))?;
         let best = best.clone();
         let as_good = found.into_iter().filter(|(swapped, _)| as_well(swapped, &best));
@@ -118,16 +125,22 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     /// The course up to the stage in which a rival was passed over, and the stage after it instead.
-    fn back_to(&self, course: &Course<N, P>, rival: &Rival, noticeable: f64, seed: u64) -> Course<N, P> {
-        let stage = course.stages[rival.stage].clone();
+    fn back_to(&self, course: &Course<N, P>, rival: &Rival<P>, noticeable: f64, seed: u64) -> Course<N, P> {
+        let mut stage = course.stages[rival.stage].clone();
+        let known = stage.settled.hypothesis.effects.len();
+        let choice = stage.contenders.iter().position(|c| c.is_same(&rival.fitted)).unwrap_or_else(|| {
+            let start = &rival.fitted.fit.hypothesis;
+            stage.contenders.push(self.contender(&stage.weights, start, known, Effort::FULL, &[]));
+            stage.contenders.len() - 1
+        });
         let before = &stage.settled.hypothesis;
         let known = |c: &&Cause| before.effects.iter().any(|e| e.same_place(&c.effect));
         let mut causes: Vec<Cause> = course.causes.iter().filter(known).cloned().collect();
-        let named = name(&stage, rival.choice, Ground::Motion, seed);
+        let named = name(&stage, choice, Ground::Motion, seed);
         let replaced = course.causes.iter().find(|c| c.effect.same_place(&rival.instead_of));
         let as_sure = replaced.map_or(named.probability, |c| c.probability);
         causes.push(Cause { probability: rival.better.unwrap_or(as_sure), ..named });
-        let next = stage.contenders[rival.choice].fit.clone();
+        let next = stage.contenders[choice].fit.clone();
         let mut other = Course {
             causes,
             stages: course.stages[..rival.stage].to_vec(),
