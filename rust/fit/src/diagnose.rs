@@ -158,15 +158,19 @@ impl WithArm for Request<'_> {
         let Options { max_causes, seed, .. } = *self.options;
         let mut conclusion = study.conclude(study.attribute(max_causes, seed, None), max_causes, seed);
         let mut notes = Vec::new();
-        if conclusion.0.is_unexplained()
+        let pushed = conclusion.1.iter().any(|e| e.probability > 0.5);
+        if (conclusion.0.is_unexplained() || pushed)
             && let Some([training, holdout]) = crosswise(self.training, self.holdout, self.options.horizon)
             && let Ok(mut other) = self.study::<A, N, P>(arm, theta, &training, &holdout)
         {
             let attribution = other.attribute(max_causes, seed, None);
             if explains(&attribution, &conclusion.0) {
-                conclusion = other.conclude(attribution, max_causes, seed);
-                study = other;
-                notes.push(CROSSWISE.to_owned());
+                let instead = other.conclude(attribution, max_causes, seed);
+                if !pushed || instead.1.is_empty() {
+                    conclusion = instead;
+                    study = other;
+                    notes.push(CROSSWISE.to_owned());
+                }
             }
         }
         let attribution = &conclusion.0;
