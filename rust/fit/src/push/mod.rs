@@ -1,13 +1,14 @@
 //! Pushes from outside: torques that no log shows, at one time of one log, judged inside that log.
 //!
 //! [`residual`] is the torque that a log lacks under a model, beside everything the model could be wrong by; [`search`] finds in it what
-//! comes once and does not follow from the state; [`fit`] sizes it by output error, where the model is good enough for that; [`limit`] tells it
+//! comes once and does not follow from the state; [`outlying`] finds what is too light for that; [`fit`] sizes it by output error, where the model is good enough for that; [`limit`] tells it
 //! from what a drive does not give.
 
 mod bell;
 mod fit;
 mod limit;
 mod linear;
+mod outlying;
 mod own;
 mod residual;
 mod scatter;
@@ -15,7 +16,7 @@ mod search;
 
 use crate::belief::{belief_beside, left_beside, left_over};
 use crate::course::Attribution;
-use crate::decide::noticeable;
+use crate::decide::{FAINTEST, noticeable};
 use crate::model::{Hypothesis, Placed};
 use crate::progress::Work;
 use crate::study::Study;
@@ -79,6 +80,8 @@ struct State<'a, const N: usize, const P: usize> {
     remainder: bool,
     /// Improvement relative to the motion below which nothing is worth a name.
     noticeable: f64,
+    /// The same for what stands far out of noise.
+    faintest: f64,
 }
 
 /// Where a piece of a log is kept: whether in the holdout, and its index there.
@@ -96,11 +99,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         max_causes: usize,
         seed: u64,
     ) -> (Attribution<N, P>, Vec<Event>) {
-        let mut events = self.events(&alone);
+        let faint = alone.causes.is_empty();
+        let mut events = self.events(&alone, faint);
         let limit = self.limit(&alone, &events);
         if limit.is_some() {
             alone = self.attribute(max_causes, seed, limit.clone());
-            events = self.events(&alone);
+            events = self.events(&alone, faint);
         }
         if events.is_empty() {
             return (alone, events);
@@ -111,7 +115,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         if harmful {
             events.clear();
         } else if !alone.is_unexplained() {
-            events = self.events(&beside);
+            events = self.events(&beside, faint);
+            events.retain(Event::is_known);
         }
         self.set_pushes(&events);
         if events.is_empty() {
@@ -126,8 +131,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         (beside, events)
     }
 
-    /// Pushes that the model of an attribution leaves unexplained, log by log.
-    fn events(&self, attribution: &Attribution<N, P>) -> Vec<Event> {
+    /// Pushes that the model of an attribution leaves unexplained, log by log; faint ones too where no greater cause was found without them.
+    fn events(&self, attribution: &Attribution<N, P>, faint: bool) -> Vec<Event> {
         let (first, last) = (&attribution.stages[0], &attribution.stages[attribution.stages.len() - 1]);
         let state = State {
             model: &attribution.model.hypothesis,
@@ -135,6 +140,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             scale: last.weights.training.scale,
             remainder: attribution.is_unexplained(),
             noticeable: noticeable(first.relative_error()),
+            faintest: if faint { FAINTEST } else { noticeable(first.relative_error()) },
         };
         let recordings = self.recordings();
         self.watch.begin(Work::Pushes, recordings.len());
@@ -149,25 +155,35 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     fn in_recording(&self, places: &[Place], state: &State<'_, N, P>) -> Vec<Event> {
-        if !places.iter().any(|place| self.could_hold_a_push(*place, state)) {
-            return Vec::new();
+        let own = Own::new(self, places, state);
+        let mut events = Vec::new();
+        if places.iter().any(|place| self.could_hold_a_push(*place, state)) {
+            events = self.of_bells(places, state, &own);
         }
+        if !state.remainder {
+            for place in places {
+                self.in_outlying_windows(*place, state, &own, &mut events);
+            }
+            let all: Vec<Bell> = events.iter().map(Event::as_bell).collect();
+            events.retain(|e| !self.meets_an_end(e, &all));
+        }
+        // So many are no rare events, but something that the arm does again and again.
+        if events.len() < MOST { events } else { Vec::new() }
+    }
+
+    /// Pushes that stand out of the torque that a recording lacks.
+    fn of_bells(&self, places: &[Place], state: &State<'_, N, P>, own: &Own<'_, A, N, P>) -> Vec<Event> {
         let pieces: Vec<&Track<N>> = places.iter().map(|p| self.track(*p)).collect();
         let whole = Track::joined(&pieces).filter(|t| t.t[t.len() - 1] - t.t[0] > SHORTEST_LOG);
         let residual = whole.and_then(|track| Residual::new(&self.arm, &track, state.model, &self.prior));
         let Some(found) = residual.and_then(|r| search(&r, state.remainder)) else { return Vec::new() };
-        if found.bells.is_empty() {
-            return Vec::new();
-        }
-        let own = Own::new(self, places, state);
         let mut events: Vec<Event> = Vec::new();
         for bell in &found.bells {
             let Some(rough) = self.rough(places, bell, found.rest) else { continue };
-            events.extend(self.sized(rough, state, &own, &events));
+            events.extend(self.sized(rough, state, own, &events));
         }
         events.retain(|e| e.is_known() && !self.meets_an_end(e, &found.bells));
-        // So many are no rare events, but something that the arm does again and again.
-        if events.len() < MOST { events } else { Vec::new() }
+        events
     }
 
     /// Whether a push and another one on its joint both drive it back from the same end of its travel: that is where it touches something.
@@ -245,6 +261,12 @@ impl Event {
     /// Whether its impulse is known not to be zero.
     fn is_known(&self) -> bool {
         self.push.p[0].abs() > KNOWN * self.sigma[0]
+    }
+
+    /// When, where and which way.
+    fn as_bell(&self) -> Bell {
+        let [height, time, width] = self.push.p;
+        Bell { joint: self.push.joint, time, width, height, sigma: self.sigma[0], z: 0.0 }
     }
 
     fn place(&self) -> Place {
