@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from armgap import Arm, Diagnosis, Log, diagnose, simulate
+from armgap.cli.demo import CASE_FOLDER
 from armgap.simulation import Effect
 from swings import off, sines
 
@@ -124,3 +125,22 @@ def test_values_of_one_log_that_differ_are_not_taken_for_pushes(arm: Arm) -> Non
     training = simulate(arm, t, sines(t, 13), noise=1e-5, seed=1)
     holdout = simulate(grown, t, sines(t, 14), noise=1e-5, seed=2)
     assert "external_pulse" not in {c.effect for c in diagnose(training, arm, holdout=holdout).causes}
+
+
+@pytest.mark.parametrize(("joint", "impulse"), [(1, 0.05), (2, 0.02)])
+def test_a_push_too_light_for_the_lacking_torque_is_found_in_the_window_it_moves(joint: int, impulse: float) -> None:
+    """Lost in the noise of accelerations, and of no consequence to the whole log; predictions of one window miss by it."""
+    arm = Arm.read(CASE_FOLDER / "arm.toml")
+    t = np.arange(2400) * arm.sample_period
+    push = Effect("external_pulse", joint, {"impulse": impulse, "time": 3.3, "duration": 0.07})
+    training, holdout = (
+        simulate(arm, t, sines(t, seed), effects=effects, noise=1e-5, seed=seed, name=f"run {seed}")
+        for seed, effects in ((1, [push]), (2, []))
+    )
+    [cause] = diagnose(training, arm, holdout=holdout).causes
+    assert (cause.effect, cause.joint, cause.log) == ("external_pulse", joint, "run 1")
+    assert cause.probability > 0.9
+    for name, value in push.parameters.items():
+        estimate = cause.parameters[name]
+        assert abs(estimate.value - value) < 3.0 * estimate.sigma
+        assert estimate.value == pytest.approx(value, rel=0.03)
