@@ -116,7 +116,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             events.clear();
         } else if !alone.is_unexplained() {
             events = self.events(&beside, faint);
-            events.retain(Event::is_known);
         }
         self.set_pushes(&events);
         if events.is_empty() {

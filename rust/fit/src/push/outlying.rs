@@ -20,6 +20,10 @@ const OUTLYING: f64 = 30.0;
 /// Share of the cost of the windows it touches that a push has to explain.
 const CLEAR: f64 = 0.8;
 
+/// Its impulse exceeds its standard deviation by this factor: what explains a window like that and is not known is something else, such as the
+/// wrong instant at which a joint comes to rest.
+const KNOWN: f64 = 5.0;
+
 /// Durations that are tried, s, and the distance of the times.
 const DURATIONS: [f64; 3] = [0.01, 0.05, 0.15];
 const STEP: f64 = 0.02;
@@ -28,8 +32,7 @@ const STEP: f64 = 0.02;
 const SLIGHT: f64 = 1e-6;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// Adds to the pushes of a log those that explain what single windows miss beside them. How well they are known is seen once the model is
-    /// fitted beside them: until then they widen its values and the scatter that they are weighed against.
+    /// Adds to the pushes of a log those that explain what single windows miss beside them.
     pub(super) fn in_outlying_windows(
         &self,
         place: Place,
@@ -41,7 +44,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         while events.len() < MOST {
             let rough = self.in_worst_window(place, state, events);
             let sized = rough.and_then(|rough| self.sized(rough, state, own, events));
-            let Some(event) = sized.filter(|e| e.share > CLEAR) else { return };
+            let Some(event) = sized.filter(|e| e.share > CLEAR && e.push.p[0].abs() > KNOWN * e.sigma[0])
+            else {
+                return;
+            };
             events.push(event);
         }
     }
