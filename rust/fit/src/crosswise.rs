@@ -5,6 +5,7 @@
 //! log is cut into stretches that are learnt from and judged on by turns. Both kinds of motion are then in both, and what explains
 //! nearly all of the gap there has been judged on stretches that it was not fitted to.
 
+use crate::attribute::Stage;
 use crate::belief::left_over;
 use crate::course::Attribution;
 use crate::diagnose::LogData;
@@ -73,7 +74,7 @@ pub fn explains<const N: usize, const P: usize>(
     crosswise: &Attribution<N, P>,
     plain: &Attribution<N, P>,
 ) -> bool {
-    let excess = |a: &Attribution<N, P>| a.stages.last().map_or(f64::INFINITY, |s| s.excess());
+    let excess = |a: &Attribution<N, P>| a.stages.last().map_or(f64::INFINITY, Stage::excess);
     let less = !crosswise.is_unexplained() || excess(crosswise) < MUCH_LESS * excess(plain);
     !crosswise.causes.is_empty() && less && left_over(&crosswise.stages) < LEFT
 }

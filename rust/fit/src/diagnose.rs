@@ -1,9 +1,11 @@
 //! The diagnosis: where the gap lies, which effect causes it, how far it shrinks.
 
 use crate::arm::{ArmDescription, WithArm};
+use crate::course::Attribution;
 use crate::crosswise::{crosswise, explains};
 use crate::model::Placed;
 use crate::progress::{Observer, Watch, Work, guarded};
+use crate::push::Event;
 use crate::report::Diagnosis;
 use crate::scale::Scales;
 use crate::solve::Prior;
@@ -105,6 +107,12 @@ const FEWEST_WINDOWS: usize = 4;
 const CROSSWISE: &str = "the training logs do not show what the holdout does: every log was cut into stretches that were learnt from and \
      judged on by turns";
 
+/// Probability from which a push counts as named.
+const LIKELY: f64 = 0.5;
+
+/// What the causes of a study are, and the pushes beside them.
+type Conclusion<const N: usize, const P: usize> = (Attribution<N, P>, Vec<Event>);
+
 /// Diagnoses the gap between an arm and its logs; `observer` is told how far it is and may stop it.
 pub fn diagnose(
     arm: &ArmDescription,
@@ -158,20 +166,9 @@ impl WithArm for Request<'_> {
         let Options { max_causes, seed, .. } = *self.options;
         let mut conclusion = study.conclude(study.attribute(max_causes, seed, None), max_causes, seed);
         let mut notes = Vec::new();
-        let pushed = conclusion.1.iter().any(|e| e.probability > 0.5);
-        if (conclusion.0.is_unexplained() || pushed)
-            && let Some([training, holdout]) = crosswise(self.training, self.holdout, self.options.horizon)
-            && let Ok(mut other) = self.study::<A, N, P>(arm, theta, &training, &holdout)
-        {
-            let attribution = other.attribute(max_causes, seed, None);
-            if explains(&attribution, &conclusion.0) {
-                let instead = other.conclude(attribution, max_causes, seed);
-                if !pushed || instead.1.is_empty() {
-                    conclusion = instead;
-                    study = other;
-                    notes.push(CROSSWISE.to_owned());
-                }
-            }
+        if let Some((other, instead)) = self.crosswise(arm, theta, &conclusion)? {
+            (study, conclusion) = (other, instead);
+            notes.push(CROSSWISE.to_owned());
         }
         let attribution = &conclusion.0;
         let open = study.open_candidates(&attribution.model.hypothesis).len();
@@ -185,6 +182,35 @@ impl WithArm for Request<'_> {
 }
 
 impl Request<'_> {
+    /// The study of logs cut crosswise and its conclusion, where that explains what the first one left, or took for pushes.
+    fn crosswise<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        &self,
+        arm: A,
+        theta: [f64; P],
+        first: &Conclusion<N, P>,
+    ) -> Result<Option<(Study<A, N, P>, Conclusion<N, P>)>, DiagnoseError> {
+        let Options { max_causes, seed, horizon, .. } = *self.options;
+        let pushed = first.1.iter().any(|e| e.probability > LIKELY);
+        if !first.0.is_unexplained() && !pushed {
+            return Ok(None);
+        }
+        let Some([training, holdout]) = crosswise(self.training, self.holdout, horizon) else {
+            return Ok(None);
+        };
+        let mut study = match self.study(arm, theta, &training, &holdout) {
+            Ok(study) => study,
+            // Stretches may hold too few windows where the logs do not.
+            Err(DiagnoseError::TooShort { .. }) => return Ok(None),
+            Err(error) => return Err(error),
+        };
+        let attribution = study.attribute(max_causes, seed, None);
+        if !explains(&attribution, &first.0) {
+            return Ok(None);
+        }
+        let conclusion = study.conclude(attribution, max_causes, seed);
+        Ok((!pushed || conclusion.1.is_empty()).then_some((study, conclusion)))
+    }
+
     fn study<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         arm: A,
