@@ -1,8 +1,8 @@
 //! Pushes from outside: torques that no log shows, at one time of one log, judged inside that log.
 //!
 //! [`residual`] is the torque that a log lacks under a model, beside everything the model could be wrong by; [`search`] finds in it what
-//! comes once and does not follow from the state; [`outlying`] finds what is too light for that; [`fit`] sizes it by output error, where the model is good enough for that; [`limit`] tells it
-//! from what a drive does not give.
+//! comes once and does not follow from the state; [`outlying`] finds what is too light for that; [`fit`] sizes it by output error, where
+//! the model is good enough for that; [`limit`] tells it from what a drive does not give.
 
 mod bell;
 mod fit;

@@ -20,8 +20,8 @@ const OUTLYING: f64 = 30.0;
 /// Share of the cost of the windows it touches that a push has to explain.
 const CLEAR: f64 = 0.8;
 
-/// Its impulse exceeds its standard deviation by this factor: what explains a window like that and is not known is something else, such as the
-/// wrong instant at which a joint comes to rest.
+/// Its impulse exceeds its standard deviation by this factor: what explains a window like that and is not known is something else, such as
+/// the wrong instant at which a joint comes to rest.
 const KNOWN: f64 = 5.0;
 
 /// Durations that are tried, s, and the distance of the times.
