@@ -104,11 +104,11 @@ impl std::error::Error for DiagnoseError {}
 const FEWEST_WINDOWS: usize = 4;
 
 /// What is said where logs were cut crosswise.
-const CROSSWISE: &str = "the training logs do not show what the holdout does: every log was cut into stretches that were learnt from and \
-     judged on by turns";
+const CROSSWISE: &str = "effects fitted to the training logs did not explain the holdout: every log was cut into stretches that were learnt \
+     from and judged on by turns";
 
 /// Probability from which a push counts as named.
-const LIKELY: f64 = 0.5;
+const NAMED: f64 = 0.5;
 
 /// What the causes of a study are, and the pushes beside them.
 type Conclusion<const N: usize, const P: usize> = (Attribution<N, P>, Vec<Event>);
@@ -165,17 +165,18 @@ impl WithArm for Request<'_> {
         let mut study = self.study::<A, N, P>(arm.clone(), theta, self.training, self.holdout)?;
         let Options { max_causes, seed, .. } = *self.options;
         let mut conclusion = study.conclude(study.attribute(max_causes, seed, None), max_causes, seed);
-        let mut notes = Vec::new();
-        if let Some((other, instead)) = self.crosswise(arm, theta, &conclusion)? {
-            (study, conclusion) = (other, instead);
-            notes.push(CROSSWISE.to_owned());
+        let instead = self.crosswise(arm, theta, &conclusion)?;
+        let is_crosswise = instead.is_some();
+        if let Some(instead) = instead {
+            (study, conclusion) = instead;
         }
         let attribution = &conclusion.0;
         let open = study.open_candidates(&attribution.model.hypothesis).len();
         study.watch.begin(Work::Result, open + attribution.stages[0].field.len());
         let mut diagnosis = crate::compose::compose(&study, &conclusion, self.arm, self.options);
-        notes.append(&mut diagnosis.notes);
-        diagnosis.notes = notes;
+        if is_crosswise {
+            diagnosis.notes.insert(0, CROSSWISE.to_owned());
+        }
         diagnosis.seconds = started.elapsed().as_secs_f64();
         Ok(diagnosis)
     }
@@ -190,7 +191,7 @@ impl Request<'_> {
         first: &Conclusion<N, P>,
     ) -> Result<Option<(Study<A, N, P>, Conclusion<N, P>)>, DiagnoseError> {
         let Options { max_causes, seed, horizon, .. } = *self.options;
-        let pushed = first.1.iter().any(|e| e.probability > LIKELY);
+        let pushed = first.1.iter().any(|e| e.probability > NAMED);
         if !first.0.is_unexplained() && !pushed {
             return Ok(None);
         }

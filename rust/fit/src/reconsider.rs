@@ -127,10 +127,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// The course up to the stage in which a rival was passed over, and the stage after it instead.
     fn back_to(&self, course: &Course<N, P>, rival: &Rival<P>, noticeable: f64, seed: u64) -> Course<N, P> {
         let mut stage = course.stages[rival.stage].clone();
-        let known = stage.settled.hypothesis.effects.len();
+        let added = stage.settled.hypothesis.effects.len();
         let choice = stage.contenders.iter().position(|c| c.is_same(&rival.fitted)).unwrap_or_else(|| {
             let start = &rival.fitted.fit.hypothesis;
-            stage.contenders.push(self.contender(&stage.weights, start, known, Effort::FULL, &[]));
+            stage.contenders.push(self.contender(&stage.weights, start, added, Effort::FULL, &[]));
             stage.contenders.len() - 1
         });
         let before = &stage.settled.hypothesis;
