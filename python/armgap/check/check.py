@@ -1,0 +1,101 @@
+"""What a check says: a defect of the input, how sure that is, and what to do about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal, get_args
+
+__all__ = ["NAMES", "SEVERITIES", "Check", "CheckName", "Severity"]
+
+CheckName = Literal[
+    "torque_sign",
+    "position_sign",
+    "joint_order",
+    "relative_angle",
+    "position_zero",
+    "gravity_sign",
+    "gravity_missing",
+    "torque_is_position",
+    "torque_unit",
+    "position_unit",
+    "time_shift",
+    "repeated_positions",
+    "filtered_positions",
+    "quantized_torque",
+    "wrapped_positions",
+    "spike",
+    "stamp_jitter",
+    "dead_stretch",
+    "copied_holdout",
+]
+Severity = Literal["error", "repaired", "warning"]
+
+NAMES: tuple[CheckName, ...] = get_args(CheckName)
+SEVERITIES: tuple[Severity, ...] = get_args(Severity)
+
+
+@dataclass(frozen=True)
+class Check:
+    """A defect of the input.
+
+    Attributes
+    ----------
+    check : str
+        Which defect, one of `NAMES`.
+    severity : {"error", "repaired", "warning"}
+        ``"error"``: log and arm file contradict each other, the verdict is ``"input"``; ``"repaired"``: the log was repaired and the
+        diagnosis goes on with it; ``"warning"``: noticed, nothing was changed.
+    message : str
+        One sentence with the figures.
+    remedies : tuple of str
+        What mends it: options of the command line, or lines of the arm file. Several where no log tells them apart.
+    joint : int, optional
+        Joint, from 1; None for the whole log or arm.
+    log : str, optional
+        Name of the log; None if it concerns all.
+    rows : tuple of (int, int)
+        Ranges of rows ``(first, last)`` of the log, from 0, both included.
+    """
+
+    check: CheckName
+    severity: Severity
+    message: str
+    remedies: tuple[str, ...] = ()
+    joint: int | None = None
+    log: str | None = None
+    rows: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def remedy(self) -> str:
+        """All remedies in one line."""
+        return " or ".join(self.remedies)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the entry of a diagnosis' ``checks``."""
+        return {
+            "check": self.check,
+            "joint": self.joint,
+            "log": self.log,
+            "severity": self.severity,
+            "message": self.message,
+            "remedy": self.remedy,
+            "remedies": list(self.remedies),
+            "rows": [list(r) for r in self.rows],
+        }
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Check:
+        """Build it from an entry of ``checks``."""
+        return cls(
+            check=data["check"],
+            severity=data["severity"],
+            message=data["message"],
+            remedies=tuple(data.get("remedies") or filter(None, [data.get("remedy")])),
+            joint=data.get("joint"),
+            log=data.get("log"),
+            rows=tuple((int(a), int(b)) for a, b in data.get("rows", ())),
+        )
+
+    def of(self, log: str | None) -> Check:
+        """Return the same check of another log."""
+        return replace(self, log=log)
