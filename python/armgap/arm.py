@@ -104,6 +104,12 @@ class Arm:
         return tuple(self._kind["parameter_units"])
 
     @property
+    def gravity_parameters(self) -> NDArray[np.intp]:
+        """Indices of the entries of `theta` that are weights: torques or forces of gravity [N m or N]."""
+        weight = "N m" if self.rotary else "N"
+        return np.array([i for i in range(self.n_inertial) if self.parameter_units[i] == weight], dtype=np.intp)
+
+    @property
     def _kind(self) -> dict[str, Any]:
         return kinds()[self.kind]
 
