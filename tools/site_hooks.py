@@ -163,7 +163,7 @@ def figures() -> str:
 
 def thresholds() -> str:
     """Constants of the decision with what their comments say."""
-    source = (ROOT / "rust" / "fit" / "src" / "decide.rs").read_text(encoding="utf-8")
+    source = (ROOT / "rust" / "fit" / "src" / "acceptance.rs").read_text(encoding="utf-8")
     found = re.findall(r"^/// ([^\n]+)\n(?:pub )?const (\w+): \w+ = ([^;]+);", source, re.MULTILINE)
     return "\n".join(
         ["| constant | value | what |", "| --- | --- | --- |", *(f"| `{n}` | {v} | {text} |" for text, n, v in found)]

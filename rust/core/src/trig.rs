@@ -127,7 +127,7 @@ fn series<V: Number>(z: V, c: &[f64; 8], whole: bool) -> V {
 
 /// Sine and cosine of an angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Turn<V> {
+pub struct SinCos<V> {
     /// Sine.
     pub sine: V,
     /// Cosine.
@@ -176,7 +176,7 @@ impl<V: Number> Rotation<V> {
     }
 }
 
-impl<V: Number> Turn<V> {
+impl<V: Number> SinCos<V> {
     /// Of an angle, rad.
     #[inline(always)]
     pub fn of(angle: V) -> Self {
@@ -235,7 +235,7 @@ mod tests {
             let ways = [(NEAR, Rotation::near as fn(f64) -> Rotation<f64>), (SLIGHT, Rotation::slight)];
             for (largest, rotation) in ways {
                 let way = largest * part;
-                let (there, exact) = (Turn::of(x).by(&rotation(way)), Turn::of(x + way));
+                let (there, exact) = (SinCos::of(x).by(&rotation(way)), SinCos::of(x + way));
                 let off = (there.sine - exact.sine).abs().max((there.cosine - exact.cosine).abs());
                 // The sum of the angles is rounded too.
                 assert!(off < 1.5e-15, "{x} by {way}: {off:e}");

@@ -1,7 +1,7 @@
 //! The diagnosis as data: the schema `armgap.diagnosis/1` and what a report draws besides.
 
 use crate::energy::Energy;
-use crate::locate::{Place, Regime};
+use crate::locate::{Location, Regime};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -30,7 +30,7 @@ pub struct Diagnosis {
     pub gap: Gap,
     /// Where.
     #[serde(rename = "where")]
-    pub places: Vec<Place>,
+    pub places: Vec<Location>,
     /// What the torque lacking on each joint does with energy.
     pub energy: Vec<Energy>,
     /// Which.

@@ -1,7 +1,7 @@
 //! `diagnose`.
 
 use crate::convert::{description, matrix, vector};
-use crate::watched::watched;
+use crate::progress::with_progress;
 use armgap_fit::diagnose::{LogData, Options, diagnose as run};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -49,12 +49,12 @@ pub fn diagnose(
         chosen.max_causes = value.extract()?;
     }
     if let Some(value) = options.get_item("own")? {
-        chosen.own = value.extract()?;
+        chosen.custom_effects = value.extract()?;
     }
     if let Some(value) = options.get_item("seed")? {
         chosen.seed = value.extract()?;
     }
-    let result = watched(py, progress.as_ref(), move |observer| {
+    let result = with_progress(py, progress.as_ref(), move |observer| {
         let (training, holdout) = (views(&training), views(&holdout));
         let diagnosis = run(&arm, &training, &holdout, &chosen, observer).map_err(|e| e.to_string())?;
         serde_json::to_string(&diagnosis).map_err(|e| e.to_string())

@@ -42,17 +42,17 @@ pub fn identify<'py>(
     let arm =
         ArmDescription { kind, gravity, theta, sigma, counts_per_rev: None, torque_limit: None, link_length };
     let work = Identification { scheme, variant, cutoff, forgetting, p0, theta0: &theta0, t, q, tau, dq };
-    let course = py
+    let history = py
         .detach(|| arm.dispatch(work))
         .flatten()
         .ok_or_else(|| PyValueError::new_err("`theta` or `theta0` has the wrong length for this arm"))?;
     let result = PyDict::new(py);
-    let r = course.parameters;
-    result.set_item("theta", table(py, course.theta, t.len(), r)?)?;
-    result.set_item("errors", table(py, course.errors, t.len(), course.outputs)?)?;
-    result.set_item("covariance", table(py, course.covariance, r, r)?)?;
-    result.set_item("updates", course.updates)?;
-    result.set_item("rejected", course.rejected)?;
+    let r = history.parameters;
+    result.set_item("theta", table(py, history.theta, t.len(), r)?)?;
+    result.set_item("errors", table(py, history.errors, t.len(), history.outputs)?)?;
+    result.set_item("covariance", table(py, history.covariance, r, r)?)?;
+    result.set_item("updates", history.updates)?;
+    result.set_item("rejected", history.rejected)?;
     Ok(result)
 }
 

@@ -6,8 +6,8 @@ mod diagnose;
 mod estimator;
 mod fit;
 mod identify;
+mod progress;
 mod simulate;
-mod watched;
 
 use pyo3::prelude::*;
 

@@ -17,11 +17,11 @@ static SPEC: Spec = Spec {
     least_joints: 1,
     parameters: &[
         EffectParameter::threshold("position", Quantity::Reach, f64::NEG_INFINITY),
-        EffectParameter::bounded("stiffness", Quantity::StopStiffness, 0.0, f64::INFINITY),
-        EffectParameter::bounded("damping", Quantity::StopDamping, 0.0, f64::INFINITY),
+        EffectParameter::bounded("stiffness", Quantity::ContactStiffness, 0.0, f64::INFINITY),
+        EffectParameter::bounded("damping", Quantity::ContactDamping, 0.0, f64::INFINITY),
     ],
     // Shares of the reach on either side.
-    starts: &[
+    initial_guesses: &[
         [0.99, 150.0, 0.5],
         [-0.99, 150.0, 0.5],
         [0.95, 30.0, 0.2],

@@ -9,7 +9,7 @@
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, NEVER, Quantity, Scope, Spec, Trial};
 use crate::real::{Real, lit};
-use crate::transmission::Drive;
+use crate::transmission::Transmission;
 
 /// Elastic transmission.
 #[derive(Debug)]
@@ -29,7 +29,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("rotor_inertia", Quantity::Inertia, 1e-6, f64::INFINITY),
     ],
     // Motors of 3, 8 and 30 % of the link's inertia that swing at 8 to 40 Hz against it.
-    starts: &[
+    initial_guesses: &[
         [0.15, 0.3, 0.03],
         [0.5, 0.5, 0.03],
         [1.8, 1.0, 0.03],
@@ -49,15 +49,15 @@ impl<T: Real> Effect<T> for JointElasticity {
         &SPEC
     }
 
-    fn drive(&self, p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Drive<T>> {
+    fn transmission(&self, p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Transmission<T>> {
         let rigid = p[0] >= lit(NEVER);
-        (!rigid).then_some(Drive {
+        (!rigid).then_some(Transmission {
             inertia: p[2],
             stiffness: p[0],
             damping: p[1],
-            gap: T::zero(),
-            inside: false,
-            riding: T::zero(),
+            backlash: T::zero(),
+            part_of_link: false,
+            coupling_ratio: T::zero(),
         })
     }
 }

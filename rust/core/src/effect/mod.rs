@@ -37,7 +37,7 @@ mod torque_saturation;
 mod viscous_asymmetry;
 
 use crate::real::{Real, lit};
-use crate::transmission::Drive;
+use crate::transmission::Transmission;
 
 /// Most parameters an effect may have.
 pub const MAX_PARAMETERS: usize = 3;
@@ -110,9 +110,9 @@ pub enum Quantity {
     /// Torque per rate of twist of a shaft.
     ShaftDamping,
     /// Torque per depth behind a stop.
-    StopStiffness,
+    ContactStiffness,
     /// Torque per speed behind a stop.
-    StopDamping,
+    ContactDamping,
     /// Torque per cubed position.
     Hardening,
     /// Torque times time.
@@ -155,10 +155,10 @@ impl Quantity {
             (Self::Inertia, false) | (Self::Mass, _) => "kg",
             (Self::Drag, true) => "N m s^2/rad^2",
             (Self::Drag, false) => "N s^2/m^2",
-            (Self::Stiffness | Self::ShaftStiffness | Self::StopStiffness, true) => "N m/rad",
-            (Self::Stiffness | Self::ShaftStiffness | Self::StopStiffness, false) => "N/m",
-            (Self::Damping | Self::ShaftDamping | Self::StopDamping, true) => "N m s/rad",
-            (Self::Damping | Self::ShaftDamping | Self::StopDamping, false) => "N s/m",
+            (Self::Stiffness | Self::ShaftStiffness | Self::ContactStiffness, true) => "N m/rad",
+            (Self::Stiffness | Self::ShaftStiffness | Self::ContactStiffness, false) => "N/m",
+            (Self::Damping | Self::ShaftDamping | Self::ContactDamping, true) => "N m s/rad",
+            (Self::Damping | Self::ShaftDamping | Self::ContactDamping, false) => "N s/m",
             (Self::CubicDrag, true) => "N m s^3/rad^3",
             (Self::CubicDrag, false) => "N s^3/m^3",
             (Self::Impulse, true) => "N m s",
@@ -224,7 +224,7 @@ pub struct Hooks {
     pub command: bool,
     /// [`Effect::measured`].
     pub measured: bool,
-    /// [`Effect::remember`].
+    /// [`Effect::hysteresis_after`].
     pub memory: bool,
 }
 
@@ -262,7 +262,7 @@ pub struct Spec {
     /// Its parameters; the first one switches it off at its neutral value.
     pub parameters: &'static [EffectParameter],
     /// Trial values, in units of the log's own scale of each quantity (see the fit's `scale`).
-    pub starts: &'static [[f64; MAX_PARAMETERS]],
+    pub initial_guesses: &'static [[f64; MAX_PARAMETERS]],
     /// How it is tested before it is fitted.
     pub trial: Trial,
     /// Hooks in use.
@@ -277,7 +277,7 @@ pub enum Trial {
     /// By the derivative at neutral along a ray on which all parameters grow together.
     Ray,
     /// Not at all: it belongs to one log and is looked for there.
-    Event,
+    Disturbance,
     /// By the whole difference it makes at a trial value: a threshold has no derivative where it is never reached.
     Whole,
 }
@@ -302,7 +302,7 @@ pub struct JointPoint<T> {
     pub friction: T,
     /// Direction in which the next joint (after the last, the first) slides: -1, 0 or 1.
     pub other: T,
-    /// What the joint remembers of its path (see [`Effect::remember`]).
+    /// What the joint remembers of its path (see [`Effect::hysteresis_after`]).
     pub memory: T,
 }
 
@@ -391,12 +391,12 @@ pub trait Effect<T: Real>: Sync {
     }
 
     /// What the joint remembers after moving by `distance`, if it remembered `memory` before.
-    fn remember(&self, _p: &[T; MAX_PARAMETERS], memory: T, _distance: T) -> T {
+    fn hysteresis_after(&self, _p: &[T; MAX_PARAMETERS], memory: T, _distance: T) -> T {
         memory
     }
 
     /// The motor side of a joint whose own inertia at `q = 0` is `inertia`; none for a rigid joint.
-    fn drive(&self, _p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Drive<T>> {
+    fn transmission(&self, _p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Transmission<T>> {
         None
     }
 
@@ -406,7 +406,7 @@ pub trait Effect<T: Real>: Sync {
     }
 
     /// Rewrites a whole log's command of one joint, sample times `t`, into the torque that reaches the joint.
-    fn command(&self, _p: &[T; MAX_PARAMETERS], _t: &[T], _torque: &mut [Pulse<T>]) {}
+    fn command(&self, _p: &[T; MAX_PARAMETERS], _t: &[T], _torque: &mut [InputSegment<T>]) {}
 
     /// Position the encoder shows when the joint stands at `q`.
     fn measured(&self, _p: &[T; MAX_PARAMETERS], q: T) -> T {
@@ -419,7 +419,7 @@ pub trait Effect<T: Real>: Sync {
 /// Between them it is quadratic, so Simpson's rule gives its mean. Laws that smear or shift a step choose the three values such that the
 /// mean and the first moment, and with them the speed and the way a mass gains, are exact however fast they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pulse<T> {
+pub struct InputSegment<T> {
     /// At the sample.
     pub start: T,
     /// Half-way to the next sample.
@@ -428,7 +428,7 @@ pub struct Pulse<T> {
     pub end: T,
 }
 
-impl<T: Real> Pulse<T> {
+impl<T: Real> InputSegment<T> {
     /// A torque held constant over the interval.
     #[inline]
     pub fn held(tau: T) -> Self {

@@ -3,7 +3,7 @@
 use super::Plant;
 use crate::arm::Arm;
 use crate::effect::Edge;
-use crate::pose::Place;
+use crate::kinematics::JointState;
 use crate::real::{Real, lit};
 use nalgebra::SVector;
 
@@ -52,18 +52,18 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
         let mut fastest = T::zero();
         let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));
-        if self.smoothing == T::zero() && !self.drives.any() && !behind {
+        if self.smoothing == T::zero() && !self.drivetrain.any() && !behind {
             return fastest;
         }
-        let inertia = self.rigid.balance(&Place { q: (*q).into(), dq: [T::zero(); N] }).inertia;
+        let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
         for j in 0..N {
             let free = Self::free_inertia(j, &inertia);
             if self.smoothing > T::zero() {
                 let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
                 fastest = fastest.max(self.level(j, &x, T::one()) / (self.smoothing * free));
             }
-            if let Some(drive) = self.drives.get(j).filter(|d| d.gap <= T::zero()) {
-                fastest = fastest.max(drive.rate(free));
+            if let Some(transmission) = self.drivetrain.get(j).filter(|d| d.backlash <= T::zero()) {
+                fastest = fastest.max(transmission.rate(free));
             }
             if behind {
                 let met = self.edges(j).filter(|edge| edge.is_behind(q[j]));

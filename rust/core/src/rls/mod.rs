@@ -14,7 +14,7 @@ mod factorized;
 mod lanes;
 mod plain;
 
-use crate::cpu::{Cpu, Level, Work};
+use crate::cpu::{Cpu, Kernel, Level};
 use crate::real::{Real, lit};
 use factorized::Factorized;
 use nalgebra::{ArrayStorage, SMatrix, SVector};
@@ -175,7 +175,7 @@ impl<T: Real, const R: usize> Rls<T, R> {
                 rows[m][j] = psi[(m, j)];
             }
         }
-        self.level.run(Sample { rls: self, rows, y: y.data.0[0] })
+        self.level.run(UpdateKernel { rls: self, rows, y: y.data.0[0] })
     }
 
     /// The same within code that already runs with the instructions in use.
@@ -207,13 +207,13 @@ impl<T: Real, const R: usize> Rls<T, R> {
 }
 
 /// One call of [`Rls::update`].
-struct Sample<'a, T: Real, const M: usize, const R: usize> {
+struct UpdateKernel<'a, T: Real, const M: usize, const R: usize> {
     rls: &'a mut Rls<T, R>,
     rows: [[T; R]; M],
     y: [T; M],
 }
 
-impl<T: Real, const M: usize, const R: usize> Work for Sample<'_, T, M, R> {
+impl<T: Real, const M: usize, const R: usize> Kernel for UpdateKernel<'_, T, M, R> {
     type Output = Update<T, M>;
 
     #[inline(always)]
