@@ -121,6 +121,23 @@ pub fn diagnose(
     options: &Options,
     observer: &Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
+    validate(arm, training, holdout, options)?;
+    let request = Request { arm, training, holdout, options, observer };
+    let ended = guarded(|| arm.dispatch(request)).ok_or(DiagnoseError::Stopped)?;
+    ended.ok_or(DiagnoseError::Parameters(arm.kind))?
+}
+
+/// Checks the options and the numbers of all logs.
+///
+/// # Errors
+///
+/// The first thing that cannot be worked with.
+pub(crate) fn validate(
+    arm: &ArmDescription,
+    training: &[LogData<'_>],
+    holdout: &[LogData<'_>],
+    options: &Options,
+) -> Result<(), DiagnoseError> {
     if !(options.horizon > 0.0 && options.horizon.is_finite()) {
         return Err(DiagnoseError::Horizon(options.horizon));
     }
@@ -144,17 +161,16 @@ pub fn diagnose(
             return Err(DiagnoseError::BadSamples(log.name.clone()));
         }
     }
-    let request = Request { arm, training, holdout, options, observer };
-    let ended = guarded(|| arm.dispatch(request)).ok_or(DiagnoseError::Stopped)?;
-    ended.ok_or(DiagnoseError::Parameters(arm.kind))?
+    Ok(())
 }
 
-struct Request<'a> {
-    arm: &'a ArmDescription,
-    training: &'a [LogData<'a>],
-    holdout: &'a [LogData<'a>],
-    options: &'a Options,
-    observer: &'a Observer,
+/// What was asked for.
+pub(crate) struct Request<'a> {
+    pub(crate) arm: &'a ArmDescription,
+    pub(crate) training: &'a [LogData<'a>],
+    pub(crate) holdout: &'a [LogData<'a>],
+    pub(crate) options: &'a Options,
+    pub(crate) observer: &'a Observer,
 }
 
 impl WithArm for Request<'_> {
@@ -216,7 +232,8 @@ impl Request<'_> {
         Ok((!pushed || conclusion.1.is_empty()).then_some((context, conclusion)))
     }
 
-    fn context<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    /// Windows of both sets, scales and priors.
+    pub(crate) fn context<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         arm: A,
         theta: [f64; P],

@@ -38,6 +38,8 @@ pub mod progress;
 pub mod push;
 mod random;
 mod reconsider;
+pub mod refit;
+pub mod regression_rows;
 pub mod report;
 mod residual_torque;
 mod ruled_out;

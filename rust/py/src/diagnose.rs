@@ -3,6 +3,7 @@
 use crate::convert::{description, matrix, vector};
 use crate::progress::with_progress;
 use armgap_fit::diagnose::{LogData, Options, diagnose as run};
+use armgap_fit::refit::refit as rigid_fit;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -24,6 +25,34 @@ struct Owned {
     q: Vec<f64>,
     tau: Vec<f64>,
     tables: Vec<Vec<f64>>,
+}
+
+/// The arm's parameters estimated again without any effect: `theta`, `sigma`, and per joint the RMS errors `before` and `refit` and
+/// the RMS displacement `motion` on the holdout.
+#[pyfunction]
+pub fn refit<'py>(
+    py: Python<'py>,
+    arm: &Bound<'py, PyDict>,
+    training: Vec<PyLog<'py>>,
+    holdout: Vec<PyLog<'py>>,
+    horizon: f64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let arm = description(arm)?;
+    let n = arm.kind.joints();
+    let training = training.iter().map(|log| copy(log, n)).collect::<PyResult<Vec<_>>>()?;
+    let holdout = holdout.iter().map(|log| copy(log, n)).collect::<PyResult<Vec<_>>>()?;
+    let options = Options { horizon, ..Options::default() };
+    let found = with_progress(py, None, move |observer| {
+        rigid_fit(&arm, &views(&training), &views(&holdout), &options, observer).map_err(|e| e.to_string())
+    })?
+    .map_err(PyValueError::new_err)?;
+    let result = PyDict::new(py);
+    result.set_item("theta", found.theta)?;
+    result.set_item("sigma", found.sigma)?;
+    result.set_item("before", found.before)?;
+    result.set_item("refit", found.refit)?;
+    result.set_item("motion", found.motion)?;
+    Ok(result)
 }
 
 /// The diagnosis of training and holdout logs, as JSON; `progress(title, fraction)` is called now and then.

@@ -1,10 +1,11 @@
 //! `identify` and `velocity`.
 
-use crate::convert::{kind_of, matrix, vector};
+use crate::convert::{description, kind_of, matrix, vector};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_fit::arm::ArmDescription;
 use armgap_fit::identify::{Identification, Velocity};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use armgap_fit::regression_rows::RegressionRows;
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -58,6 +59,28 @@ pub fn identify<'py>(
 
 fn table(py: Python<'_>, x: Vec<f64>, rows: usize, columns: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {
     PyArray1::from_vec(py, x).reshape([rows, columns])
+}
+
+/// Rows of the filtered dynamic model: regressor (samples, joints, parameters) and filtered torques (samples, joints); NaN at the
+/// first two samples.
+#[pyfunction]
+pub fn regression_rows<'py>(
+    py: Python<'py>,
+    arm: &Bound<'py, PyDict>,
+    t: PyReadonlyArray1<'py, f64>,
+    q: PyReadonlyArray2<'py, f64>,
+    tau: PyReadonlyArray2<'py, f64>,
+    cutoff: f64,
+) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>)> {
+    let arm = description(arm)?;
+    let (n, p) = (arm.kind.joints(), arm.kind.parameters().len());
+    let t = vector(&t, "t")?;
+    let (q, tau) = (matrix(&q, "q", t.len(), n)?, matrix(&tau, "tau", t.len(), n)?);
+    let work = RegressionRows { cutoff, t, q, tau };
+    let rows = py
+        .detach(|| arm.dispatch(work))
+        .ok_or_else(|| PyValueError::new_err("`theta` has the wrong length for this arm"))?;
+    Ok((PyArray1::from_vec(py, rows.psi).reshape([t.len(), n, p])?, table(py, rows.y, t.len(), n)?))
 }
 
 /// Velocities from positions.
