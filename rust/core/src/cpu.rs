@@ -51,10 +51,10 @@ impl<const DOUBLES: usize> Cpu for Fused<DOUBLES> {
 
 /// A computation that is compiled for each level.
 pub trait Kernel {
-    /// What it gives.
+    /// Result of the computation.
     type Output;
 
-    /// Does it; the implementation is `#[inline(always)]`, and so is all that it calls and that has to be fast.
+    /// Runs the computation; the implementation is `#[inline(always)]`, and so is all that it calls and that has to be fast.
     fn run<C: Cpu>(self) -> Self::Output;
 }
 
@@ -74,7 +74,7 @@ enum InstructionSet {
 }
 
 impl Level {
-    /// Those that the code was compiled for.
+    /// Instructions that the code was compiled for.
     pub const PORTABLE: Self = Self(InstructionSet::Portable);
 
     /// The most that the processor has, or, without the standard library, [`Level::PORTABLE`].
