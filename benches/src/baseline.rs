@@ -65,7 +65,7 @@ pub struct Arrays {
 }
 
 impl Arrays {
-    /// The same run in arrays.
+    /// The samples of a run as arrays.
     pub fn of(samples: &[Sample<f64, 2>]) -> Self {
         let flat = |of: fn(&Sample<f64, 2>) -> [f64; 2]| samples.iter().flat_map(of).collect();
         Self { q: flat(|s| s.q.into()), tau: flat(|s| s.tau.into()) }

@@ -22,7 +22,7 @@ const SAME: f64 = 1e-6;
 
 type Seed = Plant<f64, TwoLink<f64>, 2, 9>;
 
-/// Runs of one arm: their starts, and their parts of one row of torques.
+/// Runs of one arm: their initial states, and their parts of one row of torques.
 struct Case {
     name: &'static str,
     plant: Seed,

@@ -152,7 +152,7 @@ impl armgap_settings {
     }
 
     /// The settings as the core takes them.
-    pub(crate) fn to_core<T: Real>(&self) -> Option<OnlineSettings<T>> {
+    pub(crate) fn online_settings<T: Real>(&self) -> Option<OnlineSettings<T>> {
         let kind = kind_of(self.arm)?;
         Some(OnlineSettings {
             kind,
@@ -179,7 +179,7 @@ pub(crate) fn kind_of(arm: u32) -> Option<ArmKind> {
     ArmKind::ALL.get(arm as usize).copied()
 }
 
-/// What the core's complaint is in C.
+/// The status code of an error of the core.
 pub(crate) fn status_of(error: OnlineError) -> armgap_status {
     match error {
         OnlineError::Range(_) => armgap_status::ARMGAP_RANGE,

@@ -23,7 +23,7 @@ impl<T: Real> Slot<T> {
 }
 
 /// Whether a pointer can be read or written.
-fn usable<T>(pointer: *const T) -> core::result::Result<(), armgap_status> {
+fn usable<T>(pointer: *const T) -> Result<(), armgap_status> {
     if pointer.is_null() {
         Err(ARMGAP_NULL)
     } else if !pointer.is_aligned() {
@@ -34,7 +34,7 @@ fn usable<T>(pointer: *const T) -> core::result::Result<(), armgap_status> {
 }
 
 /// A slice of the caller's numbers.
-unsafe fn slice<'a, T>(pointer: *const T, count: usize) -> core::result::Result<&'a [T], armgap_status> {
+unsafe fn slice<'a, T>(pointer: *const T, count: usize) -> Result<&'a [T], armgap_status> {
     usable(pointer)?;
     if count > MOST_PARAMETERS {
         return Err(ARMGAP_LENGTH);
@@ -43,7 +43,7 @@ unsafe fn slice<'a, T>(pointer: *const T, count: usize) -> core::result::Result<
     Ok(unsafe { core::slice::from_raw_parts(pointer, count) })
 }
 
-fn answer(done: core::result::Result<armgap_status, armgap_status>) -> armgap_status {
+fn answer(done: Result<armgap_status, armgap_status>) -> armgap_status {
     match done {
         Ok(status) | Err(status) => status,
     }
@@ -68,7 +68,7 @@ pub(crate) unsafe fn start<T: Real, M>(
         }
         let theta0 = if theta0.is_null() && count == 0 { &[] } else { unsafe { slice(theta0, count)? } };
         // SAFETY: checked above.
-        let online_settings = unsafe { &*settings }.to_core::<T>().ok_or(ARMGAP_RANGE)?;
+        let online_settings = unsafe { &*settings }.online_settings::<T>().ok_or(ARMGAP_RANGE)?;
         let online = Online::new(online_settings, theta0).map_err(status_of)?;
         // SAFETY: not null, aligned, large enough by the assertion.
         unsafe { memory.cast::<Slot<T>>().write(Slot { mark: Slot::<T>::MARKED, online }) };
@@ -77,7 +77,7 @@ pub(crate) unsafe fn start<T: Real, M>(
 }
 
 /// The estimator in the caller's memory, if there is one.
-unsafe fn opened<'a, T: Real, M>(memory: *const M) -> core::result::Result<&'a Slot<T>, armgap_status> {
+unsafe fn opened<'a, T: Real, M>(memory: *const M) -> Result<&'a Slot<T>, armgap_status> {
     usable(memory)?;
     let slot = memory.cast::<Slot<T>>();
     // SAFETY: the mark is read alone first, from memory that is large enough for it.
@@ -111,11 +111,7 @@ pub(crate) unsafe fn update<T: Real, M>(
 }
 
 /// Copies numbers of the estimator to the caller, who has to have room for exactly as many.
-unsafe fn give<T: Real>(
-    from: &[T],
-    to: *mut T,
-    count: usize,
-) -> core::result::Result<armgap_status, armgap_status> {
+unsafe fn give<T: Real>(from: &[T], to: *mut T, count: usize) -> Result<armgap_status, armgap_status> {
     usable(to.cast_const())?;
     if count != from.len() {
         return Err(ARMGAP_LENGTH);

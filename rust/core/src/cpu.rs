@@ -49,12 +49,12 @@ impl<const DOUBLES: usize> Cpu for Fused<DOUBLES> {
     }
 }
 
-/// What is compiled for each level.
+/// A computation that is compiled for each level.
 pub trait Kernel {
-    /// What it gives.
+    /// Result of the computation.
     type Output;
 
-    /// Does it; the implementation is `#[inline(always)]`, and so is all that it calls and that has to be fast.
+    /// Runs the computation; the implementation is `#[inline(always)]`, and so is all that it calls and that has to be fast.
     fn run<C: Cpu>(self) -> Self::Output;
 }
 
@@ -74,7 +74,7 @@ enum InstructionSet {
 }
 
 impl Level {
-    /// Those that the code was compiled for.
+    /// Instructions that the code was compiled for.
     pub const PORTABLE: Self = Self(InstructionSet::Portable);
 
     /// The most that the processor has, or, without the standard library, [`Level::PORTABLE`].
@@ -91,7 +91,7 @@ impl Level {
         Self::PORTABLE
     }
 
-    /// The same with eight doubles at once for work that is run by [`Level::run_wide`].
+    /// Like [`Level::detect`], and eight doubles at once, where the processor has AVX-512, for kernels run by [`Level::run_wide`].
     #[inline]
     pub fn widest() -> Self {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
@@ -112,7 +112,7 @@ impl Level {
         }
     }
 
-    /// Runs the work with these instructions.
+    /// Runs a kernel with these instructions.
     #[inline(always)]
     pub fn run<W: Kernel>(self, kernel: W) -> W::Output {
         match self.0 {
@@ -122,7 +122,7 @@ impl Level {
         }
     }
 
-    /// Runs work that has eight doubles side by side.
+    /// Runs a kernel that has eight doubles side by side.
     #[inline(always)]
     pub fn run_wide<W: Kernel>(self, kernel: W) -> W::Output {
         match self.0 {
@@ -133,19 +133,20 @@ impl Level {
     }
 }
 
-/// Runs the work compiled for every processor; a function of its own, so that there is one copy of it.
+/// Runs a kernel compiled for every processor; a function of its own, so that there is one copy of it.
 #[inline(never)]
 fn portable<W: Kernel>(kernel: W) -> W::Output {
     kernel.run::<Portable>()
 }
 
-/// Runs the work compiled for AVX2 and FMA.
+/// Runs a kernel compiled for AVX2 and FMA.
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[inline(always)]
 #[allow(unsafe_code)]
 fn on_avx2<W: Kernel>(kernel: W) -> W::Output {
-    // SAFETY: called for `InstructionSet::Avx2` only, which only `Level::detect` makes, after asking the processor for both. The function itself
-    // is safe code; what could go wrong is a processor without these instructions, and nothing else.
+    // SAFETY: called for `InstructionSet::Avx2` and `InstructionSet::Avx512` only. `Level::detect` makes the first after asking the processor
+    // for AVX2 and FMA, `Level::widest` the second only where `Level::detect` has found both. The function itself is safe code; what could
+    // go wrong is a processor without these instructions, and nothing else.
     unsafe { avx2(kernel) }
 }
 
@@ -155,7 +156,7 @@ fn avx2<W: Kernel>(kernel: W) -> W::Output {
     kernel.run::<Fused<4>>()
 }
 
-/// Runs the work compiled for AVX-512.
+/// Runs a kernel compiled for AVX-512.
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[inline(always)]
 #[allow(unsafe_code)]

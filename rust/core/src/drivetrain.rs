@@ -1,7 +1,7 @@
-//! The motor sides of an arm's joints: what reaches the links of the motors' torque, and how the rotors move.
+//! The transmissions of all joints: the torques that reach the links, and the motion of the rotors.
 //!
-//! A play is open or closed. Open, its rotor and its link move apart from each other; closed, they move as one body for as long as the
-//! flank pushes. When they meet they stay together, and the rotor's momentum goes over to the arm at once (a plastic impact,
+//! Backlash is open or closed. Open, rotor and link move independently; closed, they move as one body for as long as the flank
+//! pushes. At an impact they stay together, and the rotor's momentum goes over to the arm at once (a plastic impact,
 //! Brogliato 1999, chapter 4).
 
 use crate::linear::solve_positive_definite;
@@ -12,7 +12,7 @@ use nalgebra::SVector;
 /// An inertia matrix, by rows.
 type InertiaMatrix<T, const N: usize> = [[T; N]; N];
 
-/// The motor sides of all joints; a rigid joint has none. Loops count joints by their index, so that compilers see none out of range.
+/// The transmissions of all joints; a rigid joint has none. Loops count joints by their index, so that compilers see none out of range.
 #[derive(Debug, Clone, Copy)]
 pub struct Drivetrain<T, const N: usize> {
     of: [Option<Transmission<T>>; N],
@@ -26,7 +26,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         Self { of: [None; N], any: false, has_backlash: false }
     }
 
-    /// Puts a motor side on joint `j`, if there is such a joint, and takes its inertia out of the link if it is a part of that.
+    /// Puts a transmission on joint `j`, if there is such a joint, and takes the rotor's inertia out of the link's if it is a part of that.
     pub(crate) fn add(
         &mut self,
         j: usize,
@@ -42,31 +42,32 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         Some(())
     }
 
-    /// Whether a joint has a motor side of its own.
+    /// Whether any joint has a transmission.
     #[inline]
     pub fn any(&self) -> bool {
         self.any
     }
 
-    /// Whether one of them has play.
+    /// Whether any transmission has backlash.
     #[inline]
     pub fn has_backlash(&self) -> bool {
         self.has_backlash
     }
 
-    /// The motor side of joint `j`.
+    /// The transmission of joint `j`.
     #[inline]
     pub fn get(&self, j: usize) -> Option<&Transmission<T>> {
         self.of.get(j)?.as_ref()
     }
 
-    /// Joints with a motor side.
+    /// Joints with a transmission.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (usize, &Transmission<T>)> {
         self.of.iter().enumerate().filter_map(|(j, transmission)| Some((j, transmission.as_ref()?)))
     }
 
-    /// What the motor of joint `j` does not pass on of its torque; what a closed play passes on is all of it, to rotor and link together.
+    /// Part of joint `j`'s motor torque that accelerates the rotor instead of reaching the link; zero with closed backlash, where rotor and
+    /// link move as one.
     #[inline]
     fn retained(j: usize, transmission: &Transmission<T>, tau: T, latent: &LatentState<T, N>) -> T {
         if transmission.backlash > T::zero() {
@@ -75,7 +76,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         tau - transmission.transmitted(latent.deflection[j], latent.deflection_rate[j])
     }
 
-    /// What reaches the joints of the motors' torque `tau`.
+    /// Torques that reach the joints when the motors give `tau`.
     #[inline]
     pub fn torque_at_joints(&self, tau: &SVector<T, N>, latent: &LatentState<T, N>) -> SVector<T, N> {
         let mut torque_at_joints = *tau;
@@ -89,7 +90,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         torque_at_joints
     }
 
-    /// Adds the rotors that move with their links because their play is closed.
+    /// Adds the inertia of rotors that move with their links because their backlash is closed.
     #[inline]
     pub(crate) fn add_closed_rotors(&self, inertia: &mut InertiaMatrix<T, N>, latent: &LatentState<T, N>) {
         for j in 0..N {
@@ -100,14 +101,14 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         }
     }
 
-    /// Adds all rotors, as if they moved with their links.
+    /// Adds the inertia of all rotors, as if they moved with their links.
     pub(crate) fn add_rotors(&self, inertia: &mut InertiaMatrix<T, N>) {
         for (j, transmission) in self.iter() {
             add_rotor_inertia(inertia, transmission.inertia, &transmission.rotor_jacobian(j));
         }
     }
 
-    /// Accelerations of the twists beside those of the joints.
+    /// Accelerations of the transmissions' deflections, given those of the joints.
     #[inline]
     pub(crate) fn deflection_accelerations(
         &self,
@@ -127,7 +128,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         deflection_acceleration
     }
 
-    /// By how much the flank of joint `j`'s closed play would have to pull; positive where it opens. None for other joints.
+    /// Force by which the flank of joint `j`'s closed backlash would have to pull; positive where it opens. None for other joints.
     #[inline]
     pub(crate) fn flank_tension(
         &self,
@@ -143,7 +144,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         )
     }
 
-    /// Depth of joint `j`'s rotor behind the nearer flank of its open play. None for other joints.
+    /// Depth of joint `j`'s rotor behind the nearer flank of its open backlash. None for other joints.
     #[inline]
     pub(crate) fn depth(&self, j: usize, latent: &LatentState<T, N>) -> Option<T> {
         let transmission = self.get(j).filter(|d| d.backlash > T::zero())?;
@@ -151,7 +152,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         open.then(|| latent.deflection[j].abs() - transmission.half_backlash())
     }
 
-    /// Joint `j`'s rotor meets the flank it is at, in an arm with this inertia: the velocities and the twists' rates change at once.
+    /// Plastic impact of joint `j`'s rotor on the flank it is at, in an arm with this inertia: velocities and deflection rates jump.
     pub(crate) fn impact(
         &self,
         j: usize,
@@ -181,7 +182,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
     }
 }
 
-/// Adds the inertia of a rotor that turns by `rotor_jacobian` per unit of the joints.
+/// Adds the inertia of a rotor whose velocity is `rotor_jacobian . dq`.
 #[inline]
 fn add_rotor_inertia<T: Real, const N: usize>(
     matrix: &mut InertiaMatrix<T, N>,

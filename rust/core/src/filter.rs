@@ -95,7 +95,7 @@ impl<T: Real> FilterCoefficients<T> {
     }
 }
 
-/// The coefficients of one interval, kept for the next, which usually is as long.
+/// Coefficients of the last interval, reused while the intervals have the same length.
 ///
 /// Lengths that differ by rounding of the clock count as equal; those that differ a little more take `exp` from its series.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,11 +106,11 @@ pub struct CachedCoefficients<T> {
 
 /// Relative change of a decay below which two intervals are as long as each other; the estimates follow it to first order.
 const SAME: f64 = 1e-12;
-/// The same up to which three terms of the series suffice: the fourth is 4e-18.
+/// Relative change of a decay up to which three terms of the series of `exp` suffice: the fourth is 4e-18.
 const NEAR: f64 = 1e-4;
 
 impl<T: Real> CachedCoefficients<T> {
-    /// Nothing kept yet.
+    /// An empty cache.
     #[inline]
     pub fn new(cutoff: &Cutoff<T>) -> Self {
         Self { h: T::zero(), step: cutoff.step(T::zero()) }

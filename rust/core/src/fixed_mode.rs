@@ -1,9 +1,9 @@
-//! A step over which no friction mode changes: the arm glides, some of its joints held.
+//! One Runge-Kutta step with fixed friction modes: every joint slides in one direction or is stuck throughout.
 //!
 //! Classical Runge-Kutta on `M(q) ddq = tau - C dq - g - f` with the direction of every joint's dry friction given as a number, -1, 0
 //! (stuck) or 1. What couples a stuck joint to others is taken out by factors of zero, so one and the same arithmetic serves every
-//! mode, one arm or several side by side. [`rk4_fixed_mode`] also says whether the modes it was given are those the motion has: if not, the step is
-//! worth nothing and [`crate::integrate`] finds the instant of the change.
+//! mode, one arm or several side by side. [`rk4_fixed_mode`] also checks whether the given modes agree with the motion ([`ModeCheck`]); if they do
+//! not, the step is discarded and [`crate::integrate`] finds the instant of the mode change.
 
 use crate::kinematics::{AngleRange, JointState, KinematicState, rotated};
 use crate::linear::solve_positive_definite;
@@ -16,21 +16,21 @@ use crate::trig::{Rotation, SinCos};
 pub struct Instant<'a, V, const N: usize> {
     /// Time, s.
     pub t: V,
-    /// Where the arm is.
+    /// Kinematic state of the arm.
     pub kinematics: &'a KinematicState<V, N>,
     /// Torques of the motors.
     pub tau: &'a [V; N],
 }
 
-/// What glides: an arm with its friction and effects, or several.
+/// Dynamics of an arm with its friction and effects, or of several arms side by side.
 pub trait Dynamics<V: Number, const N: usize> {
-    /// What turns the arm's angles on where its joints move by so much, and the largest of these angles.
+    /// Rotations of the arm's angles for these joint displacements, and the largest of these angles.
     fn rotations(&self, by: &[V; N], reach: AngleRange) -> ([Rotation<V>; N], V);
 
-    /// A place whose angles have these sines and cosines, with all that follows from it.
+    /// Kinematic state of these joints, given the sines and cosines of the arm's angles.
     fn rotated(&self, joints: &JointState<V, N>, sincos: [SinCos<V>; N]) -> KinematicState<V, N>;
 
-    /// Torques that accelerate: `tau - C dq - g - f` and what effects add, friction in these directions.
+    /// Generalized force `tau - C dq - g - f` with the effects' torques, dry friction in these directions.
     fn generalized_force(&self, at: &Instant<'_, V, N>, direction: &[V; N]) -> [V; N];
 
     /// Whether any joint is stuck in these modes.
@@ -39,7 +39,7 @@ pub trait Dynamics<V: Number, const N: usize> {
         modes.any_stuck
     }
 
-    /// By how much holding each joint takes more than friction can give, where it is stuck; anything not positive elsewhere.
+    /// Stiction violation of each stuck joint: friction torque at rest less the Coulomb level. Not positive for sliding joints.
     fn stiction_violation(
         &self,
         at: &Instant<'_, V, N>,
@@ -55,18 +55,18 @@ pub struct Modes<V, const N: usize> {
     pub direction: [V; N],
     /// 1 for joints that slide, 0 for those that are stuck.
     slides: [V; N],
-    /// 1 for joints with dry friction; 0 for those that reverse without noticing.
+    /// 1 for joints with dry friction, 0 for joints without.
     dry: [V; N],
-    /// Against the direction where dry friction notices.
+    /// `-direction` for joints with dry friction, 0 for others.
     against: [V; N],
-    /// Whether any is stuck.
+    /// Whether any joint is stuck.
     pub(crate) any_stuck: bool,
-    /// Whether the last step did not end in these modes.
+    /// Whether the modes changed since the last step, so that its end does not vouch for them.
     pub(crate) fresh: bool,
 }
 
 impl<V: Number, const N: usize> Modes<V, N> {
-    /// Modes of these directions; `dry` is 1 for joints with dry friction, 0 for those that reverse without noticing.
+    /// Modes of these directions; `dry` is 1 for joints with dry friction, 0 for joints without.
     #[inline(always)]
     pub fn new(direction: [V; N], dry: [V; N]) -> Self {
         let (mut slides, mut against, mut any_stuck) = (direction, direction, false);
@@ -82,29 +82,29 @@ impl<V: Number, const N: usize> Modes<V, N> {
 /// A sample interval, or a part of it.
 #[derive(Debug, Clone, Copy)]
 pub struct Span<V, const N: usize> {
-    /// Where it starts, s.
+    /// Start time, s.
     pub t: V,
-    /// How long it is, s.
+    /// Length, s.
     pub h: V,
     /// Torques at its start, its middle and its end.
     pub tau: [[V; N]; 3],
 }
 
-/// Whether a step's modes were those of the motion, and what tells which changed.
+/// Check of the assumed friction modes after a step, with the quantities that tell which mode changed.
 #[derive(Debug, Clone, Copy)]
 pub struct ModeCheck<V, const N: usize> {
-    /// Positive, or no number, where the modes are not those of the motion, or the step is too far.
+    /// > 0 or NaN if an assumed friction mode is violated or `range_violation` is.
     pub mode_violation: V,
-    /// Positive, or no number, where the motion is not finite or too far for one step.
+    /// > 0 or NaN if the motion is not finite or exceeds the angle range of one step.
     pub range_violation: V,
     /// Accelerations at the start and, in the last stage's approximation, at the end.
     pub ddq: [[V; N]; 2],
-    /// What holds stuck joints at the same two instants; of no meaning where none is stuck.
+    /// Static friction at the same two instants; meaningless if no joint is stuck.
     pub static_friction: [StaticFriction<V, N>; 2],
 }
 
 impl<V: Number, const N: usize> ModeCheck<V, N> {
-    /// Those of no step.
+    /// All zero.
     #[inline(always)]
     pub fn none() -> Self {
         let zero = V::of(lit(0.0));
@@ -118,16 +118,16 @@ impl<V: Number, const N: usize> ModeCheck<V, N> {
     }
 }
 
-/// What it takes to hold stuck joints.
+/// Static friction of stuck joints.
 #[derive(Debug, Clone, Copy)]
 pub struct StaticFriction<V, const N: usize> {
-    /// Torques of friction.
+    /// Friction torque that keeps a stuck joint at rest.
     pub friction_at_rest: [V; N],
-    /// By how much they are more than friction gives, where a joint is stuck; anything not positive elsewhere.
+    /// Excess of `friction_at_rest` over the Coulomb level; not positive for sliding joints.
     pub stiction_violation: [V; N],
 }
 
-/// The torques that accelerate, and the accelerations.
+/// Generalized force and acceleration at one Runge-Kutta stage.
 #[derive(Clone, Copy)]
 struct StageMotion<V, const N: usize> {
     generalized_force: [V; N],
@@ -155,7 +155,7 @@ fn motion<V: Number, B: Dynamics<V, N>, const N: usize>(
     StageMotion { generalized_force, ddq: solve_positive_definite(inertia, right) }
 }
 
-/// What holds stuck joints.
+/// Static friction of stuck joints: generalized force less `M ddq`.
 #[inline(always)]
 fn static_friction<V: Number, B: Dynamics<V, N>, const N: usize>(
     dynamics: &B,
@@ -210,14 +210,14 @@ fn contradiction<V: Number>(dq: V, ddq: V, direction: V, slides: V) -> V {
     dq.where_zero(released, dq.size() - dq * direction)
 }
 
-/// Where the arm is at a stage, and how it accelerates there.
+/// Kinematic state, generalized force and acceleration at one Runge-Kutta stage.
 #[derive(Clone, Copy)]
 struct RkStage<V, const N: usize> {
     kinematics: KinematicState<V, N>,
     motion: StageMotion<V, N>,
 }
 
-/// The stage `dt` after the start, moved there at the velocities and accelerations of the stage before, under the `tau`-th torques.
+/// Runge-Kutta stage at `dt` after the start, from the velocities and accelerations of the previous stage, under the `tau`-th torques of the span.
 #[inline(always)]
 fn rk_stage<V: Number, B: Dynamics<V, N>, const N: usize>(
     step: &FixedModeStep<'_, V, B, N>,
@@ -233,11 +233,11 @@ fn rk_stage<V: Number, B: Dynamics<V, N>, const N: usize>(
     RkStage { kinematics, motion }
 }
 
-/// What a step is taken from.
+/// Input of one step.
 pub struct FixedModeStep<'a, V, B, const N: usize> {
-    /// What moves.
+    /// Dynamics of the arm.
     pub dynamics: &'a B,
-    /// Where it starts.
+    /// Kinematic state at the start.
     pub start: &'a KinematicState<V, N>,
     /// Friction modes.
     pub modes: &'a Modes<V, N>,
@@ -245,7 +245,7 @@ pub struct FixedModeStep<'a, V, B, const N: usize> {
     pub span: &'a Span<V, N>,
 }
 
-/// One step with these friction modes: where it ends. Its signs are written over `mode_check`.
+/// One classical Runge-Kutta step with fixed friction modes; returns the kinematic state at its end and overwrites `mode_check`.
 ///
 /// From the start to the second stage, and from the third to the fourth, the arm turns by half a step at the velocity it starts with; the
 /// rest of the ways between them follows from accelerations, and is short.

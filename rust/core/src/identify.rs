@@ -20,7 +20,7 @@ use nalgebra::SVector;
 
 /// Positions, velocities, torques and intervals beyond this belong to no arm, and their squares would stay in filters and integrals for good.
 const LARGEST: f64 = 1e9;
-/// The same for times; seconds since any epoch stay below.
+/// Times beyond this are rejected, s; seconds since any epoch stay below.
 const LATEST: f64 = 1e11;
 
 /// Settings of an estimator of `R` parameters.
@@ -137,13 +137,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         Self { arm, settings, rls, past, regression: None, rejected: 0 }
     }
 
-    /// The same with the covariance kept in another form than the default of its precision.
+    /// Keeps the covariance in another form than the default of its precision.
     pub fn with_form(mut self, form: Form) -> Self {
         self.rls = self.rls.with_form(form);
         self
     }
 
-    /// The same with other instructions than the most that the processor has.
+    /// Uses other instructions than the widest that the processor has.
     pub fn with_level(mut self, level: Level) -> Self {
         self.rls = self.rls.with_level(level);
         self

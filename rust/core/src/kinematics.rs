@@ -1,13 +1,13 @@
-//! Where an arm is, how it moves, and what of its equation follows from that.
+//! Kinematic state of an arm, and the terms of its equation of motion that follow from it.
 //!
-//! Sines and cosines of a place near a known one are those of the known one turned on by the difference ([`crate::trig::Rotation`]).
+//! Sines and cosines near a known state follow from those of the known state by the addition theorems ([`crate::trig::Rotation`]).
 
 use crate::arm::{Arm, EquationTerms};
 use crate::number::Number;
 use crate::real::{Real, lit};
 use crate::trig::{NEAR, Rotation, SLIGHT, SinCos};
 
-/// An arm with numbers in the form its equation needs them.
+/// A rigid arm with parameter values in the form its equation of motion needs.
 #[derive(Debug, Clone, Copy)]
 pub struct RigidArm<V, A, const N: usize, const P: usize> {
     /// The arm.
@@ -18,7 +18,7 @@ pub struct RigidArm<V, A, const N: usize, const P: usize> {
     pub viscous: [V; N],
     /// Coulomb coefficients.
     pub coulomb: [V; N],
-    /// Inertia that is the same everywhere, that added by effects included.
+    /// Part of the inertia matrix that does not depend on `q`, including what effects add.
     pub constant_inertia: [[V; N]; N],
     /// Angle by which the base is turned.
     pub tilt: V,
@@ -31,7 +31,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<
         self.kinematics(joints).equation_terms
     }
 
-    /// A place with all that follows from it.
+    /// Kinematic state of these joints.
     #[inline(always)]
     pub fn kinematics(&self, joints: &JointState<V, N>) -> KinematicState<V, N> {
         let angles = self.arm.angles(&joints.q, self.tilt);
@@ -42,7 +42,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<
         self.rotated(joints, sincos)
     }
 
-    /// What turns the arm's angles on where its joints move by so much, and the largest of these angles.
+    /// Rotations of the arm's angles for these joint displacements, and the largest of these angles.
     #[inline(always)]
     pub fn rotations(&self, by: &[V; N], reach: AngleRange) -> ([Rotation<V>; N], V) {
         // Adding -0 is the one sum that a compiler may leave out.
@@ -55,7 +55,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<
         (rotations, far)
     }
 
-    /// A place whose angles have these sines and cosines, with all that follows from it.
+    /// Kinematic state of these joints, given the sines and cosines of the arm's angles.
     #[inline(always)]
     pub fn rotated(&self, joints: &JointState<V, N>, sincos: [SinCos<V>; N]) -> KinematicState<V, N> {
         let equation_terms =
@@ -65,7 +65,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> RigidArm<T, A, N, P> {
-    /// A place with all that follows from it, turned on from positions with known sines and cosines if it is within reach of them.
+    /// Kinematic state of these joints, from positions with known sines and cosines if they are within the angle range.
     #[inline(always)]
     pub fn near(
         &self,
@@ -86,7 +86,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> RigidArm<T, A, N,
     }
 }
 
-/// Where joints are and how they move.
+/// Positions and velocities of all joints.
 #[derive(Debug, Clone, Copy)]
 pub struct JointState<V, const N: usize> {
     /// Positions.
@@ -95,7 +95,7 @@ pub struct JointState<V, const N: usize> {
     pub dq: [V; N],
 }
 
-/// A place with all that follows from it.
+/// Joint state, sines and cosines, and the terms of the equation of motion at it.
 #[derive(Debug, Clone, Copy)]
 pub struct KinematicState<V, const N: usize> {
     /// Positions and velocities.
@@ -120,7 +120,7 @@ impl<V: Number, const N: usize> KinematicState<V, N> {
     }
 }
 
-/// The sines and cosines of angles turned on, each by its rotation.
+/// Sines and cosines of rotated angles.
 #[inline(always)]
 pub fn rotated<V: Number, const N: usize>(sincos: &[SinCos<V>; N], by: &[Rotation<V>; N]) -> [SinCos<V>; N] {
     let mut rotated = *sincos;
@@ -130,12 +130,12 @@ pub fn rotated<V: Number, const N: usize>(sincos: &[SinCos<V>; N], by: &[Rotatio
     rotated
 }
 
-/// How far it can be from one pose to another; a shorter way takes shorter series.
+/// Range of angle differences that a rotation series covers; a smaller range needs fewer terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AngleRange {
-    /// As far as an arm gets in half a step.
+    /// Up to the rotation in half a step.
     Near,
-    /// As far as the stages of a step are from each other.
+    /// Up to the difference between Runge-Kutta stages at the same time.
     Slight,
 }
 
@@ -149,13 +149,13 @@ impl AngleRange {
         }
     }
 
-    /// An angle as a part of the largest: beyond 1, too far.
+    /// An angle relative to the largest: beyond 1 the series does not hold.
     #[inline(always)]
     pub fn part<V: Number>(self, angle: V) -> V {
         angle * V::of(lit(1.0 / self.largest()))
     }
 
-    /// What turns on by an angle within reach.
+    /// Rotation by an angle within the range.
     #[inline(always)]
     fn rotation<V: Number>(self, angle: V) -> Rotation<V> {
         match self {

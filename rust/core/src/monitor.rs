@@ -1,5 +1,5 @@
-//! What an estimator that runs on its own has to say about itself: how large its errors are, whether the motion still teaches it
-//! anything, and whether the model has stopped explaining the arm.
+//! Monitor of an online estimator: size of its errors, excitation by the motion, and an alarm when the model no longer explains the
+//! arm.
 //!
 //! **Spread.** Mean square of each prediction error over the last `memory` samples; with the diagonal of `P` it gives standard deviations.
 //!

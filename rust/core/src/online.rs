@@ -16,7 +16,7 @@ pub const MOST_PARAMETERS: usize = 11;
 /// Largest number of joints of any arm.
 pub const MOST_JOINTS: usize = 2;
 
-/// Everything that is chosen before the first sample.
+/// Settings of an online estimator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnlineSettings<T> {
     /// Kind of arm.
@@ -42,7 +42,7 @@ pub struct OnlineSettings<T> {
 /// Why an estimator cannot be made or a sample cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OnlineError {
-    /// A number of the choice is not finite or outside its range.
+    /// A setting is not finite or outside its range.
     Range(&'static str),
     /// A slice has another length than the arm needs.
     Length {
@@ -100,7 +100,7 @@ impl<T: Real> OnlineSettings<T> {
         if self.scheme == Scheme::FilteredDynamic { self.kind.joints() } else { 1 }
     }
 
-    fn check(&self) -> core::result::Result<(), OnlineError> {
+    fn check(&self) -> Result<(), OnlineError> {
         let positive = |x: T, most: f64| x > T::zero() && x <= lit(most);
         let wrong = [
             (!positive(self.cutoff, 1e6), "cutoff"),
@@ -137,7 +137,7 @@ enum EstimatorOfArm<T: Real> {
 
 impl<T: Real> Online<T> {
     /// An estimator that has seen nothing yet; `theta0` has one entry per parameter, or none for zeros.
-    pub fn new(settings: OnlineSettings<T>, theta0: &[T]) -> core::result::Result<Self, OnlineError> {
+    pub fn new(settings: OnlineSettings<T>, theta0: &[T]) -> Result<Self, OnlineError> {
         settings.check()?;
         let expected = settings.parameters();
         if !(theta0.is_empty() || theta0.len() == expected) {
@@ -177,7 +177,7 @@ impl<T: Real> Online<T> {
         Ok(Self { settings, running })
     }
 
-    /// What was chosen.
+    /// The settings.
     pub fn settings(&self) -> &OnlineSettings<T> {
         &self.settings
     }
@@ -190,7 +190,7 @@ impl<T: Real> Online<T> {
         q: &[T],
         dq: Option<&[T]>,
         tau: &[T],
-    ) -> core::result::Result<SampleStatus, OnlineError> {
+    ) -> Result<SampleStatus, OnlineError> {
         let expected = self.settings.kind.joints();
         for (name, x) in [("q", q), ("dq", dq.unwrap_or(q)), ("tau", tau)] {
             if x.len() != expected {
@@ -274,7 +274,7 @@ impl<T: Real> Online<T> {
     }
 }
 
-/// What every watched estimator can do.
+/// What every monitored estimator can do.
 trait DynEstimator<T: Real> {
     fn update(&mut self, when: When<T>, q: &[T], dq: Option<&[T]>, tau: &[T]) -> SampleStatus;
     fn theta(&self) -> &[T];

@@ -1,34 +1,33 @@
-//! What lies between the motor and the link, and what a joint remembers of its path: states that no encoder shows.
+//! Transmission between motor and link, and hysteresis of a joint: latent states, which no encoder measures.
 //!
-//! A rigid joint has neither. A joint driven through a spring, or through play, has a motor side of its own,
+//! A rigid joint has neither. A joint driven through a spring, or through backlash, has a rotor of its own,
 //!
 //! ```text
-//! inertia d2(u q + twist)/dt2 = tau - transmitted,      transmitted = stiffness twist + damping dtwist
+//! inertia d2(u q + deflection)/dt2 = tau - transmitted,      transmitted = stiffness deflection + damping d(deflection)/dt
 //! ```
 //!
-//! (Spong 1987), where `u q` is the joint's own position and, as far as the rotor rides on them, that of the joints before, on which the
-//! motor reacts with as much of the torque that it does not transmit. Within a play of width `backlash` nothing is transmitted, and
-//! outside it the flanks push and never pull. A joint with hysteresis remembers a quantity that changes with the distance travelled and
-//! with nothing else.
+//! (Spong 1987), where `u` is the rotor Jacobian: 1 for the joint's own position and the coupling ratio for the joints before, on which the
+//! motor reacts with the same share of the torque that it does not transmit. Within a backlash of width `backlash` nothing is transmitted;
+//! outside it the flanks push and never pull. The hysteresis state of a joint changes with the distance travelled and with nothing else.
 
 use crate::real::{Real, lit};
 use nalgebra::SVector;
 
-/// The motor side of a joint.
+/// Transmission of a joint, with its rotor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transmission<T> {
-    /// Inertia of the motor side, seen from the joint.
+    /// Inertia of the rotor, seen from the joint.
     pub inertia: T,
     /// Stiffness of the shaft or of the flanks.
     pub stiffness: T,
     /// Damping of the shaft or of the flanks.
     pub damping: T,
-    /// Play, both sides together; zero for a shaft without play.
+    /// Backlash, both sides together; zero for a shaft without backlash.
     pub backlash: T,
-    /// Whether the inertia is a part of the link's nominal inertia rather than an addition to it.
+    /// Whether the rotor's inertia is a part of the link's nominal inertia rather than an addition to it.
     pub part_of_link: bool,
-    /// Part of the turning of the joints before it that the rotor takes part in beside its own: one for a motor that sits on the link before,
-    /// next to nothing behind a high gear.
+    /// Coupling ratio: rotor velocity per velocity of each joint before its own; 1 for a motor that sits on the link before, about 0
+    /// behind a high gear ratio.
     pub coupling_ratio: T,
 }
 
@@ -47,7 +46,7 @@ impl<T: Real> Transmission<T> {
         side * (self.stiffness * depth + self.damping * side * deflection_rate).max(T::zero())
     }
 
-    /// How the rotor of joint `j` turns as the joints of a planar chain do, per unit of each.
+    /// Rotor Jacobian of joint `j` in a planar chain: rotor velocity per velocity of each joint.
     #[inline]
     pub fn rotor_jacobian<const N: usize>(&self, j: usize) -> [T; N] {
         core::array::from_fn(|k| match k.cmp(&j) {
@@ -57,7 +56,7 @@ impl<T: Real> Transmission<T> {
         })
     }
 
-    /// How far the rotor may turn to either side of the middle of its play.
+    /// Half of the backlash.
     #[inline]
     pub fn half_backlash(&self) -> T {
         self.backlash * lit(0.5)
@@ -70,23 +69,23 @@ impl<T: Real> Transmission<T> {
     }
 }
 
-/// States of the joints that no encoder shows.
+/// Latent states of the joints, which no encoder measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LatentState<T, const N: usize> {
-    /// What each joint remembers of its path, as it was at `anchor`.
+    /// Hysteresis state of each joint at the position `anchor`.
     pub memory: SVector<T, N>,
-    /// Position at which `memory` holds.
+    /// Position at which the hysteresis state is `memory`.
     pub anchor: SVector<T, N>,
-    /// Motor position less joint position.
+    /// Deflection: motor position less joint position.
     pub deflection: SVector<T, N>,
-    /// Its rate.
+    /// Rate of the deflection.
     pub deflection_rate: SVector<T, N>,
-    /// The flank that carries where a play is closed, -1 or 1; zero where none does.
+    /// The flank in contact where the backlash is closed, -1 or 1; zero where it is open.
     pub side: SVector<T, N>,
 }
 
 impl<T: Real, const N: usize> LatentState<T, N> {
-    /// Nothing remembered and nothing twisted at `q`.
+    /// All latent states zero, at `q`.
     pub fn none(q: SVector<T, N>) -> Self {
         let zero = SVector::zeros();
         Self { memory: zero, anchor: q, deflection: zero, deflection_rate: zero, side: zero }

@@ -1,4 +1,4 @@
-//! What comes at an instant: plays that close and open, stops that are met, pushes that begin and end between samples.
+//! Events at an instant: backlash that closes and opens, impacts on joint limits, disturbances that begin and end between samples.
 
 use armgap_core::arm::{Axis, TwoLink};
 use armgap_core::effect::{Active, Effect, InputSegment, MAX_PARAMETERS, find};

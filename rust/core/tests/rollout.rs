@@ -1,4 +1,4 @@
-//! Runs made together against the same runs made alone.
+//! Batch rollouts against the scalar integrator.
 
 use armgap_core::arm::TwoLink;
 use armgap_core::cpu::Level;

@@ -66,7 +66,7 @@ fn with_central_differences(mut samples: Vec<Sample<f64, 2>>) -> Vec<Sample<f64,
     samples
 }
 
-/// The same without velocities.
+/// Samples of the run without velocities.
 fn positions_only(samples: &[Sample<f64, 2>]) -> Vec<Sample<f64, 2>> {
     samples.iter().map(|s| Sample { dq: None, ..*s }).collect()
 }

@@ -1,7 +1,7 @@
-//! What is accepted as a cause.
+//! Acceptance criteria: what is accepted as a cause.
 //!
 //! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the
-//! windows' own scatter, or when it brings the parameters back to their trusted values.
+//! windows' own scatter, or when it brings the parameters back to their prior values.
 
 use crate::attribute::{Candidate, SearchNode, is_plausible};
 use crate::model::EffectInstance;
@@ -10,16 +10,16 @@ use armgap_core::effect::{Quantity, Trial};
 /// Mean advantage per window, in standard errors, below which a cause is not accepted.
 pub const CERTAIN: f64 = 3.5;
 
-/// The same for a nuisance, which claims nothing.
+/// Mean advantage per window, in standard errors, below which a nuisance, which is never named, is not accepted.
 const CERTAIN_ENOUGH: f64 = 2.5;
 
-/// The same as for a cause on the holdout alone, where a cause must at least not fail.
+/// Mean advantage per holdout window, in standard errors, below which a cause is not accepted: on the holdout alone it must not fail.
 const HOLDOUT_CERTAIN: f64 = 1.0;
 
 /// Share of the gap above the floor below which an improvement does not matter.
 pub const MATTERS: f64 = 0.1;
 
-/// The same where the gap itself is of no consequence: only an effect that explains most of it counts.
+/// Share of a gap of no consequence below which an improvement does not matter: only an effect that explains most of it counts.
 const MATTERS_IN_SMALL: f64 = 0.5;
 
 /// Cost above the floor, as a factor, below which there is nothing left to explain.
@@ -28,17 +28,17 @@ pub const ABOVE_FLOOR: f64 = 1.25;
 /// Cost of a typical window, relative to what noise alone leaves, up to which a gap is that of a few windows.
 const AT_FLOOR: f64 = 1.5;
 
-/// What a contender must take off those few, in costs of a typical window, and what others may lose by it, as a part of that.
+/// What a candidate must take off those few, in costs of a typical window, and what others may lose by it, as a part of that.
 const OUTLYING: f64 = 25.0;
 const HARMLESS: f64 = 0.05;
 
-/// Decrease of the distance from trusted values, in squared sigmas, that makes a cause on its own.
+/// Decrease of the prior cost, in squared sigmas, that makes a cause on its own.
 pub const TRUST_GAIN: f64 = 16.0;
 
 /// Beside an unexplained gap larger than this part of the motion, implausible values are no evidence: the gap may have moved them.
 const TRUSTWORTHY: f64 = 0.01;
 
-/// Contenders whose distance from trusted values differs by less, in squared sigmas, are look-alikes.
+/// Candidates whose prior cost differs by less, in squared sigmas, are look-alikes.
 pub const ALIKE_TRUST: f64 = 6.0;
 
 /// Cost above the floor, as a factor, beyond which a gap without a cause is called unexplained.
@@ -59,14 +59,14 @@ pub const CLEAR: f64 = 2.75;
 const MATTERS_IF_FAINT: f64 = 0.7;
 const CERTAIN_IF_FAINT: f64 = 5.0;
 
-/// Probability left to a cause beside a remainder that it does not touch at all.
+/// Probability left to a cause when all of the gap stays unexplained.
 pub const REMAINDER_DOUBT: f64 = 0.2;
 
-/// How fast a remainder takes the probability from causes that leave it: effects that are in no library were seen to be imitated by
+/// How fast an unexplained remainder reduces the probability of the causes: effects that are in no library were seen to be imitated by
 /// two or three that are, for up to eight tenths of the gap.
 pub const REMAINDER_POWER: i32 = 6;
 
-/// The same relative to the first gap: what lies below it is no cause of that gap.
+/// Improvement relative to the first gap below which an effect is no cause of that gap.
 const NOTICEABLE: f64 = 0.02;
 
 /// A fit that ends this close to the largest possible size has found no effect.
@@ -75,34 +75,34 @@ const AT_BOUND: f64 = 0.98;
 /// Resamples of the windows.
 pub const RESAMPLES: usize = 400;
 
-/// A contender with fewer parameters is preferred if it reaches this part of the best one's advantage.
+/// A candidate with fewer parameters is preferred if it reaches this part of the best one's advantage.
 pub const ALMOST: f64 = 0.95;
 
-/// The same where even the best leaves most of the gap: there, further parameters are taken up by what they are not about.
+/// Part of the best one's advantage for that preference where even the best leaves most of the gap: there, further parameters fit other causes.
 const ALMOST_IN_DOUBT: f64 = 0.6;
 
-/// A contender that explains more than this part of the gap is about it.
+/// A candidate that explains more than this part of the gap explains most of it.
 const MOST: f64 = 0.5;
 
-/// A contender whose cost is within this part of the winner's advantage is a look-alike.
+/// A candidate whose cost is within this part of the winner's advantage is a look-alike.
 const LOOK_ALIKE: f64 = 0.03;
 
-/// Improvement relative to the motion below which a cause is not worth a name, given the first gap; what is of consequence by itself
-/// always is.
+/// Minimum relevance of a cause: improvement relative to the motion below which it is not named, given the first gap. What is of
+/// consequence by itself is always named.
 pub fn min_relevance(first_gap: f64) -> f64 {
     (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENCE)
 }
 
 impl<const N: usize, const P: usize> SearchNode<N, P> {
-    /// Whether the data hardly prefer `best` to another contender.
+    /// Whether the data hardly prefer `best` to another candidate.
     pub fn is_alike(&self, best: &Candidate<P>, other: &Candidate<P>) -> bool {
         let advantage = self.base.score() - best.score();
         other.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0) || best.z_over(other) < 1.0
     }
 
-    /// Whether a contender explains windows that stand far out of noise, in training and holdout, at no cost to any other.
+    /// Whether a candidate explains windows that stand far out of noise, in training and holdout, at no cost to any other.
     ///
-    /// An effect that shows in a few windows, such as a stop that is hardly touched, never has a mean advantage of many standard errors.
+    /// An effect that shows in a few windows, such as a joint limit that is hardly touched, never has a mean advantage of many standard errors.
     /// Where all other windows are at the floor, it needs none: their noise is known, and it is not noise that it takes away.
     fn settles_outliers(&self, candidate: &Candidate<P>) -> bool {
         let windows = self.base.holdout.len() as f64;
@@ -135,16 +135,16 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     }
 }
 
-/// Why a contender deserves to be adopted.
+/// Why a candidate is accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ground {
     /// It moves predictions closer to the measurement.
     Motion,
-    /// It brings the parameters back to their trusted values.
+    /// It brings the parameters back to their prior values.
     Trust,
 }
 
-/// Index of the contender to adopt, and why, if any deserves it; smoother friction is adopted once.
+/// Index of the accepted candidate, and why, if any is accepted; friction regularisation is accepted once.
 ///
 /// Improvements below `min_relevance`, relative to the motion, do not count.
 pub fn choose<const N: usize, const P: usize>(
@@ -164,7 +164,7 @@ pub fn choose<const N: usize, const P: usize>(
         .map(|index| (index, Ground::Trust))
 }
 
-/// The best contender that describes an arm; one with a value at its bound gives way to one that does almost as well without.
+/// The best candidate that describes an arm; one with a value at its bound gives way to one that does almost as well without.
 pub fn best<const N: usize, const P: usize>(node: &SearchNode<N, P>, regularised: bool) -> Option<usize> {
     let open = |i: &usize| node.candidates[*i].effect.is_some() || !regularised;
     let first = (0..node.candidates.len()).find(open)?;
@@ -173,12 +173,12 @@ pub fn best<const N: usize, const P: usize>(node: &SearchNode<N, P>, regularised
     (first..node.candidates.len()).filter(as_good).find(|i| is_possible(&node.candidates[*i]))
 }
 
-/// Whether a contender's effect is neither idle nor at the largest size.
+/// Whether a candidate's effect is neither idle nor at the largest size.
 pub fn is_possible<const P: usize>(candidate: &Candidate<P>) -> bool {
     candidate.size < AT_BOUND && !candidate.is_idle()
 }
 
-/// The contender with the fewest parameters among those that do almost as well as the best: a spring with a far-off rest position is
+/// The candidate with the fewest parameters among those that do almost as well as the best: a spring with a far-off rest position is
 /// an offset.
 fn simplest<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
@@ -198,7 +198,7 @@ fn simplest<const N: usize, const P: usize>(
     (0..node.candidates.len()).filter(as_good).min_by_key(|i| (size(*i), *i)).unwrap_or(best)
 }
 
-/// Whether a contender closes a part of the gap that matters, on the holdout too.
+/// Whether a candidate closes a part of the gap that matters, on the holdout too.
 pub fn moves<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,
@@ -217,7 +217,7 @@ pub fn moves<const N: usize, const P: usize>(
         && (is_certain(node, candidate, certain) || node.settles_outliers(candidate))
 }
 
-/// Whether a contender's advantage exceeds the windows' scatter, on the holdout alone too.
+/// Whether a candidate's advantage exceeds the windows' scatter, on the holdout alone too.
 fn is_certain<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,
@@ -226,7 +226,7 @@ fn is_certain<const N: usize, const P: usize>(
     candidate.z_over(&node.base) > certain && candidate.holdout_z_over(&node.base) > HOLDOUT_CERTAIN
 }
 
-/// Whether rounded friction, a nuisance without a name, explains most of the gap.
+/// Whether friction regularisation, a nuisance that is never named, explains most of the gap.
 pub fn is_regularisation<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,
@@ -234,14 +234,14 @@ pub fn is_regularisation<const N: usize, const P: usize>(
     node.share(candidate) > MOST && is_certain(node, candidate, CERTAIN_ENOUGH)
 }
 
-/// Whether a contender explains implausible parameters by one effect.
+/// Whether a candidate explains implausible parameters by one effect.
 pub fn restores<const N: usize, const P: usize>(node: &SearchNode<N, P>, candidate: &Candidate<P>) -> bool {
     candidate.effect.is_some()
         && (node.relative_error() < TRUSTWORTHY || !node.is_open())
         && brings_back(node, candidate)
 }
 
-/// Whether a contender brings implausible parameters back towards their trusted values, at no cost.
+/// Whether a candidate brings implausible parameters back towards their prior values, at no cost.
 pub fn brings_back<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,

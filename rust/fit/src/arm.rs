@@ -9,9 +9,9 @@ pub struct ArmDescription {
     pub kind: ArmKind,
     /// Acceleration of gravity, m/s^2.
     pub gravity: f64,
-    /// Trusted values of all parameters.
+    /// Prior values of all parameters.
     pub theta: Vec<f64>,
-    /// One-sigma trust in each.
+    /// Their prior standard deviations.
     pub sigma: Vec<f64>,
     /// Encoder counts per revolution.
     pub counts_per_rev: Option<Vec<f64>>,

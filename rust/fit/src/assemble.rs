@@ -35,7 +35,7 @@ pub struct Compared<const P: usize> {
     pub after: Hypothesis<P>,
 }
 
-/// The diagnosis of a study.
+/// The diagnosis as data.
 pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     (attribution, disturbances): &(Attribution<N, P>, Vec<Disturbance>),
@@ -117,10 +117,10 @@ fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     ResidualTorques { before, refit, after }
 }
 
-/// Each joint's share of the gap: what causes explain lies where they sit, as far as they are sure; the rest where torque is lacking.
+/// Each joint's share of the gap: what causes explain lies on their joints, weighted by their probability; the rest by residual torque.
 ///
-/// A torque that is lacking on one joint bends the motion of all, and an error of its coupling shows on the others; so where a cause
-/// is known, its own joint says more than the lacking torque does.
+/// A residual torque on one joint changes the motion of all, and an error of its coupling shows on the others; so where a cause is known,
+/// its own joint says more than the residual torque does.
 fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     (attribution, disturbances): (&Attribution<N, P>, &[Disturbance]),
@@ -149,7 +149,7 @@ fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     std::array::from_fn(|j| told[j] + open * whole[j] + left * rest[j])
 }
 
-/// What the figures amount to.
+/// The verdict.
 fn verdict<const N: usize, const P: usize>(attribution: &Attribution<N, P>, gap: &Gap) -> &'static str {
     if !attribution.causes.is_empty() {
         return "effect";
@@ -182,7 +182,7 @@ fn cause(cause: &crate::belief::Cause, joints: usize, rotary: bool) -> Cause {
     }
 }
 
-/// A push as a cause.
+/// An external disturbance as a cause.
 fn push<A, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     disturbance: &Disturbance,

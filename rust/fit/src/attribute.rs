@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// Candidates that are fitted again under the weights of the best.
 const FINALISTS: usize = 4;
 
-/// Candidates that are fitted with sensitivities of their own before the finalists are chosen.
+/// Candidates that are fitted with their own Jacobian before the finalists are chosen.
 const TAKEN_ON: usize = 2 * FINALISTS;
 
 /// Rounds in which the finalists are fitted under weights of the best one's residual.
@@ -23,13 +23,13 @@ const MAX_REWEIGHTINGS: usize = 3;
 /// A residual whose scale has shrunk by less than this factor needs no new weights.
 const SHRUNK: f64 = 1.15;
 
-/// Finalists by closeness to trusted values lie within this many squared sigmas of the closest.
+/// Finalists by prior cost lie within this many squared sigmas of the lowest.
 const TRUSTED: f64 = 10.0;
 
 /// Size relative to the largest possible below which nothing is left of an effect.
 const IDLE: f64 = 2e-5;
 
-/// Size, relative to the typical one, that a parameter starts from which a simpler law lacks.
+/// Initial guess, relative to the typical size, of a parameter that a simpler law does not have.
 const LITTLE: f64 = 0.1;
 
 /// Share of windows that are left out where only the size of a gap is in question.
@@ -38,22 +38,22 @@ const SPOILT: f64 = 0.02;
 /// One alternative to the current model, fitted on the training windows and judged on the holdout.
 #[derive(Debug, Clone)]
 pub struct Candidate<const P: usize> {
-    /// The added effect; none for the current model, with or without smoother friction.
+    /// The added effect; none for the current model, with or without friction regularisation.
     pub effect: Option<EffectInstance>,
     /// Size of the added effect's first parameter relative to the largest possible.
     pub size: f64,
     /// The fit.
     pub fit: Fit<P>,
-    /// Tempered cost of every training window.
+    /// Student-t cost of every training window.
     pub training: Vec<f64>,
-    /// Tempered cost of every holdout window.
+    /// Student-t cost of every holdout window.
     pub holdout: Vec<f64>,
     /// Cost of the holdout windows as they are, but for the worst few.
     pub error: f64,
 }
 
 impl<const P: usize> Candidate<P> {
-    /// Cost on all windows, and of leaving the trusted values.
+    /// Cost on all windows plus the prior cost.
     pub fn score(&self) -> f64 {
         self.training.iter().chain(&self.holdout).sum::<f64>() + self.fit.prior_cost
     }
@@ -83,7 +83,7 @@ impl<const P: usize> Candidate<P> {
         z_score(&self.advantages(other))
     }
 
-    /// The same on the holdout windows alone.
+    /// Mean advantage over `other` per holdout window, in units of its standard error.
     pub fn holdout_z_over(&self, other: &Self) -> f64 {
         z_score(&self.advantages(other)[self.training.len()..])
     }
@@ -97,7 +97,7 @@ fn z_score(x: &[f64]) -> f64 {
     mean / (variance / n).sqrt().max(1e-12)
 }
 
-/// One stage: the current model and its alternatives, under common weights.
+/// One search node: the current model and its candidates, under common weights.
 #[derive(Debug, Clone)]
 pub struct SearchNode<const N: usize, const P: usize> {
     /// The current model, fitted under weights of its own residual.
@@ -119,23 +119,23 @@ pub struct SearchNode<const N: usize, const P: usize> {
     pub motion: f64,
 }
 
-/// How the finalists and the current model end.
+/// The finalists and the current model at the end of the last round.
 struct FinalRound<const N: usize, const P: usize> {
     base: Candidate<P>,
     candidates: Vec<Candidate<P>>,
-    /// Weights by the best contender's residual, where that called for others.
+    /// Weights by the best candidate's residual, where that called for others.
     weights: Option<SplitWeighting<N>>,
 }
 
 impl<const N: usize, const P: usize> SearchNode<N, P> {
-    /// Share of the holdout's cost above the floor that a contender removes.
+    /// Share of the holdout's cost above the floor that a candidate removes.
     pub fn share(&self, candidate: &Candidate<P>) -> f64 {
         let base: f64 = self.base.holdout.iter().sum();
         let here: f64 = candidate.holdout.iter().sum();
         (base - here) / (base - self.floor).max(1e-9 * base)
     }
 
-    /// RMS improvement of a contender on the holdout, relative to the motion within the windows.
+    /// RMS improvement of a candidate on the holdout, relative to the motion within the windows.
     pub fn relevance(&self, candidate: &Candidate<P>) -> f64 {
         ((self.base.error - candidate.error).max(0.0) / self.motion).sqrt()
     }
@@ -167,12 +167,12 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// One stage around the current model; improvements below `min_relevance`, relative to the motion, are not looked for.
+    /// The search node around the current model; improvements below `min_relevance`, relative to the motion, are not looked for.
     pub fn node(&self, current: &Hypothesis<P>, scale: [f64; N], min_relevance: f64) -> SearchNode<N, P> {
         self.node_around(self.settle(current, scale), min_relevance)
     }
 
-    /// The same around a fit under weights of its own residual.
+    /// The search node around a fit under weights of its own residual; improvements below `min_relevance` are not looked for.
     pub fn node_around(
         &self,
         (fit, weights): (Fit<P>, SplitWeighting<N>),
@@ -222,7 +222,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         fitted.iter().filter(|c| c.effect.is_some()).map(|c| (c.clone(), share(c))).collect()
     }
 
-    /// Fits all starts and judges them, best first; `jacobian` are the sensitivities of the model they add to, where they are known. What
+    /// Fits all initial guesses and judges them, best first; `jacobian` is that of the model they add to, where it is known. What
     /// diverged or came down to nothing is left out.
     pub(crate) fn fit_candidates(
         &self,
@@ -238,7 +238,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         ranked(initial_guesses.into_par_iter().map(fitted).collect())
     }
 
-    /// The best contenders fitted with sensitivities of their own where they have used those of the model they add to.
+    /// The best candidates, fitted again with their own Jacobian where they have reused columns of the model they add to.
     fn taken_on(
         &self,
         weights: &SplitWeighting<N>,
@@ -253,7 +253,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         ranked(candidates.into_par_iter().enumerate().map(on).collect())
     }
 
-    /// A start fitted and judged; what it has beyond the `known` effects is the one under test.
+    /// Fits an initial guess and judges it; its effect beyond the `known` ones is the one under test.
     pub(crate) fn candidate(
         &self,
         weights: &SplitWeighting<N>,
@@ -262,7 +262,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         effort: Effort,
         jacobian: &[Vec<f64>],
     ) -> Candidate<P> {
-        // Where an effect starts at neutral, the sensitivities of the model without it are nearly its own.
+        // Where an effect starts at neutral, the Jacobian of the model without it is nearly its own.
         let near = initial_guess.effects.get(known).is_some_and(|e| e.law.spec().trial != Trial::Whole);
         let jacobian = if near { jacobian } else { &[] };
         let fit = self.problem(&weights.training).solve_reusing(initial_guess, effort, jacobian);
@@ -273,13 +273,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Candidate { effect, size, fit, training, holdout, error }
     }
 
-    /// Tempered costs of the holdout windows, and their cost as they are.
+    /// Student-t costs of the holdout windows, and their plain cost but for the worst few.
     pub fn judged_on_holdout(&self, weights: &SplitWeighting<N>, fit: &Fit<P>) -> (Vec<f64>, f64) {
         let raw = self.judge(&weights.holdout).raw_costs(&fit.hypothesis);
         (raw.iter().map(|cost| weights.holdout.student_t_cost(*cost)).collect(), without_worst(raw))
     }
 
-    /// Re-weights by the best contender's residual and fits the finalists and the current model again.
+    /// Re-weights by the best candidate's residual and fits the finalists and the current model again.
     fn final_round(
         &self,
         current: &Hypothesis<P>,
@@ -317,7 +317,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FinalRound { base, candidates, weights: heavier }
     }
 
-    /// Cost of predicting that every joint stays where its window starts.
+    /// Cost of predicting that every joint stays at the initial position of its window.
     pub(crate) fn motion(&self, weights: &SplitWeighting<N>) -> f64 {
         self.holdout.motion(&weights.holdout.scale)
     }
@@ -329,7 +329,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Contenders, best first, none twice; what diverged or came down to nothing is left out.
+/// Candidates, best first, none twice; what diverged or came down to nothing is left out.
 fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>> {
     candidates.retain(|c| c.score().is_finite() && !c.is_idle());
     candidates.sort_by(|a, b| a.score().total_cmp(&b.score()));
@@ -342,7 +342,7 @@ fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>
     best
 }
 
-/// Hypotheses to be fitted to the end: the best by cost, of those that are not hopeless, and the best by closeness to trusted values.
+/// Hypotheses to be fitted to the end: the best by cost, of those that are not hopeless, and the best by prior cost.
 fn finalists<const P: usize>(candidates: &[Candidate<P>], hopeless: f64) -> Vec<Hypothesis<P>> {
     let mut by_trust: Vec<usize> = (0..candidates.len()).collect();
     let prior = |i: &usize| candidates[*i].fit.prior_cost;
@@ -356,19 +356,19 @@ fn finalists<const P: usize>(candidates: &[Candidate<P>], hopeless: f64) -> Vec<
         .collect()
 }
 
-/// Whether parameters may lie that far from their trusted values, in squared sigmas, by chance.
+/// Whether a prior cost, the squared distance from the arm file's values in sigmas, is plausible by chance.
 pub fn is_plausible<const P: usize>(prior_cost: f64) -> bool {
     prior_cost <= P as f64 + 3.0 * (2.0 * P as f64).sqrt()
 }
 
-/// Sum of all costs but the worst few, which a bad start may have spoilt.
+/// Sum of all costs but the worst few, which a bad initial state may have spoilt.
 fn without_worst(mut costs: Vec<f64>) -> f64 {
     costs.sort_by(f64::total_cmp);
     let kept = costs.len() - (costs.len() as f64 * SPOILT) as usize;
     costs.iter().take(kept).sum()
 }
 
-/// The model with what is left of a contender's effect when its first parameter vanishes, if that is an effect of its own.
+/// The model with what is left of a candidate's effect when its first parameter vanishes, if that is an effect of its own.
 fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> Option<Hypothesis<P>> {
     let effect = candidate.effect?;
     let law = find::<f64>(effect.law.simpler()?)?;
@@ -383,7 +383,7 @@ fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> O
     (!taken).then(|| Hypothesis { theta, ..model.with(EffectInstance { law, joint: effect.joint, p }) })
 }
 
-/// The model with the law of which a contender's effect is the simplest case, with a little of what the simple one lacks.
+/// The model with the law of which a candidate's effect is the simplest case, with a small value of the parameter that the simple one does not have.
 fn richer<const N: usize, const P: usize>(
     model: &Hypothesis<P>,
     candidate: &Candidate<P>,

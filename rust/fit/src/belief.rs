@@ -1,4 +1,4 @@
-//! A cause by name, and how sure that is.
+//! Selection probability of a cause.
 
 use crate::acceptance::{
     ABOVE_FLOOR, ALIKE_TRUST, Ground, REMAINDER_DOUBT, REMAINDER_POWER, RESAMPLES, UNEXPLAINED, restores,
@@ -26,7 +26,7 @@ pub struct Cause {
 }
 
 impl<const N: usize, const P: usize> SearchNode<N, P> {
-    /// Whether no log of motion tells the effects of two contenders apart.
+    /// Whether no log of motion tells the effects of two candidates apart.
     fn are_equivalent(&self, a: usize, b: usize) -> bool {
         match (self.candidates[a].effect, self.candidates[b].effect) {
             (Some(a), Some(b)) => equivalent::are(&a, &b, N),
@@ -35,7 +35,7 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     }
 }
 
-/// The chosen contender as a cause, with its look-alikes and probability.
+/// The chosen candidate as a cause, with its look-alikes and probability.
 pub fn name<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     choice: usize,
@@ -64,7 +64,7 @@ pub fn name<const N: usize, const P: usize>(
     }
 }
 
-/// How often the chosen contender, or one that no motion tells from it, has the lowest cost when the windows are drawn again.
+/// How often the chosen candidate, or one that no motion tells from it, has the lowest cost when the windows are drawn again.
 fn probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize, seed: u64) -> f64 {
     let advantages: Vec<Vec<f64>> = node.candidates.iter().map(|c| c.advantages(&node.base)).collect();
     let own: Vec<f64> = node.candidates.iter().map(|c| node.base.fit.prior_cost - c.fit.prior_cost).collect();
@@ -87,7 +87,7 @@ fn probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: 
     (f64::from(wins) + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
-/// How often one contender has a lower cost than another when the windows are drawn again.
+/// How often one candidate has a lower cost than another when the windows are drawn again.
 pub fn probability_over<const P: usize>(one: &Candidate<P>, other: &Candidate<P>, seed: u64) -> f64 {
     let advantages = one.advantages(other);
     let own = other.fit.prior_cost - one.fit.prior_cost;
@@ -99,7 +99,8 @@ pub fn probability_over<const P: usize>(one: &Candidate<P>, other: &Candidate<P>
     (wins as f64 + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
-/// Probability of the chosen contender, or one that no motion tells from it, among all effects that would restore the trusted values, from their distances.
+/// Probability of the chosen candidate, or one that no motion tells from it, among all effects that would restore the prior values, from
+/// their prior costs.
 fn trust_probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize) -> f64 {
     let best = node.candidates[choice].fit.prior_cost;
     let free = |c: &Candidate<P>| c.effect.as_ref().map_or(0, EffectInstance::len) as f64;
@@ -133,7 +134,7 @@ pub fn left_beside<const N: usize, const P: usize>(
     unexplained_of(first.last(), second.last())
 }
 
-/// Part of one stage's gap that is left in a later one, where that is more than noise.
+/// Part of one node's gap that is left in a later one, where that is more than noise.
 fn unexplained_of<const N: usize, const P: usize>(
     earlier: Option<&SearchNode<N, P>>,
     last: Option<&SearchNode<N, P>>,
@@ -145,7 +146,7 @@ fn unexplained_of<const N: usize, const P: usize>(
     left_of(earlier, last)
 }
 
-/// Part of one stage's gap that is left in a later one.
+/// Part of one node's gap that is left in a later one.
 fn left_of<const N: usize, const P: usize>(earlier: &SearchNode<N, P>, last: &SearchNode<N, P>) -> f64 {
     // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them. Where it is of no
     // consequence by itself, both must say so.

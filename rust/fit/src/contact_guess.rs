@@ -1,35 +1,35 @@
-//! Starts from the data: where a joint runs into something, and how hard that is.
+//! Initial guesses of contacts from the data: where a joint hits a joint limit, and how stiff that is.
 //!
-//! Beyond a stop the torque that the model lacks is a hinge: it grows with depth and with speed and pushes back. The position is found by
-//! trying, stiffness and damping for each by least squares.
+//! Beyond a joint limit the residual torque is a hinge: it grows with depth and with speed and pushes back. The position is found by a
+//! line search, stiffness and damping at each position by least squares.
 
 use crate::model::Hypothesis;
 use crate::residual_torque::{InverseDynamicsResidual, inverse_dynamics_residuals};
 use crate::track::Track;
 use armgap_core::arm::Arm;
 
-/// Half width, in samples, of the local cubic that accelerations are taken from: a knock is short.
+/// Half width, in samples, of the local cubic that accelerations are taken from: an impact is short.
 const HALF_WIDTH: usize = 3;
 
-/// Fewest samples beyond a stop.
+/// Fewest samples beyond a joint limit.
 const FEWEST: usize = 5;
 
 /// Growth of the number of samples beyond, from one position that is tried to the next.
 const GROWTH: f64 = 1.15;
 
-/// Largest part of the samples beyond a stop.
+/// Largest part of the samples beyond a joint limit.
 const MOST: f64 = 0.8;
 
-/// A hinge explains at least this part of the lacking torque beyond it.
+/// A hinge explains at least this part of the residual torque beyond it.
 const EXPLAINS: f64 = 0.3;
 
-/// Speed below which friction is rounded, relative to the joint's RMS speed.
+/// Speed below which friction is regularised, relative to the joint's RMS speed.
 const SLOW: f64 = 0.02;
 
-/// A stop: position, stiffness and damping.
+/// A contact: position, stiffness and damping.
 pub type ContactGuess = [f64; 3];
 
-/// What a joint lacks at one sample.
+/// Residual torque of a joint at one sample.
 #[derive(Debug, Clone, Copy)]
 struct ContactSample {
     q: f64,
@@ -37,10 +37,10 @@ struct ContactSample {
     residual: f64,
 }
 
-/// How much harder a stop is taken to be as well: a knock that is over before the cubic has passed it seems softer than it is.
+/// How much stiffer a second guess is: an impact that is over before the cubic has passed it seems softer than it is.
 const HARDER: f64 = 8.0;
 
-/// Stops of every joint that logs show under a model, at most one on either side, each as it seems and harder.
+/// Contacts of every joint that logs show under a model, at most one on either side, each as it seems and stiffer.
 pub fn contact_guesses<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     tracks: &[Track<N>],
     arm: &A,
@@ -66,7 +66,7 @@ pub fn contact_guesses<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     })
 }
 
-/// The stop on one side of zero as it seems, and a harder one that a knock goes as much less deep into.
+/// The contact on one side of zero as it seems, and a stiffer one that an impact enters less deeply.
 fn both(samples: &mut [ContactSample], side: f64) -> Vec<ContactGuess> {
     let Some(guess) = hinge(samples, side) else { return Vec::new() };
     let [position, stiffness, damping] = guess;
@@ -89,7 +89,7 @@ fn hinge(samples: &mut [ContactSample], side: f64) -> Option<ContactGuess> {
     tried.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(guess, _)| guess)
 }
 
-/// Stiffness and damping of a stop that all these samples lie beyond, and the squared torque that it explains.
+/// Stiffness and damping of a contact that all these samples lie beyond, and the squared torque that it explains.
 fn spring(beyond: &[ContactSample], position: f64, side: f64) -> Option<([f64; 2], f64)> {
     let [mut dd, mut dv, mut vv, mut dy, mut vy, mut yy] = [0.0; 6];
     for sample in beyond {

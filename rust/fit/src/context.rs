@@ -1,4 +1,4 @@
-//! The study of one arm: training and holdout windows, trusted values, and the current weights of residuals.
+//! The context of a diagnosis: arm, prior, scales, training and holdout windows; and the weighting of their residuals.
 
 use crate::model::{EffectInstance, Hypothesis};
 use crate::progress::{Phase, ProgressReporter};
@@ -14,11 +14,11 @@ const MAX_ROUNDS: usize = 5;
 /// A round that changes every joint's scale by less than this factor is the last.
 const SETTLED: f64 = 1.1;
 
-/// What stays the same throughout a diagnosis.
+/// What a diagnosis works with: the arm, its prior, scales, and windows.
 pub struct DiagnosisContext<A, const N: usize, const P: usize> {
     /// The arm.
     pub arm: A,
-    /// Trusted values.
+    /// Prior of the arm's parameters.
     pub prior: Prior<P>,
     /// Typical sizes.
     pub scales: Scales<N>,
@@ -28,9 +28,9 @@ pub struct DiagnosisContext<A, const N: usize, const P: usize> {
     pub holdout: WindowSet<N>,
     /// Standard deviation of the position measurement.
     pub noise: [f64; N],
-    /// Effects of the user's own, at their start.
+    /// Custom effects at their initial guess.
     pub custom_effects: Vec<EffectInstance>,
-    /// Who looks on.
+    /// Progress report and cancellation.
     pub progress: ProgressReporter,
 }
 
@@ -49,7 +49,7 @@ impl<const N: usize> WindowSet<N> {
         Self { data, measured }
     }
 
-    /// Cost, in these scales, of predicting that every joint stays where its window starts.
+    /// Cost, in these scales, of predicting that every joint stays at the initial position of its window.
     pub fn motion(&self, scale: &[f64; N]) -> f64 {
         let moved = self.data.windows.iter().map(|window| {
             let rows = self.measured[window.range()].chunks_exact(N);
@@ -62,22 +62,22 @@ impl<const N: usize> WindowSet<N> {
     }
 }
 
-/// Weights for training and holdout windows, taken around one hypothesis.
+/// Weightings of training and holdout windows around one hypothesis.
 #[derive(Debug, Clone)]
 pub struct SplitWeighting<const N: usize> {
-    /// Weights of the training windows.
+    /// Weighting of the training windows.
     pub training: Weighting<N>,
-    /// Weights of the holdout windows.
+    /// Weighting of the holdout windows.
     pub holdout: Weighting<N>,
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The fitting problem under these weights.
+    /// The fitting problem on the training windows under this weighting.
     pub fn problem<'a>(&'a self, weighting: &'a Weighting<N>) -> FitProblem<'a, A, N, P> {
         self.on(&self.training, weighting)
     }
 
-    /// The judging problem under these weights.
+    /// The problem on the holdout windows under this weighting.
     pub fn judge<'a>(&'a self, weighting: &'a Weighting<N>) -> FitProblem<'a, A, N, P> {
         self.on(&self.holdout, weighting)
     }
@@ -94,14 +94,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Weights around a hypothesis: starts are fitted to it and the scales are those given.
+    /// Weightings around a hypothesis: initial states are fitted to it and the scales are those given.
     pub fn weights(&self, hypothesis: &Hypothesis<P>, scale: [f64; N]) -> SplitWeighting<N> {
         let around = |sample| self.weighting(sample, hypothesis, scale);
         let (training, holdout) = rayon::join(|| around(&self.training), || around(&self.holdout));
         SplitWeighting { training, holdout }
     }
 
-    /// A metric whose starts have been fitted to the hypothesis once and relinearised there.
+    /// The weighting whose initial states have been fitted to the hypothesis once and relinearised there.
     pub fn weighting(
         &self,
         sample: &WindowSet<N>,
@@ -140,7 +140,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (fit, weights)
     }
 
-    /// Scale of each joint's residual under a hypothesis: its RMS once starts are fitted, widened by its correlation in time,
+    /// Scale of each joint's residual under a hypothesis: its RMS once initial states are fitted, widened by its correlation in time,
     /// and never under the measurement's noise.
     pub fn residual_scale(&self, weighting: &Weighting<N>, hypothesis: &Hypothesis<P>) -> [f64; N] {
         let problem = self.problem(weighting);
@@ -182,7 +182,7 @@ fn loop_rounds(mut round: impl FnMut(usize) -> bool) {
     }
 }
 
-/// Start corrections no larger than twenty times what the measured start allows; beyond, the window's model is at fault.
+/// Corrections of initial states, at most twenty standard deviations of the measured one; beyond, the model of the window is at fault.
 fn bounded<const N: usize>(
     data: &Dataset<N>,
     offsets: Vec<InitialStateOffset<N>>,
@@ -199,7 +199,7 @@ fn bounded<const N: usize>(
     offsets
 }
 
-/// RMS of pooled windows by their trust, times the square root of the autocorrelation time in samples (at least one).
+/// RMS of pooled windows by their robust weights, times the square root of the autocorrelation time in samples (at least one).
 fn correlated_rms(windows: &[Vec<f64>], robust_weight: &[f64]) -> f64 {
     let moment = |lag: usize| -> f64 {
         let product = |w: &Vec<f64>| w.iter().zip(w.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();

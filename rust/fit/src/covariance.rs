@@ -1,4 +1,4 @@
-//! How far fitted values may be off.
+//! Covariance of fitted values, by the jackknife over windows.
 //!
 //! Windows are the independent observations. Leaving window `w` out moves the fitted values, to first order, by
 //!
@@ -41,7 +41,7 @@ pub struct ParameterCovariance {
 }
 
 impl ParameterCovariance {
-    /// Nothing is known of `k` values.
+    /// Infinite variances of `k` values.
     fn unknown(k: usize) -> Self {
         Self {
             matrix: DMatrix::from_diagonal_element(k, k, f64::INFINITY),
@@ -76,7 +76,7 @@ impl ParameterCovariance {
     }
 }
 
-/// The same of the values that predictions tell of, each in units of what it would be known to if the others were given.
+/// Covariance and degrees of freedom of the values on which predictions depend, each in units of its standard deviation given the others.
 struct Determined {
     covariance: DMatrix<f64>,
     degrees_of_freedom: Vec<f64>,
@@ -117,7 +117,7 @@ impl Determined {
     }
 }
 
-/// What is left in a window by what is left in all on average, at least one.
+/// Cost of a window relative to the average over all, at least one.
 fn relative_cost(gram: &Gram, window: usize) -> f64 {
     let left = |score: &DVector<f64>| score[score.len() - 1];
     let average = gram.scores.iter().map(left).sum::<f64>() / gram.scores.len() as f64;
@@ -140,7 +140,7 @@ mod tests {
         (0..12).map(|_| random.below(1 << 30) as f64 / (1u64 << 30) as f64).sum::<f64>() - 6.0
     }
 
-    /// Two values fitted to noise, whose columns have these sizes in each window: the values and how far they may be off.
+    /// Two values fitted to noise, whose columns have these sizes in each window: the values and their covariance.
     fn fitted(sizes: &[[f64; 2]], random: &mut Random) -> ([f64; 2], ParameterCovariance) {
         let mut rows: Vec<Vec<[f64; 3]>> = sizes
             .iter()

@@ -1,4 +1,4 @@
-//! Effects of the user's own: a torque per unit of size, given at every sample of every log.
+//! Custom effects: a torque per unit of size, given by the user at every sample of every log.
 //!
 //! What a function of time, position, velocity and torque says along the *measured* motion is a torque of its own on the joint; its size
 //! is fitted and takes part in the ranking like any other. Within a window the predicted motion stays close to the measured one, so
@@ -8,10 +8,10 @@ use armgap_core::effect::{
     Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial,
 };
 
-/// Most effects of the user's own in one diagnosis.
+/// Most custom effects in one diagnosis.
 pub const MOST: usize = 4;
 
-/// What the user calls an effect, and the joint it acts on.
+/// Name of a custom effect, and the joint it acts on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CustomEffect {
     /// Name in results.
@@ -20,7 +20,7 @@ pub struct CustomEffect {
     pub joint: usize,
 }
 
-/// The law of the user's effect `index`; its torques lie in the logs' tables.
+/// The law of custom effect `index`; its torques lie in the logs' tables.
 #[derive(Debug)]
 struct Tabulated(usize);
 
@@ -54,12 +54,12 @@ impl Effect<f64> for Tabulated {
     }
 }
 
-/// The law of the user's effect number `index`.
+/// The law of custom effect `index`.
 pub fn law(index: usize) -> &'static dyn Effect<f64> {
     &LAWS[index]
 }
 
-/// Which of the user's effects a law is, if it is one.
+/// Index of a law among the custom effects, if it is one.
 fn index(law: &dyn Effect<f64>) -> Option<usize> {
     SPECS.iter().position(|spec| std::ptr::eq(spec, law.spec()))
 }

@@ -27,11 +27,11 @@ pub struct LogData<'a> {
     pub q: &'a [f64],
     /// Torques, one row per sample, held until the next.
     pub tau: &'a [f64],
-    /// Torque per unit of size of each of the user's own effects, sample by sample; as many as there are `own` effects.
+    /// Torque per unit of size of each custom effect, sample by sample.
     pub tables: Vec<&'a [f64]>,
 }
 
-/// What a diagnosis may be told.
+/// Options of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Prediction horizon, s.
@@ -40,7 +40,7 @@ pub struct Options {
     pub max_causes: usize,
     /// Seed of the resampling that gives probabilities and intervals.
     pub seed: u64,
-    /// Joints, from 0, of the user's own effects; their torques lie in the logs' tables.
+    /// Joints, from 0, of the custom effects; their torques lie in the logs' tables.
     pub custom_effects: Vec<usize>,
 }
 
@@ -68,9 +68,9 @@ pub enum DiagnoseError {
     BadSamples(String),
     /// The horizon is not a positive number of seconds.
     Horizon(f64),
-    /// Too many effects of the user's own, one without a table of torques in some log, or on a joint that is not there.
+    /// Too many custom effects, one without a table of torques in some log, or on a joint that is not there.
     CustomEffects,
-    /// The observer wanted no more.
+    /// The observer cancelled the diagnosis.
     Stopped,
 }
 
@@ -103,17 +103,17 @@ impl std::error::Error for DiagnoseError {}
 /// Windows without which nothing can be said.
 const FEWEST_WINDOWS: usize = 4;
 
-/// What is said where logs were cut crosswise.
+/// Note of a diagnosis by interleaved cross-validation.
 const CROSSWISE: &str = "effects fitted to the training logs did not explain the holdout: every log was cut into stretches that were learnt \
      from and judged on by turns";
 
-/// Probability from which a push counts as named.
+/// Probability from which an external disturbance counts as named.
 const NAMED: f64 = 0.5;
 
-/// What the causes of a study are, and the pushes beside them.
+/// An attribution and the external disturbances beside it.
 type Conclusion<const N: usize, const P: usize> = (Attribution<N, P>, Vec<Disturbance>);
 
-/// Diagnoses the gap between an arm and its logs; `observer` is told how far it is and may stop it.
+/// Diagnoses the gap between an arm and its logs; `observer` gets the progress and may cancel.
 pub fn diagnose(
     arm: &ArmDescription,
     training: &[LogData<'_>],
@@ -203,7 +203,7 @@ impl WithArm for Request<'_> {
 }
 
 impl Request<'_> {
-    /// The study of logs cut crosswise and its conclusion, where that explains what the first one left, or took for pushes.
+    /// The diagnosis by interleaved cross-validation, where it explains what the first one left open or took for external disturbances.
     fn crosswise<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         arm: A,
@@ -254,7 +254,7 @@ impl Request<'_> {
         Ok(DiagnosisContext { arm, prior, scales, training, holdout, noise, custom_effects, progress })
     }
 
-    /// The user's own effects at their starts.
+    /// The custom effects at their initial guesses.
     fn custom_effects<const N: usize>(&self, scales: &Scales<N>) -> Vec<EffectInstance> {
         let placed = |(index, joint): (usize, &usize)| {
             let law = custom_effect::law(index);

@@ -1,6 +1,6 @@
-//! How far values fitted to the training logs and to the holdout agree, and the standard deviations that follow from it.
+//! Dispersion factor: standard deviations widened by the difference between fits to the training logs and to the holdout.
 //!
-//! A covariance from one set of windows knows how they scatter around their own fit, not what they all err by: a start state
+//! A covariance from one set of windows knows how they scatter around their own fit, not what they all err by: an initial state
 //! behind a gear, friction that is smoother than the model's. What differs from motion to motion shows when the same model is fitted
 //! to other motions. Deviations are widened by the factor by which the two fits differ more than they should (the dispersion
 //! ratio of Birge 1932, over all values that the logs determine, and each value's own share of it).
@@ -9,7 +9,7 @@ use crate::context::{DiagnosisContext, SplitWeighting};
 use crate::solve::{Effort, Fit};
 use armgap_core::arm::Arm;
 
-/// A value counts as determined by a log if that log narrows its trusted deviation to this part.
+/// A value counts as determined by a log if that log narrows its prior deviation to this part.
 const DETERMINED: f64 = 0.5;
 
 /// Weight of a value's own difference beside the dispersion of all: one observation of one degree of freedom.
@@ -19,7 +19,7 @@ const OWN: f64 = 0.5;
 const MOST: f64 = 1e3;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Widens the deviations of a fit by how much a fit of the same model to the holdout differs from it.
+    /// Multiplies the deviations of a fit by its dispersion factor against a fit of the same model to the holdout.
     pub fn apply_dispersion_factor(&self, fit: &mut Fit<P>, weights: &SplitWeighting<N>) {
         let other = self.judge(&weights.holdout).solve(&fit.hypothesis, Effort::FULL);
         let squares = self.squared_differences(fit, &other);

@@ -1,12 +1,12 @@
-//! How strongly each joint is disturbed: the random torques that would make a model miss the way it does.
+//! How strongly each joint is disturbed: maximum likelihood intensities of random torques that explain the prediction errors.
 //!
-//! Between prediction and measurement of one window lies the motion that the lacking torque `d` made, seen through the encoders' noise:
+//! Between prediction and measurement of one window lies the motion that the residual torque `d` made, seen through the encoders' noise:
 //!
 //! ```text
 //! M(q) dde/dt2 = d,     y = e + v,     d white of intensity W = diag(w_1 .. w_n),     v white of the encoders' variances.
 //! ```
 //!
-//! The intensities are those of largest likelihood (innovations of the Kalman filter; Schweppe 1965), every window's start left open. So
+//! The intensities are those of largest likelihood (innovations of the Kalman filter; Schweppe 1965), every window's initial state left open. So
 //! the encoders' noise is told from a torque by its spectrum, and what a coupled arm shows on one joint from what acts on the other.
 
 use crate::context::DiagnosisContext;
@@ -19,7 +19,7 @@ use armgap_core::arm::Arm;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rayon::prelude::*;
 
-/// A start is left open: this many times the standard deviations it was measured with.
+/// Factor on the standard deviations of a measured initial state, which leaves it open.
 const OPEN: f64 = 100.0;
 
 /// The search begins at a torque of this part of the joint's typical one, held over one sample.
@@ -40,14 +40,14 @@ const MAX_ITERATIONS: u64 = 60;
 type Matrix<const N: usize> = SMatrix<f64, N, N>;
 type Vector<const N: usize> = SVector<f64, N>;
 
-/// One sample of a window: what is missed, time to the next, and what a torque does there.
+/// Prediction error at one sample of a window, time to the next, and the inverse inertia there.
 struct PredictionError<const N: usize> {
     error: Vector<N>,
     step: f64,
     mobility: Matrix<N>,
 }
 
-/// Misses of all windows, ready to be judged under any intensities.
+/// Prediction errors of all windows, and the likelihood of intensities under them.
 struct PredictionErrors<const N: usize> {
     windows: Vec<(KalmanFilter<N>, Vec<PredictionError<N>>)>,
     noise: Matrix<N>,
@@ -55,7 +55,7 @@ struct PredictionErrors<const N: usize> {
     faintest: [f64; N],
 }
 
-/// Each joint's share of the kinetic energy that lacking torques feed into the arm over the holdout, under a hypothesis: `w_j (M^-1)_jj`.
+/// Each joint's share of the kinetic energy that residual torques feed into the arm over the holdout, under a hypothesis: `w_j (M^-1)_jj`.
 ///
 /// The measure is that of Gauss's principle of least constraint, in which torques of unlike joints compare; shares add to one.
 pub fn shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
@@ -138,7 +138,7 @@ impl<const N: usize> CostFunction for PredictionErrors<N> {
     }
 }
 
-/// Kalman filter of the missed positions and velocities: their estimates and covariance, in blocks.
+/// Kalman filter of the prediction errors of positions and velocities: their estimates and covariance, in blocks.
 #[derive(Clone)]
 struct KalmanFilter<const N: usize> {
     e: Vector<N>,

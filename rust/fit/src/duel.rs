@@ -1,7 +1,7 @@
 //! Two effects that explain about the same, each under the weights it deserves.
 //!
-//! Windows are weighed, and their starts fitted, around the best contender. That flatters it: a start that had to be moved far for it
-//! is trusted less from then on, and lets the rival's advantage there pass. Of two that are close, each is therefore judged under
+//! Windows are weighed, and their initial states fitted, around the best candidate. That flatters it: an initial state that had to be moved far for it
+//! is weighted less from then on, and lets the rival's advantage there pass. Of two that are close, each is therefore judged under
 //! weights made around either, and the one with the clearer win in its own has the last word.
 
 use crate::acceptance::MATTERS;
@@ -16,7 +16,7 @@ use armgap_core::arm::Arm;
 const CLOSE: f64 = 3.0;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The stage under the weights of its best contender or of the best one's rival, whichever wins more clearly there.
+    /// The node under the weights of its best candidate or of the best one's rival, whichever wins more clearly there.
     pub(crate) fn duel(&self, node: SearchNode<N, P>) -> SearchNode<N, P> {
         let Some((best, rival)) = close_pair(&node) else { return node };
         let current = node.settled.hypothesis.clone();
@@ -25,7 +25,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if lead(&other) > lead(&own) { other } else { own }
     }
 
-    /// The same finalists under weights made around one of them.
+    /// The node with its finalists fitted under weights made around one of them.
     fn around(&self, current: &Hypothesis<P>, node: &SearchNode<N, P>, one: usize) -> SearchNode<N, P> {
         let chosen = &node.candidates[one].fit.hypothesis;
         let (_, weights) = self.settle(chosen, node.weights.training.scale);
@@ -38,7 +38,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// The best contender and the first that is close to it, if motion can tell their effects apart.
+/// The best candidate and the first that is close to it, if motion can tell their effects apart.
 fn close_pair<const N: usize, const P: usize>(node: &SearchNode<N, P>) -> Option<(usize, usize)> {
     let (best, others) = node.candidates.split_first()?;
     if node.share(best) < MATTERS {
@@ -58,7 +58,7 @@ fn is_close<const N: usize, const P: usize>(
     alike && other.z_over(&node.base) > CLOSE && !equivalent::are(&a, &b, N)
 }
 
-/// By how much the best contender of a stage leads, in standard errors.
+/// By how much the best candidate of a node leads, in standard errors.
 fn lead<const N: usize, const P: usize>(node: &SearchNode<N, P>) -> f64 {
     match &node.candidates[..] {
         [best, second, ..] => best.z_over(second),

@@ -1,9 +1,9 @@
-//! What the missing torque does with energy.
+//! Energy balance of the residual torque.
 //!
 //! Power is torque times velocity. Friction that a model leaves out only takes energy from the joint; a spring, an inertia or a tilt
-//! takes and gives it back; a motor that delivers more than its command supplies it. So the work of the lacking torque, relative to all
-//! that it exchanges, tells kinds of causes apart before any is named. What noise adds to the lacking torque takes and gives at random:
-//! it makes the balance smaller, not other.
+//! takes and gives it back; a motor that delivers more than its command supplies it. So the work of the residual torque, relative to
+//! all that it exchanges, tells kinds of causes apart before any is named. What noise adds to the residual torque takes and gives at
+//! random: it makes the balance smaller in size and leaves its sign.
 
 use crate::locate::{ResidualTorque, ResidualTorques};
 use serde::Serialize;
@@ -11,14 +11,14 @@ use serde::Serialize;
 /// A balance beyond this is that of a torque that on the whole takes, or gives.
 const ONE_WAY: f64 = 0.5;
 
-/// The energy that the torque lacking on one joint takes and gives.
+/// Energy that the residual torque of one joint takes and gives.
 #[derive(Debug, Clone, Serialize)]
 pub struct Energy {
     /// 1-based joint.
     pub joint: usize,
-    /// The model that lacks it: `before` (the arm file as it is), `refit` or `after`.
+    /// The model it belongs to: `before` (the arm file as it is), `refit` or `after`.
     pub model: &'static str,
-    /// Mean power of the lacking torque, W; negative: the model lacks a loss.
+    /// Mean power of the residual torque, W; negative: the model leaves out a loss.
     pub power: f64,
     /// Mean of its size, W: what is taken and given.
     pub exchanged: f64,
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
     use nalgebra::Vector1;
 
-    /// One joint that swings under a torque of its position and its velocity.
+    /// One joint that oscillates under a torque of its position and its velocity.
     fn oscillation(residual: fn(f64, f64) -> f64) -> Vec<ResidualTorque<1>> {
         (0..1000)
             .map(|i| {

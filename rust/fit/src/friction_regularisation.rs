@@ -1,4 +1,4 @@
-//! Friction that is rounded around standstill: the width over which its sign changes, fitted as a nuisance.
+//! Friction regularisation: the width over which the sign of friction changes around standstill, fitted as a nuisance.
 //!
 //! Dry friction jumps; the friction of many simulators, and of joints that creep, follows `tanh(dq / width)`. The width is no cause of a gap that
 //! has a name, but a model with another one misses every reversal, and what it misses there hides small causes.
@@ -12,10 +12,10 @@ use crate::solve::{Effort, Fit, FitProblem};
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
 
-/// Smoother friction is fitted only if it does not raise the cost by more than this factor as it stands.
+/// A wider regularisation is fitted only if it does not raise the cost by more than this factor before the fit.
 const WORTH_SMOOTHING: f64 = 2.0;
 
-/// Widths that compete with the candidates of every stage, relative to the slowest joint's RMS speed.
+/// Widths that compete with the candidates of every search node, relative to the slowest joint's RMS speed.
 const SMOOTHING: [f64; 2] = [0.03, 0.1];
 
 /// Where nothing is accepted, widths that are fitted first, relative to the slowest joint's RMS speed.
@@ -28,7 +28,7 @@ const REACH: [f64; 2] = [4.0, 16.0];
 /// Evaluations of the search, each a fit of the parameters.
 const EVALUATIONS: u64 = 9;
 
-/// The cost of the data and of trust, parameters fitted, by the width.
+/// Data cost plus prior cost, parameters fitted, as a function of the width.
 struct ByWidth<'a, A, const N: usize, const P: usize> {
     problem: &'a FitProblem<'a, A, N, P>,
     model: &'a Hypothesis<P>,
@@ -46,7 +46,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> ByWidth<'_, A, N, P> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The model with smoother friction, or with exact friction if it is smoothed now, where that is not plainly worse.
+    /// The model with wider friction regularisation, or with exact friction if it is regularised now, where that is not plainly worse.
     pub fn regularisation_guesses(
         &self,
         model: &Hypothesis<P>,
@@ -67,7 +67,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.scales.speed.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// The current model with friction rounded over the best width, if that explains most of the gap.
+    /// The current model with friction regularised over the best width, if that explains most of the gap.
     pub fn regularisation(&self, node: &SearchNode<N, P>) -> Option<Fit<P>> {
         if node.excess() < ABOVE_FLOOR {
             return None;

@@ -1,4 +1,4 @@
-//! How far predictions miss on the holdout: windows from measured starts, and whole logs from their first sample.
+//! How far predictions miss on the holdout: windows from measured initial states, and whole logs from their first sample.
 
 use crate::arm::ArmDescription;
 use crate::assemble::Compared;
@@ -26,15 +26,15 @@ const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
 /// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
 const FREE_RUN_LIMIT: f64 = 100.0;
 
-/// A window's variance from its measured start counts up to this many times the typical one.
+/// A window's variance from its measured initial state counts up to this many times the typical one.
 const WORST_START: f64 = 10.0;
 
-/// Predictions on the holdout from measured starts, and their squared errors.
+/// Predictions on the holdout from measured initial states, and their squared errors.
 pub struct Errors<const N: usize> {
     before: Vec<f64>,
     refit: Vec<f64>,
     after: Vec<f64>,
-    /// Mean variance that measured starts and the measurement itself put into the errors, per joint.
+    /// Mean variance that measured initial states and the measurement itself put into the errors, per joint.
     floor: [f64; N],
 }
 
@@ -94,7 +94,7 @@ impl<const N: usize> Errors<N> {
     }
 }
 
-/// Variance of a perfect model's errors: noise of the sample itself, and of the measured start carried along the window, around what the
+/// Variance of a perfect model's errors: noise of the sample itself, and of the measured initial state carried along the window, around what the
 /// model predicts.
 fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
@@ -119,7 +119,7 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     };
     let windows: Vec<[f64; N]> = data.windows.iter().map(carried).collect();
     std::array::from_fn(|j| {
-        // A window whose start decides whether a joint sticks has no meaningful derivative; it counts as a bad one, not as infinite.
+        // A window whose initial state decides whether a joint sticks has no meaningful derivative; it counts as a bad one, not as infinite.
         let typical = crate::track::median(windows.iter().map(|w| w[j]).collect());
         let mean =
             windows.iter().map(|w| w[j].min(WORST_START * typical)).sum::<f64>() / windows.len() as f64;

@@ -33,7 +33,7 @@ pub struct Identification<'a> {
     pub dq: Option<&'a [f64]>,
 }
 
-/// The course of an estimate; one row per sample.
+/// History of an estimate; one row per sample.
 #[derive(Debug, Clone, Default)]
 pub struct EstimateHistory {
     /// Estimates.
@@ -55,7 +55,7 @@ pub struct EstimateHistory {
 impl WithArm for Identification<'_> {
     type Output = Option<EstimateHistory>;
 
-    /// The course, or none if `theta0` has the wrong length.
+    /// The history, or none if `theta0` has the wrong length.
     fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
         self,
         arm: A,

@@ -1,4 +1,4 @@
-//! Where full fits start: which candidates are worth one, and from which values.
+//! Initial guesses of full fits: which candidates are worth one, and from which values.
 
 use crate::acceptance::CONSEQUENCE;
 use crate::attribute::is_plausible;
@@ -12,10 +12,10 @@ use crate::solve::Fit;
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
 
-/// Candidates that get a full fit in each stage.
+/// Candidates that get a full fit at each search node.
 const FULL_FITS: usize = 18;
 
-/// A candidate that leaves less than this part of its trace unexplained by the arm's own parameters shows only against trusted values.
+/// A candidate that leaves less than this part of its trace unexplained by the arm's own parameters shows only against the prior.
 const ABSORBED: f64 = 0.03;
 
 /// A candidate that leaves less than this part is imitated as exactly as derivatives can tell.
@@ -24,12 +24,13 @@ const IMITATED: f64 = 1e-4;
 /// A candidate that to first order removes less than this part of the cost is not fitted.
 const TRACE: f64 = 0.01;
 
-/// The same where the gap is of no consequence and only an effect that explains most of it would be named.
+/// A candidate that to first order removes less than this part of a gap of no consequence is not fitted: only an effect that explains most
+/// of it would be named.
 const TRACE_IN_SMALL: f64 = 0.1;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Hypotheses that are worth a full fit: one candidate more than the fitted model, or smoother friction. Beside them the tests of
-    /// all candidates, the open ones first, where they were made.
+    /// Hypotheses that are worth a full fit: one candidate more than the fitted model, or friction regularisation. And the score
+    /// tests of all candidates, the open ones first, where they were made.
     pub(crate) fn initial_guesses(
         &self,
         fit: &Fit<P>,
@@ -56,7 +57,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         });
         let mut initial_guesses: Vec<Hypothesis<P>> = more.collect();
         if !is_plausible::<P>(fit.prior_cost) {
-            // What bears a part of the load, always, has spoilt the values that are fitted without it.
+            // A contact that always carries a part of the load has spoilt the values that are fitted without it.
             let trusted = Hypothesis { theta: self.prior.theta, ..fit.hypothesis.clone() };
             initial_guesses
                 .extend(self.contact_guesses(&all, &trusted).into_iter().map(|stop| trusted.with(stop)));
@@ -74,7 +75,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         known.chain(self.custom_effects.iter().copied()).filter(|c| !taken(c)).collect()
     }
 
-    /// Further starts of candidates that repeat with position, where the residual does.
+    /// Further initial guesses of candidates that are periodic in position, from the periodogram of the residual.
     fn ripple_guesses(
         &self,
         all: &[EffectInstance],
@@ -94,7 +95,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         open.iter().flat_map(initial_guesses).collect()
     }
 
-    /// Further starts of candidates that act beyond a position, where the torque that a model lacks does.
+    /// Further initial guesses of contacts, which act beyond a position, from the residual torque.
     fn contact_guesses(&self, all: &[EffectInstance], model: &Hypothesis<P>) -> Vec<EffectInstance> {
         let mut open: Vec<EffectInstance> = all.iter().filter(|c| c.is_contact()).copied().collect();
         open.sort_by_key(|c| c.joint);
@@ -113,8 +114,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         open.iter().flat_map(initial_guesses).collect()
     }
 
-    /// The model with the load that brings its parameters closest to their trusted values, the motion staying the same; none for effects
-    /// that are no loads.
+    /// The model with the payload that brings its parameters closest to their prior values, the motion staying the same; none for effects
+    /// that are no payloads.
     ///
     /// For a given distance the parameters' shift is linear in the mass, so one line of candidates over the distance suffices.
     fn payload_guess(&self, model: &Hypothesis<P>, effect: EffectInstance) -> Option<Hypothesis<P>> {
@@ -140,7 +141,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 
     /// The model with a candidate; where the arm's parameters can imitate it, they make room for it at once, and where they imitate it
-    /// to rounding, so that motion says nothing of its size, it gets the size that brings them closest to their trusted values.
+    /// to rounding, so that motion says nothing of its size, it gets the size that brings them closest to their prior values.
     fn compensated(&self, model: &Hypothesis<P>, found: &ScoreTest) -> Hypothesis<P> {
         if found.distinct >= ABSORBED {
             return model.with(found.effect);
@@ -152,7 +153,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         model.with_values(&room).with(effect)
     }
 
-    /// A candidate at the size that brings the arm's parameters closest to their trusted values, and that size.
+    /// A candidate at the size that brings the arm's parameters closest to their prior values, and that size.
     fn trusted(&self, model: &Hypothesis<P>, found: &ScoreTest) -> (EffectInstance, f64) {
         let parameter = &found.effect.law.spec().parameters[found.tested];
         let (mut along, mut off) = (0.0, 0.0);
@@ -168,14 +169,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// The best start of each of the best-scoring candidates, and of those that only trusted values can reveal.
+/// The best initial guess of each of the best-scoring candidates, and of those that only the prior can reveal.
 fn promising(screened: &[ScoreTest], least: f64) -> Vec<&ScoreTest> {
     let mut order: Vec<&ScoreTest> = screened.iter().filter(|s| s.gain > 0.0).collect();
     order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut chosen: Vec<&ScoreTest> = Vec::new();
     for scored in order {
         let wanted = (chosen.len() < FULL_FITS && scored.gain > least) || scored.distinct < ABSORBED;
-        // A test at a trial value says little of where to start, so two of them may; so may two peaks of a spectrum.
+        // A test at a trial value says little about the best initial guess, so two of them are taken; so are two peaks of a periodogram.
         let several = scored.effect.law.spec().trial == Trial::Whole || scored.effect.is_periodic();
         let initial_guesses = if several { 2 } else { 1 };
         if wanted && chosen.iter().filter(|c| c.effect.same_place(&scored.effect)).count() < initial_guesses {

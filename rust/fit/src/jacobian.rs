@@ -1,24 +1,24 @@
-//! How predictions change with the free values, at a point of a search.
+//! The Jacobian of the predictions by the free values, at a point of a fit.
 
 use crate::model::Hypothesis;
 use crate::solve::{FitProblem, scaled_inverse};
 use crate::weighting::Gram;
 use armgap_core::arm::Arm;
 
-/// A value of whose sensitivity the others leave less than this part needs theirs from where it stands itself.
+/// A column of which the others leave less than this part is collinear: then no columns are reused.
 const APART: f64 = 0.05;
 
-/// Sensitivities of the free values, the first of them perhaps on loan from a neighbour, and their inner products.
+/// Jacobian columns of the free values, the first of them possibly reused from a neighbour, and their inner products.
 pub(crate) struct Jacobian<'a> {
     reused_columns: &'a [Vec<f64>],
     computed: Vec<Vec<f64>>,
     pub(crate) gram: Gram,
-    /// Whether they are those of an earlier point.
+    /// Whether it is that of an earlier point.
     pub(crate) is_reused: bool,
 }
 
 impl<'a> Jacobian<'a> {
-    /// Of all values where they stand.
+    /// All columns at the current point.
     pub(crate) fn new<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         problem: &FitProblem<A, N, P>,
         at: &Linearisation<P>,
@@ -26,7 +26,7 @@ impl<'a> Jacobian<'a> {
         Self::with(problem, at, &[])
     }
 
-    /// With those of the first values on loan, if they can be told from the others by them.
+    /// With the columns `known` reused for the first values, unless the others are collinear with them.
     pub(crate) fn reusing<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         problem: &FitProblem<A, N, P>,
         at: &Linearisation<P>,
@@ -51,7 +51,7 @@ impl<'a> Jacobian<'a> {
         jacobian
     }
 
-    /// Whether the others leave enough of each of those that are not on loan.
+    /// Whether no computed column is collinear with the others.
     fn are_distinct(&self) -> bool {
         let count = self.reused_columns() + self.computed.len();
         let normal = self.gram.total.view((0, 0), (count, count)).into_owned();
@@ -61,17 +61,17 @@ impl<'a> Jacobian<'a> {
         })
     }
 
-    /// Whether all are those of the point they are used at.
+    /// Whether all columns belong to the current point.
     pub(crate) fn is_current(&self) -> bool {
         self.reused_columns() == 0 && !self.is_reused
     }
 
-    /// How many are on loan.
+    /// Number of reused columns.
     pub(crate) fn reused_columns(&self) -> usize {
         self.reused_columns.len()
     }
 
-    /// Goes on to serve at another point.
+    /// Reuses the columns at another point.
     pub(crate) fn reuse_at<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &mut self,
         problem: &FitProblem<A, N, P>,

@@ -1,7 +1,7 @@
-//! States that no encoder shows, at the start of every window: driven along the measured motion from the start of the log.
+//! Latent states, which no encoder measures, at the start of every window: simulated along the measured motion from the start of the log.
 //!
-//! What a joint remembers depends on its path, and a motor behind a shaft or play swings under the logged torque about the measured
-//! position of its link; neither needs a guess.
+//! The hysteresis state of a joint depends on its path, and a motor behind a shaft or backlash moves under the logged torque against the
+//! measured position of its link; neither needs an initial guess.
 
 use crate::track::Track;
 use armgap_core::arm::Arm;
@@ -10,7 +10,7 @@ use armgap_core::plant::Plant;
 use armgap_core::transmission::{LatentState, Transmission};
 use nalgebra::SVector;
 
-/// Measured motion of one sample.
+/// Measured state at one sample.
 #[derive(Debug, Clone, Copy)]
 pub struct MeasuredState<const N: usize> {
     /// Positions.
@@ -19,7 +19,7 @@ pub struct MeasuredState<const N: usize> {
     pub dq: SVector<f64, N>,
 }
 
-/// Steps per sample of a motor that swings at this rate times the sample period.
+/// Natural frequency of the motor times the step length, at most.
 const STEP: f64 = 1.0;
 
 /// Steps per sample at most.
@@ -28,7 +28,7 @@ const MAX_STEPS: usize = 8;
 /// A position or its rate beyond this [SI] is cut: the hypothesis is wrong, and its cost will say so.
 const LIMIT: f64 = 1e3;
 
-/// Hidden states of a plant at every sample of a track up to `last`, under these torques.
+/// Latent states of a plant at every sample of a track up to `last`, under these torques.
 pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     track: &Track<N>,
     plant: &Plant<f64, A, N, P>,
@@ -61,7 +61,7 @@ pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     all
 }
 
-/// The same with flanks that do not give.
+/// These latent states with rigid flanks: a rotor behind a flank is put onto it.
 fn rigid<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     state: &LatentState<f64, N>,
     plant: &Plant<f64, A, N, P>,
@@ -102,12 +102,12 @@ impl MotorMotion<'_> {
         [self.torque.at(s), q, dq]
     }
 
-    /// Acceleration of the motor beside this torque and link.
+    /// Acceleration of the motor under this torque, against this link.
     fn slope(&self, [torque, q, dq]: &[f64; 3], at: f64, rate: f64) -> f64 {
         (torque - self.transmission.transmitted(at - q, rate - dq)) / self.transmission.inertia
     }
 
-    /// What accelerates a motor on a shaft without play at the fraction `s` of the interval, if it stands still at zero.
+    /// Acceleration at the fraction `s` of the interval of a motor at rest at zero, on a shaft without backlash.
     fn push(&self, s: f64) -> f64 {
         let (q, dq) = self.link(s);
         (self.torque.at(s) + self.transmission.stiffness * q + self.transmission.damping * dq)
@@ -119,13 +119,14 @@ impl MotorMotion<'_> {
         if self.transmission.backlash > 0.0 {
             return self.steps((e, v), |s| self.drawn(s), |here, e, v| self.slope(here, e, v));
         }
-        // Without play everything is linear.
+        // Without backlash everything is linear.
         let Transmission { stiffness, damping, inertia, .. } = self.transmission;
         let (pull, brake) = (stiffness / inertia, damping / inertia);
         self.steps((e, v), |s| self.push(s), |push, e, v| push - pull * e - brake * v)
     }
 
-    /// The same by Runge-Kutta, given what drives the motor at a fraction of the interval and how that accelerates it.
+    /// Position and velocity of the motor at the end of the interval by Runge-Kutta, given its input at a fraction of the interval and the
+    /// acceleration under that input.
     #[inline(always)]
     fn steps<D>(
         &self,
@@ -172,7 +173,7 @@ mod tests {
             coupling_ratio: 0.0,
         };
         let (speed, segment) = (0.4, InputSegment::held(torque));
-        // Beside a link at constant speed: a motor that starts with it swings about the twist that carries the torque.
+        // Behind a link at constant speed: a motor that starts with it oscillates about the deflection that carries the torque.
         let (mut at, mut velocity) = (0.0, speed);
         for k in 0..50 {
             let t = f64::from(k) * h;

@@ -1,6 +1,6 @@
 //! armgap-fit: from logs and a nominal arm to a diagnosis.
 //!
-//! The way of the data: `track` (log) -> `window` (short rollouts) -> `weighting` (what a residual weighs) -> `solve` (output error)
+//! The way of the data: `track` (log) -> `window` (short rollouts) -> `weighting` (weights of residuals) -> `solve` (output error)
 //! -> `attribute` (which effect) and `locate` (where) -> `report` (the result as data).
 
 #![forbid(unsafe_code)]

@@ -1,7 +1,7 @@
-//! Where the gap lies: the torque that each joint lacks, over the regimes of its motion.
+//! Where the gap lies: residual torque of each joint over the regimes of its motion.
 //!
 //! The prediction of a window and the measurement run under the same torque, so their difference is smooth; its second derivative
-//! is the acceleration the model lacks, and `M(q)` times that the torque it lacks.
+//! is the residual acceleration, and `M(q)` times that the residual torque.
 
 use crate::model::Hypothesis;
 use crate::smooth::local_cubic;
@@ -12,7 +12,7 @@ use nalgebra::SVector;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Half width, in samples, of the cubic whose curvature is the missing acceleration.
+/// Half width, in samples, of the cubic whose curvature is the residual acceleration.
 const HALF_WIDTH: usize = 8;
 
 /// A joint is near a reversal if its velocity changes sign within this time, s.
@@ -24,7 +24,7 @@ const BINS: usize = 6;
 /// A regime stands out if its mean square residual is this many times the joint's.
 const STANDS_OUT: f64 = 1.6;
 
-/// One sample's state and lacking torque, per joint.
+/// One sample's state and residual torque, per joint.
 #[derive(Debug, Clone, Copy)]
 pub struct ResidualTorque<const N: usize> {
     /// Index of the log.
@@ -39,11 +39,11 @@ pub struct ResidualTorque<const N: usize> {
     pub tau: SVector<f64, N>,
     /// Whether each joint is near a reversal.
     pub reversal: [bool; N],
-    /// Lacking torques.
+    /// Residual torques.
     pub residual: SVector<f64, N>,
 }
 
-/// Lacking torque at every other sample of all windows under each of several hypotheses.
+/// Residual torque at every other sample of all windows under each of several hypotheses.
 pub fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize, const H: usize>(
     arm: &A,
     data: &Dataset<N>,
@@ -77,7 +77,7 @@ pub fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize, const
     std::array::from_fn(|h| windows.iter().flatten().map(|residuals| residuals[h]).collect())
 }
 
-/// The motion at sample `k` of a log, nothing lacking.
+/// Measured state at sample `k` of a log, with zero residual torque.
 fn measured_state<const N: usize>(track: &Track<N>, index: usize, k: usize) -> ResidualTorque<N> {
     ResidualTorque {
         track: index,
@@ -101,7 +101,7 @@ fn reverses(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> bool {
     (q(b) - q(k)) * (q(k) - q(a)) < 0.0
 }
 
-/// RMS lacking torque of one joint over bins of one variable.
+/// RMS residual torque of one joint over bins of one variable.
 #[derive(Debug, Clone, Serialize)]
 pub struct Regime {
     /// 1-based joint.
@@ -114,7 +114,7 @@ pub struct Regime {
     pub edges: Vec<f64>,
     /// Unit of the RMS figures.
     pub torque_unit: &'static str,
-    /// RMS lacking torque with the arm file as it is.
+    /// RMS residual torque with the arm file as it is.
     pub before: Vec<f64>,
     /// With parameters re-estimated.
     pub refit: Vec<f64>,
@@ -215,7 +215,7 @@ fn bin(edges: &[f64], value: f64) -> usize {
     edges[1..edges.len() - 1].partition_point(|edge| *edge <= value)
 }
 
-/// The three hypotheses' lacking torques, sample by sample.
+/// Residual torques of the three hypotheses, sample by sample.
 pub struct ResidualTorques<const N: usize> {
     /// Arm file as it is.
     pub before: Vec<ResidualTorque<N>>,

@@ -1,4 +1,4 @@
-//! A hypothesis about the arm: parameter values, friction smoothing, and effects placed on joints.
+//! A hypothesis about the arm: parameter values, width of the friction regularisation, and effects on joints.
 
 use crate::custom_effect;
 use armgap_core::arm::Arm;
@@ -35,7 +35,7 @@ impl EffectInstance {
         false
     }
 
-    /// The same effect on the same joint, whatever its values.
+    /// Whether `other` is the same effect on the same joint, whatever its values.
     pub fn same_place(&self, other: &Self) -> bool {
         self.law.spec().name == other.law.spec().name && self.joint == other.joint
     }
@@ -73,7 +73,7 @@ impl<const P: usize> Hypothesis<P> {
         Self { theta, smoothing: 0.0, effects: Vec::new() }
     }
 
-    /// The same with one more effect.
+    /// This hypothesis with one more effect.
     pub fn with(&self, effect: EffectInstance) -> Self {
         let mut more = self.clone();
         more.effects.push(effect);
@@ -86,7 +86,7 @@ impl<const P: usize> Hypothesis<P> {
         self.theta.iter().copied().chain(effects).collect()
     }
 
-    /// The same hypothesis with other values.
+    /// This hypothesis with other values of `theta` and of the effects' parameters.
     pub fn with_values(&self, values: &[f64]) -> Self {
         let mut other = self.clone();
         let mut rest = values.iter().copied();
@@ -111,7 +111,7 @@ impl<const P: usize> Hypothesis<P> {
     }
 
     /// Rewrites the held commands of a log into the torque that reaches the joints; `pushes` are added last, `tables` are those of the
-    /// user's own effects.
+    /// custom effects.
     pub fn command<const N: usize>(
         &self,
         t: &[f64],

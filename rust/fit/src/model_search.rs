@@ -1,4 +1,4 @@
-//! One cause after another: the search, and what is dropped again.
+//! The model search: one cause after another is added, and causes that have become idle are dropped.
 //!
 //! After every addition all causes are fitted together again, and one that has become idle is dropped.
 
@@ -11,7 +11,7 @@ use crate::solve::{Effort, Fit};
 use crate::together::Both;
 use armgap_core::arm::Arm;
 
-/// The whole course of an attribution.
+/// Result of a model search.
 pub struct Attribution<const N: usize, const P: usize> {
     /// Parameters re-estimated, no effects.
     pub refit: Fit<P>,
@@ -19,12 +19,12 @@ pub struct Attribution<const N: usize, const P: usize> {
     pub model: Fit<P>,
     /// Accepted causes, strongest first.
     pub causes: Vec<Cause>,
-    /// Every stage, the last one being the one that accepted nothing.
+    /// Every search node, the last one being the one at which nothing was accepted.
     pub nodes: Vec<SearchNode<N, P>>,
 }
 
 impl<const N: usize, const P: usize> Attribution<N, P> {
-    /// The effect that was taken up after a stage.
+    /// The effect that was added after a node.
     pub fn added(&self, node: usize) -> Option<&EffectInstance> {
         added(&self.nodes.iter().collect::<Vec<_>>(), node)
     }
@@ -40,7 +40,7 @@ impl<const N: usize, const P: usize> Attribution<N, P> {
     }
 }
 
-/// The effect that was taken up after one of these stages.
+/// The effect that was added after one of these nodes.
 pub(crate) fn added<'a, const N: usize, const P: usize>(
     nodes: &[&'a SearchNode<N, P>],
     node: usize,
@@ -50,23 +50,23 @@ pub(crate) fn added<'a, const N: usize, const P: usize>(
     effects(node + 1)?.iter().find(|e| !before.iter().any(|known| known.same_place(e)))
 }
 
-/// Where a search stands.
+/// State of a model search.
 pub(crate) struct ModelSearch<const N: usize, const P: usize> {
     pub causes: Vec<Cause>,
-    /// The stages before this one.
+    /// The nodes before this one.
     pub nodes: Vec<SearchNode<N, P>>,
     pub node: SearchNode<N, P>,
     pub regularised: bool,
-    /// Whether friction's rounding has been fitted.
+    /// Whether the friction regularisation has been fitted.
     pub regularisation_fitted: bool,
     /// Improvements of this size count, relative to the motion.
     pub threshold: f64,
-    /// Whether it has gone back to a rival before.
+    /// Whether a cause has been swapped for a rival before.
     pub turned: bool,
 }
 
 impl<const N: usize, const P: usize> ModelSearch<N, P> {
-    /// Takes up two causes; returns the fit with both.
+    /// Adds two causes; returns the fit with both.
     fn take_up(&mut self, both: Both<N, P>) -> Fit<P> {
         let fit = both.node.candidates[both.choice].fit.clone();
         self.causes.extend(both.causes);
@@ -115,7 +115,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Attribution { refit, model, causes, nodes }
     }
 
-    /// Takes up one cause after another, or two at once, until nothing more deserves it.
+    /// Adds one cause after another, or two at once, until no candidate is accepted.
     pub(crate) fn pursue(
         &self,
         search: &mut ModelSearch<N, P>,
@@ -157,8 +157,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// The same from the first stage by another pair of causes, where a search has ended beside a gap: the first cause may have stood in
-    /// for both. Only a pair that explains nearly all of the gap counts.
+    /// Restarts a search that has ended with a gap from its first node with another pair of causes: the first cause may have stood in for
+    /// both. Only a pair that explains nearly all of the gap counts.
     fn restarted(
         &self,
         mut search: ModelSearch<N, P>,
@@ -179,7 +179,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         search
     }
 
-    /// Goes on to the stage around `next`.
+    /// Goes on to the node around `next`.
     pub(crate) fn advance(&self, search: &mut ModelSearch<N, P>, next: &Fit<P>, min_relevance: f64) {
         let settled = self.settle(&next.hypothesis, search.node.weights.training.scale);
         let node = self.node_around(settled.clone(), min_relevance);
@@ -188,7 +188,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 
     /// Looks into a gap that is too small to matter by itself, and yet stands above the floor by the factor `clear`; returns which
-    /// improvements count. `settled` is what the stage was made around.
+    /// improvements count. `settled` is what the node was made around.
     fn look_closer(
         &self,
         node: &mut SearchNode<N, P>,

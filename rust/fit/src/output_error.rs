@@ -1,6 +1,6 @@
 //! All parameters of an arm from one log by output error: Gauss-Newton over short windows, with exact dry friction.
 //!
-//! Every window starts from its measured state and runs under the logged torque; the sum of squared differences of positions is
+//! Every window starts from its measured initial state and runs under the logged torque; the sum of squared differences of positions is
 //! minimised over `theta` by Levenberg's and Marquardt's method with forward differences. All windows of all displaced parameters
 //! are independent runs, which vector units and processors share (see [`armgap_core::rollout`]).
 
@@ -75,7 +75,7 @@ impl WithArm for OutputError<'_> {
     }
 }
 
-/// Windows of a log with their measured positions and starts.
+/// Windows of a log with their measured positions and the offsets of their initial states.
 struct OutputErrorProblem<'a, A, const N: usize> {
     arm: &'a A,
     data: &'a Dataset<N>,
@@ -83,7 +83,7 @@ struct OutputErrorProblem<'a, A, const N: usize> {
     offsets: Vec<InitialStateOffset<N>>,
 }
 
-/// Parameters with the residual that they leave.
+/// Parameters with their residual and cost.
 struct TrialPoint<const P: usize> {
     theta: [f64; P],
     residual: Vec<f64>,
@@ -179,7 +179,7 @@ fn normal_equations(columns: &[Vec<f64>], residual: &[f64]) -> (DMatrix<f64>, DV
     (normal, DVector::from_vec(cross(&[residual], &columns)))
 }
 
-/// One damped step; friction stays where it is possible.
+/// One damped step; friction coefficients stay non-negative.
 fn moved<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     theta: &[f64; P],
     normal: &DMatrix<f64>,

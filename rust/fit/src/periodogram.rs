@@ -1,8 +1,8 @@
-//! Starts from the data: with how many cycles per turn of a joint the residual repeats.
+//! Periodogram of the residual over position: initial guesses of ripple, with its cycles per turn of a joint.
 //!
 //! Over a short window a torque `sin(n q)` bends the prediction by nearly its double integral over the joint's own inertia. For
 //! every `n` of a grid its two phases are fitted to the residuals of all windows, each freed from an offset and a drift as an error
-//! of its start would leave: least-squares spectral analysis (Lomb 1976) over position in place of time.
+//! of its initial state would leave: least-squares spectral analysis (Lomb 1976) over position in place of time.
 
 use crate::model::Hypothesis;
 use crate::solve::FitProblem;
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 /// Step of the grid, in cycles over the joint's travel: half the width of a peak.
 const RESOLUTION: f64 = 0.5;
 
-/// Fewest cycles over the travel; slower ripple is much like gravity and has fixed starts.
+/// Fewest cycles over the travel; slower ripple is much like gravity and has fixed initial guesses.
 const FEWEST: f64 = 2.0;
 
 /// Phase at most that a ripple turns by per sample at RMS speed, rad.
@@ -24,7 +24,7 @@ const FASTEST: f64 = 2.5;
 /// Most points of the grid.
 const MOST_POINTS: usize = 600;
 
-/// Points of the grid taken together.
+/// Points of the grid per batch.
 const BATCH: usize = 8;
 
 /// Peaks reported for a joint.
@@ -43,7 +43,7 @@ pub struct SpectralPeak {
     pub gain: f64,
 }
 
-/// The strongest repeats in the residual of a hypothesis that act on joint `j`, best first.
+/// The highest peaks of the periodogram of a hypothesis's residual on joint `j`, best first.
 pub fn periodogram_peaks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     base: &Hypothesis<P>,
@@ -68,7 +68,7 @@ pub fn periodogram_peaks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     peaks(&groups.as_flattened()[..points])
 }
 
-/// One window's motion of one joint, with what its residual asks for.
+/// One window's motion of one joint, with its residual.
 struct Path {
     /// Positions halfway between samples, the first before the first row.
     q: Vec<f64>,
@@ -80,7 +80,7 @@ struct Path {
     residual: Vec<f64>,
     /// Orthonormal drift; the offset is constant.
     drift: Vec<f64>,
-    /// Weight of the window.
+    /// Robust weight of the window.
     weight: f64,
 }
 
@@ -207,7 +207,7 @@ impl Spectrum<'_> {
         (squares, right)
     }
 
-    /// Sines and cosines of all frequencies at `q`, each turned on from the one before.
+    /// Sines and cosines of all frequencies at `q`, each rotated from the one before.
     #[inline(always)]
     fn phases<C: Cpu>(&self, q: f64) -> [Each; 2] {
         let (mut s, mut c) = sin_cos(self.first * q);

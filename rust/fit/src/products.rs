@@ -2,10 +2,10 @@
 
 use armgap_core::cpu::{Cpu, Kernel, Level};
 
-/// Entries taken together.
+/// Entries per vector.
 const LANES: usize = 8;
 
-/// Columns taken together: their sums need not wait for each other.
+/// Columns per pass: their sums need not wait for each other.
 const COLUMNS_AT_ONCE: usize = 4;
 
 /// `x . y` for several `y` of the length of `x`.

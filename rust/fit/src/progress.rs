@@ -1,9 +1,9 @@
-//! Who looks on while long work runs: told how far it is, asked whether to go on.
+//! Progress reports and cancellation of long computations.
 //!
 //! Work is counted in units: a fit, a candidate's test. What is still to come is not known, for every cause that is found is followed by
 //! a search for the next; so a part of the work takes a share of what is left, and the fraction done never falls.
 //!
-//! A diagnosis that is told to stop unwinds from wherever it is (`resume_unwind`: no panic hook, no message; rayon hands it on) to
+//! A cancelled diagnosis unwinds from wherever it is (`resume_unwind`: no panic hook, no message; rayon hands it on) to
 //! `guarded`, which makes an error of it. Nothing outside this file sees the unwinding.
 
 use std::any::Any;
@@ -11,7 +11,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 
-/// What a diagnosis is busy with.
+/// Phase of a computation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
     /// Fitting the model as far as it is known.
@@ -22,9 +22,9 @@ pub enum Phase {
     Candidates,
     /// Fitting the best of them to the end.
     Finalists,
-    /// Looking for pushes.
+    /// Looking for external disturbances.
     Pushes,
-    /// Composing the result.
+    /// Assembling the result.
     Result,
     /// Simulating once more with half the steps.
     Simulate,
@@ -44,7 +44,7 @@ impl Phase {
         }
     }
 
-    /// Share of what is left that this work takes, measured on logs with one cause: their search has two rounds.
+    /// Share of what is left that this phase takes, measured on logs with one cause: their search has two rounds.
     const fn share(self) -> f64 {
         match self {
             Self::Refit => 0.09,
@@ -59,36 +59,36 @@ impl Phase {
     }
 }
 
-/// How far a diagnosis is.
+/// A progress report.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
-    /// What it is busy with.
+    /// Current phase.
     pub phase: Phase,
     /// Estimated fraction of the work that is done, from 0 to 1; never falls.
     pub fraction: f64,
 }
 
-/// What an observer wants.
+/// Answer of an observer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Control {
-    /// Go on.
+    /// Continue.
     Go,
-    /// End with an error, soon.
+    /// Cancel with an error, soon.
     ContactGuess,
 }
 
 /// Called often and from any thread; must be quick.
 pub type Observer = Arc<dyn Fn(Progress) -> Control + Send + Sync>;
 
-/// The work counted, and who looks on.
+/// Counts units of work and reports progress to the observer.
 pub struct ProgressReporter {
     observer: Observer,
-    /// Index of the work in `ORDER`.
+    /// Index of the phase in `ORDER`.
     phase: AtomicUsize,
-    /// Units planned and done of the current work.
+    /// Units planned and done in the current phase.
     planned: AtomicUsize,
     done: AtomicUsize,
-    /// Fractions where the current work begins and ends, and the largest told, as bits: positive numbers sort alike.
+    /// Fractions where the current phase begins and ends, and the largest reported, as bits: positive numbers sort alike.
     from: AtomicU64,
     to: AtomicU64,
     reported: AtomicU64,
@@ -123,13 +123,13 @@ impl ProgressReporter {
         }
     }
 
-    /// A count of work that is not told: the observer sees how far this one was, and may stop it.
+    /// A reporter whose units do not count: the observer sees the progress of this one as it was, and may cancel.
     pub fn aside(&self) -> Self {
         let (observer, now) = (Arc::clone(&self.observer), self.current());
         Self::new(Arc::new(move |_| observer(now)))
     }
 
-    /// Begins work of about so many units; what came before is over.
+    /// Begins a phase of about so many units; the phase before is over.
     pub fn begin(&self, phase: Phase, units: usize) {
         let from = f64::from_bits(self.to.load(Relaxed));
         self.phase.store(ORDER.iter().position(|w| *w == phase).unwrap_or(0), Relaxed);
@@ -146,7 +146,7 @@ impl ProgressReporter {
         self.check();
     }
 
-    /// Tells the observer; does not return if it wants to stop.
+    /// Reports to the observer; does not return if it cancels.
     pub fn check(&self) {
         if (self.observer)(self.current()) == Control::ContactGuess {
             resume_unwind(Box::new(Stopped));
@@ -163,7 +163,7 @@ impl ProgressReporter {
     }
 }
 
-/// Runs `phase`; none if it was stopped.
+/// Runs `task`; none if it was cancelled.
 pub fn guarded<T>(task: impl FnOnce() -> T) -> Option<T> {
     match catch_unwind(AssertUnwindSafe(task)) {
         Ok(result) => Some(result),

@@ -4,7 +4,7 @@
 //! ten times as large, what tells them apart is noise. And what a law with more values explained beyond one with fewer may have been the
 //! doing of a cause that was found later. So before a further cause is looked for, each rival takes the place of its cause beside all
 //! others; if it does better, or as well with fewer values, the search goes on from there again. The better end counts, if it is reached
-//! with no more causes: beside a gap, more are taken up by what they are not about.
+//! with no more causes: beside a gap, more are added by what they are not about.
 
 use crate::acceptance::{ABOVE_FLOOR, Ground, MATTERS, is_possible};
 use crate::attribute::{Candidate, SearchNode};
@@ -16,7 +16,7 @@ use crate::model_search::{ModelSearch, added};
 use crate::solve::Effort;
 use armgap_core::arm::Arm;
 
-/// A rival explains at least this part of what its cause explained when that was taken up.
+/// A rival explains at least this part of what its cause explained when that was added.
 const RIVALS: f64 = 0.5;
 
 /// Rivals that are tried for each cause.
@@ -32,13 +32,13 @@ const AS_WELL: f64 = 1.05;
 /// always fits a little better.
 const RICHER: f64 = 0.9;
 
-/// A rival that does better beside the other causes than the cause it could have been taken up for.
+/// A rival that does better beside the other causes than the cause it could have been added for.
 struct Rival<const P: usize> {
-    /// The stage in which it was passed over.
+    /// The node in which it was passed over.
     node: usize,
     /// The rival as it was fitted there.
     fitted: Candidate<P>,
-    /// The effect that was taken up.
+    /// The effect that was added.
     instead_of: EffectInstance,
     /// How sure it is that this one is better; none where it has fewer values and does as well.
     better: Option<f64>,
@@ -47,7 +47,7 @@ struct Rival<const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The course that takes up a better rival of one of the causes in that one's place, if it ends better. Those with more values are tried
+    /// The search that adds a better rival of one of the causes in that one's place, if it ends better. Those with more values are tried
     /// once a search has `ended`: before, what they explain beyond may still be the doing of another cause. The others have been tried by then.
     pub(crate) fn reconsidered(
         &self,
@@ -73,7 +73,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (0..search.nodes.len()).find_map(|index| self.better_in(&all, index, ended, seed))
     }
 
-    /// The same among those that were passed over in one stage.
+    /// The first rival that does better than its cause beside the others, among those that were not chosen at one node.
     fn better_in(&self, all: &[&SearchNode<N, P>], index: usize, ended: bool, seed: u64) -> Option<Rival<P>> {
         let (node, last, adopted) = (all[index], *all.last()?, added(all, index)?);
         let model = &last.settled.hypothesis;
@@ -124,7 +124,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         as_good.min_by_key(|(swapped, _)| size(swapped)).map(|(_, rival)| rival)
     }
 
-    /// The course up to the stage in which a rival was passed over, and the stage after it instead.
+    /// The search up to the node in which a rival was passed over, and the node after it instead.
     fn back_to(
         &self,
         search: &ModelSearch<N, P>,
@@ -160,7 +160,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         other
     }
 
-    /// Causes that a course ends with once the idle are dropped.
+    /// Causes that a search ends with once the idle are dropped.
     fn needed(&self, search: &ModelSearch<N, P>) -> usize {
         let (mut model, mut causes) = (search.node.settled.clone(), search.causes.clone());
         self.prune(&mut model, &mut causes, &search.node);
@@ -168,7 +168,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Whether predictions of one contender miss by hardly more than those of another.
+/// Whether predictions of one candidate miss by hardly more than those of another.
 fn as_well<const P: usize>(one: &Candidate<P>, other: &Candidate<P>) -> bool {
     one.error < AS_WELL.powi(2) * other.error
 }

@@ -1,4 +1,4 @@
-//! The torque that a log lacks under a model, sample by sample: what the measured motion needs beyond what was given.
+//! Residual torque of a log under a model by inverse dynamics: what the measured motion needs beyond the given torque.
 
 use crate::latent_states::latent_states;
 use crate::model::{EffectInstance, Hypothesis};
@@ -8,20 +8,20 @@ use armgap_core::arm::Arm;
 use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
 
-/// One sample.
+/// Residual torque at one sample.
 pub struct InverseDynamicsResidual<const N: usize> {
     /// Its time, s.
     pub t: f64,
     /// Position, velocity and acceleration.
     pub motion: [SVector<f64, N>; 3],
-    /// Torque given, between the intervals before and after.
+    /// Given torque, mean of the intervals before and after.
     pub tau: SVector<f64, N>,
-    /// Torque needed beyond it.
+    /// Residual torque.
     pub residual: SVector<f64, N>,
 }
 
-/// Every sample of a log but the `half` at either end, with derivatives from local cubics of that half width, friction rounded below the
-/// speed `slow`, and `pushes` given; none if the model cannot be simulated.
+/// Every sample of a log but the `half` at either end, with derivatives from local cubics of that half width, friction regularised below
+/// the speed `slow`, and the disturbances `pushes` given; none if the model cannot be simulated.
 pub fn inverse_dynamics_residuals<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     track: &Track<N>,

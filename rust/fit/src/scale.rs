@@ -33,7 +33,7 @@ const LARGEST: f64 = 50.0;
 /// Times are measured in sample periods; this many of them are possible.
 const LONGEST_TIME: f64 = 1000.0;
 
-/// A stop is soft if the joint's torque moves it by a share of the travel, hard if by this part of it.
+/// A joint limit is soft if the joint's torque moves it by a share of the travel, hard if by this part of it.
 const HARDEST: f64 = 1e4;
 
 /// Laws that change with speed do so below this many times the RMS speed, or they are other laws.
@@ -104,7 +104,7 @@ impl<const N: usize> Scales<N> {
         0.5 * (from + to)
     }
 
-    /// Start value of a parameter of joint `j`, given in units of its size; none where the joint never gets there.
+    /// Initial guess of a parameter of joint `j`, given in units of its size; none where the joint never gets there.
     pub fn initial_guess(&self, quantity: Quantity, j: usize, value: f64) -> Option<f64> {
         match quantity {
             Quantity::Ratio => Some(value),

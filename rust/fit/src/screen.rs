@@ -1,6 +1,6 @@
 //! Score tests: how much each candidate would reduce the cost, to first order, from one shared Jacobian.
 //!
-//! With `H` the inner products of the sensitivities of the free values (trust in them included) and `s` their products with the
+//! With `H` the inner products of the sensitivities of the free values (their prior precision included) and `s` their products with the
 //! residual, a further parameter with sensitivity `c` reduces the cost by `(s_c - H_c H^-1 s)^2 / (H_cc - H_c H^-1 H_c')` (Rao 1948).
 
 use crate::model::{EffectInstance, Hypothesis};
@@ -11,10 +11,10 @@ use armgap_core::effect::{Scope, Trial, catalogue};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Size of the trial displacement of a candidate's first parameter, relative to its start value.
+/// Size of the trial displacement of a candidate's first parameter, relative to its initial guess.
 const TRIAL: f64 = 1e-3;
 
-/// A candidate at one start value, tested to first order.
+/// Score test of a candidate at one initial guess.
 #[derive(Debug, Clone)]
 pub struct ScoreTest {
     /// The effect, its first parameter at the value the test suggests.
@@ -25,7 +25,7 @@ pub struct ScoreTest {
     pub estimate: f64,
     /// Its standard deviation, from the windows' scatter.
     pub sigma: f64,
-    /// Standard deviation if the residual were white with the metric's scale: what the log could tell at best.
+    /// Standard deviation if the residual were white with the weighting's scale: what the log determines at best.
     pub information_sigma: f64,
     /// Changes of the model's own values that make room for the candidate, per unit of its size, to first order.
     pub imitation: Vec<f64>,
@@ -37,7 +37,7 @@ pub struct ScoreTest {
     pub distinct: f64,
 }
 
-/// Every effect on every joint it can sit on, at each of its start values.
+/// Every effect on every joint it can act on, at each of its initial guesses.
 pub fn effect_instances<const N: usize>(scales: &Scales<N>) -> Vec<EffectInstance> {
     let mut all = Vec::new();
     for law in catalogue::<f64>().iter().filter(|law| law.spec().least_joints <= N) {
@@ -140,7 +140,7 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     (residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect(), direct)
 }
 
-/// Tempered cost of a residual.
+/// Student-t cost of a residual, summed over the windows.
 fn student_t_total<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     residual: &[f64],

@@ -12,7 +12,7 @@ use nalgebra::SVector;
 /// Sub-steps per sample beyond which a tolerance is given up.
 const MAX_SUBSTEPS: usize = 256;
 
-/// Samples between two looks at who looks on.
+/// Samples between two progress/cancellation checks.
 const LOOK: usize = 4096;
 
 /// A simulation to be run.
@@ -32,7 +32,7 @@ pub struct Simulation<'a> {
     pub tolerance: f64,
     /// Width of the smoothed sign, rad/s; zero for exact dry friction.
     pub smoothing: f64,
-    /// Who looks on.
+    /// Progress report and cancellation.
     pub progress: &'a ProgressReporter,
 }
 
@@ -140,7 +140,7 @@ impl Simulation<'_> {
     }
 }
 
-/// Inertia matrices of an arm with effects at the poses `q`, row by row.
+/// Inertia matrices of an arm with effects at the positions `q`, row by row.
 #[derive(Debug, Clone)]
 pub struct InertiaMatrices<'a> {
     /// Positions.

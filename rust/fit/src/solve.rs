@@ -1,7 +1,7 @@
 //! Gauss-Newton with Levenberg's damping over the arm's parameters and the effects' together (output error).
 //!
-//! Minimises `cost = |residual|^2 (metric) + |(theta - nominal) / sigma|^2`, where the second term is the arm file's own trust in its
-//! values, over the free values within their bounds.
+//! Minimises `cost = |residual|^2 (weighted) + |(theta - nominal) / sigma|^2`, where the second term is the prior, from the arm
+//! file's values and sigmas, over the free values within their bounds.
 
 use crate::covariance::ParameterCovariance;
 use crate::jacobian::{Jacobian, Linearisation};
@@ -18,13 +18,13 @@ use rayon::prelude::*;
 /// Relative displacement for sensitivities; events are located to 1e-12, so a forward difference is good to 1e-6.
 const RELATIVE_STEP: f64 = 1e-6;
 
-/// Where the cost falls as foreseen to within this part of what ends a search, the sensitivities still hold where the step has led.
+/// Where the cost falls as predicted to within this part of what ends a search, the Jacobian is reused at the new point.
 const FORESEEN: f64 = 0.5;
 
-/// Sensitivities that still hold end a search if they foresee a fall of less than this part of what ends it.
+/// A reused Jacobian ends a search if it predicts a decrease of less than this part of what ends it.
 const LEAST: f64 = 0.1;
 
-/// Sensitivities taken over from a neighbour serve on where the cost falls as foreseen to within this part of the fall.
+/// Columns reused from a neighbour are reused again where the cost falls as predicted to within this part of the decrease.
 const SERVES: f64 = 0.25;
 
 /// How far a search is taken.
@@ -34,7 +34,7 @@ pub struct Effort {
     pub iterations: usize,
     /// A decrease of the cost by less than this part of it ends the search.
     pub enough: f64,
-    /// Whether the sensitivities of an earlier point may end it.
+    /// Whether the Jacobian of an earlier point may be reused and end the search.
     pub reuse_jacobian: bool,
 }
 
@@ -45,19 +45,19 @@ impl Effort {
     pub const FULL: Self = Self { iterations: 15, enough: 1e-4, reuse_jacobian: false };
 }
 
-/// Trusted values of the arm's parameters.
+/// Prior of the arm's parameters.
 #[derive(Debug, Clone, Copy)]
 pub struct Prior<const P: usize> {
     /// Values of the arm file.
     pub theta: [f64; P],
-    /// One-sigma trust in them.
+    /// Their standard deviations.
     pub sigma: [f64; P],
     /// How many of the first parameters are inertial; the rest is friction and may not be negative.
     pub inertial: usize,
 }
 
 impl<const P: usize> Prior<P> {
-    /// Squared distance from the trusted values in units of sigma.
+    /// Prior cost: squared distance from the arm file's values in units of sigma.
     pub fn cost(&self, theta: &[f64; P]) -> f64 {
         (0..P).map(|i| ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2)).sum()
     }
@@ -73,11 +73,11 @@ pub struct FitProblem<'a, A, const N: usize, const P: usize> {
     pub measured: &'a [f64],
     /// Weights.
     pub weighting: &'a Weighting<N>,
-    /// Trusted values.
+    /// Prior of the arm's parameters.
     pub prior: &'a Prior<P>,
     /// Typical sizes of the effects' parameters.
     pub scales: &'a Scales<N>,
-    /// Who looks on.
+    /// Progress report and cancellation.
     pub progress: &'a ProgressReporter,
 }
 
@@ -88,13 +88,13 @@ pub struct Fit<const P: usize> {
     pub hypothesis: Hypothesis<P>,
     /// Cost of the data.
     pub data_cost: f64,
-    /// Cost of the distance from trusted values.
+    /// Prior cost.
     pub prior_cost: f64,
-    /// How far the free values may be off.
+    /// Covariance of the free values.
     pub covariance: ParameterCovariance,
     /// Cost of every window as it is.
     pub costs: Vec<f64>,
-    /// Whether it was taken to its end with sensitivities of its own.
+    /// Whether the last Jacobian was its own, without reused columns.
     pub own_jacobian: bool,
 }
 
@@ -113,7 +113,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         self.weighting.residual(self.measured, &predicted)
     }
 
-    /// Tempered cost of every window.
+    /// Student-t cost of every window.
     pub fn window_costs(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
         self.raw_costs(hypothesis).into_iter().map(|cost| self.weighting.student_t_cost(cost)).collect()
     }
@@ -143,7 +143,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
             .collect()
     }
 
-    /// Whitened sensitivities of the prediction to all free values.
+    /// Whitened Jacobian of the prediction by all free values.
     pub fn jacobian(&self, hypothesis: &Hypothesis<P>) -> Vec<Vec<f64>> {
         let all: Vec<usize> = (0..hypothesis.values().len()).collect();
         self.sensitivities(hypothesis, &self.residual(hypothesis), &all)
@@ -192,7 +192,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         self.solve_reusing(initial_guess, effort, &[])
     }
 
-    /// The same beside a neighbour, whose sensitivities to the first values serve as long as the cost falls as they foresee.
+    /// Minimises the cost from `initial_guess`, reusing a neighbour's Jacobian columns `known` for the first values as long as the cost falls as
+    /// they predict.
     pub fn solve_reusing(&self, initial_guess: &Hypothesis<P>, effort: Effort, known: &[Vec<f64>]) -> Fit<P> {
         let (lower, upper) = self.bounds(initial_guess);
         let mut at = Linearisation::new(self, initial_guess.clone());
@@ -265,7 +266,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         (normal, gradient)
     }
 
-    /// How far the values may be off.
+    /// Covariance of the free values.
     fn covariance(&self, gram: &Gram, at: &Linearisation<P>) -> ParameterCovariance {
         let (lower, upper) = self.bounds(&at.hypothesis);
         let prior_precision: Vec<f64> =

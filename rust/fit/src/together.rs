@@ -1,7 +1,7 @@
 //! Two causes at once: either leaves so much of the gap to the other that neither is accepted alone.
 //!
 //! A cause is judged by the part of the gap it removes. Of two of the same size each removes a half of it at most, and if the windows
-//! weigh by the worse of the two, much less. So before a search ends beside an open gap, the best contenders are each taken on trust:
+//! weigh by the worse of the two, much less. So before a search ends beside an open gap, the best candidates are each taken on trust:
 //! if another then closes nearly all of the gap, and neither can be spared, both are causes.
 
 use crate::acceptance::{CERTAIN, Ground, best, brings_back, choose, is_possible, moves};
@@ -15,18 +15,18 @@ use armgap_core::arm::Arm;
 /// Part of the gap above the floor that two effects must explain to be accepted together.
 const NEARLY_ALL: f64 = 0.85;
 
-/// Contenders that are taken on trust.
+/// Candidates that are taken on trust.
 const TRIED: usize = 3;
 
-/// Mean advantage, in standard errors, below which a contender is not worth that, unless it brings implausible parameters back to
-/// their trusted values.
+/// Mean advantage, in standard errors, below which a candidate is not worth that, unless it brings implausible parameters back to
+/// their prior values.
 const HOPEFUL: f64 = 1.5;
 
-/// Two causes and the stage in which the second was found.
+/// Two causes and the node in which the second was found.
 pub struct Both<const N: usize, const P: usize> {
     /// Both, in the order in which they were found.
     pub causes: [Cause; 2],
-    /// The stage beside the first cause.
+    /// The node beside the first cause.
     pub node: SearchNode<N, P>,
     /// The second cause in it.
     pub choice: usize,

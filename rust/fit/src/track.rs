@@ -28,15 +28,15 @@ pub struct Track<const N: usize> {
     pub noise: [f64; N],
     /// Smallest step of the position measurement, per joint; zero where none is seen.
     pub step: [f64; N],
-    /// Pushes from outside that are known.
+    /// Known external disturbances.
     pub pushes: Vec<EffectInstance>,
-    /// Torque per unit of size of each of the user's own effects, sample by sample.
+    /// Torque per unit of size of each custom effect, sample by sample.
     pub tables: Vec<Vec<f64>>,
     /// Smoothed motion, once it is asked for.
     path: OnceLock<Vec<MeasuredState<N>>>,
 }
 
-/// A measured start: position and velocity of each joint with their covariance.
+/// A measured initial state: position and velocity of each joint with their covariance.
 #[derive(Debug, Clone, Copy)]
 pub struct InitialState<const N: usize> {
     /// Positions.
@@ -72,7 +72,7 @@ impl<const N: usize> Track<N> {
         track
     }
 
-    /// The same log with the torques of the user's own effects.
+    /// Adds the torques of the custom effects to the log.
     pub fn with_tables(mut self, tables: Vec<Vec<f64>>) -> Self {
         self.tables = tables;
         self

@@ -1,13 +1,13 @@
-//! What a residual weighs once each window's start has been fitted to it.
+//! Weighting of residuals, with each window's initial state projected out.
 //!
-//! The start of a window is measured, with noise. Its error is a nuisance with a prior; to first order it is projected out: with
-//! `X` the sensitivity of the window's prediction to its start and `L L'` the precision of the measured start,
+//! The initial state of a window is measured, with noise. Its error is a nuisance with a prior; to first order it is projected out: with
+//! `X` the sensitivity of the window's prediction to its initial state and `L L'` the precision of the measured initial state,
 //!
 //! ```text
 //! cost(r) = min over d of |W^(1/2) (r - X d)|^2 + |L' (c + d)|^2 = |a|^2 - |Q' a|^2,     a = [W^(1/2) r; -L' c],
 //! ```
 //!
-//! where `Q` is an orthonormal basis of `[W^(1/2) X; L']` and `c` the displacement the prediction already starts from (variable
+//! where `Q` is an orthonormal basis of `[W^(1/2) X; L']` and `c` the offset of the initial state that the prediction already has (variable
 //! projection, Golub and Pereyra 1973).
 
 use crate::model::Hypothesis;
@@ -18,17 +18,17 @@ use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, SVector};
 use rayon::prelude::*;
 
-/// How much less a measured start is trusted than its own noise says.
+/// Factor on the standard deviations of a measured initial state.
 const INITIAL_STATE_INFLATION: f64 = 2.0;
 
-/// A local cubic errs by more where the acceleration jumps: trust in a start is lowered to the displacement it turned out to need, up to
-/// this many of its standard deviations.
+/// A local cubic errs by more where the acceleration jumps: the standard deviation of an initial state is raised to the offset it turned
+/// out to need, up to this many of its standard deviations.
 const LARGEST_INFLATION: f64 = 20.0;
 
 /// Heaviness of the tail of windows' costs: a window this many times worse than typical has about half its weight.
 const TAIL: f64 = 3.0;
 
-/// Displacements for the sensitivity to a start, in m or rad and per second.
+/// Displacements for the sensitivity to an initial state, in m or rad and per second.
 const INITIAL_STATE_STEP: f64 = 1e-6;
 
 /// One window's projection.
@@ -36,11 +36,11 @@ const INITIAL_STATE_STEP: f64 = 1e-6;
 struct Projection {
     /// Rows of `Q` that belong to samples.
     samples: DMatrix<f64>,
-    /// Rows of `Q` that belong to the prior of the start.
+    /// Rows of `Q` that belong to the prior of the initial state.
     prior: DMatrix<f64>,
     /// `-L' c`.
     prior_residual: DVector<f64>,
-    /// `R^-1` of the same factorisation: start corrections from coordinates.
+    /// `R^-1` of the same factorisation: corrections of the initial state from coordinates.
     back: DMatrix<f64>,
 }
 
@@ -50,7 +50,7 @@ impl Projection {
         self.samples.as_slice().chunks_exact(self.samples.nrows()).collect()
     }
 
-    /// What the pull of the measured start adds to the residual's coordinates.
+    /// What the prior of the measured initial state adds to the residual's coordinates.
     fn prior_coordinates(&self) -> DVector<f64> {
         self.prior.tr_mul(&self.prior_residual)
     }
@@ -93,21 +93,21 @@ impl Projection {
     }
 }
 
-/// Weights of a dataset's residuals.
+/// Weighting of a dataset's residuals.
 #[derive(Debug, Clone)]
 pub struct Weighting<const N: usize> {
     /// Standard deviation each joint's residual is measured in.
     pub scale: [f64; N],
-    /// Displacement of each window's start that the predictions are made with.
+    /// Offset of each window's initial state that the predictions are made with.
     pub offsets: Vec<InitialStateOffset<N>>,
-    /// Weight of each window; less than one where the model fails far beyond what is typical.
+    /// Robust weight of each window; less than one where the model fails far beyond what is typical.
     pub robust_weight: Vec<f64>,
-    /// Cost of a typical window under the hypothesis the metric was made for.
+    /// Cost of a typical window under the hypothesis the weighting was made for.
     pub typical: f64,
     projections: Vec<Projection>,
 }
 
-/// Inner products of columns under the metric, the residual last.
+/// Inner products of columns under the weighting, the residual last.
 #[derive(Debug, Clone, Default)]
 pub struct Gram {
     /// Sum over windows.
@@ -140,7 +140,7 @@ impl Gram {
 }
 
 impl<const N: usize> Weighting<N> {
-    /// The metric around a hypothesis that predicts `predicted`, with starts displaced by `offsets`.
+    /// The weighting around a hypothesis that predicts `predicted`, with initial states displaced by `offsets`.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         data: &Dataset<N>,
         arm: &A,
@@ -160,7 +160,7 @@ impl<const N: usize> Weighting<N> {
         Self { scale, offsets, robust_weight, typical: 1.0, projections }
     }
 
-    /// The same metric with windows trusted by how well a hypothesis of this residual explains them.
+    /// Sets the robust weights of the windows by how well a hypothesis of this residual explains them.
     pub fn robust(mut self, data: &Dataset<N>, residual: &[f64]) -> Self {
         let costs = self.costs(data, residual);
         self.typical = crate::track::median(costs.clone()).max(f64::MIN_POSITIVE);
@@ -168,13 +168,13 @@ impl<const N: usize> Weighting<N> {
         self
     }
 
-    /// Cost of a window with its tail cut: that of a multivariate Student variable, linear for typical windows and
-    /// logarithmic far beyond.
+    /// Student-t cost of a window: the negative log-likelihood of a multivariate Student variable, linear for typical windows and logarithmic
+    /// far beyond.
     pub fn student_t_cost(&self, cost: f64) -> f64 {
         self.typical * (1.0 + TAIL) * (cost / (TAIL * self.typical)).ln_1p()
     }
 
-    /// Sum of the windows' costs, each by its trust.
+    /// Sum of the windows' costs, each by its robust weight.
     pub fn total(&self, costs: &[f64]) -> f64 {
         costs.iter().zip(&self.robust_weight).map(|(cost, robust_weight)| cost * robust_weight).sum()
     }
@@ -200,7 +200,8 @@ impl<const N: usize> Weighting<N> {
         self.gram_with(columns.len(), data, columns, residual)
     }
 
-    /// The same without the products of two different columns after the first `lead`: they stay zero.
+    /// Inner products of whitened `columns` and, last, a whitened `residual`, without those of two different columns after the first `lead`:
+    /// these stay zero.
     pub fn gram_with(&self, lead: usize, data: &Dataset<N>, columns: &[&[f64]], residual: &[f64]) -> Gram {
         let k = columns.len();
         let one = |(window, projection): (&crate::window::Window<N>, &Projection)| {
@@ -237,7 +238,7 @@ impl<const N: usize> Weighting<N> {
         windows.map(|(window, projection)| projection.cost(&residual[window.range()])).collect()
     }
 
-    /// The residual that is left once the starts are fitted, whitened, in the order of the flat vector.
+    /// The residual that is left once the initial states are fitted, whitened, in the order of the flat vector.
     pub fn remainder(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
         let mut left = residual.to_vec();
         for (window, projection) in data.windows.iter().zip(&self.projections) {
@@ -252,7 +253,7 @@ impl<const N: usize> Weighting<N> {
         left
     }
 
-    /// The displacements of all starts that fit a whitened residual best.
+    /// The offsets of all initial states that fit a whitened residual best.
     pub fn refit_initial_states(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<InitialStateOffset<N>> {
         let windows = data.windows.iter().zip(&self.projections).zip(&self.offsets);
         windows
@@ -270,7 +271,7 @@ impl<const N: usize> Weighting<N> {
     }
 }
 
-/// Derivatives of all predictions by the starts' positions and velocities, around those of the starts themselves.
+/// Derivatives of all predictions by initial positions and velocities, around the initial states displaced by `offsets`.
 pub fn initial_state_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     data: &Dataset<N>,
     arm: &A,
@@ -303,7 +304,7 @@ pub fn initial_state_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: u
         .collect()
 }
 
-/// The projection of one window from its start's sensitivities, scales and covariance.
+/// The projection of one window from the sensitivities to its initial state, scales and covariance.
 fn projection<const N: usize>(
     columns: &[&[f64]],
     scale: &[f64; N],
@@ -332,7 +333,7 @@ fn projection<const N: usize>(
     }
 }
 
-/// `L'` with `L L'` the precision of a measured start, positions first, then velocities.
+/// `L'` with `L L'` the precision of a measured initial state, positions first, then velocities.
 fn initial_state_precision_root<const N: usize>(
     start: &InitialState<N>,
     shift: &InitialStateOffset<N>,

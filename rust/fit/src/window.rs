@@ -1,6 +1,6 @@
 //! Short windows cut from logs, and the simulation of a hypothesis over them.
 //!
-//! Every window starts from its measured state and runs under the logged torque; the predicted positions of all windows lie in one
+//! Every window starts from its measured initial state and runs under the logged torque; the predicted positions of all windows lie in one
 //! flat vector, row by row and joint by joint.
 
 use crate::latent_states::latent_states;
@@ -22,10 +22,10 @@ const DIVERGED: f64 = 1e3;
 /// Sub-steps per sample are capped here; what is too stiff for them is refused by its cost.
 const MAX_SUBSTEPS: usize = 4;
 
-/// The same for motors that swing against their links.
+/// Most sub-steps per sample for motors that oscillate against their links.
 const MAX_SUBSTEPS_DRIVEN: usize = 5;
 
-/// The same for joints that knock against a stop.
+/// Most sub-steps per sample for joints that hit a joint limit.
 const MAX_SUBSTEPS_IMPACT: usize = 12;
 
 /// Samples `first ..= last` of one track; row 0 is sample `first + 1`.
@@ -39,7 +39,7 @@ pub struct Window<const N: usize> {
     pub last: usize,
     /// Where its rows begin in the flat vector, in rows.
     pub offset: usize,
-    /// Measured start.
+    /// Measured initial state.
     pub initial_state: InitialState<N>,
 }
 
@@ -67,7 +67,7 @@ pub struct Dataset<const N: usize> {
 }
 
 impl<const N: usize> Dataset<N> {
-    /// The same windows of logs without any known pushes.
+    /// These windows, with all known external disturbances removed from their logs.
     pub fn without_pushes(&self) -> Self {
         let mut bare = self.clone();
         bare.tracks.iter_mut().for_each(|track| track.pushes.clear());
@@ -126,12 +126,12 @@ impl<const N: usize> Dataset<N> {
             .collect()
     }
 
-    /// Starts as measured.
+    /// Zero offsets: initial states as measured.
     pub fn zero_offsets(&self) -> Vec<InitialStateOffset<N>> {
         vec![InitialStateOffset::none(); self.windows.len()]
     }
 
-    /// Predicted positions of all windows, each from its measured start displaced by its entry of `offsets`.
+    /// Predicted positions of all windows, each from its measured initial state displaced by its entry of `offsets`.
     pub fn predict<A: Arm<f64, N, P>, const P: usize>(
         &self,
         arm: &A,
@@ -199,7 +199,7 @@ impl<const N: usize> Dataset<N> {
         })
     }
 
-    /// Hidden states of every track's samples, up to the start of its last window; none for a plant without any.
+    /// Latent states at every track's samples, up to the start of its last window; none for a plant without any.
     fn latent<A: Arm<f64, N, P>, const P: usize>(
         &self,
         plant: &Plant<f64, A, N, P>,
@@ -217,7 +217,7 @@ impl<const N: usize> Dataset<N> {
     }
 }
 
-/// A displacement of a window's start state.
+/// An offset of a window's initial state.
 #[derive(Debug, Clone, Copy)]
 pub struct InitialStateOffset<const N: usize> {
     /// Added to the positions.
@@ -227,7 +227,7 @@ pub struct InitialStateOffset<const N: usize> {
 }
 
 impl<const N: usize> InitialStateOffset<N> {
-    /// No displacement.
+    /// No offset.
     pub fn none() -> Self {
         Self { q: SVector::zeros(), dq: SVector::zeros() }
     }
@@ -239,7 +239,7 @@ const NEAR_EDGE: f64 = 0.3;
 /// Runs that share the lanes of one vector unit: enough that few lanes are idle at the end.
 const GROUP: usize = 4 * WIDTH;
 
-/// Makes one run, in as many steps per sample as its plant needs.
+/// Simulates one run by the scalar integrator, in as many steps per sample as its plant needs.
 fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
     let most = match (run.plant.jumps(), run.plant.drivetrain().any()) {
         (true, _) => MAX_SUBSTEPS_IMPACT,

@@ -9,7 +9,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Name, times, positions, torques, and the torques of the user's own effects.
+/// Name, times, positions, torques, and the torques of the custom effects.
 type PyLog<'py> = (
     String,
     PyReadonlyArray1<'py, f64>,

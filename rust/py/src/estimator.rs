@@ -1,8 +1,8 @@
 //! `Estimator`: the online estimator, one sample at a time or over arrays.
 
 use crate::convert::{kind_of, matrix, vector};
-use armgap_core::monitor::ProgressReporter;
-use armgap_core::online::{FitProblem, MOST_PARAMETERS, Online, OnlineSettings, SampleStatus, When};
+use armgap_core::monitor::MonitorSettings;
+use armgap_core::online::{MOST_PARAMETERS, Online, OnlineError, OnlineSettings, SampleStatus, When};
 use armgap_core::real::{Real, lit};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::Form;
@@ -27,7 +27,7 @@ pub struct Estimator {
     joints: usize,
 }
 
-/// What the settings are, in the order of the Python class.
+/// Settings from arguments in the order of the Python class.
 fn settings<T: Real>(
     kind: &str,
     scheme: &str,
@@ -46,7 +46,7 @@ fn settings<T: Real>(
         Some(other) => return Err(PyValueError::new_err(format!("unknown form `{other}`"))),
     };
     let [cutoff, forgetting, p0, memory, between, floor] = numbers.map(lit::<T>);
-    let watch = ProgressReporter { memory, settling: counts[0], learning: counts[1], between, floor };
+    let monitor = MonitorSettings { memory, settling: counts[0], learning: counts[1], between, floor };
     let variant = if paper { Variant::Paper } else { Variant::Exact };
     Ok(OnlineSettings {
         kind: kind_of(kind)?,
@@ -57,7 +57,7 @@ fn settings<T: Real>(
         cutoff,
         forgetting,
         p0,
-        watch,
+        monitor,
     })
 }
 
@@ -70,10 +70,10 @@ fn code(outcome: SampleStatus) -> u8 {
     }
 }
 
-fn complaint(error: FitProblem) -> PyErr {
+fn complaint(error: OnlineError) -> PyErr {
     PyValueError::new_err(match error {
-        FitProblem::Range(name) => format!("`{name}` is outside its range"),
-        FitProblem::Length { name, expected } => format!("`{name}` needs {expected} values"),
+        OnlineError::Range(name) => format!("`{name}` is outside its range"),
+        OnlineError::Length { name, expected } => format!("`{name}` needs {expected} values"),
     })
 }
 
@@ -178,7 +178,7 @@ impl Estimator {
         let any = if single {
             let settings = settings::<f32>(kind, scheme, paper, form, asymmetry, numbers, counts)?;
             if theta0.len() > MOST_PARAMETERS {
-                return Err(complaint(FitProblem::Length {
+                return Err(complaint(OnlineError::Length {
                     name: "theta0",
                     expected: settings.parameters(),
                 }));

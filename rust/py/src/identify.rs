@@ -10,7 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// The course of an estimate over a log.
+/// History of an estimate over a log.
 #[pyfunction]
 pub fn identify<'py>(
     py: Python<'py>,

@@ -1,6 +1,6 @@
-//! Long work on a thread of its own, while the calling thread tells Python how far it is and looks for signals.
+//! Progress callback: long work on a thread of its own, while the calling thread reports progress to Python and checks for signals.
 //!
-//! Only the calling thread enters Python: for signals 25 times a second, to tell the progress 8 times. When it is interrupted it returns at once; the work is told to
+//! Only the calling thread enters Python: for signals 25 times a second, to report progress 8 times. When it is interrupted it returns at once; the work is told to
 //! stop, and ends at its next unit without anyone waiting for it, which is why it owns its data.
 
 use armgap_fit::progress::{Control, Observer, Progress};
@@ -13,11 +13,11 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Time between two looks for signals.
-const LOOK: Duration = Duration::from_millis(40);
+/// Time between two checks for signals.
+const CHECK: Duration = Duration::from_millis(40);
 
-/// Looks from one telling of the progress to the next.
-const TELL: u32 = 3;
+/// Signal checks from one progress report to the next.
+const CHECKS_PER_REPORT: u32 = 3;
 
 /// What the two threads share.
 #[derive(Default)]
@@ -26,14 +26,14 @@ struct Shared {
     stop: AtomicBool,
 }
 
-/// Runs `work`, which is given an observer; `told(title, fraction)` is called with the progress. Without it, work is short: it is done on
+/// Runs `work`, which is given an observer; `callback(title, fraction)` is called with the progress. Without it, work is short: it is done on
 /// this thread, and nothing interrupts it.
 pub fn with_progress<T: Send + 'static>(
     py: Python<'_>,
-    told: Option<&Py<PyAny>>,
+    callback: Option<&Py<PyAny>>,
     work: impl FnOnce(&Observer) -> T + Send + 'static,
 ) -> PyResult<T> {
-    let Some(told) = told else {
+    let Some(callback) = callback else {
         let nobody: Observer = Arc::new(|_| Control::Go);
         let ended = py.detach(move || catch_unwind(AssertUnwindSafe(|| work(&nobody))));
         return ended.map_err(defect);
@@ -46,10 +46,10 @@ pub fn with_progress<T: Send + 'static>(
         let _ = send.send(work(&observer));
     });
     let looked = Arc::clone(&shared);
-    let result = py.detach(move || wait(&ended, &looked, told));
+    let result = py.detach(move || wait(&ended, &looked, callback));
     match result {
         Ok(Some(result)) => {
-            tell(py, &shared, told, true)?;
+            report(py, &shared, callback, true)?;
             Ok(result)
         }
         Ok(None) => match thread.join() {
@@ -75,33 +75,33 @@ fn defect(panic: Box<dyn Any + Send>) -> PyErr {
 }
 
 /// Waits for the result; none if the thread ended without.
-fn wait<T>(ended: &Receiver<T>, shared: &Shared, told: &Py<PyAny>) -> PyResult<Option<T>> {
-    let mut looks = 0;
+fn wait<T>(ended: &Receiver<T>, shared: &Shared, callback: &Py<PyAny>) -> PyResult<Option<T>> {
+    let mut checks = 0;
     loop {
-        looks += 1;
-        match ended.recv_timeout(LOOK) {
+        checks += 1;
+        match ended.recv_timeout(CHECK) {
             Ok(result) => return Ok(Some(result)),
             Err(RecvTimeoutError::Disconnected) => return Ok(None),
             Err(RecvTimeoutError::Timeout) => {
-                let told = (looks % TELL == 1).then_some(told);
-                Python::attach(|py| look(py, shared, told))?;
+                let callback = (checks % CHECKS_PER_REPORT == 1).then_some(callback);
+                Python::attach(|py| poll(py, shared, callback))?;
             }
         }
     }
 }
 
-/// Lets Python handle its signals, and tells it how far the work is if it wants to know now.
-fn look(py: Python<'_>, shared: &Shared, told: Option<&Py<PyAny>>) -> PyResult<()> {
+/// Lets Python handle its signals, and reports the progress if a callback is given.
+fn poll(py: Python<'_>, shared: &Shared, callback: Option<&Py<PyAny>>) -> PyResult<()> {
     py.check_signals()?;
-    told.map_or(Ok(()), |told| tell(py, shared, told, false))
+    callback.map_or(Ok(()), |callback| report(py, shared, callback, false))
 }
 
-/// Tells Python how far the work is; all of it, once it has ended.
-fn tell(py: Python<'_>, shared: &Shared, told: &Py<PyAny>, ended: bool) -> PyResult<()> {
+/// Calls back with the progress; with 1 once the work has ended.
+fn report(py: Python<'_>, shared: &Shared, callback: &Py<PyAny>, ended: bool) -> PyResult<()> {
     let latest = *shared.latest.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(progress) = latest {
         let fraction = if ended { 1.0 } else { progress.fraction };
-        told.call1(py, (progress.phase.title(), fraction))?;
+        callback.call1(py, (progress.phase.title(), fraction))?;
     }
     Ok(())
 }

@@ -71,7 +71,7 @@ pub fn simulate<'py>(
     Ok((shape(trajectory.q)?, shape(trajectory.dq)?))
 }
 
-/// Inertia matrices at some poses, effects included.
+/// Inertia matrices at some positions, effects included.
 #[pyfunction]
 pub fn inertia<'py>(
     py: Python<'py>,

@@ -23,7 +23,7 @@ use crate::real::{Real, sgn};
 use crate::trig::SinCos;
 use nalgebra::{SMatrix, SVector};
 
-/// Inertia matrix, by rows, and `C dq + g` at a state.
+/// Terms of the equation of motion at a state: inertia matrix, by rows, and `C dq + g`.
 #[derive(Debug, Clone, Copy)]
 pub struct EquationTerms<V, const N: usize> {
     /// `M(q)`.
@@ -143,10 +143,10 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Angles whose sines and cosines [`Arm::equation_terms`] needs, with the base turned by `tilt`.
     fn angles<V: Number<Real = T>>(&self, q: &[V; N], tilt: V) -> [V; N];
 
-    /// The part of the inertia matrix that is the same everywhere.
+    /// The part of the inertia matrix that does not depend on `q`.
     fn constant_inertia(&self, theta: &[T; P]) -> [[T; N]; N];
 
-    /// Inertia matrix, given its steady part, and `C dq + g` together, for the integrator: of one arm, or of several side by side.
+    /// Inertia matrix, given its constant part, and `C dq + g` together, for the integrator: of one arm, or of several side by side.
     fn equation_terms<V: Number<Real = T>>(
         &self,
         theta: &[V; P],

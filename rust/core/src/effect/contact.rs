@@ -1,9 +1,9 @@
-//! A stop: beyond a position, on the side away from zero, a spring and damper push back and never pull.
+//! A joint limit: beyond a position, on the side away from zero, a spring and damper push back and never pull.
 
 use super::{Edge, Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
-/// Contact with a stop.
+/// Contact with a joint limit.
 #[derive(Debug)]
 pub struct Contact;
 

@@ -1,12 +1,12 @@
-//! A push from outside: a constant torque of the given impulse for `duration` around `time`. It belongs to one log.
+//! External disturbance: a constant torque of the given impulse for `duration` around `time`. It belongs to one log.
 //!
-//! Each interval carries the exact mean and first moment of the push over it, so the speed and the way that a mass gains are exact whatever
+//! Each interval carries the exact mean and first moment of the torque over it, so a mass gains the exact speed and distance whatever
 //! the sample times.
 
 use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::{Real, lit};
 
-/// A push at one time.
+/// External disturbance at one time.
 #[derive(Debug)]
 pub struct ExternalPulse;
 

@@ -1,7 +1,7 @@
 //! Joint elasticity: the motor drives the link through a spring and damper (Spong 1987),
 //!
 //! ```text
-//! rotor_inertia d2(q + twist)/dt2 = tau - stiffness twist - damping dtwist
+//! rotor_inertia d2(q + deflection)/dt2 = tau - stiffness deflection - damping d(deflection)/dt
 //! ```
 //!
 //! The rotor comes in addition to the rigid arm; encoder and friction are on the link's side. A shaft of infinite stiffness is a
@@ -28,7 +28,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("damping", Quantity::ShaftDamping, 0.0, f64::INFINITY),
         EffectParameter::bounded("rotor_inertia", Quantity::Inertia, 1e-6, f64::INFINITY),
     ],
-    // Motors of 3, 8 and 30 % of the link's inertia that swing at 8 to 40 Hz against it.
+    // Motors of 3, 8 and 30 % of the link's inertia that oscillate at 8 to 40 Hz against it.
     initial_guesses: &[
         [0.15, 0.3, 0.03],
         [0.5, 0.5, 0.03],

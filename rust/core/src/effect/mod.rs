@@ -105,13 +105,13 @@ pub enum Quantity {
     CubicDrag,
     /// Torque per position.
     Stiffness,
-    /// Torque per twist of a shaft.
+    /// Torque per deflection of a shaft.
     ShaftStiffness,
-    /// Torque per rate of twist of a shaft.
+    /// Torque per deflection rate of a shaft.
     ShaftDamping,
-    /// Torque per depth behind a stop.
+    /// Torque per depth behind a joint limit.
     ContactStiffness,
-    /// Torque per speed behind a stop.
+    /// Torque per speed behind a joint limit.
     ContactDamping,
     /// Torque per cubed position.
     Hardening,
@@ -261,7 +261,7 @@ pub struct Spec {
     pub least_joints: usize,
     /// Its parameters; the first one switches it off at its neutral value.
     pub parameters: &'static [EffectParameter],
-    /// Trial values, in units of the log's own scale of each quantity (see the fit's `scale`).
+    /// Initial guesses, in units of the log's own scale of each quantity (see the fit's `scale`).
     pub initial_guesses: &'static [[f64; MAX_PARAMETERS]],
     /// How it is tested before it is fitted.
     pub trial: Trial,
@@ -276,7 +276,7 @@ pub enum Trial {
     Amplitudes(usize),
     /// By the derivative at neutral along a ray on which all parameters grow together.
     Ray,
-    /// Not at all: it belongs to one log and is looked for there.
+    /// Not at all: an external disturbance belongs to one log and is looked for there.
     Disturbance,
     /// By the whole difference it makes at a trial value: a threshold has no derivative where it is never reached.
     Whole,
@@ -302,11 +302,11 @@ pub struct JointPoint<T> {
     pub friction: T,
     /// Direction in which the next joint (after the last, the first) slides: -1, 0 or 1.
     pub other: T,
-    /// What the joint remembers of its path (see [`Effect::hysteresis_after`]).
+    /// Hysteresis state of the joint (see [`Effect::hysteresis_after`]).
     pub memory: T,
 }
 
-/// A position at which a joint's torque jumps, and what it meets beyond, on the side away from zero.
+/// A position at which a joint's torque jumps, and the contact beyond it, on the side away from zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge<T> {
     /// Position.
@@ -324,7 +324,7 @@ impl<T: Real> Edge<T> {
         (q - self.position) * self.position > T::zero()
     }
 
-    /// Fastest rate, 1/s, of an inertia that has met it.
+    /// Fastest rate, 1/s, of an inertia in contact with it.
     pub fn rate(&self, inertia: T) -> T {
         (self.stiffness / inertia).sqrt().max(self.damping / inertia)
     }
@@ -390,12 +390,12 @@ pub trait Effect<T: Real>: Sync {
         T::zero()
     }
 
-    /// What the joint remembers after moving by `distance`, if it remembered `memory` before.
+    /// Hysteresis state after moving by `distance` from a position where it was `memory`.
     fn hysteresis_after(&self, _p: &[T; MAX_PARAMETERS], memory: T, _distance: T) -> T {
         memory
     }
 
-    /// The motor side of a joint whose own inertia at `q = 0` is `inertia`; none for a rigid joint.
+    /// Transmission of a joint whose own inertia at `q = 0` is `inertia`; none for a rigid joint.
     fn transmission(&self, _p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Transmission<T>> {
         None
     }
@@ -417,7 +417,7 @@ pub trait Effect<T: Real>: Sync {
 /// Torque over one sample interval: its values at the start, the middle and the end.
 ///
 /// Between them it is quadratic, so Simpson's rule gives its mean. Laws that smear or shift a step choose the three values such that the
-/// mean and the first moment, and with them the speed and the way a mass gains, are exact however fast they are.
+/// mean and the first moment, and with them the speed and the distance a mass gains, are exact however fast they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InputSegment<T> {
     /// At the sample.
@@ -436,7 +436,7 @@ impl<T: Real> InputSegment<T> {
     }
 
     /// The straight line with the given mean and first moment about the middle of an interval of length `h`: what moves a mass by the
-    /// same speed and the same way as the torque that has them.
+    /// same speed and the same distance as the torque that has them.
     pub fn with_moment(mean: T, moment: T, h: T) -> Self {
         let rise = if h > T::zero() { lit::<T>(6.0) * moment / (h * h) } else { T::zero() };
         Self { start: mean - rise, middle: mean, end: mean + rise }
@@ -458,7 +458,7 @@ impl<T: Real> InputSegment<T> {
         l0 * self.start + l1 * self.middle + l2 * self.end
     }
 
-    /// Both torques together.
+    /// Sum of both torques.
     #[inline]
     pub fn plus(self, other: Self) -> Self {
         Self {
@@ -468,13 +468,13 @@ impl<T: Real> InputSegment<T> {
         }
     }
 
-    /// The same law applied to each of the three values.
+    /// Applies `f` to each of the three values.
     pub fn map(self, f: impl Fn(T) -> T) -> Self {
         Self { start: f(self.start), middle: f(self.middle), end: f(self.end) }
     }
 }
 
-/// An effect placed on an arm with its parameters' values.
+/// An effect on a joint of an arm, with its parameters' values.
 #[derive(Clone, Copy)]
 pub struct Active<T: Real> {
     /// The law.

@@ -1,4 +1,4 @@
-//! Plays that close and open inside a step.
+//! Backlash that closes and opens inside a step.
 
 use super::crossing::{Change, Located, ModeEvent, TrialStep};
 use super::root::hermite_root;
@@ -9,7 +9,7 @@ use crate::plant::Accelerations;
 use crate::real::Real;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A, N, P> {
-    /// Opens the plays whose flank would have to pull; whether any was.
+    /// Opens every backlash whose flank would have to pull; returns whether any was opened.
     pub(super) fn open(&self, x: T, state: &mut State<T, N>, motion: &Accelerations<T, N>) -> bool {
         let tau = self.interval.torque_at(x);
         let mut opened = false;
@@ -23,7 +23,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         opened
     }
 
-    /// When joint `j`'s play closes or opens within the step.
+    /// When joint `j`'s backlash closes or opens within the step.
     pub(super) fn flank(
         &self,
         j: usize,
@@ -52,7 +52,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         })
     }
 
-    /// Integrates to where joint `j`'s rotor meets its flank.
+    /// Integrates to the impact of joint `j`'s rotor on its flank.
     pub(super) fn locate_impact(&self, trial_step: &TrialStep<'_, T, N>, j: usize, s: T) -> Located<T, N> {
         let beyond = |there: &State<T, N>| {
             let depth = self.plant.drivetrain().depth(j, &there.latent)?;
@@ -62,7 +62,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         self.locate_crossing(trial_step, s, beyond)
     }
 
-    /// The state just after joint `j`'s rotor has met its flank.
+    /// The state just after the impact of joint `j`'s rotor on its flank.
     pub(super) fn after_impact(&self, j: usize, mut state: State<T, N>) -> State<T, N> {
         let joints = JointState { q: state.q.into(), dq: state.dq.into() };
         let inertia = self.plant.rigid().kinematics(&joints).equation_terms.inertia;
@@ -70,7 +70,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         state
     }
 
-    /// Closes the plays that a step without events has gone beyond.
+    /// Closes every backlash whose flank a step without events has crossed.
     pub(super) fn close_crossed(&self, state: &mut State<T, N>) {
         for j in 0..N {
             if self.plant.drivetrain().depth(j, &state.latent).is_some_and(|depth| depth > T::zero()) {

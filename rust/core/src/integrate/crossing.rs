@@ -1,4 +1,4 @@
-//! Changes inside a step, of friction modes, plays and torques that jump: which comes first, and when.
+//! Events inside a step: changes of friction modes, backlash that closes or opens, torques that jump; which comes first, and when.
 
 use super::root::{STRAIGHT, VelocityZero, hermite_root};
 use super::{State, SubStep};
@@ -13,7 +13,7 @@ const MAX_REFINEMENTS: usize = 4;
 /// Attempts at the instant of a release.
 const MAX_FALSE_POSITIONS: usize = 12;
 
-/// A release is found where holding takes more than friction gives, but by less than this part of what the step changes.
+/// A release is located where the stiction violation is positive, but less than this part of its change over the step.
 const RELEASED: f64 = 1e-8;
 
 /// A joint that has crossed a position at which its torque jumps is put this far beyond it, rad or m.
@@ -66,7 +66,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         first
     }
 
-    /// When a stuck joint breaks away within the step, by linear interpolation of the torque that it lacks.
+    /// When a stuck joint breaks away within the step, by linear interpolation of the stiction violation.
     fn release(
         &self,
         j: usize,
@@ -191,8 +191,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         Located { length: s * dt, reached }
     }
 
-    /// Integrates to just beyond where friction, or a flank, no longer holds: false position in Illinois' way (Dowell and Jarratt
-    /// 1971) between the start of the step, where it lacks `ends[0] < 0`, and its end, where it lacks `ends[1] > 0`.
+    /// Integrates to just beyond where static friction, or a closed flank, no longer holds: the Illinois variant of false position (Dowell
+    /// and Jarratt 1971) between the start of the step with the violation `ends[0] < 0` and its end with `ends[1] > 0`.
     fn locate_beyond(
         &self,
         trial_step: &TrialStep<'_, T, N>,
@@ -247,23 +247,23 @@ pub(super) struct ModeEvent<T> {
 pub(super) enum Change<T> {
     /// The velocity reaches zero.
     Standstill,
-    /// Friction no longer holds; by how much it lacks at the start and at the end of the step.
+    /// Static friction no longer holds the joint.
     Release {
         /// The mode it changes to.
         mode: Mode,
-        /// What holding takes beyond friction's level at both ends of the step.
+        /// Stiction violation at both ends of the step.
         stiction_violation: [T; 2],
     },
-    /// A rotor meets the flank of its play.
+    /// A rotor hits the flank of its backlash.
     Impact,
     /// A joint crosses a position at which its torque jumps.
     Cross {
         /// The position.
         at: T,
     },
-    /// A flank no longer pushes; by how much it would have to pull at both ends of the step.
+    /// A flank no longer pushes and the backlash opens.
     Open {
-        /// That pull.
+        /// Force by which the flank would have to pull, at both ends of the step; a flank can only push.
         flank_tension: [T; 2],
     },
 }

@@ -3,8 +3,8 @@
 //! While no joint reverses, sticks or breaks away the right-hand side is smooth and the step is of order four. A joint whose
 //! velocity would change sign is stopped at the instant it reaches zero; there it either sticks, if friction can hold it, or
 //! goes on in the direction of the torque. A stuck joint breaks away at the instant the torque it needs exceeds its Coulomb
-//! level. So the arm left under a torque below that level does not creep, and a step across a reversal keeps its accuracy. In the same way
-//! a rotor meets the flank of its play, and leaves it, at an instant of its own.
+//! level. So the arm left under a torque below that level does not creep, and a step across a reversal keeps its accuracy. Impacts of
+//! a rotor on the flank of its backlash, and its separation, are located in the same way.
 
 mod backlash;
 mod crossing;
@@ -32,7 +32,7 @@ pub struct State<T, const N: usize> {
     pub dq: SVector<T, N>,
     /// Friction modes.
     pub modes: [Mode; N],
-    /// States that no encoder shows.
+    /// Latent states of the transmissions and of hysteresis.
     pub latent: LatentState<T, N>,
 }
 
@@ -141,11 +141,11 @@ pub(crate) fn exact<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     SubStep::new(plant, interval, state).exact(state, done, interval.h - done);
 }
 
-/// One sub-step's surroundings.
+/// Context of one sub-step.
 struct SubStep<'a, T: Real, A, const N: usize, const P: usize> {
     plant: &'a Plant<T, A, N, P>,
     interval: &'a Interval<'a, T, N>,
-    /// Where the sub-step starts; sines and cosines within it are turned on from here.
+    /// Kinematic state at its start; sines and cosines within it are rotated from here.
     origin: KinematicState<T, N>,
 }
 
@@ -279,7 +279,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
         motion
     }
 
-    /// By how much holding joint `j` takes more than friction gives, and the direction it would slide in.
+    /// Stiction violation of joint `j`, and the direction it would slide in.
     #[inline]
     fn stiction_violation(
         &self,

@@ -6,7 +6,7 @@ use crate::real::{Real, lit};
 /// A correction of this part of a step is as good on a straight line: what is left out is of the order of its square.
 pub(super) const STRAIGHT: f64 = 1e-6;
 
-/// The same on a curve of constant rate of acceleration, whose error is of the order of its cube.
+/// A correction of this part of a step is as good on a curve of constant jerk: what is left out is of the order of its cube.
 const CURVED: f64 = 1e-3;
 
 /// The rate of acceleration over less than this part of a step is not known well enough.
@@ -16,7 +16,7 @@ const SHORT: f64 = 0.01;
 /// that curve.
 const ROOT: f64 = 1e-3;
 
-/// A place close to where joint `j`'s velocity vanishes, `length` after the start of a step, and the accelerations at both.
+/// A joint state close to where joint `j`'s velocity vanishes, `length` after the start of a step, and the accelerations at both.
 pub(crate) struct VelocityZero<'a, T, const N: usize> {
     pub(crate) joints: &'a JointState<T, N>,
     pub(crate) j: usize,
@@ -31,7 +31,7 @@ impl<T: Real, const N: usize> VelocityZero<'_, T, N> {
         -self.joints.dq[self.j] / self.ddq[1][self.j]
     }
 
-    /// The place where the velocity vanishes and the time from here to there, if it is so close within a step of `whole` that no
+    /// The joint state where the velocity vanishes and the time from here to there, if it is so close within a step of `whole` that no
     /// further step is needed.
     #[inline]
     pub(crate) fn reached(&self, whole: T) -> Option<(T, JointState<T, N>)> {

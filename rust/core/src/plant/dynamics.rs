@@ -1,4 +1,4 @@
-//! The plant as a step without mode changes sees it: on one run, or on several side by side.
+//! The plant's dynamics with fixed friction modes, as [`crate::fixed_mode`] integrates them.
 
 use super::Plant;
 use crate::arm::Arm;

@@ -62,7 +62,7 @@ pub struct Accelerations<T, const N: usize> {
     pub ddq: SVector<T, N>,
     /// Friction torque of stuck joints; zero for sliding ones.
     pub friction_at_rest: SVector<T, N>,
-    /// Acceleration of the twist of driven joints; zero for rigid ones.
+    /// Acceleration of the transmissions' deflections; zero for rigid joints.
     pub deflection_acceleration: SVector<T, N>,
 }
 
@@ -143,19 +143,19 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         }
     }
 
-    /// The motor sides of its joints.
+    /// Transmissions between motors and links.
     #[inline]
     pub fn drivetrain(&self) -> &Drivetrain<T, N> {
         &self.drivetrain
     }
 
-    /// Whether a joint remembers its path.
+    /// Whether a joint has a hysteresis state.
     #[inline]
     pub fn has_hysteresis(&self) -> bool {
         self.has_hysteresis
     }
 
-    /// What the joints remember at `q`.
+    /// Hysteresis states of the joints at `q`.
     #[inline]
     pub fn memory(&self, q: &SVector<T, N>, latent: &LatentState<T, N>) -> SVector<T, N> {
         let mut memory = latent.memory;
@@ -180,14 +180,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         &self.rigid.theta
     }
 
-    /// Whether nothing but friction modes can change during a step: exact friction, no states that no encoder shows, and no torque that
-    /// jumps at a position.
+    /// Whether nothing but friction modes can change during a step: exact friction, no latent states, and no torque that jumps at a
+    /// position.
     #[inline]
     pub fn only_modes_change(&self) -> bool {
         self.is_plain() && !self.jumps
     }
 
-    /// The same but for torques that jump.
+    /// Whether friction is exact and there are no latent states; torques may jump at a position.
     #[inline]
     pub fn is_plain(&self) -> bool {
         self.smoothing == T::zero() && !self.drivetrain.any() && !self.has_hysteresis
@@ -210,7 +210,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.rigid.coulomb[j] > T::zero() || self.hooks.iter().any(|on| on.force || on.coulomb)
     }
 
-    /// 1 for a joint with dry friction, 0 for one that reverses without noticing.
+    /// 1 for a joint with dry friction, 0 for one without.
     #[inline]
     pub(crate) fn dry(&self, j: usize) -> T {
         if self.is_dry(j) { T::one() } else { T::zero() }
@@ -248,7 +248,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         }
     }
 
-    /// The same for given torques at the joints.
+    /// Equation (1) solved for `ddq`, given the torques that reach the joints.
     #[inline]
     fn undriven(
         &self,
@@ -284,8 +284,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.solve(inertia, &rhs, modes)
     }
 
-    /// Equation (1) read the other way: the torque that a measured motion needs beyond `tau`, with motors riding rigidly on their
-    /// links and friction smoothed as set.
+    /// Residual torque by inverse dynamics: the torque that a measured motion needs beyond `tau`, with rigid transmissions and friction
+    /// smoothed as set.
     pub fn residual_torque(
         &self,
         t: T,
@@ -348,8 +348,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         core::array::from_fn(|j| exact && modes[j] == Mode::Stuck)
     }
 
-    /// By how much the holding torque of joint `j` exceeds what friction can give, and the direction it would slide in.
-    /// Not positive: it stays.
+    /// Stiction violation of joint `j` at rest (friction torque at rest less the Coulomb level), and the direction it would slide in.
+    /// Not positive: the joint stays stuck.
     #[inline]
     pub fn stiction_violation(&self, j: usize, t: T, q: T, tau: T, friction_at_rest: T) -> (T, T) {
         let direction = if friction_at_rest < T::zero() { -T::one() } else { T::one() };

@@ -7,7 +7,7 @@ use crate::kinematics::JointState;
 use crate::real::{Real, lit};
 use nalgebra::SVector;
 
-/// How much shorter the steps of a knock are than those that only keep it stable.
+/// How much shorter the steps of an impact are than those that only keep it stable.
 const FOLLOWED: f64 = 4.0;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
@@ -47,8 +47,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         least.max(lit(1e-9))
     }
 
-    /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, a motor swings against its link, or a joint knocks
-    /// against a stop, which is to be followed and not only survived. Zero for a rigid arm with exact friction.
+    /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, a motor oscillates against its link, or a joint hits
+    /// a joint limit, an impact that is to be resolved and not only stable. Zero for a rigid arm with exact friction.
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
         let mut fastest = T::zero();
         let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));

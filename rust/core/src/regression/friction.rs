@@ -1,4 +1,4 @@
-//! Filters of friction over an interval in which joints may turn round.
+//! Filters of friction over an interval in which joints may reverse.
 //!
 //! A sampled `sgn(dq)` says only that the sign changed somewhere between two samples. Taken as a ramp it is wrong by up to half a period
 //! at every reversal, and a regressor with such an error draws its coefficient towards zero. With the velocity linear between states
@@ -19,7 +19,7 @@ use crate::filter::FilterCoefficients;
 use crate::real::{Real, lit, sgn};
 use nalgebra::SVector;
 
-/// What a velocity does between two states.
+/// A velocity that is linear between two states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct VelocitySegment<T> {
     from: T,
@@ -113,7 +113,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Torques over a swing.
+    /// Torques over a velocity segment.
     #[inline(always)]
     pub(super) fn filter_torques<C: Cpu>(
         &mut self,
@@ -139,7 +139,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Dissipated powers over a swing.
+    /// Dissipated powers over a velocity segment.
     #[inline(always)]
     pub(super) fn filter_powers<C: Cpu>(
         &mut self,
@@ -155,7 +155,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Dissipated energies of a swing of `h` seconds by the trapezoidal rule, as in the paper.
+    /// Dissipated energies of a velocity segment of `h` seconds by the trapezoidal rule, as in the paper.
     #[inline(always)]
     pub(super) fn add_trapezes(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
         let half = h * lit(0.5);
@@ -166,7 +166,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Dissipated energies of a swing of `h` seconds.
+    /// Dissipated energies of a velocity segment of `h` seconds.
     #[inline(always)]
     pub(super) fn add_energies(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
         for j in 0..N {

@@ -73,7 +73,7 @@ pub struct Snapshot<T, const N: usize> {
     pub dq: SVector<T, N>,
 }
 
-/// The way from one state to the next in two parts, each under a constant torque.
+/// Interval from one state to the next in two parts, each under a constant torque.
 ///
 /// With states at the samples both parts have the same torque; with states half-way between samples, where a difference of positions
 /// is the velocity to second order, the sample in the middle is where the torque changes.
@@ -91,7 +91,7 @@ pub struct SampleInterval<T, const N: usize> {
     pub middle: SVector<T, N>,
 }
 
-/// Coefficients of a passage and of its two parts, kept while they stay as long.
+/// Filter coefficients of a sample interval and of its two parts, cached while their lengths stay the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct SegmentCoefficients<T> {
     whole: CachedCoefficients<T>,

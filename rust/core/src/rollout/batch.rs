@@ -1,4 +1,4 @@
-//! The lanes on their way.
+//! The state of all lanes of a batch rollout and its step.
 
 use super::clock::Clock;
 use super::cursor::{
@@ -20,38 +20,38 @@ use crate::trig::SinCos;
 use core::array::from_fn;
 use nalgebra::SVector;
 
-/// Steps after which sines and cosines that were turned on step by step are computed afresh.
+/// Steps after which sines and cosines that were rotated step by step are computed anew.
 const STEPS_TO_RECOMPUTE: usize = 64;
 
-/// Taken from what is wrong in lanes that have ended.
+/// Subtracted from the mode violation of lanes that have ended.
 const IDLE: f64 = 1e30;
 
-/// How the lanes go through a step.
+/// How far the lanes go in a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum StepExtent {
-    /// All from sample to sample.
+    /// All lanes over a whole sample interval.
     Full,
-    /// Some through the rest of an interval.
+    /// Some lanes over the rest of an interval.
     Partial,
-    /// Some to a reversal.
+    /// Some lanes up to a reversal.
     ToReversal,
 }
 
-/// The lanes' states on their way.
+/// State of all lanes.
 pub(super) struct LaneBatch<'a, T: Real, C, A, const W: usize, const H: usize, const N: usize, const P: usize>
 {
     plant_lanes: [PlantLanes<'a, T, C, A, W, N, P>; H],
     kinematics: [KinematicState<Lanes<T, C, W>, N>; H],
     modes: [Modes<Lanes<T, C, W>, N>; H],
     spans: [Span<Lanes<T, C, W>, N>; H],
-    /// Where the last step started, with sines and cosines, and what it says.
+    /// Joint states, sines and cosines at the start of the last step, and its mode checks.
     initial_guesses: [JointState<Lanes<T, C, W>, N>; H],
     sincos: [[SinCos<Lanes<T, C, W>>; N]; H],
     mode_check: [ModeCheck<Lanes<T, C, W>, N>; H],
     clocks: [Clock<T, N>; WIDTH],
-    /// Nothing in lanes that move, so much that nothing is wrong in those that have ended.
+    /// 0 for lanes that move, [`IDLE`] for lanes that have ended, so that these never show a mode violation.
     idle: [Lanes<T, C, W>; H],
-    /// Which run is in which lane, and its way; none in lanes that have ended.
+    /// Which run is in which lane, and its cursor; none in lanes that have ended.
     runs: [usize; WIDTH],
     cursors: [Option<RunCursor<'a, T, N>>; WIDTH],
     /// Lanes that move.
@@ -134,7 +134,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
     }
 
-    /// One step of every lane with the modes it has; whether it was right in all of them.
+    /// One step of every lane with its friction modes; returns whether the modes hold in all lanes.
     #[inline(always)]
     fn step_lanes<const EFFECTS: bool, const ANY_STUCK: bool>(&mut self) -> bool {
         let mut right = self.extent != StepExtent::ToReversal;
@@ -158,7 +158,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         right
     }
 
-    /// Goes on from a step that was right in all lanes.
+    /// Accepts a step whose modes hold in all lanes.
     #[inline(always)]
     fn arrive_all(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
         if self.extent != StepExtent::Full {
@@ -185,7 +185,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         self.renew_modes();
     }
 
-    /// Goes on from a step after which lanes go different ways.
+    /// Resolves a step lane by lane: accepted, repeated, or handed to the scalar integrator.
     #[inline(always)]
     fn resolve_lanes(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
         self.extent = StepExtent::Partial;
@@ -202,7 +202,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         self.renew_modes();
     }
 
-    /// Modes of the directions as they are now.
+    /// Recomputes the modes from the current directions.
     #[inline(always)]
     fn renew_modes(&mut self) {
         for i in 0..H {
@@ -215,7 +215,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         self.modes_stale = false;
     }
 
-    /// Lane `l`'s place.
+    /// Joint state of lane `l`.
     #[inline(always)]
     fn joints(&self, l: usize) -> JointState<T, N> {
         lane_of(&self.kinematics[l / W].joints, l % W)
@@ -261,7 +261,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         if let Some(RunCursor { interval: Some(interval), .. }) = &self.cursors[l] {
             start_interval(&mut self.spans[l / W], l % W, interval);
         } else {
-            // A step of no length, of which nothing is wrong.
+            // A step of zero length, which violates no mode.
             self.spans[l / W].h.0[l % W] = T::zero();
             self.idle[l / W].0[l % W] = lit(IDLE);
             self.moving -= 1;
@@ -272,7 +272,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         self.put(l, &rigid.kinematics(&JointState { q: state.q.into(), dq: state.dq.into() }));
     }
 
-    /// Gives lane `l` other directions.
+    /// Sets the sliding directions of lane `l`.
     #[inline]
     fn set_direction(&mut self, l: usize, direction: &[T; N]) {
         for j in 0..N {
@@ -281,7 +281,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         self.modes_stale = true;
     }
 
-    /// Puts lane `l` into a pose.
+    /// Sets the kinematic state of lane `l`.
     #[inline]
     fn put(&mut self, l: usize, own: &KinematicState<T, N>) {
         let (l, i) = (l % W, l / W);
@@ -296,7 +296,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
     }
 
-    /// Sets lanes that only go a part of their interval to that.
+    /// Sets the spans of lanes that step over a part of their interval only.
     #[inline(never)]
     fn set_partial_steps(&mut self) {
         self.extent = StepExtent::Full;
@@ -323,7 +323,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
     }
 
-    /// What comes of lane `l`'s step; whether it is at the end of its interval.
+    /// Resolves lane `l`'s step; returns whether the lane is at the end of its interval.
     #[inline(never)]
     fn judge(&mut self, l: usize) -> bool {
         let (i, lane) = (l / W, l % W);

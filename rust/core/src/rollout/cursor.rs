@@ -1,4 +1,4 @@
-//! One lane's part of what is side by side.
+//! The cursor of a run in a lane, and access to one lane's values.
 
 use super::Run;
 use crate::cpu::Cpu;
@@ -19,7 +19,7 @@ use nalgebra::SVector;
 type Rows<'a, T, const N: usize> =
     Zip<Zip<Zip<Iter<'a, T>, Iter<'a, T>>, Iter<'a, [InputSegment<T>; N]>>, IterMut<'a, [T; N]>>;
 
-/// A run on its way through a lane.
+/// Position of a lane in its run: the current interval and the rows that follow.
 pub(super) struct RunCursor<'a, T, const N: usize> {
     rows: Rows<'a, T, N>,
     /// The interval it is in; none at the end.
@@ -29,7 +29,7 @@ pub(super) struct RunCursor<'a, T, const N: usize> {
 }
 
 impl<'a, T: Real, const N: usize> RunCursor<'a, T, N> {
-    /// That of a run, at its first interval.
+    /// At the first interval of a run.
     pub(super) fn of<A, const P: usize>(run: &mut Run<'a, T, A, N, P>) -> Option<Self> {
         let ends = run.t.get(1..)?;
         let positions = core::mem::take(&mut run.positions).as_chunks_mut().0;
@@ -72,7 +72,7 @@ pub(super) fn start_interval<T: Real, C: Cpu, const W: usize, const N: usize>(
     }
 }
 
-/// The numbers of lane `l`.
+/// Values of lane `l`.
 #[inline]
 pub(super) fn lane_values<T: Real, C, const W: usize, const N: usize>(
     x: &[Lanes<T, C, W>; N],
@@ -81,7 +81,7 @@ pub(super) fn lane_values<T: Real, C, const W: usize, const N: usize>(
     from_fn(|j| x[j].0[l])
 }
 
-/// Lane `l`'s place.
+/// Joint state of lane `l`.
 #[inline]
 pub(super) fn lane_of<T: Real, C, const W: usize, const N: usize>(
     joints: &JointState<Lanes<T, C, W>, N>,
@@ -99,7 +99,7 @@ pub(super) fn sincos_of<T: Real, C, const W: usize, const N: usize>(
     from_fn(|j| SinCos { sine: sincos[j].sine.0[l], cosine: sincos[j].cosine.0[l] })
 }
 
-/// What holds lane `l`.
+/// Static friction of lane `l`.
 #[inline]
 pub(super) fn static_friction_of<T: Real, C, const W: usize, const N: usize>(
     friction: &StaticFriction<Lanes<T, C, W>, N>,
@@ -111,7 +111,7 @@ pub(super) fn static_friction_of<T: Real, C, const W: usize, const N: usize>(
     }
 }
 
-/// A state of its own.
+/// State of the scalar integrator from a joint state and sliding directions.
 #[inline]
 pub(super) fn state_of<T: Real, const N: usize>(
     joints: &JointState<T, N>,

@@ -1,4 +1,4 @@
-//! What comes of a step in which a lane's friction modes may have changed.
+//! One lane's step in which friction modes may have changed, and what to do about it.
 
 use super::clock::{Clock, MAX_CHANGES, Reversal};
 use crate::fixed_mode::StaticFriction;
@@ -8,13 +8,13 @@ use crate::real::Real;
 
 /// One lane's part of a step.
 pub(super) struct LaneStep<T, const N: usize> {
-    /// Where it started and where it ended.
+    /// Joint states at its start and its end.
     pub(super) ends: [JointState<T, N>; 2],
     /// Accelerations there.
     pub(super) ddq: [[T; N]; 2],
-    /// What it takes there to hold stuck joints, if there are any.
+    /// Static friction there, if any joint is stuck.
     pub(super) static_friction: Option<[StaticFriction<T, N>; 2]>,
-    /// Positive, or no number, where it went too far for one step.
+    /// > 0 or NaN if the step exceeds the angle range.
     pub(super) range_violation: T,
     /// Joints with dry friction.
     pub(super) dry: [bool; N],
@@ -24,15 +24,15 @@ pub(super) struct LaneStep<T, const N: usize> {
     pub(super) inertia: [[T; N]; N],
 }
 
-/// What to do about it.
+/// What to do after the step.
 pub(super) enum StepOutcome<T, const N: usize> {
-    /// It is right: the lane goes on from its end.
+    /// The modes hold: the lane goes on from its end.
     Accepted,
-    /// It ended at a reversal, which is here.
+    /// It ended at a reversal, with this joint state.
     Reversed(JointState<T, N>),
-    /// It is taken again from its start.
+    /// It is repeated from its start with other modes or another length.
     Repeat,
-    /// What is left of the interval is for the lane alone.
+    /// The scalar integrator takes the rest of the interval.
     Scalar,
 }
 
@@ -53,7 +53,7 @@ impl<T: Real, const N: usize> LaneStep<T, N> {
         outcome
     }
 
-    /// Releases the joint that friction holds least, and holds one that was released to no avail.
+    /// Releases the joint with the largest stiction violation, and sticks one that was released but is pulled back.
     fn settle(&self, clock: &mut Clock<T, N>, direction: &mut [T; N]) -> Option<StepOutcome<T, N>> {
         let (mut released, mut worst) = (None, T::zero());
         for j in 0..N {
@@ -140,7 +140,7 @@ impl<T: Real, const N: usize> LaneStep<T, N> {
         StepOutcome::Reversed(joints)
     }
 
-    /// By how much the acceleration of joint `j` changes where its dry friction turns round, all other joints free to move.
+    /// Change of joint `j`'s acceleration when its dry friction reverses, all other joints free to move.
     fn acceleration_step(&self, j: usize) -> T {
         let mut own = self.inertia[j][j];
         for i in 0..N {

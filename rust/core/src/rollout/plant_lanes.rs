@@ -45,7 +45,7 @@ pub(super) struct PlantLanes<'a, T: Real, C, A, const W: usize, const N: usize, 
 impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: usize>
     PlantLanes<'a, T, C, A, W, N, P>
 {
-    /// The same plant in all lanes.
+    /// One plant, copied into all lanes.
     pub(super) fn new(plant: &'a Plant<T, A, N, P>) -> Self {
         let RigidArm { arm, theta, viscous, coulomb, constant_inertia, tilt } = plant.rigid();
         let rigid = RigidArm {
@@ -172,7 +172,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         Lanes::new(sums)
     }
 
-    /// By how much holding joint `j` takes more than friction gives, in the lanes where it is stuck.
+    /// Stiction violation of joint `j` in the lanes where it is stuck.
     #[inline(never)]
     fn stiction_violations(
         &self,
@@ -193,7 +193,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
     }
 }
 
-/// A bundle on its way. Without effects it is known whether any joint is held, and a step is one piece of code without a branch.
+/// Dynamics of the lanes. Without effects it is known whether any joint is stuck, and a step is code without a branch.
 pub(super) struct LaneDynamics<'b, B, const EFFECTS: bool, const ANY_STUCK: bool>(pub(super) &'b B);
 
 impl<

@@ -19,7 +19,8 @@ const LONGEST: f64 = 2.5;
 /// A push that lowers the cost of the windows it touches by less than this share is not seen there.
 const HELPS: f64 = 0.01;
 
-/// The same, beside a remainder, where the model fitted to the recording with the push is compared to that fitted without it.
+/// Beside a remainder, a push that lowers the cost of the windows it touches by less than this share is not seen there; the model fitted to
+/// the recording with the push is compared to that fitted without it.
 const HELPS_OWN: f64 = 0.02;
 
 /// Least share of the cost of the windows it touches that a push must explain before its size by output error is believed.
@@ -159,7 +160,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         self.residual_under(self.model, p)
     }
 
-    /// The same under another model.
+    /// Whitened residual under another model and a push of these values.
     fn residual_under(&self, model: &Hypothesis<P>, p: &Vector3<f64>) -> Vec<f64> {
         let mut data = self.sample.data.clone();
         data.tracks[0].pushes = self.with(p);

@@ -80,7 +80,7 @@ struct PushState<'a, const N: usize, const P: usize> {
     remainder: bool,
     /// Improvement relative to the motion below which nothing is worth a name.
     min_relevance: f64,
-    /// The same for what stands far out of noise.
+    /// Improvement relative to the motion below which nothing is worth a name, for what stands far out of noise.
     faintest: f64,
 }
 
