@@ -110,6 +110,12 @@ class Arm:
         return np.array([i for i in range(self.n_inertial) if self.parameter_units[i] == weight], dtype=np.intp)
 
     @property
+    def expects_weight(self) -> bool:
+        """Whether the weights in `theta` are those of an arm that hangs down at zero: none negative, one positive."""
+        weights = self.theta[self.gravity_parameters]
+        return bool(np.all(weights >= 0) and np.any(weights > 0))
+
+    @property
     def _kind(self) -> dict[str, Any]:
         return kinds()[self.kind]
 

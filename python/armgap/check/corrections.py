@@ -16,15 +16,17 @@ from armgap.log import Finding, Log
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["CORRECTIONS", "Corrections", "GravityCorrection"]
+__all__ = ["CORRECTIONS", "Corrections", "GravityCorrection", "PositionUnit"]
 
 GravityCorrection = Literal["reversed", "compensated"]
+PositionUnit = Literal["deg", "turns"]
 
 _COLUMN = re.compile(r"(q|dq|tau)([1-9]\d*)")
 _POSITION = re.compile(r"q([1-9]\d*)")
 _TORQUE = re.compile(r"tau([1-9]\d*)?")
 _ANGLE = re.compile(r"(?P<number>[-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|m|turns)?")
 _ANGLE_UNITS = {"deg": math.pi / 180, "rad": 1.0, "m": 1.0, "turns": 2 * math.pi, None: 1.0}
+_SPAN = re.compile(r"(?:(?P<log>.+):)?(?P<first>[\d.]+)-(?P<last>[\d.]+)")
 # Standard deviation [SI] left to gravity parameters that are known to be zero.
 _NO_GRAVITY_SIGMA = 1e-9
 
@@ -33,7 +35,8 @@ _NO_GRAVITY_SIGMA = 1e-9
 class Corrections:
     """How the columns of the logs differ from what the arm file means.
 
-    They are applied in this order: `swap`, `flip`, `zero`, `absolute` and `relative`, `factor`, `shift`; `gravity` is about the arm.
+    They are applied in this order: `unit`, `swap`, `flip`, `zero`, `absolute` and `relative`, `factor`, `skip`, `shift`; `gravity` is about
+    the arm.
 
     Attributes
     ----------
@@ -54,6 +57,10 @@ class Corrections:
     gravity : {"reversed", "compensated"}, optional
         ``"reversed"``: gravity acts the other way than the arm file says; ``"compensated"``: torques were logged without what
         carries the arm's weight, or the arm moves in a horizontal plane.
+    unit : {"deg", "turns"}, optional
+        Unit of all positions where it is not rad.
+    skip : tuple of str
+        Times of a log that are left out, in seconds from its first sample: ``"0-2.5"``, or ``"run1:0-2.5"`` of one log.
 
     Examples
     --------
@@ -69,6 +76,8 @@ class Corrections:
     factor: Mapping[str, float] = field(default_factory=dict)
     shift: Mapping[str, float] = field(default_factory=dict)
     gravity: GravityCorrection | None = None
+    unit: PositionUnit | None = None
+    skip: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         """Whether there is anything to correct."""
@@ -96,6 +105,9 @@ class Corrections:
         gravity = given.get("gravity")
         if gravity is not None and gravity not in get_args(GravityCorrection):
             raise OptionError(f"gravity cannot be `{gravity}`", remedy="write reversed or compensated")
+        unit = given.get("unit")
+        if unit is not None and unit not in get_args(PositionUnit):
+            raise OptionError(f"positions cannot be in `{unit}`", remedy="write deg or turns")
         return cls(
             flip=tuple(_column("flip", word) for word in _words(given.get("flip", ()))),
             zero={k: _angle(v) for k, v in _pairs("zero", given.get("zero", ()), _POSITION, "q1=180deg")},
@@ -107,6 +119,8 @@ class Corrections:
             },
             shift={k: _seconds(v) for k, v in _pairs("shift", given.get("shift", ()), _TORQUE, "tau=-0.005")},
             gravity=gravity,
+            unit=unit,
+            skip=tuple(_span(word) for word in _words(given.get("skip", ()))),
         )
 
     def merged(self, other: Corrections) -> Corrections:
@@ -120,23 +134,29 @@ class Corrections:
             factor={**self.factor, **other.factor},
             shift={**self.shift, **other.shift},
             gravity=other.gravity or self.gravity,
+            unit=other.unit or self.unit,
+            skip=tuple(dict.fromkeys((*self.skip, *other.skip))),
         )
 
     def options(self) -> tuple[str, ...]:
         """Return the command line's options for this."""
-        words = [f"--flip {','.join(self.flip)}"] if self.flip else []
+        words = [f"--units q={self.unit}"] if self.unit else []
+        words += [f"--flip {','.join(self.flip)}"] if self.flip else []
         words += [f"--zero {column}={_in_degrees(value)}" for column, value in self.zero.items()]
         words += [f"--swap {a},{b}" for a, b in self.swap]
         words += [f"--absolute {column}" for column in self.absolute]
         words += [f"--relative {column}" for column in self.relative]
         words += [f"--factor {column}={value:.4g}" for column, value in self.factor.items()]
         words += [f"--shift {column}={value:.4g}" for column, value in self.shift.items()]
+        words += [f"--skip {span}" for span in self.skip]
         return (*words, *((f"--gravity {self.gravity}",) if self.gravity else ()))
 
     def to_dict(self) -> dict[str, Any]:
         """Return what there is to correct, ready for JSON."""
         given = {f.name: getattr(self, f.name) for f in fields(self)}
-        plain = {k: list(v) if isinstance(v, tuple) else dict(v) if isinstance(v, Mapping) else v for k, v in given.items()}
+        plain = {
+            k: list(v) if isinstance(v, tuple) else dict(v) if isinstance(v, Mapping) else v for k, v in given.items()
+        }
         return {k: v for k, v in plain.items() if v}
 
     def on_log(self, log: Log) -> Log:
@@ -154,6 +174,8 @@ class Corrections:
         dq = None if log.dq is None else log.dq.copy()
         arrays = {"q": q, "tau": tau, "dq": dq}
         self._check_joints(log)
+        if self.unit is not None:
+            q *= _ANGLE_UNITS[self.unit]
         for a, b in self.swap:
             kind, i, j = _split(a)[0], _split(a)[1], _split(b)[1]
             for name in ("q", "dq") if kind == "q" else (kind,):
@@ -176,11 +198,28 @@ class Corrections:
                     dq[:, j] += sign * dq[:, j - 1]
         for column, value in self.factor.items():
             tau[:, _torques(column)] *= value
+        if self.skip:
+            keep = ~self._skipped(log)
+            if not keep.any():
+                raise OptionError(f"--skip leaves nothing of {log.name}", remedy="leave out less")
+            log = replace(log, t=log.t[keep])
+            q, tau, dq = q[keep], tau[keep], None if dq is None else dq[keep]
         if self.shift:
             log, tau, keep = _shifted(log, tau, self.shift.get("tau", 0.0))
             q, dq = q[keep], None if dq is None else dq[keep]
         said = Finding("corrected", f"read with {' '.join(about_log.options())}")
         return replace(log, q=q, tau=tau, dq=dq, findings=(*log.findings, said))
+
+    def _skipped(self, log: Log) -> Any:
+        """Return which samples are left out."""
+        skipped = np.zeros(len(log), dtype=bool)
+        since = log.t - log.t[0]
+        for span in self.skip:
+            match = _SPAN.fullmatch(span)
+            assert match is not None
+            if match["log"] in (None, log.name):
+                skipped |= (since >= float(match["first"])) & (since <= float(match["last"]))
+        return skipped
 
     def on_arm(self, arm: Arm) -> Arm:
         """Return the arm with gravity as these corrections say."""
@@ -243,7 +282,9 @@ def _words(value: str | Iterable[str]) -> list[str]:
 
 def _column(option: str, word: str) -> str:
     if not _COLUMN.fullmatch(word):
-        raise OptionError(f"--{option}: `{word}` is no column of a log", remedy=f"write --{option} tau1 or --{option} q1")
+        raise OptionError(
+            f"--{option}: `{word}` is no column of a log", remedy=f"write --{option} tau1 or --{option} q1"
+        )
     return word
 
 
@@ -265,7 +306,9 @@ def _pairs(option: str, value: Any, column: re.Pattern[str], example: str) -> li
             pairs.append((key, number))
     for key, _ in pairs:
         if not column.fullmatch(key):
-            raise OptionError(f"--{option}: `{key}` is not a column that it is about", remedy=f"write --{option} {example}")
+            raise OptionError(
+                f"--{option}: `{key}` is not a column that it is about", remedy=f"write --{option} {example}"
+            )
     return pairs
 
 
@@ -276,7 +319,8 @@ def _exchanges(value: Any) -> tuple[tuple[str, str], ...]:
         kinds = {match[1] for word in pair if (match := _COLUMN.fullmatch(word))}
         if len(pair) != 2 or len(kinds) != 1 or pair[0] == pair[1] or not all(_COLUMN.fullmatch(w) for w in pair):
             raise OptionError(
-                f"--swap: `{','.join(pair)}` are not two columns of one kind", remedy="write --swap q1,q2 or --swap tau1,tau2"
+                f"--swap: `{','.join(pair)}` are not two columns of one kind",
+                remedy="write --swap q1,q2 or --swap tau1,tau2",
             )
     return tuple((a, b) for a, b in pairs)
 
@@ -308,6 +352,19 @@ def _finite(option: str, number: float) -> float:
     if not math.isfinite(number):
         raise OptionError(f"--{option}: {number} is not a finite number", remedy="correct it")
     return number
+
+
+def _span(word: str) -> str:
+    match = _SPAN.fullmatch(word)
+    try:
+        good = match is not None and float(match["first"]) < float(match["last"])
+    except ValueError:
+        good = False
+    if not good:
+        raise OptionError(
+            f"--skip: `{word}` are no times", remedy="write --skip 0-2.5 or --skip NAME:0-2.5, in seconds"
+        )
+    return word
 
 
 def _in_degrees(value: float) -> str:

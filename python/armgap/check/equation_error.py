@@ -106,38 +106,58 @@ class Fit:
 
 
 class EquationError:
-    """Rows of several logs, and what bounded parameters leave of their torques."""
+    """Normal equations of several logs, joint by joint, and what bounded parameters leave of their torques."""
 
     def __init__(self, rows: Sequence[Rows], arm: Arm, scale: Array | None = None) -> None:
         self.arm = arm
-        self.psi = np.concatenate([r.psi for r in rows])
-        self.y = np.concatenate([r.y for r in rows])
+        self.rows = tuple(rows)
+        self.count = sum(len(r.y) for r in rows)
+        self.gram = sum(np.einsum("kji,kjl->jil", r.psi, r.psi, optimize=True) for r in rows) / max(self.count, 1)
+        self.moment, self.square = self._moments([r.y for r in rows])
         self.scale = self._scale() if scale is None else scale
+
+    def _moments(self, torques: Sequence[Array]) -> tuple[Array, Array]:
+        """Return the products of the regressor with torques, and of torques with themselves, per joint."""
+        pairs = list(zip(self.rows, torques, strict=True))
+        moment = sum(np.einsum("kji,kj->ji", r.psi, y) for r, y in pairs) / max(self.count, 1)
+        square = sum(np.sum(y**2, axis=0) for y in torques) / max(self.count, 1)
+        return np.asarray(moment), np.asarray(square)
 
     def _scale(self) -> Array:
         """Mean square per joint of the torque, or of the largest term of the equation of motion as the arm file has it.
 
         Inertia and weight cancel near a resonance, where the torque alone would be a small measure.
         """
-        terms = np.mean((self.psi * self.arm.theta) ** 2, axis=0).max(axis=1)
-        return np.maximum(np.maximum(np.mean(self.y**2, axis=0), terms), 1e-30)
+        terms = (np.diagonal(self.gram, axis1=1, axis2=2) * self.arm.theta**2).max(axis=1)
+        return np.maximum(np.maximum(self.square, terms), 1e-30)
 
-    def fit(self, low: Array, high: Array, y: Array | None = None) -> Fit:
-        """Return the parameters between `low` and `high` that explain the torques best."""
-        n, p = self.psi.shape[1:]
-        y = self.y if y is None else y
-        weight = np.sqrt(1.0 / self.scale)
-        a = (self.psi * weight[:, None]).reshape(-1, p)
-        b = (y * weight).reshape(-1)
-        size = np.linalg.norm(a, axis=0)
+    def fit(self, low: Array, high: Array, torques: Sequence[Array] | None = None) -> Fit:
+        """Return the parameters between `low` and `high` that explain the torques, or others in their place, best."""
+        moment, square = (self.moment, self.square) if torques is None else self._moments(torques)
+        return self._solve(low, high, moment, square, self.scale)
+
+    def with_factors(self, low: Array, high: Array, factors: Array) -> Fit:
+        """Return the fit to torques times a factor per joint."""
+        scale = np.maximum(self.scale, self.square * factors**2)
+        return self._solve(low, high, self.moment * factors[:, None], self.square * factors**2, scale)
+
+    def _solve(self, low: Array, high: Array, moment: Array, square: Array, scale: Array) -> Fit:
+        gram = np.einsum("jil,j->il", self.gram, 1.0 / scale)
+        size = np.sqrt(np.diag(gram))
         size[size == 0] = 1.0
-        a = a / size
-        theta = _bounded(a.T @ a, a.T @ b, low * size, high * size) / size
-        residual = y - self.psi @ theta
-        return Fit(theta, np.mean(residual**2, axis=0) / self.scale)
+        theta = (
+            _bounded(gram / np.outer(size, size), (moment / scale[:, None]).sum(axis=0) / size, low * size, high * size)
+            / size
+        )
+        left = square - 2.0 * moment @ theta + np.einsum("i,jil,l->j", theta, self.gram, theta)
+        return Fit(theta, np.maximum(left, 0.0) / scale)
+
+    def expected(self) -> Array:
+        """Return per joint the factor that makes the arm file's own torques of the logged ones, by least squares."""
+        return (self.moment @ self.arm.theta) / np.maximum(self.square, 1e-30)
 
     def __len__(self) -> int:
-        return len(self.y)
+        return self.count
 
 
 def bounds(arm: Arm, factor: float = _TRUST_FACTOR) -> tuple[Array, Array]:
