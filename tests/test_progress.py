@@ -16,7 +16,7 @@ import pytest
 
 from armgap import Arm, Log, diagnose, seed_torque, simulate
 from armgap.cli.progress import left
-from armgap.progress import following, of_many, tell
+from armgap.progress import part_callback, report_progress, use_callback
 from armgap.simulation import Effect
 
 CONTROL_C = b"\x03"
@@ -107,7 +107,7 @@ def test_an_interrupt_or_an_error_of_the_callback_ends_a_diagnosis(arm, motion):
 def test_reading_tells_the_file_and_how_much_of_it(name, seed_log, tmp_path):
     seed_log.write(tmp_path / name)
     told: list[tuple[str, float]] = []
-    with following(lambda work, fraction: told.append((work, fraction))):
+    with use_callback(lambda work, fraction: told.append((work, fraction))):
         Log.read(tmp_path / name)
     assert {work for work, _ in told} == {f"reading {name}"}
     assert max(fraction for _, fraction in told) > 0.5
@@ -115,12 +115,12 @@ def test_reading_tells_the_file_and_how_much_of_it(name, seed_log, tmp_path):
 
 def test_parts_of_many_share_the_whole():
     told: list[tuple[str, float]] = []
-    with following(lambda work, fraction: told.append((work, fraction))):
+    with use_callback(lambda work, fraction: told.append((work, fraction))):
         for part in range(2):
-            with following(of_many("both", part, 2)):
-                tell("one", 0.0)
-                tell("one", 1.0)
-        tell("after", 0.5)
+            with use_callback(part_callback("both", part, 2)):
+                report_progress("one", 0.0)
+                report_progress("one", 1.0)
+        report_progress("after", 0.5)
     assert told == [("both", 0.0), ("both", 0.5), ("both", 0.5), ("both", 1.0), ("after", 0.5)]
 
 

@@ -159,7 +159,7 @@ def _bands(all_figures: Sequence[Figures]) -> str:
     rows = [(name, *(_plain(s.get(name)) for s in shares)) for name in shares[0]]
     return (
         "## By how far the effect stands out\n\nError of predictions over 0.2 s with the re-estimated arm, where it is largest, "
-        "as a multiple of what it is without the effect; of a pair, the fainter.\n\n"
+        "as a multiple of what it is without the effect; of a pair, the smaller.\n\n"
         + table(("stands out by", *_titles(all_figures)), rows)
     )
 

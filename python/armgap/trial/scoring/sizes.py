@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from armgap.trial.answers import Answer, Limit, Named
-from armgap.trial.key import Hidden, Key
+from armgap.trial.answers import AbsentEffect, Answer, NamedCause
+from armgap.trial.key import HiddenEffect, Key
 from armgap.trial.verdict import equivalent
 
 __all__ = ["BoundScore", "SizeScore", "bound_scores", "size_scores"]
@@ -106,7 +106,7 @@ def bound_scores(answer: Answer, key: Key) -> list[BoundScore]:
     return found
 
 
-def _size(cause: Named, hidden: Hidden) -> SizeScore:
+def _size(cause: NamedCause, hidden: HiddenEffect) -> SizeScore:
     if cause.effect in VECTOR:
         return _vector(cause, hidden, VECTOR[cause.effect])
     key = MAIN[cause.effect]
@@ -117,14 +117,14 @@ def _size(cause: Named, hidden: Hidden) -> SizeScore:
     return SizeScore(cause.effect, abs(told - truth) / abs(truth), _covers(told - truth, sigma))
 
 
-def _truth(hidden: Hidden, key: str) -> float:
+def _truth(hidden: HiddenEffect, key: str) -> float:
     """Hidden size in the library's terms, from its neutral value."""
     if hidden.effect == "rotor_coupling":  # the library states what the rotor adds off the diagonal
         return hidden.parameters["inertia"] * hidden.parameters["gear"]
     return hidden.parameters[key] - NEUTRAL.get(hidden.effect, 0.0)
 
 
-def _vector(cause: Named, hidden: Hidden, keys: tuple[str, ...]) -> SizeScore:
+def _vector(cause: NamedCause, hidden: HiddenEffect, keys: tuple[str, ...]) -> SizeScore:
     apart = [cause.sizes[k].value - hidden.parameters[k] for k in keys]
     covers = [_covers(d, cause.sizes[k].sigma) for d, k in zip(apart, keys, strict=True)]
     covered = None if None in covers else all(c is True for c in covers)
@@ -136,5 +136,5 @@ def _covers(difference: float, sigma: float | None) -> bool | None:
     return None if sigma is None or sigma <= 0 else abs(difference) <= Z_95 * sigma
 
 
-def _bound(limit: Limit, hidden: Hidden) -> BoundScore:
+def _bound(limit: AbsentEffect, hidden: HiddenEffect) -> BoundScore:
     return BoundScore(hidden.effect, hidden.joint, limit.value, _truth(hidden, limit.parameter))
