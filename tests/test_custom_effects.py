@@ -76,7 +76,7 @@ def test_what_knows_the_library_only_still_works(fanned: tuple[list[Path], armga
         ([armgap.CustomEffect("fan", 1, lambda t, q, dq, tau: np.zeros(3))], "shape (3,)"),
         ([armgap.CustomEffect("fan", 1, lambda t, q, dq, tau: 0 * t)], "zero all along"),
         ([armgap.CustomEffect("fan", 1, lambda t, q, dq, tau: np.full(len(t), np.nan))], "is nan"),
-        ([armgap.CustomEffect(f"fan{i}", 1, law) for i in range(5)], "5 effects"),
+        ([armgap.CustomEffect(f"fan{i}", 1, law) for i in range(5)], "5 custom effects"),
     ],
 )
 def test_unusable_effects_are_refused(

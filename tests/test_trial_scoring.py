@@ -102,8 +102,8 @@ def test_interval_of_a_share_holds_the_share(right, of):
 
 
 def test_sizes_and_intervals():
-    told = NamedCause("stribeck", 2, 0.9, {"amplitude": Size(0.55, 0.02), "velocity": Size(0.1, 0.01)})
-    [score] = size_scores(answer(told), key(STRIBECK))
+    stated = NamedCause("stribeck", 2, 0.9, {"amplitude": Size(0.55, 0.02), "velocity": Size(0.1, 0.01)})
+    [score] = size_scores(answer(stated), key(STRIBECK))
     assert (round(score.error, 9), score.covered) == (0.1, False)
     gain = HiddenEffect("torque_gain", 1, {"gain": 0.8})
     [score] = size_scores(answer(NamedCause("torque_gain", 1, 0.9, {"gain": Size(0.81, 0.01)})), key(gain))

@@ -74,7 +74,7 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     """Load a public name when it is first used, so that importing the package stays fast."""
     if name not in _HOMES:
-        return import_module("armgap._renamed").old_names(__name__)(name)
+        return import_module("armgap._renamed").old_names(__name__, stacklevel=3)(name)
     value = getattr(import_module(_HOMES[name]), name)
     globals()[name] = value
     return value

@@ -32,13 +32,15 @@ RENAMED = {
 }
 
 
-def old_names(module: str) -> Callable[[str], Any]:
+def old_names(module: str, *, stacklevel: int = 2) -> Callable[[str], Any]:
     """Return the ``__getattr__`` of a module some of whose names have changed.
 
     Parameters
     ----------
     module : str
         Name of the module.
+    stacklevel : int, default 2
+        Frame that the warning names: 2 is the caller of ``__getattr__`` where this is the returned function itself.
 
     Examples
     --------
@@ -55,7 +57,7 @@ def old_names(module: str) -> Callable[[str], Any]:
         if old not in RENAMED:
             raise AttributeError(f"module {module!r} has no attribute {name!r}")
         new = RENAMED[old]
-        warnings.warn(f"{old} is now {new}; the old name goes with 0.3.0", DeprecationWarning, stacklevel=2)
+        warnings.warn(f"{old} is now {new}; the old name goes with 0.3.0", DeprecationWarning, stacklevel=stacklevel)
         home, _, changed = new.rpartition(".")
         return getattr(import_module(home), changed)
 

@@ -19,7 +19,7 @@ from armgap.cli.common import check_outputs, console, interruptible, json_option
 from armgap.cli.progress import working
 from armgap.errors import OptionError
 from armgap.progress import report_progress, use_callback
-from armgap.trial.commands import all_of_it, baselines, make, peers, run, score
+from armgap.trial.commands import all_of_it, baselines, former_name, make, run, score
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -77,7 +77,7 @@ def command(
     say.print(f"right: {right} of {len(scores)}")
 
 
-for _step in (make, run, score, baselines, peers, all_of_it):
+for _step in (make, run, score, baselines, former_name, all_of_it):
     command.add_command(_step)
 
 

@@ -77,7 +77,7 @@ def _excitation(e: Excitation) -> str:
         "good" if e.condition <= _RECOMMENDED else f"above {_RECOMMENDED:g} parameters can stand in for each other"
     )
     said = f"condition number {_plain(e.condition)} ({quality})"
-    said += f"; told least: {e.weakest}" if weak else ""
+    said += f"; least excited: {e.weakest}" if weak else ""
     return f"{said}; not well excited: {', '.join(weak)}" if weak else f"{said}; every parameter is well excited"
 
 

@@ -22,7 +22,9 @@ __all__ = ["all_of_it"]
 @workers_option
 @limit_option
 @click.option("--baselines/--no-baselines", default=True, show_default=True, help="Let other methods answer too.")
-@click.option("--peers/--no-peers", default=None, hidden=True)  # former name of --baselines; goes with 0.3.0
+@click.option(
+    "--peers/--no-peers", "former_name", default=None, hidden=True
+)  # former name of --baselines; goes with 0.3.0
 @json_option
 @md_option
 @quiet_option
@@ -34,7 +36,7 @@ def all_of_it(
     workers: int,
     limit_s: float,
     baselines: bool,
-    peers: bool | None,
+    former_name: bool | None,
     json_file: str | None,
     md_file: str | None,
     quiet: bool,
@@ -46,7 +48,7 @@ def all_of_it(
     from armgap.trial.methods import methods
 
     check_outputs(json_file, md_file)
-    names = list(methods()) if (baselines if peers is None else peers) else ["armgap"]
+    names = list(methods()) if (baselines if former_name is None else former_name) else ["armgap"]
     for name in names:
         methods()[name].check()  # what is not installed is missed now, not after the cases are made
     silent = quiet or "-" in (json_file, md_file)

@@ -10,7 +10,7 @@ import click
 from armgap.cli.common import console, quiet_option
 from armgap.trial.commands.common import folder_argument, progress, workers_option
 
-__all__ = ["answer_all", "baselines", "limit_option", "peers", "run"]
+__all__ = ["answer_all", "baselines", "former_name", "limit_option", "run"]
 
 limit_option = click.option(
     "--limit",
@@ -56,7 +56,7 @@ def baselines(folder: Path, only: tuple[str, ...], workers: int, limit_s: float,
 
 
 #: Former name of the command; goes with 0.3.0.
-peers = click.Command(
+former_name = click.Command(
     "peers", callback=baselines.callback, params=baselines.params, help=baselines.help, hidden=True, deprecated=True
 )
 

@@ -1,4 +1,4 @@
-"""How well sizes are told: error of a named cause's size, intervals that hold the truth, bounds of what is called absent."""
+"""How well sizes are stated: error of a named cause's size, intervals that hold the truth, bounds of what is called absent."""
 
 from __future__ import annotations
 
@@ -111,10 +111,10 @@ def _size(cause: NamedCause, hidden: HiddenEffect) -> SizeScore:
         return _vector(cause, hidden, VECTOR[cause.effect])
     key = MAIN[cause.effect]
     truth = _truth(hidden, key)
-    told, sigma = cause.sizes[key].value - NEUTRAL.get(cause.effect, 0.0), cause.sizes[key].sigma
+    stated, sigma = cause.sizes[key].value - NEUTRAL.get(cause.effect, 0.0), cause.sizes[key].sigma
     if key == "amplitude" and cause.effect == "torque_ripple":
-        told, truth = abs(told), abs(truth)  # the sign is in the phase
-    return SizeScore(cause.effect, abs(told - truth) / abs(truth), _covers(told - truth, sigma))
+        stated, truth = abs(stated), abs(truth)  # the sign is in the phase
+    return SizeScore(cause.effect, abs(stated - truth) / abs(truth), _covers(stated - truth, sigma))
 
 
 def _truth(hidden: HiddenEffect, key: str) -> float:
