@@ -102,7 +102,7 @@ def test_power_balance_without_friction():
     assert energy(x.q_true[-1], x.dq_true[-1]) == pytest.approx(work, rel=1e-9)
 
 
-@pytest.mark.parametrize(("build", "change"), [
+@pytest.mark.parametrize(("config", "change"), [
     (PlantConfig(DIRECT_DRIVE), {}),
     (PlantConfig(DIRECT_DRIVE, payload=(0.8, 0.2)), {"payload": (0.8, 0.2)}),
     (PlantConfig(DIRECT_DRIVE, armature={1: 0.05}), {"armature": 0.05}),

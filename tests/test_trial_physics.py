@@ -16,7 +16,7 @@ from armgap.trial.effects import REGISTRY
 from armgap.trial.excitation import Tracked, rings
 from armgap.trial.key import HiddenEffect
 from armgap.trial.plant import PlantConfig
-from armgap.trial.simulated_arm import SimulatedArm, Source, Trace, run
+from armgap.trial.simulated_arm import SimulatedArm, CommandSource, Trace, run
 from dry_friction import DryArm
 
 TH = np.array(DIRECT_DRIVE.theta)
@@ -57,7 +57,7 @@ ORACLES = {
 }
 
 
-def paper_torque(scale: tuple[float, float] = (1.0, 1.0)) -> Source:
+def paper_torque(scale: tuple[float, float] = (1.0, 1.0)) -> CommandSource:
     """Equations (31)-(32) of Reyes and Kelly (1997), scaled per joint."""
 
     def command(t: float, _q: list[float]) -> list[float]:

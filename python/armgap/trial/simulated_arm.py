@@ -18,7 +18,7 @@ CommandSource = Callable[[float, list[float]], list[float]]
 
 @dataclass
 class SimulatedArm:
-    """What effects act on: the arm's build, an actuator and an encoder per joint."""
+    """What effects act on: the plant's configuration, an actuator and an encoder per joint."""
 
     config: PlantConfig
     actuators: list[Actuator] = field(default_factory=list)
