@@ -196,7 +196,7 @@ def facts(name: str) -> str:
         f"| source | {entry['source']} |",
         f"| excited by | {entry['excited_by']} |",
         "",
-        f"![{_title(entry)}: position with and without it, and the torque the model lacks]({name}.svg)",
+        f"![{_title(entry)}: position with and without it, and the residual torque]({name}.svg)",
         "",
         f"*{_bench(name)} with {_sizes(name)}. {_reading(name)}*",
         "",
@@ -230,7 +230,7 @@ def _sizes(name: str) -> str:
 
 def _reading(name: str) -> str:
     against = site_pictures.AXES[site_pictures.SIGNATURES[name].against].rpartition(" [")[0]
-    return f"Left: positions under the same torques. Right: the torque the model lacks, over {against}."
+    return f"Left: positions under the same torques. Right: the residual torque of the nominal model, over {against}."
 
 
 def _parameter(p: dict[str, Any], *, first: bool) -> str:

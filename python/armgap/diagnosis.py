@@ -8,22 +8,26 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from armgap import _native
+from armgap._renamed import old_names
 from armgap.arm import Arm
+from armgap.custom_effect import CustomEffect, TorqueTables
 from armgap.errors import LogShapeError, OptionError
 from armgap.evidence import laws, plausibility
 from armgap.log import Log, gather
 from armgap.log.findings import remarks
 from armgap.log.stretches import choose
-from armgap.own import OwnEffect, Tables
-from armgap.progress import Told, following, tell
-from armgap.report.notebook import Shown
+from armgap.progress import ProgressCallback, report_progress, use_callback
+from armgap.report.notebook import NotebookDisplay
 
-__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
+__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Location", "RuledOut", "Value", "diagnose"]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
 
 #: What a part of a log is called after the log's own name.
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
@@ -43,7 +47,7 @@ class Value:
 
 
 @dataclass(frozen=True)
-class AtHorizon:
+class GapAtHorizon:
     """RMS position error per joint on the holdout at one prediction horizon [s]; fields as in `Gap` [rad or m]."""
 
     horizon_s: float
@@ -69,9 +73,9 @@ class Gap:
     closed_ci : tuple of float
         95 % interval of it, from resampled windows.
     free_run_before, free_run_after : tuple of float
-        The same over the whole holdout, simulated from its first sample.
-    horizons : tuple of AtHorizon
-        The same at other prediction horizons, as far as the logs are long enough.
+        RMS error over the whole holdout, simulated from its first sample [rad or m].
+    horizons : tuple of GapAtHorizon
+        RMS errors at other prediction horizons, as far as the logs are long enough.
     """
 
     horizon_s: float
@@ -83,11 +87,11 @@ class Gap:
     closed_ci: tuple[float, float]
     free_run_before: tuple[float, ...]
     free_run_after: tuple[float, ...]
-    horizons: tuple[AtHorizon, ...] = ()
+    horizons: tuple[GapAtHorizon, ...] = ()
 
 
 @dataclass(frozen=True)
-class Place:
+class Location:
     """Where a part of the gap lies."""
 
     joint: int
@@ -147,7 +151,7 @@ _Record = TypeVar("_Record", Value, Equivalent, Bound)
 
 
 @dataclass(frozen=True)
-class Diagnosis(Shown):
+class Diagnosis(NotebookDisplay):
     """The result of `diagnose`.
 
     Attributes
@@ -157,7 +161,7 @@ class Diagnosis(Shown):
         named; ``"unexplained"``: a gap that no effect in the library explains.
     gap : Gap
         How far.
-    where : tuple of Place
+    where : tuple of Location
         Where, most of the gap first.
     causes : tuple of Cause
         Which, strongest first.
@@ -171,7 +175,7 @@ class Diagnosis(Shown):
 
     verdict: str
     gap: Gap
-    where: tuple[Place, ...]
+    where: tuple[Location, ...]
     causes: tuple[Cause, ...]
     ruled_out: tuple[RuledOut, ...]
     parameters: dict[str, dict[str, Value]]
@@ -201,7 +205,7 @@ class Diagnosis(Shown):
                 tuple(gap["free_run"]["after"]),
                 tuple(_at_horizon(h) for h in gap.get("horizons", ())),
             ),
-            where=tuple(_place(p) for p in data["where"]),
+            where=tuple(_location(p) for p in data["where"]),
             causes=tuple(_cause(c) for c in data["causes"]),
             ruled_out=tuple(_ruled_out(r) for r in data["ruled_out"]),
             parameters=parameters,
@@ -235,14 +239,14 @@ def _take(kind: type[_Record], data: dict[str, Any]) -> _Record:
     return kind(**{f.name: data[f.name] for f in fields(kind) if f.name in data})
 
 
-def _at_horizon(data: dict[str, Any]) -> AtHorizon:
+def _at_horizon(data: dict[str, Any]) -> GapAtHorizon:
     errors = (tuple(data[key]) for key in ("before", "refit", "after", "floor"))
-    return AtHorizon(data["horizon_s"], *errors)
+    return GapAtHorizon(data["horizon_s"], *errors)
 
 
-def _place(data: dict[str, Any]) -> Place:
+def _location(data: dict[str, Any]) -> Location:
     spread = data.get("range") or {}
-    return Place(
+    return Location(
         data["joint"], data["share"], data["regime"], data["detail"],
         spread.get("variable"), spread.get("from"), spread.get("to"),
     )  # fmt: skip
@@ -276,8 +280,8 @@ def diagnose(
     horizon: float = 0.25,
     max_causes: int = 4,
     seed: int = 1,
-    effects: Sequence[OwnEffect] = (),
-    progress: Told | None = None,
+    effects: Sequence[CustomEffect] = (),
+    progress: ProgressCallback | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between an arm's nominal model and its logs.
 
@@ -290,7 +294,7 @@ def diagnose(
         Training logs: anything that `Log.read` or `Log.from_frame` takes, and patterns such as ``"logs/*.parquet"``.
     arm : Arm or path
         Nominal model.
-    holdout : the same, optional
+    holdout : Log, path, pattern, table, or sequence of these, optional
         Logs to judge on. Without it the last 40 % of every training log are held out.
     horizon : float, default 0.25
         Prediction horizon [s].
@@ -298,8 +302,8 @@ def diagnose(
         Causes named at most.
     seed : int, default 1
         Seed of the resampling behind probabilities and intervals.
-    effects : sequence of OwnEffect, default none
-        Effects of your own that take part in the ranking, four at most.
+    effects : sequence of CustomEffect, default none
+        Custom effects that take part in the ranking, four at most.
     progress : callable, optional
         ``progress(work, fraction)`` is called now and then with what is being done and an estimate of how much of it is done, from 0
         to 1.
@@ -315,7 +319,7 @@ def diagnose(
     KeyboardInterrupt
         On an interrupt, within a fifth of a second.
     """
-    with following(progress):
+    with use_callback(progress):
         return _diagnose(logs, arm, holdout, horizon, max_causes, seed, effects)
 
 
@@ -326,7 +330,7 @@ def _diagnose(
     horizon: float,
     max_causes: int,
     seed: int,
-    effects: Sequence[OwnEffect],
+    effects: Sequence[CustomEffect],
 ) -> Diagnosis:
     """Check, read, split, choose; hand over to the core; and add what is known on this side."""
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
@@ -350,22 +354,24 @@ def _diagnose(
                 remedy="give a longer log or a shorter --horizon",
                 file=log.path or log.name,
             )
-    own = Tables.of(effects, training, held)
+    tables = TorqueTables.of(effects, training, held)
     joints = [e.joint - 1 for e in effects]
     options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed), "own": joints}
     try:
-        text = _native.diagnose(arm.to_native(), _columns(training, own), _columns(held, own), options, tell)
+        text = _native.diagnose(
+            arm.to_native(), _columns(training, tables), _columns(held, tables), options, report_progress
+        )
     except ValueError as error:
         raise _refused(str(error), training, held) from None
-    data = own.named(json.loads(text))
+    data = tables.named(json.loads(text))
     data["arm"]["name"] = arm.name
     for cause in data["causes"]:
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = notes + data["notes"]
-    known, logs_with_own = own.applied(data, (*training, *held))
+    known, corrected_logs = tables.applied(data, (*training, *held))
     count = len(training)
-    data["laws"] = laws(known, arm, logs_with_own[:count], logs_with_own[count:])
+    data["laws"] = laws(known, arm, corrected_logs[:count], corrected_logs[count:])
     data["plausibility"] = plausibility(known, arm)
     data["log_findings"] = [
         {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
@@ -430,6 +436,6 @@ def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
     return training, held
 
 
-def _columns(logs: list[Log], own: Tables) -> list[tuple[str, Any, Any, Any, list[Any]]]:
+def _columns(logs: list[Log], tables: TorqueTables) -> list[tuple[str, Any, Any, Any, list[Any]]]:
     fix = np.ascontiguousarray
-    return [(log.name, fix(log.t), fix(log.q), fix(log.tau), own.by_log[log.name]) for log in logs]
+    return [(log.name, fix(log.t), fix(log.q), fix(log.tau), tables.by_log[log.name]) for log in logs]

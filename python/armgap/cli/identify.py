@@ -22,7 +22,7 @@ from armgap.cli.common import (
     write,
 )
 from armgap.cli.progress import working
-from armgap.progress import following, of_many
+from armgap.progress import part_callback, use_callback
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
@@ -113,6 +113,6 @@ def _identified(
     work = [(log, scheme) for log in logs for scheme in schemes]
     results = []
     for number, (log, scheme) in enumerate(work):
-        with following(of_many("identifying", number, len(work))):
+        with use_callback(part_callback("identifying", number, len(work))):
             results.append(identify(log, arm, scheme=scheme, **settings))
     return results

@@ -9,11 +9,11 @@ from typing import Any
 
 from armgap.arm import Arm
 from armgap.errors import LogShapeError, OptionError
-from armgap.inspection.channels import Joint, joint
+from armgap.inspection.channels import JointChannels, joint
 from armgap.inspection.excitation import Excitation, excitation
 from armgap.inspection.sampling import Sampling, sampling
 from armgap.log import Finding, Log, gather
-from armgap.progress import tell
+from armgap.progress import report_progress
 
 __all__ = ["Inspection", "inspect"]
 
@@ -30,7 +30,7 @@ class Inspection:
         The file's own names by standard name.
     sampling : Sampling
         When samples were taken.
-    joints : tuple of Joint
+    joints : tuple of JointChannels
         Positions and torques of each joint.
     excitation : Excitation, optional
         What the log tells about the arm's parameters; None without an arm.
@@ -45,7 +45,7 @@ class Inspection:
     log: str
     columns: dict[str, str]
     sampling: Sampling
-    joints: tuple[Joint, ...]
+    joints: tuple[JointChannels, ...]
     excitation: Excitation | None
     findings: tuple[Finding, ...]
     source: Log = field(repr=False, compare=False)
@@ -112,13 +112,13 @@ def inspect(log: Any, arm: Arm | None = None) -> Inspection:
             file=log.path or log.name,
         )
     steps = log.n_joints + 2
-    tell(f"inspecting {log.name}", 0.0)
+    report_progress(f"inspecting {log.name}", 0.0)
     sampled = sampling(log)
     joints = []
     for j in range(log.n_joints):
-        tell(f"inspecting {log.name}", (j + 1) / steps)
+        report_progress(f"inspecting {log.name}", (j + 1) / steps)
         joints.append(joint(log, j, arm))
-    tell(f"inspecting {log.name}", (log.n_joints + 1) / steps)
+    report_progress(f"inspecting {log.name}", (log.n_joints + 1) / steps)
     return Inspection(
         log=log.name,
         columns=dict(log.columns),

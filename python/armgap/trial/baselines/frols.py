@@ -19,22 +19,22 @@ from typing import Any
 
 import numpy as np
 
-from armgap.trial.answers import Answer, Named
+from armgap.trial.answers import Answer, NamedCause
+from armgap.trial.baselines.regression import Array, regression_data
+from armgap.trial.baselines.signatures import Signature, signatures
 from armgap.trial.engine import TrialEngineMissingError
 from armgap.trial.methods import Method
-from armgap.trial.peers.regression import Array, data
-from armgap.trial.peers.signatures import Signature, signatures
 from armgap.trial.sealed import SealedCase
 
 __all__ = ["FROLS"]
 
 #: Terms that BIC chooses among, causes named at most, and the least share of power of a named cause.
-TERMS, MOST, LEAST = 8, 4, 0.05
+TERMS, MAX_CAUSES, MIN_SHARE = 8, 4, 0.05
 
 
 def answer(case: SealedCase) -> Answer:
     """Name the effects of the terms that FROLS keeps, most power first."""
-    made = data(case)
+    made = regression_data(case)
     q, _ = np.linalg.qr(made.base)
     found = signatures(case.arm, made, made.motions[0])
     columns = np.hstack([s.columns for s in found])
@@ -51,8 +51,10 @@ def _named(terms: list[Signature], shares: list[float]) -> Answer:
     for s, share in zip(terms, shares, strict=True):
         key = (s.effect, s.joint)
         total[key] = total.get(key, 0.0) + share
-    best = sorted(((share, key) for key, share in total.items() if share >= LEAST), key=lambda x: -x[0])[:MOST]
-    causes = tuple(Named(effect, joint, min(max(share, 0.0), 1.0)) for share, (effect, joint) in best)
+    best = sorted(((share, key) for key, share in total.items() if share >= MIN_SHARE), key=lambda x: -x[0])[
+        :MAX_CAUSES
+    ]
+    causes = tuple(NamedCause(effect, joint, min(max(share, 0.0), 1.0)) for share, (effect, joint) in best)
     return Answer("frols", "effect" if causes else "none", causes)
 
 
@@ -84,7 +86,7 @@ def _library() -> Any:
     try:
         return _Library()
     except ImportError as error:
-        raise TrialEngineMissingError("sysidentpy", "the peer frols", "trial-peers") from error
+        raise TrialEngineMissingError("sysidentpy", "the baseline frols", "trial-baselines") from error
 
 
 class _Library:
@@ -105,7 +107,7 @@ FROLS = Method(
     "frols",
     "SysIdentPy FROLS",
     f"sysidentpy.FROLS over the same signatures with the arm's columns projected out, up to {TERMS} terms by BIC; effects whose terms "
-    f"remove at least {LEAST:.0%} of the residual's power, that share as probability",
+    f"remove at least {MIN_SHARE:.0%} of the residual's power, that share as probability",
     answer,
     check=_check,
 )

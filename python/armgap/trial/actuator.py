@@ -1,7 +1,7 @@
-"""Actuator and sensor chains, outside the physics engine.
+"""Models of actuators and encoders, outside the physics engine.
 
 Command, held from sample to sample -> delay -> gain -> dead zone -> saturation -> lag -> joint; joint -> eccentricity
-and offset of the encoder -> whole counts. Each stage is called once per internal step of length ``dt`` and keeps its
+and offset of the encoder -> whole counts. Each block is called once per internal step of length ``dt`` and keeps its
 own state.
 """
 
@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 
-class Stage(Protocol):
-    """One link of an actuator chain."""
+class ActuatorBlock(Protocol):
+    """One block of an actuator model."""
 
     def __call__(self, u: float, dt: float) -> float:
         """Torque out for torque in, over the next ``dt`` seconds."""
@@ -112,30 +112,30 @@ class MagneticHysteresis:
         return (1.0 - self.share) * u + self.share * self._z
 
 
-#: Order of the stages from command to joint.
+#: Order of the blocks from command to joint.
 ORDER = (Delay, Gain, DeadZone, MagneticHysteresis, Saturation, SlewLimit, Lag)
 
 
 @dataclass
 class Actuator:
-    """The chain of one joint; stages run in :data:`ORDER` whatever the order they came in."""
+    """The actuator of one joint: blocks in series, which run in :data:`ORDER` whatever the order they came in."""
 
-    stages: list[Stage] = field(default_factory=list)
+    blocks: list[ActuatorBlock] = field(default_factory=list)
 
-    def add(self, stage: Stage) -> None:
-        """Put a stage where it belongs."""
-        self.stages.append(stage)
-        self.stages.sort(key=lambda s: ORDER.index(type(s)))
+    def add(self, block: ActuatorBlock) -> None:
+        """Put a block where it belongs."""
+        self.blocks.append(block)
+        self.blocks.sort(key=lambda s: ORDER.index(type(s)))
 
     @property
     def constant(self) -> bool:
         """Whether a held command gives a held torque."""
-        return all(isinstance(s, Gain | DeadZone | Saturation) for s in self.stages)
+        return all(isinstance(s, Gain | DeadZone | Saturation) for s in self.blocks)
 
     def __call__(self, u: float, dt: float) -> float:
         """Torque at the joint."""
-        for stage in self.stages:
-            u = stage(u, dt)
+        for block in self.blocks:
+            u = block(u, dt)
         return u
 
 

@@ -1,4 +1,4 @@
-"""The peers of the blind trial: they speak the library's names, and find what is plain to see."""
+"""The baselines of the blind trial: they speak the library's names, and find what is plain to see."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 pytest.importorskip("mujoco", reason="MuJoCo is missing: pip install 'armgap[trial]'")
-pytest.importorskip("scipy", reason="regression peers need scipy: pip install 'armgap[trial-peers]'")
+pytest.importorskip("scipy", reason="regression baselines need scipy: pip install 'armgap[trial-baselines]'")
 
 import armgap
 from armgap import Arm, seed_torque, simulate
 from armgap.simulation import Effect
+from armgap.trial.baselines import BASELINES
+from armgap.trial.baselines.mujoco_model import build_spec
+from armgap.trial.baselines.regression import RegressionData, motion, regression_data, regressor
+from armgap.trial.baselines.signatures import COUPLED, PER_ARM, PER_JOINT, ROTARY, signatures
 from armgap.trial.engine import TrialEngineMissingError
 from armgap.trial.methods import methods
-from armgap.trial.peers import PEERS
-from armgap.trial.peers.mujoco_model import build_spec
-from armgap.trial.peers.regression import Data, data, motion, regressor
-from armgap.trial.peers.signatures import COUPLED, OWN, ROTARY, WHOLE, signatures
 from armgap.trial.sealed import SealedCase
 from armgap.trial.windows import Mechanism, cut, misses
 
@@ -46,7 +46,7 @@ def first(case: SealedCase, name: str) -> tuple[str, int | None] | None:
 
 def test_signatures_are_of_the_library_and_cover_it():
     known = {e["name"] for e in armgap.effects()}
-    covered = OWN.keys() | WHOLE.keys() | {"coulomb_asymmetry"}  # the same signature as torque_offset
+    covered = PER_JOINT.keys() | PER_ARM.keys() | {"coulomb_asymmetry"}  # the same signature as torque_offset
     assert covered == known
     assert covered >= ROTARY | COUPLED
 
@@ -54,7 +54,7 @@ def test_signatures_are_of_the_library_and_cover_it():
 def test_regressor_times_parameters_is_the_torque_that_was_applied(arm):
     """Y theta = tau on the arm's own simulation, wherever the joints move."""
     case = sealed(arm)
-    made = data(case)
+    made = regression_data(case)
     error = made.tau - made.base @ arm.theta
     assert np.sqrt(np.mean(error**2)) < 0.05 * np.sqrt(np.mean(made.tau**2))
 
@@ -82,7 +82,7 @@ def test_smoothing_is_exact_for_cubics():
 def test_true_signature_explains_the_residual(name, arm):
     """With the arm's true values, the torque an effect takes is its signature times its size."""
     case = sealed(arm, Effect(name, 2, SIZES[name]))
-    made: Data = data(case)
+    made: RegressionData = regression_data(case)
     residual = made.tau - made.base @ arm.theta
     own = [s for s in signatures(arm, made, made.motions[0]) if (s.effect, s.joint) == (name, 2)]
     explained = max(
@@ -94,11 +94,11 @@ def test_true_signature_explains_the_residual(name, arm):
     assert explained > 0.6
 
 
-@pytest.mark.parametrize("peer", ["stepwise", "frols"])
-def test_regression_peers_find_a_plain_effect(peer, arm):
-    if peer == "frols":
-        pytest.importorskip("sysidentpy", reason="pip install 'armgap[trial-peers]'")
-    assert first(sealed(arm, Effect("torque_dead_zone", 2, {"level": 1.0})), peer) == ("torque_dead_zone", 2)
+@pytest.mark.parametrize("baseline", ["stepwise", "frols"])
+def test_regression_baselines_find_a_plain_effect(baseline, arm):
+    if baseline == "frols":
+        pytest.importorskip("sysidentpy", reason="pip install 'armgap[trial-baselines]'")
+    assert first(sealed(arm, Effect("torque_dead_zone", 2, {"level": 1.0})), baseline) == ("torque_dead_zone", 2)
 
 
 def test_correlation_finds_what_is_left_after_re_estimation(arm):
@@ -134,8 +134,8 @@ def test_masses_of_the_mujoco_model_move_as_the_base_parameters_do(kind, arm, tm
 
 
 def test_mujoco_sysid_finds_an_offset(arm, monkeypatch):
-    pytest.importorskip("absl", reason="pip install 'armgap[trial-peers]'")
-    module = importlib.import_module("armgap.trial.peers.sysid")
+    pytest.importorskip("absl", reason="pip install 'armgap[trial-baselines]'")
+    module = importlib.import_module("armgap.trial.baselines.sysid")
     monkeypatch.setattr(module, "WINDOWS", 4)
     monkeypatch.setattr(module, "ITERATIONS", 4)
     case = sealed(arm, Effect("torque_offset", 2, {"offset": 1.0}), seconds=3.0)
@@ -148,14 +148,14 @@ def test_mujoco_sysid_finds_an_offset(arm, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "package"), [("frols", "sysidentpy.model_structure_selection"), ("sysid", "mujoco.sysid")]
 )
-def test_a_peer_that_is_not_installed_says_so_in_one_line(name, package, monkeypatch):
+def test_a_baseline_that_is_not_installed_says_so_in_one_line(name, package, monkeypatch):
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(TrialEngineMissingError, match=r"pip install 'armgap\[trial-peers\]'"):
+    with pytest.raises(TrialEngineMissingError, match=r"pip install 'armgap\[trial-baselines\]'"):
         methods()[name].check()
 
 
-def test_every_peer_says_how_it_is_set():
-    assert len({m.name for m in PEERS}) == len(PEERS) == len(methods()) - 1
+def test_every_baseline_says_how_it_is_set():
+    assert len({m.name for m in BASELINES}) == len(BASELINES) == len(methods()) - 1
     assert all(m.settings and not m.settings.endswith(".") for m in methods().values())
 
 

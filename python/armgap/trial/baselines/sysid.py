@@ -24,18 +24,18 @@ from typing import Any
 import numpy as np
 
 from armgap.arm import Arm
-from armgap.trial.answers import Answer, Named, Size
+from armgap.trial.answers import Answer, NamedCause, Size
+from armgap.trial.baselines.mujoco_model import build_spec, set_coulomb, set_inertial
+from armgap.trial.baselines.regression import Array
 from armgap.trial.engine import TrialEngineMissingError
 from armgap.trial.methods import HORIZON, Method
-from armgap.trial.peers.mujoco_model import build_spec, set_coulomb, set_inertial
-from armgap.trial.peers.regression import Array
 from armgap.trial.sealed import SealedCase
 from armgap.trial.windows import Window, cut
 
 __all__ = ["SYSID"]
 
 #: Windows it is fitted to, iterations at most, causes named at most, and trust in the arm file, in sigmas, as bounds.
-WINDOWS, ITERATIONS, MOST, TRUST = 10, 10, 4, 4.0
+WINDOWS, ITERATIONS, MAX_CAUSES, TRUST = 10, 10, 4, 4.0
 #: Effects among its parameters, and their equivalents.
 EXPRESSED = frozenset(
     {
@@ -52,12 +52,12 @@ EXPRESSED = frozenset(
     }
 )
 #: Step of finite differences, as a share of the scales: above what the contact solver's tolerance leaves.
-NUDGE = 1e-4
+FINITE_DIFFERENCE_STEP = 1e-4
 Set = Callable[[Any, float], None]
 
 
 @dataclass(frozen=True)
-class Knob:
+class EffectParameter:
     """An effect as a parameter of a MuJoCo model: its neutral value, where to start, its bounds, and how it is set."""
 
     effect: str
@@ -79,16 +79,16 @@ def answer(case: SealedCase) -> Answer:
     """Fit everything at once and name what moved."""
     sysid = _sysid()
     arm, windows = case.arm, _windows(case)
-    knobs = _knobs(arm, windows)
-    parameters = _parameters(sysid, arm, knobs)
+    effect_parameters = _effect_parameters(arm, windows)
+    parameters = _parameters(sysid, arm, effect_parameters)
     residual = sysid.build_residual_fn(
         models_sequences=[_sequences(sysid, arm, windows)],
         modify_residual=_compare(sysid, arm, windows),
-        custom_rollout=_delayed(sysid, knobs),
+        custom_rollout=_delayed(sysid, effect_parameters),
         n_threads=1,
         resample_true=False,
     )
-    settings = {"max_iters": ITERATIONS, "eps": NUDGE, "x_scale": _scale(parameters)}
+    settings = {"max_iters": ITERATIONS, "eps": FINITE_DIFFERENCE_STEP, "x_scale": _scale(parameters)}
     with contextlib.redirect_stdout(io.StringIO()):
         found, result = sysid.optimize(parameters, residual, optimizer="mujoco", verbose=False, **settings)
     left, _, _ = residual(result.x, found)
@@ -96,7 +96,7 @@ def answer(case: SealedCase) -> Answer:
     scale = _scale(parameters)
     intervals = np.asarray(sysid.calculate_intervals(left, np.asarray(result.jac) * scale)[1]).ravel() * scale
     insights = importlib.import_module("mujoco.sysid.report.sections.insights").AutomatedInsights("", found)
-    return _named(knobs, np.asarray(result.x), intervals, _at_bounds(insights))
+    return _named(effect_parameters, np.asarray(result.x), intervals, _at_bounds(insights))
 
 
 def _scale(parameters: Any) -> Array:
@@ -106,14 +106,19 @@ def _scale(parameters: Any) -> Array:
     return scale
 
 
-def _named(knobs: list[Knob], x: Array, intervals: Array, stuck: list[str]) -> Answer:
+def _named(effect_parameters: list[EffectParameter], x: Array, intervals: Array, stuck: list[str]) -> Answer:
     moved = []
-    for knob, value, half in zip(knobs, x[len(x) - len(knobs) :], intervals[len(x) - len(knobs) :], strict=True):
-        away = abs(value - knob.neutral) / half if half > 0 else 0.0
-        if away > 1.0 and knob.name not in stuck:
-            size = {knob.parameter: Size(float(value), float(half) / 1.96)}
-            moved.append((away, Named(knob.effect, knob.joint, _confidence(away), size)))
-    causes = tuple(cause for _, cause in sorted(moved, key=lambda m: -m[0])[:MOST])
+    for parameter, value, half in zip(
+        effect_parameters,
+        x[len(x) - len(effect_parameters) :],
+        intervals[len(x) - len(effect_parameters) :],
+        strict=True,
+    ):
+        away = abs(value - parameter.neutral) / half if half > 0 else 0.0
+        if away > 1.0 and parameter.name not in stuck:
+            size = {parameter.parameter: Size(float(value), float(half) / 1.96)}
+            moved.append((away, NamedCause(parameter.effect, parameter.joint, _confidence(away), size)))
+    causes = tuple(cause for _, cause in sorted(moved, key=lambda m: -m[0])[:MAX_CAUSES])
     remark = f"at a bound: {', '.join(stuck)}" if stuck else "all parameters within their bounds"
     return Answer("sysid", "effect" if causes else "parameters", causes, remark=remark)
 
@@ -163,9 +168,9 @@ def _compare(sysid: Any, arm: Arm, windows: list[Window]) -> Callable[..., Any]:
     return compare
 
 
-def _delayed(sysid: Any, knobs: list[Knob]) -> Callable[..., Any]:
+def _delayed(sysid: Any, effect_parameters: list[EffectParameter]) -> Callable[..., Any]:
     """Rollouts whose commands come late by the delays and lags among the parameters, as a user's own rollout would do it."""
-    late = [k for k in knobs if k.effect in ("actuator_delay", "actuator_lag")]
+    late = [k for k in effect_parameters if k.effect in ("actuator_delay", "actuator_lag")]
 
     def rollout(*, control_signal: Any, param_dicts: Any, **rest: Any) -> Any:
         chunks = len(control_signal) // len(param_dicts)
@@ -175,13 +180,13 @@ def _delayed(sysid: Any, knobs: list[Knob]) -> Callable[..., Any]:
     return rollout
 
 
-def _late(sysid: Any, control: Any, params: Any, late: list[Knob]) -> Any:
+def _late(sysid: Any, control: Any, params: Any, late: list[EffectParameter]) -> Any:
     data, t = control.data.copy(), control.times
-    for knob in late:
-        column, value = (knob.joint or 1) - 1, float(params[knob.name].value[0])
+    for parameter in late:
+        column, value = (parameter.joint or 1) - 1, float(params[parameter.name].value[0])
         change = (
             np.interp(t - value, t, data[:, column])
-            if knob.effect == "actuator_delay"
+            if parameter.effect == "actuator_delay"
             else _lagged(data[:, column], t, value)
         )
         data[:, column] = change
@@ -200,7 +205,7 @@ def _lagged(u: Array, t: Array, constant: float) -> Array:
     return mean
 
 
-def _parameters(sysid: Any, arm: Arm, knobs: list[Knob]) -> Any:
+def _parameters(sysid: Any, arm: Arm, effect_parameters: list[EffectParameter]) -> Any:
     params = sysid.ParameterDict()
     n, b, low = arm.n_joints, arm.n_inertial, np.maximum(arm.theta - TRUST * arm.sigma, 0.05 * arm.theta)
     low = np.where(arm.theta > 0, low, -TRUST * arm.sigma)
@@ -216,32 +221,42 @@ def _parameters(sysid: Any, arm: Arm, knobs: list[Knob]) -> Any:
 
     params.add(sysid.Parameter("inertial", arm.theta[:b], low[:b], high[:b], modifier=inertial))
     params.add(sysid.Parameter("friction", arm.theta[b:], low[b:], high[b:], modifier=friction))
-    for knob in knobs:
-        params.add(_parameter(sysid, knob))
+    for parameter in effect_parameters:
+        params.add(_parameter(sysid, parameter))
     return params
 
 
-def _parameter(sysid: Any, knob: Knob) -> Any:
+def _parameter(sysid: Any, parameter: EffectParameter) -> Any:
     return sysid.Parameter(
-        knob.name, knob.start, knob.low, knob.high, modifier=lambda s, p: knob.set(s, float(p.value[0]))
+        parameter.name,
+        parameter.start,
+        parameter.low,
+        parameter.high,
+        modifier=lambda s, p: parameter.set(s, float(p.value[0])),
     )
 
 
-def _knobs(arm: Arm, windows: list[Window]) -> list[Knob]:
+def _effect_parameters(arm: Arm, windows: list[Window]) -> list[EffectParameter]:
     """Effects that a parameter of MuJoCo expresses and a fit can separate; starts stand a little inside their bounds."""
     tau = np.concatenate([w.tau for w in windows])
     speed = np.quantile(np.abs([w.dq0 for w in windows]), 0.95, axis=0)
     travel = np.ptp([w.q0 for w in windows], axis=0)
-    return [k for j in range(arm.n_joints) for k in _joint_knobs(arm, j, tau[:, j], float(speed[j]), float(travel[j]))]
+    return [
+        k
+        for j in range(arm.n_joints)
+        for k in _joint_effect_parameters(arm, j, tau[:, j], float(speed[j]), float(travel[j]))
+    ]
 
 
-def _joint_knobs(arm: Arm, j: int, tau: Array, speed: float, travel: float) -> list[Knob]:
+def _joint_effect_parameters(arm: Arm, j: int, tau: Array, speed: float, travel: float) -> list[EffectParameter]:
     usual, top = float(np.sqrt(np.mean(tau**2))), float(np.max(np.abs(tau)))
     inertia = float(arm.theta[0] if j == 0 else arm.theta[2])
     number = j + 1
 
-    def knob(effect: str, parameter: str, neutral: float, start: float, low: float, high: float, set_it: Set) -> Knob:
-        return Knob(effect, number, parameter, neutral, start, low, high, set_it)
+    def parameter(
+        effect: str, parameter: str, neutral: float, start: float, low: float, high: float, set_it: Set
+    ) -> EffectParameter:
+        return EffectParameter(effect, number, parameter, neutral, start, low, high, set_it)
 
     def offset(spec: Any, v: float) -> None:
         spec.actuator(f"motor{j}").biasprm[0] += v
@@ -263,29 +278,31 @@ def _joint_knobs(arm: Arm, j: int, tau: Array, speed: float, travel: float) -> l
     def zero(spec: Any, v: float) -> None:
         spec.joint(f"joint{j}").ref = v
 
-    knobs = [
-        knob("actuator_lag", "time_constant", 0.0, 5e-4, 1e-6, 0.05, lambda s, v: None),
-        knob("actuator_delay", "delay", 0.0, 5e-4, 0.0, 0.05, lambda s, v: None),
-        knob("torque_saturation", "level", 1.1 * top, 0.98 * top, 0.2 * top, 1.1 * top, level),
-        knob("joint_spring", "k", 0.0, 0.01 * usual / travel, 0.0, 3.0 * usual / travel, spring),
-        knob("quadratic_drag", "c", 0.0, 0.01 * usual / speed**2, 0.0, 3.0 * usual / speed**2, drag),
+    effect_parameters = [
+        parameter("actuator_lag", "time_constant", 0.0, 5e-4, 1e-6, 0.05, lambda s, v: None),
+        parameter("actuator_delay", "delay", 0.0, 5e-4, 0.0, 0.05, lambda s, v: None),
+        parameter("torque_saturation", "level", 1.1 * top, 0.98 * top, 0.2 * top, 1.1 * top, level),
+        parameter("joint_spring", "k", 0.0, 0.01 * usual / travel, 0.0, 3.0 * usual / travel, spring),
+        parameter("quadratic_drag", "c", 0.0, 0.01 * usual / speed**2, 0.0, 3.0 * usual / speed**2, drag),
     ]
     if arm.rotary:  # on an axis an offset is the weight along it
-        knobs.append(knob("torque_offset", "offset", 0.0, 0.0, -usual, usual, offset))
+        effect_parameters.append(parameter("torque_offset", "offset", 0.0, 0.0, -usual, usual, offset))
     if j > 0:
-        knobs.append(knob("rotor_inertia", "inertia", 0.0, 0.01 * inertia, 0.0, 1.5 * inertia, armature))
+        effect_parameters.append(
+            parameter("rotor_inertia", "inertia", 0.0, 0.01 * inertia, 0.0, 1.5 * inertia, armature)
+        )
     if arm.rotary:
-        knobs.append(knob("encoder_offset", "offset", 0.0, 0.0, -0.4, 0.4, zero))
-    return knobs
+        effect_parameters.append(parameter("encoder_offset", "offset", 0.0, 0.0, -0.4, 0.4, zero))
+    return effect_parameters
 
 
 def _sysid() -> Any:
     try:
         module = importlib.import_module("mujoco.sysid")
     except ImportError as error:
-        raise TrialEngineMissingError("mujoco.sysid", "the peer sysid", "trial-peers") from error
+        raise TrialEngineMissingError("mujoco.sysid", "the baseline sysid", "trial-baselines") from error
     if not hasattr(module, "optimize"):
-        raise TrialEngineMissingError("mujoco.sysid", "the peer sysid", "trial-peers")
+        raise TrialEngineMissingError("mujoco.sysid", "the baseline sysid", "trial-baselines")
     return module
 
 

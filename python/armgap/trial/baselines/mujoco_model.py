@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from armgap.arm import Arm
+from armgap.trial.baselines.regression import Array
 from armgap.trial.engine import mujoco
-from armgap.trial.peers.regression import Array
 
 __all__ = ["build_spec", "set_coulomb", "set_inertial"]
 

@@ -46,8 +46,8 @@ def law(t: np.ndarray, q: np.ndarray, dq: np.ndarray, tau: np.ndarray) -> np.nda
 
 def test_an_own_effect_is_named_with_its_size(fanned: tuple[list[Path], armgap.Arm]) -> None:
     (train, held), arm = fanned
-    own = armgap.OwnEffect("fan", 1, law)
-    idle = armgap.OwnEffect("idle", 2, lambda t, q, dq, tau: np.sin(40.0 * t))
+    own = armgap.CustomEffect("fan", 1, law)
+    idle = armgap.CustomEffect("idle", 2, lambda t, q, dq, tau: np.sin(40.0 * t))
     found = armgap.diagnose(train, arm, holdout=held, effects=[idle, own])
     first = found.causes[0]
     assert (first.effect, first.joint) == ("fan", 1)
@@ -60,7 +60,7 @@ def test_an_own_effect_is_named_with_its_size(fanned: tuple[list[Path], armgap.A
 
 def test_what_knows_the_library_only_still_works(fanned: tuple[list[Path], armgap.Arm]) -> None:
     (train, held), arm = fanned
-    found = armgap.diagnose(train, arm, holdout=held, effects=[armgap.OwnEffect("fan", 1, law)])
+    found = armgap.diagnose(train, arm, holdout=held, effects=[armgap.CustomEffect("fan", 1, law)])
     assert "Fan, joint 1" in found.summary()
     assert "Fan, joint 1" in found._repr_html_()
     assert "fan" in armgap.correct(found, arm).render("json")
@@ -70,17 +70,17 @@ def test_what_knows_the_library_only_still_works(fanned: tuple[list[Path], armga
 @pytest.mark.parametrize(
     ("effects", "words"),
     [
-        ([armgap.OwnEffect("stribeck", 1, law)], "another effect called 'stribeck'"),
-        ([armgap.OwnEffect("Fan", 1, law)], "cannot be called"),
-        ([armgap.OwnEffect("fan", 3, law)], "placed on joint 3"),
-        ([armgap.OwnEffect("fan", 1, lambda t, q, dq, tau: np.zeros(3))], "shape (3,)"),
-        ([armgap.OwnEffect("fan", 1, lambda t, q, dq, tau: 0 * t)], "zero all along"),
-        ([armgap.OwnEffect("fan", 1, lambda t, q, dq, tau: np.full(len(t), np.nan))], "is nan"),
-        ([armgap.OwnEffect(f"fan{i}", 1, law) for i in range(5)], "5 effects"),
+        ([armgap.CustomEffect("stribeck", 1, law)], "another effect called 'stribeck'"),
+        ([armgap.CustomEffect("Fan", 1, law)], "cannot be called"),
+        ([armgap.CustomEffect("fan", 3, law)], "placed on joint 3"),
+        ([armgap.CustomEffect("fan", 1, lambda t, q, dq, tau: np.zeros(3))], "shape (3,)"),
+        ([armgap.CustomEffect("fan", 1, lambda t, q, dq, tau: 0 * t)], "zero all along"),
+        ([armgap.CustomEffect("fan", 1, lambda t, q, dq, tau: np.full(len(t), np.nan))], "is nan"),
+        ([armgap.CustomEffect(f"fan{i}", 1, law) for i in range(5)], "5 custom effects"),
     ],
 )
 def test_unusable_effects_are_refused(
-    fanned: tuple[list[Path], armgap.Arm], effects: list[armgap.OwnEffect], words: str
+    fanned: tuple[list[Path], armgap.Arm], effects: list[armgap.CustomEffect], words: str
 ) -> None:
     (train, held), arm = fanned
     with pytest.raises(OptionError) as refusal:

@@ -6,17 +6,17 @@ from typing import Any
 
 from armgap.report import charts
 
-__all__ = ["Data", "Step", "length_unit", "load_text", "steps", "torque_unit"]
+__all__ = ["Data", "ModelLabel", "length_unit", "load_text", "model_labels", "torque_unit"]
 
 Data = dict[str, Any]
-Step = tuple[str, str, str]
+ModelLabel = tuple[str, str, str]
 
-_BEFORE: Step = ("arm file", "before", charts.BEFORE)
-_REFIT: Step = ("re-estimated", "refit", charts.REFIT)
-_AFTER: Step = ("with causes", "after", charts.AFTER)
+_BEFORE: ModelLabel = ("arm file", "before", charts.BEFORE)
+_REFIT: ModelLabel = ("re-estimated", "refit", charts.REFIT)
+_AFTER: ModelLabel = ("with causes", "after", charts.AFTER)
 
 
-def steps(data: Data) -> tuple[Step, ...]:
+def model_labels(data: Data) -> tuple[ModelLabel, ...]:
     """Name, key and colour of each model; without causes the third is the second again and left out."""
     return (_BEFORE, _REFIT, _AFTER) if data.get("causes") else (_BEFORE, _REFIT)
 

@@ -1,4 +1,4 @@
-"""Signatures of the effects in the torque residual, shapes on a grid; used by every regression peer alike."""
+"""Signatures of the effects in the torque residual, shapes on a grid; used by every regression baseline alike."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from armgap.arm import Arm
-from armgap.trial.peers.regression import Array, Data, Motion, regressor
+from armgap.trial.baselines.regression import Array, Motion, RegressionData, regressor
 
 __all__ = ["Signature", "signatures"]
 
 #: Width of a numerical derivative with respect to positions, rad.
-NUDGE = 1e-5
+POSITION_STEP = 1e-5
 DELAYS = (0.001, 0.002, 0.004, 0.008, 0.016)  # s
 LEVELS = (0.5, 0.65, 0.8, 0.9)
 ORDERS = 12
@@ -31,7 +31,7 @@ class Signature:
     effect, joint
         As everywhere.
     columns : ndarray, shape (m, k)
-        Rows as in `Data`.
+        Rows as in `RegressionData`.
     """
 
     effect: str
@@ -39,32 +39,32 @@ class Signature:
     columns: Array
 
 
-def signatures(arm: Arm, made: Data, ref: Motion) -> list[Signature]:
+def signatures(arm: Arm, made: RegressionData, ref: Motion) -> list[Signature]:
     """All effects of the library on all their joints, every shape of the grid.
 
     Parameters
     ----------
     arm : Arm
         Arm file.
-    made : Data
+    made : RegressionData
         Motions and scale.
     ref : Motion
         Motion by whose speeds, levels and travel the grid is laid out; the same for training and holdout.
     """
     found: list[Signature] = []
     for j in range(arm.n_joints):
-        for effect, shapes in OWN.items():
+        for effect, shapes in PER_JOINT.items():
             if (arm.rotary or effect not in ROTARY) and (arm.n_joints > 1 or effect not in COUPLED):
                 found += _built(effect, j, made, lambda x, j=j, f=shapes: f(arm, x, j, ref))  # type: ignore[misc]
     if arm.rotary:
-        for effect, shapes in WHOLE.items():
+        for effect, shapes in PER_ARM.items():
             if effect in COUPLED and arm.n_joints == 1:
                 continue
             found += _built(effect, None, made, lambda x, f=shapes: f(arm, x, 0, ref))  # type: ignore[misc]
     return found
 
 
-def _built(effect: str, joint: int | None, made: Data, shapes: Callable[[Motion], Shapes]) -> list[Signature]:
+def _built(effect: str, joint: int | None, made: RegressionData, shapes: Callable[[Motion], Shapes]) -> list[Signature]:
     n = made.scale.size
     per_log = zip(*(list(shapes(x)) for x in made.motions), strict=True)
     number = None if joint is None else joint + 1
@@ -195,8 +195,8 @@ def _moved(arm: Arm, x: Motion, shift: Callable[[Array], tuple[Array, Array, Arr
     """Change of the nominal torque when joint `j` is read differently, per unit of the shift."""
     parts = [x.q.copy(), x.dq.copy(), x.ddq.copy()]
     for part, moved in zip(parts, shift(np.column_stack([x.q[:, j], x.dq[:, j], x.ddq[:, j]])), strict=True):
-        part[:, j] += NUDGE * moved
-    change: Array = (regressor(arm, *parts) - regressor(arm, x.q, x.dq, x.ddq)) @ arm.theta / NUDGE
+        part[:, j] += POSITION_STEP * moved
+    change: Array = (regressor(arm, *parts) - regressor(arm, x.q, x.dq, x.ddq)) @ arm.theta / POSITION_STEP
     return change
 
 
@@ -241,10 +241,10 @@ def _payload(arm: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
 def _tilt(arm: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
     still = np.zeros_like(x.q)
     moved = x.q.copy()
-    moved[:, 0] += NUDGE
+    moved[:, 0] += POSITION_STEP
     n = arm.n_inertial
     change = (regressor(arm, moved, still, still) - regressor(arm, x.q, still, still))[..., :n] @ arm.theta[:n]
-    yield change[..., None] / NUDGE
+    yield change[..., None] / POSITION_STEP
 
 
 def _one_sided(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
@@ -269,8 +269,8 @@ def _coupling(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
     yield x.ddq[:, ::-1, None]
 
 
-Own = Callable[[Arm, Motion, int, Motion], Shapes]
-OWN: dict[str, Own] = {
+ShapeFunction = Callable[[Arm, Motion, int, Motion], Shapes]
+PER_JOINT: dict[str, ShapeFunction] = {
     "torque_offset": _offset,
     "stribeck": _stribeck,
     "quadratic_drag": _drag,
@@ -298,7 +298,7 @@ OWN: dict[str, Own] = {
     "hardening_spring": _hardening,
     "cross_friction": _crossed,
 }
-WHOLE: dict[str, Own] = {"payload": _payload, "base_tilt": _tilt, "rotor_coupling": _coupling}
+PER_ARM: dict[str, ShapeFunction] = {"payload": _payload, "base_tilt": _tilt, "rotor_coupling": _coupling}
 #: Effects between two joints.
 COUPLED = {"cross_friction", "rotor_coupling"}
 #: Effects that make no sense on a linear axis.

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from armgap.trial.answers import Answer, Named
+from armgap.trial.answers import Answer, NamedCause
 from armgap.trial.methods import Method
 from armgap.trial.sealed import SealedCase
 
 __all__ = ["CONSTANT"]
 
 #: Stribeck friction of the first joint, the effect most often named in the literature on friction; one of 24 effects.
-GUESS = Named("stribeck", 1, probability=1.0 / 24.0)
+GUESS = NamedCause("stribeck", 1, probability=1.0 / 24.0)
 
 
 def answer(case: SealedCase) -> Answer:

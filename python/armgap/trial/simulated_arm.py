@@ -8,25 +8,25 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.trial.chain import Actuator, Encoder
-from armgap.trial.plant import Build, Plant
+from armgap.trial.actuator import Actuator, Encoder
+from armgap.trial.plant import Plant, PlantConfig
 
 Array = NDArray[np.float64]
 #: Commands for the next sample from time and measured positions.
-Source = Callable[[float, list[float]], list[float]]
+CommandSource = Callable[[float, list[float]], list[float]]
 
 
 @dataclass
-class Rig:
-    """What effects act on: the arm's build, an actuator and an encoder per joint."""
+class SimulatedArm:
+    """What effects act on: the plant's configuration, an actuator and an encoder per joint."""
 
-    build: Build
+    config: PlantConfig
     actuators: list[Actuator] = field(default_factory=list)
     encoders: list[Encoder] = field(default_factory=list)
     pulses: dict[str, list[tuple[int, float, float, float]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        arm = self.build.arm
+        arm = self.config.arm
         self.actuators = self.actuators or [Actuator() for _ in range(arm.n_joints)]
         self.encoders = self.encoders or [Encoder(s) for s in arm.step]
 
@@ -52,23 +52,23 @@ class Trace:
     dq_true: Array
 
 
-def run(rig: Rig, source: Source, duration: float) -> Trace:
+def run(sim: SimulatedArm, source: CommandSource, duration: float) -> Trace:
     """Run the arm from rest at ``q = 0`` and log it once per sample period."""
-    plant = Plant(rig.build)
-    period = rig.build.arm.sample_period
+    plant = Plant(sim.config)
+    period = sim.config.arm.sample_period
     n = round(duration / period)
     q, tau, q_true, dq_true = (np.empty((n, plant.n)) for _ in range(4))
     t: Array = period * np.arange(n, dtype=np.float64)
     for k in range(n):
         q_true[k], dq_true[k] = plant.position(), plant.velocity()
-        q[k] = [e(x) for e, x in zip(rig.encoders, plant.position(), strict=True)]
+        q[k] = [e(x) for e, x in zip(sim.encoders, plant.position(), strict=True)]
         tau[k] = source(float(t[k]), q[k].tolist())
-        _one_sample(plant, rig.actuators, tau[k].tolist())
+        _one_sample(plant, sim.actuators, tau[k].tolist())
     return Trace(t, q, tau, q_true, dq_true)
 
 
 def _one_sample(plant: Plant, actuators: list[Actuator], command: list[float]) -> None:
-    if not plant.lawful and all(a.constant for a in actuators):
+    if not plant.state_dependent and all(a.constant for a in actuators):
         plant.hold([a(u, plant.dt) for a, u in zip(actuators, command, strict=True)])
         return
     for _ in range(plant.steps_per_sample):

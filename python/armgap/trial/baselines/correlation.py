@@ -9,27 +9,27 @@ from __future__ import annotations
 import numpy as np
 
 from armgap.arm import Arm
-from armgap.trial.answers import Answer, Named
+from armgap.trial.answers import Answer, NamedCause
+from armgap.trial.baselines.regression import Array, RegressionData, regression_data
+from armgap.trial.baselines.signatures import Signature, signatures
 from armgap.trial.methods import Method
-from armgap.trial.peers.regression import Array, Data, data
-from armgap.trial.peers.signatures import Signature, signatures
 from armgap.trial.sealed import SealedCase
 
 __all__ = ["CORRELATION", "refit_residual"]
 
 #: Share of the residual's power that a named cause explains.
-LEAST = 0.1
+MIN_SHARE = 0.1
 
 
 def answer(case: SealedCase) -> Answer:
     """Name the best correlated signature; the squared correlation stands for its probability."""
-    made = data(case)
+    made = regression_data(case)
     residual = refit_residual(case.arm, made)
     shares = [(s, _explained(s, residual)) for s in signatures(case.arm, made, made.motions[0])]
     best, share = min(shares, key=lambda x: _bic(*x))
-    if share < LEAST:
+    if share < MIN_SHARE:
         return Answer("correlation", "none")
-    return Answer("correlation", "effect", (Named(best.effect, best.joint, min(share, 1.0)),))
+    return Answer("correlation", "effect", (NamedCause(best.effect, best.joint, min(share, 1.0)),))
 
 
 def _bic(s: Signature, share: float) -> float:
@@ -38,7 +38,7 @@ def _bic(s: Signature, share: float) -> float:
     return float(rows * np.log(max(1.0 - share, 1e-12)) + columns * np.log(rows))
 
 
-def refit_residual(arm: Arm, made: Data) -> Array:
+def refit_residual(arm: Arm, made: RegressionData) -> Array:
     """Torques that the re-estimated arm leaves, with the arm file's sigmas as prior."""
     theta = arm.theta + _step(made.base, made.tau - made.base @ arm.theta, arm.sigma)
     left: Array = made.tau - made.base @ theta
@@ -61,6 +61,6 @@ CORRELATION = Method(
     "correlation",
     "residual correlation",
     "arm re-estimated by least squares on torques with the arm file's sigmas as prior; names the effect whose signature "
-    f"has the largest squared correlation with the torque residual, if that is at least {LEAST:g}",
+    f"has the largest squared correlation with the torque residual, if that is at least {MIN_SHARE:g}",
     answer,
 )

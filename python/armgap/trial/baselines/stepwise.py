@@ -18,15 +18,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armgap.trial.answers import Answer, Named
+from armgap.trial.answers import Answer, NamedCause
+from armgap.trial.baselines.regression import Array, regression_data
+from armgap.trial.baselines.signatures import Signature, signatures
 from armgap.trial.methods import Method
-from armgap.trial.peers.regression import Array, data
-from armgap.trial.peers.signatures import Signature, signatures
 from armgap.trial.sealed import SealedCase
 
 __all__ = ["STEPWISE"]
 
-MOST, EVIDENCE, HELD_OUT = 4, 10.0, 0.98
+MAX_CAUSES, EVIDENCE, HELD_OUT = 4, 10.0, 0.98
 EVENTS = ("external_pulse",)
 
 
@@ -62,10 +62,10 @@ class _Problem:
 def answer(case: SealedCase) -> Answer:
     """Name what stepwise selection keeps."""
     problem, candidates = _problem(case)
-    chosen: list[Named] = []
+    chosen: list[NamedCause] = []
     price = _price([s for s, _ in candidates])
     terms, now = 0, problem.bic(problem.columns[:, :0], 0)
-    for _ in range(MOST):
+    for _ in range(MAX_CAUSES):
         taken = {c.effect + str(c.joint) for c in chosen}
         scored = [
             (problem.bic(_padded(s, problem), terms + s.columns.shape[1]) + price[(s.effect, s.joint)], s, held)
@@ -76,7 +76,7 @@ def answer(case: SealedCase) -> Answer:
         if not left:
             break
         _, s, held = left[0]
-        chosen.append(Named(s.effect, s.joint, _weight(left, s)))
+        chosen.append(NamedCause(s.effect, s.joint, _weight(left, s)))
         problem.columns = np.hstack([problem.columns, _padded(s, problem)])
         problem.held = np.hstack([problem.held, held.columns])
         terms += s.columns.shape[1]
@@ -84,10 +84,10 @@ def answer(case: SealedCase) -> Answer:
     return Answer("stepwise", "effect" if chosen else "none", tuple(chosen))
 
 
-Scored = tuple[float, Signature, Signature]
+ScoredCandidate = tuple[float, Signature, Signature]
 
 
-def _confirmed(problem: _Problem, scored: list[Scored], limit: float) -> list[Scored]:
+def _confirmed(problem: _Problem, scored: list[ScoredCandidate], limit: float) -> list[ScoredCandidate]:
     """What is left once candidates before the first that the holdout confirms are gone; empty if none below the limit is."""
     for i, (value, s, held) in enumerate(scored):
         if value > limit:
@@ -98,8 +98,8 @@ def _confirmed(problem: _Problem, scored: list[Scored], limit: float) -> list[Sc
 
 
 def _problem(case: SealedCase) -> tuple[_Problem, list[tuple[Signature, Signature]]]:
-    made = data(case)
-    held = data(case, made.scale, held_out=True)
+    made = regression_data(case)
+    held = regression_data(case, made.scale, held_out=True)
     ref = made.motions[0]
     pairs = list(zip(signatures(case.arm, made, ref), signatures(case.arm, held, ref), strict=True))
     prior = np.diag(1.0 / case.arm.sigma)
@@ -134,7 +134,7 @@ def _holds(problem: _Problem, s: Signature, held: Signature) -> bool:
     return problem.judged(_padded(s, problem), held.columns) < HELD_OUT * before
 
 
-def _weight(scored: list[Scored], chosen: Signature) -> float:
+def _weight(scored: list[ScoredCandidate], chosen: Signature) -> float:
     """Posterior weight of an effect against all others, from their best BICs."""
     best: dict[tuple[str, int | None], float] = {}
     for value, s, _ in scored:

@@ -1,6 +1,6 @@
-"""What regression peers share: the arm's regressor on measured motion, and the signature of every effect in the torque.
+"""What regression baselines share: the arm's regressor on measured motion, and the signature of every effect in the torque.
 
-A peer sees ``residual = tau - Y theta``: the torque the arm file's model cannot account for, joint by joint, with ``Y``
+A baseline sees ``residual = tau - Y theta``: the torque the arm file's model cannot account for, joint by joint, with ``Y``
 re-estimated or not. Each effect of the library leaves a known signature there, linear in its size once its shape
 (a velocity, a period, a level, ...) is fixed; shapes come from a grid. Velocities and accelerations are those of a cubic
 through the samples within 15 ms (Savitzky-Golay); torques go through the same cubic, and both sides are averaged over
@@ -24,7 +24,7 @@ from armgap.arm import Arm
 from armgap.log import Log
 from armgap.trial.sealed import SealedCase
 
-__all__ = ["Data", "Motion", "data", "motion", "regressor"]
+__all__ = ["Motion", "RegressionData", "motion", "regression_data", "regressor"]
 
 Array = NDArray[np.float64]
 #: Half the width of the smoothing cubic, and the length of a block, s.
@@ -74,7 +74,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Data:
+class RegressionData:
     """A set of logs as a regression: joints below one another, each scaled to residuals of size one.
 
     Attributes
@@ -112,7 +112,7 @@ def motion(log: Log) -> Motion:
     return Motion(log.t - log.t[0], q, dq, ddq, _savgol(held, half, 0, h), log.tau, half, max(1, round(BLOCK / h)))
 
 
-def data(case: SealedCase, scale: Array | None = None, held_out: bool = False) -> Data:
+def regression_data(case: SealedCase, scale: Array | None = None, held_out: bool = False) -> RegressionData:
     """Training or holdout logs of a case as a regression; by default scaled by the training's own residuals."""
     motions = tuple(motion(log) for log in (case.holdout if held_out else case.training))
     one = np.ones(case.arm.n_joints)
@@ -125,7 +125,7 @@ def data(case: SealedCase, scale: Array | None = None, held_out: bool = False) -
         rows = [keep & (joint == j) for j in range(one.size)]
         scale = np.array([max(float(np.std(error[r])), TRUST * float(np.std(tau[r])), 1e-12) for r in rows])
     weight = scale[joint]
-    return Data(motions, scale, keep, (base / weight[:, None])[keep], (tau / weight)[keep])
+    return RegressionData(motions, scale, keep, (base / weight[:, None])[keep], (tau / weight)[keep])
 
 
 def _moving(x: Motion) -> Array:
