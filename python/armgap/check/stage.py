@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-
 from armgap.arm import Arm
 from armgap.check import dead_stretch, time_shift, torque_is_position, torque_unit
 from armgap.check.check import Check
