@@ -15,6 +15,7 @@ import numpy as np
 from armgap import _native
 from armgap._renamed import old_names
 from armgap.arm import Arm
+from armgap.check import Check, Corrections, copied_holdout, data_checks, examine
 from armgap.custom_effect import CustomEffect, TorqueTables
 from armgap.errors import LogShapeError, OptionError
 from armgap.evidence import laws, plausibility
@@ -158,7 +159,7 @@ class Diagnosis(NotebookDisplay):
     ----------
     verdict : str
         ``"none"``: the gap is within noise; ``"parameters"``: right structure, wrong values; ``"effect"``: causes
-        named; ``"unexplained"``: a gap that no effect in the library explains.
+        named; ``"unexplained"``: a gap that no effect in the library explains; ``"input"``: logs and arm file contradict each other.
     gap : Gap
         How far.
     where : tuple of Location
@@ -169,6 +170,8 @@ class Diagnosis(NotebookDisplay):
         What was looked for and not found.
     parameters : dict
         ``nominal``, ``refit`` and ``with_causes``: name to `Value`.
+    checks : tuple of Check
+        What was noticed about the input, errors first.
     extra : dict
         What a report draws besides: curves, ranking, options.
     """
@@ -179,13 +182,14 @@ class Diagnosis(NotebookDisplay):
     causes: tuple[Cause, ...]
     ruled_out: tuple[RuledOut, ...]
     parameters: dict[str, dict[str, Value]]
+    checks: tuple[Check, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict, repr=False)
     _data: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Diagnosis:
         """Build a diagnosis from its JSON object."""
-        known = {"schema", "verdict", "gap", "where", "causes", "ruled_out", "parameters"}
+        known = {"schema", "verdict", "gap", "where", "causes", "ruled_out", "parameters", "checks"}
         gap = data["gap"]
         parameters = {
             stage: {name: _take(Value, value) for name, value in values.items()}
@@ -209,6 +213,7 @@ class Diagnosis(NotebookDisplay):
             causes=tuple(_cause(c) for c in data["causes"]),
             ruled_out=tuple(_ruled_out(r) for r in data["ruled_out"]),
             parameters=parameters,
+            checks=tuple(Check.from_dict(c) for c in data.get("checks", ())),
             extra={key: value for key, value in data.items() if key not in known},
             _data=data,
         )
@@ -281,6 +286,8 @@ def diagnose(
     max_causes: int = 4,
     seed: int = 1,
     effects: Sequence[CustomEffect] = (),
+    repair: bool = True,
+    corrections: Corrections | None = None,
     progress: ProgressCallback | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between an arm's nominal model and its logs.
@@ -304,6 +311,10 @@ def diagnose(
         Seed of the resampling behind probabilities and intervals.
     effects : sequence of CustomEffect, default none
         Custom effects that take part in the ranking, four at most.
+    repair : bool, default True
+        Whether defects of the input are repaired that leave nothing to guess (see `armgap.check`); without it they are only said.
+    corrections : Corrections, optional
+        How columns are to be read otherwise than they stand, on top of what the arm file says.
     progress : callable, optional
         ``progress(work, fraction)`` is called now and then with what is being done and an estimate of how much of it is done, from 0
         to 1.
@@ -319,34 +330,51 @@ def diagnose(
     KeyboardInterrupt
         On an interrupt, within a fifth of a second.
     """
-    with use_callback(progress):
-        return _diagnose(logs, arm, holdout, horizon, max_causes, seed, effects)
-
-
-def _diagnose(
-    logs: LogLike | Sequence[LogLike],
-    arm: Arm | str | os.PathLike[str],
-    holdout: LogLike | Sequence[LogLike] | None,
-    horizon: float,
-    max_causes: int,
-    seed: int,
-    effects: Sequence[CustomEffect],
-) -> Diagnosis:
-    """Check, read, split, choose; hand over to the core; and add what is known on this side."""
-    arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
     if not (np.isfinite(horizon) and horizon > 0):
         raise OptionError(f"the horizon is {horizon}", remedy="give a positive number of seconds")
     if max_causes < 0:
         raise OptionError(f"the number of causes is {max_causes}", remedy="give 0 or more")
-    training = _logs(logs, arm)
-    notes = []
+    arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
+    options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed)}
+    with use_callback(progress):
+        given = _given(logs, holdout, arm, corrections or Corrections(), repair=repair)
+        return _diagnose(_examined(given, horizon, repair=repair), options, effects)
+
+
+@dataclass(frozen=True)
+class _Input:
+    """Logs and arm, and what is to be said about them."""
+
+    training: list[Log]
+    holdout: list[Log]
+    arm: Arm
+    notes: tuple[str, ...]
+    checks: tuple[Check, ...]
+
+
+def _given(
+    logs: LogLike | Sequence[LogLike],
+    holdout: LogLike | Sequence[LogLike] | None,
+    arm: Arm,
+    corrections: Corrections,
+    *,
+    repair: bool,
+) -> _Input:
+    """Read, correct and repair the logs, each by itself, and split them where nothing is held out."""
+    training, checks = _logs(logs, arm, corrections, repair=repair)
+    arm = corrections.on_arm(arm)
     if holdout is None:
-        training, held = _split(training)
-        notes.append(f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out")
-    else:
-        held = _logs(holdout, arm)
-        notes += _overlap(training, held)
-    training, held = (choose(group, horizon=horizon) for group in _tell_apart(training, held))
+        training, held = _split(_tell_apart(training, [])[0])
+        note = f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out"
+        return _Input(training, held, arm, (note,), tuple(checks))
+    held, more = _logs(holdout, arm, corrections, repair=repair)
+    checks += [*more, *copied_holdout(training, held)]
+    return _Input(*_tell_apart(training, held), arm, (), tuple(checks))
+
+
+def _examined(given: _Input, horizon: float, *, repair: bool) -> _Input:
+    """Choose stretches of long logs, and compare logs and arm file with and without each defect."""
+    training, held = (choose(group, horizon=horizon) for group in (given.training, given.holdout))
     for log in (*training, *held):
         if log.duration < horizon:
             raise LogShapeError(
@@ -354,9 +382,22 @@ def _diagnose(
                 remedy="give a longer log or a shorter --horizon",
                 file=log.path or log.name,
             )
+    try:
+        found = examine(training, held, given.arm, horizon=horizon, repair=repair)
+    except ValueError as error:
+        raise _refused(str(error), training, held) from None
+    return _Input(found.training, found.holdout, found.arm, given.notes, (*found.checks, *given.checks))
+
+
+def _diagnose(given: _Input, options: dict[str, Any], effects: Sequence[CustomEffect]) -> Diagnosis:
+    """Hand over to the core, and add what is known on this side."""
+    training, held, arm = given.training, given.holdout, given.arm
+    contradictory = any(check.severity == "error" for check in given.checks)
+    if contradictory:
+        # No effect is asked to explain a contradiction: the figures are those of the arm's own parameters.
+        options = options | {"max_causes": 0}
     tables = TorqueTables.of(effects, training, held)
-    joints = [e.joint - 1 for e in effects]
-    options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed), "own": joints}
+    options = options | {"own": [e.joint - 1 for e in effects]}
     try:
         text = _native.diagnose(
             arm.to_native(), _columns(training, tables), _columns(held, tables), options, report_progress
@@ -364,11 +405,14 @@ def _diagnose(
     except ValueError as error:
         raise _refused(str(error), training, held) from None
     data = tables.named(json.loads(text))
+    if contradictory:
+        data = _contradicted(data)
     data["arm"]["name"] = arm.name
     for cause in data["causes"]:
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
-    data["notes"] = notes + data["notes"]
+    data["notes"] = [*given.notes, *data["notes"]]
+    data["checks"] = [check.to_dict() for check in given.checks]
     known, corrected_logs = tables.applied(data, (*training, *held))
     count = len(training)
     data["laws"] = laws(known, arm, corrected_logs[:count], corrected_logs[count:])
@@ -381,7 +425,21 @@ def _diagnose(
     return Diagnosis.from_dict(data)
 
 
-def _logs(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:
+def _contradicted(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the result of logs and arm file that contradict each other: figures with the remedy applied, no causes."""
+    gap = data["gap"] | {"after": data["gap"]["refit"]}
+    return data | {"verdict": "input", "causes": [], "gap": gap}
+
+
+def _logs(
+    logs: LogLike | Sequence[LogLike], arm: Arm, corrections: Corrections, *, repair: bool
+) -> tuple[list[Log], list[Check]]:
+    read = [corrections.on_log(log) for log in _gathered(logs, arm)]
+    examined = [data_checks(log, arm, repair=repair) for log in read]
+    return [log for log, _ in examined], [check.of(check.log or log.name) for log, found in examined for check in found]
+
+
+def _gathered(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:
     read = gather(logs, arm)
     if not read:
         raise OptionError("no log was given", remedy="give at least one")
@@ -401,13 +459,6 @@ def _refused(message: str, training: list[Log], held: list[Log]) -> LogShapeErro
     logs = held if "holdout" in problem else training
     files = ", ".join(dict.fromkeys(str(log.path or log.name) for log in logs))
     return LogShapeError(problem, remedy=remedy or "see the log and the options", file=files)
-
-
-def _overlap(training: list[Log], held: list[Log]) -> list[str]:
-    """Say which logs are both learnt from and judged on."""
-    seen = {log.path.resolve() for log in training if log.path is not None}
-    both = [log.name for log in held if log.path is not None and log.path.resolve() in seen]
-    return [f"{name} is learnt from and judged on too: its figures flatter" for name in both]
 
 
 def _tell_apart(training: list[Log], held: list[Log]) -> tuple[list[Log], list[Log]]:

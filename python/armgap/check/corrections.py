@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -11,10 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from armgap.errors import ColumnError, OptionError
-from armgap.log import Finding, Log
+from armgap.log.findings import Finding
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
+    from armgap.log import Log
 
 __all__ = ["CORRECTIONS", "Corrections", "GravityCorrection", "PositionUnit"]
 
@@ -159,6 +161,20 @@ class Corrections:
         }
         return {k: v for k, v in plain.items() if v}
 
+    def toml_lines(self) -> list[str]:
+        """Return the lines of an arm file's ``[corrections]`` table, but for gravity, which the arm's values hold already."""
+        lines = [f"unit = {json.dumps(self.unit)}"] if self.unit else []
+        lines += [
+            f"{name} = {json.dumps(list(getattr(self, name)))}"
+            for name in ("flip", "absolute", "relative", "skip")
+            if getattr(self, name)
+        ]
+        lines += [f"swap = {json.dumps([list(pair) for pair in self.swap])}"] if self.swap else []
+        for name in ("zero", "factor", "shift"):
+            if values := getattr(self, name):
+                lines.append(f"{name} = {{ {', '.join(f'{k} = {v!r}' for k, v in values.items())} }}")
+        return lines
+
     def on_log(self, log: Log) -> Log:
         """Return the log with its columns read so, and say so among its findings.
 
@@ -213,12 +229,11 @@ class Corrections:
     def _skipped(self, log: Log) -> Any:
         """Return which samples are left out."""
         skipped = np.zeros(len(log), dtype=bool)
-        since = log.t - log.t[0]
         for span in self.skip:
             match = _SPAN.fullmatch(span)
             assert match is not None
-            if match["log"] in (None, log.name):
-                skipped |= (since >= float(match["first"])) & (since <= float(match["last"]))
+            if match["log"] in (None, log.recording):
+                skipped |= (log.t >= float(match["first"])) & (log.t <= float(match["last"]))
         return skipped
 
     def on_arm(self, arm: Arm) -> Arm:

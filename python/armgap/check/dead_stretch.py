@@ -69,13 +69,21 @@ def _judged(log: Log, arm: Arm, runs: Sequence[tuple[int, int, int]]) -> list[Ch
 
 
 def _check(log: Log, j: int, first: int, last: int, within: float, outside: NDArray[np.float64]) -> Check:
-    begins, ends = float(log.t[first] - log.t[0]), float(log.t[last] - log.t[0])
+    begins, ends = float(log.t[first]), float(log.t[last])
     message = (
         f"`tau{j + 1}` stays at {log.tau[first, j]:.4g} from {begins:.4g} to {ends:.4g} s while the joint moves as if driven: the "
         f"torque that is missing there is {np.sqrt(within):.3g} (RMS), elsewhere {np.sqrt(float(np.mean(outside**2))):.2g}"
     )
-    remedy = f"--skip {log.name}:{begins:.4g}-{ends:.4g}"
-    return Check("dead_stretch", "error", message, (remedy,), j + 1, log.name, ((first, last),))
+    remedy = f"--skip {log.recording}:{begins:.4g}-{ends:.4g}"
+    return Check(
+        "dead_stretch",
+        "error",
+        message,
+        (remedy,),
+        j + 1,
+        log.recording,
+        ((first + log.first_row, last + log.first_row),),
+    )
 
 
 def _merged(checks: list[Check]) -> list[Check]:

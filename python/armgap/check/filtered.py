@@ -70,11 +70,17 @@ def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
         return ""
     exact = _EXACT * max(rounding(q) for q in pieces)
     if (share := _between_knots(pieces, moving, max(exact, 0.01 * (grid or 0.0)), grid or 0.0)) > _PIECEWISE:
-        return f"lies exactly on straight lines or cubics between knots in {100 * share:.0f} % of the rows: interpolated"
+        return (
+            f"lies exactly on straight lines or cubics between knots in {100 * share:.0f} % of the rows: interpolated"
+        )
     squares, middle = noise_by_order(pieces, moving)
     if middle[-1] <= exact:
         smooth = squares[-1] <= exact and dry and _reversals(pieces, moving) >= _REVERSALS
-        return "is smooth to its last digit, reversals included: filtered, fitted or computed, not measured" if smooth else ""
+        return (
+            "is smooth to its last digit, reversals included: filtered, fitted or computed, not measured"
+            if smooth
+            else ""
+        )
     least = min(float(squares.min()), _over_times(log, j, rows, moving))
     if step is not None and least < _OF_ENCODER * step / np.sqrt(12) and not _driven(log, j, rows, moving):
         return (
