@@ -16,6 +16,7 @@ from armgap import _native
 from armgap._renamed import old_names
 from armgap.arm import Arm
 from armgap.check import Check, Corrections, copied_holdout, data_checks, examine
+from armgap.check.time_shift import causal
 from armgap.custom_effect import CustomEffect, TorqueTables
 from armgap.errors import LogShapeError, OptionError
 from armgap.evidence import laws, plausibility
@@ -412,7 +413,8 @@ def _diagnose(given: _Input, options: dict[str, Any], effects: Sequence[CustomEf
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = [*given.notes, *data["notes"]]
-    data["checks"] = [check.to_dict() for check in given.checks]
+    checks = [*given.checks, *_ambiguous_delay(data, training, arm)]
+    data["checks"] = [check.to_dict() for check in checks]
     known, corrected_logs = tables.applied(data, (*training, *held))
     count = len(training)
     data["laws"] = laws(known, arm, corrected_logs[:count], corrected_logs[count:])
@@ -423,6 +425,20 @@ def _diagnose(given: _Input, options: dict[str, Any], effects: Sequence[CustomEf
         for f in log.findings
     ]
     return Diagnosis.from_dict(data)
+
+
+def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> list[Check]:
+    """List the shift of the file among the equivalents of delays that are equal on all joints, and warn of it."""
+    period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
+    check = causal(data["causes"], arm.n_joints, period)
+    if check is None:
+        return []
+    for cause in data["causes"]:
+        if cause["effect"] == "actuator_delay":
+            cause["equivalents"].append(
+                {"effect": "time_shift", "joint": None, "why": "torques early in the file by as much"}
+            )
+    return [check]
 
 
 def _contradicted(data: dict[str, Any]) -> dict[str, Any]:

@@ -121,9 +121,8 @@ class Suspect:
     gain: float
 
 
-def screen(logs: Sequence[Log], arm: Arm) -> tuple[Fit, list[Suspect]]:
-    """Return the equation error of the logs as they stand, and readings that lower it, the best first."""
-    base = EquationError([Rows.of(log, arm) for log in logs], arm)
+def screen(base: EquationError, logs: Sequence[Log], arm: Arm) -> tuple[Fit, list[Suspect]]:
+    """Return what the logs leave as they stand (`base`), and readings that lower it, the best first."""
     low, high = bounds(arm)
     stands = base.fit(low, high)
     suspects = []

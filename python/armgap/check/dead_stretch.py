@@ -16,6 +16,8 @@ __all__ = ["find"]
 
 # A torque that stays the same for so long [s] is a stretch.
 _SHORTEST_S = 0.4
+# The filters have forgotten what was before after this time [s], six of their time constants.
+_FORGOTTEN_S = 0.2
 # The equation of motion leaves so many times more there (mean square) than elsewhere, and this share of the joint's torque.
 _WORSE = 25.0
 _SHARE = 0.1
@@ -47,11 +49,13 @@ def _constant(log: Log, j: int) -> list[tuple[int, int]]:
 def _judged(log: Log, arm: Arm, runs: Sequence[tuple[int, int, int]]) -> list[Check]:
     rows = Rows.of(log, arm)
     dead = np.zeros((len(rows.y), log.n_joints), dtype=bool)
+    alive = np.ones(len(rows.y), dtype=bool)
+    when = log.t[rows.samples]
     for j, first, last in runs:
-        # The filters forget what was before within their settling time, which a short stretch lasts longer than.
-        begins = log.t[first] + 0.5 * _SHORTEST_S
-        dead[(log.t[rows.samples] >= begins) & (rows.samples <= last), j] = True
-    alive = ~dead.any(axis=1)
+        # The filters forget what was before, or what was missing, within this time.
+        settled = log.t[first] + _FORGOTTEN_S
+        dead[(when >= settled) & (when <= log.t[last]), j] = True
+        alive &= (when < log.t[first]) | (when > log.t[last] + _FORGOTTEN_S)
     if alive.sum() < _FEWEST:
         return []
     outside = Rows(rows.psi[alive], rows.y[alive], rows.samples[alive])

@@ -156,6 +156,11 @@ class EquationError:
         """Return per joint the factor that makes the arm file's own torques of the logged ones, by least squares."""
         return (self.moment @ self.arm.theta) / np.maximum(self.square, 1e-30)
 
+    def size_of(self, theta: Array) -> Array:
+        """Return per joint the factor that makes the arm file's torques of those of `theta`, by least squares."""
+        own = np.einsum("i,jil,l->j", theta, self.gram, theta)
+        return np.einsum("i,jil,l->j", self.arm.theta, self.gram, theta) / np.maximum(own, 1e-30)
+
     def __len__(self) -> int:
         return self.count
 

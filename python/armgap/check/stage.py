@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -10,8 +11,9 @@ from armgap.check import dead_stretch, time_shift, torque_is_position, torque_un
 from armgap.check.check import Check
 from armgap.check.contradiction import Found, confirm, screen
 from armgap.check.corrections import Corrections
+from armgap.check.equation_error import EquationError, Rows
 from armgap.log import Log
-from armgap.progress import tell
+from armgap.progress import report_progress
 
 __all__ = ["Examined", "examine"]
 
@@ -65,11 +67,11 @@ def examine(
     -------
     Examined
     """
-    tell("checking the input", 0.0)
+    report_progress("checking the input", 0.0)
     now = Examined(list(training), list(holdout), arm, (), Corrections())
     if unusable := torque_is_position.find([*training, *holdout], arm):
         return replace(now, checks=tuple(unusable))
-    for step in (_factor, _contradiction, _shift, _dead):
+    for step in (_reading, _shift, _dead):
         now = step(now, horizon, repair)
         if now.contradictory:
             break
@@ -77,16 +79,17 @@ def examine(
     return replace(now, checks=tuple(sorted(now.checks, key=lambda check: order.index(check.severity))))
 
 
-def _factor(now: Examined, horizon: float, repair: bool) -> Examined:
-    corrections, checks = torque_unit.find([*now.training, *now.holdout], now.arm)
-    if not repair:
-        checks = [replace(c, severity="warning") if c.severity == "repaired" else c for c in checks]
-        corrections = Corrections()
-    return _applied(now, corrections, checks)
-
-
-def _contradiction(now: Examined, horizon: float, repair: bool) -> Examined:
-    stands, suspects = screen([*now.training, *now.holdout], now.arm)
+def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
+    """Look for another reading of the columns: a factor on torques, or anything that `contradiction.READINGS` offers."""
+    logs = [*now.training, *now.holdout]
+    base = EquationError([Rows.of(log, now.arm) for log in logs], now.arm)
+    stands, suspects = screen(base, logs, now.arm)
+    corrections, checks = torque_unit.find(base, now.arm, min((s.fit.cost for s in suspects), default=math.inf))
+    if checks:
+        if not repair:
+            checks = [replace(c, severity="warning") if c.severity == "repaired" else c for c in checks]
+            corrections = Corrections()
+        return _applied(now, corrections, checks)
     found = confirm(stands, suspects, now.training, now.holdout, now.arm, horizon)
     if found is None:
         return now

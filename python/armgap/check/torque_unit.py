@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from armgap.arm import Arm
 from armgap.check.check import Check, Severity
 from armgap.check.corrections import Corrections
-from armgap.check.equation_error import EquationError, Rows, bounds
-from armgap.log import Log
+from armgap.check.equation_error import EquationError, bounds
 
 __all__ = ["find"]
 
@@ -36,12 +35,21 @@ _GAIN_IN_COST = 0.5
 _LEFT = 0.3
 
 
-def find(logs: Sequence[Log], arm: Arm) -> tuple[Corrections, list[Check]]:
-    """Return the factors that belong on torque columns, and what is to be said about them."""
-    base = EquationError([Rows.of(log, arm) for log in logs], arm)
+def find(base: EquationError, arm: Arm, rival: float = math.inf) -> tuple[Corrections, list[Check]]:
+    """Return the factors that belong on torque columns, and what is to be said about them.
+
+    Parameters
+    ----------
+    base : EquationError
+        The logs as they stand.
+    arm : Arm
+        Nominal model.
+    rival : float
+        Cost of the best other reading of the logs; factors have to do better.
+    """
     low, high = bounds(arm, _TRUST)
     factors = _factors(base, low, high)
-    odd = [j for j, c in enumerate(factors) if not 1 / _GAIN <= c <= _GAIN]
+    odd = [j for j, c in enumerate(factors) if not _within(c, _GAIN)]
     if not odd or np.any(factors <= 0):
         return Corrections(), []
     applied = np.where(np.isin(np.arange(len(factors)), odd), factors, 1.0)
@@ -49,25 +57,28 @@ def find(logs: Sequence[Log], arm: Arm) -> tuple[Corrections, list[Check]]:
     if shared:
         applied = np.full(len(factors), math.exp(float(np.mean(np.log(factors)))))
     fit = base.with_factors(low, high, applied)
-    if base.fit(low, high).cost - fit.cost < _GAIN_IN_COST or float(fit.share.max()) > _LEFT:
+    needed = base.fit(low, high).cost - (0.0 if shared and _within(applied[0], _SCALED) else _GAIN_IN_COST)
+    if min(needed, rival) < fit.cost or float(fit.share.max()) > _LEFT:
         return Corrections(), []
-    return _said(applied, odd, shared, logs)
+    return _said(applied, odd, shared)
+
+
+def _within(factor: float, bound: float) -> bool:
+    return bool(1 / bound <= factor <= bound)
 
 
 def _factors(base: EquationError, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the factor of every torque column: parameters within the arm file's trust and factors, by turns."""
+    """Return the factor of every torque column: the form of the torques by parameters in the trust of the file, their size by the file."""
     factors = base.expected()
     for _ in range(_ROUNDS):
         if np.any(factors <= 0):
             break
         theta = base.with_factors(low, high, factors).theta
-        factors = (base.moment @ theta) / np.maximum(base.square, 1e-30)
+        factors = factors * base.size_of(theta)
     return factors
 
 
-def _said(
-    factors: NDArray[np.float64], odd: Sequence[int], shared: bool, logs: Sequence[Log]
-) -> tuple[Corrections, list[Check]]:
+def _said(factors: NDArray[np.float64], odd: Sequence[int], shared: bool) -> tuple[Corrections, list[Check]]:
     listed = {f"tau{j + 1}": float(f"{factors[j]:.4g}") for j in odd}
     corrections = Corrections(factor={"tau": next(iter(listed.values()))} if shared and len(odd) > 1 else listed)
     largest = max(max(c, 1 / c) for c in listed.values())
