@@ -8,7 +8,7 @@ positive. So a log that is read the wrong way cannot be explained by an arm that
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,12 @@ from armgap import _native
 from armgap.arm import Arm
 from armgap.log import Log
 
-__all__ = ["EquationError", "Fit", "Rows", "bounds"]
+__all__ = ["CUTOFF", "EquationError", "Fit", "Rows", "bounds"]
 
 Array = NDArray[np.float64]
 
 # Cut-off of the filters [rad/s]: above the motion of arms (a few hertz), below what encoders add; at 2.5 ms it is 0.075 of the sample rate.
-_CUTOFF = 30.0
+CUTOFF = 30.0
 # The cut-off at most, in parts of the sample rate, where logs are slow.
 _LARGEST_CUTOFF = 0.5
 # Time constants of the filters that pass before a row counts, after the start and after a hole in the samples.
@@ -35,6 +35,8 @@ _TRUST_FACTOR = 5.0
 _LARGEST_LOG = 4000
 # Share of a joint's torque below which a residual counts as explained: what unmodelled effects leave of healthy logs of real arms.
 _EXPLAINED = 0.02
+# Share of a joint's torque that nothing tells from none.
+_EXACT = 1e-5
 # A bound is left if that lowers the cost by more than this part of the largest moment.
 _SETTLED = 1e-9
 # Rounds of the active set method per parameter at most, and what keeps columns that a log does not excite solvable.
@@ -61,14 +63,14 @@ class Rows:
     samples: NDArray[np.intp]
 
     @classmethod
-    def of(cls, log: Log, arm: Arm) -> Rows:
-        """Return the rows of a log, of a stretch from its middle if it is long."""
+    def of(cls, log: Log, arm: Arm, cutoff: float = CUTOFF) -> Rows:
+        """Return the rows of a log, of a stretch from its middle if it is long; `cutoff` is that of the filters [rad/s]."""
         first = max(0, (len(log) - _LARGEST_LOG) // 2)
         part = slice(first, first + _LARGEST_LOG)
         t, q, tau = (np.ascontiguousarray(x[part]) for x in (log.t, log.q, log.tau))
         steps = np.diff(t)
         period = float(np.median(steps))
-        cutoff = min(_CUTOFF, _LARGEST_CUTOFF / period)
+        cutoff = min(cutoff, _LARGEST_CUTOFF / period)
         psi, y = _native.regression_rows(arm.to_native(), t, q, tau, cutoff)
         settled = _settled(t, _HOLE * period, _SETTLING / cutoff)
         settled &= np.isfinite(y).all(axis=1)
@@ -104,6 +106,11 @@ class Fit:
         """Mean over the joints of the logarithm of the unexplained share."""
         return float(np.mean(np.log(self.share + _EXPLAINED)))
 
+    @property
+    def closeness(self) -> float:
+        """Mean over the joints of the logarithm of the unexplained share itself, for readings that all explain nearly everything."""
+        return float(np.mean(np.log(self.share + _EXACT)))
+
 
 class EquationError:
     """Normal equations of several logs, joint by joint, and what bounded parameters leave of their torques."""
@@ -137,9 +144,13 @@ class EquationError:
         return self._solve(low, high, moment, square, self.scale)
 
     def with_factors(self, low: Array, high: Array, factors: Array) -> Fit:
-        """Return the fit to torques times a factor per joint."""
-        scale = np.maximum(self.scale, self.square * factors**2)
-        return self._solve(low, high, self.moment * factors[:, None], self.square * factors**2, scale)
+        """Return the fit to torques times a factor per joint; shares are of the torques, whatever their unit."""
+        square = self.square * factors**2
+        return self._solve(low, high, self.moment * factors[:, None], square, np.maximum(square, 1e-30))
+
+    def of_torques(self, fit: Fit) -> Fit:
+        """Return a fit with its shares taken of the torques alone."""
+        return replace(fit, share=fit.share * self.scale / np.maximum(self.square, 1e-30))
 
     def _solve(self, low: Array, high: Array, moment: Array, square: Array, scale: Array) -> Fit:
         gram = np.einsum("jil,j->il", self.gram, 1.0 / scale)

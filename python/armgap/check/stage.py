@@ -84,7 +84,8 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
     logs = [*now.training, *now.holdout]
     base = EquationError([Rows.of(log, now.arm) for log in logs], now.arm)
     stands, suspects = screen(base, logs, now.arm)
-    corrections, checks = torque_unit.find(base, now.arm, min((s.fit.cost for s in suspects), default=math.inf))
+    rival = min((base.of_torques(s.fit).closeness for s in suspects), default=math.inf)
+    corrections, checks = torque_unit.find(base, now.arm, rival)
     if checks:
         if not repair:
             checks = [replace(c, severity="warning") if c.severity == "repaired" else c for c in checks]

@@ -23,95 +23,80 @@ __all__ = ["acausal", "causal", "confirmed"]
 
 # Shifts that are tried [samples].
 _LARGEST = 8
-# A shift is looked at more closely from this part of a sample on; friction that is not modelled moves the estimate by as much.
-_COUNTS = 0.3
-# Predictions with the shift have to miss by less than this part of what they miss without.
-_BETTER = 0.9
+# Cut-off of the filters [rad/s]: a shift shows in the motion itself; what a controller makes of encoder noise would hide it.
+_CUTOFF = 10.0
+# A shift counts from this part of a sample on. On simulated logs with hidden effects the estimate is -0.25 to 0.85 samples off, and
+# earlier (a negative shift) is the side that no drive's lag is on.
+_COUNTS = 0.6
+# So many of the halves of all logs have to agree, each by half as much.
+_AGREEING = 0.75
+# Predictions with the shift may miss by no more than this part of what they miss without; a neighbour has to be better by this much.
+_AS_GOOD = 1.02
+_CLEARLY = 0.97
+# A share of torque that nothing tells from none.
+_EXACT = 1e-7
+# A half needs so many rows.
+_FEWEST = 200
 # Delays of all joints are one shift of the file if they differ by less than this part of a sample, or by this many of their deviations.
 _EQUAL = 0.5
 _EQUAL_SIGMAS = 3.0
-# Blocks of rows that have to agree, and how sure they have to be [standard deviations].
-_BLOCKS = 12
-_SURE = 3.0
 
 
 def acausal(logs: Sequence[Log], arm: Arm) -> int:
     """Return by how many samples the torques of all logs come late in the file; 0 if they do not."""
-    estimates = []
-    for log in logs:
-        rows = Rows.of(log, arm)
-        if len(rows.y) < 10 * _BLOCKS:
-            continue
-        estimates += _by_block(rows, arm)
-    if len(estimates) < _BLOCKS:
+    curves = [_curve(half, arm) for log in logs for half in _halves(Rows.of(log, arm, _CUTOFF))]
+    if not curves:
         return 0
-    late = -np.asarray(estimates)
-    middle = float(np.median(late))
-    deviation = 1.2533 * float(np.median(np.abs(late - middle))) * 1.4826 / np.sqrt(len(late))
-    if middle < _COUNTS or middle < _SURE * deviation:
+    late = -_minimum(np.sum(curves, axis=0))
+    agreeing = np.mean([-_minimum(curve) > 0.5 * _COUNTS for curve in curves])
+    if not _COUNTS <= late < _LARGEST or agreeing < _AGREEING:
         return 0
-    return min(max(1, round(middle)), _LARGEST)
+    return max(1, round(late))
 
 
-def _by_block(rows: Rows, arm: Arm) -> list[float]:
-    """Return the shift that explains each block of rows best, under the parameters that explain all of them best [samples]."""
+def _halves(rows: Rows) -> list[Rows]:
+    """Return the rows in two halves, for estimates that are independent of each other."""
+    middle = len(rows.y) // 2
+    parts = [slice(0, middle), slice(middle, None)]
+    halves = [Rows(rows.psi[part], rows.y[part], rows.samples[part]) for part in parts]
+    return [half for half in halves if len(half.y) >= _FEWEST]
+
+
+def _curve(rows: Rows, arm: Arm) -> NDArray[np.float64]:
+    """Return the log-likelihood's cost of every shift, joints weighted by what they leave unexplained."""
     low, high = bounds(arm)
-    shifts = np.arange(-_LARGEST, _LARGEST + 1)
-    base = EquationError([rows], arm)
-    costs = [base.fit(low, high, [np.roll(rows.y, s, axis=0)]).cost for s in shifts]
-    best = int(shifts[int(np.argmin(costs))])
-    theta = base.fit(low, high, [np.roll(rows.y, best, axis=0)]).theta
-    expected = rows.psi @ theta
-    inside = slice(_LARGEST, len(rows.y) - _LARGEST)
-    blocks = np.array_split(np.arange(len(rows.y))[inside], _BLOCKS)
-    found = []
-    for block in blocks:
-        squares = np.array([_square(expected[block], rows.y[block - s], base.scale) for s in shifts])
-        at = _minimum(shifts, squares)
-        if at is not None:
-            found.append(at)
-    return found
+    count = len(rows.y)
+    inner = slice(_LARGEST, count - _LARGEST)
+    base = EquationError([Rows(rows.psi[inner], rows.y[inner], rows.samples[inner])], arm)
+    shifted = [rows.y[_LARGEST - s : count - _LARGEST - s] for s in range(-_LARGEST, _LARGEST + 1)]
+    return np.array([count * float(np.sum(np.log(base.fit(low, high, [y]).share + _EXACT))) for y in shifted])
 
 
-def _square(expected: NDArray[np.float64], y: NDArray[np.float64], scale: NDArray[np.float64]) -> float:
-    return float(np.sum((y - expected) ** 2 / scale))
-
-
-def _minimum(shifts: NDArray[np.intp], squares: NDArray[np.float64]) -> float | None:
-    """Return where a parabola through the least value and its neighbours is least; None where the least lies at an end."""
-    i = int(np.argmin(squares))
-    if i in (0, len(squares) - 1):
-        return None
-    a, b, c = squares[i - 1 : i + 2]
-    curvature = a - 2 * b + c
-    return float(shifts[i] + 0.5 * (a - c) / curvature) if curvature > 0 else None
+def _minimum(costs: NDArray[np.float64]) -> float:
+    """Return the shift where a parabola through the least cost and its neighbours is least [samples]."""
+    i = int(np.argmin(costs))
+    if i in (0, len(costs) - 1):
+        return float(i - _LARGEST)
+    a, b, c = costs[i - 1 : i + 2]
+    return float(i - _LARGEST + 0.5 * (a - c) / (a - 2 * b + c))
 
 
 def confirmed(
     samples: int, training: Sequence[Log], holdout: Sequence[Log], arm: Arm, horizon: float
 ) -> Corrections | None:
-    """Return the shift that predictions confirm: better than none, and than one sample more or less.
-
-    Prediction errors grow in proportion to a shift that is left, so a descent from `samples` finds the least.
-    """
+    """Return the shift unless predictions speak against it; of its neighbours the one that they clearly prefer."""
     period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
     as_is = Refit.of(arm, training, holdout, horizon)
-    errors = {0: 1.0}
 
     def error(k: int) -> float:
-        if k not in errors:
-            corrections = Corrections(shift={"tau": -k * period})
-            read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
-            errors[k] = Refit.of(arm, read[0], read[1], horizon).against(as_is)
-        return errors[k]
+        corrections = Corrections(shift={"tau": -k * period})
+        read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
+        return Refit.of(arm, read[0], read[1], horizon).against(as_is)
 
-    best = samples
-    while 0 < best < 2 * _LARGEST:
-        near = min((best - 1, best, best + 1), key=error)
-        if near == best:
-            break
-        best = near
-    if best <= 0 or error(best) > _BETTER:
+    errors = {k: error(k) for k in (samples - 1, samples, samples + 1) if k}
+    best = min(errors, key=lambda k: errors[k])
+    best = best if errors[best] < _CLEARLY * errors[samples] else samples
+    if errors[best] > _AS_GOOD:
         return None
     return Corrections(shift={"tau": float(f"{-best * period:.6g}")})
 

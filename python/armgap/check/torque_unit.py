@@ -45,7 +45,7 @@ def find(base: EquationError, arm: Arm, rival: float = math.inf) -> tuple[Correc
     arm : Arm
         Nominal model.
     rival : float
-        Cost of the best other reading of the logs; factors have to do better.
+        Closeness of the best other reading of the logs; factors have to come closer.
     """
     low, high = bounds(arm, _TRUST)
     factors = _factors(base, low, high)
@@ -57,8 +57,10 @@ def find(base: EquationError, arm: Arm, rival: float = math.inf) -> tuple[Correc
     if shared:
         applied = np.full(len(factors), math.exp(float(np.mean(np.log(factors)))))
     fit = base.with_factors(low, high, applied)
-    needed = base.fit(low, high).cost - (0.0 if shared and _within(applied[0], _SCALED) else _GAIN_IN_COST)
-    if min(needed, rival) < fit.cost or float(fit.share.max()) > _LEFT:
+    needed = base.with_factors(low, high, np.ones_like(applied)).cost - (
+        0.0 if shared and _within(applied[0], _SCALED) else _GAIN_IN_COST
+    )
+    if needed < fit.cost or rival < fit.closeness or float(fit.share.max()) > _LEFT:
         return Corrections(), []
     return _said(applied, odd, shared)
 
