@@ -252,7 +252,7 @@ def test_every_check_is_offered_somewhere(arm: Arm, pendulum: Arm) -> None:
     def turned(a: Arm) -> Arm:
         return replace(a, theta=-a.theta)
 
-    offered = [r for a in (arm, pendulum, turned(pendulum)) for readings in READINGS for r in readings(a)]
+    offered = [r for a in (arm, pendulum, turned(pendulum)) for readings in READINGS for r in readings(a, 1.0)]
     assert all(r.check in NAMES and r.remedies and r.corrections for r in offered)
     assert set(CORRECTIONS) >= {
         "flip",

@@ -29,9 +29,9 @@ from armgap.check.equation_error import EquationError, Fit, Rows, bounds
 from armgap.check.reading import Reading
 from armgap.log import Log
 
-__all__ = ["READINGS", "Found", "confirm", "screen"]
+__all__ = ["READINGS", "Found", "Refit", "Suspect", "confirm", "screen"]
 
-READINGS: tuple[Callable[[Arm], Iterable[Reading]], ...] = (
+READINGS: tuple[Callable[[Arm, float], Iterable[Reading]], ...] = (
     torque_sign.readings,
     position_sign.readings,
     joint_order.readings,
@@ -125,9 +125,10 @@ def screen(base: EquationError, logs: Sequence[Log], arm: Arm) -> tuple[Fit, lis
     """Return what the logs leave as they stand (`base`), and readings that lower it, the best first."""
     low, high = bounds(arm)
     stands = base.fit(low, high)
+    travel = max(float(np.ptp(log.q, axis=0).max()) for log in logs)
     suspects = []
     for readings in READINGS:
-        for reading in readings(arm):
+        for reading in readings(arm, travel):
             fit = _read(reading, base, logs, arm, low, high)
             if (gain := stands.cost - fit.cost) > _SUSPICIOUS:
                 suspects.append(Suspect(reading, fit, gain))

@@ -136,7 +136,8 @@ class EquationError:
         Inertia and weight cancel near a resonance, where the torque alone would be a small measure.
         """
         terms = (np.diagonal(self.gram, axis1=1, axis2=2) * self.arm.theta**2).max(axis=1)
-        return np.maximum(np.maximum(self.square, terms), 1e-30)
+        scale: Array = np.maximum(np.maximum(self.square, terms), 1e-30)
+        return scale
 
     def fit(self, low: Array, high: Array, torques: Sequence[Array] | None = None) -> Fit:
         """Return the parameters between `low` and `high` that explain the torques, or others in their place, best."""
@@ -170,7 +171,8 @@ class EquationError:
     def size_of(self, theta: Array) -> Array:
         """Return per joint the factor that makes the arm file's torques of those of `theta`, by least squares."""
         own = np.einsum("i,jil,l->j", theta, self.gram, theta)
-        return np.einsum("i,jil,l->j", self.arm.theta, self.gram, theta) / np.maximum(own, 1e-30)
+        size: Array = np.einsum("i,jil,l->j", self.arm.theta, self.gram, theta) / np.maximum(own, 1e-30)
+        return size
 
     def __len__(self) -> int:
         return self.count

@@ -11,7 +11,7 @@ from armgap.check.reading import Reading, reading
 __all__ = ["readings"]
 
 
-def readings(arm: Arm) -> Iterator[Reading]:
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
     """Yield the arm without its weights, where it has any."""
     if arm.theta[arm.gravity_parameters].any():
         yield reading(

@@ -15,7 +15,7 @@ from armgap.check.reading import Reading, reading
 __all__ = ["readings"]
 
 
-def readings(arm: Arm) -> Iterator[Reading]:
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
     """Yield the arm with its gravity turned over, where it has any that no other check speaks of."""
     weights = arm.theta[arm.gravity_parameters]
     if not weights.any() or (arm.rotary and arm.expects_weight):

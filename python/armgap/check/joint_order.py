@@ -12,7 +12,7 @@ from armgap.check.reading import Reading, reading
 __all__ = ["readings"]
 
 
-def readings(arm: Arm) -> Iterator[Reading]:
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
     """Yield every pair of joints with positions, torques or both exchanged."""
     for i, j in combinations(range(1, arm.n_joints + 1), 2):
         q, tau = (f"q{i}", f"q{j}"), (f"tau{i}", f"tau{j}")

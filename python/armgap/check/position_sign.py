@@ -14,7 +14,7 @@ from armgap.check.reading import Reading, reading
 __all__ = ["readings"]
 
 
-def readings(arm: Arm) -> Iterator[Reading]:
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
     """Yield, for arms of several joints, each joint's positions, and its positions with its torques."""
     if arm.n_joints == 1:
         return

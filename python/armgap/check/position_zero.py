@@ -18,7 +18,7 @@ __all__ = ["OFFSETS", "readings"]
 OFFSETS = (180, 90, -90)
 
 
-def readings(arm: Arm) -> Iterator[Reading]:
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
     """Yield every joint that turns with its zero at each of `OFFSETS`."""
     if not arm.rotary:
         return

@@ -11,7 +11,7 @@ from armgap.check.reading import Reading, reading
 __all__ = ["readings"]
 
 
-def readings(arm: Arm) -> Iterator[Reading]:
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
     """Yield both directions for every joint after the first of an arm that turns."""
     if not arm.rotary:
         return

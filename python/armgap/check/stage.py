@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armgap.arm import Arm
 from armgap.check import dead_stretch, time_shift, torque_is_position, torque_unit
 from armgap.check.check import Check
-from armgap.check.contradiction import Found, confirm, screen
+from armgap.check.contradiction import Found, Refit, Suspect, confirm, screen
 from armgap.check.corrections import Corrections
 from armgap.check.equation_error import EquationError, Rows
 from armgap.log import Log
 from armgap.progress import report_progress
 
 __all__ = ["Examined", "examine"]
+
+# Readings whose mean log share of unexplained torque differs by less are told apart by predictions.
+_CLOSE = 1.0
 
 
 @dataclass(frozen=True)
@@ -84,17 +86,31 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
     logs = [*now.training, *now.holdout]
     base = EquationError([Rows.of(log, now.arm) for log in logs], now.arm)
     stands, suspects = screen(base, logs, now.arm)
-    rival = min((base.of_torques(s.fit).closeness for s in suspects), default=math.inf)
-    corrections, checks = torque_unit.find(base, now.arm, rival)
-    if checks:
-        if not repair:
-            checks = [replace(c, severity="warning") if c.severity == "repaired" else c for c in checks]
-            corrections = Corrections()
-        return _applied(now, corrections, checks)
+    factors = torque_unit.find(base, now.arm)
+    if factors is not None and _prefers(factors, suspects, base, now, horizon):
+        applied = factors.corrections if repair and factors.checks[0].severity == "repaired" else Corrections()
+        said = [c if c.severity != "repaired" or repair else replace(c, severity="warning") for c in factors.checks]
+        return _applied(now, applied, said)
     found = confirm(stands, suspects, now.training, now.holdout, now.arm, horizon)
     if found is None:
         return now
     return _applied(now, found.reading.corrections, [_said(found, now.arm, horizon)])
+
+
+def _prefers(
+    factors: torque_unit.Factors, suspects: Sequence[Suspect], base: EquationError, now: Examined, horizon: float
+) -> bool:
+    """Return whether factors on torques explain the logs better than any other reading; predictions decide between close ones."""
+    rivals = [s for s in suspects if base.of_torques(s.fit).closeness < factors.closeness + _CLOSE]
+    if not rivals:
+        return True
+    with_factors = _predicted(factors.corrections, now, horizon)
+    return all(with_factors.against(_predicted(s.reading.corrections, now, horizon)) <= 1.0 for s in rivals[:2])
+
+
+def _predicted(corrections: Corrections, now: Examined, horizon: float) -> Refit:
+    read = [[corrections.on_log(log) for log in group] for group in (now.training, now.holdout)]
+    return Refit.of(corrections.on_arm(now.arm), read[0], read[1], horizon)
 
 
 def _said(found: Found, arm: Arm, horizon: float) -> Check:

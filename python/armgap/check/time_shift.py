@@ -32,7 +32,7 @@ _COUNTS = 0.6
 _AGREEING = 0.75
 # Predictions with the shift may miss by no more than this part of what they miss without; a neighbour has to be better by this much.
 _AS_GOOD = 1.02
-_CLEARLY = 0.97
+_CLEARLY = 0.9
 # A share of torque that nothing tells from none.
 _EXACT = 1e-7
 # A half needs so many rows.

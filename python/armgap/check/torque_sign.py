@@ -14,7 +14,7 @@ from armgap.check.reading import Reading, reading
 __all__ = ["readings"]
 
 
-def readings(arm: Arm) -> Iterator[Reading]:
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
     """Yield one reading per joint, and one of all joints."""
     joints = range(1, arm.n_joints + 1)
     every_tau, every_q = tuple(f"tau{j}" for j in joints), tuple(f"q{j}" for j in joints)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from armgap.check.check import Check, Severity
 from armgap.check.corrections import Corrections
 from armgap.check.equation_error import EquationError, bounds
 
-__all__ = ["find"]
+__all__ = ["Factors", "find"]
 
 # A factor within these bounds is a gain of the drive (an effect), or wrong parameters.
 _GAIN = 2.0
@@ -35,34 +36,32 @@ _GAIN_IN_COST = 0.5
 _LEFT = 0.3
 
 
-def find(base: EquationError, arm: Arm, rival: float = math.inf) -> tuple[Corrections, list[Check]]:
-    """Return the factors that belong on torque columns, and what is to be said about them.
+@dataclass(frozen=True)
+class Factors:
+    """Factors on torque columns, what they leave unexplained, and what is to be said about them."""
 
-    Parameters
-    ----------
-    base : EquationError
-        The logs as they stand.
-    arm : Arm
-        Nominal model.
-    rival : float
-        Closeness of the best other reading of the logs; factors have to come closer.
-    """
+    corrections: Corrections
+    closeness: float
+    checks: tuple[Check, ...]
+
+
+def find(base: EquationError, arm: Arm) -> Factors | None:
+    """Return the factors that belong on torque columns of the logs (`base`), or None."""
     low, high = bounds(arm, _TRUST)
     factors = _factors(base, low, high)
     odd = [j for j, c in enumerate(factors) if not _within(c, _GAIN)]
     if not odd or np.any(factors <= 0):
-        return Corrections(), []
+        return None
     applied = np.where(np.isin(np.arange(len(factors)), odd), factors, 1.0)
     shared = len(odd) == len(factors) and float(factors.max() / factors.min()) < _ALIKE
     if shared:
         applied = np.full(len(factors), math.exp(float(np.mean(np.log(factors)))))
     fit = base.with_factors(low, high, applied)
-    needed = base.with_factors(low, high, np.ones_like(applied)).cost - (
-        0.0 if shared and _within(applied[0], _SCALED) else _GAIN_IN_COST
-    )
-    if needed < fit.cost or rival < fit.closeness or float(fit.share.max()) > _LEFT:
-        return Corrections(), []
-    return _said(applied, odd, shared)
+    needed = 0.0 if shared and _within(applied[0], _SCALED) else _GAIN_IN_COST
+    if base.with_factors(low, high, np.ones_like(applied)).cost - fit.cost < needed or float(fit.share.max()) > _LEFT:
+        return None
+    corrections, checks = _said(applied, odd, shared)
+    return Factors(corrections, fit.closeness, tuple(checks))
 
 
 def _within(factor: float, bound: float) -> bool:
@@ -97,4 +96,4 @@ def _said(factors: NDArray[np.float64], odd: Sequence[int], shared: bool) -> tup
         message = f"`{column}` times {c:.4g} is the torque that the arm file expects: a current, a percentage, or the motor's side of a gear?"
         joint = int(column[3:]) if column != "tau" else None
         checks.append(Check("torque_unit", severity, message, tuple(remedies), joint))
-    return (corrections if severity == "repaired" else Corrections()), checks
+    return corrections, checks
