@@ -37,7 +37,9 @@ def look(log: Log, arm: Arm | None) -> Outcome:
         step = grid_step(tau)
         if step is None or step / np.sqrt(12) <= _MATTERS * spread or not _rounded(tau, step):
             continue
-        said = f"tau{j + 1} moves in steps of {step:.3g}, {100 * step / spread:.2g} % of its RMS variation of {spread:.3g}"
+        said = (
+            f"tau{j + 1} moves in steps of {step:.3g}, {100 * step / spread:.2g} % of its RMS variation of {spread:.3g}"
+        )
         remedy = ("log the torque with more digits",)
         found.append(Check("quantized_torque", "warning", said, remedy, j + 1, log.name))
     return Outcome(tuple(found)) if found else NOTHING

@@ -27,6 +27,8 @@ def look(log: Log, arm: Arm | None) -> Outcome:
             continue
         q[:, j] = unwrapped(log.q[:, j])
         times = "once" if len(at) == 1 else f"{len(at)} times"
-        said = f"q{j + 1} jumps by a whole turn {times}, first at {seconds(log.t[at[0]])}, and goes on smoothly without it"
+        said = (
+            f"q{j + 1} jumps by a whole turn {times}, first at {seconds(log.t[at[0]])}, and goes on smoothly without it"
+        )
         found.append(Check("wrapped_positions", "repaired", said, (), j + 1, log.name, ranges(at)))
     return Outcome(tuple(found), replace(log, q=q), None, "the turns were taken out") if found else NOTHING
