@@ -27,8 +27,12 @@ _OF_ENCODER = 0.5
 _COLOURED = 1.3
 # Counts per row from which rounding is white.
 _WHITE_COUNTS = 1.0
+# Noise that is so many steps of the log's grid is not its rounding.
+_ABOVE_GRID = 2.0
 # A joint moves where it gets on by more than this part of its usual fast pace, per row.
 _MOVES = 0.05
+# Positions that are held in this share of the rows in motion are another defect.
+_HELD = 0.1
 # Rows in motion that have to speak, and reversals that an exact log has to pass smoothly.
 _FEWEST, _REVERSALS = 200, 4
 # Numbers are exact within so many roundings, fourth differences within so many times more.
@@ -68,9 +72,10 @@ def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
     paces = [travel_per_row(q, _HALF) for q in pieces]
     usual = float(np.quantile(np.concatenate(paces), 0.9))
     grid = grid_step(np.concatenate(pieces))
-    slowest = max(_MOVES * usual, _WHITE_COUNTS * (step if step is not None else grid or 0.0))
+    slowest = max(_MOVES * usual, _WHITE_COUNTS * max(step or 0.0, grid or 0.0))
     moving = [p > slowest for p in paces]
-    if sum(int(np.count_nonzero(m)) for m in moving) < _FEWEST:
+    count = sum(int(np.count_nonzero(m)) for m in moving)
+    if count < _FEWEST or _stale(pieces, moving) > _HELD * count:
         return ""
     even = [m & _even(log.t[r], log.sample_period) for r, m in zip(rows, moving, strict=True)]
     spaced = sum(int(np.count_nonzero(m)) for m in even) >= _FEWEST
@@ -92,7 +97,9 @@ def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
             f"has noise of {least:.2g} at high frequencies where the encoder's step of {step:.3g} makes {step / np.sqrt(12):.2g}: "
             "filtered, interpolated, or of a finer encoder than the arm file's"
         )
-    if spaced and grid is None and not driven:
+    if grid is not None and least < _OF_ENCODER * grid / np.sqrt(12) and not driven:
+        return f"has noise of {least:.2g} at high frequencies, less than its own steps of {grid:.3g} make: filtered"
+    if spaced and (grid is None or squares[-1] > _ABOVE_GRID * grid) and not driven:
         falls = min(float(of[ORDERS.index(6)] / of[-1]) for of in (squares, middle))
         if falls > _COLOURED:
             return f"has noise that falls towards high frequencies (by a factor of {falls:.2g}), as no encoder's does: filtered"
@@ -111,6 +118,11 @@ def _unmeasured(pieces: list[Array], moving: list[NDArray[np.bool_]], exact: flo
     if share <= _PIECEWISE:
         return ""
     return f"lies exactly on straight lines or cubics between knots in {100 * share:.0f} % of the rows: interpolated"
+
+
+def _stale(pieces: list[Array], moving: list[NDArray[np.bool_]]) -> int:
+    """Return how many rows in motion repeat the position before."""
+    return sum(int(np.count_nonzero((q[1:] == q[:-1]) & m[1:])) for q, m in zip(pieces, moving, strict=True))
 
 
 def _largest(pieces: list[Array]) -> float:
