@@ -27,8 +27,6 @@ _OF_ENCODER = 0.5
 _COLOURED = 1.3
 # Counts per row from which rounding is white.
 _WHITE_COUNTS = 1.0
-# Noise that is so many steps of the log's grid is not its rounding.
-_ABOVE_GRID = 2.0
 # A joint moves where it gets on by more than this part of its usual fast pace, per row.
 _MOVES = 0.05
 # Positions that are held in this share of the rows in motion are another defect.
@@ -99,7 +97,7 @@ def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
         )
     if grid is not None and least < _OF_ENCODER * grid / np.sqrt(12) and not driven:
         return f"has noise of {least:.2g} at high frequencies, less than its own steps of {grid:.3g} make: filtered"
-    if spaced and (grid is None or squares[-1] > _ABOVE_GRID * grid) and not driven:
+    if spaced and grid is None and not driven:
         falls = min(float(of[ORDERS.index(6)] / of[-1]) for of in (squares, middle))
         if falls > _COLOURED:
             return f"has noise that falls towards high frequencies (by a factor of {falls:.2g}), as no encoder's does: filtered"

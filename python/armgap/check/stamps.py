@@ -38,7 +38,7 @@ _LONG, _LATE = 1.3, 0.6
 _ROUNDS = 12
 # Rows to either side whose mean lateness is compared.
 _BESIDE = 12
-# Even times stay within this part of a period of the stamps' mean over so many rows; a clock's drift is slower than that, too.
+# Even times stay within this part of a period of the stamps' mean over so many rows; a clock's drift bends by less, too.
 _NEAR, _MEAN_ROWS = 0.35, 25
 # A drift of the clock is followed over so many rows if it stands out by so many deviations.
 _DRIFT_ROWS, _DRIFT_STANDS_OUT = 128, 4.0
@@ -116,7 +116,8 @@ def _even_times(t: Array, steps: Array, period: float) -> Array | None:
         start, period = _straight(index, t)
     late = t - start - period * index
     drift = _drift(late)
-    if len(t) > _DRIFT_ROWS and float(np.max(np.abs(drift[_DRIFT_ROWS:] - drift[:-_DRIFT_ROWS]))) > _NEAR * period:
+    bends = drift[2 * _DRIFT_ROWS :] - 2 * drift[_DRIFT_ROWS:-_DRIFT_ROWS] + drift[: -2 * _DRIFT_ROWS]
+    if float(np.max(np.abs(bends), initial=0.0)) > _NEAR * period:
         return None
     even = start + period * index + drift
     late = late - drift
