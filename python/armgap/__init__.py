@@ -9,6 +9,7 @@ from armgap._native import __version__
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
+    from armgap.custom_effect import CustomEffect
     from armgap.diagnosis import Diagnosis, diagnose
     from armgap.errors import ArmgapError
     from armgap.estimator import Estimator
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from armgap.identification import Identification, identify
     from armgap.inspection import Inspection, inspect
     from armgap.log import Finding, Log
-    from armgap.own import OwnEffect
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
 
@@ -26,13 +26,13 @@ __all__ = [
     "ArmFit",
     "ArmgapError",
     "Corrected",
+    "CustomEffect",
     "Diagnosis",
     "Estimator",
     "Finding",
     "Identification",
     "Inspection",
     "Log",
-    "OwnEffect",
     "Reproduction",
     "__version__",
     "correct",
@@ -58,7 +58,7 @@ _HOMES = {
     "ArmFit": "armgap.fitting",
     "fit": "armgap.fitting",
     "Log": "armgap.log",
-    "OwnEffect": "armgap.own",
+    "CustomEffect": "armgap.custom_effect",
     "Identification": "armgap.identification",
     "identify": "armgap.identification",
     "Reproduction": "armgap.reproduction",
@@ -74,7 +74,7 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     """Load a public name when it is first used, so that importing the package stays fast."""
     if name not in _HOMES:
-        raise AttributeError(f"module 'armgap' has no attribute {name!r}")
+        return import_module("armgap._renamed").old_names(__name__, stacklevel=3)(name)
     value = getattr(import_module(_HOMES[name]), name)
     globals()[name] = value
     return value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import Any
 
 import click
 
@@ -10,11 +10,13 @@ from armgap.cli.common import (
     check_outputs,
     columns_option,
     console,
+    corrections_options,
     interruptible,
     json_option,
     parse_columns,
     parse_units,
     quiet_option,
+    read_arm,
     units_option,
     write,
 )
@@ -27,6 +29,8 @@ __all__ = ["command"]
 @click.argument("logs", nargs=-1, required=True, metavar="LOG…")
 @click.option("--arm", "arm_file", metavar="ARM.toml", help="Arm file; tells what the log says about its parameters.")
 @click.option("--report", "report_file", metavar="OUT.html", help="Write a page with pictures.")
+@click.option("--no-repair", is_flag=True, help="Say what is wrong with the logs and repair nothing.")
+@corrections_options
 @json_option
 @columns_option
 @units_option
@@ -39,19 +43,22 @@ def command(
     columns: str | None,
     units: str | None,
     quiet: bool,
+    no_repair: bool,
+    **corrections: Any,
 ) -> None:
     """Say what LOGs hold: columns, sampling, steps, saturation, motion, and what they tell about an arm's parameters."""
     import json
 
-    from armgap.arm import Arm
     from armgap.inspection import inspect
     from armgap.log import Log, paths
 
     check_outputs(json_file, report_file)
     naming = {"columns": parse_columns(columns), "units": parse_units(units)}
-    arm = Arm.read(Path(arm_file)) if arm_file is not None else None
+    arm = read_arm(arm_file, corrections) if arm_file is not None else None
     with working("reading", quiet=quiet):
-        found = interruptible(lambda: [inspect(Log.read(path, arm=arm, **naming), arm) for path in paths(logs)])
+        found = interruptible(
+            lambda: [inspect(Log.read(path, arm=arm, **naming), arm, repair=not no_repair) for path in paths(logs)]
+        )
     if report_file is not None:
         from armgap.inspection.page import render
 

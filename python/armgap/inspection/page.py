@@ -12,7 +12,7 @@ from armgap.inspection import words
 from armgap.inspection.inspection import Inspection
 from armgap.report import charts, page
 from armgap.report.page import Section
-from armgap.report.words import Answer
+from armgap.report.words import SummaryAnswer
 
 __all__ = ["render"]
 
@@ -28,7 +28,7 @@ def render(inspections: Sequence[Inspection]) -> str:
     title = f"Log: {inspections[0].log}" if single else f"{len(inspections)} logs"
     lead = "What the log holds, how it was sampled, and what its motion tells."
     pairs = words.overview(inspections[0]) if single else [(found.log, _brief(found)) for found in inspections]
-    answers = [Answer(question, *_headline(answer)) for question, answer in pairs]
+    answers = [SummaryAnswer(question, *_headline(answer)) for question, answer in pairs]
     sections = [section for found in inspections for section in _sections(found, single=single)]
     return page.render(title, lead, answers, sections)
 

@@ -48,6 +48,10 @@ class Log:
         File it was read from.
     columns : mapping
         The file's own name of each column in use, by standard name.
+    part_of : str, optional
+        Name of the log that it is a part of.
+    first_row : int
+        Row of that log, from 0, that it begins with.
     """
 
     name: str
@@ -58,6 +62,8 @@ class Log:
     findings: tuple[Finding, ...] = ()
     path: Path | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
+    part_of: str | None = None
+    first_row: int = 0
 
     @classmethod
     def read(
@@ -188,7 +194,8 @@ class Log:
             *checks.notice(arrays, names, arm), *checks.unused(recording, names),
         ]  # fmt: skip
         arrays.t.__isub__(arrays.t[0])
-        return cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key)
+        log = cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key)
+        return log if arm is None or arm.corrections is None else arm.corrections.on_log(log)
 
     def __post_init__(self) -> None:
         """Put times on whole nanoseconds, so that a log is the same log in every format, and make the arrays read-only."""
@@ -219,6 +226,11 @@ class Log:
         """Return the number of samples."""
         return len(self.t)
 
+    @property
+    def recording(self) -> str:
+        """Name of the whole log, also of a part of it."""
+        return self.part_of or self.name
+
     def part(self, first: int, last: int, name: str, *, findings: tuple[Finding, ...] | None = None) -> Log:
         """Return the samples `first` up to, not including, `last` as a log of its own, with the times of this one.
 
@@ -227,7 +239,8 @@ class Log:
         rows = slice(first, last)
         dq = None if self.dq is None else self.dq[rows]
         found = self.findings if findings is None else findings
-        return Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
+        part = Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
+        return replace(part, part_of=self.recording, first_row=self.first_row + first)
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
         """Return the log with other findings."""

@@ -25,7 +25,7 @@ _DEGREE = math.pi / 180
 
 FACTORS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "q": {"rad": 1.0, "deg": _DEGREE, "m": 1.0, "mm": 1e-3},
+    "q": {"rad": 1.0, "deg": _DEGREE, "turns": 2 * math.pi, "m": 1.0, "mm": 1e-3},
     "dq": {"rad/s": 1.0, "deg/s": _DEGREE, "m/s": 1.0, "mm/s": 1e-3},
     "tau": {"Nm": 1.0, "mNm": 1e-3, "N": 1.0, "kN": 1e3},
 }
@@ -152,7 +152,7 @@ def _factor(group: str, unit: str, arm: Arm | None) -> float:
 
 
 def _suits(group: str, unit: str, arm: Arm | None) -> bool:
-    angular = unit.startswith(("rad", "deg")) or unit.endswith("Nm")
+    angular = unit.startswith(("rad", "deg", "turns")) or unit.endswith("Nm")
     return arm is None or group == "t" or angular == arm.rotary
 
 

@@ -10,7 +10,7 @@ from armgap.diagnosis import Value
 from armgap.report import charts
 from armgap.report.document import Document
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
-from armgap.report.words import Answer, each_joint, error_text, figure, joint_text, percent, sizes, title, value
+from armgap.report.words import SummaryAnswer, each_joint, error_text, figure, joint_text, percent, sizes, title, value
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -33,12 +33,12 @@ def comparison_document(c: Comparison) -> Document:
     return Document(heading, _LEADS[c.outcome], answers(c), [_gap(c), _causes(c), _parameters(c), _method(c)])
 
 
-def answers(c: Comparison) -> list[Answer]:
+def answers(c: Comparison) -> list[SummaryAnswer]:
     """Three questions about a repair."""
     return [
-        Answer("Did the gap shrink?", *_shrunk(c)),
-        Answer("What became of the causes?", *_became(c)),
-        Answer("Did the arm's own values change?", *_moved(c)),
+        SummaryAnswer("Did the gap shrink?", *_shrunk(c)),
+        SummaryAnswer("What became of the causes?", *_became(c)),
+        SummaryAnswer("Did the arm's own values change?", *_moved(c)),
     ]
 
 

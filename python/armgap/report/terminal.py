@@ -32,7 +32,7 @@ def summary_table(diagnosis: Diagnosis | Data) -> RenderableType:
     return Group(*parts, gap_table(data))
 
 
-def answer_lines(answer: words.Answer) -> list[RenderableType]:
+def answer_lines(answer: words.SummaryAnswer) -> list[RenderableType]:
     """A question with its answer, and an empty line."""
     from rich.padding import Padding
     from rich.text import Text

@@ -8,10 +8,10 @@ from armgap.report.page import Section
 from armgap.report.sections.about import data_quality, method
 from armgap.report.sections.causes import evidence, look_alikes, ranking
 from armgap.report.sections.gap import first_picture, gap_map
+from armgap.report.sections.model_labels import Data
 from armgap.report.sections.motion import free_run, horizons, predictions
 from armgap.report.sections.parameters import parameters
 from armgap.report.sections.silent import not_shown, ruled_out
-from armgap.report.sections.steps import Data
 
 __all__ = ["SECTIONS"]
 
