@@ -18,13 +18,13 @@ from armgap.trial.arms import MODELS
 from armgap.trial.engine import worker_pool
 from armgap.trial.trial import Plan
 
-from .answering import WHOLE, Record, answer, answer_floor
+from .answering import WHOLE, Record, about, answer, answer_floor
 from .defects import REPAIRED, chosen
-from .making import make, plans, trial_plans
+from .making import make, plans, read, trial_plans
 
 MODES = ("defects", "clean", "repaired", "floor")
 #: Longest time for one answer, and for making one case [s].
-LIMIT, MAKING = 300.0, 1200.0
+LIMIT, MAKING = 600.0, 1200.0
 #: Libraries read these when they are loaded: one thread in each process.
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
 
@@ -126,7 +126,8 @@ def _answers(
         futures = [(t, pool.schedule(ask, args=args, timeout=options.limit)) for t, args in arguments]
         try:
             for task, future in futures:
-                yield _result(task, future, options.limit)
+                record = _result(task, future, options.limit)
+                yield {**about(read(options.cache / task.case)), **record} if "failed" in record else record
         finally:
             pool.stop()
 

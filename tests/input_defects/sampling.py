@@ -29,7 +29,7 @@ FAST = (*SHIFTS, "joint_elasticity", "backlash", "external_pulse", "presliding",
 def sampling() -> Iterator[Defect]:
     """All of them."""
     for rows in range(1, 6):
-        yield Defect(f"time_shift:late {rows}", partial(late, rows=rows), ANY, ("tau", "rows"), SHIFTS)
+        yield Defect(f"time_shift:late {rows}", partial(late, rows=rows), ANY, ("q", "rows"), SHIFTS)
         yield Defect(f"time_shift:early {rows}", partial(early, rows=rows), ANY, ("tau", "rows"), SHIFTS)
     for rows in (2, 3, 5):
         yield Defect(f"repeated_positions:{rows}", partial(held, rows=rows), ANY, ("q",))

@@ -95,26 +95,19 @@ def defects_section(records: list[Record]) -> str:
 
 
 def _groups(rows: list[Row]) -> dict[str, list[Row]]:
-    answered = [x for x in rows if "model" in x.record]
-    groups = {model: [x for x in answered if x.record["model"] == model] for model in _seen(answered)}
-    groups["with a hidden effect"] = [x for x in answered if x.record["hidden"]]
-    groups["without"] = [x for x in answered if not x.record["hidden"]]
+    models = dict.fromkeys(x.record["model"] for x in rows)
+    groups = {model: [x for x in rows if x.record["model"] == model] for model in models}
+    groups["with a hidden effect"] = [x for x in rows if x.record["hidden"]]
+    groups["without"] = [x for x in rows if not x.record["hidden"]]
     return groups
 
 
-def _seen(rows: list[Row]) -> list[str]:
-    return list(dict.fromkeys(x.record["model"] for x in rows))
-
-
 def _line(name: str, rows: Sequence[Row], left_out: int) -> list[str]:
-    results = [x.judged for x in rows]
-
-    def share(good: Callable[[Judged], bool]) -> str:
-        return percent(sum(r is not None and good(r) for r in results), len(results))
-
-    strange = sum(r is not None and r.strange for r in results)
-    counts = [share(lambda r: r.right), share(lambda r: r.complete), share(lambda r: not r.wrong)]
-    return [name, str(len(rows)), *counts, str(strange), str(left_out)]
+    results = [x.judged for x in rows if x.judged is not None]
+    right, complete, strange = (sum(getattr(r, key) for r in results) for key in ("right", "complete", "strange"))
+    harmless = len(rows) - sum(bool(r.wrong) for r in results)
+    shares = [percent(count, len(rows)) for count in (right, complete, harmless)]
+    return [name, str(len(rows)), *shares, str(strange), str(left_out)]
 
 
 def _wrong(rows: list[Row]) -> str:
@@ -140,7 +133,9 @@ def _failed(records: list[Record]) -> str:
     if not failed:
         return ""
     lines = [[r["defect"], r["case"], r["failed"].replace("|", "/")] for r in failed]
-    return "### Without an answer\n\nCounted as not right.\n\n" + table(["defect", "case", "why"], lines)
+    return "### Without an answer\n\nCounted as not right, and as naming nothing.\n\n" + table(
+        ["defect", "case", "why"], lines
+    )
 
 
 def clean_section(records: list[Record]) -> str:

@@ -24,8 +24,8 @@ import numpy as np
 
 from armgap.trial.arms import TrialArm, random_arm
 from armgap.trial.case import build_rig
-from armgap.trial.plant import Plant
 from armgap.trial.chain import Encoder
+from armgap.trial.plant import Plant
 from armgap.trial.rig import Rig
 
 from .case import Array
