@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -15,7 +15,7 @@ import numpy as np
 from armgap import _native
 from armgap._renamed import old_names
 from armgap.arm import Arm
-from armgap.check import Check, Corrections, copied_holdout, data_checks, examine
+from armgap.check import Check, Corrections, copied_holdout, data_checks, examine, torque_unit
 from armgap.check.time_shift import causal
 from armgap.custom_effect import CustomEffect, TorqueTables
 from armgap.errors import LogShapeError, OptionError
@@ -351,6 +351,23 @@ class _Input:
     arm: Arm
     notes: tuple[str, ...]
     checks: tuple[Check, ...]
+    factors: Mapping[str, float] = field(default_factory=dict)
+
+    def with_factors(self, factors: Mapping[str, float]) -> _Input:
+        """Return the input with other factors on its torque columns than those that it was repaired with."""
+        by_column = {
+            f"tau{j + 1}": self.factors.get(f"tau{j + 1}", self.factors.get("tau", 1.0))
+            for j in range(self.arm.n_joints)
+        }
+        ratio = Corrections(factor={column: c / by_column[column] for column, c in factors.items()})
+        checks = [c for c in self.checks if c.check != "torque_unit"]
+        return replace(
+            self,
+            training=[replace(ratio.on_log(log), findings=log.findings) for log in self.training],
+            holdout=[replace(ratio.on_log(log), findings=log.findings) for log in self.holdout],
+            checks=(*torque_unit.said(factors), *checks),
+            factors=factors,
+        )
 
 
 def _given(
@@ -387,7 +404,8 @@ def _examined(given: _Input, horizon: float, *, repair: bool) -> _Input:
         found = examine(training, held, given.arm, horizon=horizon, repair=repair)
     except ValueError as error:
         raise _refused(str(error), training, held) from None
-    return _Input(found.training, found.holdout, found.arm, given.notes, (*found.checks, *given.checks))
+    checks = (*found.checks, *given.checks)
+    return _Input(found.training, found.holdout, found.arm, given.notes, checks, found.corrections.factor)
 
 
 def _diagnose(given: _Input, options: dict[str, Any], effects: Sequence[CustomEffect]) -> Diagnosis:
@@ -406,6 +424,8 @@ def _diagnose(given: _Input, options: dict[str, Any], effects: Sequence[CustomEf
     except ValueError as error:
         raise _refused(str(error), training, held) from None
     data = tables.named(json.loads(text))
+    if factors := torque_unit.refined(given.factors, data["causes"], arm.n_joints):
+        return _diagnose(replace(given.with_factors(factors), factors={}), options, effects)
     if contradictory:
         data = _contradicted(data)
     data["arm"]["name"] = arm.name
@@ -503,6 +523,10 @@ def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
     return training, held
 
 
-def _columns(logs: list[Log], tables: TorqueTables) -> list[tuple[str, Any, Any, Any, list[Any]]]:
+def _columns(logs: list[Log], tables: TorqueTables) -> list[tuple[str, Any, Any, Any, list[Any], Any]]:
     fix = np.ascontiguousarray
-    return [(log.name, fix(log.t), fix(log.q), fix(log.tau), tables.by_log[log.name]) for log in logs]
+    moments = [None if log.moment is None else fix(log.moment) for log in logs]
+    return [
+        (log.name, fix(log.t), fix(log.q), fix(log.tau), tables.by_log[log.name], moment)
+        for log, moment in zip(logs, moments, strict=True)
+    ]

@@ -17,6 +17,8 @@ from armgap.log import Log
 
 __all__ = ["find"]
 
+# Units that a reference may be in where positions are in rad: rad, degrees, turns.
+_UNITS = (1.0, 180.0 / np.pi, 0.5 / np.pi)
 # The column follows the position by a factor this near to one, and from the same zero to this part of the travel.
 _NEAR_ONE = 0.15
 _NEAR_ZERO = 0.15
@@ -56,7 +58,7 @@ def _servo(log: Log, j: int) -> float:
     a = np.column_stack([np.ones_like(q), q, dq, ddq])
     size = np.maximum(np.abs(a).max(axis=0), 1e-30)
     x = np.linalg.lstsq(a / size, tau, rcond=None)[0] / size
-    follows = abs(x[1] - 1.0) < _NEAR_ONE and abs(x[0]) < _NEAR_ZERO * float(np.ptp(q))
+    follows = any(abs(x[1] / unit - 1.0) < _NEAR_ONE for unit in _UNITS) and abs(x[0]) < _NEAR_ZERO * float(np.ptp(tau))
     return float(np.var(tau - a @ x)) / variance if follows else 1.0
 
 

@@ -48,6 +48,8 @@ class Log:
         File it was read from.
     columns : mapping
         The file's own name of each column in use, by standard name.
+    moment : ndarray, shape (n_samples, n_joints), optional
+        First moment of every torque about the middle of its interval, where it is the mean of several [N m s^2 or N s^2].
     part_of : str, optional
         Name of the log that it is a part of.
     first_row : int
@@ -62,6 +64,7 @@ class Log:
     findings: tuple[Finding, ...] = ()
     path: Path | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
+    moment: NDArray[np.float64] | None = None
     part_of: str | None = None
     first_row: int = 0
 
@@ -200,7 +203,7 @@ class Log:
     def __post_init__(self) -> None:
         """Put times on whole nanoseconds, so that a log is the same log in every format, and make the arrays read-only."""
         object.__setattr__(self, "t", np.rint(self.t * _NS) / _NS)
-        for name in ("t", "q", "tau", "dq"):
+        for name in ("t", "q", "tau", "dq", "moment"):
             values = getattr(self, name)
             if values is not None:
                 view = values.view()
@@ -240,7 +243,8 @@ class Log:
         dq = None if self.dq is None else self.dq[rows]
         found = self.findings if findings is None else findings
         part = Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
-        return replace(part, part_of=self.recording, first_row=self.first_row + first)
+        moment = None if self.moment is None else self.moment[rows]
+        return replace(part, moment=moment, part_of=self.recording, first_row=self.first_row + first)
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
         """Return the log with other findings."""
