@@ -19,6 +19,7 @@ from armgap.evidence import laws, plausibility
 from armgap.log import Log, gather
 from armgap.log.findings import remarks
 from armgap.log.stretches import choose
+from armgap.log.units import si
 from armgap.own import OwnEffect, Tables
 from armgap.progress import Told, following, tell
 from armgap.report.notebook import Shown
@@ -367,12 +368,32 @@ def _diagnose(
     count = len(training)
     data["laws"] = laws(known, arm, logs_with_own[:count], logs_with_own[count:])
     data["plausibility"] = plausibility(known, arm)
+    data["input"] = _input(arm, training, held)
     data["log_findings"] = [
         {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
         for log in (*training, *held)
         for f in log.findings
     ]
     return Diagnosis.from_dict(data)
+
+
+def _input(arm: Arm, training: list[Log], held: list[Log]) -> dict[str, Any]:
+    """Which columns of which files were used, in which units; stretches of one log are one entry."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for use, logs in (("training", training), ("holdout", held)):
+        for log in logs:
+            name = _STRETCH.sub("", log.name)
+            file = None if log.path is None else str(log.path)
+            entry = {
+                "name": name,
+                "file": file,
+                "set": use,
+                "rows": 0,
+                "columns": dict(log.columns),
+                "units": dict(log.units),
+            }
+            found.setdefault((use, name), entry)["rows"] += len(log)
+    return {"logs": list(found.values()), "units": si(arm.rotary)}
 
 
 def _logs(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:

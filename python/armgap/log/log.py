@@ -48,6 +48,8 @@ class Log:
         File it was read from.
     columns : mapping
         The file's own name of each column in use, by standard name.
+    units : mapping
+        Unit that each of these columns had in the file, by standard name; the arrays are in SI units.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Log:
     findings: tuple[Finding, ...] = ()
     path: Path | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def read(
@@ -176,19 +179,24 @@ class Log:
         names, said = columns.resolve(recording, place, mapping or {}, arm)
         scales = units.stated(names, declared or {}, arm, place)
         raw = columns.extract(recording, place, names)
+        ticks = clocks.ticks(raw, scales, names, arm, place)
         arrays, timed = clocks.in_seconds(raw, scales, names, arm, place)
         arrays = units.scaled(arrays, scales)
         checks.order(arrays, place, names)
         arrays, cleaned = checks.without_repeats(arrays)
         checks.motion(arrays, place, names)
+        declared_only = arrays
         arrays, converted = units.recognised(arrays, names, arm, scales.settled)
+        there = units.in_file(
+            names, scales, ticks, arm, degrees=(arrays.q is not declared_only.q, arrays.dq is not declared_only.dq)
+        )
         units.check(arrays, place, names, arm, scales.settled)
         noticed = [
             *recording.findings, *said, *scales.findings, *timed, *cleaned, *converted,
             *checks.notice(arrays, names, arm), *checks.unused(recording, names),
         ]  # fmt: skip
         arrays.t.__isub__(arrays.t[0])
-        return cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key)
+        return cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key, there)
 
     def __post_init__(self) -> None:
         """Put times on whole nanoseconds, so that a log is the same log in every format, and make the arrays read-only."""
@@ -227,7 +235,7 @@ class Log:
         rows = slice(first, last)
         dq = None if self.dq is None else self.dq[rows]
         found = self.findings if findings is None else findings
-        return Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
+        return Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns, self.units)
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
         """Return the log with other findings."""
