@@ -115,6 +115,8 @@ class Comparison:
         Prediction horizon of both [s].
     names : tuple of str
         What the two diagnoses are called.
+    kind : str
+        Kind of the arm.
     """
 
     outcome: str
@@ -127,6 +129,7 @@ class Comparison:
     unit: str
     horizon_s: float
     names: tuple[str, str]
+    kind: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object, schema ``armgap.comparison/1``."""
@@ -191,6 +194,7 @@ def compare(before: Diagnosis, after: Diagnosis, names: tuple[str, str] = ("befo
         str(before.to_dict()["gap"].get("unit", "rad")),
         before.gap.horizon_s,
         names,
+        str((before.to_dict().get("arm") or {}).get("kind", "")),
     )
 
 

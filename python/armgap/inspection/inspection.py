@@ -40,6 +40,8 @@ class Inspection:
         The log itself.
     rotary : bool, optional
         Whether the joints turn; None without an arm.
+    kind : str
+        Kind of the arm; empty without one.
     """
 
     log: str
@@ -50,6 +52,7 @@ class Inspection:
     findings: tuple[Finding, ...]
     source: Log = field(repr=False, compare=False)
     rotary: bool | None = None
+    kind: str = ""
 
     @property
     def units(self) -> tuple[str, str]:
@@ -128,6 +131,7 @@ def inspect(log: Any, arm: Arm | None = None) -> Inspection:
         findings=log.findings,
         source=log,
         rotary=None if arm is None else arm.rotary,
+        kind="" if arm is None else arm.kind,
     )
 
 

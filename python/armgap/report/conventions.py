@@ -79,9 +79,9 @@ def section(kind: str, logs: list[Data] | None = None, si: Data | None = None) -
     """
     if kind not in WORDS:
         return None
-    return Section(
-        TITLE, sketch=panel(kind), points=WORDS[kind], tables=_tables(kind, logs or [], si or {}), name="conventions"
-    )
+    tables = _tables(kind, logs or [], si or {})
+    title = TITLE if tables else "Conventions"
+    return Section(title, sketch=panel(kind), points=WORDS[kind], tables=tables, name="conventions")
 
 
 def _tables(kind: str, logs: list[Data], si: Data) -> list[Table]:
