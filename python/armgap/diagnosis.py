@@ -16,6 +16,7 @@ from armgap import _native
 from armgap.arm import Arm
 from armgap.errors import LogShapeError, OptionError
 from armgap.evidence import laws, plausibility
+from armgap.literals import Status, Verdict
 from armgap.log import Log, gather
 from armgap.log.findings import remarks
 from armgap.log.stretches import choose
@@ -139,7 +140,7 @@ class RuledOut:
 
     effect: str
     joint: int | None
-    status: str
+    status: Status
     bound: Bound | None
     why: str | None
 
@@ -153,9 +154,9 @@ class Diagnosis(Shown):
 
     Attributes
     ----------
-    verdict : str
+    verdict : {"none", "parameters", "effect", "unexplained", "input"}
         ``"none"``: the gap is within noise; ``"parameters"``: right structure, wrong values; ``"effect"``: causes
-        named; ``"unexplained"``: a gap that no effect in the library explains.
+        named; ``"unexplained"``: a gap that no effect in the library explains; ``"input"``: logs and arm file contradict each other.
     gap : Gap
         How far.
     where : tuple of Place
@@ -170,7 +171,7 @@ class Diagnosis(Shown):
         What a report draws besides: curves, ranking, options.
     """
 
-    verdict: str
+    verdict: Verdict
     gap: Gap
     where: tuple[Place, ...]
     causes: tuple[Cause, ...]

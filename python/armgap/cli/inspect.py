@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,6 +20,10 @@ from armgap.cli.common import (
     write,
 )
 from armgap.cli.progress import working
+
+if TYPE_CHECKING:
+    from armgap.arm import Arm
+    from armgap.inspection import Columns, Inspection
 
 __all__ = ["command"]
 
@@ -40,33 +45,55 @@ def command(
     units: str | None,
     quiet: bool,
 ) -> None:
-    """Say what LOGs hold: columns, sampling, steps, saturation, motion, and what they tell about an arm's parameters."""
+    """Say what LOGs hold: columns, sampling, steps, saturation, motion, and what they tell about an arm's parameters.
+
+    Of a log whose columns have other names, and without a mapping, it lists the columns and proposes one.
+    """
     import json
 
     from armgap.arm import Arm
-    from armgap.inspection import inspect
-    from armgap.log import Log, paths
+    from armgap.inspection import Columns
+    from armgap.log import paths
 
     check_outputs(json_file, report_file)
     naming = {"columns": parse_columns(columns), "units": parse_units(units)}
     arm = Arm.read(Path(arm_file)) if arm_file is not None else None
     with working("reading", quiet=quiet):
-        found = interruptible(lambda: [inspect(Log.read(path, arm=arm, **naming), arm) for path in paths(logs)])
+        files = paths(logs)
+        found = interruptible(lambda: [_inspected(path, arm, naming, listing=report_file is None) for path in files])
     if report_file is not None:
         from armgap.inspection.page import render
 
-        write(report_file, render(found))
+        write(report_file, render([one for one in found if not isinstance(one, Columns)]))
     if json_file is not None:
         results = [f.to_dict() for f in found]
         write(json_file, json.dumps(results[0] if len(results) == 1 else results, indent=2, allow_nan=False))
     if quiet or json_file == "-":
         return
-    from armgap.inspection.terminal import tables
+    from armgap.inspection.terminal import column_table, tables
 
     say = console()
-    for one in found:
+    for path, one in zip(files, found, strict=True):
+        if isinstance(one, Columns):
+            say.print(column_table(one, str(path)))
+            continue
         say.print(tables(one))
         for finding in one.findings:
             say.print(f"note: {one.log}: {finding.message}", highlight=False, markup=False)
     if report_file is not None:
         say.print(f"report: {report_file}", highlight=False, markup=False)
+
+
+def _inspected(path: Path, arm: Arm | None, naming: dict[str, Any], *, listing: bool) -> Inspection | Columns:
+    """What a log holds; or, where nobody has said which column is which, what columns there are."""
+    from armgap.errors import ColumnError
+    from armgap.inspection import columns_of, inspect
+    from armgap.log import Log
+
+    try:
+        return inspect(Log.read(path, arm=arm, **naming), arm)
+    except ColumnError:
+        mapped = naming["columns"] or (arm is not None and arm.columns)
+        if mapped or not listing or str(path) == "-":
+            raise
+        return columns_of(path, arm)

@@ -227,6 +227,18 @@ class Log:
         """Return the number of samples."""
         return len(self.t)
 
+    def _repr_html_(self) -> str:
+        """Return length, rate and columns as HTML for a notebook."""
+        from armgap.report.shown import log_facts
+
+        return log_facts(self).html()
+
+    def _repr_markdown_(self) -> str:
+        """Return length, rate and columns as Markdown."""
+        from armgap.report.shown import log_facts
+
+        return log_facts(self).markdown()
+
     def part(self, first: int, last: int, name: str, *, findings: tuple[Finding, ...] | None = None) -> Log:
         """Return the samples `first` up to, not including, `last` as a log of its own, with the times of this one.
 

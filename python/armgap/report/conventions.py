@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from armgap.log.units import FACTORS
 from armgap.report.page import Section, Table
 from armgap.report.sketch import panel
 
@@ -102,6 +101,8 @@ def _rows(kind: str, log: Data, si: Data) -> list[tuple[str, ...]]:
 
 
 def _row(kind: str, key: str, name: str, unit: str, si: Data) -> tuple[str, ...]:
+    from armgap.log.units import FACTORS
+
     match = _KEY.fullmatch(key)
     group, joint = match.groups() if match else (key, "")
     words = _QUANTITIES | (_FORCE if kind == "axis" else {})
