@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint test-rust test-python reproduce bench bench-peers bench-ferromotion bench-instructions header dist docs wheel wheel-check clean all tools lint-tools
+.PHONY: help setup demo test lint test-rust test-python reproduce bench bench-baselines bench-ferromotion bench-instructions header dist docs wheel wheel-check clean all tools lint-tools
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
@@ -58,11 +58,11 @@ reproduce: setup ## the seed paper's tables and figures beside our own
 bench: ## cost per sample, per step and per effect of the core
 	cargo bench -p armgap-benches
 
-bench-peers: $(VENV)/.built ## the core beside plain C, numpy, padasip, filterpy, MuJoCo, Pinocchio and scipy
+bench-baselines: $(VENV)/.built ## the core beside plain C, numpy, padasip, filterpy, MuJoCo, Pinocchio and scipy
 	$(BIN)/python -m pip install -q --disable-pip-version-check $$($(BIN)/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']['peers'])")
-	cargo run -q --release -p armgap-benches --bin peers
-	$(BIN)/python benches/peers/compare.py
-	$(BIN)/python benches/peers/fit.py
+	cargo run -q --release -p armgap-benches --bin baselines
+	$(BIN)/python benches/baselines/compare.py
+	$(BIN)/python benches/baselines/fit.py
 
 bench-ferromotion: tools ## the core's rollout beside the crate ferromotion, which is downloaded and takes minutes to compile
 	CARGO_TARGET_DIR=target/ferromotion cargo run -q --release --manifest-path benches/ferromotion/Cargo.toml

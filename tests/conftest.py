@@ -65,7 +65,7 @@ def seed_log(arm: Arm) -> Log:
 
 @pytest.fixture
 def frame(seed_log: Log) -> pl.DataFrame:
-    """The same log as a table."""
+    """The columns of a log as a table."""
     return seed_log.to_polars()
 
 

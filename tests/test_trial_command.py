@@ -67,7 +67,7 @@ def test_words_that_make_no_sense(words, says, run):
 
 @pytest.fixture(scope="module")
 def trial(tmp_path_factory):
-    """A whole trial without peers, made, answered and scored by one command; its folder and its page."""
+    """A whole trial without baselines, made, answered and scored by one command; its folder and its page."""
     from armgap.cli import main
 
     pytest.importorskip("pebble", reason="answering cases needs armgap[trial]")
@@ -75,7 +75,7 @@ def trial(tmp_path_factory):
     page = target / "scores.md"
     words = ["trial", "all", "-n", "2", "--seed", "6", "--duration", "2", "--workers", "1", "-o", str(target / "cases")]
     with pytest.raises(SystemExit) as stop:
-        main([*words, "--no-peers", "--md", str(page), "--quiet"])
+        main([*words, "--no-baselines", "--md", str(page), "--quiet"])
     assert not stop.value.code
     return target / "cases", page.read_text()
 
@@ -168,7 +168,7 @@ def test_another_trial_is_not_mixed_in(trial, run):
         (["--cases", "3", "run", "."], "before `run`"),
         (["score", "."], "no cases"),
         (["run", "none"], "none"),
-        (["peers", ".", "--only", "oracle"], "oracle"),
+        (["baselines", ".", "--only", "oracle"], "oracle"),
         (["all", "-n", "2"], "--output"),
         (["make", "-n", "0", "-o", "x"], "-n"),
     ],

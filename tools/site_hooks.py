@@ -163,7 +163,7 @@ def figures() -> str:
 
 def thresholds() -> str:
     """Constants of the decision with what their comments say."""
-    source = (ROOT / "rust" / "fit" / "src" / "decide.rs").read_text(encoding="utf-8")
+    source = (ROOT / "rust" / "fit" / "src" / "acceptance.rs").read_text(encoding="utf-8")
     found = re.findall(r"^/// ([^\n]+)\n(?:pub )?const (\w+): \w+ = ([^;]+);", source, re.MULTILINE)
     return "\n".join(
         ["| constant | value | what |", "| --- | --- | --- |", *(f"| `{n}` | {v} | {text} |" for text, n, v in found)]
@@ -196,7 +196,7 @@ def facts(name: str) -> str:
         f"| source | {entry['source']} |",
         f"| excited by | {entry['excited_by']} |",
         "",
-        f"![{_title(entry)}: position with and without it, and the torque the model lacks]({name}.svg)",
+        f"![{_title(entry)}: position with and without it, and the residual torque]({name}.svg)",
         "",
         f"*{_bench(name)} with {_sizes(name)}. {_reading(name)}*",
         "",
@@ -230,7 +230,7 @@ def _sizes(name: str) -> str:
 
 def _reading(name: str) -> str:
     against = site_pictures.AXES[site_pictures.SIGNATURES[name].against].rpartition(" [")[0]
-    return f"Left: positions under the same torques. Right: the torque the model lacks, over {against}."
+    return f"Left: positions under the same torques. Right: the residual torque of the nominal model, over {against}."
 
 
 def _parameter(p: dict[str, Any], *, first: bool) -> str:

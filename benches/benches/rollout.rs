@@ -1,7 +1,7 @@
 //! Cost of simulating the seed paper's 10 s: steps per period, and what each effect adds.
 
 use armgap_bench::run::{PERIOD, SAMPLES, THETA, arm, rollout, torque};
-use armgap_core::effect::{Active, Pulse, catalogue};
+use armgap_core::effect::{Active, InputSegment, catalogue};
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -21,7 +21,7 @@ fn with_effect(plant: &Plant<f64, armgap_core::arm::TwoLink<f64>, 2, 9>) -> Stat
     let mut state = State::new(Vector2::zeros(), Vector2::zeros());
     for k in 0..SAMPLES {
         let t = f64::from(k) * PERIOD;
-        let torque = torque(t).map(Pulse::held);
+        let torque = torque(t).map(InputSegment::held);
         advance(plant, &mut state, &Interval { t, h: PERIOD, torque: &torque }, 1);
     }
     state
@@ -33,7 +33,7 @@ fn effects(c: &mut Criterion) {
     let bare = Plant::new(arm::<f64>(), THETA);
     group.bench_function("no effect", |b| b.iter(|| with_effect(&bare)));
     for law in catalogue::<f64>() {
-        let mut p = law.spec().starts.first().copied().unwrap_or_default();
+        let mut p = law.spec().initial_guesses.first().copied().unwrap_or_default();
         for (value, parameter) in p.iter_mut().zip(law.spec().parameters) {
             *value = value.clamp(parameter.lower, parameter.upper);
         }

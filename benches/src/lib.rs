@@ -1,4 +1,4 @@
-//! What others cost that do the same as the core.
+//! Baselines: plain C that computes the same as the core.
 
-pub mod peer;
-pub mod peer_rollout;
+pub mod baseline;
+pub mod baseline_rollout;

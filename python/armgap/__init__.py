@@ -10,6 +10,7 @@ from armgap._native import __version__
 if TYPE_CHECKING:
     from armgap.arm import Arm
     from armgap.check import CheckName, Severity
+    from armgap.custom_effect import CustomEffect
     from armgap.diagnosis import Diagnosis, diagnose
     from armgap.errors import ArmgapError
     from armgap.estimator import Estimator
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from armgap.inspection import Inspection, inspect
     from armgap.literals import Filters, Scheme, Status, Verdict
     from armgap.log import Finding, Log
-    from armgap.own import OwnEffect
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
 
@@ -29,6 +29,7 @@ __all__ = [
     "ArmgapError",
     "CheckName",
     "Corrected",
+    "CustomEffect",
     "Diagnosis",
     "Estimator",
     "Filters",
@@ -36,7 +37,6 @@ __all__ = [
     "Identification",
     "Inspection",
     "Log",
-    "OwnEffect",
     "Reproduction",
     "Scheme",
     "Severity",
@@ -72,7 +72,7 @@ _HOMES = {
     "ArmFit": "armgap.fitting",
     "fit": "armgap.fitting",
     "Log": "armgap.log",
-    "OwnEffect": "armgap.own",
+    "CustomEffect": "armgap.custom_effect",
     "Identification": "armgap.identification",
     "identify": "armgap.identification",
     "Reproduction": "armgap.reproduction",
@@ -88,7 +88,7 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     """Load a public name when it is first used, so that importing the package stays fast."""
     if name not in _HOMES:
-        raise AttributeError(f"module 'armgap' has no attribute {name!r}")
+        return import_module("armgap._renamed").old_names(__name__, stacklevel=3)(name)
     value = getattr(import_module(_HOMES[name]), name)
     globals()[name] = value
     return value

@@ -14,6 +14,8 @@ __all__ = [
     "fit",
     "identify",
     "inertia",
+    "refit",
+    "regression_rows",
     "simulate",
     "theta_from_links",
     "velocity",
@@ -63,6 +65,16 @@ def diagnose(
     options: dict[str, Any],
     progress: Callable[[str, float], object] | None = None,
 ) -> str: ...
+def refit(
+    arm: dict[str, Any], training: Sequence[_Log], holdout: Sequence[_Log], horizon: float
+) -> dict[str, list[float]]: ...
+def regression_rows(
+    arm: dict[str, Any],
+    t: NDArray[np.float64],
+    q: NDArray[np.float64],
+    tau: NDArray[np.float64],
+    cutoff: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 def fit(
     arm: dict[str, Any],
     t: NDArray[np.float64],

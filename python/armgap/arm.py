@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
+
+if TYPE_CHECKING:
+    from armgap.check.corrections import Corrections
 
 __all__ = ["Arm", "kinds"]
 
@@ -44,6 +47,8 @@ class Arm:
         SHA-256 of a sealed key that belongs to the arm's logs.
     path : Path, optional
         File it was read from.
+    corrections : Corrections, optional
+        How columns of the arm's logs are to be read otherwise than they stand.
     """
 
     name: str
@@ -59,6 +64,7 @@ class Arm:
     sealed: str | None = None
     path: Path | None = None
     link_mass: NDArray[np.float64] | None = None
+    corrections: Corrections | None = None
 
     @classmethod
     def read(cls, path: str | Path) -> Arm:
@@ -76,7 +82,8 @@ class Arm:
         """
         from armgap.arm_file import ArmFile
 
-        return cls(**ArmFile.load(Path(path)).fields())
+        arm = cls(**ArmFile.load(Path(path)).fields())
+        return arm if arm.corrections is None else arm.corrections.on_arm(arm)
 
     @property
     def n_joints(self) -> int:
@@ -102,6 +109,18 @@ class Arm:
     def parameter_units(self) -> tuple[str, ...]:
         """Units of the entries of `theta`."""
         return tuple(self._kind["parameter_units"])
+
+    @property
+    def gravity_parameters(self) -> NDArray[np.intp]:
+        """Indices of the entries of `theta` that are weights: torques or forces of gravity [N m or N]."""
+        weight = "N m" if self.rotary else "N"
+        return np.array([i for i in range(self.n_inertial) if self.parameter_units[i] == weight], dtype=np.intp)
+
+    @property
+    def expects_weight(self) -> bool:
+        """Whether the weights in `theta` are those of an arm that hangs down at zero: none negative, one positive."""
+        weights = self.theta[self.gravity_parameters]
+        return bool(np.all(weights >= 0) and np.any(weights > 0))
 
     @property
     def _kind(self) -> dict[str, Any]:
@@ -172,6 +191,8 @@ class Arm:
                 lines += [*(() if opened else ("", f"[{table}]")), f"{key} = {_listed(value)}"]
         if self.columns:
             lines += ["", "[columns]", *(f"{k} = {_quoted(v)}" for k, v in self.columns.items())]
+        if self.corrections:
+            lines += ["", "[corrections]", *self.corrections.toml_lines()]
         if self.sealed is not None:
             lines += ["", "[sealed]", f"sha256 = {_quoted(self.sealed)}"]
         return "\n".join(lines) + "\n"

@@ -7,14 +7,17 @@ import math
 import re
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.arm import kinds
-from armgap.errors import ArmFileError
+from armgap.errors import ArmFileError, OptionError
+
+if TYPE_CHECKING:
+    from armgap.check.corrections import Corrections
 
 __all__ = ["ArmFile"]
 
@@ -26,6 +29,7 @@ _TABLES: dict[str, tuple[str, ...]] = {
     "actuator": ("torque_limit",),
     "geometry": ("link_length", "link_mass"),
     "columns": (),
+    "corrections": (),
     "sealed": ("sha256",),
 }
 _SCALARS = ("name", "kind", "gravity", "sample_period")
@@ -92,6 +96,7 @@ class ArmFile:
             link_length=self._lengths(n),
             link_mass=self._masses(n),
             columns=columns,
+            corrections=self._corrections(),
             sealed=self._sealed(),
             path=self.path,
         )
@@ -204,6 +209,19 @@ class ArmFile:
             if list(mapping.values()).count(value) > 1:
                 raise self._error(f"columns.{key}", f"`{value}` is mapped twice", "map each column once")
         return dict(mapping)
+
+    def _corrections(self) -> Corrections:
+        """Return how the logs' columns are to be read otherwise than they stand."""
+        from armgap.check.corrections import CORRECTIONS, Corrections
+
+        given = self.data.get("corrections", {})
+        for key in given:
+            if key not in CORRECTIONS:
+                raise self._error(f"corrections.{key}", "is not a correction", _suggest(key, list(CORRECTIONS)))
+        try:
+            return Corrections.parse(**given)
+        except OptionError as error:
+            raise self._error("corrections", error.problem, error.remedy) from None
 
     def _sealed(self) -> str | None:
         value = self.data.get("sealed", {}).get("sha256")

@@ -8,12 +8,16 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from armgap import _native
+from armgap._renamed import old_names
 from armgap.arm import Arm
+from armgap.check import Check, Corrections, copied_holdout, data_checks, examine
+from armgap.check.time_shift import causal
+from armgap.custom_effect import CustomEffect, TorqueTables
 from armgap.errors import LogShapeError, OptionError
 from armgap.evidence import laws, plausibility
 from armgap.literals import Status, Verdict
@@ -21,11 +25,13 @@ from armgap.log import Log, gather
 from armgap.log.findings import remarks
 from armgap.log.stretches import choose
 from armgap.log.units import si
-from armgap.own import OwnEffect, Tables
-from armgap.progress import Told, following, tell
-from armgap.report.notebook import Shown
+from armgap.progress import ProgressCallback, report_progress, use_callback
+from armgap.report.notebook import NotebookDisplay
 
-__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
+__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Location", "RuledOut", "Value", "diagnose"]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
 
 #: What a part of a log is called after the log's own name.
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
@@ -45,7 +51,7 @@ class Value:
 
 
 @dataclass(frozen=True)
-class AtHorizon:
+class GapAtHorizon:
     """RMS position error per joint on the holdout at one prediction horizon [s]; fields as in `Gap` [rad or m]."""
 
     horizon_s: float
@@ -71,9 +77,9 @@ class Gap:
     closed_ci : tuple of float
         95 % interval of it, from resampled windows.
     free_run_before, free_run_after : tuple of float
-        The same over the whole holdout, simulated from its first sample.
-    horizons : tuple of AtHorizon
-        The same at other prediction horizons, as far as the logs are long enough.
+        RMS error over the whole holdout, simulated from its first sample [rad or m].
+    horizons : tuple of GapAtHorizon
+        RMS errors at other prediction horizons, as far as the logs are long enough.
     """
 
     horizon_s: float
@@ -85,11 +91,11 @@ class Gap:
     closed_ci: tuple[float, float]
     free_run_before: tuple[float, ...]
     free_run_after: tuple[float, ...]
-    horizons: tuple[AtHorizon, ...] = ()
+    horizons: tuple[GapAtHorizon, ...] = ()
 
 
 @dataclass(frozen=True)
-class Place:
+class Location:
     """Where a part of the gap lies."""
 
     joint: int
@@ -149,7 +155,7 @@ _Record = TypeVar("_Record", Value, Equivalent, Bound)
 
 
 @dataclass(frozen=True)
-class Diagnosis(Shown):
+class Diagnosis(NotebookDisplay):
     """The result of `diagnose`.
 
     Attributes
@@ -159,7 +165,7 @@ class Diagnosis(Shown):
         named; ``"unexplained"``: a gap that no effect in the library explains; ``"input"``: logs and arm file contradict each other.
     gap : Gap
         How far.
-    where : tuple of Place
+    where : tuple of Location
         Where, most of the gap first.
     causes : tuple of Cause
         Which, strongest first.
@@ -167,23 +173,26 @@ class Diagnosis(Shown):
         What was looked for and not found.
     parameters : dict
         ``nominal``, ``refit`` and ``with_causes``: name to `Value`.
+    checks : tuple of Check
+        What was noticed about the input, errors first.
     extra : dict
         What a report draws besides: curves, ranking, options.
     """
 
     verdict: Verdict
     gap: Gap
-    where: tuple[Place, ...]
+    where: tuple[Location, ...]
     causes: tuple[Cause, ...]
     ruled_out: tuple[RuledOut, ...]
     parameters: dict[str, dict[str, Value]]
+    checks: tuple[Check, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict, repr=False)
     _data: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Diagnosis:
         """Build a diagnosis from its JSON object."""
-        known = {"schema", "verdict", "gap", "where", "causes", "ruled_out", "parameters"}
+        known = {"schema", "verdict", "gap", "where", "causes", "ruled_out", "parameters", "checks"}
         gap = data["gap"]
         parameters = {
             stage: {name: _take(Value, value) for name, value in values.items()}
@@ -203,10 +212,11 @@ class Diagnosis(Shown):
                 tuple(gap["free_run"]["after"]),
                 tuple(_at_horizon(h) for h in gap.get("horizons", ())),
             ),
-            where=tuple(_place(p) for p in data["where"]),
+            where=tuple(_location(p) for p in data["where"]),
             causes=tuple(_cause(c) for c in data["causes"]),
             ruled_out=tuple(_ruled_out(r) for r in data["ruled_out"]),
             parameters=parameters,
+            checks=tuple(Check.from_dict(c) for c in data.get("checks", ())),
             extra={key: value for key, value in data.items() if key not in known},
             _data=data,
         )
@@ -237,14 +247,14 @@ def _take(kind: type[_Record], data: dict[str, Any]) -> _Record:
     return kind(**{f.name: data[f.name] for f in fields(kind) if f.name in data})
 
 
-def _at_horizon(data: dict[str, Any]) -> AtHorizon:
+def _at_horizon(data: dict[str, Any]) -> GapAtHorizon:
     errors = (tuple(data[key]) for key in ("before", "refit", "after", "floor"))
-    return AtHorizon(data["horizon_s"], *errors)
+    return GapAtHorizon(data["horizon_s"], *errors)
 
 
-def _place(data: dict[str, Any]) -> Place:
+def _location(data: dict[str, Any]) -> Location:
     spread = data.get("range") or {}
-    return Place(
+    return Location(
         data["joint"], data["share"], data["regime"], data["detail"],
         spread.get("variable"), spread.get("from"), spread.get("to"),
     )  # fmt: skip
@@ -278,8 +288,10 @@ def diagnose(
     horizon: float = 0.25,
     max_causes: int = 4,
     seed: int = 1,
-    effects: Sequence[OwnEffect] = (),
-    progress: Told | None = None,
+    effects: Sequence[CustomEffect] = (),
+    repair: bool = True,
+    corrections: Corrections | None = None,
+    progress: ProgressCallback | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between an arm's nominal model and its logs.
 
@@ -292,7 +304,7 @@ def diagnose(
         Training logs: anything that `Log.read` or `Log.from_frame` takes, and patterns such as ``"logs/*.parquet"``.
     arm : Arm or path
         Nominal model.
-    holdout : the same, optional
+    holdout : Log, path, pattern, table, or sequence of these, optional
         Logs to judge on. Without it the last 40 % of every training log are held out.
     horizon : float, default 0.25
         Prediction horizon [s].
@@ -300,8 +312,12 @@ def diagnose(
         Causes named at most.
     seed : int, default 1
         Seed of the resampling behind probabilities and intervals.
-    effects : sequence of OwnEffect, default none
-        Effects of your own that take part in the ranking, four at most.
+    effects : sequence of CustomEffect, default none
+        Custom effects that take part in the ranking, four at most.
+    repair : bool, default True
+        Whether defects of the input are repaired that leave nothing to guess (see `armgap.check`); without it they are only said.
+    corrections : Corrections, optional
+        How columns are to be read otherwise than they stand, on top of what the arm file says.
     progress : callable, optional
         ``progress(work, fraction)`` is called now and then with what is being done and an estimate of how much of it is done, from 0
         to 1.
@@ -317,34 +333,51 @@ def diagnose(
     KeyboardInterrupt
         On an interrupt, within a fifth of a second.
     """
-    with following(progress):
-        return _diagnose(logs, arm, holdout, horizon, max_causes, seed, effects)
-
-
-def _diagnose(
-    logs: LogLike | Sequence[LogLike],
-    arm: Arm | str | os.PathLike[str],
-    holdout: LogLike | Sequence[LogLike] | None,
-    horizon: float,
-    max_causes: int,
-    seed: int,
-    effects: Sequence[OwnEffect],
-) -> Diagnosis:
-    """Check, read, split, choose; hand over to the core; and add what is known on this side."""
-    arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
     if not (np.isfinite(horizon) and horizon > 0):
         raise OptionError(f"the horizon is {horizon}", remedy="give a positive number of seconds")
     if max_causes < 0:
         raise OptionError(f"the number of causes is {max_causes}", remedy="give 0 or more")
-    training = _logs(logs, arm)
-    notes = []
+    arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
+    options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed)}
+    with use_callback(progress):
+        given = _given(logs, holdout, arm, corrections or Corrections(), repair=repair)
+        return _diagnose(_examined(given, horizon, repair=repair), options, effects)
+
+
+@dataclass(frozen=True)
+class _Input:
+    """Logs and arm, and what is to be said about them."""
+
+    training: list[Log]
+    holdout: list[Log]
+    arm: Arm
+    notes: tuple[str, ...]
+    checks: tuple[Check, ...]
+
+
+def _given(
+    logs: LogLike | Sequence[LogLike],
+    holdout: LogLike | Sequence[LogLike] | None,
+    arm: Arm,
+    corrections: Corrections,
+    *,
+    repair: bool,
+) -> _Input:
+    """Read, correct and repair the logs, each by itself, and split them where nothing is held out."""
+    training, checks = _logs(logs, arm, corrections, repair=repair)
+    arm = corrections.on_arm(arm)
     if holdout is None:
-        training, held = _split(training)
-        notes.append(f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out")
-    else:
-        held = _logs(holdout, arm)
-        notes += _overlap(training, held)
-    training, held = (choose(group, horizon=horizon) for group in _tell_apart(training, held))
+        training, held = _split(_tell_apart(training, [])[0])
+        note = f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out"
+        return _Input(training, held, arm, (note,), tuple(checks))
+    held, more = _logs(holdout, arm, corrections, repair=repair)
+    checks += [*more, *copied_holdout(training, held)]
+    return _Input(*_tell_apart(training, held), arm, (), tuple(checks))
+
+
+def _examined(given: _Input, horizon: float, *, repair: bool) -> _Input:
+    """Choose stretches of long logs, and compare logs and arm file with and without each defect."""
+    training, held = (choose(group, horizon=horizon) for group in (given.training, given.holdout))
     for log in (*training, *held):
         if log.duration < horizon:
             raise LogShapeError(
@@ -352,22 +385,41 @@ def _diagnose(
                 remedy="give a longer log or a shorter --horizon",
                 file=log.path or log.name,
             )
-    own = Tables.of(effects, training, held)
-    joints = [e.joint - 1 for e in effects]
-    options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed), "own": joints}
     try:
-        text = _native.diagnose(arm.to_native(), _columns(training, own), _columns(held, own), options, tell)
+        found = examine(training, held, given.arm, horizon=horizon, repair=repair)
     except ValueError as error:
         raise _refused(str(error), training, held) from None
-    data = own.named(json.loads(text))
+    return _Input(found.training, found.holdout, found.arm, given.notes, (*found.checks, *given.checks))
+
+
+def _diagnose(given: _Input, options: dict[str, Any], effects: Sequence[CustomEffect]) -> Diagnosis:
+    """Hand over to the core, and add what is known on this side."""
+    training, held, arm = given.training, given.holdout, given.arm
+    contradictory = any(check.severity == "error" for check in given.checks)
+    if contradictory:
+        # No effect is asked to explain a contradiction: the figures are those of the arm's own parameters.
+        options = options | {"max_causes": 0}
+    tables = TorqueTables.of(effects, training, held)
+    options = options | {"own": [e.joint - 1 for e in effects]}
+    try:
+        text = _native.diagnose(
+            arm.to_native(), _columns(training, tables), _columns(held, tables), options, report_progress
+        )
+    except ValueError as error:
+        raise _refused(str(error), training, held) from None
+    data = tables.named(json.loads(text))
+    if contradictory:
+        data = _contradicted(data)
     data["arm"]["name"] = arm.name
     for cause in data["causes"]:
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
-    data["notes"] = notes + data["notes"]
-    known, logs_with_own = own.applied(data, (*training, *held))
+    data["notes"] = [*given.notes, *data["notes"]]
+    checks = [*given.checks, *_ambiguous_delay(data, training, arm)]
+    data["checks"] = [check.to_dict() for check in checks]
+    known, corrected_logs = tables.applied(data, (*training, *held))
     count = len(training)
-    data["laws"] = laws(known, arm, logs_with_own[:count], logs_with_own[count:])
+    data["laws"] = laws(known, arm, corrected_logs[:count], corrected_logs[count:])
     data["plausibility"] = plausibility(known, arm)
     data["input"] = _input(arm, training, held)
     data["log_findings"] = [
@@ -397,7 +449,35 @@ def _input(arm: Arm, training: list[Log], held: list[Log]) -> dict[str, Any]:
     return {"logs": list(found.values()), "units": si(arm.rotary)}
 
 
-def _logs(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:
+def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> list[Check]:
+    """List the shift of the file among the equivalents of delays that are equal on all joints, and warn of it."""
+    period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
+    check = causal(data["causes"], arm.n_joints, period)
+    if check is None:
+        return []
+    for cause in data["causes"]:
+        if cause["effect"] == "actuator_delay":
+            cause["equivalents"].append(
+                {"effect": "time_shift", "joint": None, "why": "torques early in the file by as much"}
+            )
+    return [check]
+
+
+def _contradicted(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the result of logs and arm file that contradict each other: figures with the remedy applied, no causes."""
+    gap = data["gap"] | {"after": data["gap"]["refit"]}
+    return data | {"verdict": "input", "causes": [], "gap": gap}
+
+
+def _logs(
+    logs: LogLike | Sequence[LogLike], arm: Arm, corrections: Corrections, *, repair: bool
+) -> tuple[list[Log], list[Check]]:
+    read = [corrections.on_log(log) for log in _gathered(logs, arm)]
+    examined = [data_checks(log, arm, repair=repair) for log in read]
+    return [log for log, _ in examined], [check.of(check.log or log.name) for log, found in examined for check in found]
+
+
+def _gathered(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:
     read = gather(logs, arm)
     if not read:
         raise OptionError("no log was given", remedy="give at least one")
@@ -417,13 +497,6 @@ def _refused(message: str, training: list[Log], held: list[Log]) -> LogShapeErro
     logs = held if "holdout" in problem else training
     files = ", ".join(dict.fromkeys(str(log.path or log.name) for log in logs))
     return LogShapeError(problem, remedy=remedy or "see the log and the options", file=files)
-
-
-def _overlap(training: list[Log], held: list[Log]) -> list[str]:
-    """Say which logs are both learnt from and judged on."""
-    seen = {log.path.resolve() for log in training if log.path is not None}
-    both = [log.name for log in held if log.path is not None and log.path.resolve() in seen]
-    return [f"{name} is learnt from and judged on too: its figures flatter" for name in both]
 
 
 def _tell_apart(training: list[Log], held: list[Log]) -> tuple[list[Log], list[Log]]:
@@ -452,6 +525,6 @@ def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
     return training, held
 
 
-def _columns(logs: list[Log], own: Tables) -> list[tuple[str, Any, Any, Any, list[Any]]]:
+def _columns(logs: list[Log], tables: TorqueTables) -> list[tuple[str, Any, Any, Any, list[Any]]]:
     fix = np.ascontiguousarray
-    return [(log.name, fix(log.t), fix(log.q), fix(log.tau), own.by_log[log.name]) for log in logs]
+    return [(log.name, fix(log.t), fix(log.q), fix(log.tau), tables.by_log[log.name]) for log in logs]

@@ -40,7 +40,7 @@ class Run:
 class Estimator:
     """Recursive estimation of an arm's parameters, as a controller runs it.
 
-    The same compiled code as in the C library: it allocates nothing per sample and gives the same numbers.
+    It runs the compiled code of the C library, allocates nothing per sample and gives the same numbers.
 
     Parameters
     ----------

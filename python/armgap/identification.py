@@ -14,7 +14,7 @@ from armgap.arm import Arm
 from armgap.errors import ColumnError, OptionError
 from armgap.literals import FILTERS, SCHEMES, VELOCITIES, Filters, Scheme, VelocityMethod
 from armgap.log import Log
-from armgap.progress import tell
+from armgap.progress import report_progress
 
 __all__ = ["SCHEMES", "Identification", "identify", "velocity"]
 
@@ -212,12 +212,12 @@ def identify(
         raise OptionError(f"`theta0` has shape {start.shape}", remedy=f"give {len(names)} finite values")
     dq = _velocities(log, velocity)
 
-    def course(cutoff: float) -> dict[str, Any]:
-        return _course(log, arm, dq, start, (scheme, filters == "paper", cutoff, forgetting, p0))
+    def estimates(cutoff: float) -> dict[str, Any]:
+        return _estimates(log, arm, dq, start, (scheme, filters == "paper", cutoff, forgetting, p0))
 
-    tell(scheme, 0.0)
-    whole = course(cutoff)
-    tell(scheme, 0.5)
+    report_progress(scheme, 0.0)
+    whole = estimates(cutoff)
+    report_progress(scheme, 0.5)
     theta = whole["theta"][-1].copy()
     return Identification(
         log=log.name,
@@ -229,7 +229,7 @@ def identify(
         parameter_units=tuple(units),
         theta=theta,
         sigma=_sigma(whole["errors"], whole["covariance"]),
-        cutoff_drift=None if scheme == "supplied-energy" else theta - course(cutoff / 2)["theta"][-1],
+        cutoff_drift=None if scheme == "supplied-energy" else theta - estimates(cutoff / 2)["theta"][-1],
         updates=whole["updates"],
         rejected=whole["rejected"],
         t=log.t,
@@ -238,7 +238,7 @@ def identify(
     )
 
 
-def _course(
+def _estimates(
     log: Log,
     arm: Arm,
     dq: NDArray[np.float64] | None,

@@ -14,7 +14,7 @@ from armgap import _native
 from armgap.arm import Arm
 from armgap.errors import OptionError
 from armgap.log import Log
-from armgap.progress import tell
+from armgap.progress import report_progress
 
 __all__ = ["Effect", "effects", "seed_torque", "simulate"]
 
@@ -163,7 +163,18 @@ def simulate(
     lengths = None if arm.link_length is None else arm.link_length.tolist()
     try:
         q, dq = _native.simulate(
-            arm.kind, arm.gravity, lengths, arm.theta.tolist(), t, tau, start, speed, placed, tolerance, smoothing, tell
+            arm.kind,
+            arm.gravity,
+            lengths,
+            arm.theta.tolist(),
+            t,
+            tau,
+            start,
+            speed,
+            placed,
+            tolerance,
+            smoothing,
+            report_progress,
         )
     except ValueError as error:
         raise OptionError(str(error), remedy="see `armgap.effects()` and the arm file") from None

@@ -3,7 +3,7 @@
 
 use armgap_bench::run::{PERIOD, torque};
 use armgap_core::arm::{LinkParameters, TwoLink};
-use armgap_core::effect::Pulse;
+use armgap_core::effect::InputSegment;
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
 use ferromotion_core::{LinkInertia, Robot, forward_dynamics_aba, from_urdf_full, inertial_regressor};
@@ -75,7 +75,7 @@ fn ours(plant: &Plant<f64, TwoLink<f64>, 2, 9>) -> Vec<[f64; 2]> {
     (0..SAMPLES)
         .map(|k| {
             let (before, t) = (state.q.into(), f64::from(k) * PERIOD);
-            advance(plant, &mut state, &Interval { t, h: PERIOD, torque: &torque(t).map(Pulse::held) }, 1);
+            advance(plant, &mut state, &Interval { t, h: PERIOD, torque: &torque(t).map(InputSegment::held) }, 1);
             before
         })
         .collect()

@@ -1,8 +1,8 @@
 //! The nine parameters of the two-link arm from 10 s of motion with dry friction, by output error over windows of 0.2 s. Markdown on
-//! standard output; with a file's name, the same problem as JSON for other solvers (`peers/output_error.py`).
+//! standard output; with a file's name, the same problem as JSON for other solvers (`baselines/output_error.py`).
 
 use armgap_bench::run::{PERIOD, SAMPLES, THETA, rollout, torque};
-use armgap_core::arm::Kind;
+use armgap_core::arm::ArmKind;
 use armgap_fit::arm::ArmDescription;
 use armgap_fit::output_error::{Estimate, OutputError};
 use armgap_fit::track::Track;
@@ -40,7 +40,7 @@ fn log() -> Log {
 fn fitted(log: &Log) -> Option<Estimate> {
     let first: Vec<f64> = THETA.iter().zip(FIRST).map(|(x, f)| x * f).collect();
     let arm = ArmDescription {
-        kind: Kind::TwoLink,
+        kind: ArmKind::TwoLink,
         gravity: 9.81,
         sigma: vec![1.0; first.len()],
         theta: first,
@@ -57,7 +57,7 @@ fn problem(log: &Log, estimate: &Estimate, milliseconds: f64) -> String {
     let data = Dataset::new(vec![Track::<2>::new("", &log.t, &log.q, &log.tau, Some(log.steps))], HORIZON);
     let mut windows = String::new();
     for (i, w) in data.windows.iter().enumerate() {
-        let (q, dq, comma) = (w.start.q, w.start.dq, if i == 0 { "" } else { "," });
+        let (q, dq, comma) = (w.initial_state.q, w.initial_state.dq, if i == 0 { "" } else { "," });
         let _ = write!(windows, "{comma}[{},{},{},{},{},{}]", w.first, w.last, q[0], q[1], dq[0], dq[1]);
     }
     let first: Vec<f64> = THETA.iter().zip(FIRST).map(|(x, f)| x * f).collect();

@@ -3,14 +3,14 @@
 //! All columns of a row are measured in turn, over and over, so that whatever else the machine does falls on all of them alike.
 
 use armgap_bench::run::{PERIOD, SAMPLES, THETA, arm, torque};
-use armgap_benches::peer::Build;
-use armgap_benches::peer_rollout;
+use armgap_benches::baseline::Build;
+use armgap_benches::baseline_rollout;
 use armgap_core::arm::TwoLink;
 use armgap_core::cpu::Level;
-use armgap_core::effect::Pulse;
+use armgap_core::effect::InputSegment;
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
-use armgap_core::rollout::{Run, Together};
+use armgap_core::rollout::{BatchRollout, Run};
 use nalgebra::Vector2;
 use std::hint::black_box;
 use std::io::Write;
@@ -22,15 +22,15 @@ const SAME: f64 = 1e-6;
 
 type Seed = Plant<f64, TwoLink<f64>, 2, 9>;
 
-/// Runs of one arm: their starts, and their parts of one row of torques.
+/// Runs of one arm: their initial states, and their parts of one row of torques.
 struct Case {
     name: &'static str,
     plant: Seed,
     tau: Vec<f64>,
-    torque: Vec<[Pulse<f64>; 2]>,
+    torque: Vec<[InputSegment<f64>; 2]>,
     t: Vec<f64>,
     /// First period and state of every run.
-    starts: Vec<(usize, [f64; 4])>,
+    initial_states: Vec<(usize, [f64; 4])>,
     periods: usize,
 }
 
@@ -45,9 +45,9 @@ impl Case {
             name,
             plant: Plant::new(arm::<f64>(), theta),
             tau: rows.concat(),
-            torque: rows.iter().map(|row| row.map(Pulse::held)).collect(),
+            torque: rows.iter().map(|row| row.map(InputSegment::held)).collect(),
             t: (0..=SAMPLES).map(|k| f64::from(k) * PERIOD).collect(),
-            starts: vec![(0, [0.0; 4])],
+            initial_states: vec![(0, [0.0; 4])],
             periods: SAMPLES as usize,
         }
     }
@@ -55,17 +55,17 @@ impl Case {
     /// So many runs from different states.
     fn many(mut self, name: &'static str, count: u32, periods: usize) -> Self {
         let start = |l: u32| (0, [0.002 * f64::from(l), -0.003 * f64::from(l), 0.1, -0.2]);
-        (self.name, self.starts, self.periods) = (name, (0..count).map(start).collect(), periods);
+        (self.name, self.initial_states, self.periods) = (name, (0..count).map(start).collect(), periods);
         self
     }
 
     /// The run cut into windows of so many periods, each from where the run is then.
     fn windows(mut self, name: &'static str, periods: usize) -> Self {
         let mut state = State::new(Vector2::zeros(), Vector2::zeros());
-        self.starts.clear();
+        self.initial_states.clear();
         for k in 0..self.torque.len() {
             if k % periods == 0 {
-                self.starts.push((k, [state.q[0], state.q[1], state.dq[0], state.dq[1]]));
+                self.initial_states.push((k, [state.q[0], state.q[1], state.dq[0], state.dq[1]]));
             }
             let interval = Interval { t: self.t[k], h: PERIOD, torque: &self.torque[k] };
             advance(&self.plant, &mut state, &interval, 1);
@@ -75,18 +75,18 @@ impl Case {
     }
 
     fn steps(&self) -> usize {
-        self.starts.len() * self.periods
+        self.initial_states.len() * self.periods
     }
 
-    fn peer(&self, build: Build, q: &mut [f64]) {
-        for ((first, x), q) in self.starts.iter().zip(q.chunks_exact_mut(2 * self.periods)) {
+    fn baseline(&self, build: Build, q: &mut [f64]) {
+        for ((first, x), q) in self.initial_states.iter().zip(q.chunks_exact_mut(2 * self.periods)) {
             let tau = &self.tau[2 * first..2 * (first + self.periods)];
-            peer_rollout::rollout(build, self.plant.theta(), x, tau, PERIOD, q);
+            baseline_rollout::rollout(build, self.plant.theta(), x, tau, PERIOD, q);
         }
     }
 
     fn one_by_one(&self, q: &mut [f64]) {
-        for ((first, x), q) in self.starts.iter().zip(q.chunks_exact_mut(2 * self.periods)) {
+        for ((first, x), q) in self.initial_states.iter().zip(q.chunks_exact_mut(2 * self.periods)) {
             let mut state = state(x);
             for (k, q) in (*first..).zip(q.chunks_exact_mut(2)) {
                 let interval = Interval { t: self.t[k], h: PERIOD, torque: &self.torque[k] };
@@ -97,7 +97,7 @@ impl Case {
     }
 
     fn together(&self, level: Level, q: &mut [f64]) {
-        let runs = self.starts.iter().zip(q.chunks_exact_mut(2 * self.periods));
+        let runs = self.initial_states.iter().zip(q.chunks_exact_mut(2 * self.periods));
         let mut runs: Vec<_> = runs
             .map(|((first, x), positions)| Run {
                 plant: &self.plant,
@@ -107,7 +107,7 @@ impl Case {
                 positions,
             })
             .collect();
-        Together { runs: &mut runs, limit: 1e3 }.make(level);
+        BatchRollout { runs: &mut runs, limit: 1e3 }.run_all(level);
     }
 }
 
@@ -131,8 +131,8 @@ fn compare(case: &Case) -> ([f64; 6], f64) {
             let q = black_box(&mut q[column]);
             let start = Instant::now();
             match column {
-                0 => case.peer(Build::Portable, q),
-                1 => case.peer(Build::Native, q),
+                0 => case.baseline(Build::Portable, q),
+                1 => case.baseline(Build::Native, q),
                 2 => case.one_by_one(q),
                 3 => case.together(Level::PORTABLE, q),
                 4 => case.together(Level::detect(), q),

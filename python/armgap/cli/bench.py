@@ -11,7 +11,7 @@ import click
 from armgap.cli.common import check_outputs, console, interruptible, json_option, quiet_option, write
 from armgap.cli.progress import working
 from armgap.literals import SCHEMES
-from armgap.progress import tell
+from armgap.progress import report_progress
 
 __all__ = ["command", "measure"]
 
@@ -48,7 +48,7 @@ def measure(samples: int, period: float, *, everything: bool = False) -> dict[st
     for scheme in SCHEMES:
         for filters in ("paper", "exact"):
             for single in (False, True):
-                tell("measuring", len(rows) / count)
+                report_progress("measuring", len(rows) / count)
                 for plain in (True, False) if everything else (not single,):
                     times = _native.bench(scheme, filters == "paper", plain, single, samples)
                     row: dict[str, Any] = {

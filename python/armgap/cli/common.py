@@ -6,15 +6,19 @@ import os
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextvars import copy_context
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from rich.console import Console
 
 from armgap.errors import OptionError, ResultError
+
+if TYPE_CHECKING:
+    from armgap.arm import Arm
 
 __all__ = [
     "ManyValues",
@@ -22,11 +26,13 @@ __all__ = [
     "check_outputs",
     "columns_option",
     "console",
+    "corrections_options",
     "interruptible",
     "json_option",
     "parse_columns",
     "parse_units",
     "quiet_option",
+    "read_arm",
     "report_option",
     "units_option",
     "write",
@@ -51,6 +57,40 @@ json_option = click.option("--json", "json_file", metavar="OUT", help="Write the
 report_option = click.option(
     "--report", "report_file", metavar="OUT", help="Write the report: .html, .md for pull requests, or .json."
 )
+_CORRECTIONS = {
+    "flip": ("tau1,…", "Columns that count the other way than the arm file means."),
+    "zero": ("q1=180deg", "What a position column reads where the model's joint is at zero."),
+    "swap": ("q1,q2", "Two columns that stand for each other."),
+    "absolute": ("q2", "Position columns that count from the world, not from the link before."),
+    "relative": ("q2", "Position columns that count from the link before, not from the world."),
+    "factor": ("tau1=12.5", "Factor that makes torques of a torque column."),
+    "shift": ("tau=-0.005", "Seconds to be added to the times of all torques."),
+    "skip": ("[LOG:]0-2.5", "Times of a log, in seconds from its start, that are left out."),
+}
+
+
+def corrections_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that say how columns are to be read otherwise than they stand."""
+    gravity = click.Choice(["reversed", "compensated"])
+    command = click.option("--gravity", type=gravity, help="Gravity acts the other way, or torques carry no weight.")(
+        command
+    )
+    for name, (metavar, text) in reversed(_CORRECTIONS.items()):
+        command = click.option(f"--{name}", multiple=True, metavar=metavar, help=text)(command)
+    return command
+
+
+def read_arm(path: str, given: Mapping[str, Any]) -> Arm:
+    """Read an arm file, with the values of `corrections_options` on top of its own corrections."""
+    from armgap.arm import Arm
+    from armgap.check.corrections import Corrections
+
+    arm = Arm.read(Path(path))
+    wanted = Corrections.parse(**{name: given[name] for name in (*_CORRECTIONS, "gravity")})
+    merged = wanted if arm.corrections is None else arm.corrections.merged(wanted)
+    return wanted.on_arm(replace(arm, corrections=merged or None))
+
+
 quiet_option = click.option("--quiet", is_flag=True, help="No progress and no summary.")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,17 +12,19 @@ from armgap.cli.common import (
     check_outputs,
     columns_option,
     console,
+    corrections_options,
     interruptible,
     json_option,
     parse_columns,
     parse_units,
     quiet_option,
+    read_arm,
     units_option,
     write,
 )
 from armgap.cli.progress import working
 from armgap.literals import FILTERS, SCHEMES
-from armgap.progress import following, of_many
+from armgap.progress import part_callback, use_callback
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
@@ -46,6 +47,7 @@ __all__ = ["command"]
     help="Velocity estimate; backward for the paper's filters, central for the exact ones. midpoint: as online.",
 )
 @click.option("--asymmetry", is_flag=True, help="Estimate a torque offset per joint (asymmetric Coulomb friction) too.")
+@corrections_options
 @json_option
 @columns_option
 @units_option
@@ -62,18 +64,18 @@ def command(
     columns: str | None,
     units: str | None,
     quiet: bool,
+    **corrections: Any,
 ) -> None:
     """Estimate the arm's parameters from LOGs by recursive least squares, with the seed paper's three schemes."""
     import json
 
     from rich.table import Table
 
-    from armgap.arm import Arm
     from armgap.log import gather
     from armgap.log.findings import remarks
 
     check_outputs(json_file)
-    arm = Arm.read(Path(arm_file))
+    arm = read_arm(arm_file, corrections)
     schemes = [s for s in SCHEMES if scheme in (s, "all")]
     with working("reading", quiet=quiet):
         read = gather(logs, arm, columns=parse_columns(columns), units=parse_units(units))
@@ -113,6 +115,6 @@ def _identified(
     work = [(log, scheme) for log in logs for scheme in schemes]
     results = []
     for number, (log, scheme) in enumerate(work):
-        with following(of_many("identifying", number, len(work))):
+        with use_callback(part_callback("identifying", number, len(work))):
             results.append(identify(log, arm, scheme=scheme, **settings))
     return results

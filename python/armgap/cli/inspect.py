@@ -11,11 +11,13 @@ from armgap.cli.common import (
     check_outputs,
     columns_option,
     console,
+    corrections_options,
     interruptible,
     json_option,
     parse_columns,
     parse_units,
     quiet_option,
+    read_arm,
     units_option,
     write,
 )
@@ -32,6 +34,8 @@ __all__ = ["command"]
 @click.argument("logs", nargs=-1, required=True, metavar="LOG…")
 @click.option("--arm", "arm_file", metavar="ARM.toml", help="Arm file; tells what the log says about its parameters.")
 @click.option("--report", "report_file", metavar="OUT.html", help="Write a page with pictures.")
+@click.option("--no-repair", is_flag=True, help="Say what is wrong with the logs and repair nothing.")
+@corrections_options
 @json_option
 @columns_option
 @units_option
@@ -44,6 +48,8 @@ def command(
     columns: str | None,
     units: str | None,
     quiet: bool,
+    no_repair: bool,
+    **corrections: Any,
 ) -> None:
     """Say what LOGs hold: columns, sampling, steps, saturation, motion, and what they tell about an arm's parameters.
 
@@ -51,16 +57,16 @@ def command(
     """
     import json
 
-    from armgap.arm import Arm
     from armgap.inspection import Columns
     from armgap.log import paths
 
     check_outputs(json_file, report_file)
     naming = {"columns": parse_columns(columns), "units": parse_units(units)}
-    arm = Arm.read(Path(arm_file)) if arm_file is not None else None
+    arm = read_arm(arm_file, corrections) if arm_file is not None else None
     with working("reading", quiet=quiet):
         files = paths(logs)
-        found = interruptible(lambda: [_inspected(path, arm, naming, listing=report_file is None) for path in files])
+        options = {"listing": report_file is None, "repair": not no_repair}
+        found = interruptible(lambda: [_inspected(path, arm, naming, **options) for path in files])
     if report_file is not None:
         from armgap.inspection.page import render
 
@@ -84,14 +90,16 @@ def command(
         say.print(f"report: {report_file}", highlight=False, markup=False)
 
 
-def _inspected(path: Path, arm: Arm | None, naming: dict[str, Any], *, listing: bool) -> Inspection | Columns:
+def _inspected(
+    path: Path, arm: Arm | None, naming: dict[str, Any], *, listing: bool, repair: bool
+) -> Inspection | Columns:
     """What a log holds; or, where nobody has said which column is which, what columns there are."""
     from armgap.errors import ColumnError
     from armgap.inspection import columns_of, inspect
     from armgap.log import Log
 
     try:
-        return inspect(Log.read(path, arm=arm, **naming), arm)
+        return inspect(Log.read(path, arm=arm, **naming), arm, repair=repair)
     except ColumnError:
         mapped = naming["columns"] or (arm is not None and arm.columns)
         if mapped or not listing or str(path) == "-":

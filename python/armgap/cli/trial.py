@@ -18,8 +18,8 @@ import click
 from armgap.cli.common import check_outputs, console, interruptible, json_option, quiet_option, write
 from armgap.cli.progress import working
 from armgap.errors import OptionError
-from armgap.progress import following, tell
-from armgap.trial.commands import all_of_it, make, peers, run, score
+from armgap.progress import report_progress, use_callback
+from armgap.trial.commands import all_of_it, baselines, former_name, make, run, score
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -67,8 +67,8 @@ def command(
         scores = []
         with working("diagnosing", quiet=quiet):
             for i, case in enumerate(found):
-                tell(f"diagnosing case {i + 1} of {len(found)}", i / len(found))
-                with following(_nobody):
+                report_progress(f"diagnosing case {i + 1} of {len(found)}", i / len(found))
+                with use_callback(_ignore):
                     scores.append(interruptible(partial(_score, case, horizon)))
     right = sum(judgement.right for _, judgement, _ in scores)
     if json_file is not None:
@@ -77,7 +77,7 @@ def command(
     say.print(f"right: {right} of {len(scores)}")
 
 
-for _step in (make, run, score, peers, all_of_it):
+for _step in (make, run, score, baselines, former_name, all_of_it):
     command.add_command(_step)
 
 
@@ -125,8 +125,8 @@ def _make(target: Path, cases: int, seed: int | None, duration: float, quiet: bo
         return make_trial(chosen, cases, folder=target, duration=duration)
 
 
-def _nobody(_: str, __: float) -> None:
-    """Follow nothing: what a case tells of itself is less than what all cases tell."""
+def _ignore(_: str, __: float) -> None:
+    """Drop the progress of one case: the bar shows that of all cases."""
 
 
 def _score(case: Path, horizon: float) -> tuple[str, Judgement, float]:

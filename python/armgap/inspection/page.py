@@ -14,7 +14,7 @@ from armgap.log.units import si
 from armgap.report import charts, page
 from armgap.report.conventions import brief, section
 from armgap.report.page import Section
-from armgap.report.words import Answer
+from armgap.report.words import SummaryAnswer
 
 __all__ = ["render"]
 
@@ -30,7 +30,7 @@ def render(inspections: Sequence[Inspection]) -> str:
     title = f"Log: {inspections[0].log}" if single else f"{len(inspections)} logs"
     lead = "What the log holds, how it was sampled, and what its motion tells."
     pairs = words.overview(inspections[0]) if single else [(found.log, _brief(found)) for found in inspections]
-    answers = [Answer(question, *_headline(answer)) for question, answer in pairs]
+    answers = [SummaryAnswer(question, *_headline(answer)) for question, answer in pairs]
     sections = [part for found in inspections for part in _sections(found, single=single)]
     kind = inspections[0].kind
     conventions = section(kind, [_read(found) for found in inspections], si(inspections[0].rotary))

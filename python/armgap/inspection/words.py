@@ -7,7 +7,7 @@ import shlex
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from armgap.inspection.channels import Joint
+    from armgap.inspection.channels import JointChannels
     from armgap.inspection.excitation import Excitation
     from armgap.inspection.inspection import Inspection
     from armgap.inspection.unmapped import Columns
@@ -81,7 +81,7 @@ def _excitation(e: Excitation) -> str:
         "good" if e.condition <= _RECOMMENDED else f"above {_RECOMMENDED:g} parameters can stand in for each other"
     )
     said = f"condition number {_plain(e.condition)} ({quality})"
-    said += f"; told least: {e.weakest}" if weak else ""
+    said += f"; least excited: {e.weakest}" if weak else ""
     return f"{said}; not well excited: {', '.join(weak)}" if weak else f"{said}; every parameter is well excited"
 
 
@@ -115,14 +115,14 @@ def _rate(length: str) -> str:
     return " or ".join(f"{unit}/s" for unit in length.split(" or "))
 
 
-def _position_step(j: Joint) -> str:
+def _position_step(j: JointChannels) -> str:
     said = "none" if j.q_step is None else f"{j.q_step:.5g}"
     if j.q_step_arm is None or (j.q_step is not None and abs(j.q_step / j.q_step_arm - 1) < 0.01):
         return said
     return f"{said} (arm file: {j.q_step_arm:.5g})"
 
 
-def _flat(j: Joint) -> str:
+def _flat(j: JointChannels) -> str:
     return "; ".join(f"at {f.level:.4g}: {100 * f.share:.1f} %, up to {f.longest_s:.3g} s" for f in j.flat_tops) or "no"
 
 

@@ -48,6 +48,10 @@ class Log:
         File it was read from.
     columns : mapping
         The file's own name of each column in use, by standard name.
+    part_of : str, optional
+        Name of the log that it is a part of.
+    first_row : int
+        Row of that log, from 0, that it begins with.
     units : mapping
         Unit that each of these columns had in the file, by standard name; the arrays are in SI units.
     """
@@ -60,6 +64,8 @@ class Log:
     findings: tuple[Finding, ...] = ()
     path: Path | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
+    part_of: str | None = None
+    first_row: int = 0
     units: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
@@ -196,7 +202,8 @@ class Log:
             *checks.notice(arrays, names, arm), *checks.unused(recording, names),
         ]  # fmt: skip
         arrays.t.__isub__(arrays.t[0])
-        return cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key, there)
+        log = cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key, units=there)
+        return log if arm is None or arm.corrections is None else arm.corrections.on_log(log)
 
     def __post_init__(self) -> None:
         """Put times on whole nanoseconds, so that a log is the same log in every format, and make the arrays read-only."""
@@ -227,6 +234,11 @@ class Log:
         """Return the number of samples."""
         return len(self.t)
 
+    @property
+    def recording(self) -> str:
+        """Name of the whole log, also of a part of it."""
+        return self.part_of or self.name
+
     def _repr_html_(self) -> str:
         """Return length, rate and columns as HTML for a notebook."""
         from armgap.report.shown import log_facts
@@ -247,7 +259,8 @@ class Log:
         rows = slice(first, last)
         dq = None if self.dq is None else self.dq[rows]
         found = self.findings if findings is None else findings
-        return Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns, self.units)
+        part = Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
+        return replace(part, units=self.units, part_of=self.recording, first_row=self.first_row + first)
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
         """Return the log with other findings."""

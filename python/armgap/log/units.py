@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from armgap.errors import OptionError, UnitError
 from armgap.log.columns import Arrays, Names
 from armgap.log.findings import Finding
+from armgap.log.turns import TURN, unwrapped
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
@@ -24,7 +25,7 @@ _DEGREE = math.pi / 180
 
 FACTORS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "q": {"rad": 1.0, "deg": _DEGREE, "m": 1.0, "mm": 1e-3},
+    "q": {"rad": 1.0, "deg": _DEGREE, "turns": 2 * math.pi, "m": 1.0, "mm": 1e-3},
     "dq": {"rad/s": 1.0, "deg/s": _DEGREE, "m/s": 1.0, "mm/s": 1e-3},
     "tau": {"Nm": 1.0, "mNm": 1e-3, "N": 1.0, "kN": 1e3},
 }
@@ -46,6 +47,8 @@ _SURE_RATIO = (52.0, 63.0)
 _MILLI_RATIO = (700.0, 1400.0)
 # An arm's commanded torque does not exceed its limit by this factor, except in another unit.
 _TORQUE_FACTOR = 20.0
+# A unit changes all rows; what this share of them does is a defect of its own, seen later.
+_WILD_SHARE = 0.002
 
 
 @dataclass(frozen=True)
@@ -149,7 +152,7 @@ def _factor(group: str, unit: str, arm: Arm | None) -> float:
 
 
 def _suits(group: str, unit: str, arm: Arm | None) -> bool:
-    angular = unit.startswith(("rad", "deg")) or unit.endswith("Nm")
+    angular = unit.startswith(("rad", "deg", "turns")) or unit.endswith("Nm")
     return arm is None or group == "t" or angular == arm.rotary
 
 
@@ -265,7 +268,7 @@ def _velocity(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
 def _speed_ratio(arrays: Arrays, j: int) -> float:
     """Return the slope of the differenced position over the velocity column; 0 where there is none."""
     assert arrays.dq is not None
-    moved = np.diff(arrays.q[:, j])
+    moved = np.diff(_without_turns(arrays.q[:, j]))
     said = 0.5 * (arrays.dq[1:, j] + arrays.dq[:-1, j]) * np.diff(arrays.t)
     power = float(said @ said)
     return float(moved @ said) / power if power > 0 else 0.0
@@ -276,7 +279,7 @@ def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
     if _slides(arm):
         farthest, fastest, unit = _FARTHEST_M, math.inf, "mm"
     for j, name in enumerate(names.q):
-        travel, speed = float(np.ptp(arrays.q[:, j])), _peak_speed(arrays, j)
+        travel, speed = _travel(arrays.q[:, j]), _peak_speed(arrays, j)
         counts = not _slides(arm) and _moves_in_counts(arrays, arm, j, _DEGREE)
         if travel > farthest or speed > fastest or counts:
             si = "m" if _slides(arm) else "rad"
@@ -293,8 +296,20 @@ def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
 def _peak_speed(arrays: Arrays, j: int) -> float:
     """Return the speed that is exceeded for 1 % of the log."""
     stride = max(1, round(_SPEED_SPAN_S / float(np.median(np.diff(arrays.t[:_ENOUGH])))))
-    t, q = arrays.t[::stride], arrays.q[::stride, j]
+    t, q = arrays.t[::stride], _without_turns(arrays.q[:, j])[::stride]
     return float(np.quantile(np.abs(np.diff(q) / np.diff(t)), 0.99)) if len(t) > 1 else 0.0
+
+
+def _travel(q: NDArray[np.float64]) -> float:
+    """Return the range of positions; a few wild rows do not count."""
+    wild = int(_WILD_SHARE * len(q))
+    ends = np.partition(q, (wild, len(q) - 1 - wild))
+    return float(ends[len(q) - 1 - wild] - ends[wild])
+
+
+def _without_turns(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return positions without the jumps of a wrapped encoder, in radians or in degrees: they are no speed."""
+    return unwrapped(unwrapped(q, TURN), 360.0)
 
 
 def _moves_in_counts(arrays: Arrays, arm: Arm | None, j: int, factor: float) -> bool:
@@ -314,7 +329,9 @@ def _torque(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) ->
     if arm is None or arm.torque_limit is None:
         return
     for j, name in enumerate(names.tau):
-        peak, limit = float(np.max(np.abs(arrays.tau[:, j]))), float(arm.torque_limit[j])
+        wild = int(_WILD_SHARE * len(arrays.tau))
+        peak = float(np.partition(np.abs(arrays.tau[:, j]), -1 - wild)[-1 - wild])
+        limit = float(arm.torque_limit[j])
         if peak > _TORQUE_FACTOR * limit:
             si = "Nm" if arm.rotary else "N"
             raise UnitError(

@@ -22,7 +22,7 @@ _LOG_MORE = (
     "Log more: the measured torque (motor current times torque constant), mapped to the tau columns in place of the command, tells "
     "whether the gap lies in the drive; note the times of any contact or load."
 )
-_OWN = "If you suspect a law, write it as an effect of your own and give it to `armgap.diagnose(..., effects=[...])`."
+_OWN = "If you suspect a law, write it as a custom effect and give it to `armgap.diagnose(..., effects=[...])`."
 
 
 def next_steps(data: Data) -> list[str]:

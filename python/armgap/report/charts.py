@@ -198,7 +198,7 @@ def law(entry: dict[str, Any]) -> Any:
     f.add_layout(Whisker(base="x", lower="low", upper="high", source=ColumnDataSource(ends), line_color=BEFORE))
     f.line(bins["x"], bins["law"], color=AFTER, line_width=2.5, legend_label="fitted law")
     rings = {"size": 8, "color": BEFORE, "fill_color": None, "line_width": 2}
-    f.scatter(bins["x"], bins["mean"], legend_label="mean lacking torque", **rings)
+    f.scatter(bins["x"], bins["mean"], legend_label="mean residual torque", **rings)
     _reach(f, [*ends["low"], *ends["high"], *bins["law"]])
     _legend(f)
     return f

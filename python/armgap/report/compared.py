@@ -11,7 +11,7 @@ from armgap.report import charts
 from armgap.report.conventions import brief, section
 from armgap.report.document import Document
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
-from armgap.report.words import Answer, each_joint, error_text, figure, joint_text, percent, sizes, title, value
+from armgap.report.words import SummaryAnswer, each_joint, error_text, figure, joint_text, percent, sizes, title, value
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -53,12 +53,12 @@ def _by_status(c: Comparison) -> list[CauseChange]:
     return sorted(c.causes, key=lambda x: _ORDER.index(x.status))
 
 
-def answers(c: Comparison) -> list[Answer]:
+def answers(c: Comparison) -> list[SummaryAnswer]:
     """Three questions about a repair: what went and what came, then how far."""
     return [
-        Answer("What became of the causes?", *_became(c)),
-        Answer("Did the gap shrink?", *_shrunk(c)),
-        Answer("Did the arm's own values change?", *_moved(c)),
+        SummaryAnswer("What became of the causes?", *_became(c)),
+        SummaryAnswer("Did the gap shrink?", *_shrunk(c)),
+        SummaryAnswer("Did the arm's own values change?", *_moved(c)),
     ]
 
 

@@ -23,7 +23,7 @@ class Document:
     ----------
     title, lead : str
         Heading and the sentence below it.
-    answers : sequence of Answer
+    answers : sequence of SummaryAnswer
         The first screen.
     sections : sequence of Section
         What follows; the first one's pictures belong to the first screen.
@@ -35,7 +35,7 @@ class Document:
 
     title: str
     lead: str
-    answers: Sequence[words.Answer]
+    answers: Sequence[words.SummaryAnswer]
     sections: Sequence[Section]
     brief: str = ""
     before: Section | None = None

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator, Sequence
 
 from armgap.report.document import Document
-from armgap.report.page import Bar, Cell, Drawing, Heat, Section, Table, Tile, Track
-from armgap.report.words import Answer
+from armgap.report.page import Bar, Cell, Drawing, HeatMap, IntervalLine, Section, Table, Tile
+from armgap.report.words import SummaryAnswer
 
 __all__ = ["markdown_of"]
 
@@ -45,7 +45,7 @@ def _blocks(document: Document) -> Iterator[str]:
         yield from _section(section)
 
 
-def _answer(answer: Answer) -> str:
+def _answer(answer: SummaryAnswer) -> str:
     headline = f"**{escape(answer.headline)}**" if answer.headline else ""
     return "<br>".join(filter(None, (headline, escape(answer.detail))))
 
@@ -105,7 +105,7 @@ def _entities(text: str) -> str:
 def _cell(cell: Cell) -> str:
     if isinstance(cell, Bar):
         return f"`{bar(cell.share)}` {escape(cell.text)}"
-    return escape(cell.text) if isinstance(cell, Track) else _coded(cell, cell=True)
+    return escape(cell.text) if isinstance(cell, IntervalLine) else _coded(cell, cell=True)
 
 
 def bar(share: float, width: int = BAR) -> str:
@@ -121,7 +121,7 @@ def bar(share: float, width: int = BAR) -> str:
     return head + "░" * (width - len(head))
 
 
-def _heat(heat: Heat) -> tuple[list[str], list[list[str]]]:
+def _heat(heat: HeatMap) -> tuple[list[str], list[list[str]]]:
     """A map as a table; the tile that stands out is bold."""
     width = max(len(tiles) for _, tiles in heat.rows)
     header = ["", *(["low"] + [""] * (width - 2) + ["high"] if width > 1 else [""])]

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from armgap.report.words import Answer
+from armgap._renamed import old_names
+from armgap.report.words import SummaryAnswer
 
-__all__ = ["Bar", "Cell", "Drawing", "Heat", "Section", "Table", "Tile", "Track", "render"]
+__all__ = ["Bar", "Cell", "Drawing", "HeatMap", "IntervalLine", "Section", "Table", "Tile", "render"]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
 
 
 @dataclass(frozen=True)
@@ -22,7 +26,7 @@ class Bar:
 
 
 @dataclass(frozen=True)
-class Track:
+class IntervalLine:
     """A cell that holds dots on a line from -1 to 1 around a shaded middle.
 
     Attributes
@@ -32,7 +36,7 @@ class Track:
     middle : float
         Half width of the shaded middle.
     text : str
-        The same in words, for a reader without the picture.
+        The positions in words, for a reader without the picture.
     """
 
     dots: Sequence[tuple[float, str]]
@@ -40,7 +44,7 @@ class Track:
     text: str
 
 
-Cell = str | Bar | Track
+Cell = str | Bar | IntervalLine
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,7 @@ class Tile:
 
 
 @dataclass(frozen=True)
-class Heat:
+class HeatMap:
     """A map in rows of tiles, each row with its label."""
 
     caption: str
@@ -107,7 +111,7 @@ class Section:
         Paragraphs.
     figures : sequence
         Charts: bokeh models, or `Drawing`.
-    heats : sequence of Heat
+    heats : sequence of HeatMap
         Maps beside the charts.
     tables : sequence of Table or (header, rows)
         Tables.
@@ -126,7 +130,7 @@ class Section:
     title: str
     text: Sequence[str] = ()
     figures: Sequence[Any] = ()
-    heats: Sequence[Heat] = ()
+    heats: Sequence[HeatMap] = ()
     tables: Sequence[Table | tuple[Sequence[str], Sequence[Sequence[Cell]]]] = ()
     notes: Sequence[str] = ()
     columns: int = 1
@@ -148,7 +152,7 @@ class _Part:
 def render(
     title: str,
     lead: str,
-    answers: Sequence[Answer],
+    answers: Sequence[SummaryAnswer],
     sections: Sequence[Section],
     *,
     brief: str = "",
@@ -160,7 +164,7 @@ def render(
     ----------
     title, lead : str
         Heading and the sentence below it.
-    answers : sequence of Answer
+    answers : sequence of SummaryAnswer
         The first screen.
     sections : sequence of Section
         What follows; the first one's pictures belong to the first screen.

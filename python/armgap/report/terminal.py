@@ -44,7 +44,7 @@ def _steps(data: Data) -> list[RenderableType]:
     return [*lines, Text()]
 
 
-def answer_lines(answer: words.Answer) -> list[RenderableType]:
+def answer_lines(answer: words.SummaryAnswer) -> list[RenderableType]:
     """A question with its answer, and an empty line."""
     from rich.padding import Padding
     from rich.text import Text

@@ -7,12 +7,13 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from armgap import _native
+from armgap._renamed import old_names
 
 __all__ = [
-    "Answer",
+    "SummaryAnswer",
     "answers",
     "doubtful",
     "each_joint",
@@ -31,6 +32,9 @@ __all__ = [
     "variable_text",
     "verdict",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
 
 Data = dict[str, Any]
 
@@ -78,7 +82,7 @@ _VARIABLES = {"dq": "speed", "reversal": "near a reversal", "q": "position", "ta
 
 
 @dataclass(frozen=True)
-class Answer:
+class SummaryAnswer:
     """One of the three questions.
 
     Attributes
@@ -242,15 +246,15 @@ def _check_text(check: Data) -> str:
     return name if check.get("joint") is None else f"{name} of joint {check['joint']}"
 
 
-def answers(data: Data) -> list[Answer]:
+def answers(data: Data) -> list[SummaryAnswer]:
     """The three questions with their answers."""
-    first = Answer("Where is the gap?", *_where(data))
+    first = SummaryAnswer("Where is the gap?", *_where(data))
     if data["verdict"] == "input":
-        first = Answer("What contradicts what?", *_contradicts(data))
+        first = SummaryAnswer("What contradicts what?", *_contradicts(data))
     return [
         first,
-        Answer("Which effect causes it?", *_which(data)),
-        Answer("How far does it shrink?", *_how_far(data)),
+        SummaryAnswer("Which effect causes it?", *_which(data)),
+        SummaryAnswer("How far does it shrink?", *_how_far(data)),
     ]
 
 

@@ -45,8 +45,8 @@ WANDER_SEEDS = tuple(range(10))
 # The estimates' first seconds belong to the choice of P(0).
 SETTLED_S = 3.0
 
-Step = tuple[str, Filters, VelocityMethod, bool]
-LADDER: tuple[Step, ...] = (
+LadderStep = tuple[str, Filters, VelocityMethod, bool]
+LADDER: tuple[LadderStep, ...] = (
     ("as in the paper", "paper", "backward", False),
     ("consistent filters", "exact", "backward", False),
     ("and central velocities", "exact", "central", False),
@@ -206,7 +206,7 @@ def reproduce() -> Reproduction:
     return Reproduction(arm, log, steps, wandering, ideal, responses)
 
 
-def _identify(log: Log, arm: Arm, scheme: Scheme, step: Step) -> Identification:
+def _identify(log: Log, arm: Arm, scheme: Scheme, step: LadderStep) -> Identification:
     _, filters, velocity, asymmetry = step
     return identify(
         log, arm, scheme=scheme, filters=filters, velocity=velocity, asymmetry=asymmetry, cutoff=CUTOFF_RAD_S

@@ -87,7 +87,7 @@ def _result(result: Callable[[], Answer], case: Path, method: Method, limit_s: f
 
 
 def _answer(case: str, name: str) -> Answer:
-    """One case in a process of its own; complaints of armgap and failures of a peer become answers."""
+    """One case in a process of its own; complaints of armgap and failures of a baseline become answers."""
     method = methods()[name]
     start = time.process_time()
     try:

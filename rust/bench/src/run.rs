@@ -1,7 +1,7 @@
 //! The run that the benchmarks share: Table I's arm under the torques (31) and (32) of Reyes and Kelly (1997).
 
 use armgap_core::arm::TwoLink;
-use armgap_core::effect::Pulse;
+use armgap_core::effect::InputSegment;
 use armgap_core::identify::Sample;
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
@@ -36,7 +36,7 @@ pub fn rollout(substeps: usize) -> Vec<State<f64, 2>> {
     (0..SAMPLES)
         .map(|k| {
             let (t, before) = (f64::from(k) * PERIOD, state);
-            let torque = torque(t).map(Pulse::held);
+            let torque = torque(t).map(InputSegment::held);
             advance(&plant, &mut state, &Interval { t, h: PERIOD, torque: &torque }, substeps);
             before
         })

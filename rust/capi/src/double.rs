@@ -38,7 +38,8 @@ pub unsafe extern "C" fn armgap_update(
     unsafe { slot::update(estimator, When::At(t), q, dq, tau, joints) }
 }
 
-/// The same for a sample `h` seconds after the last one, which keeps its resolution however long the controller runs.
+/// Takes one sample `h` seconds after the last one; `h` keeps its resolution however long the controller runs. Arguments as for
+/// `armgap_update`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_update_after(
     estimator: *mut armgap_estimator,

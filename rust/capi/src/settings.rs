@@ -1,8 +1,8 @@
 //! What is chosen before the first sample, and what a call may answer.
 
-use armgap_core::arm::Kind;
-use armgap_core::monitor::Watch;
-use armgap_core::online::{Choice, Problem};
+use armgap_core::arm::ArmKind;
+use armgap_core::monitor::MonitorSettings;
+use armgap_core::online::{OnlineError, OnlineSettings};
 use armgap_core::real::{Real, lit};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::Form;
@@ -131,30 +131,30 @@ pub struct armgap_report {
 
 impl armgap_settings {
     /// The defaults for a kind of arm.
-    pub(crate) fn of(kind: Kind) -> Self {
-        let choice = Choice::<f64>::new(kind);
+    pub(crate) fn of(kind: ArmKind) -> Self {
+        let defaults = OnlineSettings::<f64>::new(kind);
         Self {
             arm: kind as u32,
-            scheme: choice.scheme as u32,
+            scheme: defaults.scheme as u32,
             filters: armgap_filters::ARMGAP_EXACT as u32,
             form: armgap_form::ARMGAP_DEFAULT_FORM as u32,
             asymmetry: 0,
-            settling: choice.watch.settling,
-            learning: choice.watch.learning,
+            settling: defaults.monitor.settling,
+            learning: defaults.monitor.learning,
             reserved: 0,
-            cutoff: choice.cutoff,
-            forgetting: choice.forgetting,
-            p0: choice.p0,
-            memory: choice.watch.memory,
-            between: choice.watch.between,
-            floor: choice.watch.floor,
+            cutoff: defaults.cutoff,
+            forgetting: defaults.forgetting,
+            p0: defaults.p0,
+            memory: defaults.monitor.memory,
+            between: defaults.monitor.between,
+            floor: defaults.monitor.floor,
         }
     }
 
     /// The settings as the core takes them.
-    pub(crate) fn choice<T: Real>(&self) -> Option<Choice<T>> {
+    pub(crate) fn online_settings<T: Real>(&self) -> Option<OnlineSettings<T>> {
         let kind = kind_of(self.arm)?;
-        Some(Choice {
+        Some(OnlineSettings {
             kind,
             scheme: *Scheme::ALL.get(self.scheme as usize)?,
             variant: *[Variant::Exact, Variant::Paper].get(self.filters as usize)?,
@@ -163,7 +163,7 @@ impl armgap_settings {
             cutoff: lit(self.cutoff),
             forgetting: lit(self.forgetting),
             p0: lit(self.p0),
-            watch: Watch {
+            monitor: MonitorSettings {
                 memory: lit(self.memory),
                 settling: self.settling,
                 learning: self.learning,
@@ -175,15 +175,15 @@ impl armgap_settings {
 }
 
 /// A kind of arm by its number.
-pub(crate) fn kind_of(arm: u32) -> Option<Kind> {
-    Kind::ALL.get(arm as usize).copied()
+pub(crate) fn kind_of(arm: u32) -> Option<ArmKind> {
+    ArmKind::ALL.get(arm as usize).copied()
 }
 
-/// What the core's complaint is in C.
-pub(crate) fn status_of(problem: Problem) -> armgap_status {
-    match problem {
-        Problem::Range(_) => armgap_status::ARMGAP_RANGE,
-        Problem::Length { .. } => armgap_status::ARMGAP_LENGTH,
+/// The status code of an error of the core.
+pub(crate) fn status_of(error: OnlineError) -> armgap_status {
+    match error {
+        OnlineError::Range(_) => armgap_status::ARMGAP_RANGE,
+        OnlineError::Length { .. } => armgap_status::ARMGAP_LENGTH,
     }
 }
 
@@ -207,7 +207,7 @@ pub unsafe extern "C" fn armgap_settings_default(settings: *mut armgap_settings,
 /// Number of joints of an `armgap_arm`; 0 for no known one.
 #[unsafe(no_mangle)]
 pub extern "C" fn armgap_joints(arm: u32) -> usize {
-    kind_of(arm).map_or(0, Kind::joints)
+    kind_of(arm).map_or(0, ArmKind::joints)
 }
 
 /// Number of parameters of an `armgap_arm` without asymmetries; 0 for no known one.

@@ -1,8 +1,8 @@
 //! One sample of simulated motion, for tests of a controller without its arm.
 
 use crate::settings::{armgap_status, kind_of};
-use armgap_core::arm::{Arm, Axis, Kind, Pendulum, TwoLink};
-use armgap_core::effect::Pulse;
+use armgap_core::arm::{Arm, ArmKind, Axis, Pendulum, TwoLink};
+use armgap_core::effect::InputSegment;
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
 use armgap_status::{ARMGAP_LENGTH, ARMGAP_NULL, ARMGAP_OK, ARMGAP_RANGE, ARMGAP_UNALIGNED};
@@ -41,11 +41,11 @@ pub unsafe extern "C" fn armgap_advance(
     // SAFETY: not null, aligned; that they hold as many numbers as stated is the caller's promise.
     unsafe {
         match kind {
-            Kind::Axis => moved(|_| Axis { gravity }, theta.cast(), h, q.cast(), dq.cast(), tau.cast()),
-            Kind::Pendulum => {
+            ArmKind::Axis => moved(|_| Axis { gravity }, theta.cast(), h, q.cast(), dq.cast(), tau.cast()),
+            ArmKind::Pendulum => {
                 moved(|_| Pendulum { gravity }, theta.cast(), h, q.cast(), dq.cast(), tau.cast())
             }
-            Kind::TwoLink => {
+            ArmKind::TwoLink => {
                 moved(|p| TwoLink::new(gravity, None, p), theta.cast(), h, q.cast(), dq.cast(), tau.cast())
             }
         }
@@ -67,7 +67,7 @@ unsafe fn moved<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     }
     let plant = Plant::new(arm(&theta), theta);
     let mut state = State::new(SVector::from(from), SVector::from(speed));
-    advance(&plant, &mut state, &Interval { t: 0.0, h, torque: &tau.map(Pulse::held) }, 2);
+    advance(&plant, &mut state, &Interval { t: 0.0, h, torque: &tau.map(InputSegment::held) }, 2);
     if !state.is_finite() {
         return ARMGAP_RANGE;
     }

@@ -1,7 +1,7 @@
 //! An estimator in memory of the caller's.
 
 use crate::settings::{armgap_report, armgap_settings, armgap_status, status_of};
-use armgap_core::online::{MOST_PARAMETERS, Online, Result, When};
+use armgap_core::online::{MOST_PARAMETERS, Online, SampleStatus, When};
 use armgap_core::real::Real;
 use armgap_status::{
     ARMGAP_LENGTH, ARMGAP_NOT_STARTED, ARMGAP_NULL, ARMGAP_OK, ARMGAP_RANGE, ARMGAP_REJECTED,
@@ -23,7 +23,7 @@ impl<T: Real> Slot<T> {
 }
 
 /// Whether a pointer can be read or written.
-fn usable<T>(pointer: *const T) -> core::result::Result<(), armgap_status> {
+fn usable<T>(pointer: *const T) -> Result<(), armgap_status> {
     if pointer.is_null() {
         Err(ARMGAP_NULL)
     } else if !pointer.is_aligned() {
@@ -34,7 +34,7 @@ fn usable<T>(pointer: *const T) -> core::result::Result<(), armgap_status> {
 }
 
 /// A slice of the caller's numbers.
-unsafe fn slice<'a, T>(pointer: *const T, count: usize) -> core::result::Result<&'a [T], armgap_status> {
+unsafe fn slice<'a, T>(pointer: *const T, count: usize) -> Result<&'a [T], armgap_status> {
     usable(pointer)?;
     if count > MOST_PARAMETERS {
         return Err(ARMGAP_LENGTH);
@@ -43,7 +43,7 @@ unsafe fn slice<'a, T>(pointer: *const T, count: usize) -> core::result::Result<
     Ok(unsafe { core::slice::from_raw_parts(pointer, count) })
 }
 
-fn answer(done: core::result::Result<armgap_status, armgap_status>) -> armgap_status {
+fn answer(done: Result<armgap_status, armgap_status>) -> armgap_status {
     match done {
         Ok(status) | Err(status) => status,
     }
@@ -68,8 +68,8 @@ pub(crate) unsafe fn start<T: Real, M>(
         }
         let theta0 = if theta0.is_null() && count == 0 { &[] } else { unsafe { slice(theta0, count)? } };
         // SAFETY: checked above.
-        let choice = unsafe { &*settings }.choice::<T>().ok_or(ARMGAP_RANGE)?;
-        let online = Online::new(choice, theta0).map_err(status_of)?;
+        let online_settings = unsafe { &*settings }.online_settings::<T>().ok_or(ARMGAP_RANGE)?;
+        let online = Online::new(online_settings, theta0).map_err(status_of)?;
         // SAFETY: not null, aligned, large enough by the assertion.
         unsafe { memory.cast::<Slot<T>>().write(Slot { mark: Slot::<T>::MARKED, online }) };
         Ok(ARMGAP_OK)
@@ -77,7 +77,7 @@ pub(crate) unsafe fn start<T: Real, M>(
 }
 
 /// The estimator in the caller's memory, if there is one.
-unsafe fn opened<'a, T: Real, M>(memory: *const M) -> core::result::Result<&'a Slot<T>, armgap_status> {
+unsafe fn opened<'a, T: Real, M>(memory: *const M) -> Result<&'a Slot<T>, armgap_status> {
     usable(memory)?;
     let slot = memory.cast::<Slot<T>>();
     // SAFETY: the mark is read alone first, from memory that is large enough for it.
@@ -103,19 +103,15 @@ pub(crate) unsafe fn update<T: Real, M>(
         // SAFETY: opened above; nobody else holds it during this call.
         let online = unsafe { &mut (*memory.cast::<Slot<T>>()).online };
         Ok(match online.update(when, q, dq, tau).map_err(status_of)? {
-            Result::Updated => ARMGAP_OK,
-            Result::Starting => ARMGAP_STARTING,
-            Result::Rejected => ARMGAP_REJECTED,
+            SampleStatus::Updated => ARMGAP_OK,
+            SampleStatus::Starting => ARMGAP_STARTING,
+            SampleStatus::Rejected => ARMGAP_REJECTED,
         })
     })())
 }
 
 /// Copies numbers of the estimator to the caller, who has to have room for exactly as many.
-unsafe fn give<T: Real>(
-    from: &[T],
-    to: *mut T,
-    count: usize,
-) -> core::result::Result<armgap_status, armgap_status> {
+unsafe fn give<T: Real>(from: &[T], to: *mut T, count: usize) -> Result<armgap_status, armgap_status> {
     usable(to.cast_const())?;
     if count != from.len() {
         return Err(ARMGAP_LENGTH);
@@ -148,14 +144,14 @@ pub(crate) unsafe fn report<T: Real, M>(memory: *const M, to: *mut armgap_report
         let online = unsafe { &opened::<T, M>(memory)?.online };
         usable(to.cast_const())?;
         let double = |x: T| x.to_subset().unwrap_or(f64::NAN);
-        let choice = online.choice();
+        let settings = online.settings();
         let report = armgap_report {
             updates: online.updates(),
             rejected: online.rejected(),
             excitation: double(online.excitation()),
             alarm: double(online.alarm_level()),
-            parameters: u32::try_from(choice.parameters()).unwrap_or(0),
-            outputs: u32::try_from(choice.outputs()).unwrap_or(0),
+            parameters: u32::try_from(settings.parameters()).unwrap_or(0),
+            outputs: u32::try_from(settings.outputs()).unwrap_or(0),
         };
         // SAFETY: not null, aligned.
         unsafe { to.write(report) };

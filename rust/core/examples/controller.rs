@@ -3,9 +3,9 @@
 //! The arm is simulated here; in a real controller encoders and motors take its place, and nothing else changes.
 
 use armgap_core::arm::{Arm, TwoLink};
-use armgap_core::effect::Pulse;
+use armgap_core::effect::InputSegment;
 use armgap_core::integrate::{Interval, State, advance};
-use armgap_core::online::{Choice, MOST_PARAMETERS, Online, Problem, When};
+use armgap_core::online::{MOST_PARAMETERS, Online, OnlineError, OnlineSettings, When};
 use armgap_core::plant::Plant;
 use nalgebra::Vector2;
 
@@ -20,16 +20,16 @@ fn excite(t: f64) -> [f64; 2] {
     ]
 }
 
-fn main() -> Result<(), Problem> {
+fn main() -> Result<(), OnlineError> {
     let plant = Plant::new(TwoLink::new(9.81, None, &TRUTH), TRUTH);
     let mut arm = State::new(Vector2::zeros(), Vector2::zeros());
-    let mut estimator = Online::<f64>::new(Choice::new(armgap_core::arm::Kind::TwoLink), &[])?;
+    let mut estimator = Online::<f64>::new(OnlineSettings::new(armgap_core::arm::ArmKind::TwoLink), &[])?;
 
     for k in 0..4000 {
         let t = f64::from(k) * PERIOD;
         let tau = excite(t);
         estimator.update(When::After(PERIOD), arm.q.as_slice(), None, &tau)?;
-        advance(&plant, &mut arm, &Interval { t, h: PERIOD, torque: &tau.map(Pulse::held) }, 1);
+        advance(&plant, &mut arm, &Interval { t, h: PERIOD, torque: &tau.map(InputSegment::held) }, 1);
     }
 
     let mut sigma = [0.0; MOST_PARAMETERS];

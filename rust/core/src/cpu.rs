@@ -5,7 +5,7 @@
 //! for those with AVX2 and FMA. A [`Level`] says which, and one call without a branch in between enters the code.
 //!
 //! `a b + c` goes through [`Cpu::fused`], because a compiler does not join the two on its own, and because the standard library's
-//! `mul_add` is a function call where the instruction is missing. Everything below [`Work::run`] has to be inlined: a function that
+//! `mul_add` is a function call where the instruction is missing. Everything below [`Kernel::run`] has to be inlined: a function that
 //! stays outside is compiled for every processor.
 //!
 //! Without the feature `std` there is nothing to find out: what the builder's `target-cpu` has is known, and there is no unsafe code.
@@ -49,21 +49,21 @@ impl<const DOUBLES: usize> Cpu for Fused<DOUBLES> {
     }
 }
 
-/// What is compiled for each level.
-pub trait Work {
-    /// What it gives.
+/// A computation that is compiled for each level.
+pub trait Kernel {
+    /// Result of the computation.
     type Output;
 
-    /// Does it; the implementation is `#[inline(always)]`, and so is all that it calls and that has to be fast.
+    /// Runs the computation; the implementation is `#[inline(always)]`, and so is all that it calls and that has to be fast.
     fn run<C: Cpu>(self) -> Self::Output;
 }
 
 /// Instructions that may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Level(Kind);
+pub struct Level(InstructionSet);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum InstructionSet {
     Portable,
     /// Made by [`Level::detect`] alone, where the processor has them.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
@@ -74,8 +74,8 @@ enum Kind {
 }
 
 impl Level {
-    /// Those that the code was compiled for.
-    pub const PORTABLE: Self = Self(Kind::Portable);
+    /// Instructions that the code was compiled for.
+    pub const PORTABLE: Self = Self(InstructionSet::Portable);
 
     /// The most that the processor has, or, without the standard library, [`Level::PORTABLE`].
     #[inline]
@@ -86,17 +86,17 @@ impl Level {
             // All have it but the first with AVX2 and the one that valgrind plays, which does not know every form of AVX's instructions.
             && std::arch::is_x86_feature_detected!("adx")
         {
-            return Self(Kind::Avx2);
+            return Self(InstructionSet::Avx2);
         }
         Self::PORTABLE
     }
 
-    /// The same with eight doubles at once for work that is run by [`Level::run_wide`].
+    /// Like [`Level::detect`], and eight doubles at once, where the processor has AVX-512, for kernels run by [`Level::run_wide`].
     #[inline]
     pub fn widest() -> Self {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
         if Self::detect() != Self::PORTABLE && std::arch::is_x86_feature_detected!("avx512f") {
-            return Self(Kind::Avx512);
+            return Self(InstructionSet::Avx512);
         }
         Self::detect()
     }
@@ -104,70 +104,71 @@ impl Level {
     /// Name in tables.
     pub const fn name(self) -> &'static str {
         match self.0 {
-            Kind::Portable => "portable",
+            InstructionSet::Portable => "portable",
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
-            Kind::Avx2 => "AVX2 and FMA",
+            InstructionSet::Avx2 => "AVX2 and FMA",
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
-            Kind::Avx512 => "AVX-512",
+            InstructionSet::Avx512 => "AVX-512",
         }
     }
 
-    /// Runs the work with these instructions.
+    /// Runs a kernel with these instructions.
     #[inline(always)]
-    pub fn run<W: Work>(self, work: W) -> W::Output {
+    pub fn run<W: Kernel>(self, kernel: W) -> W::Output {
         match self.0 {
-            Kind::Portable => portable(work),
+            InstructionSet::Portable => portable(kernel),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
-            Kind::Avx2 | Kind::Avx512 => on_avx2(work),
+            InstructionSet::Avx2 | InstructionSet::Avx512 => on_avx2(kernel),
         }
     }
 
-    /// Runs work that has eight doubles side by side.
+    /// Runs a kernel that has eight doubles side by side.
     #[inline(always)]
-    pub fn run_wide<W: Work>(self, work: W) -> W::Output {
+    pub fn run_wide<W: Kernel>(self, kernel: W) -> W::Output {
         match self.0 {
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
-            Kind::Avx512 => on_avx512(work),
-            _ => self.run(work),
+            InstructionSet::Avx512 => on_avx512(kernel),
+            _ => self.run(kernel),
         }
     }
 }
 
-/// Runs the work compiled for every processor; a function of its own, so that there is one copy of it.
+/// Runs a kernel compiled for every processor; a function of its own, so that there is one copy of it.
 #[inline(never)]
-fn portable<W: Work>(work: W) -> W::Output {
-    work.run::<Portable>()
+fn portable<W: Kernel>(kernel: W) -> W::Output {
+    kernel.run::<Portable>()
 }
 
-/// Runs the work compiled for AVX2 and FMA.
+/// Runs a kernel compiled for AVX2 and FMA.
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[inline(always)]
 #[allow(unsafe_code)]
-fn on_avx2<W: Work>(work: W) -> W::Output {
-    // SAFETY: called for `Kind::Avx2` only, which only `Level::detect` makes, after asking the processor for both. The function itself
-    // is safe code; what could go wrong is a processor without these instructions, and nothing else.
-    unsafe { avx2(work) }
+fn on_avx2<W: Kernel>(kernel: W) -> W::Output {
+    // SAFETY: called for `InstructionSet::Avx2` and `InstructionSet::Avx512` only. `Level::detect` makes the first after asking the processor
+    // for AVX2 and FMA, `Level::widest` the second only where `Level::detect` has found both. The function itself is safe code; what could
+    // go wrong is a processor without these instructions, and nothing else.
+    unsafe { avx2(kernel) }
 }
 
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[target_feature(enable = "avx2,fma")]
-fn avx2<W: Work>(work: W) -> W::Output {
-    work.run::<Fused<4>>()
+fn avx2<W: Kernel>(kernel: W) -> W::Output {
+    kernel.run::<Fused<4>>()
 }
 
-/// Runs the work compiled for AVX-512.
+/// Runs a kernel compiled for AVX-512.
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[inline(always)]
 #[allow(unsafe_code)]
-fn on_avx512<W: Work>(work: W) -> W::Output {
-    // SAFETY: called for `Kind::Avx512` only, which only `Level::widest` makes, after asking the processor for all three.
-    unsafe { avx512(work) }
+fn on_avx512<W: Kernel>(kernel: W) -> W::Output {
+    // SAFETY: called for `InstructionSet::Avx512` only, which only `Level::widest` makes, after asking the processor for all three.
+    unsafe { avx512(kernel) }
 }
 
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[target_feature(enable = "avx2,fma,avx512f")]
-fn avx512<W: Work>(work: W) -> W::Output {
-    work.run::<Fused<8>>()
+fn avx512<W: Kernel>(kernel: W) -> W::Output {
+    kernel.run::<Fused<8>>()
 }
 
 #[cfg(test)]
@@ -177,7 +178,7 @@ mod tests {
     /// What rounding takes off a square.
     struct Rounding(f64);
 
-    impl Work for Rounding {
+    impl Kernel for Rounding {
         type Output = f64;
 
         #[inline(always)]

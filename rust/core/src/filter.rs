@@ -9,8 +9,8 @@
 //!   the torque), and `D = lambda (1 - F)`, which makes the pair consistent by construction. Energies are quadratic in the velocity:
 //!   for them `D` also takes the value half-way, because a chord lies above a convex curve at every sample, which adds up to a bias.
 //!
-//! Configuration ([`Cutoff`], [`Step`]) and state (one output per channel, the caller's) are separate, so one step's coefficients drive
-//! any number of channels; [`Kept`] keeps them while the interval stays the same.
+//! Configuration ([`Cutoff`], [`FilterCoefficients`]) and state (one output per channel, the caller's) are separate, so one step's coefficients drive
+//! any number of channels; [`CachedCoefficients`] keeps them while the interval stays the same.
 //! Starting values: with `D` started in the steady state of its first input and every `F` of the same equation from zero, an equation
 //! `y = dp/dt + b` holds for the filtered signals from the first sample on, whatever the motion at that time.
 
@@ -26,7 +26,7 @@ pub struct Cutoff<T> {
 
 /// Coefficients for a sample interval of one length.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step<T> {
+pub struct FilterCoefficients<T> {
     /// `exp(-h lambda)`.
     pub decay: T,
     /// Weight of the input at the start of the interval, input linear over it.
@@ -44,13 +44,13 @@ pub struct Step<T> {
 impl<T: Real> Cutoff<T> {
     /// Coefficients for an interval of `h` seconds.
     #[inline]
-    pub fn step(&self, h: T) -> Step<T> {
+    pub fn step(&self, h: T) -> FilterCoefficients<T> {
         let x = self.rad_per_s * h;
-        Step::with_decay(self.rad_per_s, x, (-x).exp())
+        FilterCoefficients::with_decay(self.rad_per_s, x, (-x).exp())
     }
 }
 
-impl<T: Real> Step<T> {
+impl<T: Real> FilterCoefficients<T> {
     #[inline]
     fn with_decay(lambda: T, x: T, decay: T) -> Self {
         // (1 - a)/x, from its series where the difference would cancel.
@@ -95,22 +95,22 @@ impl<T: Real> Step<T> {
     }
 }
 
-/// The coefficients of one interval, kept for the next, which usually is as long.
+/// Coefficients of the last interval, reused while the intervals have the same length.
 ///
 /// Lengths that differ by rounding of the clock count as equal; those that differ a little more take `exp` from its series.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Kept<T> {
+pub struct CachedCoefficients<T> {
     h: T,
-    step: Step<T>,
+    step: FilterCoefficients<T>,
 }
 
 /// Relative change of a decay below which two intervals are as long as each other; the estimates follow it to first order.
 const SAME: f64 = 1e-12;
-/// The same up to which three terms of the series suffice: the fourth is 4e-18.
+/// Relative change of a decay up to which three terms of the series of `exp` suffice: the fourth is 4e-18.
 const NEAR: f64 = 1e-4;
 
-impl<T: Real> Kept<T> {
-    /// Nothing kept yet.
+impl<T: Real> CachedCoefficients<T> {
+    /// An empty cache.
     #[inline]
     pub fn new(cutoff: &Cutoff<T>) -> Self {
         Self { h: T::zero(), step: cutoff.step(T::zero()) }
@@ -118,7 +118,7 @@ impl<T: Real> Kept<T> {
 
     /// Coefficients for an interval of `h` seconds.
     #[inline(always)]
-    pub fn step(&mut self, h: T) -> Step<T> {
+    pub fn step(&mut self, h: T) -> FilterCoefficients<T> {
         if h != self.h {
             self.renew(h);
         }
@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn kept_coefficients_are_those_of_the_interval() {
         // Equal, off by a clock's rounding, off by jitter, another period, and back.
-        let mut kept = Kept::new(&CUTOFF);
+        let mut kept = CachedCoefficients::new(&CUTOFF);
         for h in [0.0025, 0.0025, 0.0025 + 1e-15, 0.0025 + 1e-6, 0.0025 - 1e-6, 0.004, 1e-9, 0.0025] {
             let (step, fresh) = (kept.step(h), CUTOFF.step(h));
             for (a, b) in [

@@ -9,16 +9,18 @@
 //! single precision is the only way to keep its resolution: after three hours a time in `f32` has steps of a millisecond.
 
 use crate::arm::Arm;
-use crate::cpu::{Cpu, Level, Work};
+use crate::cpu::{Cpu, Kernel, Level};
 use crate::filter::Cutoff;
 use crate::real::{Real, lit};
-use crate::regression::{FilteredDynamic, FilteredPower, Passage, Scheme, Snapshot, SuppliedEnergy, Variant};
+use crate::regression::{
+    FilteredDynamic, FilteredPower, SampleInterval, Scheme, Snapshot, SuppliedEnergy, Variant,
+};
 use crate::rls::{Form, Rls, Update};
 use nalgebra::SVector;
 
 /// Positions, velocities, torques and intervals beyond this belong to no arm, and their squares would stay in filters and integrals for good.
 const LARGEST: f64 = 1e9;
-/// The same for times; seconds since any epoch stay below.
+/// Times beyond this are rejected, s; seconds since any epoch stay below.
 const LATEST: f64 = 1e11;
 
 /// Settings of an estimator of `R` parameters.
@@ -135,13 +137,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         Self { arm, settings, rls, past, regression: None, rejected: 0 }
     }
 
-    /// The same with the covariance kept in another form than the default of its precision.
+    /// Keeps the covariance in another form than the default of its precision.
     pub fn with_form(mut self, form: Form) -> Self {
         self.rls = self.rls.with_form(form);
         self
     }
 
-    /// The same with other instructions than the most that the processor has.
+    /// Uses other instructions than the widest that the processor has.
     pub fn with_level(mut self, level: Level) -> Self {
         self.rls = self.rls.with_level(level);
         self
@@ -163,7 +165,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
     pub fn update(&mut self, sample: &Sample<T, N>) -> Outcome<T, N> {
         let Sample { t, q, dq, tau } = sample;
         let h = if self.past.seen == Seen::Nothing { T::one() } else { *t - self.past.t };
-        self.rls.level().run(Take { estimator: self, t: *t, h, q, dq: dq.as_ref(), tau })
+        self.rls.level().run(SampleKernel { estimator: self, t: *t, h, q, dq: dq.as_ref(), tau })
     }
 
     /// Takes one sample `h` seconds after the last one; for the first sample any positive number will do.
@@ -171,7 +173,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
     pub fn update_after(&mut self, h: T, reading: &Reading<T, N>) -> Outcome<T, N> {
         let Reading { q, dq, tau } = reading;
         let t = self.past.t + h;
-        self.rls.level().run(Take { estimator: self, t, h, q, dq: dq.as_ref(), tau })
+        self.rls.level().run(SampleKernel { estimator: self, t, h, q, dq: dq.as_ref(), tau })
     }
 
     #[inline(always)]
@@ -256,10 +258,11 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         let inverse = if h == past.h { past.inverse } else { T::one() / h };
         let difference = (q - past.q) * inverse;
         let between = (past.q + q) * half;
-        let (now, passage, tau) = if dq.is_some() || self.settings.variant == Variant::Paper {
+        let (now, interval, tau) = if dq.is_some() || self.settings.variant == Variant::Paper {
             let now = Snapshot { q: *q, dq: dq.copied().unwrap_or(difference) };
-            let passage = Passage { h, split: h * half, first: past.tau, second: past.tau, middle: between };
-            (now, passage, *tau)
+            let interval =
+                SampleInterval { h, split: h * half, first: past.tau, second: past.tau, middle: between };
+            (now, interval, *tau)
         } else {
             // The state half-way between the two samples; on the way there from the one before, the torque changed at the last sample.
             let (now, held, split) = (Snapshot { q: between, dq: difference }, past.tau, past.h * half);
@@ -267,36 +270,41 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
                 self.start(now, held);
                 return Outcome::Starting;
             }
-            let passage =
-                Passage { h: split + h * half, split, first: past.tau_before, second: held, middle: past.q };
-            (now, passage, held)
+            let interval = SampleInterval {
+                h: split + h * half,
+                split,
+                first: past.tau_before,
+                second: held,
+                middle: past.q,
+            };
+            (now, interval, held)
         };
-        self.regress::<C>(&now, &passage, &tau)
+        self.regress::<C>(&now, &interval, &tau)
     }
 
     #[inline(always)]
     fn regress<C: Cpu>(
         &mut self,
         now: &Snapshot<T, N>,
-        passage: &Passage<T, N>,
+        interval: &SampleInterval<T, N>,
         tau: &SVector<T, N>,
     ) -> Outcome<T, N> {
         let (arm, variant) = (&self.arm, self.settings.variant);
         let outcome = match &mut self.regression {
             None => Outcome::Starting,
             Some(Regression::Dynamic(scheme)) => {
-                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, passage);
+                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, interval);
                 match self.rls.learn::<C, _>(&psi, &y) {
                     Update::Used(error) => Outcome::Updated(error),
                     Update::Rejected => Outcome::Rejected,
                 }
             }
             Some(Regression::Energy(scheme)) => {
-                let (psi, y) = scheme.update::<A, R>(arm, variant, now, passage, tau);
+                let (psi, y) = scheme.update::<A, R>(arm, variant, now, interval, tau);
                 scalar(self.rls.learn::<C, _>(&psi, &y))
             }
             Some(Regression::Power(scheme)) => {
-                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, passage, tau);
+                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, interval, tau);
                 scalar(self.rls.learn::<C, _>(&psi, &y))
             }
         };
@@ -309,7 +317,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
 }
 
 /// One call of [`Estimator::update`].
-struct Take<'a, T: Real, A, const N: usize, const P: usize, const R: usize> {
+struct SampleKernel<'a, T: Real, A, const N: usize, const P: usize, const R: usize> {
     estimator: &'a mut Estimator<T, A, N, P, R>,
     t: T,
     h: T,
@@ -318,8 +326,8 @@ struct Take<'a, T: Real, A, const N: usize, const P: usize, const R: usize> {
     tau: &'a SVector<T, N>,
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Work
-    for Take<'_, T, A, N, P, R>
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Kernel
+    for SampleKernel<'_, T, A, N, P, R>
 {
     type Output = Outcome<T, N>;
 

@@ -32,7 +32,7 @@ impl<T: Copy, C, const W: usize> Lanes<T, C, W> {
 }
 
 impl<T: Real, C, const W: usize> Lanes<T, C, W> {
-    /// Whether every one is zero or negative; none of them is no number.
+    /// True if all lanes are <= 0; false if any is positive or NaN.
     #[inline(always)]
     pub fn none_positive(self) -> bool {
         let mut none = true;

@@ -17,19 +17,19 @@ mod readme {}
 
 pub mod arm;
 pub mod cpu;
-pub mod drives;
+pub mod drivetrain;
 pub mod effect;
 pub mod filter;
-pub mod glide;
+pub mod fixed_mode;
 pub mod identify;
 pub mod integrate;
+pub mod kinematics;
 pub mod lanes;
 pub mod linear;
 pub mod monitor;
 pub mod number;
 pub mod online;
 pub mod plant;
-pub mod pose;
 pub mod real;
 pub mod regression;
 pub mod rls;

@@ -1,5 +1,5 @@
-//! What an estimator that runs on its own has to say about itself: how large its errors are, whether the motion still teaches it
-//! anything, and whether the model has stopped explaining the arm.
+//! Monitor of an online estimator: size of its errors, excitation by the motion, and an alarm when the model no longer explains the
+//! arm.
 //!
 //! **Spread.** Mean square of each prediction error over the last `memory` samples; with the diagonal of `P` it gives standard deviations.
 //!
@@ -29,7 +29,7 @@ const OUTLIER: f64 = 25.0;
 
 /// Settings of a monitor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Watch<T> {
+pub struct MonitorSettings<T> {
     /// Samples over which spread and excitation are averaged.
     pub memory: T,
     /// Samples used before learning begins, while estimate and filters settle.
@@ -42,7 +42,7 @@ pub struct Watch<T> {
     pub floor: T,
 }
 
-impl<T: Real> Default for Watch<T> {
+impl<T: Real> Default for MonitorSettings<T> {
     /// For a period of some milliseconds: a second of memory, one of settling, four of learning, a false alarm in a million samples.
     fn default() -> Self {
         Self { memory: lit(400.0), settling: 400, learning: 1600, between: lit(1e6), floor: T::zero() }
@@ -52,7 +52,7 @@ impl<T: Real> Default for Watch<T> {
 /// State of a monitor of `N` errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Monitor<T, const N: usize> {
-    watch: Watch<T>,
+    settings: MonitorSettings<T>,
     samples: u32,
     mean_square: SVector<T, N>,
     excitation: T,
@@ -67,10 +67,10 @@ pub struct Monitor<T, const N: usize> {
 
 impl<T: Real, const N: usize> Monitor<T, N> {
     /// A monitor that has seen nothing yet.
-    pub fn new(watch: Watch<T>) -> Self {
+    pub fn new(settings: MonitorSettings<T>) -> Self {
         let zero = SVector::zeros();
         Self {
-            watch,
+            settings,
             samples: 0,
             mean_square: zero,
             excitation: T::zero(),
@@ -80,7 +80,7 @@ impl<T: Real, const N: usize> Monitor<T, N> {
             correlation: zero,
             inverse_sigma: zero,
             sum: zero,
-            limit: (watch.between * lit(N as f64)).ln(),
+            limit: (settings.between * lit(N as f64)).ln(),
         }
     }
 
@@ -88,17 +88,17 @@ impl<T: Real, const N: usize> Monitor<T, N> {
     #[inline]
     pub fn update(&mut self, error: &SVector<T, N>, leverage: T, parameters: usize, age: T) {
         self.samples = self.samples.saturating_add(1);
-        let weight = T::one() / self.watch.memory.min(lit(f64::from(self.samples))).max(T::one());
+        let weight = T::one() / self.settings.memory.min(lit(f64::from(self.samples))).max(T::one());
         for j in 0..N {
             let change = error[j] * error[j] - self.mean_square[j];
             self.mean_square[j] += change * weight;
         }
         let share = leverage * age / lit(parameters as f64);
         self.excitation += (share - self.excitation) * weight;
-        let learned = self.watch.settling.saturating_add(self.watch.learning);
+        let learned = self.settings.settling.saturating_add(self.settings.learning);
         if self.samples > learned {
             self.test(error);
-        } else if self.samples > self.watch.settling {
+        } else if self.samples > self.settings.settling {
             self.learn(error, self.samples == learned);
         }
         self.last = *error;
@@ -115,10 +115,10 @@ impl<T: Real, const N: usize> Monitor<T, N> {
         }
         let most: T = lit(0.999);
         for j in 0..N {
-            let variance = self.square[j] / lit(f64::from(self.watch.learning.max(1)));
+            let variance = self.square[j] / lit(f64::from(self.settings.learning.max(1)));
             let ratio = self.product[j] / self.square[j];
             let rho = if ratio.is_finite() { ratio.max(-most).min(most) } else { T::zero() };
-            let floor = self.watch.floor.max(lit(1e-15));
+            let floor = self.settings.floor.max(lit(1e-15));
             self.correlation[j] = rho;
             self.inverse_sigma[j] = T::one() / (variance * (T::one() - rho * rho)).sqrt().max(floor);
         }

@@ -20,13 +20,13 @@ pub trait Number:
     /// `self a + b`, rounded once where that is one instruction.
     fn fused(self, a: Self, b: Self) -> Self;
 
-    /// Sine and cosine; lanes may give numbers that are none beyond [`crate::trig::LARGEST`].
+    /// Sine and cosine; lanes may give NaN beyond [`crate::trig::LARGEST`].
     fn sine_cosine(self) -> (Self, Self);
 
     /// Without the sign.
     fn size(self) -> Self;
 
-    /// The larger of the two; `other` where `self` is no number.
+    /// The larger of the two; `other` where `self` is NaN.
     fn larger(self, other: Self) -> Self;
 
     /// `zero` where `self` is zero, `other` where it is not.

@@ -2,10 +2,10 @@
 //!
 //! Vectors come as slices; a slice of the wrong length is an error, never a panic.
 
-use crate::arm::{Arm, Axis, Kind, Pendulum, TwoLink};
+use crate::arm::{Arm, ArmKind, Axis, Pendulum, TwoLink};
 use crate::filter::Cutoff;
 use crate::identify::{Estimator, Outcome, Reading, Sample, Settings};
-use crate::monitor::{Monitor, Watch};
+use crate::monitor::{Monitor, MonitorSettings};
 use crate::real::{Real, lit};
 use crate::regression::{Scheme, Variant};
 use crate::rls::Form;
@@ -16,11 +16,11 @@ pub const MOST_PARAMETERS: usize = 11;
 /// Largest number of joints of any arm.
 pub const MOST_JOINTS: usize = 2;
 
-/// Everything that is chosen before the first sample.
+/// Settings of an online estimator.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Choice<T> {
+pub struct OnlineSettings<T> {
     /// Kind of arm.
-    pub kind: Kind,
+    pub kind: ArmKind,
     /// Regression model.
     pub scheme: Scheme,
     /// Filters and alignment.
@@ -36,13 +36,13 @@ pub struct Choice<T> {
     /// `P(0) = p0 I`; forgetting lifts no variance above it.
     pub p0: T,
     /// Monitor.
-    pub watch: Watch<T>,
+    pub monitor: MonitorSettings<T>,
 }
 
 /// Why an estimator cannot be made or a sample cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Problem {
-    /// A number of the choice is not finite or outside its range.
+pub enum OnlineError {
+    /// A setting is not finite or outside its range.
     Range(&'static str),
     /// A slice has another length than the arm needs.
     Length {
@@ -64,7 +64,7 @@ pub enum When<T> {
 
 /// What became of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Result {
+pub enum SampleStatus {
     /// Taken; not enough samples for a regression yet.
     Starting,
     /// The estimate was updated.
@@ -73,9 +73,9 @@ pub enum Result {
     Rejected,
 }
 
-impl<T: Real> Choice<T> {
+impl<T: Real> OnlineSettings<T> {
     /// The filtered power model with consistent filters at 50 rad/s, without forgetting.
-    pub fn new(kind: Kind) -> Self {
+    pub fn new(kind: ArmKind) -> Self {
         Self {
             kind,
             scheme: Scheme::FilteredPower,
@@ -85,7 +85,7 @@ impl<T: Real> Choice<T> {
             cutoff: lit(50.0),
             forgetting: T::one(),
             p0: lit(1000.0),
-            watch: Watch::default(),
+            monitor: MonitorSettings::default(),
         }
     }
 
@@ -100,19 +100,19 @@ impl<T: Real> Choice<T> {
         if self.scheme == Scheme::FilteredDynamic { self.kind.joints() } else { 1 }
     }
 
-    fn check(&self) -> core::result::Result<(), Problem> {
+    fn check(&self) -> Result<(), OnlineError> {
         let positive = |x: T, most: f64| x > T::zero() && x <= lit(most);
         let wrong = [
             (!positive(self.cutoff, 1e6), "cutoff"),
             (!positive(self.forgetting, 1.0), "forgetting"),
             (!positive(self.p0, 1e12), "p0"),
-            (!positive(self.watch.memory, 1e12) || self.watch.memory < T::one(), "memory"),
-            (!positive(self.watch.between, 1e30) || self.watch.between < lit(10.0), "between"),
-            (self.watch.learning < 2, "learning"),
-            (!(self.watch.floor >= T::zero() && self.watch.floor <= lit(1e30)), "floor"),
+            (!positive(self.monitor.memory, 1e12) || self.monitor.memory < T::one(), "memory"),
+            (!positive(self.monitor.between, 1e30) || self.monitor.between < lit(10.0), "between"),
+            (self.monitor.learning < 2, "learning"),
+            (!(self.monitor.floor >= T::zero() && self.monitor.floor <= lit(1e30)), "floor"),
         ];
         match wrong.into_iter().find(|(wrong, _)| *wrong) {
-            Some((_, name)) => Err(Problem::Range(name)),
+            Some((_, name)) => Err(OnlineError::Range(name)),
             None => Ok(()),
         }
     }
@@ -121,53 +121,65 @@ impl<T: Real> Choice<T> {
 /// An estimator of any arm.
 #[derive(Debug, Clone, Copy)]
 pub struct Online<T: Real> {
-    choice: Choice<T>,
-    running: Running<T>,
+    settings: OnlineSettings<T>,
+    running: EstimatorOfArm<T>,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Running<T: Real> {
-    Axis(Watched<T, Axis<T>, 1, 4, 4>),
-    AxisAsymmetric(Watched<T, Axis<T>, 1, 4, 5>),
-    Pendulum(Watched<T, Pendulum<T>, 1, 4, 4>),
-    PendulumAsymmetric(Watched<T, Pendulum<T>, 1, 4, 5>),
-    TwoLink(Watched<T, TwoLink<T>, 2, 9, 9>),
-    TwoLinkAsymmetric(Watched<T, TwoLink<T>, 2, 9, 11>),
+enum EstimatorOfArm<T: Real> {
+    Axis(MonitoredEstimator<T, Axis<T>, 1, 4, 4>),
+    AxisAsymmetric(MonitoredEstimator<T, Axis<T>, 1, 4, 5>),
+    Pendulum(MonitoredEstimator<T, Pendulum<T>, 1, 4, 4>),
+    PendulumAsymmetric(MonitoredEstimator<T, Pendulum<T>, 1, 4, 5>),
+    TwoLink(MonitoredEstimator<T, TwoLink<T>, 2, 9, 9>),
+    TwoLinkAsymmetric(MonitoredEstimator<T, TwoLink<T>, 2, 9, 11>),
 }
 
 impl<T: Real> Online<T> {
     /// An estimator that has seen nothing yet; `theta0` has one entry per parameter, or none for zeros.
-    pub fn new(choice: Choice<T>, theta0: &[T]) -> core::result::Result<Self, Problem> {
-        choice.check()?;
-        let expected = choice.parameters();
+    pub fn new(settings: OnlineSettings<T>, theta0: &[T]) -> Result<Self, OnlineError> {
+        settings.check()?;
+        let expected = settings.parameters();
         if !(theta0.is_empty() || theta0.len() == expected) {
-            return Err(Problem::Length { name: "theta0", expected });
+            return Err(OnlineError::Length { name: "theta0", expected });
         }
         if !theta0.iter().all(|x| x.abs() <= lit(1e9)) {
-            return Err(Problem::Range("theta0"));
+            return Err(OnlineError::Range("theta0"));
         }
         // Neither gravity nor lengths occur in the regressors.
         let (gravity, length1) = (lit(9.81), T::zero());
-        let running = match (choice.kind, choice.asymmetry) {
-            (Kind::Axis, false) => Running::Axis(Watched::new(Axis { gravity }, &choice, theta0)),
-            (Kind::Axis, true) => Running::AxisAsymmetric(Watched::new(Axis { gravity }, &choice, theta0)),
-            (Kind::Pendulum, false) => Running::Pendulum(Watched::new(Pendulum { gravity }, &choice, theta0)),
-            (Kind::Pendulum, true) => {
-                Running::PendulumAsymmetric(Watched::new(Pendulum { gravity }, &choice, theta0))
+        let running = match (settings.kind, settings.asymmetry) {
+            (ArmKind::Axis, false) => {
+                EstimatorOfArm::Axis(MonitoredEstimator::new(Axis { gravity }, &settings, theta0))
             }
-            (Kind::TwoLink, false) => {
-                Running::TwoLink(Watched::new(TwoLink { gravity, length1 }, &choice, theta0))
+            (ArmKind::Axis, true) => {
+                EstimatorOfArm::AxisAsymmetric(MonitoredEstimator::new(Axis { gravity }, &settings, theta0))
             }
-            (Kind::TwoLink, true) => {
-                Running::TwoLinkAsymmetric(Watched::new(TwoLink { gravity, length1 }, &choice, theta0))
+            (ArmKind::Pendulum, false) => {
+                EstimatorOfArm::Pendulum(MonitoredEstimator::new(Pendulum { gravity }, &settings, theta0))
             }
+            (ArmKind::Pendulum, true) => EstimatorOfArm::PendulumAsymmetric(MonitoredEstimator::new(
+                Pendulum { gravity },
+                &settings,
+                theta0,
+            )),
+            (ArmKind::TwoLink, false) => EstimatorOfArm::TwoLink(MonitoredEstimator::new(
+                TwoLink { gravity, length1 },
+                &settings,
+                theta0,
+            )),
+            (ArmKind::TwoLink, true) => EstimatorOfArm::TwoLinkAsymmetric(MonitoredEstimator::new(
+                TwoLink { gravity, length1 },
+                &settings,
+                theta0,
+            )),
         };
-        Ok(Self { choice, running })
+        Ok(Self { settings, running })
     }
 
-    /// What was chosen.
-    pub fn choice(&self) -> &Choice<T> {
-        &self.choice
+    /// The settings.
+    pub fn settings(&self) -> &OnlineSettings<T> {
+        &self.settings
     }
 
     /// Takes one sample: positions, velocities where they are known, and the torques that act until the next sample.
@@ -178,11 +190,11 @@ impl<T: Real> Online<T> {
         q: &[T],
         dq: Option<&[T]>,
         tau: &[T],
-    ) -> core::result::Result<Result, Problem> {
-        let expected = self.choice.kind.joints();
+    ) -> Result<SampleStatus, OnlineError> {
+        let expected = self.settings.kind.joints();
         for (name, x) in [("q", q), ("dq", dq.unwrap_or(q)), ("tau", tau)] {
             if x.len() != expected {
-                return Err(Problem::Length { name, expected });
+                return Err(OnlineError::Length { name, expected });
             }
         }
         Ok(self.running_mut().update(when, q, dq, tau))
@@ -197,7 +209,7 @@ impl<T: Real> Online<T> {
     /// Prediction errors of the last sample used, one per output.
     pub fn errors(&self) -> &[T] {
         let errors = self.running().errors();
-        errors.get(..self.choice.outputs()).unwrap_or(errors)
+        errors.get(..self.settings.outputs()).unwrap_or(errors)
     }
 
     /// Writes the diagonal of `P` into `out` and returns how many entries it has.
@@ -208,7 +220,7 @@ impl<T: Real> Online<T> {
     /// Writes standard deviations of the parameters into `out`, as if errors were white, and returns how many there are.
     pub fn sigma(&self, out: &mut [T; MOST_PARAMETERS]) -> usize {
         let count = self.variances(out);
-        let outputs = self.choice.outputs();
+        let outputs = self.settings.outputs();
         let squares = self.running().mean_square().iter().take(outputs);
         let spread = squares.fold(T::zero(), |sum, x| sum + *x) / lit(outputs as f64);
         for x in out {
@@ -238,33 +250,33 @@ impl<T: Real> Online<T> {
     }
 
     #[inline]
-    fn running(&self) -> &dyn Run<T> {
+    fn running(&self) -> &dyn DynEstimator<T> {
         match &self.running {
-            Running::Axis(x) => x,
-            Running::AxisAsymmetric(x) => x,
-            Running::Pendulum(x) => x,
-            Running::PendulumAsymmetric(x) => x,
-            Running::TwoLink(x) => x,
-            Running::TwoLinkAsymmetric(x) => x,
+            EstimatorOfArm::Axis(x) => x,
+            EstimatorOfArm::AxisAsymmetric(x) => x,
+            EstimatorOfArm::Pendulum(x) => x,
+            EstimatorOfArm::PendulumAsymmetric(x) => x,
+            EstimatorOfArm::TwoLink(x) => x,
+            EstimatorOfArm::TwoLinkAsymmetric(x) => x,
         }
     }
 
     #[inline]
-    fn running_mut(&mut self) -> &mut dyn Run<T> {
+    fn running_mut(&mut self) -> &mut dyn DynEstimator<T> {
         match &mut self.running {
-            Running::Axis(x) => x,
-            Running::AxisAsymmetric(x) => x,
-            Running::Pendulum(x) => x,
-            Running::PendulumAsymmetric(x) => x,
-            Running::TwoLink(x) => x,
-            Running::TwoLinkAsymmetric(x) => x,
+            EstimatorOfArm::Axis(x) => x,
+            EstimatorOfArm::AxisAsymmetric(x) => x,
+            EstimatorOfArm::Pendulum(x) => x,
+            EstimatorOfArm::PendulumAsymmetric(x) => x,
+            EstimatorOfArm::TwoLink(x) => x,
+            EstimatorOfArm::TwoLinkAsymmetric(x) => x,
         }
     }
 }
 
-/// What every watched estimator can do.
-trait Run<T: Real> {
-    fn update(&mut self, when: When<T>, q: &[T], dq: Option<&[T]>, tau: &[T]) -> Result;
+/// What every monitored estimator can do.
+trait DynEstimator<T: Real> {
+    fn update(&mut self, when: When<T>, q: &[T], dq: Option<&[T]>, tau: &[T]) -> SampleStatus;
     fn theta(&self) -> &[T];
     fn errors(&self) -> &[T];
     fn variances(&self, out: &mut [T; MOST_PARAMETERS]) -> usize;
@@ -277,7 +289,7 @@ trait Run<T: Real> {
 
 /// An estimator with its monitor.
 #[derive(Debug, Clone, Copy)]
-struct Watched<T: Real, A, const N: usize, const P: usize, const R: usize> {
+struct MonitoredEstimator<T: Real, A, const N: usize, const P: usize, const R: usize> {
     estimator: Estimator<T, A, N, P, R>,
     monitor: Monitor<T, N>,
     errors: SVector<T, N>,
@@ -285,24 +297,26 @@ struct Watched<T: Real, A, const N: usize, const P: usize, const R: usize> {
     memory: T,
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Watched<T, A, N, P, R> {
-    fn new(arm: A, choice: &Choice<T>, theta0: &[T]) -> Self {
-        let settings = Settings {
-            scheme: choice.scheme,
-            variant: choice.variant,
-            cutoff: Cutoff { rad_per_s: choice.cutoff },
-            forgetting: choice.forgetting,
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>
+    MonitoredEstimator<T, A, N, P, R>
+{
+    fn new(arm: A, settings: &OnlineSettings<T>, theta0: &[T]) -> Self {
+        let estimator_settings = Settings {
+            scheme: settings.scheme,
+            variant: settings.variant,
+            cutoff: Cutoff { rad_per_s: settings.cutoff },
+            forgetting: settings.forgetting,
             theta0: vector(theta0),
-            p0: choice.p0,
+            p0: settings.p0,
         };
-        let forgotten = T::one() - choice.forgetting;
-        let estimator = Estimator::new(arm, settings);
+        let forgotten = T::one() - settings.forgetting;
+        let estimator = Estimator::new(arm, estimator_settings);
         Self {
-            estimator: match choice.form {
+            estimator: match settings.form {
                 Some(form) => estimator.with_form(form),
                 None => estimator,
             },
-            monitor: Monitor::new(choice.watch),
+            monitor: Monitor::new(settings.monitor),
             errors: SVector::zeros(),
             memory: if forgotten > T::zero() { T::one() / forgotten } else { lit(1e30) },
         }
@@ -319,25 +333,25 @@ fn vector<T: Real, const N: usize>(x: &[T]) -> SVector<T, N> {
     v
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Run<T>
-    for Watched<T, A, N, P, R>
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> DynEstimator<T>
+    for MonitoredEstimator<T, A, N, P, R>
 {
     #[inline]
-    fn update(&mut self, when: When<T>, q: &[T], dq: Option<&[T]>, tau: &[T]) -> Result {
+    fn update(&mut self, when: When<T>, q: &[T], dq: Option<&[T]>, tau: &[T]) -> SampleStatus {
         let (q, dq, tau) = (vector(q), dq.map(vector), vector(tau));
         let outcome = match when {
             When::At(t) => self.estimator.update(&Sample { t, q, dq, tau }),
             When::After(h) => self.estimator.update_after(h, &Reading { q, dq, tau }),
         };
         match outcome {
-            Outcome::Starting => Result::Starting,
-            Outcome::Rejected => Result::Rejected,
+            Outcome::Starting => SampleStatus::Starting,
+            Outcome::Rejected => SampleStatus::Rejected,
             Outcome::Updated(error) => {
                 let rls = self.estimator.rls();
                 let age = self.memory.min(lit(rls.updates() as f64));
                 self.monitor.update(&error, rls.leverage(), R, age);
                 self.errors = error;
-                Result::Updated
+                SampleStatus::Updated
             }
         }
     }

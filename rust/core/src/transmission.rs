@@ -1,66 +1,65 @@
-//! What lies between the motor and the link, and what a joint remembers of its path: states that no encoder shows.
+//! Transmission between motor and link, and hysteresis of a joint: latent states, which no encoder measures.
 //!
-//! A rigid joint has neither. A joint driven through a spring, or through play, has a motor side of its own,
+//! A rigid joint has neither. A joint driven through a spring, or through backlash, has a rotor of its own,
 //!
 //! ```text
-//! inertia d2(u q + twist)/dt2 = tau - transmitted,      transmitted = stiffness twist + damping dtwist
+//! inertia d2(u q + deflection)/dt2 = tau - transmitted,      transmitted = stiffness deflection + damping d(deflection)/dt
 //! ```
 //!
-//! (Spong 1987), where `u q` is the joint's own position and, as far as the rotor rides on them, that of the joints before, on which the
-//! motor reacts with as much of the torque that it does not transmit. Within a play of width `gap` nothing is transmitted, and
-//! outside it the flanks push and never pull. A joint with hysteresis remembers a quantity that changes with the distance travelled and
-//! with nothing else.
+//! (Spong 1987), where `u` is the rotor Jacobian: 1 for the joint's own position and the coupling ratio for the joints before, on which the
+//! motor reacts with the same share of the torque that it does not transmit. Within a backlash of width `backlash` nothing is transmitted;
+//! outside it the flanks push and never pull. The hysteresis state of a joint changes with the distance travelled and with nothing else.
 
 use crate::real::{Real, lit};
 use nalgebra::SVector;
 
-/// The motor side of a joint.
+/// Transmission of a joint, with its rotor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drive<T> {
-    /// Inertia of the motor side, seen from the joint.
+pub struct Transmission<T> {
+    /// Inertia of the rotor, seen from the joint.
     pub inertia: T,
     /// Stiffness of the shaft or of the flanks.
     pub stiffness: T,
     /// Damping of the shaft or of the flanks.
     pub damping: T,
-    /// Play, both sides together; zero for a shaft without play.
-    pub gap: T,
-    /// Whether the inertia is a part of the link's nominal inertia rather than an addition to it.
-    pub inside: bool,
-    /// Part of the turning of the joints before it that the rotor takes part in beside its own: one for a motor that sits on the link before,
-    /// next to nothing behind a high gear.
-    pub riding: T,
+    /// Backlash, both sides together; zero for a shaft without backlash.
+    pub backlash: T,
+    /// Whether the rotor's inertia is a part of the link's nominal inertia rather than an addition to it.
+    pub part_of_link: bool,
+    /// Coupling ratio: rotor velocity per velocity of each joint before its own; 1 for a motor that sits on the link before, about 0
+    /// behind a high gear ratio.
+    pub coupling_ratio: T,
 }
 
-impl<T: Real> Drive<T> {
+impl<T: Real> Transmission<T> {
     /// Torque passed on to the link.
     #[inline]
-    pub fn transmitted(&self, twist: T, dtwist: T) -> T {
-        if self.gap <= T::zero() {
-            return self.stiffness * twist + self.damping * dtwist;
+    pub fn transmitted(&self, deflection: T, deflection_rate: T) -> T {
+        if self.backlash <= T::zero() {
+            return self.stiffness * deflection + self.damping * deflection_rate;
         }
-        let depth = twist.abs() - self.gap * lit(0.5);
+        let depth = deflection.abs() - self.backlash * lit(0.5);
         if depth <= T::zero() {
             return T::zero();
         }
-        let side = if twist < T::zero() { -T::one() } else { T::one() };
-        side * (self.stiffness * depth + self.damping * side * dtwist).max(T::zero())
+        let side = if deflection < T::zero() { -T::one() } else { T::one() };
+        side * (self.stiffness * depth + self.damping * side * deflection_rate).max(T::zero())
     }
 
-    /// How the rotor of joint `j` turns as the joints of a planar chain do, per unit of each.
+    /// Rotor Jacobian of joint `j` in a planar chain: rotor velocity per velocity of each joint.
     #[inline]
-    pub fn lever<const N: usize>(&self, j: usize) -> [T; N] {
+    pub fn rotor_jacobian<const N: usize>(&self, j: usize) -> [T; N] {
         core::array::from_fn(|k| match k.cmp(&j) {
-            core::cmp::Ordering::Less => self.riding,
+            core::cmp::Ordering::Less => self.coupling_ratio,
             core::cmp::Ordering::Equal => T::one(),
             core::cmp::Ordering::Greater => T::zero(),
         })
     }
 
-    /// How far the rotor may turn to either side of the middle of its play.
+    /// Half of the backlash.
     #[inline]
-    pub fn half_gap(&self) -> T {
-        self.gap * lit(0.5)
+    pub fn half_backlash(&self) -> T {
+        self.backlash * lit(0.5)
     }
 
     /// Natural frequency against a link of this inertia, 1/s.
@@ -70,25 +69,25 @@ impl<T: Real> Drive<T> {
     }
 }
 
-/// States of the joints that no encoder shows.
+/// Latent states of the joints, which no encoder measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hidden<T, const N: usize> {
-    /// What each joint remembers of its path, as it was at `anchor`.
+pub struct LatentState<T, const N: usize> {
+    /// Hysteresis state of each joint at the position `anchor`.
     pub memory: SVector<T, N>,
-    /// Position at which `memory` holds.
+    /// Position at which the hysteresis state is `memory`.
     pub anchor: SVector<T, N>,
-    /// Motor position less joint position.
-    pub twist: SVector<T, N>,
-    /// Its rate.
-    pub dtwist: SVector<T, N>,
-    /// The flank that carries where a play is closed, -1 or 1; zero where none does.
+    /// Deflection: motor position less joint position.
+    pub deflection: SVector<T, N>,
+    /// Rate of the deflection.
+    pub deflection_rate: SVector<T, N>,
+    /// The flank in contact where the backlash is closed, -1 or 1; zero where it is open.
     pub side: SVector<T, N>,
 }
 
-impl<T: Real, const N: usize> Hidden<T, N> {
-    /// Nothing remembered and nothing twisted at `q`.
+impl<T: Real, const N: usize> LatentState<T, N> {
+    /// All latent states zero, at `q`.
     pub fn none(q: SVector<T, N>) -> Self {
         let zero = SVector::zeros();
-        Self { memory: zero, anchor: q, twist: zero, dtwist: zero, side: zero }
+        Self { memory: zero, anchor: q, deflection: zero, deflection_rate: zero, side: zero }
     }
 }

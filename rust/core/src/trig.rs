@@ -3,7 +3,7 @@
 //! A library's take another path for small, middling and large angles and, without a platform's mathematics, cost more than all of the
 //! least squares. Here the angle is brought into half a turn around zero by Cody and Waite's subtraction of `k pi` in three parts,
 //! whose products with `k` are exact; both series are evaluated at once, in pairs of terms, and `k` being odd changes both signs. Larger
-//! angles and numbers that are none go to the library. Errors stay below 1.5 rounding units of 1.
+//! angles and NaN go to the library. Errors stay below 1.5 rounding units of 1.
 //!
 //! W. J. Cody and W. Waite 1980, *Software manual for the elementary functions*, chapter 8. The coefficients interpolate the series at
 //! Chebyshev's points of `r^2` up to `(pi/2)^2`; the polynomials are off by less than 4e-17, in single precision by 1.1e-10.
@@ -97,7 +97,7 @@ pub fn sin_cos<T: Real>(x: T) -> (T, T) {
     if x.abs() <= lit(largest::<T>()) { series_of(x) } else { x.sin_cos() }
 }
 
-/// The same by the series alone.
+/// Sine and cosine of `x` rad by the series alone; valid up to [`largest`].
 #[inline(always)]
 pub(crate) fn series_of<V: Number>(x: V) -> (V, V) {
     let (constants, double) = constants::<V::Real>();
@@ -127,7 +127,7 @@ fn series<V: Number>(z: V, c: &[f64; 8], whole: bool) -> V {
 
 /// Sine and cosine of an angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Turn<V> {
+pub struct SinCos<V> {
     /// Sine.
     pub sine: V,
     /// Cosine.
@@ -176,7 +176,7 @@ impl<V: Number> Rotation<V> {
     }
 }
 
-impl<V: Number> Turn<V> {
+impl<V: Number> SinCos<V> {
     /// Of an angle, rad.
     #[inline(always)]
     pub fn of(angle: V) -> Self {
@@ -184,7 +184,7 @@ impl<V: Number> Turn<V> {
         Self { sine, cosine }
     }
 
-    /// Of an angle further on, by the theorems of addition: only the change is rounded anew.
+    /// Of the angle plus a rotation, by the addition theorems: only the change is rounded anew.
     #[inline(always)]
     pub fn by(&self, rotation: &Rotation<V>) -> Self {
         let Rotation { sine, less } = *rotation;
@@ -235,7 +235,7 @@ mod tests {
             let ways = [(NEAR, Rotation::near as fn(f64) -> Rotation<f64>), (SLIGHT, Rotation::slight)];
             for (largest, rotation) in ways {
                 let way = largest * part;
-                let (there, exact) = (Turn::of(x).by(&rotation(way)), Turn::of(x + way));
+                let (there, exact) = (SinCos::of(x).by(&rotation(way)), SinCos::of(x + way));
                 let off = (there.sine - exact.sine).abs().max((there.cosine - exact.cosine).abs());
                 // The sum of the angles is rounded too.
                 assert!(off < 1.5e-15, "{x} by {way}: {off:e}");

@@ -1,7 +1,7 @@
 //! The online path and the integrator never ask for memory.
 
 use armgap_core::arm::TwoLink;
-use armgap_core::effect::{Active, Pulse, find};
+use armgap_core::effect::{Active, InputSegment, find};
 use armgap_core::filter::Cutoff;
 use armgap_core::identify::{Estimator, Sample, Settings};
 use armgap_core::integrate::{Interval, State, advance};
@@ -68,7 +68,7 @@ fn estimators_and_integrator_allocate_nothing() {
                     let t = f64::from(k) * 0.0025;
                     let tau = Vector2::new(40.0 * (9.0 * t).sin(), 8.0 * (13.0 * t).cos());
                     estimator.update(&Sample { t, q: state.q, dq: None, tau });
-                    let torque = [Pulse::held(tau[0]), Pulse::held(tau[1])];
+                    let torque = [InputSegment::held(tau[0]), InputSegment::held(tau[1])];
                     advance(&plant, &mut state, &Interval { t, h: 0.0025, torque: &torque }, 1);
                 }
                 assert!(estimator.rls().updates() > 1900);

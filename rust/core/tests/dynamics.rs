@@ -1,7 +1,7 @@
 //! The arms as mechanics: identities that hold for every arm and every state.
 
-use armgap_core::arm::{Arm, Axis, Balance, Kind, Pendulum, TwoLink};
-use armgap_core::trig::Turn;
+use armgap_core::arm::{Arm, ArmKind, Axis, EquationTerms, Pendulum, TwoLink};
+use armgap_core::trig::SinCos;
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
@@ -19,8 +19,9 @@ fn check<A: Arm<f64, N, P>, const N: usize, const P: usize>(arm: &A, theta: [f64
 
     // Y theta = tau, and the integrator's shared terms are the same mathematics.
     assert!((arm.regressor(&q, &dq, &ddq) * vector - torque).amax() < 1e-12 * scale);
-    let turns = arm.angles(&q.into(), 0.0).map(Turn::of);
-    let Balance { inertia, bias } = arm.balance(&theta, &arm.steady_inertia(&theta), &turns, &dq.into());
+    let sincos = arm.angles(&q.into(), 0.0).map(SinCos::of);
+    let EquationTerms { inertia, bias } =
+        arm.equation_terms(&theta, &arm.constant_inertia(&theta), &sincos, &dq.into());
     assert!((SMatrix::from_fn(|i, j| inertia[i][j]) - m).amax() < 1e-12 * scale);
     assert!((SVector::from(bias) - c * dq - arm.gravity(&theta, &q, 0.0)).amax() < 1e-12 * scale);
 
@@ -72,11 +73,11 @@ proptest! {
 
 #[test]
 fn every_kind_is_listed_with_its_sizes() {
-    for kind in Kind::ALL {
-        assert_eq!(Kind::from_name(kind.name()), Some(kind));
+    for kind in ArmKind::ALL {
+        assert_eq!(ArmKind::from_name(kind.name()), Some(kind));
         assert_eq!(kind.parameters().len(), kind.inertial() + 2 * kind.joints());
     }
-    assert_eq!(Kind::from_name("hexapod"), None);
+    assert_eq!(ArmKind::from_name("hexapod"), None);
 }
 
 #[test]

@@ -1,11 +1,11 @@
 //! The integrator against what mechanics demands of it.
 
 use armgap_core::arm::{Arm, TwoLink};
-use armgap_core::effect::{Active, Pulse, Trial, find};
+use armgap_core::effect::{Active, InputSegment, Trial, find};
 use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::kinematics::JointState;
 use armgap_core::plant::{Mode, Plant};
-use armgap_core::pose::Place;
-use armgap_core::transmission::Hidden;
+use armgap_core::transmission::LatentState;
 use nalgebra::{SVector, Vector2};
 
 const THETA: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6, 1.734];
@@ -36,7 +36,7 @@ fn run(
     let mut state = start;
     for k in 0..(duration / h).round() as usize {
         let t = k as f64 * h;
-        let torque = tau(t).map(Pulse::held);
+        let torque = tau(t).map(InputSegment::held);
         advance(plant, &mut state, &Interval { t, h, torque: &torque }, substeps);
     }
     state
@@ -110,7 +110,7 @@ fn work_equals_stored_plus_dissipated_energy() {
     for k in 0..4000 {
         let t = k as f64 * H;
         let tau = seed_torque(t);
-        let torque = tau.map(Pulse::held);
+        let torque = tau.map(InputSegment::held);
         for i in 0..8 {
             let before = state;
             let interval = Interval { t: t + H / 8.0 * f64::from(i), h: H / 8.0, torque: &torque };
@@ -164,8 +164,8 @@ fn a_delayed_command_keeps_its_impulse_and_its_moment() {
         ("actuator_lag", 2e-4),
     ];
     for (name, p) in laws {
-        let mut pulses: Vec<_> = u.iter().map(|&u| Pulse::held(u)).collect();
-        find::<f64>(name).expect("in the catalogue").command(&[p, 0.0, 0.0], &t, &mut pulses);
+        let mut segments: Vec<_> = u.iter().map(|&u| InputSegment::held(u)).collect();
+        find::<f64>(name).expect("in the catalogue").command(&[p, 0.0, 0.0], &t, &mut segments);
         let (fine, mut y) = (2000, u[0]);
         for k in 0..49 {
             let h = t[k + 1] - t[k];
@@ -184,8 +184,8 @@ fn a_delayed_command_keeps_its_impulse_and_its_moment() {
                 };
                 mean += value * dt;
                 moment += value * dt * (s - 0.5) * h;
-                middle += pulses[k].at(s) * dt;
-                line += pulses[k].at(s) * dt * (s - 0.5) * h;
+                middle += segments[k].at(s) * dt;
+                line += segments[k].at(s) * dt * (s - 0.5) * h;
             }
             let size = u.iter().fold(0.0, |a: f64, b| a.max(b.abs())) * h;
             assert!((mean - middle).abs() < 1e-3 * size, "{name} {p}: {middle} against {mean}");
@@ -199,9 +199,9 @@ fn a_delayed_command_keeps_its_impulse_and_its_moment() {
 fn a_short_lag_is_like_a_short_delay() {
     let t: Vec<f64> = (0..20).map(|k| f64::from(k) * H).collect();
     let shifted = |name: &str, p: f64| {
-        let mut pulses: Vec<_> = t.iter().map(|&t| Pulse::held(seed_torque(t)[0])).collect();
-        find::<f64>(name).expect("in the catalogue").command(&[p, 0.0, 0.0], &t, &mut pulses);
-        pulses
+        let mut segments: Vec<_> = t.iter().map(|&t| InputSegment::held(seed_torque(t)[0])).collect();
+        find::<f64>(name).expect("in the catalogue").command(&[p, 0.0, 0.0], &t, &mut segments);
+        segments
     };
     let [lag, delay] = ["actuator_lag", "actuator_delay"].map(|name| shifted(name, 1e-4 * H));
     for (a, b) in lag.iter().zip(&delay) {
@@ -215,10 +215,10 @@ fn a_motion_lacks_the_torque_that_the_log_does_not_hold() {
     let plant = seed(THETA).with_effect(Active { law, joint: 1, p: [0.05, 0.0, 0.0] }).expect("room");
     let (q, dq) = (Vector2::new(0.7, -1.1), Vector2::new(1.3, -0.4));
     let (tau, push) = (Vector2::new(12.0, -3.0), Vector2::new(0.9, -0.6));
-    let hidden = Hidden::none(q);
+    let latent = LatentState::none(q);
     let modes = [Mode::of(dq[0]), Mode::of(dq[1])];
-    let pose = plant.rigid().pose(&Place { q: q.into(), dq: dq.into() });
-    let motion = plant.acceleration(0.0, &pose, &(tau + push), &modes, &hidden);
-    let lacking = plant.lacking(0.0, [&q, &dq, &motion.ddq], &tau, &hidden);
-    assert!((lacking - push).norm() < 1e-12, "{lacking}");
+    let kinematics = plant.rigid().kinematics(&JointState { q: q.into(), dq: dq.into() });
+    let motion = plant.acceleration(0.0, &kinematics, &(tau + push), &modes, &latent);
+    let residual_torque = plant.residual_torque(0.0, [&q, &dq, &motion.ddq], &tau, &latent);
+    assert!((residual_torque - push).norm() < 1e-12, "{residual_torque}");
 }

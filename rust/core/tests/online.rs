@@ -3,11 +3,11 @@
 #[path = "../../bench/src/run.rs"]
 mod run;
 
-use armgap_core::arm::Kind;
+use armgap_core::arm::ArmKind;
 use armgap_core::filter::Cutoff;
 use armgap_core::identify::{Estimator, Outcome, Reading, Sample, Settings};
-use armgap_core::monitor::{Monitor, Watch};
-use armgap_core::online::{Choice, MOST_PARAMETERS, Online, Problem, Result, When};
+use armgap_core::monitor::{Monitor, MonitorSettings};
+use armgap_core::online::{MOST_PARAMETERS, Online, OnlineError, OnlineSettings, SampleStatus, When};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::{Form, Rls};
 use nalgebra::{SMatrix, SVector, Vector1, Vector2};
@@ -26,7 +26,8 @@ impl Noise {
     }
 }
 
-const WATCH: Watch<f64> = Watch { memory: 400.0, settling: 100, learning: 20_000, between: 1e4, floor: 0.0 };
+const WATCH: MonitorSettings<f64> =
+    MonitorSettings { memory: 400.0, settling: 100, learning: 20_000, between: 1e4, floor: 0.0 };
 
 /// Alarms raised over white or correlated errors whose standard deviation is `sigma` after learning.
 fn alarms(sigma: f64, rho: f64, samples: u32) -> (u32, Option<u32>) {
@@ -60,7 +61,8 @@ fn false_alarms_are_as_rare_as_stated_and_true_ones_fast() {
 
 #[test]
 fn one_outlier_raises_no_alarm() {
-    let (mut noise, mut monitor) = (Noise(9), Monitor::<f64, 1>::new(Watch { between: 1e6, ..WATCH }));
+    let (mut noise, mut monitor) =
+        (Noise(9), Monitor::<f64, 1>::new(MonitorSettings { between: 1e6, ..WATCH }));
     for k in 0..30_000 {
         let e = if k == 25_000 { 1e6 } else { noise.next() };
         monitor.update(&Vector1::new(e), 0.0, 1, 1.0);
@@ -167,13 +169,16 @@ fn both_forms_are_the_same_least_squares() {
 
 #[test]
 fn excitation_falls_when_the_arm_stops_and_sigma_shrinks_while_it_moves() {
-    let mut online =
-        Online::<f64>::new(Choice { forgetting: 0.999, ..Choice::new(Kind::TwoLink) }, &[]).expect("valid");
+    let mut online = Online::<f64>::new(
+        OnlineSettings { forgetting: 0.999, ..OnlineSettings::new(ArmKind::TwoLink) },
+        &[],
+    )
+    .expect("valid");
     let data = run::samples::<f64>();
     let mut sigma = [[0.0; MOST_PARAMETERS]; 2];
     for (k, s) in data.iter().enumerate() {
         let result = online.update(When::After(run::PERIOD), s.q.as_slice(), None, s.tau.as_slice());
-        assert_eq!(result, Ok(if k < 2 { Result::Starting } else { Result::Updated }));
+        assert_eq!(result, Ok(if k < 2 { SampleStatus::Starting } else { SampleStatus::Updated }));
         if k == 400 {
             assert_eq!(online.sigma(&mut sigma[0]), 9);
         }
@@ -194,10 +199,20 @@ fn excitation_falls_when_the_arm_stops_and_sigma_shrinks_while_it_moves() {
 fn a_changed_arm_raises_the_alarm_and_an_unchanged_one_does_not() {
     let data = run::samples::<f64>();
     let alarm = |load: f64| {
-        let watch = Watch { settling: 800, learning: 1600, between: 1e6, floor: 0.1, ..Watch::default() };
+        let monitor = MonitorSettings {
+            settling: 800,
+            learning: 1600,
+            between: 1e6,
+            floor: 0.1,
+            ..MonitorSettings::default()
+        };
         // The floor: joint 2 sticks and slips several times within a period now and then, which no regressor can follow.
-        let choice = Choice { watch, scheme: Scheme::FilteredDynamic, ..Choice::new(Kind::TwoLink) };
-        let mut online = Online::<f64>::new(choice, &[]).expect("valid");
+        let settings = OnlineSettings {
+            monitor,
+            scheme: Scheme::FilteredDynamic,
+            ..OnlineSettings::new(ArmKind::TwoLink)
+        };
+        let mut online = Online::<f64>::new(settings, &[]).expect("valid");
         let mut noise = Noise(4);
         data.iter().enumerate().any(|(k, s)| {
             let push = if k > 3000 { load } else { 0.0 };
@@ -212,17 +227,26 @@ fn a_changed_arm_raises_the_alarm_and_an_unchanged_one_does_not() {
 
 #[test]
 fn wrong_choices_and_lengths_are_errors() {
-    let choice = Choice::<f64>::new(Kind::Pendulum);
-    let mut online = Online::new(choice, &[]).expect("valid");
+    let settings = OnlineSettings::<f64>::new(ArmKind::Pendulum);
+    let mut online = Online::new(settings, &[]).expect("valid");
     let wrong = online.update(When::At(0.0), &[0.0, 1.0], None, &[0.0]);
-    assert_eq!(wrong, Err(Problem::Length { name: "q", expected: 1 }));
+    assert_eq!(wrong, Err(OnlineError::Length { name: "q", expected: 1 }));
     for (bad, name) in [
-        (Choice { cutoff: 0.0, ..choice }, "cutoff"),
-        (Choice { forgetting: 1.1, ..choice }, "forgetting"),
-        (Choice { p0: f64::NAN, ..choice }, "p0"),
-        (Choice { watch: Watch { learning: 1, ..Watch::default() }, ..choice }, "learning"),
+        (OnlineSettings { cutoff: 0.0, ..settings }, "cutoff"),
+        (OnlineSettings { forgetting: 1.1, ..settings }, "forgetting"),
+        (OnlineSettings { p0: f64::NAN, ..settings }, "p0"),
+        (
+            OnlineSettings {
+                monitor: MonitorSettings { learning: 1, ..MonitorSettings::default() },
+                ..settings
+            },
+            "learning",
+        ),
     ] {
-        assert_eq!(Online::new(bad, &[]).err(), Some(Problem::Range(name)));
+        assert_eq!(Online::new(bad, &[]).err(), Some(OnlineError::Range(name)));
     }
-    assert_eq!(Online::new(choice, &[0.0; 3]).err(), Some(Problem::Length { name: "theta0", expected: 4 }));
+    assert_eq!(
+        Online::new(settings, &[0.0; 3]).err(),
+        Some(OnlineError::Length { name: "theta0", expected: 4 })
+    );
 }

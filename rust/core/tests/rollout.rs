@@ -1,11 +1,11 @@
-//! Runs made together against the same runs made alone.
+//! Batch rollouts against the scalar integrator.
 
 use armgap_core::arm::TwoLink;
 use armgap_core::cpu::Level;
-use armgap_core::effect::{Active, Pulse, catalogue};
+use armgap_core::effect::{Active, InputSegment, catalogue};
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
-use armgap_core::rollout::{Run, Together, WIDTH};
+use armgap_core::rollout::{BatchRollout, Run, WIDTH};
 use nalgebra::Vector2;
 
 const THETA: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6, 1.734];
@@ -23,7 +23,7 @@ fn times() -> Vec<f64> {
 }
 
 /// Torques under which joints slide, reverse, stick and break away, by `l` different ones.
-fn torques(l: usize) -> Vec<[Pulse<f64>; 2]> {
+fn torques(l: usize) -> Vec<[InputSegment<f64>; 2]> {
     let size = 1.0 / (1.0 + l as f64);
     let at = |t: f64| {
         [
@@ -31,7 +31,7 @@ fn torques(l: usize) -> Vec<[Pulse<f64>; 2]> {
             8.0 * size * (26.0 * t + l as f64).sin(),
         ]
     };
-    let between = |a: f64, b: f64| Pulse { start: a, middle: 0.4 * a + 0.6 * b, end: b };
+    let between = |a: f64, b: f64| InputSegment { start: a, middle: 0.4 * a + 0.6 * b, end: b };
     times().windows(2).map(|t| std::array::from_fn(|j| between(at(t[0])[j], at(t[1] - 1e-3)[j]))).collect()
 }
 
@@ -70,7 +70,7 @@ fn together(plants: &[Seed], level: Level) -> Vec<Vec<f64>> {
             positions,
         })
         .collect();
-    Together { runs: &mut runs, limit: 1e3 }.make(level);
+    BatchRollout { runs: &mut runs, limit: 1e3 }.run_all(level);
     out
 }
 
@@ -102,7 +102,7 @@ fn lanes_of_different_arms_move_as_each_arm_does_alone() {
 #[test]
 fn every_effect_acts_in_its_lane() {
     for law in catalogue::<f64>() {
-        let p = law.spec().starts.first().copied().unwrap_or([0.01, 0.3, 0.1]);
+        let p = law.spec().initial_guesses.first().copied().unwrap_or([0.01, 0.3, 0.1]);
         let plants: Vec<Seed> = (0..WIDTH)
             .map(|l| {
                 let active =
@@ -110,7 +110,7 @@ fn every_effect_acts_in_its_lane() {
                 seed(THETA).with_effect(active).expect("room for one effect")
             })
             .collect();
-        if plants.iter().all(Plant::glides) {
+        if plants.iter().all(Plant::only_modes_change) {
             assert_same(&plants, law.spec().name);
         }
     }
@@ -134,7 +134,7 @@ fn more_runs_than_lanes_of_different_lengths_move_as_each_does_alone() {
                 positions: &mut positions[..2 * length(l)],
             })
             .collect();
-        Together { runs: &mut runs, limit: 1e3 }.make(level);
+        BatchRollout { runs: &mut runs, limit: 1e3 }.run_all(level);
         for l in 0..torques.len() {
             let mut state = start(l % WIDTH);
             let mut expected = vec![f64::NAN; 2 * ROWS];
@@ -154,8 +154,8 @@ fn more_runs_than_lanes_of_different_lengths_move_as_each_does_alone() {
 fn a_run_that_leaves_the_limit_ends_and_leaves_its_neighbours_alone() {
     let (plant, t) = (seed(THETA), times());
     let mut torques: Vec<_> = (0..WIDTH).map(torques).collect();
-    torques[2][50][0] = Pulse::held(f64::NAN);
-    torques[5][20][1] = Pulse::held(1e9);
+    torques[2][50][0] = InputSegment::held(f64::NAN);
+    torques[5][20][1] = InputSegment::held(1e9);
     let mut out = vec![vec![f64::NAN; 2 * ROWS]; WIDTH];
     let mut runs: Vec<_> = out
         .iter_mut()
@@ -163,7 +163,7 @@ fn a_run_that_leaves_the_limit_ends_and_leaves_its_neighbours_alone() {
         .enumerate()
         .map(|(l, (positions, torque))| Run { plant: &plant, t: &t, torque, state: start(l), positions })
         .collect();
-    Together { runs: &mut runs, limit: 1e3 }.make(Level::widest());
+    BatchRollout { runs: &mut runs, limit: 1e3 }.run_all(Level::widest());
     assert!(out[2][99].is_finite() && out[2][100].is_nan());
     assert!(out[5][2 * ROWS - 1].is_nan(), "what is thrown off goes on");
     for l in [0, 1, 3, 4, 6, 7] {

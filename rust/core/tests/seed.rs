@@ -1,7 +1,7 @@
 //! The seed's run: what each scheme, filter pair and velocity makes of the arm of Table I.
 
 use armgap_core::arm::{LinkParameters, TwoLink};
-use armgap_core::effect::{Active, Pulse, find};
+use armgap_core::effect::{Active, InputSegment, find};
 use armgap_core::filter::Cutoff;
 use armgap_core::identify::{Estimator, Outcome, Sample, Settings};
 use armgap_core::integrate::{Interval, State, advance};
@@ -49,7 +49,7 @@ fn run(asymmetry: bool, counts: Option<[f64; 2]>) -> Vec<Sample<f64, 2>> {
             let tau = torque(t);
             let q = Vector2::new(round(state.q[0], 0), round(state.q[1], 1));
             let sample = Sample { t, q, dq: Some(state.dq), tau: Vector2::from(tau) };
-            advance(&plant, &mut state, &Interval { t, h: H, torque: &tau.map(Pulse::held) }, 4);
+            advance(&plant, &mut state, &Interval { t, h: H, torque: &tau.map(InputSegment::held) }, 4);
             sample
         })
         .collect()
@@ -66,7 +66,7 @@ fn with_central_differences(mut samples: Vec<Sample<f64, 2>>) -> Vec<Sample<f64,
     samples
 }
 
-/// The same without velocities.
+/// Samples of the run without velocities.
 fn positions_only(samples: &[Sample<f64, 2>]) -> Vec<Sample<f64, 2>> {
     samples.iter().map(|s| Sample { dq: None, ..*s }).collect()
 }

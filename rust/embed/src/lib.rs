@@ -5,7 +5,7 @@
 #![no_std]
 
 use armgap_core::arm::TwoLink;
-use armgap_core::effect::Pulse;
+use armgap_core::effect::InputSegment;
 use armgap_core::filter::Cutoff;
 use armgap_core::identify::{Estimator, Outcome, Sample, Settings};
 use armgap_core::integrate::{Interval, State, advance};
@@ -88,7 +88,7 @@ pub unsafe extern "C" fn armgap_advance_f64(
     let (tau, theta) = unsafe { (*tau, *theta) };
     let plant = Plant::new(TwoLink::new(9.81, None, &theta), theta);
     let mut state = unsafe { State::new(Vector2::from(*q), Vector2::from(*dq)) };
-    advance(&plant, &mut state, &Interval { t, h, torque: &tau.map(Pulse::held) }, 1);
+    advance(&plant, &mut state, &Interval { t, h, torque: &tau.map(InputSegment::held) }, 1);
     unsafe {
         q.write(state.q.into());
         dq.write(state.dq.into());

@@ -1,17 +1,17 @@
 //! From an arm's description at run time to one of the arms known at compile time.
 
-use armgap_core::arm::{Arm, Axis, Kind, Pendulum, TwoLink};
+use armgap_core::arm::{Arm, ArmKind, Axis, Pendulum, TwoLink};
 
 /// An arm as an arm file describes it; lists have one entry per parameter or joint.
 #[derive(Debug, Clone)]
 pub struct ArmDescription {
     /// Kind of arm.
-    pub kind: Kind,
+    pub kind: ArmKind,
     /// Acceleration of gravity, m/s^2.
     pub gravity: f64,
-    /// Trusted values of all parameters.
+    /// Prior values of all parameters.
     pub theta: Vec<f64>,
-    /// One-sigma trust in each.
+    /// Their prior standard deviations.
     pub sigma: Vec<f64>,
     /// Encoder counts per revolution.
     pub counts_per_rev: Option<Vec<f64>>,
@@ -46,15 +46,15 @@ impl ArmDescription {
         let gravity = self.gravity;
         let first_length = self.link_length.as_ref().and_then(|l| l.first().copied());
         match self.kind {
-            Kind::Axis => {
+            ArmKind::Axis => {
                 let theta: [f64; 4] = self.theta.as_slice().try_into().ok()?;
                 Some(work.call::<_, 1, 4, 5>(Axis { gravity }, theta))
             }
-            Kind::Pendulum => {
+            ArmKind::Pendulum => {
                 let theta: [f64; 4] = self.theta.as_slice().try_into().ok()?;
                 Some(work.call::<_, 1, 4, 5>(Pendulum { gravity }, theta))
             }
-            Kind::TwoLink => {
+            ArmKind::TwoLink => {
                 let theta: [f64; 9] = self.theta.as_slice().try_into().ok()?;
                 Some(work.call::<_, 2, 9, 11>(TwoLink::new(gravity, first_length, &theta), theta))
             }

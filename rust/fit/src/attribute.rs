@@ -1,12 +1,12 @@
 //! Which effect: screening, full fits of what passes, and the holdout's decision, one cause after another.
 
-use crate::decide::{ABOVE_FLOOR, CONSEQUENCE, UNEXPLAINED};
-use crate::model::{Hypothesis, Placed};
-use crate::progress::Work;
+use crate::acceptance::{ABOVE_FLOOR, CONSEQUENCE, UNEXPLAINED};
+use crate::context::{DiagnosisContext, SplitWeighting};
+use crate::model::{EffectInstance, Hypothesis};
+use crate::progress::Phase;
 use crate::scale::Scales;
-use crate::screen::Scored;
+use crate::screen::ScoreTest;
 use crate::solve::{Effort, Fit};
-use crate::study::{Study, Weights};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{MAX_PARAMETERS, Trial, catalogue, find};
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// Candidates that are fitted again under the weights of the best.
 const FINALISTS: usize = 4;
 
-/// Candidates that are fitted with sensitivities of their own before the finalists are chosen.
+/// Candidates that are fitted with their own Jacobian before the finalists are chosen.
 const TAKEN_ON: usize = 2 * FINALISTS;
 
 /// Rounds in which the finalists are fitted under weights of the best one's residual.
@@ -23,13 +23,13 @@ const MAX_REWEIGHTINGS: usize = 3;
 /// A residual whose scale has shrunk by less than this factor needs no new weights.
 const SHRUNK: f64 = 1.15;
 
-/// Finalists by closeness to trusted values lie within this many squared sigmas of the closest.
+/// Finalists by prior cost lie within this many squared sigmas of the lowest.
 const TRUSTED: f64 = 10.0;
 
 /// Size relative to the largest possible below which nothing is left of an effect.
 const IDLE: f64 = 2e-5;
 
-/// Size, relative to the typical one, that a parameter starts from which a simpler law lacks.
+/// Initial guess, relative to the typical size, of a parameter that a simpler law does not have.
 const LITTLE: f64 = 0.1;
 
 /// Share of windows that are left out where only the size of a gap is in question.
@@ -37,23 +37,23 @@ const SPOILT: f64 = 0.02;
 
 /// One alternative to the current model, fitted on the training windows and judged on the holdout.
 #[derive(Debug, Clone)]
-pub struct Contender<const P: usize> {
-    /// The added effect; none for the current model, with or without smoother friction.
-    pub effect: Option<Placed>,
+pub struct Candidate<const P: usize> {
+    /// The added effect; none for the current model, with or without friction regularisation.
+    pub effect: Option<EffectInstance>,
     /// Size of the added effect's first parameter relative to the largest possible.
     pub size: f64,
     /// The fit.
     pub fit: Fit<P>,
-    /// Tempered cost of every training window.
+    /// Student-t cost of every training window.
     pub training: Vec<f64>,
-    /// Tempered cost of every holdout window.
+    /// Student-t cost of every holdout window.
     pub holdout: Vec<f64>,
     /// Cost of the holdout windows as they are, but for the worst few.
     pub error: f64,
 }
 
-impl<const P: usize> Contender<P> {
-    /// Cost on all windows, and of leaving the trusted values.
+impl<const P: usize> Candidate<P> {
+    /// Cost on all windows plus the prior cost.
     pub fn score(&self) -> f64 {
         self.training.iter().chain(&self.holdout).sum::<f64>() + self.fit.prior_cost
     }
@@ -83,7 +83,7 @@ impl<const P: usize> Contender<P> {
         z_score(&self.advantages(other))
     }
 
-    /// The same on the holdout windows alone.
+    /// Mean advantage over `other` per holdout window, in units of its standard error.
     pub fn holdout_z_over(&self, other: &Self) -> f64 {
         z_score(&self.advantages(other)[self.training.len()..])
     }
@@ -97,47 +97,47 @@ fn z_score(x: &[f64]) -> f64 {
     mean / (variance / n).sqrt().max(1e-12)
 }
 
-/// One stage: the current model and its alternatives, under common weights.
+/// One search node: the current model and its candidates, under common weights.
 #[derive(Debug, Clone)]
-pub struct Stage<const N: usize, const P: usize> {
+pub struct SearchNode<const N: usize, const P: usize> {
     /// The current model, fitted under weights of its own residual.
     pub settled: Fit<P>,
     /// The current model, fitted under the common weights.
-    pub base: Contender<P>,
+    pub base: Candidate<P>,
     /// Alternatives, best first.
-    pub contenders: Vec<Contender<P>>,
+    pub candidates: Vec<Candidate<P>>,
     /// Every candidate that was fitted, by the share of the gap it removes under the current model's own weights, best first.
-    pub field: Vec<(Contender<P>, f64)>,
+    pub field: Vec<(Candidate<P>, f64)>,
     /// First-order tests of all candidates around the settled model, the open ones first; none if they were not made under the weights in
     /// force.
-    pub screened: Vec<Scored>,
+    pub screened: Vec<ScoreTest>,
     /// Weights in force.
-    pub weights: Weights<N>,
+    pub weights: SplitWeighting<N>,
     /// Cost the measurement noise alone would leave on the holdout, under these weights.
     pub floor: f64,
     /// Cost that predicting no motion at all within each window would have on the holdout.
     pub motion: f64,
 }
 
-/// How the finalists and the current model end.
+/// The finalists and the current model at the end of the last round.
 struct FinalRound<const N: usize, const P: usize> {
-    base: Contender<P>,
-    contenders: Vec<Contender<P>>,
-    /// Weights by the best contender's residual, where that called for others.
-    weights: Option<Weights<N>>,
+    base: Candidate<P>,
+    candidates: Vec<Candidate<P>>,
+    /// Weights by the best candidate's residual, where that called for others.
+    weights: Option<SplitWeighting<N>>,
 }
 
-impl<const N: usize, const P: usize> Stage<N, P> {
-    /// Share of the holdout's cost above the floor that a contender removes.
-    pub fn share(&self, contender: &Contender<P>) -> f64 {
+impl<const N: usize, const P: usize> SearchNode<N, P> {
+    /// Share of the holdout's cost above the floor that a candidate removes.
+    pub fn share(&self, candidate: &Candidate<P>) -> f64 {
         let base: f64 = self.base.holdout.iter().sum();
-        let here: f64 = contender.holdout.iter().sum();
+        let here: f64 = candidate.holdout.iter().sum();
         (base - here) / (base - self.floor).max(1e-9 * base)
     }
 
-    /// RMS improvement of a contender on the holdout, relative to the motion within the windows.
-    pub fn relevance(&self, contender: &Contender<P>) -> f64 {
-        ((self.base.error - contender.error).max(0.0) / self.motion).sqrt()
+    /// RMS improvement of a candidate on the holdout, relative to the motion within the windows.
+    pub fn relevance(&self, candidate: &Candidate<P>) -> f64 {
+        ((self.base.error - candidate.error).max(0.0) / self.motion).sqrt()
     }
 
     /// RMS error of the current model on the holdout, relative to the motion within the windows.
@@ -155,9 +155,9 @@ impl<const N: usize, const P: usize> Stage<N, P> {
         self.relative_error() > CONSEQUENCE && self.excess() > UNEXPLAINED
     }
 
-    /// Whether the current model leaves a gap above the floor in which an improvement of `noticeable` size can lie.
-    pub fn is_worth_more(&self, noticeable: f64) -> bool {
-        self.relative_error() > noticeable && self.excess() > ABOVE_FLOOR
+    /// Whether the current model leaves a gap above the floor in which an improvement of `min_relevance` size can lie.
+    pub fn is_worth_more(&self, min_relevance: f64) -> bool {
+        self.relative_error() > min_relevance && self.excess() > ABOVE_FLOOR
     }
 
     /// How far the current model's cost lies above the floor, as a factor.
@@ -166,119 +166,130 @@ impl<const N: usize, const P: usize> Stage<N, P> {
     }
 }
 
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// One stage around the current model; improvements below `noticeable`, relative to the motion, are not looked for.
-    pub fn stage(&self, current: &Hypothesis<P>, scale: [f64; N], noticeable: f64) -> Stage<N, P> {
-        self.stage_around(self.settle(current, scale), noticeable)
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// The search node around the current model; improvements below `min_relevance`, relative to the motion, are not looked for.
+    pub fn node(&self, current: &Hypothesis<P>, scale: [f64; N], min_relevance: f64) -> SearchNode<N, P> {
+        self.node_around(self.settle(current, scale), min_relevance)
     }
 
-    /// The same around a fit under weights of its own residual.
-    pub fn stage_around(&self, (fit, weights): (Fit<P>, Weights<N>), noticeable: f64) -> Stage<N, P> {
-        let (starts, screened) = self.starts(&fit, &weights, noticeable);
-        self.watch.begin(Work::Candidates, starts.len());
+    /// The search node around a fit under weights of its own residual; improvements below `min_relevance` are not looked for.
+    pub fn node_around(
+        &self,
+        (fit, weights): (Fit<P>, SplitWeighting<N>),
+        min_relevance: f64,
+    ) -> SearchNode<N, P> {
+        let (initial_guesses, screened) = self.initial_guesses(&fit, &weights, min_relevance);
+        self.progress.begin(Phase::Candidates, initial_guesses.len());
         let problem = self.problem(&weights.training);
-        let slopes = if starts.is_empty() { Vec::new() } else { problem.slopes(&fit.hypothesis) };
-        let first = self.contend(&weights, &fit.hypothesis, starts, Effort::ROUGH, &slopes);
+        let jacobian =
+            if initial_guesses.is_empty() { Vec::new() } else { problem.jacobian(&fit.hypothesis) };
+        let first = self.fit_candidates(&weights, &fit.hypothesis, initial_guesses, Effort::ROUGH, &jacobian);
         let first = self.taken_on(&weights, &fit.hypothesis, first);
         let field = self.field(&weights, &fit, &first);
-        self.watch.begin(Work::Finalists, 2 * FINALISTS + MAX_REWEIGHTINGS);
+        self.progress.begin(Phase::Finalists, 2 * FINALISTS + MAX_REWEIGHTINGS);
         let final_round = self.final_round(&fit.hypothesis, first, &weights);
         let screened = if final_round.weights.is_none() { screened } else { Vec::new() };
-        let FinalRound { base, contenders, weights: heavier } = final_round;
+        let FinalRound { base, candidates, weights: heavier } = final_round;
         let weights = heavier.unwrap_or(weights);
         let floor = self.floor(&weights);
         let motion = self.motion(&weights);
-        self.duel(Stage { settled: fit, base, contenders, field, screened, weights, floor, motion })
+        self.duel(SearchNode { settled: fit, base, candidates, field, screened, weights, floor, motion })
     }
 
     /// RMS error of a fit on the holdout relative to the motion.
-    pub(crate) fn relative_gap(&self, weights: &Weights<N>, fit: &Fit<P>) -> f64 {
+    pub(crate) fn relative_gap(&self, weights: &SplitWeighting<N>, fit: &Fit<P>) -> f64 {
         let costs = self.judge(&weights.holdout).raw_costs(&fit.hypothesis);
         (without_worst(costs) / self.motion(weights)).sqrt()
     }
 
     /// Deviation of an effect's first parameter from neutral, relative to the largest possible.
-    fn relative_size(&self, effect: &Placed) -> f64 {
+    fn relative_size(&self, effect: &EffectInstance) -> f64 {
         let parameter = &effect.law.spec().parameters[0];
         let centre = self.scales.centre(parameter, effect.joint);
         (effect.p[0] - centre).abs() / self.scales.largest(parameter.quantity, effect.joint)
     }
 
     /// All fitted candidates with the share of the gap each removes.
-    fn field(&self, weights: &Weights<N>, fit: &Fit<P>, fitted: &[Contender<P>]) -> Vec<(Contender<P>, f64)> {
+    fn field(
+        &self,
+        weights: &SplitWeighting<N>,
+        fit: &Fit<P>,
+        fitted: &[Candidate<P>],
+    ) -> Vec<(Candidate<P>, f64)> {
         let base: f64 = self.judge(&weights.holdout).window_costs(&fit.hypothesis).iter().sum();
         let above = (base - self.floor(weights)).max(1e-9 * base);
-        let share = |c: &Contender<P>| (base - c.holdout.iter().sum::<f64>()) / above;
+        let share = |c: &Candidate<P>| (base - c.holdout.iter().sum::<f64>()) / above;
         fitted.iter().filter(|c| c.effect.is_some()).map(|c| (c.clone(), share(c))).collect()
     }
 
-    /// Fits all starts and judges them, best first; `slopes` are the sensitivities of the model they add to, where they are known. What
+    /// Fits all initial guesses and judges them, best first; `jacobian` is that of the model they add to, where it is known. What
     /// diverged or came down to nothing is left out.
-    pub(crate) fn contend(
+    pub(crate) fn fit_candidates(
         &self,
-        weights: &Weights<N>,
+        weights: &SplitWeighting<N>,
         base: &Hypothesis<P>,
-        starts: Vec<Hypothesis<P>>,
+        initial_guesses: Vec<Hypothesis<P>>,
         effort: Effort,
-        slopes: &[Vec<f64>],
-    ) -> Vec<Contender<P>> {
+        jacobian: &[Vec<f64>],
+    ) -> Vec<Candidate<P>> {
         let known = base.effects.len();
-        let fitted = |start: Hypothesis<P>| self.contender(weights, &start, known, effort, slopes);
-        ranked(starts.into_par_iter().map(fitted).collect())
+        let fitted =
+            |initial_guess: Hypothesis<P>| self.candidate(weights, &initial_guess, known, effort, jacobian);
+        ranked(initial_guesses.into_par_iter().map(fitted).collect())
     }
 
-    /// The best contenders fitted with sensitivities of their own where they have used those of the model they add to.
+    /// The best candidates, fitted again with their own Jacobian where they have reused columns of the model they add to.
     fn taken_on(
         &self,
-        weights: &Weights<N>,
+        weights: &SplitWeighting<N>,
         base: &Hypothesis<P>,
-        contenders: Vec<Contender<P>>,
-    ) -> Vec<Contender<P>> {
+        candidates: Vec<Candidate<P>>,
+    ) -> Vec<Candidate<P>> {
         let known = base.effects.len();
-        let on = |(i, c): (usize, Contender<P>)| {
-            let done = c.fit.own || i >= TAKEN_ON;
-            if done { c } else { self.contender(weights, &c.fit.hypothesis, known, Effort::ROUGH, &[]) }
+        let on = |(i, c): (usize, Candidate<P>)| {
+            let done = c.fit.own_jacobian || i >= TAKEN_ON;
+            if done { c } else { self.candidate(weights, &c.fit.hypothesis, known, Effort::ROUGH, &[]) }
         };
-        ranked(contenders.into_par_iter().enumerate().map(on).collect())
+        ranked(candidates.into_par_iter().enumerate().map(on).collect())
     }
 
-    /// A start fitted and judged; what it has beyond the `known` effects is the one under test.
-    pub(crate) fn contender(
+    /// Fits an initial guess and judges it; its effect beyond the `known` ones is the one under test.
+    pub(crate) fn candidate(
         &self,
-        weights: &Weights<N>,
-        start: &Hypothesis<P>,
+        weights: &SplitWeighting<N>,
+        initial_guess: &Hypothesis<P>,
         known: usize,
         effort: Effort,
-        slopes: &[Vec<f64>],
-    ) -> Contender<P> {
-        // Where an effect starts at neutral, the sensitivities of the model without it are nearly its own.
-        let near = start.effects.get(known).is_some_and(|e| e.law.spec().trial != Trial::Whole);
-        let slopes = if near { slopes } else { &[] };
-        let fit = self.problem(&weights.training).solve_beside(start, effort, slopes);
-        let training = fit.costs.iter().map(|cost| weights.training.tempered(*cost)).collect();
+        jacobian: &[Vec<f64>],
+    ) -> Candidate<P> {
+        // Where an effect starts at neutral, the Jacobian of the model without it is nearly its own.
+        let near = initial_guess.effects.get(known).is_some_and(|e| e.law.spec().trial != Trial::Whole);
+        let jacobian = if near { jacobian } else { &[] };
+        let fit = self.problem(&weights.training).solve_reusing(initial_guess, effort, jacobian);
+        let training = fit.costs.iter().map(|cost| weights.training.student_t_cost(*cost)).collect();
         let (holdout, error) = self.judged_on_holdout(weights, &fit);
         let effect = fit.hypothesis.effects.get(known).copied();
         let size = effect.as_ref().map_or(0.0, |e| self.relative_size(e));
-        Contender { effect, size, fit, training, holdout, error }
+        Candidate { effect, size, fit, training, holdout, error }
     }
 
-    /// Tempered costs of the holdout windows, and their cost as they are.
-    pub fn judged_on_holdout(&self, weights: &Weights<N>, fit: &Fit<P>) -> (Vec<f64>, f64) {
+    /// Student-t costs of the holdout windows, and their plain cost but for the worst few.
+    pub fn judged_on_holdout(&self, weights: &SplitWeighting<N>, fit: &Fit<P>) -> (Vec<f64>, f64) {
         let raw = self.judge(&weights.holdout).raw_costs(&fit.hypothesis);
-        (raw.iter().map(|cost| weights.holdout.tempered(*cost)).collect(), without_worst(raw))
+        (raw.iter().map(|cost| weights.holdout.student_t_cost(*cost)).collect(), without_worst(raw))
     }
 
-    /// Re-weights by the best contender's residual and fits the finalists and the current model again.
+    /// Re-weights by the best candidate's residual and fits the finalists and the current model again.
     fn final_round(
         &self,
         current: &Hypothesis<P>,
-        mut contenders: Vec<Contender<P>>,
-        given: &Weights<N>,
+        mut candidates: Vec<Candidate<P>>,
+        given: &SplitWeighting<N>,
     ) -> FinalRound<N, P> {
         let mut hopeless = f64::INFINITY;
-        let mut heavier: Option<Weights<N>> = None;
+        let mut heavier: Option<SplitWeighting<N>> = None;
         for round in 1..=MAX_REWEIGHTINGS {
-            let Some(best) = contenders.first() else { break };
+            let Some(best) = candidates.first() else { break };
             let weights = heavier.as_ref().unwrap_or(given);
             let scale = self.residual_scale(&weights.training, &best.fit.hypothesis);
             let shrunk = (0..N).map(|j| weights.training.scale[j] / scale[j]).fold(0.0, f64::max);
@@ -287,78 +298,79 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             }
             let weights = heavier.as_ref().unwrap_or(given);
             let last = shrunk <= SHRUNK || round == MAX_REWEIGHTINGS;
-            let mut starts = finalists(&contenders, hopeless);
-            starts.extend(contenders.first().and_then(|best| simpler(current, best)));
-            starts.extend(contenders.first().and_then(|best| richer(current, best, &self.scales)));
+            let mut initial_guesses = finalists(&candidates, hopeless);
+            initial_guesses.extend(candidates.first().and_then(|best| simpler(current, best)));
+            initial_guesses.extend(candidates.first().and_then(|best| richer(current, best, &self.scales)));
             let effort = if last { Effort::FULL } else { Effort::ROUGH };
-            let base = || self.contender(weights, current, current.effects.len(), effort, &[]);
-            let (fitted, base) = rayon::join(|| self.contend(weights, current, starts, effort, &[]), base);
-            contenders = fitted;
+            let base = || self.candidate(weights, current, current.effects.len(), effort, &[]);
+            let (fitted, base) =
+                rayon::join(|| self.fit_candidates(weights, current, initial_guesses, effort, &[]), base);
+            candidates = fitted;
             if last {
-                return FinalRound { base, contenders, weights: heavier };
+                return FinalRound { base, candidates, weights: heavier };
             }
             let base = base.score();
-            hopeless = contenders.first().map_or(base, |best| 0.5 * (base + best.score()));
+            hopeless = candidates.first().map_or(base, |best| 0.5 * (base + best.score()));
         }
         let weights = heavier.as_ref().unwrap_or(given);
-        let base = self.contender(weights, current, current.effects.len(), Effort::FULL, &[]);
-        FinalRound { base, contenders, weights: heavier }
+        let base = self.candidate(weights, current, current.effects.len(), Effort::FULL, &[]);
+        FinalRound { base, candidates, weights: heavier }
     }
 
-    /// Cost of predicting that every joint stays where its window starts.
-    pub(crate) fn motion(&self, weights: &Weights<N>) -> f64 {
+    /// Cost of predicting that every joint stays at the initial position of its window.
+    pub(crate) fn motion(&self, weights: &SplitWeighting<N>) -> f64 {
         self.holdout.motion(&weights.holdout.scale)
     }
 
     /// Cost that measurement noise alone leaves on the holdout.
-    pub(crate) fn floor(&self, weights: &Weights<N>) -> f64 {
+    pub(crate) fn floor(&self, weights: &SplitWeighting<N>) -> f64 {
         let per_row: f64 = (0..N).map(|j| (self.noise[j] / weights.holdout.scale[j]).powi(2)).sum();
         per_row * self.holdout.data.rows as f64
     }
 }
 
-/// Contenders, best first, none twice; what diverged or came down to nothing is left out.
-fn ranked<const P: usize>(mut contenders: Vec<Contender<P>>) -> Vec<Contender<P>> {
-    contenders.retain(|c| c.score().is_finite() && !c.is_idle());
-    contenders.sort_by(|a, b| a.score().total_cmp(&b.score()));
-    let mut best: Vec<Contender<P>> = Vec::new();
-    for contender in contenders {
-        if !best.iter().any(|c| c.is_same(&contender)) {
-            best.push(contender);
+/// Candidates, best first, none twice; what diverged or came down to nothing is left out.
+fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>> {
+    candidates.retain(|c| c.score().is_finite() && !c.is_idle());
+    candidates.sort_by(|a, b| a.score().total_cmp(&b.score()));
+    let mut best: Vec<Candidate<P>> = Vec::new();
+    for candidate in candidates {
+        if !best.iter().any(|c| c.is_same(&candidate)) {
+            best.push(candidate);
         }
     }
     best
 }
 
-/// Hypotheses to be fitted to the end: the best by cost, of those that are not hopeless, and the best by closeness to trusted values.
-fn finalists<const P: usize>(contenders: &[Contender<P>], hopeless: f64) -> Vec<Hypothesis<P>> {
-    let mut by_trust: Vec<usize> = (0..contenders.len()).collect();
-    let prior = |i: &usize| contenders[*i].fit.prior_cost;
+/// Hypotheses to be fitted to the end: the best by cost, of those that are not hopeless, and the best by prior cost.
+fn finalists<const P: usize>(candidates: &[Candidate<P>], hopeless: f64) -> Vec<Hypothesis<P>> {
+    let mut by_trust: Vec<usize> = (0..candidates.len()).collect();
+    let prior = |i: &usize| candidates[*i].fit.prior_cost;
     by_trust.sort_by(|a, b| prior(a).total_cmp(&prior(b)));
     by_trust.truncate(FINALISTS / 2);
-    let least = contenders.iter().map(|c| c.fit.prior_cost).fold(f64::INFINITY, f64::min);
-    by_trust.retain(|i| contenders[*i].fit.prior_cost < least + TRUSTED);
-    let kept = contenders.iter().enumerate();
+    let least = candidates.iter().map(|c| c.fit.prior_cost).fold(f64::INFINITY, f64::min);
+    by_trust.retain(|i| candidates[*i].fit.prior_cost < least + TRUSTED);
+    let kept = candidates.iter().enumerate();
     kept.filter(|(i, c)| (*i < FINALISTS && c.score() < hopeless) || *i == 0 || by_trust.contains(i))
         .map(|(_, c)| c.fit.hypothesis.clone())
         .collect()
 }
 
-/// Whether parameters may lie that far from their trusted values, in squared sigmas, by chance.
+/// Whether a prior cost, the squared distance from the arm file's values in sigmas, is plausible by chance.
 pub fn is_plausible<const P: usize>(prior_cost: f64) -> bool {
     prior_cost <= P as f64 + 3.0 * (2.0 * P as f64).sqrt()
 }
 
-/// Sum of all costs but the worst few, which a bad start may have spoilt.
+/// Sum of all costs but the worst few, which a bad initial state may have spoilt.
 fn without_worst(mut costs: Vec<f64>) -> f64 {
     costs.sort_by(f64::total_cmp);
     let kept = costs.len() - (costs.len() as f64 * SPOILT) as usize;
     costs.iter().take(kept).sum()
 }
 
-/// The model with what is left of a contender's effect when its first parameter vanishes, if that is an effect of its own.
-fn simpler<const P: usize>(model: &Hypothesis<P>, contender: &Contender<P>) -> Option<Hypothesis<P>> {
-    let effect = contender.effect?;
+/// The model with what is left of a candidate's effect when its first parameter vanishes, if that is an effect of its own.
+fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> Option<Hypothesis<P>> {
+    let effect = candidate.effect?;
     let law = find::<f64>(effect.law.simpler()?)?;
     let value =
         |name: &str| effect.law.spec().parameters.iter().position(|p| p.name == name).map(|i| effect.p[i]);
@@ -367,17 +379,17 @@ fn simpler<const P: usize>(model: &Hypothesis<P>, contender: &Contender<P>) -> O
         *slot = value(parameter.name)?;
     }
     let taken = model.effects.iter().any(|e| e.law.spec().name == law.spec().name && e.joint == effect.joint);
-    let theta = contender.fit.hypothesis.theta;
-    (!taken).then(|| Hypothesis { theta, ..model.with(Placed { law, joint: effect.joint, p }) })
+    let theta = candidate.fit.hypothesis.theta;
+    (!taken).then(|| Hypothesis { theta, ..model.with(EffectInstance { law, joint: effect.joint, p }) })
 }
 
-/// The model with the law of which a contender's effect is the simplest case, with a little of what the simple one lacks.
+/// The model with the law of which a candidate's effect is the simplest case, with a small value of the parameter that the simple one does not have.
 fn richer<const N: usize, const P: usize>(
     model: &Hypothesis<P>,
-    contender: &Contender<P>,
+    candidate: &Candidate<P>,
     scales: &Scales<N>,
 ) -> Option<Hypothesis<P>> {
-    let effect = contender.effect?;
+    let effect = candidate.effect?;
     let name = effect.law.spec().name;
     let law = *catalogue::<f64>().iter().find(|law| law.simpler() == Some(name))?;
     let known = |wanted: &str| effect.law.spec().parameters.iter().position(|p| p.name == wanted);
@@ -389,6 +401,6 @@ fn richer<const N: usize, const P: usize>(
         };
     }
     let taken = model.effects.iter().any(|e| e.law.spec().name == law.spec().name && e.joint == effect.joint);
-    let theta = contender.fit.hypothesis.theta;
-    (!taken).then(|| Hypothesis { theta, ..model.with(Placed { law, joint: effect.joint, p }) })
+    let theta = candidate.fit.hypothesis.theta;
+    (!taken).then(|| Hypothesis { theta, ..model.with(EffectInstance { law, joint: effect.joint, p }) })
 }

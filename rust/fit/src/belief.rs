@@ -1,18 +1,18 @@
-//! A cause by name, and how sure that is.
+//! Selection probability of a cause.
 
-use crate::attribute::{Contender, Stage};
-use crate::decide::{
+use crate::acceptance::{
     ABOVE_FLOOR, ALIKE_TRUST, Ground, REMAINDER_DOUBT, REMAINDER_POWER, RESAMPLES, UNEXPLAINED, restores,
 };
+use crate::attribute::{Candidate, SearchNode};
 use crate::equivalent;
-use crate::model::Placed;
+use crate::model::EffectInstance;
 use crate::random::Random;
 
 /// A cause that was accepted.
 #[derive(Debug, Clone)]
 pub struct Cause {
     /// The effect with its values in the final model.
-    pub effect: Placed,
+    pub effect: EffectInstance,
     /// Standard deviations of its values.
     pub sigma: Vec<f64>,
     /// Probability that it, or an effect that no motion tells from it, is what the windows show.
@@ -22,58 +22,57 @@ pub struct Cause {
     /// RMS improvement on the holdout when it was added, relative to the motion.
     pub relevance: f64,
     /// Effects that this log does not tell from it.
-    pub look_alikes: Vec<Placed>,
+    pub look_alikes: Vec<EffectInstance>,
 }
 
-impl<const N: usize, const P: usize> Stage<N, P> {
-    /// Whether no log of motion tells the effects of two contenders apart.
+impl<const N: usize, const P: usize> SearchNode<N, P> {
+    /// Whether no log of motion tells the effects of two candidates apart.
     fn are_equivalent(&self, a: usize, b: usize) -> bool {
-        match (self.contenders[a].effect, self.contenders[b].effect) {
+        match (self.candidates[a].effect, self.candidates[b].effect) {
             (Some(a), Some(b)) => equivalent::are(&a, &b, N),
             _ => false,
         }
     }
 }
 
-/// The chosen contender as a cause, with its look-alikes and probability.
+/// The chosen candidate as a cause, with its look-alikes and probability.
 pub fn name<const N: usize, const P: usize>(
-    stage: &Stage<N, P>,
+    node: &SearchNode<N, P>,
     choice: usize,
     ground: Ground,
     seed: u64,
 ) -> Cause {
-    let best = &stage.contenders[choice];
-    let alike = |c: &&Contender<P>| match ground {
-        Ground::Motion => stage.is_alike(best, c),
-        Ground::Trust => restores(stage, c) && c.fit.prior_cost - best.fit.prior_cost < ALIKE_TRUST,
+    let best = &node.candidates[choice];
+    let alike = |c: &&Candidate<P>| match ground {
+        Ground::Motion => node.is_alike(best, c),
+        Ground::Trust => restores(node, c) && c.fit.prior_cost - best.fit.prior_cost < ALIKE_TRUST,
     };
-    let others = stage.contenders.iter().enumerate().filter(|(i, c)| *i != choice && c.effect.is_some());
-    let look_alikes: Vec<Placed> =
+    let others = node.candidates.iter().enumerate().filter(|(i, c)| *i != choice && c.effect.is_some());
+    let look_alikes: Vec<EffectInstance> =
         others.map(|(_, c)| c).filter(alike).filter_map(|c| c.effect).take(3).collect();
     let effect = best.effect.unwrap_or_else(|| unreachable!("only effects are named"));
     Cause {
         effect,
         sigma: Vec::new(),
         probability: match ground {
-            Ground::Motion => probability(stage, choice, seed),
-            Ground::Trust => trust_probability(stage, choice),
+            Ground::Motion => probability(node, choice, seed),
+            Ground::Trust => trust_probability(node, choice),
         },
-        share: stage.share(best).clamp(0.0, 1.0),
-        relevance: stage.relevance(best),
+        share: node.share(best).clamp(0.0, 1.0),
+        relevance: node.relevance(best),
         look_alikes,
     }
 }
 
-/// How often the chosen contender, or one that no motion tells from it, has the lowest cost when the windows are drawn again.
-fn probability<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usize, seed: u64) -> f64 {
-    let advantages: Vec<Vec<f64>> = stage.contenders.iter().map(|c| c.advantages(&stage.base)).collect();
-    let own: Vec<f64> =
-        stage.contenders.iter().map(|c| stage.base.fit.prior_cost - c.fit.prior_cost).collect();
+/// How often the chosen candidate, or one that no motion tells from it, has the lowest cost when the windows are drawn again.
+fn probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize, seed: u64) -> f64 {
+    let advantages: Vec<Vec<f64>> = node.candidates.iter().map(|c| c.advantages(&node.base)).collect();
+    let own: Vec<f64> = node.candidates.iter().map(|c| node.base.fit.prior_cost - c.fit.prior_cost).collect();
     // A law with more values that does no better is no evidence against one with fewer.
-    let size = |i: usize| stage.contenders[i].effect.as_ref().map_or(0, Placed::len);
+    let size = |i: usize| node.candidates[i].effect.as_ref().map_or(0, EffectInstance::len);
     let richer =
-        |i: usize| size(i) > size(choice) && stage.is_alike(&stage.contenders[choice], &stage.contenders[i]);
-    let ours = |i: usize| i == choice || stage.are_equivalent(i, choice) || richer(i);
+        |i: usize| size(i) > size(choice) && node.is_alike(&node.candidates[choice], &node.candidates[i]);
+    let ours = |i: usize| i == choice || node.are_equivalent(i, choice) || richer(i);
     let windows = advantages[choice].len();
     let mut random = Random(seed);
     let mut wins = 0;
@@ -88,8 +87,8 @@ fn probability<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usiz
     (f64::from(wins) + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
-/// How often one contender has a lower cost than another when the windows are drawn again.
-pub fn probability_over<const P: usize>(one: &Contender<P>, other: &Contender<P>, seed: u64) -> f64 {
+/// How often one candidate has a lower cost than another when the windows are drawn again.
+pub fn probability_over<const P: usize>(one: &Candidate<P>, other: &Candidate<P>, seed: u64) -> f64 {
     let advantages = one.advantages(other);
     let own = other.fit.prior_cost - one.fit.prior_cost;
     let mut random = Random(seed);
@@ -100,20 +99,21 @@ pub fn probability_over<const P: usize>(one: &Contender<P>, other: &Contender<P>
     (wins as f64 + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
-/// Probability of the chosen contender, or one that no motion tells from it, among all effects that would restore the trusted values, from their distances.
-fn trust_probability<const N: usize, const P: usize>(stage: &Stage<N, P>, choice: usize) -> f64 {
-    let best = stage.contenders[choice].fit.prior_cost;
-    let free = |c: &Contender<P>| c.effect.as_ref().map_or(0, Placed::len) as f64;
+/// Probability of the chosen candidate, or one that no motion tells from it, among all effects that would restore the prior values, from
+/// their prior costs.
+fn trust_probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize) -> f64 {
+    let best = node.candidates[choice].fit.prior_cost;
+    let free = |c: &Candidate<P>| c.effect.as_ref().map_or(0, EffectInstance::len) as f64;
     // Every value of its own takes one squared sigma of the distance off by chance.
-    let mass = |c: &Contender<P>| (-0.5 * (c.fit.prior_cost + free(c) - best)).exp();
+    let mass = |c: &Candidate<P>| (-0.5 * (c.fit.prior_cost + free(c) - best)).exp();
     let (mut ours, mut all) = (0.0, 0.0);
-    for (i, contender) in stage.contenders.iter().enumerate() {
-        if contender.effect.is_none() {
+    for (i, candidate) in node.candidates.iter().enumerate() {
+        if candidate.effect.is_none() {
             continue;
         }
-        all += mass(contender);
-        if i == choice || stage.are_equivalent(i, choice) {
-            ours += mass(contender);
+        all += mass(candidate);
+        if i == choice || node.are_equivalent(i, choice) {
+            ours += mass(candidate);
         }
     }
     // What is left over by the best effect must itself be plausible, or the values are simply wrong.
@@ -122,19 +122,22 @@ fn trust_probability<const N: usize, const P: usize>(stage: &Stage<N, P>, choice
 }
 
 /// Part of the first gap that the final model leaves without explanation.
-pub fn left_over<const N: usize, const P: usize>(stages: &[Stage<N, P>]) -> f64 {
-    unexplained_of(stages.first(), stages.last())
+pub fn left_over<const N: usize, const P: usize>(nodes: &[SearchNode<N, P>]) -> f64 {
+    unexplained_of(nodes.first(), nodes.last())
 }
 
 /// Part of the gap that a first attribution ends with that a second one leaves without explanation.
-pub fn left_beside<const N: usize, const P: usize>(first: &[Stage<N, P>], second: &[Stage<N, P>]) -> f64 {
+pub fn left_beside<const N: usize, const P: usize>(
+    first: &[SearchNode<N, P>],
+    second: &[SearchNode<N, P>],
+) -> f64 {
     unexplained_of(first.last(), second.last())
 }
 
-/// Part of one stage's gap that is left in a later one, where that is more than noise.
+/// Part of one node's gap that is left in a later one, where that is more than noise.
 fn unexplained_of<const N: usize, const P: usize>(
-    earlier: Option<&Stage<N, P>>,
-    last: Option<&Stage<N, P>>,
+    earlier: Option<&SearchNode<N, P>>,
+    last: Option<&SearchNode<N, P>>,
 ) -> f64 {
     let (Some(earlier), Some(last)) = (earlier, last) else { return 0.0 };
     if last.excess() < if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED } {
@@ -143,8 +146,8 @@ fn unexplained_of<const N: usize, const P: usize>(
     left_of(earlier, last)
 }
 
-/// Part of one stage's gap that is left in a later one.
-fn left_of<const N: usize, const P: usize>(earlier: &Stage<N, P>, last: &Stage<N, P>) -> f64 {
+/// Part of one node's gap that is left in a later one.
+fn left_of<const N: usize, const P: usize>(earlier: &SearchNode<N, P>, last: &SearchNode<N, P>) -> f64 {
     // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them. Where it is of no
     // consequence by itself, both must say so.
     let as_it_is = (last.relative_error() / earlier.relative_error()).powi(2);
@@ -156,14 +159,13 @@ fn left_of<const N: usize, const P: usize>(earlier: &Stage<N, P>, last: &Stage<N
 /// Lowers the probabilities where a gap of consequence remains that no candidate explains: what leaves it may also be what the named
 /// causes stand in for. A further cause is measured by the gap that was left when it was taken up: a small one may be no more than what the
 /// form of the first gets wrong.
-pub fn temper<const N: usize, const P: usize>(stages: &[Stage<N, P>], causes: &mut [Cause]) {
-    let Some(last) = stages.last() else { return };
-    let of_all = belief_beside(left_over(stages), REMAINDER_DOUBT);
+pub fn temper<const N: usize, const P: usize>(nodes: &[SearchNode<N, P>], causes: &mut [Cause]) {
+    let Some(last) = nodes.last() else { return };
+    let of_all = belief_beside(left_over(nodes), REMAINDER_DOUBT);
     for cause in causes {
         let without =
-            |s: &&Stage<N, P>| !s.settled.hypothesis.effects.iter().any(|e| e.same_place(&cause.effect));
-        let further =
-            stages.iter().take_while(without).skip(1).last().filter(|_| last.excess() > ABOVE_FLOOR);
+            |s: &&SearchNode<N, P>| !s.settled.hypothesis.effects.iter().any(|e| e.same_place(&cause.effect));
+        let further = nodes.iter().take_while(without).skip(1).last().filter(|_| last.excess() > ABOVE_FLOOR);
         let of_its_own = further.map_or(1.0, |before| belief_beside(left_of(before, last), REMAINDER_DOUBT));
         cause.probability *= of_all.min(of_its_own);
     }

@@ -5,10 +5,10 @@
 //! log is cut into stretches that are learnt from and judged on by turns. Both kinds of motion are then in both, and what explains
 //! nearly all of the gap there has been judged on stretches that it was not fitted to.
 
-use crate::attribute::Stage;
+use crate::attribute::SearchNode;
 use crate::belief::left_over;
-use crate::course::Attribution;
 use crate::diagnose::LogData;
+use crate::model_search::Attribution;
 use crate::window::cut;
 
 /// Stretches per log, if it is long enough.
@@ -74,9 +74,9 @@ pub fn explains<const N: usize, const P: usize>(
     crosswise: &Attribution<N, P>,
     plain: &Attribution<N, P>,
 ) -> bool {
-    let excess = |a: &Attribution<N, P>| a.stages.last().map_or(f64::INFINITY, Stage::excess);
+    let excess = |a: &Attribution<N, P>| a.nodes.last().map_or(f64::INFINITY, SearchNode::excess);
     let less = !crosswise.is_unexplained() || excess(crosswise) < MUCH_LESS * excess(plain);
-    !crosswise.causes.is_empty() && less && left_over(&crosswise.stages) < LEFT
+    !crosswise.causes.is_empty() && less && left_over(&crosswise.nodes) < LEFT
 }
 
 #[cfg(test)]

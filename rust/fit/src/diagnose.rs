@@ -1,19 +1,19 @@
 //! The diagnosis: where the gap lies, which effect causes it, how far it shrinks.
 
 use crate::arm::{ArmDescription, WithArm};
-use crate::course::Attribution;
+use crate::context::{DiagnosisContext, WindowSet};
 use crate::crosswise::{crosswise, explains};
-use crate::model::Placed;
-use crate::progress::{Observer, Watch, Work, guarded};
-use crate::push::Event;
+use crate::custom_effect;
+use crate::model::EffectInstance;
+use crate::model_search::Attribution;
+use crate::progress::{Observer, Phase, ProgressReporter, guarded};
+use crate::push::Disturbance;
 use crate::report::Diagnosis;
 use crate::scale::Scales;
 use crate::solve::Prior;
-use crate::study::{Sample, Study};
 use crate::track::Track;
-use crate::user;
 use crate::window::Dataset;
-use armgap_core::arm::{Arm, Kind};
+use armgap_core::arm::{Arm, ArmKind};
 use std::time::Instant;
 
 /// One log: sample times, positions and torques, row by row.
@@ -27,11 +27,11 @@ pub struct LogData<'a> {
     pub q: &'a [f64],
     /// Torques, one row per sample, held until the next.
     pub tau: &'a [f64],
-    /// Torque per unit of size of each of the user's own effects, sample by sample; as many as there are `own` effects.
+    /// Torque per unit of size of each custom effect, sample by sample.
     pub tables: Vec<&'a [f64]>,
 }
 
-/// What a diagnosis may be told.
+/// Options of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Prediction horizon, s.
@@ -40,13 +40,13 @@ pub struct Options {
     pub max_causes: usize,
     /// Seed of the resampling that gives probabilities and intervals.
     pub seed: u64,
-    /// Joints, from 0, of the user's own effects; their torques lie in the logs' tables.
-    pub own: Vec<usize>,
+    /// Joints, from 0, of the custom effects; their torques lie in the logs' tables.
+    pub custom_effects: Vec<usize>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { horizon: 0.25, max_causes: 4, seed: 1, own: Vec::new() }
+        Self { horizon: 0.25, max_causes: 4, seed: 1, custom_effects: Vec::new() }
     }
 }
 
@@ -54,7 +54,7 @@ impl Default for Options {
 #[derive(Debug, Clone, PartialEq)]
 pub enum DiagnoseError {
     /// The number of parameters does not fit the kind of arm.
-    Parameters(Kind),
+    Parameters(ArmKind),
     /// Too few samples of `set` for windows of the horizon: found, needed.
     TooShort {
         /// `training` or `holdout`.
@@ -68,9 +68,9 @@ pub enum DiagnoseError {
     BadSamples(String),
     /// The horizon is not a positive number of seconds.
     Horizon(f64),
-    /// Too many effects of the user's own, one without a table of torques in some log, or on a joint that is not there.
-    Own,
-    /// The observer wanted no more.
+    /// Too many custom effects, one without a table of torques in some log, or on a joint that is not there.
+    CustomEffects,
+    /// The observer cancelled the diagnosis.
     Stopped,
 }
 
@@ -88,10 +88,10 @@ impl std::fmt::Display for DiagnoseError {
                 write!(f, "log `{name}` holds values that are not finite, or times that do not increase")
             }
             Self::Horizon(h) => write!(f, "the horizon must be a positive number of seconds, not {h}"),
-            Self::Own => write!(
+            Self::CustomEffects => write!(
                 f,
                 "effects of your own do not fit the logs; give at most {}, each on a joint of the arm, with one torque per sample of every log",
-                user::MOST
+                custom_effect::MOST
             ),
             Self::Stopped => write!(f, "the diagnosis was stopped"),
         }
@@ -103,17 +103,17 @@ impl std::error::Error for DiagnoseError {}
 /// Windows without which nothing can be said.
 const FEWEST_WINDOWS: usize = 4;
 
-/// What is said where logs were cut crosswise.
+/// Note of a diagnosis by interleaved cross-validation.
 const CROSSWISE: &str = "effects fitted to the training logs did not explain the holdout: every log was cut into stretches that were learnt \
      from and judged on by turns";
 
-/// Probability from which a push counts as named.
+/// Probability from which an external disturbance counts as named.
 const NAMED: f64 = 0.5;
 
-/// What the causes of a study are, and the pushes beside them.
-type Conclusion<const N: usize, const P: usize> = (Attribution<N, P>, Vec<Event>);
+/// An attribution and the external disturbances beside it.
+type Conclusion<const N: usize, const P: usize> = (Attribution<N, P>, Vec<Disturbance>);
 
-/// Diagnoses the gap between an arm and its logs; `observer` is told how far it is and may stop it.
+/// Diagnoses the gap between an arm and its logs; `observer` gets the progress and may cancel.
 pub fn diagnose(
     arm: &ArmDescription,
     training: &[LogData<'_>],
@@ -121,6 +121,23 @@ pub fn diagnose(
     options: &Options,
     observer: &Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
+    validate(arm, training, holdout, options)?;
+    let request = Request { arm, training, holdout, options, observer };
+    let ended = guarded(|| arm.dispatch(request)).ok_or(DiagnoseError::Stopped)?;
+    ended.ok_or(DiagnoseError::Parameters(arm.kind))?
+}
+
+/// Checks the options and the numbers of all logs.
+///
+/// # Errors
+///
+/// The first thing that cannot be worked with.
+pub(crate) fn validate(
+    arm: &ArmDescription,
+    training: &[LogData<'_>],
+    holdout: &[LogData<'_>],
+    options: &Options,
+) -> Result<(), DiagnoseError> {
     if !(options.horizon > 0.0 && options.horizon.is_finite()) {
         return Err(DiagnoseError::Horizon(options.horizon));
     }
@@ -132,25 +149,28 @@ pub fn diagnose(
             .chain(log.tau)
             .chain(log.tables.iter().copied().flatten())
             .all(|x| x.is_finite());
-        let fits = log.tables.len() == options.own.len() && log.tables.iter().all(|x| x.len() == log.t.len());
-        if !fits || options.own.len() > user::MOST || options.own.iter().any(|j| *j >= arm.kind.joints()) {
-            return Err(DiagnoseError::Own);
+        let fits = log.tables.len() == options.custom_effects.len()
+            && log.tables.iter().all(|x| x.len() == log.t.len());
+        if !fits
+            || options.custom_effects.len() > custom_effect::MOST
+            || options.custom_effects.iter().any(|j| *j >= arm.kind.joints())
+        {
+            return Err(DiagnoseError::CustomEffects);
         }
         if !finite || log.t.windows(2).any(|w| w[1] <= w[0]) || log.t.len() < 2 {
             return Err(DiagnoseError::BadSamples(log.name.clone()));
         }
     }
-    let request = Request { arm, training, holdout, options, observer };
-    let ended = guarded(|| arm.dispatch(request)).ok_or(DiagnoseError::Stopped)?;
-    ended.ok_or(DiagnoseError::Parameters(arm.kind))?
+    Ok(())
 }
 
-struct Request<'a> {
-    arm: &'a ArmDescription,
-    training: &'a [LogData<'a>],
-    holdout: &'a [LogData<'a>],
-    options: &'a Options,
-    observer: &'a Observer,
+/// What was asked for.
+pub(crate) struct Request<'a> {
+    pub(crate) arm: &'a ArmDescription,
+    pub(crate) training: &'a [LogData<'a>],
+    pub(crate) holdout: &'a [LogData<'a>],
+    pub(crate) options: &'a Options,
+    pub(crate) observer: &'a Observer,
 }
 
 impl WithArm for Request<'_> {
@@ -162,18 +182,18 @@ impl WithArm for Request<'_> {
         theta: [f64; P],
     ) -> Self::Output {
         let started = Instant::now();
-        let mut study = self.study::<A, N, P>(arm.clone(), theta, self.training, self.holdout)?;
+        let mut context = self.context::<A, N, P>(arm.clone(), theta, self.training, self.holdout)?;
         let Options { max_causes, seed, .. } = *self.options;
-        let mut conclusion = study.conclude(study.attribute(max_causes, seed, None), max_causes, seed);
+        let mut conclusion = context.conclude(context.attribute(max_causes, seed, None), max_causes, seed);
         let instead = self.crosswise(arm, theta, &conclusion)?;
         let is_crosswise = instead.is_some();
         if let Some(instead) = instead {
-            (study, conclusion) = instead;
+            (context, conclusion) = instead;
         }
         let attribution = &conclusion.0;
-        let open = study.open_candidates(&attribution.model.hypothesis).len();
-        study.watch.begin(Work::Result, open + attribution.stages[0].field.len());
-        let mut diagnosis = crate::compose::compose(&study, &conclusion, self.arm, self.options);
+        let open = context.open_candidates(&attribution.model.hypothesis).len();
+        context.progress.begin(Phase::Result, open + attribution.nodes[0].field.len());
+        let mut diagnosis = crate::assemble::assemble(&context, &conclusion, self.arm, self.options);
         if is_crosswise {
             diagnosis.notes.insert(0, CROSSWISE.to_owned());
         }
@@ -183,13 +203,13 @@ impl WithArm for Request<'_> {
 }
 
 impl Request<'_> {
-    /// The study of logs cut crosswise and its conclusion, where that explains what the first one left, or took for pushes.
+    /// The diagnosis by interleaved cross-validation, where it explains what the first one left open or took for external disturbances.
     fn crosswise<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         arm: A,
         theta: [f64; P],
         first: &Conclusion<N, P>,
-    ) -> Result<Option<(Study<A, N, P>, Conclusion<N, P>)>, DiagnoseError> {
+    ) -> Result<Option<(DiagnosisContext<A, N, P>, Conclusion<N, P>)>, DiagnoseError> {
         let Options { max_causes, seed, horizon, .. } = *self.options;
         let pushed = first.1.iter().any(|e| e.probability > NAMED);
         if !first.0.is_unexplained() && !pushed {
@@ -198,27 +218,28 @@ impl Request<'_> {
         let Some([training, holdout]) = crosswise(self.training, self.holdout, horizon) else {
             return Ok(None);
         };
-        let mut study = match self.study(arm, theta, &training, &holdout) {
-            Ok(study) => study,
+        let mut context = match self.context(arm, theta, &training, &holdout) {
+            Ok(context) => context,
             // Stretches may hold too few windows where the logs do not.
             Err(DiagnoseError::TooShort { .. }) => return Ok(None),
             Err(error) => return Err(error),
         };
-        let attribution = study.attribute(max_causes, seed, None);
+        let attribution = context.attribute(max_causes, seed, None);
         if !explains(&attribution, &first.0) {
             return Ok(None);
         }
-        let conclusion = study.conclude(attribution, max_causes, seed);
-        Ok((!pushed || conclusion.1.is_empty()).then_some((study, conclusion)))
+        let conclusion = context.conclude(attribution, max_causes, seed);
+        Ok((!pushed || conclusion.1.is_empty()).then_some((context, conclusion)))
     }
 
-    fn study<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    /// Windows of both sets, scales and priors.
+    pub(crate) fn context<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         arm: A,
         theta: [f64; P],
         training: &[LogData<'_>],
         holdout: &[LogData<'_>],
-    ) -> Result<Study<A, N, P>, DiagnoseError> {
+    ) -> Result<DiagnosisContext<A, N, P>, DiagnoseError> {
         let training = self.sample::<N>("training", training)?;
         let holdout = self.sample::<N>("holdout", holdout)?;
         let length = self.arm.link_length.as_ref().and_then(|l| l.last().copied());
@@ -228,27 +249,27 @@ impl Request<'_> {
         let noise = std::array::from_fn(|j| {
             crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
         });
-        let watch = Watch::new(Observer::clone(self.observer));
-        let own = self.own(&scales);
-        Ok(Study { arm, prior, scales, training, holdout, noise, own, watch })
+        let progress = ProgressReporter::new(Observer::clone(self.observer));
+        let custom_effects = self.custom_effects(&scales);
+        Ok(DiagnosisContext { arm, prior, scales, training, holdout, noise, custom_effects, progress })
     }
 
-    /// The user's own effects at their starts.
-    fn own<const N: usize>(&self, scales: &Scales<N>) -> Vec<Placed> {
+    /// The custom effects at their initial guesses.
+    fn custom_effects<const N: usize>(&self, scales: &Scales<N>) -> Vec<EffectInstance> {
         let placed = |(index, joint): (usize, &usize)| {
-            let law = user::law(index);
-            let (parameter, start) = (&law.spec().parameters[0], law.spec().starts[0][0]);
+            let law = custom_effect::law(index);
+            let (parameter, start) = (&law.spec().parameters[0], law.spec().initial_guesses[0][0]);
             let size = start * scales.size(parameter.quantity, *joint);
-            Placed { law, joint: *joint, p: [size, 0.0, 0.0] }
+            EffectInstance { law, joint: *joint, p: [size, 0.0, 0.0] }
         };
-        self.options.own.iter().enumerate().map(placed).collect()
+        self.options.custom_effects.iter().enumerate().map(placed).collect()
     }
 
     fn sample<const N: usize>(
         &self,
         set: &'static str,
         logs: &[LogData<'_>],
-    ) -> Result<Sample<N>, DiagnoseError> {
+    ) -> Result<WindowSet<N>, DiagnoseError> {
         let steps = self.arm.counts_per_rev.as_ref().map(|counts| {
             std::array::from_fn(|j| {
                 if self.arm.kind.rotary() { std::f64::consts::TAU / counts[j] } else { 1.0 / counts[j] }
@@ -263,6 +284,6 @@ impl Request<'_> {
         if data.windows.len() < FEWEST_WINDOWS {
             return Err(DiagnoseError::TooShort { set, windows: data.windows.len(), needed: FEWEST_WINDOWS });
         }
-        Ok(Sample::new(data))
+        Ok(WindowSet::new(data))
     }
 }

@@ -1,25 +1,25 @@
-//! How strongly each joint is disturbed: the random torques that would make a model miss the way it does.
+//! How strongly each joint is disturbed: maximum likelihood intensities of random torques that explain the prediction errors.
 //!
-//! Between prediction and measurement of one window lies the motion that the lacking torque `d` made, seen through the encoders' noise:
+//! Between prediction and measurement of one window lies the motion that the residual torque `d` made, seen through the encoders' noise:
 //!
 //! ```text
 //! M(q) dde/dt2 = d,     y = e + v,     d white of intensity W = diag(w_1 .. w_n),     v white of the encoders' variances.
 //! ```
 //!
-//! The intensities are those of largest likelihood (innovations of the Kalman filter; Schweppe 1965), every window's start left open. So
+//! The intensities are those of largest likelihood (innovations of the Kalman filter; Schweppe 1965), every window's initial state left open. So
 //! the encoders' noise is told from a torque by its spectrum, and what a coupled arm shows on one joint from what acts on the other.
 
+use crate::context::DiagnosisContext;
 use crate::model::Hypothesis;
 use crate::scale::Scales;
-use crate::study::Study;
-use crate::window::{Shift, Window};
+use crate::window::{InitialStateOffset, Window};
 use argmin::core::{CostFunction, Error, Executor, State};
 use argmin::solver::neldermead::NelderMead;
 use armgap_core::arm::Arm;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rayon::prelude::*;
 
-/// A start is left open: this many times the standard deviations it was measured with.
+/// Factor on the standard deviations of a measured initial state, which leaves it open.
 const OPEN: f64 = 100.0;
 
 /// The search begins at a torque of this part of the joint's typical one, held over one sample.
@@ -40,50 +40,50 @@ const MAX_ITERATIONS: u64 = 60;
 type Matrix<const N: usize> = SMatrix<f64, N, N>;
 type Vector<const N: usize> = SVector<f64, N>;
 
-/// One sample of a window: what is missed, time to the next, and what a torque does there.
-struct Miss<const N: usize> {
+/// Prediction error at one sample of a window, time to the next, and the inverse inertia there.
+struct PredictionError<const N: usize> {
     error: Vector<N>,
     step: f64,
     mobility: Matrix<N>,
 }
 
-/// Misses of all windows, ready to be judged under any intensities.
-struct Misses<const N: usize> {
-    windows: Vec<(Filter<N>, Vec<Miss<N>>)>,
+/// Prediction errors of all windows, and the likelihood of intensities under them.
+struct PredictionErrors<const N: usize> {
+    windows: Vec<(KalmanFilter<N>, Vec<PredictionError<N>>)>,
     noise: Matrix<N>,
     /// Common logarithms of the intensities that [`FAINTEST`] stands for.
     faintest: [f64; N],
 }
 
-/// Each joint's share of the kinetic energy that lacking torques feed into the arm over the holdout, under a hypothesis: `w_j (M^-1)_jj`.
+/// Each joint's share of the kinetic energy that residual torques feed into the arm over the holdout, under a hypothesis: `w_j (M^-1)_jj`.
 ///
 /// The measure is that of Gauss's principle of least constraint, in which torques of unlike joints compare; shares add to one.
 pub fn shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    study: &Study<A, N, P>,
+    context: &DiagnosisContext<A, N, P>,
     hypothesis: &Hypothesis<P>,
-    starts: &[Shift<N>],
+    offsets: &[InitialStateOffset<N>],
 ) -> [f64; N] {
-    let data = &study.holdout.data;
-    let predicted = data.predict(&study.arm, hypothesis, starts);
-    let mobility = |q: &Vector<N>| study.arm.inertia(&hypothesis.theta, q).try_inverse();
-    let open = |window: &Window<N>| -> Option<(Filter<N>, Vec<Miss<N>>)> {
+    let data = &context.holdout.data;
+    let predicted = data.predict(&context.arm, hypothesis, offsets);
+    let mobility = |q: &Vector<N>| context.arm.inertia(&hypothesis.theta, q).try_inverse();
+    let open = |window: &Window<N>| -> Option<(KalmanFilter<N>, Vec<PredictionError<N>>)> {
         let track = &data.tracks[window.track];
         let rows = predicted[window.range()].chunks_exact(N).enumerate();
         let miss = |(r, row): (usize, &[f64])| {
             let k = window.first + 1 + r;
-            Some(Miss {
+            Some(PredictionError {
                 error: track.q[k] - Vector::from_row_slice(row),
                 step: track.t[(k + 1).min(track.len() - 1)] - track.t[k],
                 mobility: mobility(&track.q[k])?,
             })
         };
-        Some((Filter::open(window), rows.map(miss).collect::<Option<_>>()?))
+        Some((KalmanFilter::open(window), rows.map(miss).collect::<Option<_>>()?))
     };
     let windows: Vec<_> = data.windows.par_iter().filter_map(open).collect();
-    let unit = |part: f64| intensities(&study.scales, part);
+    let unit = |part: f64| intensities(&context.scales, part);
     let mean = windows.iter().flat_map(|(_, w)| w).map(|m| m.mobility.diagonal()).sum::<Vector<N>>();
-    let noise = Matrix::from_diagonal(&Vector::from(study.noise.map(|s| s * s)));
-    let misses = Misses { windows, noise, faintest: unit(FAINTEST) };
+    let noise = Matrix::from_diagonal(&Vector::from(context.noise.map(|s| s * s)));
+    let misses = PredictionErrors { windows, noise, faintest: unit(FAINTEST) };
     let likeliest = misses.likeliest(unit(FIRST));
     let fed = Vector::<N>::from_fn(|j, _| 10f64.powf(likeliest[j]) * mean[j]);
     let whole = fed.sum();
@@ -95,7 +95,7 @@ fn intensities<const N: usize>(scales: &Scales<N>, part: f64) -> [f64; N] {
     scales.torque.map(|torque| ((part * torque).powi(2) * scales.period).max(1e-300).log10())
 }
 
-impl<const N: usize> Misses<N> {
+impl<const N: usize> PredictionErrors<N> {
     /// Common logarithms of the likeliest intensities.
     fn likeliest(self, first: [f64; N]) -> [f64; N] {
         let corner = |i: usize| {
@@ -119,7 +119,7 @@ impl<const N: usize> Misses<N> {
 
     /// Twice the negative logarithm of the likelihood, but for a constant.
     fn deviance(&self, intensity: &Vector<N>) -> f64 {
-        let of = |(start, misses): &(Filter<N>, Vec<Miss<N>>)| {
+        let of = |(start, misses): &(KalmanFilter<N>, Vec<PredictionError<N>>)| {
             let mut filter = start.clone();
             misses.iter().map(|miss| filter.step(miss, &self.noise, intensity)).sum::<f64>()
         };
@@ -127,7 +127,7 @@ impl<const N: usize> Misses<N> {
     }
 }
 
-impl<const N: usize> CostFunction for Misses<N> {
+impl<const N: usize> CostFunction for PredictionErrors<N> {
     type Param = Vec<f64>;
     type Output = f64;
 
@@ -138,9 +138,9 @@ impl<const N: usize> CostFunction for Misses<N> {
     }
 }
 
-/// Kalman filter of the missed positions and velocities: their estimates and covariance, in blocks.
+/// Kalman filter of the prediction errors of positions and velocities: their estimates and covariance, in blocks.
 #[derive(Clone)]
-struct Filter<const N: usize> {
+struct KalmanFilter<const N: usize> {
     e: Vector<N>,
     de: Vector<N>,
     position: Matrix<N>,
@@ -149,11 +149,11 @@ struct Filter<const N: usize> {
     velocity: Matrix<N>,
 }
 
-impl<const N: usize> Filter<N> {
+impl<const N: usize> KalmanFilter<N> {
     /// At the start of a window, where nothing is known yet.
     fn open(window: &Window<N>) -> Self {
         let variance = |entry: usize| {
-            let of = |j: usize| OPEN * OPEN * window.start.covariance[j][entry];
+            let of = |j: usize| OPEN * OPEN * window.initial_state.covariance[j][entry];
             Matrix::from_diagonal(&Vector::from_fn(|j, _| of(j)))
         };
         Self {
@@ -166,7 +166,7 @@ impl<const N: usize> Filter<N> {
     }
 
     /// Takes in one sample, goes on to the next, and returns what the sample adds to the deviance.
-    fn step(&mut self, miss: &Miss<N>, noise: &Matrix<N>, intensity: &Vector<N>) -> f64 {
+    fn step(&mut self, miss: &PredictionError<N>, noise: &Matrix<N>, intensity: &Vector<N>) -> f64 {
         let Some(innovation) = Cholesky::new(self.position + noise) else { return f64::NAN };
         let v = miss.error - self.e;
         let weighed = innovation.solve(&v);
@@ -211,7 +211,7 @@ mod tests {
     }
 
     /// Windows of a coupled arm that torques of these intensities moved away from what was predicted.
-    fn misses(windows: usize, intensity: [f64; 2], seed: u64) -> Misses<2> {
+    fn misses(windows: usize, intensity: [f64; 2], seed: u64) -> PredictionErrors<2> {
         let mut random = Random(seed);
         let mobility = Matrix::<2>::new(0.4, -0.9, -0.9, 12.0);
         let mut one = || {
@@ -221,10 +221,10 @@ mod tests {
                 let kick = mobility * torque;
                 e += de * STEP + kick * (STEP * STEP / 2.0);
                 de += kick * STEP;
-                Miss { error: e.map(|x| x + NOISE * normal(&mut random)), step: STEP, mobility }
+                PredictionError { error: e.map(|x| x + NOISE * normal(&mut random)), step: STEP, mobility }
             };
             let rows: Vec<_> = (0..100).map(|_| row()).collect();
-            let start = Filter {
+            let start = KalmanFilter {
                 e: Vector::zeros(),
                 de: Vector::zeros(),
                 position: Matrix::identity() * 1e-6,
@@ -234,7 +234,7 @@ mod tests {
             (start, rows)
         };
         let windows = (0..windows).map(|_| one()).collect();
-        Misses { windows, noise: Matrix::identity() * (NOISE * NOISE), faintest: [-14.0; 2] }
+        PredictionErrors { windows, noise: Matrix::identity() * (NOISE * NOISE), faintest: [-14.0; 2] }
     }
 
     fn found(intensity: [f64; 2], seed: u64) -> [f64; 2] {

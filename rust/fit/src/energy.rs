@@ -1,24 +1,24 @@
-//! What the missing torque does with energy.
+//! Energy balance of the residual torque.
 //!
 //! Power is torque times velocity. Friction that a model leaves out only takes energy from the joint; a spring, an inertia or a tilt
-//! takes and gives it back; a motor that delivers more than its command supplies it. So the work of the lacking torque, relative to all
-//! that it exchanges, tells kinds of causes apart before any is named. What noise adds to the lacking torque takes and gives at random:
-//! it makes the balance smaller, not other.
+//! takes and gives it back; a motor that delivers more than its command supplies it. So the work of the residual torque, relative to
+//! all that it exchanges, tells kinds of causes apart before any is named. What noise adds to the residual torque takes and gives at
+//! random: it makes the balance smaller in size and leaves its sign.
 
-use crate::locate::{Lack, Lacks};
+use crate::locate::{ResidualTorque, ResidualTorques};
 use serde::Serialize;
 
 /// A balance beyond this is that of a torque that on the whole takes, or gives.
 const ONE_WAY: f64 = 0.5;
 
-/// The energy that the torque lacking on one joint takes and gives.
+/// Energy that the residual torque of one joint takes and gives.
 #[derive(Debug, Clone, Serialize)]
 pub struct Energy {
     /// 1-based joint.
     pub joint: usize,
-    /// The model that lacks it: `before` (the arm file as it is), `refit` or `after`.
+    /// The model it belongs to: `before` (the arm file as it is), `refit` or `after`.
     pub model: &'static str,
-    /// Mean power of the lacking torque, W; negative: the model lacks a loss.
+    /// Mean power of the residual torque, W; negative: the model leaves out a loss.
     pub power: f64,
     /// Mean of its size, W: what is taken and given.
     pub exchanged: f64,
@@ -31,16 +31,18 @@ pub struct Energy {
 }
 
 /// The balance of every joint under every model.
-pub fn energy<const N: usize>(lacks: &Lacks<N>) -> Vec<Energy> {
-    let models = [("before", &lacks.before), ("refit", &lacks.refit), ("after", &lacks.after)];
-    models.iter().flat_map(|(model, lacks)| of_model(model, lacks)).collect()
+pub fn energy<const N: usize>(residuals: &ResidualTorques<N>) -> Vec<Energy> {
+    let models = [("before", &residuals.before), ("refit", &residuals.refit), ("after", &residuals.after)];
+    models.iter().flat_map(|(model, residuals)| of_model(model, residuals)).collect()
 }
 
-fn of_model<const N: usize>(model: &'static str, lacks: &[Lack<N>]) -> Vec<Energy> {
-    let mean = |of: &dyn Fn(&Lack<N>) -> f64| lacks.iter().map(of).sum::<f64>() / lacks.len().max(1) as f64;
+fn of_model<const N: usize>(model: &'static str, residuals: &[ResidualTorque<N>]) -> Vec<Energy> {
+    let mean = |of: &dyn Fn(&ResidualTorque<N>) -> f64| {
+        residuals.iter().map(of).sum::<f64>() / residuals.len().max(1) as f64
+    };
     let of_joint = |j: usize| {
-        let power = mean(&|x| x.lack[j] * x.dq[j]);
-        let exchanged = mean(&|x| (x.lack[j] * x.dq[j]).abs());
+        let power = mean(&|x| x.residual[j] * x.dq[j]);
+        let exchanged = mean(&|x| (x.residual[j] * x.dq[j]).abs());
         let balance = if exchanged > 0.0 { power / exchanged } else { 0.0 };
         let kind = match balance {
             b if b < -ONE_WAY => "takes",
@@ -65,20 +67,20 @@ mod tests {
     use super::*;
     use nalgebra::Vector1;
 
-    /// One joint that swings under a torque of its position and its velocity.
-    fn swing(lack: fn(f64, f64) -> f64) -> Vec<Lack<1>> {
+    /// One joint that oscillates under a torque of its position and its velocity.
+    fn oscillation(residual: fn(f64, f64) -> f64) -> Vec<ResidualTorque<1>> {
         (0..1000)
             .map(|i| {
                 let t = 0.01 * f64::from(i);
                 let (q, dq) = (t.sin(), t.cos());
-                Lack {
+                ResidualTorque {
                     track: 0,
                     t,
                     q: Vector1::new(q),
                     dq: Vector1::new(dq),
                     tau: Vector1::new(2.0),
                     reversal: [false],
-                    lack: Vector1::new(lack(q, dq)),
+                    residual: Vector1::new(residual(q, dq)),
                 }
             })
             .collect()
@@ -86,8 +88,10 @@ mod tests {
 
     #[test]
     fn friction_takes_a_motor_gives_and_a_spring_does_both() {
-        let of =
-            |lack| energy(&Lacks { before: swing(lack), refit: Vec::new(), after: Vec::new() }).remove(0);
+        let of = |residual| {
+            energy(&ResidualTorques { before: oscillation(residual), refit: Vec::new(), after: Vec::new() })
+                .remove(0)
+        };
         let friction = of(|_, dq| -0.3 * dq.signum());
         assert!((friction.balance + 1.0).abs() < 1e-12 && friction.kind == "takes" && friction.power < 0.0);
         assert!((friction.exchanged / friction.commanded - 0.15).abs() < 1e-12);

@@ -1,6 +1,6 @@
 //! Pairs of effects that no log of motion alone tells apart.
 
-use crate::model::Placed;
+use crate::model::EffectInstance;
 
 /// An effect that could stand in for another, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,7 +14,7 @@ pub struct Equivalent {
 }
 
 /// Effects that are the same as this one on an arm with `joints` joints, whatever the motion.
-pub fn known(effect: &Placed, joints: usize) -> Vec<Equivalent> {
+pub fn known(effect: &EffectInstance, joints: usize) -> Vec<Equivalent> {
     let joint = effect.joint_number();
     let one = |effect, joint, why: &str| vec![Equivalent { effect, joint, why: why.to_owned() }];
     match effect.law.spec().name {
@@ -55,8 +55,8 @@ pub fn known(effect: &Placed, joints: usize) -> Vec<Equivalent> {
 }
 
 /// Whether two effects are the same, or the same whatever the motion, on an arm with `joints` joints.
-pub fn are(a: &Placed, b: &Placed, joints: usize) -> bool {
-    let among = |a: &Placed, b: &Placed| {
+pub fn are(a: &EffectInstance, b: &EffectInstance, joints: usize) -> bool {
+    let among = |a: &EffectInstance, b: &EffectInstance| {
         let (name, joint) = (b.law.spec().name, b.joint_number());
         known(a, joints).iter().any(|e| e.effect == name && e.joint == joint)
     };
@@ -64,7 +64,7 @@ pub fn are(a: &Placed, b: &Placed, joints: usize) -> bool {
 }
 
 /// The known equivalents and the look-alikes found in the data, none twice.
-pub fn all(effect: &Placed, look_alikes: &[Placed], joints: usize) -> Vec<Equivalent> {
+pub fn all(effect: &EffectInstance, look_alikes: &[EffectInstance], joints: usize) -> Vec<Equivalent> {
     let mut list = known(effect, joints);
     for other in look_alikes {
         let (name, joint) = (other.law.spec().name, other.joint_number());
@@ -81,8 +81,8 @@ mod tests {
     use super::*;
     use armgap_core::effect::find;
 
-    fn placed(name: &str, joint: usize) -> Placed {
-        Placed { law: find::<f64>(name).expect("in the catalogue"), joint, p: [0.0; 3] }
+    fn placed(name: &str, joint: usize) -> EffectInstance {
+        EffectInstance { law: find::<f64>(name).expect("in the catalogue"), joint, p: [0.0; 3] }
     }
 
     #[test]

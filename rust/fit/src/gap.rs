@@ -1,13 +1,13 @@
-//! How far predictions miss on the holdout: windows from measured starts, and whole logs from their first sample.
+//! How far predictions miss on the holdout: windows from measured initial states, and whole logs from their first sample.
 
 use crate::arm::ArmDescription;
-use crate::compose::Compared;
+use crate::assemble::Compared;
+use crate::context::DiagnosisContext;
 use crate::diagnose::Options;
 use crate::model::Hypothesis;
 use crate::random::Random;
 use crate::report::{AtHorizon, FreeRun, FreeRunSeries, Gap, Series};
-use crate::study::Study;
-use crate::window::{Dataset, Shift, Window};
+use crate::window::{Dataset, InitialStateOffset, Window};
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
 
@@ -26,36 +26,42 @@ const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
 /// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
 const FREE_RUN_LIMIT: f64 = 100.0;
 
-/// A window's variance from its measured start counts up to this many times the typical one.
+/// A window's variance from its measured initial state counts up to this many times the typical one.
 const WORST_START: f64 = 10.0;
 
-/// Predictions on the holdout from measured starts, and their squared errors.
+/// Predictions on the holdout from measured initial states, and their squared errors.
 pub struct Errors<const N: usize> {
     before: Vec<f64>,
     refit: Vec<f64>,
     after: Vec<f64>,
-    /// Mean variance that measured starts and the measurement itself put into the errors, per joint.
+    /// Mean variance that measured initial states and the measurement itself put into the errors, per joint.
     floor: [f64; N],
 }
 
 impl<const N: usize> Errors<N> {
     /// Predictions of the three hypotheses.
-    pub fn new<A: Arm<f64, N, P>, const P: usize>(study: &Study<A, N, P>, compared: &Compared<P>) -> Self {
-        let data = &study.holdout.data;
-        let starts = data.measured_starts();
+    pub fn new<A: Arm<f64, N, P>, const P: usize>(
+        context: &DiagnosisContext<A, N, P>,
+        compared: &Compared<P>,
+    ) -> Self {
+        let data = &context.holdout.data;
+        let offsets = data.zero_offsets();
         let bare = data.without_pushes();
-        let after = data.predict(&study.arm, &compared.after, &starts);
+        let after = data.predict(&context.arm, &compared.after, &offsets);
         Self {
-            before: bare.predict(&study.arm, &compared.before, &starts),
-            refit: bare.predict(&study.arm, &compared.refit, &starts),
-            floor: floor(study, data, &compared.after, &after),
+            before: bare.predict(&context.arm, &compared.before, &offsets),
+            refit: bare.predict(&context.arm, &compared.refit, &offsets),
+            floor: floor(context, data, &compared.after, &after),
             after,
         }
     }
 
     /// Measured and predicted positions for drawing.
-    pub fn series<A: Arm<f64, N, P>, const P: usize>(&self, study: &Study<A, N, P>) -> Vec<Series> {
-        let data = &study.holdout.data;
+    pub fn series<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        context: &DiagnosisContext<A, N, P>,
+    ) -> Vec<Series> {
+        let data = &context.holdout.data;
         let mut all = Vec::new();
         for (index, track) in data.tracks.iter().enumerate().take(DRAWN_LOGS) {
             let stride = track.len().div_ceil(DRAWN);
@@ -75,7 +81,7 @@ impl<const N: usize> Errors<N> {
                     for i in (0..window.rows()).step_by(stride) {
                         let at = (window.offset + i) * N + j;
                         s.t.push(track.t[window.first + 1 + i]);
-                        s.measured.push(study.holdout.measured[at]);
+                        s.measured.push(context.holdout.measured[at]);
                         s.before.push(self.before[at]);
                         s.refit.push(self.refit[at]);
                         s.after.push(self.after[at]);
@@ -88,21 +94,22 @@ impl<const N: usize> Errors<N> {
     }
 }
 
-/// Variance of a perfect model's errors: noise of the sample itself, and of the measured start carried along the window, around what the
+/// Variance of a perfect model's errors: noise of the sample itself, and of the measured initial state carried along the window, around what the
 /// model predicts.
 fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    study: &Study<A, N, P>,
+    context: &DiagnosisContext<A, N, P>,
     data: &Dataset<N>,
     model: &Hypothesis<P>,
     predicted: &[f64],
 ) -> [f64; N] {
-    let starts = data.measured_starts();
-    let columns = crate::metric::start_sensitivities(data, &study.arm, model, &starts, predicted);
+    let offsets = data.zero_offsets();
+    let columns =
+        crate::weighting::initial_state_sensitivities(data, &context.arm, model, &offsets, predicted);
     let carried = |window: &Window<N>| -> [f64; N] {
         let mut sum = [0.0; N];
         for row in window.range().step_by(N) {
             for (j, total) in sum.iter_mut().enumerate() {
-                for (k, [vq, cov, vdq]) in window.start.covariance.iter().enumerate() {
+                for (k, [vq, cov, vdq]) in window.initial_state.covariance.iter().enumerate() {
                     let (a, b) = (columns[k][row + j], columns[N + k][row + j]);
                     *total += a * a * vq + 2.0 * a * b * cov + b * b * vdq;
                 }
@@ -112,11 +119,11 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     };
     let windows: Vec<[f64; N]> = data.windows.iter().map(carried).collect();
     std::array::from_fn(|j| {
-        // A window whose start decides whether a joint sticks has no meaningful derivative; it counts as a bad one, not as infinite.
+        // A window whose initial state decides whether a joint sticks has no meaningful derivative; it counts as a bad one, not as infinite.
         let typical = crate::track::median(windows.iter().map(|w| w[j]).collect());
         let mean =
             windows.iter().map(|w| w[j].min(WORST_START * typical)).sum::<f64>() / windows.len() as f64;
-        study.noise[j].powi(2) + mean
+        context.noise[j].powi(2) + mean
     })
 }
 
@@ -131,14 +138,14 @@ pub fn rms<const N: usize>(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
 
 /// The gap before, re-estimated, and with the causes.
 pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    study: &Study<A, N, P>,
+    context: &DiagnosisContext<A, N, P>,
     compared: &Compared<P>,
     errors: &Errors<N>,
     free: &FreeRuns<N>,
     description: &ArmDescription,
     options: &Options,
 ) -> Gap {
-    let measured = &study.holdout.measured;
+    let measured = &context.holdout.measured;
     let floor: Vec<f64> = errors.floor.iter().map(|v| v.sqrt()).collect();
     let before = rms::<N>(measured, &errors.before);
     let after = rms::<N>(measured, &errors.after);
@@ -146,9 +153,9 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         horizon_s: options.horizon,
         unit: if description.kind.rotary() { "rad" } else { "m" },
         closed: closed(&before, &after, &floor),
-        closed_ci: closed_interval(study, errors, &floor, options.seed),
+        closed_ci: closed_interval(context, errors, &floor, options.seed),
         refit: rms::<N>(measured, &errors.refit),
-        horizons: HORIZONS.par_iter().filter_map(|h| at_horizon(study, compared, *h)).collect(),
+        horizons: HORIZONS.par_iter().filter_map(|h| at_horizon(context, compared, *h)).collect(),
         free_run: FreeRun {
             before: rms::<N>(&free.measured, &free.before),
             after: rms::<N>(&free.measured, &free.after),
@@ -161,23 +168,23 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 
 /// The gap at another prediction horizon; none where the logs are shorter than two of it.
 fn at_horizon<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    study: &Study<A, N, P>,
+    context: &DiagnosisContext<A, N, P>,
     compared: &Compared<P>,
     horizon: f64,
 ) -> Option<AtHorizon> {
-    let data = Dataset::new(study.holdout.data.tracks.clone(), horizon);
+    let data = Dataset::new(context.holdout.data.tracks.clone(), horizon);
     if data.windows.len() < 2 * data.tracks.len() {
         return None;
     }
     let bare = data.without_pushes();
-    let (measured, starts) = (data.measured(), data.measured_starts());
+    let (measured, offsets) = (data.measured(), data.zero_offsets());
     let missed = |predicted: &[f64]| rms::<N>(&measured, &limited(&measured, predicted));
-    let after = data.predict(&study.arm, &compared.after, &starts);
+    let after = data.predict(&context.arm, &compared.after, &offsets);
     Some(AtHorizon {
         horizon_s: horizon,
-        before: missed(&bare.predict(&study.arm, &compared.before, &starts)),
-        refit: missed(&bare.predict(&study.arm, &compared.refit, &starts)),
-        floor: floor(study, &data, &compared.after, &after).map(f64::sqrt).to_vec(),
+        before: missed(&bare.predict(&context.arm, &compared.before, &offsets)),
+        refit: missed(&bare.predict(&context.arm, &compared.refit, &offsets)),
+        floor: floor(context, &data, &compared.after, &after).map(f64::sqrt).to_vec(),
         after: missed(&after),
     })
 }
@@ -196,14 +203,14 @@ fn before_scale(before: &[f64]) -> f64 {
 
 /// 95 % interval of the closed share from resampled holdout windows.
 fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    study: &Study<A, N, P>,
+    context: &DiagnosisContext<A, N, P>,
     errors: &Errors<N>,
     floor: &[f64],
     seed: u64,
 ) -> [f64; 2] {
-    let data = &study.holdout.data;
+    let data = &context.holdout.data;
     let squares = |predicted: &[f64], w: &Window<N>, j: usize| -> f64 {
-        let pairs = study.holdout.measured[w.range()].iter().zip(&predicted[w.range()]);
+        let pairs = context.holdout.measured[w.range()].iter().zip(&predicted[w.range()]);
         pairs.skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
     };
     let table = |predicted: &[f64]| -> Vec<[f64; N]> {
@@ -233,7 +240,13 @@ fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
     let (mut windows, mut rows) = (Vec::new(), 0);
     for (index, track) in data.tracks.iter().enumerate() {
         let last = track.len() - 1;
-        windows.push(Window { track: index, first: 0, last, offset: rows, start: track.start(0) });
+        windows.push(Window {
+            track: index,
+            first: 0,
+            last,
+            offset: rows,
+            initial_state: track.initial_state(0),
+        });
         rows += last;
     }
     Dataset { tracks: data.tracks.clone(), windows, rows }
@@ -255,11 +268,14 @@ pub struct FreeRuns<const N: usize> {
 
 impl<const N: usize> FreeRuns<N> {
     /// Runs of the arm file as it is, and of the model with the causes.
-    pub fn new<A: Arm<f64, N, P>, const P: usize>(study: &Study<A, N, P>, compared: &Compared<P>) -> Self {
-        let data = whole(&study.holdout.data);
+    pub fn new<A: Arm<f64, N, P>, const P: usize>(
+        context: &DiagnosisContext<A, N, P>,
+        compared: &Compared<P>,
+    ) -> Self {
+        let data = whole(&context.holdout.data);
         let (bare, measured) = (data.without_pushes(), data.measured());
-        let starts = vec![Shift::none(); data.windows.len()];
-        let run = |data: &Dataset<N>, h| limited(&measured, &data.predict(&study.arm, h, &starts));
+        let offsets = vec![InitialStateOffset::none(); data.windows.len()];
+        let run = |data: &Dataset<N>, h| limited(&measured, &data.predict(&context.arm, h, &offsets));
         let (before, after) = rayon::join(|| run(&bare, &compared.before), || run(&data, &compared.after));
         Self { data, measured, before, after }
     }

@@ -33,9 +33,9 @@ pub struct Identification<'a> {
     pub dq: Option<&'a [f64]>,
 }
 
-/// The course of an estimate; one row per sample.
+/// History of an estimate; one row per sample.
 #[derive(Debug, Clone, Default)]
-pub struct Course {
+pub struct EstimateHistory {
     /// Estimates.
     pub theta: Vec<f64>,
     /// Prediction errors, the first column only for scalar schemes; NaN where there is none.
@@ -53,14 +53,14 @@ pub struct Course {
 }
 
 impl WithArm for Identification<'_> {
-    type Output = Option<Course>;
+    type Output = Option<EstimateHistory>;
 
-    /// The course, or none if `theta0` has the wrong length.
+    /// The history, or none if `theta0` has the wrong length.
     fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
         self,
         arm: A,
         _: [f64; P],
-    ) -> Option<Course> {
+    ) -> Option<EstimateHistory> {
         match self.theta0.len() {
             n if n == P => Some(self.run::<A, N, P, P>(arm)),
             n if n == R => Some(self.run::<A, N, P, R>(arm)),
@@ -70,7 +70,10 @@ impl WithArm for Identification<'_> {
 }
 
 impl Identification<'_> {
-    fn run<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(&self, arm: A) -> Course {
+    fn run<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
+        &self,
+        arm: A,
+    ) -> EstimateHistory {
         let settings = Settings {
             scheme: self.scheme,
             variant: self.variant,
@@ -82,7 +85,7 @@ impl Identification<'_> {
         let mut estimator = Estimator::<f64, A, N, P, R>::new(arm, settings);
         let row = |x: &[f64], k: usize| SVector::<f64, N>::from_fn(|j, _| x[k * N + j]);
         let outputs = if self.scheme == Scheme::FilteredDynamic { N } else { 1 };
-        let mut course = Course { parameters: R, outputs, ..Course::default() };
+        let mut history = EstimateHistory { parameters: R, outputs, ..EstimateHistory::default() };
         for k in 0..self.t.len() {
             let dq = self.dq.map(|dq| row(dq, k));
             let sample = Sample { t: self.t[k], q: row(self.q, k), dq, tau: row(self.tau, k) };
@@ -90,13 +93,13 @@ impl Identification<'_> {
                 Outcome::Updated(error) => error,
                 Outcome::Starting | Outcome::Rejected => SVector::repeat(f64::NAN),
             };
-            course.errors.extend(error.iter().take(outputs));
-            course.theta.extend(estimator.rls().theta().iter());
+            history.errors.extend(error.iter().take(outputs));
+            history.theta.extend(estimator.rls().theta().iter());
         }
-        course.covariance = estimator.rls().covariance().iter().copied().collect();
-        course.updates = estimator.rls().updates();
-        course.rejected = estimator.rejected();
-        course
+        history.covariance = estimator.rls().covariance().iter().copied().collect();
+        history.updates = estimator.rls().updates();
+        history.rejected = estimator.rejected();
+        history
     }
 }
 

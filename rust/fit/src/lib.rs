@@ -1,52 +1,54 @@
 //! armgap-fit: from logs and a nominal arm to a diagnosis.
 //!
-//! The way of the data: `track` (log) -> `window` (short rollouts) -> `metric` (what a residual weighs) -> `solve` (output error)
+//! The way of the data: `track` (log) -> `window` (short rollouts) -> `weighting` (weights of residuals) -> `solve` (output error)
 //! -> `attribute` (which effect) and `locate` (where) -> `report` (the result as data).
 
 #![forbid(unsafe_code)]
 
-mod agreement;
+pub mod acceptance;
 pub mod arm;
+pub mod assemble;
 pub mod attribute;
 pub mod belief;
-pub mod compose;
-pub mod course;
+mod contact_guess;
+pub mod context;
+pub mod covariance;
 mod crosswise;
-pub mod decide;
+pub mod custom_effect;
 pub mod diagnose;
+mod dispersion;
 mod disturbance;
 mod duel;
 pub mod energy;
 pub mod equivalent;
+mod friction_regularisation;
 mod gap;
 pub mod identify;
-mod lacking;
+mod initial_guess;
+mod jacobian;
+mod latent_states;
 pub mod locate;
-pub mod metric;
 mod minimum;
 pub mod model;
-mod observe;
+pub mod model_search;
 pub mod output_error;
+mod periodogram;
 mod products;
 pub mod progress;
 pub mod push;
 mod random;
 mod reconsider;
+pub mod refit;
+pub mod regression_rows;
 pub mod report;
-mod rounding;
+mod residual_torque;
 mod ruled_out;
 pub mod scale;
-mod scan;
 pub mod screen;
 pub mod simulate;
-mod slopes;
 pub mod smooth;
 pub mod solve;
-pub mod spread;
-mod starts;
-mod stops;
-pub mod study;
 mod together;
 pub mod track;
-pub mod user;
+pub mod weighting;
 pub mod window;

@@ -1,18 +1,18 @@
-//! Where the gap lies: the torque that each joint lacks, over the regimes of its motion.
+//! Where the gap lies: residual torque of each joint over the regimes of its motion.
 //!
 //! The prediction of a window and the measurement run under the same torque, so their difference is smooth; its second derivative
-//! is the acceleration the model lacks, and `M(q)` times that the torque it lacks.
+//! is the residual acceleration, and `M(q)` times that the residual torque.
 
 use crate::model::Hypothesis;
 use crate::smooth::local_cubic;
 use crate::track::Track;
-use crate::window::{Dataset, Shift};
+use crate::window::{Dataset, InitialStateOffset};
 use armgap_core::arm::Arm;
 use nalgebra::SVector;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Half width, in samples, of the cubic whose curvature is the missing acceleration.
+/// Half width, in samples, of the cubic whose curvature is the residual acceleration.
 const HALF_WIDTH: usize = 8;
 
 /// A joint is near a reversal if its velocity changes sign within this time, s.
@@ -24,9 +24,9 @@ const BINS: usize = 6;
 /// A regime stands out if its mean square residual is this many times the joint's.
 const STANDS_OUT: f64 = 1.6;
 
-/// One sample's state and lacking torque, per joint.
+/// One sample's state and residual torque, per joint.
 #[derive(Debug, Clone, Copy)]
-pub struct Lack<const N: usize> {
+pub struct ResidualTorque<const N: usize> {
     /// Index of the log.
     pub track: usize,
     /// Time within the log, s.
@@ -39,26 +39,26 @@ pub struct Lack<const N: usize> {
     pub tau: SVector<f64, N>,
     /// Whether each joint is near a reversal.
     pub reversal: [bool; N],
-    /// Lacking torques.
-    pub lack: SVector<f64, N>,
+    /// Residual torques.
+    pub residual: SVector<f64, N>,
 }
 
-/// Lacking torque at every other sample of all windows under each of several hypotheses.
-pub fn lacking_torques<A: Arm<f64, N, P>, const N: usize, const P: usize, const H: usize>(
+/// Residual torque at every other sample of all windows under each of several hypotheses.
+pub fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize, const H: usize>(
     arm: &A,
     data: &Dataset<N>,
-    starts: &[Shift<N>],
+    offsets: &[InitialStateOffset<N>],
     hypotheses: [&Hypothesis<P>; H],
-) -> [Vec<Lack<N>>; H] {
-    let predicted = hypotheses.map(|h| data.predict(arm, h, starts));
-    let windows: Vec<Vec<[Lack<N>; H]>> = data
+) -> [Vec<ResidualTorque<N>>; H] {
+    let predicted = hypotheses.map(|h| data.predict(arm, h, offsets));
+    let windows: Vec<Vec<[ResidualTorque<N>; H]>> = data
         .windows
         .par_iter()
         .map(|window| {
             let track = &data.tracks[window.track];
             let times = &track.t[window.first + 1..=window.last];
             let rows = if times.len() < 2 * HALF_WIDTH + 1 { 0..0 } else { 0..times.len() };
-            let lack = |i: usize, h: usize| {
+            let residual = |i: usize, h: usize| {
                 let k = window.first + 1 + i;
                 let rows = &predicted[h][window.range()];
                 let curvature = SVector::<f64, N>::from_fn(|j, _| {
@@ -68,25 +68,25 @@ pub fn lacking_torques<A: Arm<f64, N, P>, const N: usize, const P: usize, const 
                 arm.inertia(&hypotheses[h].theta, &track.q[k]) * curvature
             };
             let under_all = |i: usize| {
-                let moving = moving(track, window.track, window.first + 1 + i);
-                std::array::from_fn(|h| Lack { lack: lack(i, h), ..moving })
+                let measured_state = measured_state(track, window.track, window.first + 1 + i);
+                std::array::from_fn(|h| ResidualTorque { residual: residual(i, h), ..measured_state })
             };
             rows.step_by(2).map(under_all).collect()
         })
         .collect();
-    std::array::from_fn(|h| windows.iter().flatten().map(|lacks| lacks[h]).collect())
+    std::array::from_fn(|h| windows.iter().flatten().map(|residuals| residuals[h]).collect())
 }
 
-/// The motion at sample `k` of a log, nothing lacking.
-fn moving<const N: usize>(track: &Track<N>, index: usize, k: usize) -> Lack<N> {
-    Lack {
+/// Measured state at sample `k` of a log, with zero residual torque.
+fn measured_state<const N: usize>(track: &Track<N>, index: usize, k: usize) -> ResidualTorque<N> {
+    ResidualTorque {
         track: index,
         t: track.t[k] - track.t[0],
         q: track.q[k],
         dq: SVector::from_fn(|j, _| velocity(&track.t, |s| track.q[s][j], k)),
         tau: SVector::from_fn(|j, _| track.held[k][j].start),
         reversal: std::array::from_fn(|j| reverses(&track.t, |s| track.q[s][j], k)),
-        lack: SVector::zeros(),
+        residual: SVector::zeros(),
     }
 }
 
@@ -101,7 +101,7 @@ fn reverses(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> bool {
     (q(b) - q(k)) * (q(k) - q(a)) < 0.0
 }
 
-/// RMS lacking torque of one joint over bins of one variable.
+/// RMS residual torque of one joint over bins of one variable.
 #[derive(Debug, Clone, Serialize)]
 pub struct Regime {
     /// 1-based joint.
@@ -114,7 +114,7 @@ pub struct Regime {
     pub edges: Vec<f64>,
     /// Unit of the RMS figures.
     pub torque_unit: &'static str,
-    /// RMS lacking torque with the arm file as it is.
+    /// RMS residual torque with the arm file as it is.
     pub before: Vec<f64>,
     /// With parameters re-estimated.
     pub refit: Vec<f64>,
@@ -126,7 +126,7 @@ pub struct Regime {
 
 /// Where most of a joint's gap lies.
 #[derive(Debug, Clone, Serialize)]
-pub struct Place {
+pub struct Location {
     /// 1-based joint.
     pub joint: usize,
     /// Share of the whole gap that this joint bears.
@@ -137,12 +137,12 @@ pub struct Place {
     pub detail: String,
     /// The regime as a range of a variable; none where the gap is spread evenly.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub range: Option<Range>,
+    pub range: Option<VariableRange>,
 }
 
 /// A range of a variable.
 #[derive(Debug, Clone, Serialize)]
-pub struct Range {
+pub struct VariableRange {
     /// The variable.
     pub variable: String,
     /// Lower end.
@@ -152,19 +152,19 @@ pub struct Range {
 }
 
 /// A variable that regimes are cut along.
-struct Axis<const N: usize> {
+struct RegimeVariable<const N: usize> {
     name: String,
     unit: &'static str,
     low: &'static str,
     middle: &'static str,
     high: &'static str,
-    value: fn(&Lack<N>, usize) -> f64,
+    value: fn(&ResidualTorque<N>, usize) -> f64,
 }
 
-fn axes<const N: usize>(joint: usize, rotary: bool) -> Vec<Axis<N>> {
+fn variables<const N: usize>(joint: usize, rotary: bool) -> Vec<RegimeVariable<N>> {
     let j = joint + 1;
     let pick = |rotary_unit, linear_unit| if rotary { rotary_unit } else { linear_unit };
-    let axis = |name, unit, names: [&'static str; 3], value| Axis {
+    let variable = |name, unit, names: [&'static str; 3], value| RegimeVariable {
         name,
         unit,
         low: names[0],
@@ -173,28 +173,28 @@ fn axes<const N: usize>(joint: usize, rotary: bool) -> Vec<Axis<N>> {
         value,
     };
     vec![
-        axis(
+        variable(
             format!("abs(dq{j})"),
             pick("rad/s", "m/s"),
             ["low speed", "medium speed", "high speed"],
             |x, j| x.dq[j].abs(),
         ),
-        axis(format!("reversal{j}"), "1", ["away from reversals", "", "reversals"], |x, j| {
+        variable(format!("reversal{j}"), "1", ["away from reversals", "", "reversals"], |x, j| {
             f64::from(u8::from(x.reversal[j]))
         }),
-        axis(
+        variable(
             format!("q{j}"),
             pick("rad", "m"),
             ["one end of the travel", "part of the travel", "one end of the travel"],
             |x, j| x.q[j],
         ),
-        axis(
+        variable(
             format!("abs(tau{j})"),
             pick("N m", "N"),
             ["low torque", "medium torque", "high torque"],
             |x, j| x.tau[j].abs(),
         ),
-        axis("t".to_owned(), "s", ["start of the log", "part of the log", "end of the log"], |x, _| x.t),
+        variable("t".to_owned(), "s", ["start of the log", "part of the log", "end of the log"], |x, _| x.t),
     ]
 }
 
@@ -215,37 +215,37 @@ fn bin(edges: &[f64], value: f64) -> usize {
     edges[1..edges.len() - 1].partition_point(|edge| *edge <= value)
 }
 
-/// The three hypotheses' lacking torques, sample by sample.
-pub struct Lacks<const N: usize> {
+/// Residual torques of the three hypotheses, sample by sample.
+pub struct ResidualTorques<const N: usize> {
     /// Arm file as it is.
-    pub before: Vec<Lack<N>>,
+    pub before: Vec<ResidualTorque<N>>,
     /// Parameters re-estimated.
-    pub refit: Vec<Lack<N>>,
+    pub refit: Vec<ResidualTorque<N>>,
     /// With the causes.
-    pub after: Vec<Lack<N>>,
+    pub after: Vec<ResidualTorque<N>>,
 }
 
 /// The gap over every joint and regime.
-pub fn regimes<const N: usize>(lacks: &Lacks<N>, rotary: bool) -> Vec<Regime> {
+pub fn regimes<const N: usize>(residuals: &ResidualTorques<N>, rotary: bool) -> Vec<Regime> {
     let mut all = Vec::new();
-    if lacks.refit.is_empty() {
+    if residuals.refit.is_empty() {
         return all;
     }
     for joint in 0..N {
-        for axis in axes::<N>(joint, rotary) {
-            let edges = edges(lacks.refit.iter().map(|x| (axis.value)(x, joint)).collect());
+        for variable in variables::<N>(joint, rotary) {
+            let edges = edges(residuals.refit.iter().map(|x| (variable.value)(x, joint)).collect());
             if edges.len() < 2 {
                 continue;
             }
-            let (refit, count) = binned(&lacks.refit, joint, &axis, &edges);
+            let (refit, count) = binned(&residuals.refit, joint, &variable, &edges);
             all.push(Regime {
                 joint: joint + 1,
-                variable: axis.name.clone(),
-                unit: axis.unit.to_owned(),
+                variable: variable.name.clone(),
+                unit: variable.unit.to_owned(),
                 torque_unit: if rotary { "N m" } else { "N" },
-                before: binned(&lacks.before, joint, &axis, &edges).0,
+                before: binned(&residuals.before, joint, &variable, &edges).0,
                 refit,
-                after: binned(&lacks.after, joint, &axis, &edges).0,
+                after: binned(&residuals.after, joint, &variable, &edges).0,
                 count,
                 edges,
             });
@@ -255,16 +255,16 @@ pub fn regimes<const N: usize>(lacks: &Lacks<N>, rotary: bool) -> Vec<Regime> {
 }
 
 fn binned<const N: usize>(
-    lacks: &[Lack<N>],
+    residuals: &[ResidualTorque<N>],
     joint: usize,
-    axis: &Axis<N>,
+    variable: &RegimeVariable<N>,
     edges: &[f64],
 ) -> (Vec<f64>, Vec<usize>) {
     let bins = edges.len() - 1;
     let (mut squares, mut count) = (vec![0.0; bins], vec![0; bins]);
-    for x in lacks {
-        let b = bin(edges, (axis.value)(x, joint)).min(bins - 1);
-        squares[b] += x.lack[joint].powi(2);
+    for x in residuals {
+        let b = bin(edges, (variable.value)(x, joint)).min(bins - 1);
+        squares[b] += x.residual[joint].powi(2);
         count[b] += 1;
     }
     let rms = squares.iter().zip(&count).map(|(s, n)| if *n > 0 { (s / *n as f64).sqrt() } else { 0.0 });
@@ -272,14 +272,14 @@ fn binned<const N: usize>(
 }
 
 /// Each joint's share of the gap and the regime that stands out in it, most of the gap first.
-pub fn places<const N: usize>(shares: &[f64; N], regimes: &[Regime]) -> Vec<Place> {
-    let mut places: Vec<Place> = (0..N).map(|j| standing_out(j, shares[j], regimes)).collect();
+pub fn places<const N: usize>(shares: &[f64; N], regimes: &[Regime]) -> Vec<Location> {
+    let mut places: Vec<Location> = (0..N).map(|j| standing_out(j, shares[j], regimes)).collect();
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     places
 }
 
 /// The regime of joint `j` in which the mean square residual exceeds the joint's own most.
-fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Place {
+fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Location {
     let mut best: Option<(f64, &Regime, usize)> = None;
     for regime in regimes.iter().filter(|r| r.joint == j + 1) {
         let samples: usize = regime.count.iter().sum();
@@ -293,7 +293,7 @@ fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Place {
         }
     }
     let Some((_, regime, b)) = best else {
-        return Place {
+        return Location {
             joint: j + 1,
             share,
             regime: "everywhere".into(),
@@ -308,20 +308,20 @@ fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Place {
     } else {
         format!("{} from {from:.3} to {to:.3} {}", regime.variable, regime.unit)
     };
-    Place {
+    Location {
         joint: j + 1,
         share,
         regime: name,
         detail,
-        range: Some(Range { variable: regime.variable.clone(), from, to }),
+        range: Some(VariableRange { variable: regime.variable.clone(), from, to }),
     }
 }
 
 fn regime_name(regime: &Regime, b: usize) -> String {
     let bins = regime.count.len();
-    let all = axes::<1>(0, true);
+    let all = variables::<1>(0, true);
     let kind = |name: &str| name.trim_end_matches(|c: char| c.is_ascii_digit() || c == ')').to_owned();
-    let axis = all.iter().find(|a| kind(&a.name) == kind(&regime.variable));
+    let variable = all.iter().find(|a| kind(&a.name) == kind(&regime.variable));
     let position = if b == 0 {
         0
     } else if b + 1 == bins {
@@ -329,5 +329,5 @@ fn regime_name(regime: &Regime, b: usize) -> String {
     } else {
         1
     };
-    axis.map_or_else(String::new, |a| [a.low, a.middle, a.high][position].to_owned())
+    variable.map_or_else(String::new, |a| [a.low, a.middle, a.high][position].to_owned())
 }

@@ -1,15 +1,15 @@
-//! A hypothesis about the arm: parameter values, friction smoothing, and effects placed on joints.
+//! A hypothesis about the arm: parameter values, width of the friction regularisation, and effects on joints.
 
-use crate::user;
+use crate::custom_effect;
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Active, Effect, MAX_PARAMETERS, Pulse, Quantity, Scope};
+use armgap_core::effect::{Active, Effect, InputSegment, MAX_PARAMETERS, Quantity, Scope};
 use armgap_core::integrate::State;
 use armgap_core::plant::Plant;
 use nalgebra::SVector;
 
 /// An effect on a joint, with values for its parameters.
 #[derive(Clone, Copy)]
-pub struct Placed {
+pub struct EffectInstance {
     /// The law.
     pub law: &'static dyn Effect<f64>,
     /// 0-based joint; 0 for effects of the whole arm.
@@ -18,13 +18,13 @@ pub struct Placed {
     pub p: [f64; MAX_PARAMETERS],
 }
 
-impl std::fmt::Debug for Placed {
+impl std::fmt::Debug for EffectInstance {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}:{}:{:?}", self.law.spec().name, self.joint + 1, &self.p[..self.len()])
     }
 }
 
-impl Placed {
+impl EffectInstance {
     /// Number of parameters in use.
     pub fn len(&self) -> usize {
         self.law.spec().parameters.len()
@@ -35,13 +35,13 @@ impl Placed {
         false
     }
 
-    /// The same effect on the same joint, whatever its values.
+    /// Whether `other` is the same effect on the same joint, whatever its values.
     pub fn same_place(&self, other: &Self) -> bool {
         self.law.spec().name == other.law.spec().name && self.joint == other.joint
     }
 
     /// Whether it acts beyond a position: its parameters are that, stiffness and damping.
-    pub fn is_stop(&self) -> bool {
+    pub fn is_contact(&self) -> bool {
         self.law.spec().parameters.first().is_some_and(|p| p.quantity == Quantity::Reach)
     }
 
@@ -64,7 +64,7 @@ pub struct Hypothesis<const P: usize> {
     /// Width of the smoothed sign of friction, rad/s; zero for exact dry friction.
     pub smoothing: f64,
     /// Effects with their values.
-    pub effects: Vec<Placed>,
+    pub effects: Vec<EffectInstance>,
 }
 
 impl<const P: usize> Hypothesis<P> {
@@ -73,8 +73,8 @@ impl<const P: usize> Hypothesis<P> {
         Self { theta, smoothing: 0.0, effects: Vec::new() }
     }
 
-    /// The same with one more effect.
-    pub fn with(&self, effect: Placed) -> Self {
+    /// This hypothesis with one more effect.
+    pub fn with(&self, effect: EffectInstance) -> Self {
         let mut more = self.clone();
         more.effects.push(effect);
         more
@@ -86,7 +86,7 @@ impl<const P: usize> Hypothesis<P> {
         self.theta.iter().copied().chain(effects).collect()
     }
 
-    /// The same hypothesis with other values.
+    /// This hypothesis with other values of `theta` and of the effects' parameters.
     pub fn with_values(&self, values: &[f64]) -> Self {
         let mut other = self.clone();
         let mut rest = values.iter().copied();
@@ -111,14 +111,14 @@ impl<const P: usize> Hypothesis<P> {
     }
 
     /// Rewrites the held commands of a log into the torque that reaches the joints; `pushes` are added last, `tables` are those of the
-    /// user's own effects.
+    /// custom effects.
     pub fn command<const N: usize>(
         &self,
         t: &[f64],
-        held: &[[Pulse<f64>; N]],
-        pushes: &[Placed],
+        held: &[[InputSegment<f64>; N]],
+        pushes: &[EffectInstance],
         tables: &[Vec<f64>],
-    ) -> Option<Vec<[Pulse<f64>; N]>> {
+    ) -> Option<Vec<[InputSegment<f64>; N]>> {
         let laws = || self.effects.iter().chain(pushes).filter(|e| e.law.spec().hooks.command);
         laws().next()?;
         let mut torque = held.to_vec();
@@ -126,16 +126,16 @@ impl<const P: usize> Hypothesis<P> {
         for effect in laws() {
             column.clear();
             column.extend(torque.iter().map(|row| row[effect.joint]));
-            user::command(effect.law, &effect.p, t, tables, &mut column);
-            for (row, pulse) in torque.iter_mut().zip(&column) {
-                row[effect.joint] = *pulse;
+            custom_effect::command(effect.law, &effect.p, t, tables, &mut column);
+            for (row, segment) in torque.iter_mut().zip(&column) {
+                row[effect.joint] = *segment;
             }
         }
         Some(torque)
     }
 
     /// The state of joints whose encoders show these positions and velocities.
-    pub fn start<const N: usize>(&self, q: SVector<f64, N>, dq: SVector<f64, N>) -> State<f64, N> {
+    pub fn initial_state<const N: usize>(&self, q: SVector<f64, N>, dq: SVector<f64, N>) -> State<f64, N> {
         if !self.distorts() {
             return State::new(q, dq);
         }

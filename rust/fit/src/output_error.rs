@@ -1,6 +1,6 @@
 //! All parameters of an arm from one log by output error: Gauss-Newton over short windows, with exact dry friction.
 //!
-//! Every window starts from its measured state and runs under the logged torque; the sum of squared differences of positions is
+//! Every window starts from its measured initial state and runs under the logged torque; the sum of squared differences of positions is
 //! minimised over `theta` by Levenberg's and Marquardt's method with forward differences. All windows of all displaced parameters
 //! are independent runs, which vector units and processors share (see [`armgap_core::rollout`]).
 
@@ -9,7 +9,7 @@ use crate::model::Hypothesis;
 use crate::products::{cross, squares};
 use crate::solve::scaled_inverse;
 use crate::track::Track;
-use crate::window::{Dataset, Shift};
+use crate::window::{Dataset, InitialStateOffset};
 use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -70,39 +70,39 @@ impl WithArm for OutputError<'_> {
         if data.rows * N <= P {
             return None;
         }
-        let (measured, starts) = (data.measured(), data.measured_starts());
-        Some(Problem { arm: &arm, data: &data, measured, starts }.minimum(theta))
+        let (measured, offsets) = (data.measured(), data.zero_offsets());
+        Some(OutputErrorProblem { arm: &arm, data: &data, measured, offsets }.minimum(theta))
     }
 }
 
-/// Windows of a log with their measured positions and starts.
-struct Problem<'a, A, const N: usize> {
+/// Windows of a log with their measured positions and the offsets of their initial states.
+struct OutputErrorProblem<'a, A, const N: usize> {
     arm: &'a A,
     data: &'a Dataset<N>,
     measured: Vec<f64>,
-    starts: Vec<Shift<N>>,
+    offsets: Vec<InitialStateOffset<N>>,
 }
 
-/// Parameters with the residual that they leave.
-struct Point<const P: usize> {
+/// Parameters with their residual and cost.
+struct TrialPoint<const P: usize> {
     theta: [f64; P],
     residual: Vec<f64>,
     cost: f64,
 }
 
-impl<A, const N: usize> Problem<'_, A, N> {
-    fn point<const P: usize>(&self, theta: [f64; P]) -> Point<P>
+impl<A, const N: usize> OutputErrorProblem<'_, A, N> {
+    fn point<const P: usize>(&self, theta: [f64; P]) -> TrialPoint<P>
     where
         A: Arm<f64, N, P>,
     {
-        let predicted = self.data.predict(self.arm, &Hypothesis::rigid(theta), &self.starts);
+        let predicted = self.data.predict(self.arm, &Hypothesis::rigid(theta), &self.offsets);
         let residual: Vec<f64> = self.measured.iter().zip(&predicted).map(|(y, x)| y - x).collect();
         let cost = squares(&[&residual])[0];
-        Point { theta, residual, cost }
+        TrialPoint { theta, residual, cost }
     }
 
     /// Derivatives of the prediction by the parameters.
-    fn sensitivities<const P: usize>(&self, at: &Point<P>, steps: &[f64; P]) -> Vec<Vec<f64>>
+    fn sensitivities<const P: usize>(&self, at: &TrialPoint<P>, steps: &[f64; P]) -> Vec<Vec<f64>>
     where
         A: Arm<f64, N, P>,
     {
@@ -152,7 +152,7 @@ impl<A, const N: usize> Problem<'_, A, N> {
 
     fn estimate<const P: usize>(
         &self,
-        at: &Point<P>,
+        at: &TrialPoint<P>,
         normal: &DMatrix<f64>,
         iterations: usize,
         settled: bool,
@@ -179,7 +179,7 @@ fn normal_equations(columns: &[Vec<f64>], residual: &[f64]) -> (DMatrix<f64>, DV
     (normal, DVector::from_vec(cross(&[residual], &columns)))
 }
 
-/// One damped step; friction stays where it is possible.
+/// One damped step; friction coefficients stay non-negative.
 fn moved<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     theta: &[f64; P],
     normal: &DMatrix<f64>,

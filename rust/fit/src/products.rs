@@ -1,12 +1,12 @@
 //! Inner products of long columns, with the vector unit of the processor at hand.
 
-use armgap_core::cpu::{Cpu, Level, Work};
+use armgap_core::cpu::{Cpu, Kernel, Level};
 
-/// Entries taken together.
+/// Entries per vector.
 const LANES: usize = 8;
 
-/// Columns taken together: their sums need not wait for each other.
-const ABREAST: usize = 4;
+/// Columns per pass: their sums need not wait for each other.
+const COLUMNS_AT_ONCE: usize = 4;
 
 /// `x . y` for several `y` of the length of `x`.
 #[inline(always)]
@@ -41,16 +41,16 @@ struct Cross<'a> {
     right: &'a [&'a [f64]],
 }
 
-impl Work for Cross<'_> {
+impl Kernel for Cross<'_> {
     type Output = Vec<f64>;
 
     #[inline(always)]
     fn run<C: Cpu>(self) -> Vec<f64> {
         let mut products = Vec::with_capacity(self.left.len() * self.right.len());
         for x in self.left {
-            let (groups, rest) = self.right.as_chunks::<ABREAST>();
+            let (groups, rest) = self.right.as_chunks::<COLUMNS_AT_ONCE>();
             for group in groups {
-                products.extend(dots::<C, ABREAST>(x, *group));
+                products.extend(dots::<C, COLUMNS_AT_ONCE>(x, *group));
             }
             for y in rest {
                 products.extend(dots::<C, 1>(x, [y]));
@@ -68,7 +68,7 @@ pub fn cross(left: &[&[f64]], right: &[&[f64]]) -> Vec<f64> {
 /// One product.
 struct Pair<'a>(&'a [f64], &'a [f64]);
 
-impl Work for Pair<'_> {
+impl Kernel for Pair<'_> {
     type Output = f64;
 
     #[inline(always)]

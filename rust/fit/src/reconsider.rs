@@ -4,19 +4,19 @@
 //! ten times as large, what tells them apart is noise. And what a law with more values explained beyond one with fewer may have been the
 //! doing of a cause that was found later. So before a further cause is looked for, each rival takes the place of its cause beside all
 //! others; if it does better, or as well with fewer values, the search goes on from there again. The better end counts, if it is reached
-//! with no more causes: beside a gap, more are taken up by what they are not about.
+//! with no more causes: beside a gap, more are added by what they are not about.
 
-use crate::attribute::{Contender, Stage};
+use crate::acceptance::{ABOVE_FLOOR, Ground, MATTERS, is_possible};
+use crate::attribute::{Candidate, SearchNode};
 use crate::belief::{Cause, name, probability_over};
-use crate::course::{Course, added};
-use crate::decide::{ABOVE_FLOOR, Ground, MATTERS, is_possible};
+use crate::context::DiagnosisContext;
 use crate::equivalent;
-use crate::model::{Hypothesis, Placed};
+use crate::model::{EffectInstance, Hypothesis};
+use crate::model_search::{ModelSearch, added};
 use crate::solve::Effort;
-use crate::study::Study;
 use armgap_core::arm::Arm;
 
-/// A rival explains at least this part of what its cause explained when that was taken up.
+/// A rival explains at least this part of what its cause explained when that was added.
 const RIVALS: f64 = 0.5;
 
 /// Rivals that are tried for each cause.
@@ -32,56 +32,56 @@ const AS_WELL: f64 = 1.05;
 /// always fits a little better.
 const RICHER: f64 = 0.9;
 
-/// A rival that does better beside the other causes than the cause it could have been taken up for.
+/// A rival that does better beside the other causes than the cause it could have been added for.
 struct Rival<const P: usize> {
-    /// The stage in which it was passed over.
-    stage: usize,
+    /// The node in which it was passed over.
+    node: usize,
     /// The rival as it was fitted there.
-    fitted: Contender<P>,
-    /// The effect that was taken up.
-    instead_of: Placed,
+    fitted: Candidate<P>,
+    /// The effect that was added.
+    instead_of: EffectInstance,
     /// How sure it is that this one is better; none where it has fewer values and does as well.
     better: Option<f64>,
     /// By what factor the predictions of a search from it may miss more than those of the other's.
     allowed: f64,
 }
 
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
-    /// The course that takes up a better rival of one of the causes in that one's place, if it ends better. Those with more values are tried
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// The search that adds a better rival of one of the causes in that one's place, if it ends better. Those with more values are tried
     /// once a search has `ended`: before, what they explain beyond may still be the doing of another cause. The others have been tried by then.
     pub(crate) fn reconsidered(
         &self,
-        course: &Course<N, P>,
+        search: &ModelSearch<N, P>,
         ended: bool,
-        noticeable: f64,
+        min_relevance: f64,
         max_causes: usize,
         seed: u64,
-    ) -> Option<Course<N, P>> {
-        if course.causes.len() < 2 || course.turned {
+    ) -> Option<ModelSearch<N, P>> {
+        if search.causes.len() < 2 || search.turned {
             return None;
         }
-        let rival = self.better_rival(course, ended, seed)?;
-        let mut other = self.back_to(course, &rival, noticeable, seed);
-        self.pursue(&mut other, noticeable, max_causes, seed);
-        let as_good = other.stage.relative_error() < rival.allowed * course.stage.relative_error();
-        (as_good && self.needed(&other) <= self.needed(course)).then_some(other)
+        let rival = self.better_rival(search, ended, seed)?;
+        let mut other = self.back_to(search, &rival, min_relevance, seed);
+        self.pursue(&mut other, min_relevance, max_causes, seed);
+        let as_good = other.node.relative_error() < rival.allowed * search.node.relative_error();
+        (as_good && self.needed(&other) <= self.needed(search)).then_some(other)
     }
 
     /// The first rival that does better than its cause beside the others.
-    fn better_rival(&self, course: &Course<N, P>, ended: bool, seed: u64) -> Option<Rival<P>> {
-        let all: Vec<&Stage<N, P>> = course.stages.iter().chain([&course.stage]).collect();
-        (0..course.stages.len()).find_map(|index| self.better_in(&all, index, ended, seed))
+    fn better_rival(&self, search: &ModelSearch<N, P>, ended: bool, seed: u64) -> Option<Rival<P>> {
+        let all: Vec<&SearchNode<N, P>> = search.nodes.iter().chain([&search.node]).collect();
+        (0..search.nodes.len()).find_map(|index| self.better_in(&all, index, ended, seed))
     }
 
-    /// The same among those that were passed over in one stage.
-    fn better_in(&self, all: &[&Stage<N, P>], index: usize, ended: bool, seed: u64) -> Option<Rival<P>> {
-        let (stage, last, adopted) = (all[index], *all.last()?, added(all, index)?);
+    /// The first rival that does better than its cause beside the others, among those that were not chosen at one node.
+    fn better_in(&self, all: &[&SearchNode<N, P>], index: usize, ended: bool, seed: u64) -> Option<Rival<P>> {
+        let (node, last, adopted) = (all[index], *all.last()?, added(all, index)?);
         let model = &last.settled.hypothesis;
         let place = model.effects.iter().position(|e| e.same_place(adopted))?;
-        let cause = stage.contenders.iter().find(|c| c.effect.is_some_and(|e| e.same_place(adopted)))?;
+        let cause = node.candidates.iter().find(|c| c.effect.is_some_and(|e| e.same_place(adopted)))?;
         let open = last.excess() > ABOVE_FLOOR;
-        let size = |c: &Contender<P>| c.effect.map_or(0, |e| e.len());
-        let is_rival = |c: &Contender<P>, share: f64, of_cause: f64| {
+        let size = |c: &Candidate<P>| c.effect.map_or(0, |e| e.len());
+        let is_rival = |c: &Candidate<P>, share: f64, of_cause: f64| {
             let Some(effect) = c.effect else { return false };
             let known = model.effects.iter().any(|e| e.same_place(&effect));
             !known
@@ -91,20 +91,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 && share > (RIVALS * of_cause).max(MATTERS)
         };
         let finalists =
-            stage.contenders.iter().filter(|c| is_rival(c, stage.share(c), stage.share(cause))).take(TRIED);
+            node.candidates.iter().filter(|c| is_rival(c, node.share(c), node.share(cause))).take(TRIED);
         // One with fewer values may have fallen behind just for what they are not about.
-        let of_cause = stage.field.iter().find(|(c, _)| c.effect.is_some_and(|e| e.same_place(adopted)));
-        let is_final = |c: &Contender<P>| stage.contenders.iter().any(|f| f.is_same(c));
-        let passed_over = stage.field.iter().filter(|(c, share)| {
+        let of_cause = node.field.iter().find(|(c, _)| c.effect.is_some_and(|e| e.same_place(adopted)));
+        let is_final = |c: &Candidate<P>| node.candidates.iter().any(|f| f.is_same(c));
+        let passed_over = node.field.iter().filter(|(c, share)| {
             size(c) < size(cause) && !is_final(c) && is_rival(c, *share, of_cause.map_or(0.0, |x| x.1))
         });
-        let rivals: Vec<&Contender<P>> = finalists.chain(passed_over.map(|(c, _)| c).take(TRIED)).collect();
+        let rivals: Vec<&Candidate<P>> = finalists.chain(passed_over.map(|(c, _)| c).take(TRIED)).collect();
         if rivals.is_empty() {
             return None;
         }
-        let beside = |effects: Vec<Placed>| {
+        let beside = |effects: Vec<EffectInstance>| {
             let start = Hypothesis { effects, ..model.clone() };
-            self.contender(&last.weights, &start, place, Effort::FULL, &[])
+            self.candidate(&last.weights, &start, place, Effort::FULL, &[])
         };
         let full = beside(model.effects.clone());
         let tried = rivals.into_iter().filter_map(|rival| {
@@ -114,55 +114,61 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
             let better = (swapped.z_over(&full) > BETTER).then(|| probability_over(&swapped, &full, seed));
             let does = better.is_some() || (size(&swapped) < size(cause) && as_well(&swapped, &full));
             let allowed = if ended { RICHER } else { better.map_or(AS_WELL, |_| 1.0) };
-            let rival = Rival { stage: index, fitted: rival.clone(), instead_of: *adopted, better, allowed };
+            let rival = Rival { node: index, fitted: rival.clone(), instead_of: *adopted, better, allowed };
             (is_possible(&swapped) && does).then_some((swapped, rival))
         });
-        let found: Vec<(Contender<P>, Rival<P>)> = tried.collect();
+        let found: Vec<(Candidate<P>, Rival<P>)> = tried.collect();
         let (best, _) = found.iter().min_by(|a, b| a.0.score().total_cmp(&b.0.score()))?;
         let best = best.clone();
         let as_good = found.into_iter().filter(|(swapped, _)| as_well(swapped, &best));
         as_good.min_by_key(|(swapped, _)| size(swapped)).map(|(_, rival)| rival)
     }
 
-    /// The course up to the stage in which a rival was passed over, and the stage after it instead.
-    fn back_to(&self, course: &Course<N, P>, rival: &Rival<P>, noticeable: f64, seed: u64) -> Course<N, P> {
-        let mut stage = course.stages[rival.stage].clone();
-        let added = stage.settled.hypothesis.effects.len();
-        let choice = stage.contenders.iter().position(|c| c.is_same(&rival.fitted)).unwrap_or_else(|| {
+    /// The search up to the node in which a rival was passed over, and the node after it instead.
+    fn back_to(
+        &self,
+        search: &ModelSearch<N, P>,
+        rival: &Rival<P>,
+        min_relevance: f64,
+        seed: u64,
+    ) -> ModelSearch<N, P> {
+        let mut node = search.nodes[rival.node].clone();
+        let added = node.settled.hypothesis.effects.len();
+        let choice = node.candidates.iter().position(|c| c.is_same(&rival.fitted)).unwrap_or_else(|| {
             let start = &rival.fitted.fit.hypothesis;
-            stage.contenders.push(self.contender(&stage.weights, start, added, Effort::FULL, &[]));
-            stage.contenders.len() - 1
+            node.candidates.push(self.candidate(&node.weights, start, added, Effort::FULL, &[]));
+            node.candidates.len() - 1
         });
-        let before = &stage.settled.hypothesis;
+        let before = &node.settled.hypothesis;
         let known = |c: &&Cause| before.effects.iter().any(|e| e.same_place(&c.effect));
-        let mut causes: Vec<Cause> = course.causes.iter().filter(known).cloned().collect();
-        let named = name(&stage, choice, Ground::Motion, seed);
-        let replaced = course.causes.iter().find(|c| c.effect.same_place(&rival.instead_of));
+        let mut causes: Vec<Cause> = search.causes.iter().filter(known).cloned().collect();
+        let named = name(&node, choice, Ground::Motion, seed);
+        let replaced = search.causes.iter().find(|c| c.effect.same_place(&rival.instead_of));
         let as_sure = replaced.map_or(named.probability, |c| c.probability);
         causes.push(Cause { probability: rival.better.unwrap_or(as_sure), ..named });
-        let next = stage.contenders[choice].fit.clone();
-        let mut other = Course {
+        let next = node.candidates[choice].fit.clone();
+        let mut other = ModelSearch {
             causes,
-            stages: course.stages[..rival.stage].to_vec(),
-            smoothed: before.smoothing > 0.0,
-            rounded: false,
-            threshold: course.threshold,
-            stage,
+            nodes: search.nodes[..rival.node].to_vec(),
+            regularised: before.smoothing > 0.0,
+            regularisation_fitted: false,
+            threshold: search.threshold,
+            node,
             turned: true,
         };
-        self.advance(&mut other, &next, noticeable);
+        self.advance(&mut other, &next, min_relevance);
         other
     }
 
-    /// Causes that a course ends with once the idle are dropped.
-    fn needed(&self, course: &Course<N, P>) -> usize {
-        let (mut model, mut causes) = (course.stage.settled.clone(), course.causes.clone());
-        self.prune(&mut model, &mut causes, &course.stage);
+    /// Causes that a search ends with once the idle are dropped.
+    fn needed(&self, search: &ModelSearch<N, P>) -> usize {
+        let (mut model, mut causes) = (search.node.settled.clone(), search.causes.clone());
+        self.prune(&mut model, &mut causes, &search.node);
         causes.len()
     }
 }
 
-/// Whether predictions of one contender miss by hardly more than those of another.
-fn as_well<const P: usize>(one: &Contender<P>, other: &Contender<P>) -> bool {
+/// Whether predictions of one candidate miss by hardly more than those of another.
+fn as_well<const P: usize>(one: &Candidate<P>, other: &Candidate<P>) -> bool {
     one.error < AS_WELL.powi(2) * other.error
 }

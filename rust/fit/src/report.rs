@@ -1,11 +1,11 @@
 //! The diagnosis as data: the schema `armgap.diagnosis/1` and what a report draws besides.
 
 use crate::energy::Energy;
-use crate::locate::{Place, Regime};
+use crate::locate::{Location, Regime};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Named values in the order of the model.
+/// Named values, in alphabetical order of their names.
 pub type Named<T> = BTreeMap<String, T>;
 
 /// A number with its uncertainty.
@@ -30,8 +30,8 @@ pub struct Diagnosis {
     pub gap: Gap,
     /// Where.
     #[serde(rename = "where")]
-    pub places: Vec<Place>,
-    /// What the torque lacking on each joint does with energy.
+    pub places: Vec<Location>,
+    /// Energy balance of each joint's residual torque.
     pub energy: Vec<Energy>,
     /// Which.
     pub causes: Vec<Cause>,
@@ -45,9 +45,9 @@ pub struct Diagnosis {
     pub training: Vec<LogSummary>,
     /// Logs it was judged on.
     pub holdout: Vec<LogSummary>,
-    /// All fitted candidates of the first stage, best first.
+    /// All fitted candidates of the first search node, best first.
     pub ranking: Vec<Ranked>,
-    /// The course of the attribution.
+    /// The steps of the model search.
     pub stages: Vec<StageSummary>,
     /// The gap by joint and regime.
     pub regimes: Vec<Regime>,
@@ -86,7 +86,7 @@ pub struct Gap {
     pub closed: f64,
     /// 95 % interval of it.
     pub closed_ci: [f64; 2],
-    /// The same at other prediction horizons.
+    /// RMS errors at other prediction horizons.
     pub horizons: Vec<AtHorizon>,
     /// Over the whole holdout from its first sample.
     pub free_run: FreeRun,
@@ -133,7 +133,7 @@ pub struct Cause {
     pub closed: f64,
     /// What this log does not tell from it.
     pub equivalents: Vec<EquivalentSummary>,
-    /// The log that a push belongs to.
+    /// The log that an external disturbance belongs to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,
 }
@@ -229,7 +229,7 @@ pub struct Ranked {
     pub joint: Option<usize>,
     /// Share of the holdout's gap above the floor it removes.
     pub closed: f64,
-    /// Squared distance of the arm's parameters from their trusted values, in sigmas, with it.
+    /// Squared distance of the arm's parameters from their prior values, in sigmas, with it.
     pub trust: f64,
     /// RMS on the holdout per joint.
     pub rms: Vec<f64>,
@@ -237,7 +237,7 @@ pub struct Ranked {
     pub parameters: Named<Value>,
 }
 
-/// One step of the attribution.
+/// One step of the model search.
 #[derive(Debug, Clone, Serialize)]
 pub struct StageSummary {
     /// What the step added.
@@ -246,7 +246,7 @@ pub struct StageSummary {
     pub rms: Vec<f64>,
     /// Cost above the noise floor before the step, as a factor.
     pub excess: f64,
-    /// Squared distance of the arm's parameters from their trusted values, in sigmas, before the step.
+    /// Squared distance of the arm's parameters from their prior values, in sigmas, before the step.
     pub trust: f64,
     /// RMS error before the step relative to the motion within the windows.
     pub relative_error: f64,

@@ -1,12 +1,12 @@
 //! What was looked for and not found: a status for every candidate that is no cause.
 
-use crate::course::Attribution;
-use crate::decide::{ALMOST, MATTERS, restores};
-use crate::model::Placed;
+use crate::acceptance::{ALMOST, MATTERS, restores};
+use crate::context::DiagnosisContext;
+use crate::covariance::NORMAL_95;
+use crate::model::EffectInstance;
+use crate::model_search::Attribution;
 use crate::report::{Bound, RuledOut};
-use crate::screen::{Scored, screen};
-use crate::spread::NORMAL_95;
-use crate::study::Study;
+use crate::screen::{ScoreTest, screen};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Spec, Trial, catalogue};
 
@@ -18,23 +18,23 @@ const COULD_BE: f64 = 0.1;
 
 /// Status of every candidate that is no cause, from its first-order test around the final model.
 pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    study: &Study<A, N, P>,
+    context: &DiagnosisContext<A, N, P>,
     attribution: &Attribution<N, P>,
     rotary: bool,
 ) -> Vec<RuledOut> {
-    let stage = &attribution.stages[attribution.stages.len() - 1];
+    let node = &attribution.nodes[attribution.nodes.len() - 1];
     let model = &attribution.model.hypothesis;
-    let open = study.open_candidates(model);
-    let problem = study.problem(&stage.weights.training);
-    let unchanged = model.effects.len() == stage.settled.hypothesis.effects.len()
-        && model.values() == stage.settled.hypothesis.values();
-    let known = stage.screened.get(..open.len()).filter(|_| unchanged);
-    let scored = known.map_or_else(|| screen(&problem, model, &open), <[Scored]>::to_vec);
-    let remains = problem.metric.total(&problem.raw_costs(model));
-    let unexplained = stage.is_open();
-    let mut list: Vec<(Placed, RuledOut)> = Vec::new();
+    let open = context.open_candidates(model);
+    let problem = context.problem(&node.weights.training);
+    let unchanged = model.effects.len() == node.settled.hypothesis.effects.len()
+        && model.values() == node.settled.hypothesis.values();
+    let known = node.screened.get(..open.len()).filter(|_| unchanged);
+    let scored = known.map_or_else(|| screen(&problem, model, &open), <[ScoreTest]>::to_vec);
+    let remains = problem.weighting.total(&problem.raw_costs(model));
+    let unexplained = node.is_open();
+    let mut list: Vec<(EffectInstance, RuledOut)> = Vec::new();
     for test in &scored {
-        let mut entry = status(study, test, rotary);
+        let mut entry = status(context, test, rotary);
         if unexplained {
             doubt(&mut entry, test, remains);
         }
@@ -58,9 +58,9 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 /// Status of the effects that no test of candidates looks for.
 fn never_fitted<const N: usize>() -> Vec<RuledOut> {
     let laws = catalogue::<f64>().iter().map(|law| law.spec());
-    let unsearched = laws.filter(|spec| spec.starts.is_empty() && spec.least_joints <= N);
+    let unsearched = laws.filter(|spec| spec.initial_guesses.is_empty() && spec.least_joints <= N);
     let entry = |spec: &Spec, joint: Option<usize>| {
-        let (status, why) = if spec.trial == Trial::Event {
+        let (status, why) = if spec.trial == Trial::Disturbance {
             (
                 "absent",
                 "no push stands out of what the model lacks in any of these logs; a joint at rest shows none below its friction",
@@ -83,13 +83,13 @@ fn weaker(a: &RuledOut, b: &RuledOut) -> bool {
 }
 
 fn status<A, const N: usize, const P: usize>(
-    study: &Study<A, N, P>,
-    test: &Scored,
+    context: &DiagnosisContext<A, N, P>,
+    test: &ScoreTest,
     rotary: bool,
 ) -> RuledOut {
     let spec = test.effect.law.spec();
     let parameter = &spec.parameters[0];
-    let typical = study.scales.size(parameter.quantity, test.effect.joint);
+    let typical = context.scales.size(parameter.quantity, test.effect.joint);
     let sigma = test.sigma.max(test.information_sigma);
     let (effect, joint) = (spec.name, test.effect.joint_number());
     if spec.trial == Trial::Whole {
@@ -118,21 +118,22 @@ fn status<A, const N: usize, const P: usize>(
 /// The named cause in whose place another effect would have done nearly as well, by the motion or by what it makes of the parameters.
 fn rivalled<const N: usize, const P: usize>(
     attribution: &Attribution<N, P>,
-    place: &Placed,
-) -> Option<Placed> {
-    let named = |e: &&Placed| attribution.causes.iter().any(|c| c.effect.same_place(e));
-    attribution.stages.iter().enumerate().find_map(|(i, stage)| {
+    place: &EffectInstance,
+) -> Option<EffectInstance> {
+    let named = |e: &&EffectInstance| attribution.causes.iter().any(|c| c.effect.same_place(e));
+    attribution.nodes.iter().enumerate().find_map(|(i, node)| {
         let adopted = attribution.added(i).filter(named)?;
-        let at =
-            |place: &Placed| stage.contenders.iter().find(|c| c.effect.is_some_and(|e| e.same_place(place)));
+        let at = |place: &EffectInstance| {
+            node.candidates.iter().find(|c| c.effect.is_some_and(|e| e.same_place(place)))
+        };
         let (cause, rival) = (at(adopted)?, at(place)?);
-        let by_motion = stage.share(cause) > MATTERS && stage.share(rival) > ALMOST * stage.share(cause);
-        (by_motion || (restores(stage, cause) && restores(stage, rival))).then_some(*adopted)
+        let by_motion = node.share(cause) > MATTERS && node.share(rival) > ALMOST * node.share(cause);
+        (by_motion || (restores(node, cause) && restores(node, rival))).then_some(*adopted)
     })
 }
 
 /// What would do nearly as well in place of a named cause is absent only if that is right.
-fn leave_open(entry: &mut RuledOut, instead: &Placed) {
+fn leave_open(entry: &mut RuledOut, instead: &EffectInstance) {
     if entry.status == "absent" {
         (entry.status, entry.bound) = ("undecided", None);
         let joint = instead.joint_number().map_or(String::new(), |j| format!(", joint {j}"));
@@ -144,7 +145,7 @@ fn leave_open(entry: &mut RuledOut, instead: &Placed) {
 }
 
 /// Where a gap remains, an effect is absent only if the largest size it could have would explain next to nothing of it.
-fn doubt(entry: &mut RuledOut, test: &Scored, remains: f64) {
+fn doubt(entry: &mut RuledOut, test: &ScoreTest, remains: f64) {
     let most = entry.bound.as_ref().map_or(test.gain, |bound| (bound.value / test.information_sigma).powi(2));
     let share = (most / remains).min(1.0);
     if entry.status == "absent" && share > COULD_BE {
@@ -155,7 +156,7 @@ fn doubt(entry: &mut RuledOut, test: &Scored, remains: f64) {
 }
 
 /// Status of an effect that begins beyond a threshold: excited if any trial threshold was passed.
-fn threshold_status(test: &Scored) -> RuledOut {
+fn threshold_status(test: &ScoreTest) -> RuledOut {
     let spec = test.effect.law.spec();
     let (effect, joint) = (spec.name, test.effect.joint_number());
     let reached = test.distinct > 0.0 && test.information_sigma < 0.5;

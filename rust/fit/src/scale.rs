@@ -1,6 +1,6 @@
 //! Typical sizes on a given arm and log, by quantity: what "small" and "large" mean for an effect's parameter.
 
-use crate::model::Placed;
+use crate::model::EffectInstance;
 use crate::track::Track;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{EffectParameter, NEVER, Quantity};
@@ -33,7 +33,7 @@ const LARGEST: f64 = 50.0;
 /// Times are measured in sample periods; this many of them are possible.
 const LONGEST_TIME: f64 = 1000.0;
 
-/// A stop is soft if the joint's torque moves it by a share of the travel, hard if by this part of it.
+/// A joint limit is soft if the joint's torque moves it by a share of the travel, hard if by this part of it.
 const HARDEST: f64 = 1e4;
 
 /// Laws that change with speed do so below this many times the RMS speed, or they are other laws.
@@ -59,7 +59,9 @@ impl<const N: usize> Scales<N> {
                 rms(tracks.iter().flat_map(|t| t.held.iter().map(move |p| p[j].start)))
             }),
             speed: std::array::from_fn(|j| rms(tracks.iter().flat_map(|t| speeds(t, j)))),
-            position: std::array::from_fn(|j| spread(tracks.iter().flat_map(|t| t.column(j)).collect())),
+            position: std::array::from_fn(|j| {
+                standard_deviation(tracks.iter().flat_map(|t| t.column(j)).collect())
+            }),
             travel: std::array::from_fn(|j| {
                 let q = || tracks.iter().flat_map(move |t| t.q.iter().map(move |q| q[j]));
                 [q().fold(f64::INFINITY, f64::min), q().fold(f64::NEG_INFINITY, f64::max)]
@@ -78,8 +80,8 @@ impl<const N: usize> Scales<N> {
             Quantity::Inertia => self.inertia[j],
             Quantity::Drag => self.torque[j] / (self.speed[j] * self.speed[j]),
             Quantity::CubicDrag => self.torque[j] / self.speed[j].powi(3),
-            Quantity::Damping | Quantity::StopDamping => self.torque[j] / self.speed[j],
-            Quantity::Stiffness | Quantity::StopStiffness => self.torque[j] / self.position[j],
+            Quantity::Damping | Quantity::ContactDamping => self.torque[j] / self.speed[j],
+            Quantity::Stiffness | Quantity::ContactStiffness => self.torque[j] / self.position[j],
             Quantity::Impulse => self.inertia[j] * self.speed[j],
             Quantity::Hardening => self.torque[j] / self.position[j].powi(3),
             Quantity::ShaftStiffness => self.inertia[j] * SHAFT_RATE * SHAFT_RATE * MOTOR_SHARE,
@@ -102,8 +104,8 @@ impl<const N: usize> Scales<N> {
         0.5 * (from + to)
     }
 
-    /// Start value of a parameter of joint `j`, given in units of its size; none where the joint never gets there.
-    pub fn start(&self, quantity: Quantity, j: usize, value: f64) -> Option<f64> {
+    /// Initial guess of a parameter of joint `j`, given in units of its size; none where the joint never gets there.
+    pub fn initial_guess(&self, quantity: Quantity, j: usize, value: f64) -> Option<f64> {
         match quantity {
             Quantity::Ratio => Some(value),
             Quantity::Rest => Some(self.middle(j) + value * self.size(quantity, j)),
@@ -129,14 +131,14 @@ impl<const N: usize> Scales<N> {
         let most = match quantity {
             Quantity::Time => LONGEST_TIME,
             Quantity::Speed => FASTEST,
-            Quantity::StopStiffness | Quantity::StopDamping => HARDEST,
+            Quantity::ContactStiffness | Quantity::ContactDamping => HARDEST,
             _ => LARGEST,
         };
         most * self.size(quantity, j)
     }
 
     /// Sizes of all parameters of an effect.
-    pub fn of(&self, effect: &Placed) -> Vec<f64> {
+    pub fn of(&self, effect: &EffectInstance) -> Vec<f64> {
         effect.law.spec().parameters.iter().map(|p| self.size(p.quantity, effect.joint)).collect()
     }
 }
@@ -150,7 +152,7 @@ fn rms(x: impl Iterator<Item = f64>) -> f64 {
     if n > 0.0 { (sum / n).sqrt() } else { 0.0 }
 }
 
-fn spread(x: Vec<f64>) -> f64 {
+fn standard_deviation(x: Vec<f64>) -> f64 {
     let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
     rms(x.into_iter().map(|x| x - mean))
 }

@@ -1,31 +1,31 @@
 //! Score tests: how much each candidate would reduce the cost, to first order, from one shared Jacobian.
 //!
-//! With `H` the inner products of the sensitivities of the free values (trust in them included) and `s` their products with the
+//! With `H` the inner products of the sensitivities of the free values (their prior precision included) and `s` their products with the
 //! residual, a further parameter with sensitivity `c` reduces the cost by `(s_c - H_c H^-1 s)^2 / (H_cc - H_c H^-1 H_c')` (Rao 1948).
 
-use crate::model::{Hypothesis, Placed};
+use crate::model::{EffectInstance, Hypothesis};
 use crate::scale::Scales;
-use crate::solve::{Problem, neutral, scaled_inverse};
+use crate::solve::{FitProblem, neutral, scaled_inverse};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Trial, catalogue};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Size of the trial displacement of a candidate's first parameter, relative to its start value.
+/// Size of the trial displacement of a candidate's first parameter, relative to its initial guess.
 const TRIAL: f64 = 1e-3;
 
-/// A candidate at one start value, tested to first order.
+/// Score test of a candidate at one initial guess.
 #[derive(Debug, Clone)]
-pub struct Scored {
+pub struct ScoreTest {
     /// The effect, its first parameter at the value the test suggests.
-    pub effect: Placed,
+    pub effect: EffectInstance,
     /// Expected decrease of the cost.
     pub gain: f64,
     /// Estimated deviation of the first parameter from neutral.
     pub estimate: f64,
     /// Its standard deviation, from the windows' scatter.
     pub sigma: f64,
-    /// Standard deviation if the residual were white with the metric's scale: what the log could tell at best.
+    /// Standard deviation if the residual were white with the weighting's scale: what the log determines at best.
     pub information_sigma: f64,
     /// Changes of the model's own values that make room for the candidate, per unit of its size, to first order.
     pub imitation: Vec<f64>,
@@ -37,19 +37,19 @@ pub struct Scored {
     pub distinct: f64,
 }
 
-/// Every effect on every joint it can sit on, at each of its start values.
-pub fn candidates<const N: usize>(scales: &Scales<N>) -> Vec<Placed> {
+/// Every effect on every joint it can act on, at each of its initial guesses.
+pub fn effect_instances<const N: usize>(scales: &Scales<N>) -> Vec<EffectInstance> {
     let mut all = Vec::new();
     for law in catalogue::<f64>().iter().filter(|law| law.spec().least_joints <= N) {
         let spec = law.spec();
         let joints = if spec.scope == Scope::Joint { N } else { 1 };
         for joint in 0..joints {
-            for start in spec.starts {
-                let mut effect = Placed { law: *law, joint, p: *start };
+            for initial_guess in spec.initial_guesses {
+                let mut effect = EffectInstance { law: *law, joint, p: *initial_guess };
                 let mut reached = true;
                 for (value, parameter) in effect.p.iter_mut().zip(spec.parameters) {
-                    match scales.start(parameter.quantity, joint, *value) {
-                        Some(start) => *value = start.clamp(parameter.lower, parameter.upper),
+                    match scales.initial_guess(parameter.quantity, joint, *value) {
+                        Some(initial_guess) => *value = initial_guess.clamp(parameter.lower, parameter.upper),
                         None => reached = false,
                     }
                 }
@@ -64,21 +64,21 @@ pub fn candidates<const N: usize>(scales: &Scales<N>) -> Vec<Placed> {
 
 /// Scores all candidates around a fitted hypothesis.
 pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    problem: &Problem<A, N, P>,
+    problem: &FitProblem<A, N, P>,
     base: &Hypothesis<P>,
-    candidates: &[Placed],
-) -> Vec<Scored> {
+    candidates: &[EffectInstance],
+) -> Vec<ScoreTest> {
     let residual = problem.residual(base);
     let free: Vec<usize> = (0..base.values().len()).collect();
     let mut columns = problem.sensitivities(base, &residual, &free);
     let k = columns.len();
-    let before: f64 = tempered(problem, &residual);
+    let before: f64 = student_t_total(problem, &residual);
     let traced: Vec<(Vec<f64>, Option<f64>)> =
         candidates.par_iter().map(|c| trace(problem, base, &residual, before, c)).collect();
     let (traces, direct): (Vec<Vec<f64>>, Vec<Option<f64>>) = traced.into_iter().unzip();
     columns.extend(traces);
     let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-    let gram = problem.metric.gram_with(k, problem.data, &columns, &residual);
+    let gram = problem.weighting.gram_with(k, problem.data, &columns, &residual);
     let last = gram.total.nrows() - 1;
     let mut own = gram.total.view((0, 0), (k, k)).into_owned();
     let mut own_score = gram.total.column(last).rows(0, k).into_owned();
@@ -88,7 +88,7 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         own_score[i] += precision * (problem.prior.theta[i] - base.theta[i]);
     }
     let inverse = scaled_inverse(&own).unwrap_or_else(|| DMatrix::zeros(k, k));
-    let score = |(i, effect): (usize, &Placed)| {
+    let score = |(i, effect): (usize, &EffectInstance)| {
         let c = k + i;
         let cross: DVector<f64> = gram.total.column(c).rows(0, k).into_owned();
         let weights = &inverse * &cross;
@@ -108,18 +108,18 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 }
 
 /// What the test moves: the first amplitude whose trial value is not neutral.
-fn tested(candidate: &Placed) -> usize {
+fn tested(candidate: &EffectInstance) -> usize {
     let off = neutral(candidate);
     (0..candidate.len()).find(|&i| candidate.p[i] != off.p[i]).unwrap_or(0)
 }
 
 /// Sensitivity of the whitened prediction to the tested parameter at neutral, or the whole difference that the effect makes.
 fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    problem: &Problem<A, N, P>,
+    problem: &FitProblem<A, N, P>,
     base: &Hypothesis<P>,
     residual: &[f64],
     before: f64,
-    candidate: &Placed,
+    candidate: &EffectInstance,
 ) -> (Vec<f64>, Option<f64>) {
     let i = tested(candidate);
     let (moved, step) = match candidate.law.spec().trial {
@@ -129,36 +129,42 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             moved.p[i] += step;
             (moved, step)
         }
-        Trial::Ray => (Placed { p: candidate.p.map(|x| TRIAL * x), ..*candidate }, TRIAL),
-        Trial::Whole | Trial::Event => (*candidate, 1.0),
+        Trial::Ray => (EffectInstance { p: candidate.p.map(|x| TRIAL * x), ..*candidate }, TRIAL),
+        Trial::Whole | Trial::Disturbance => (*candidate, 1.0),
     };
     let there = problem.residual(&base.with(moved));
-    problem.watch.unit();
+    problem.progress.unit();
     // What begins beyond a threshold may show in few windows, which weigh next to nothing until it explains them.
-    let direct = (candidate.law.spec().trial == Trial::Whole).then(|| before - tempered(problem, &there));
+    let direct =
+        (candidate.law.spec().trial == Trial::Whole).then(|| before - student_t_total(problem, &there));
     (residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect(), direct)
 }
 
-/// Tempered cost of a residual.
-fn tempered<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    problem: &Problem<A, N, P>,
+/// Student-t cost of a residual, summed over the windows.
+fn student_t_total<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    problem: &FitProblem<A, N, P>,
     residual: &[f64],
 ) -> f64 {
-    problem.metric.costs(problem.data, residual).into_iter().map(|c| problem.metric.tempered(c)).sum()
+    problem
+        .weighting
+        .costs(problem.data, residual)
+        .into_iter()
+        .map(|c| problem.weighting.student_t_cost(c))
+        .sum()
 }
 
 /// The test of one candidate; a parameter that would have to cross its bound has nothing to gain.
-fn scored(effect: &Placed, raw: f64, information: f64, slope: f64, scatter: f64) -> Scored {
+fn scored(effect: &EffectInstance, raw: f64, information: f64, slope: f64, scatter: f64) -> ScoreTest {
     let estimate = slope / information;
     let mut suggested = *effect;
     let admissible = match effect.law.spec().trial {
         Trial::Amplitudes(_) => {
             let i = tested(effect);
             let parameter = &effect.law.spec().parameters[i];
-            let start = (effect.p[i] - parameter.neutral).abs();
+            let initial_guess = (effect.p[i] - parameter.neutral).abs();
             let most =
                 (parameter.neutral + estimate).clamp(parameter.lower, parameter.upper) - parameter.neutral;
-            suggested.p[i] = parameter.neutral + most.clamp(-20.0 * start, 20.0 * start);
+            suggested.p[i] = parameter.neutral + most.clamp(-20.0 * initial_guess, 20.0 * initial_guess);
             most
         }
         Trial::Ray => {
@@ -167,10 +173,10 @@ fn scored(effect: &Placed, raw: f64, information: f64, slope: f64, scatter: f64)
             share
         }
         // A share of the whole difference, from none to all of it.
-        Trial::Whole | Trial::Event => estimate.clamp(0.0, 1.0),
+        Trial::Whole | Trial::Disturbance => estimate.clamp(0.0, 1.0),
     };
     let gain = if raw > 0.0 { (2.0 * slope - information * admissible) * admissible } else { 0.0 };
-    Scored {
+    ScoreTest {
         effect: suggested,
         gain: if gain.is_finite() { gain.max(0.0) } else { 0.0 },
         estimate,
@@ -183,14 +189,14 @@ fn scored(effect: &Placed, raw: f64, information: f64, slope: f64, scatter: f64)
     }
 }
 
-impl Scored {
+impl ScoreTest {
     /// By how much the tested parameter of the suggestion differs from neutral, in the units of the test.
-    fn admissible(&self, candidate: &Placed) -> f64 {
+    fn admissible(&self, candidate: &EffectInstance) -> f64 {
         let i = tested(candidate);
         match candidate.law.spec().trial {
             Trial::Amplitudes(_) => self.effect.p[i] - candidate.law.spec().parameters[i].neutral,
             Trial::Ray => self.effect.p[i] / candidate.p[i],
-            Trial::Whole | Trial::Event => 1.0,
+            Trial::Whole | Trial::Disturbance => 1.0,
         }
     }
 }

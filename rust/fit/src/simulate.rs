@@ -1,18 +1,18 @@
 //! Simulation of a hypothesis under given torques, with sub-steps chosen from an error tolerance.
 
 use crate::arm::WithArm;
-use crate::model::{Hypothesis, Placed};
-use crate::progress::{Watch, Work};
+use crate::model::{EffectInstance, Hypothesis};
+use crate::progress::{Phase, ProgressReporter};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Pulse, interval};
+use armgap_core::effect::{InputSegment, interval};
 use armgap_core::integrate::{Interval, State, advance};
-use armgap_core::pose::Place;
+use armgap_core::kinematics::JointState;
 use nalgebra::SVector;
 
 /// Sub-steps per sample beyond which a tolerance is given up.
 const MAX_SUBSTEPS: usize = 256;
 
-/// Samples between two looks at who looks on.
+/// Samples between two progress/cancellation checks.
 const LOOK: usize = 4096;
 
 /// A simulation to be run.
@@ -27,13 +27,13 @@ pub struct Simulation<'a> {
     /// Velocities at the first sample.
     pub dq0: &'a [f64],
     /// Effects with their values.
-    pub effects: &'a [Placed],
+    pub effects: &'a [EffectInstance],
     /// Largest admissible change of any position when the sub-steps are halved.
     pub tolerance: f64,
     /// Width of the smoothed sign, rad/s; zero for exact dry friction.
     pub smoothing: f64,
-    /// Who looks on.
-    pub watch: &'a Watch,
+    /// Progress report and cancellation.
+    pub progress: &'a ProgressReporter,
 }
 
 /// Positions and velocities at the samples, row by row.
@@ -115,10 +115,10 @@ impl Simulation<'_> {
         hypothesis: &Hypothesis<P>,
         substeps: usize,
     ) -> Result<Trajectory, SimulationError> {
-        self.watch.begin(Work::Simulate, self.t.len() / LOOK);
+        self.progress.begin(Phase::Simulate, self.t.len() / LOOK);
         let plant = hypothesis.plant(arm).ok_or(SimulationError::Effects)?;
-        let held: Vec<[Pulse<f64>; N]> =
-            self.tau.chunks_exact(N).map(|row| std::array::from_fn(|j| Pulse::held(row[j]))).collect();
+        let held: Vec<[InputSegment<f64>; N]> =
+            self.tau.chunks_exact(N).map(|row| std::array::from_fn(|j| InputSegment::held(row[j]))).collect();
         let torque = hypothesis.command(self.t, &held, &[], &[]).unwrap_or(held);
         let start = |x: &[f64]| SVector::<f64, N>::from_fn(|j, _| x[j]);
         let mut state = State::new(start(self.q0), start(self.dq0));
@@ -126,7 +126,7 @@ impl Simulation<'_> {
         let (mut q, mut dq) = (Vec::with_capacity(n * N), Vec::with_capacity(n * N));
         for k in 0..n {
             if k % LOOK == LOOK - 1 {
-                self.watch.unit();
+                self.progress.unit();
             }
             if !state.is_finite() {
                 return Err(SimulationError::Diverged(k));
@@ -140,16 +140,16 @@ impl Simulation<'_> {
     }
 }
 
-/// Inertia matrices of an arm with effects at the poses `q`, row by row.
+/// Inertia matrices of an arm with effects at the positions `q`, row by row.
 #[derive(Debug, Clone)]
-pub struct Inertia<'a> {
+pub struct InertiaMatrices<'a> {
     /// Positions.
     pub q: &'a [f64],
     /// Effects with their values.
-    pub effects: &'a [Placed],
+    pub effects: &'a [EffectInstance],
 }
 
-impl WithArm for Inertia<'_> {
+impl WithArm for InertiaMatrices<'_> {
     type Output = Option<Vec<f64>>;
 
     /// All entries of all matrices by rows; none for more effects than a plant carries.
@@ -161,8 +161,8 @@ impl WithArm for Inertia<'_> {
         let hypothesis = Hypothesis { effects: self.effects.to_vec(), ..Hypothesis::rigid(theta) };
         let plant = hypothesis.plant::<A, N>(&arm)?;
         let at = |q: &[f64]| {
-            let place = Place { q: std::array::from_fn(|j| q[j]), dq: [0.0; N] };
-            plant.rigid().balance(&place).inertia
+            let joints = JointState { q: std::array::from_fn(|j| q[j]), dq: [0.0; N] };
+            plant.rigid().equation_terms(&joints).inertia
         };
         Some(self.q.chunks_exact(N).flat_map(|q| at(q).into_iter().flatten()).collect())
     }

@@ -56,13 +56,13 @@ pub fn local_cubic(t: &[f64], q: impl Fn(usize) -> f64, at: usize, half: usize) 
         q(k) - base - (c[0] + x * (c[1] + x * (c[2] + x * c[3])))
     };
     let squares: f64 = (first..first + count).map(|k| left(k).powi(2)).sum();
-    let freedom = count.saturating_sub(4);
+    let degrees_of_freedom = count.saturating_sub(4);
     Local {
         q: base + c[0],
         dq: c[1] / scale,
         ddq: 2.0 * c[2] / (scale * scale),
         covariance: [inverse[(0, 0)], inverse[(0, 1)] / scale, inverse[(1, 1)] / (scale * scale)],
         ddq_variance: 4.0 * inverse[(2, 2)] / scale.powi(4),
-        misfit: if freedom > 0 { squares / freedom as f64 } else { 0.0 },
+        misfit: if degrees_of_freedom > 0 { squares / degrees_of_freedom as f64 } else { 0.0 },
     }
 }

@@ -1,14 +1,14 @@
 //! Gauss-Newton with Levenberg's damping over the arm's parameters and the effects' together (output error).
 //!
-//! Minimises `cost = |residual|^2 (metric) + |(theta - nominal) / sigma|^2`, where the second term is the arm file's own trust in its
-//! values, over the free values within their bounds.
+//! Minimises `cost = |residual|^2 (weighted) + |(theta - nominal) / sigma|^2`, where the second term is the prior, from the arm
+//! file's values and sigmas, over the free values within their bounds.
 
-use crate::metric::{Gram, Metric};
-use crate::model::{Hypothesis, Placed};
-use crate::progress::Watch;
+use crate::covariance::ParameterCovariance;
+use crate::jacobian::{Jacobian, Linearisation};
+use crate::model::{EffectInstance, Hypothesis};
+use crate::progress::ProgressReporter;
 use crate::scale::Scales;
-use crate::slopes::{Point, Slopes};
-use crate::spread::Spread;
+use crate::weighting::{Gram, Weighting};
 use crate::window::Dataset;
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
@@ -18,13 +18,13 @@ use rayon::prelude::*;
 /// Relative displacement for sensitivities; events are located to 1e-12, so a forward difference is good to 1e-6.
 const RELATIVE_STEP: f64 = 1e-6;
 
-/// Where the cost falls as foreseen to within this part of what ends a search, the sensitivities still hold where the step has led.
+/// Where the cost falls as predicted to within this part of what ends a search, the Jacobian is reused at the new point.
 const FORESEEN: f64 = 0.5;
 
-/// Sensitivities that still hold end a search if they foresee a fall of less than this part of what ends it.
+/// A reused Jacobian ends a search if it predicts a decrease of less than this part of what ends it.
 const LEAST: f64 = 0.1;
 
-/// Sensitivities taken over from a neighbour serve on where the cost falls as foreseen to within this part of the fall.
+/// Columns reused from a neighbour are reused again where the cost falls as predicted to within this part of the decrease.
 const SERVES: f64 = 0.25;
 
 /// How far a search is taken.
@@ -34,37 +34,37 @@ pub struct Effort {
     pub iterations: usize,
     /// A decrease of the cost by less than this part of it ends the search.
     pub enough: f64,
-    /// Whether the sensitivities of an earlier point may end it.
-    pub thrifty: bool,
+    /// Whether the Jacobian of an earlier point may be reused and end the search.
+    pub reuse_jacobian: bool,
 }
 
 impl Effort {
     /// Far enough to rank candidates.
-    pub const ROUGH: Self = Self { iterations: 4, enough: 1e-2, thrifty: true };
+    pub const ROUGH: Self = Self { iterations: 4, enough: 1e-2, reuse_jacobian: true };
     /// To the minimum.
-    pub const FULL: Self = Self { iterations: 15, enough: 1e-4, thrifty: false };
+    pub const FULL: Self = Self { iterations: 15, enough: 1e-4, reuse_jacobian: false };
 }
 
-/// Trusted values of the arm's parameters.
+/// Prior of the arm's parameters.
 #[derive(Debug, Clone, Copy)]
 pub struct Prior<const P: usize> {
     /// Values of the arm file.
     pub theta: [f64; P],
-    /// One-sigma trust in them.
+    /// Their standard deviations.
     pub sigma: [f64; P],
     /// How many of the first parameters are inertial; the rest is friction and may not be negative.
     pub inertial: usize,
 }
 
 impl<const P: usize> Prior<P> {
-    /// Squared distance from the trusted values in units of sigma.
+    /// Prior cost: squared distance from the arm file's values in units of sigma.
     pub fn cost(&self, theta: &[f64; P]) -> f64 {
         (0..P).map(|i| ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2)).sum()
     }
 }
 
 /// Data and the weights to judge them by.
-pub struct Problem<'a, A, const N: usize, const P: usize> {
+pub struct FitProblem<'a, A, const N: usize, const P: usize> {
     /// The arm.
     pub arm: &'a A,
     /// Logs cut into windows.
@@ -72,13 +72,13 @@ pub struct Problem<'a, A, const N: usize, const P: usize> {
     /// Measured positions of the windows.
     pub measured: &'a [f64],
     /// Weights.
-    pub metric: &'a Metric<N>,
-    /// Trusted values.
+    pub weighting: &'a Weighting<N>,
+    /// Prior of the arm's parameters.
     pub prior: &'a Prior<P>,
     /// Typical sizes of the effects' parameters.
     pub scales: &'a Scales<N>,
-    /// Who looks on.
-    pub watch: &'a Watch,
+    /// Progress report and cancellation.
+    pub progress: &'a ProgressReporter,
 }
 
 /// The end of a search.
@@ -88,39 +88,39 @@ pub struct Fit<const P: usize> {
     pub hypothesis: Hypothesis<P>,
     /// Cost of the data.
     pub data_cost: f64,
-    /// Cost of the distance from trusted values.
+    /// Prior cost.
     pub prior_cost: f64,
-    /// How far the free values may be off.
-    pub spread: Spread,
+    /// Covariance of the free values.
+    pub covariance: ParameterCovariance,
     /// Cost of every window as it is.
     pub costs: Vec<f64>,
-    /// Whether it was taken to its end with sensitivities of its own.
-    pub own: bool,
+    /// Whether the last Jacobian was its own, without reused columns.
+    pub own_jacobian: bool,
 }
 
 impl<const P: usize> Fit<P> {
     /// Standard deviation of the free value `i`.
     pub fn sigma(&self, i: usize) -> f64 {
-        self.spread.covariance[(i, i)].max(0.0).sqrt()
+        self.covariance.matrix[(i, i)].max(0.0).sqrt()
     }
 }
 
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> {
     /// Whitened residual, measured minus predicted.
     pub fn residual(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
-        self.watch.check();
-        let predicted = self.data.predict(self.arm, hypothesis, &self.metric.starts);
-        self.metric.residual(self.measured, &predicted)
+        self.progress.check();
+        let predicted = self.data.predict(self.arm, hypothesis, &self.weighting.offsets);
+        self.weighting.residual(self.measured, &predicted)
     }
 
-    /// Tempered cost of every window.
+    /// Student-t cost of every window.
     pub fn window_costs(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
-        self.raw_costs(hypothesis).into_iter().map(|cost| self.metric.tempered(cost)).collect()
+        self.raw_costs(hypothesis).into_iter().map(|cost| self.weighting.student_t_cost(cost)).collect()
     }
 
     /// Cost of every window as it is.
     pub fn raw_costs(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
-        self.metric.costs(self.data, &self.residual(hypothesis))
+        self.weighting.costs(self.data, &self.residual(hypothesis))
     }
 
     /// Whitened sensitivities of the prediction to the free values `which`, given the residual at `hypothesis`.
@@ -143,8 +143,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
             .collect()
     }
 
-    /// Whitened sensitivities of the prediction to all free values.
-    pub fn slopes(&self, hypothesis: &Hypothesis<P>) -> Vec<Vec<f64>> {
+    /// Whitened Jacobian of the prediction by all free values.
+    pub fn jacobian(&self, hypothesis: &Hypothesis<P>) -> Vec<Vec<f64>> {
         let all: Vec<usize> = (0..hypothesis.values().len()).collect();
         self.sensitivities(hypothesis, &self.residual(hypothesis), &all)
     }
@@ -187,62 +187,70 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
         (lower, upper)
     }
 
-    /// Minimises the cost from `start`, over all free values.
-    pub fn solve(&self, start: &Hypothesis<P>, effort: Effort) -> Fit<P> {
-        self.solve_beside(start, effort, &[])
+    /// Minimises the cost from `initial_guess`, over all free values.
+    pub fn solve(&self, initial_guess: &Hypothesis<P>, effort: Effort) -> Fit<P> {
+        self.solve_reusing(initial_guess, effort, &[])
     }
 
-    /// The same beside a neighbour, whose sensitivities to the first values serve as long as the cost falls as they foresee.
-    pub fn solve_beside(&self, start: &Hypothesis<P>, effort: Effort, known: &[Vec<f64>]) -> Fit<P> {
-        let (lower, upper) = self.bounds(start);
-        let mut at = Point::new(self, start.clone());
+    /// Minimises the cost from `initial_guess`, reusing a neighbour's Jacobian columns `known` for the first values as long as the cost falls as
+    /// they predict.
+    pub fn solve_reusing(&self, initial_guess: &Hypothesis<P>, effort: Effort, known: &[Vec<f64>]) -> Fit<P> {
+        let (lower, upper) = self.bounds(initial_guess);
+        let mut at = Linearisation::new(self, initial_guess.clone());
         let mut damping = 1e-4;
-        let mut slopes = Slopes::beside(self, &at, known);
+        let mut jacobian = Jacobian::reusing(self, &at, known);
         'search: for _ in 0..effort.iterations {
-            let (normal, gradient) = self.normal_equations(&slopes.gram, &at.hypothesis);
+            let (normal, gradient) = self.normal_equations(&jacobian.gram, &at.hypothesis);
             let now = at.hypothesis.values();
             let mut fall = None;
             for _ in 0..6 {
                 let values = inside(&now, step(&normal, &gradient, damping, &now, &lower, &upper), &lower, P);
                 let change = DVector::from_fn(now.len(), |i, _| values[i] - now[i]);
                 let foreseen = change.dot(&(2.0 * &gradient - &normal * &change));
-                if slopes.followed && foreseen < LEAST * effort.enough * at.cost() {
+                if jacobian.is_reused && foreseen < LEAST * effort.enough * at.cost() {
                     break 'search;
                 }
-                let trial = Point::new(self, at.hypothesis.with_values(&values));
+                let trial = Linearisation::new(self, at.hypothesis.with_values(&values));
                 if trial.cost() < at.cost() {
                     fall = Some((at.cost() - trial.cost(), foreseen));
                     at = trial;
                     damping = (damping * 0.1).max(1e-9);
                     break;
                 }
-                if !slopes.are_own() {
+                if !jacobian.is_current() {
                     break;
                 }
                 damping = (damping * 10.0).min(1e6);
             }
             let enough = effort.enough * at.cost();
             match fall {
-                None if !slopes.are_own() => slopes = Slopes::new(self, &at),
+                None if !jacobian.is_current() => jacobian = Jacobian::new(self, &at),
                 Some((fall, foreseen)) if fall > enough => {
                     let missed = (fall - foreseen).abs();
-                    if effort.thrifty && missed < FORESEEN * enough {
-                        slopes.follow(self, &at);
+                    if effort.reuse_jacobian && missed < FORESEEN * enough {
+                        jacobian.reuse_at(self, &at);
                         continue;
                     }
-                    slopes = if missed < SERVES * foreseen && slopes.lent() > 0 {
-                        Slopes::beside(self, &at, known)
+                    jacobian = if missed < SERVES * foreseen && jacobian.reused_columns() > 0 {
+                        Jacobian::reusing(self, &at, known)
                     } else {
-                        Slopes::new(self, &at)
+                        Jacobian::new(self, &at)
                     };
                 }
                 _ => break,
             }
         }
-        self.watch.unit();
-        let spread = self.spread(&slopes.gram, &at);
-        let Point { hypothesis, data_cost, prior_cost, costs, .. } = at;
-        Fit { hypothesis, data_cost, prior_cost, spread, costs, own: slopes.lent() == 0 }
+        self.progress.unit();
+        let covariance = self.covariance(&jacobian.gram, &at);
+        let Linearisation { hypothesis, data_cost, prior_cost, costs, .. } = at;
+        Fit {
+            hypothesis,
+            data_cost,
+            prior_cost,
+            covariance,
+            costs,
+            own_jacobian: jacobian.reused_columns() == 0,
+        }
     }
 
     /// Normal matrix and right-hand side, the prior included.
@@ -258,13 +266,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Problem<'_, A, N, P> {
         (normal, gradient)
     }
 
-    /// How far the values may be off.
-    fn spread(&self, gram: &Gram, at: &Point<P>) -> Spread {
+    /// Covariance of the free values.
+    fn covariance(&self, gram: &Gram, at: &Linearisation<P>) -> ParameterCovariance {
         let (lower, upper) = self.bounds(&at.hypothesis);
-        let trust: Vec<f64> =
+        let prior_precision: Vec<f64> =
             (0..lower.len()).map(|i| if i < P { self.prior.sigma[i].powi(-2) } else { 0.0 }).collect();
         let range: Vec<f64> = lower.iter().zip(&upper).map(|(l, u)| u - l).collect();
-        Spread::new(gram, &trust, &range)
+        ParameterCovariance::new(gram, &prior_precision, &range)
     }
 }
 
@@ -322,13 +330,13 @@ pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// The effect switched off: its amplitudes at neutral, its shape as it is.
-pub fn neutral(effect: &Placed) -> Placed {
+pub fn neutral(effect: &EffectInstance) -> EffectInstance {
     let mut off = *effect;
     let spec = effect.law.spec();
     let amplitudes = match spec.trial {
         Trial::Amplitudes(count) => count,
         Trial::Ray => off.len(),
-        Trial::Whole | Trial::Event => 1,
+        Trial::Whole | Trial::Disturbance => 1,
     };
     for (value, parameter) in off.p.iter_mut().zip(spec.parameters).take(amplitudes) {
         *value = parameter.neutral;

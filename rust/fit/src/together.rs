@@ -1,100 +1,100 @@
 //! Two causes at once: either leaves so much of the gap to the other that neither is accepted alone.
 //!
 //! A cause is judged by the part of the gap it removes. Of two of the same size each removes a half of it at most, and if the windows
-//! weigh by the worse of the two, much less. So before a search ends beside an open gap, the best contenders are each taken on trust:
+//! weigh by the worse of the two, much less. So before a search ends beside an open gap, the best candidates are each taken on trust:
 //! if another then closes nearly all of the gap, and neither can be spared, both are causes.
 
-use crate::attribute::{Contender, Stage};
+use crate::acceptance::{CERTAIN, Ground, best, brings_back, choose, is_possible, moves};
+use crate::attribute::{Candidate, SearchNode};
 use crate::belief::{Cause, name};
-use crate::decide::{CERTAIN, Ground, best, brings_back, choose, is_possible, moves};
-use crate::model::Placed;
+use crate::context::DiagnosisContext;
+use crate::model::EffectInstance;
 use crate::solve::Effort;
-use crate::study::Study;
 use armgap_core::arm::Arm;
 
 /// Part of the gap above the floor that two effects must explain to be accepted together.
 const NEARLY_ALL: f64 = 0.85;
 
-/// Contenders that are taken on trust.
+/// Candidates that are taken on trust.
 const TRIED: usize = 3;
 
-/// Mean advantage, in standard errors, below which a contender is not worth that, unless it brings implausible parameters back to
-/// their trusted values.
+/// Mean advantage, in standard errors, below which a candidate is not worth that, unless it brings implausible parameters back to
+/// their prior values.
 const HOPEFUL: f64 = 1.5;
 
-/// Two causes and the stage in which the second was found.
+/// Two causes and the node in which the second was found.
 pub struct Both<const N: usize, const P: usize> {
     /// Both, in the order in which they were found.
     pub causes: [Cause; 2],
-    /// The stage beside the first cause.
-    pub stage: Stage<N, P>,
+    /// The node beside the first cause.
+    pub node: SearchNode<N, P>,
     /// The second cause in it.
     pub choice: usize,
 }
 
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// The two effects that explain together what none explains alone; the first of them is not `but`.
     pub fn together(
         &self,
-        alone: &Stage<N, P>,
-        but: Option<&Placed>,
-        noticeable: f64,
+        alone: &SearchNode<N, P>,
+        but: Option<&EffectInstance>,
+        min_relevance: f64,
         seed: u64,
     ) -> Option<Both<N, P>> {
-        if !alone.is_worth_more(noticeable) {
+        if !alone.is_worth_more(min_relevance) {
             return None;
         }
-        let other = |e: &Placed| but.is_none_or(|but| !e.same_place(but));
-        let hopeful = |c: &&Contender<P>| {
+        let other = |e: &EffectInstance| but.is_none_or(|but| !e.same_place(but));
+        let hopeful = |c: &&Candidate<P>| {
             c.effect.as_ref().is_some_and(other)
                 && alone.shows(c.effect.as_ref())
                 && is_possible(c)
                 && (c.z_over(&alone.base) > HOPEFUL || brings_back(alone, c))
         };
         alone
-            .contenders
+            .candidates
             .iter()
             .filter(hopeful)
             .take(TRIED)
-            .find_map(|first| self.beside(alone, first, noticeable, seed))
+            .find_map(|first| self.beside(alone, first, min_relevance, seed))
     }
 
     /// The effect that explains the rest beside `first`, if both are needed.
     fn beside(
         &self,
-        alone: &Stage<N, P>,
-        first: &Contender<P>,
-        noticeable: f64,
+        alone: &SearchNode<N, P>,
+        first: &Candidate<P>,
+        min_relevance: f64,
         seed: u64,
     ) -> Option<Both<N, P>> {
-        let stage = self.stage(&first.fit.hypothesis, alone.weights.training.scale, noticeable);
-        let (choice, ground) = choose(&stage, true, noticeable)?;
-        let pair = &stage.contenders[choice];
+        let node = self.node(&first.fit.hypothesis, alone.weights.training.scale, min_relevance);
+        let (choice, ground) = choose(&node, true, min_relevance)?;
+        let pair = &node.candidates[choice];
         let none = &alone.settled.hypothesis;
-        let base = self.contender(&stage.weights, none, none.effects.len(), Effort::FULL, &[]);
-        let whole = Stage {
+        let base = self.candidate(&node.weights, none, none.effects.len(), Effort::FULL, &[]);
+        let whole = SearchNode {
             settled: alone.settled.clone(),
             base,
-            contenders: Vec::new(),
+            candidates: Vec::new(),
             field: Vec::new(),
             screened: Vec::new(),
-            weights: stage.weights.clone(),
-            floor: stage.floor,
-            motion: stage.motion,
+            weights: node.weights.clone(),
+            floor: node.floor,
+            motion: node.motion,
         };
-        if ground != Ground::Motion || whole.share(pair) < NEARLY_ALL || !moves(&whole, pair, noticeable) {
+        if ground != Ground::Motion || whole.share(pair) < NEARLY_ALL || !moves(&whole, pair, min_relevance) {
             return None;
         }
         let mut without = pair.fit.hypothesis.clone();
         without.effects.remove(none.effects.len());
-        let again = self.stage(&without, stage.weights.training.scale, noticeable);
-        let (found, needed) = match choose(&again, true, noticeable) {
+        let again = self.node(&without, node.weights.training.scale, min_relevance);
+        let (found, needed) = match choose(&again, true, min_relevance) {
             Some((found, Ground::Trust)) => (found, Ground::Trust),
             _ => (best(&again, true)?, Ground::Motion),
         };
-        let certain = needed == Ground::Trust || again.contenders[found].z_over(&again.base) > CERTAIN;
-        let same = again.contenders[found].effect?.same_place(&first.effect?);
-        let causes = [name(&again, found, needed, seed), name(&stage, choice, ground, seed)];
-        (same && certain).then_some(Both { causes, stage, choice })
+        let certain = needed == Ground::Trust || again.candidates[found].z_over(&again.base) > CERTAIN;
+        let same = again.candidates[found].effect?.same_place(&first.effect?);
+        let causes = [name(&again, found, needed, seed), name(&node, choice, ground, seed)];
+        (same && certain).then_some(Both { causes, node, choice })
     }
 }

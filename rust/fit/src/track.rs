@@ -1,9 +1,9 @@
 //! One log, ready to be simulated against: times, positions, held torques, and what its noise looks like.
 
-use crate::model::Placed;
-use crate::observe::Moving;
+use crate::latent_states::MeasuredState;
+use crate::model::EffectInstance;
 use crate::smooth::{Local, local_cubic};
-use armgap_core::effect::Pulse;
+use armgap_core::effect::InputSegment;
 use nalgebra::SVector;
 use std::sync::OnceLock;
 
@@ -23,22 +23,22 @@ pub struct Track<const N: usize> {
     /// Measured positions.
     pub q: Vec<SVector<f64, N>>,
     /// Commanded torque, held until the next sample.
-    pub held: Vec<[Pulse<f64>; N]>,
+    pub held: Vec<[InputSegment<f64>; N]>,
     /// Standard deviation of the position measurement, per joint.
     pub noise: [f64; N],
     /// Smallest step of the position measurement, per joint; zero where none is seen.
     pub step: [f64; N],
-    /// Pushes from outside that are known.
-    pub pushes: Vec<Placed>,
-    /// Torque per unit of size of each of the user's own effects, sample by sample.
+    /// Known external disturbances.
+    pub pushes: Vec<EffectInstance>,
+    /// Torque per unit of size of each custom effect, sample by sample.
     pub tables: Vec<Vec<f64>>,
     /// Smoothed motion, once it is asked for.
-    path: OnceLock<Vec<Moving<N>>>,
+    path: OnceLock<Vec<MeasuredState<N>>>,
 }
 
-/// A measured start: position and velocity of each joint with their covariance.
+/// A measured initial state: position and velocity of each joint with their covariance.
 #[derive(Debug, Clone, Copy)]
-pub struct Start<const N: usize> {
+pub struct InitialState<const N: usize> {
     /// Positions.
     pub q: SVector<f64, N>,
     /// Velocities.
@@ -57,7 +57,7 @@ impl<const N: usize> Track<N> {
             name: name.to_owned(),
             t: t.to_vec(),
             q: rows(q).into_iter().map(SVector::from).collect(),
-            held: rows(tau).into_iter().map(|row| row.map(Pulse::held)).collect(),
+            held: rows(tau).into_iter().map(|row| row.map(InputSegment::held)).collect(),
             noise: [0.0; N],
             step: [0.0; N],
             pushes: Vec::new(),
@@ -72,7 +72,7 @@ impl<const N: usize> Track<N> {
         track
     }
 
-    /// The same log with the torques of the user's own effects.
+    /// Adds the torques of the custom effects to the log.
     pub fn with_tables(mut self, tables: Vec<Vec<f64>>) -> Self {
         self.tables = tables;
         self
@@ -114,8 +114,8 @@ impl<const N: usize> Track<N> {
     }
 
     /// The measured state at a sample, from a local cubic in each joint.
-    pub fn start(&self, at: usize) -> Start<N> {
-        let mut start = Start { q: self.q[at], dq: SVector::zeros(), covariance: [[0.0; 3]; N] };
+    pub fn initial_state(&self, at: usize) -> InitialState<N> {
+        let mut start = InitialState { q: self.q[at], dq: SVector::zeros(), covariance: [[0.0; 3]; N] };
         for j in 0..N {
             let local = self.local(j, at);
             let variance = self.noise[j] * self.noise[j];
@@ -126,11 +126,14 @@ impl<const N: usize> Track<N> {
     }
 
     /// Smoothed motion at every sample.
-    pub fn path(&self) -> &[Moving<N>] {
+    pub fn path(&self) -> &[MeasuredState<N>] {
         self.path.get_or_init(|| {
             let moving = |k: usize| {
                 let locals: [Local; N] = std::array::from_fn(|j| self.local(j, k));
-                Moving { q: SVector::from_fn(|j, _| locals[j].q), dq: SVector::from_fn(|j, _| locals[j].dq) }
+                MeasuredState {
+                    q: SVector::from_fn(|j, _| locals[j].q),
+                    dq: SVector::from_fn(|j, _| locals[j].dq),
+                }
             };
             (0..self.len()).map(moving).collect()
         })

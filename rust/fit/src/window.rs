@@ -1,18 +1,18 @@
 //! Short windows cut from logs, and the simulation of a hypothesis over them.
 //!
-//! Every window starts from its measured state and runs under the logged torque; the predicted positions of all windows lie in one
+//! Every window starts from its measured initial state and runs under the logged torque; the predicted positions of all windows lie in one
 //! flat vector, row by row and joint by joint.
 
+use crate::latent_states::latent_states;
 use crate::model::Hypothesis;
-use crate::observe::hidden_states;
-use crate::track::{Start, Track};
+use crate::track::{InitialState, Track};
 use armgap_core::arm::Arm;
 use armgap_core::cpu::Level;
-use armgap_core::effect::Pulse;
+use armgap_core::effect::InputSegment;
 use armgap_core::integrate::{Interval, advance};
 use armgap_core::plant::Plant;
-use armgap_core::rollout::{Run, Together, WIDTH};
-use armgap_core::transmission::Hidden;
+use armgap_core::rollout::{BatchRollout, Run, WIDTH};
+use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
 use rayon::prelude::*;
 
@@ -22,11 +22,11 @@ const DIVERGED: f64 = 1e3;
 /// Sub-steps per sample are capped here; what is too stiff for them is refused by its cost.
 const MAX_SUBSTEPS: usize = 4;
 
-/// The same for motors that swing against their links.
+/// Most sub-steps per sample for motors that oscillate against their links.
 const MAX_SUBSTEPS_DRIVEN: usize = 5;
 
-/// The same for joints that knock against a stop.
-const MAX_SUBSTEPS_KNOCKING: usize = 12;
+/// Most sub-steps per sample for joints that hit a joint limit.
+const MAX_SUBSTEPS_IMPACT: usize = 12;
 
 /// Samples `first ..= last` of one track; row 0 is sample `first + 1`.
 #[derive(Debug, Clone, Copy)]
@@ -39,8 +39,8 @@ pub struct Window<const N: usize> {
     pub last: usize,
     /// Where its rows begin in the flat vector, in rows.
     pub offset: usize,
-    /// Measured start.
-    pub start: Start<N>,
+    /// Measured initial state.
+    pub initial_state: InitialState<N>,
 }
 
 impl<const N: usize> Window<N> {
@@ -67,7 +67,7 @@ pub struct Dataset<const N: usize> {
 }
 
 impl<const N: usize> Dataset<N> {
-    /// The same windows of logs without any known pushes.
+    /// These windows, with all known external disturbances removed from their logs.
     pub fn without_pushes(&self) -> Self {
         let mut bare = self.clone();
         bare.tracks.iter_mut().for_each(|track| track.pushes.clear());
@@ -100,7 +100,13 @@ impl<const N: usize> Dataset<N> {
         let mut rows = 0;
         for (index, track) in tracks.iter().enumerate() {
             for (first, last) in cut(&track.t, horizon) {
-                windows.push(Window { track: index, first, last, offset: rows, start: track.start(first) });
+                windows.push(Window {
+                    track: index,
+                    first,
+                    last,
+                    offset: rows,
+                    initial_state: track.initial_state(first),
+                });
                 rows += last - first;
             }
         }
@@ -120,17 +126,17 @@ impl<const N: usize> Dataset<N> {
             .collect()
     }
 
-    /// Starts as measured.
-    pub fn measured_starts(&self) -> Vec<Shift<N>> {
-        vec![Shift::none(); self.windows.len()]
+    /// Zero offsets: initial states as measured.
+    pub fn zero_offsets(&self) -> Vec<InitialStateOffset<N>> {
+        vec![InitialStateOffset::none(); self.windows.len()]
     }
 
-    /// Predicted positions of all windows, each from its measured start displaced by its entry of `starts`.
+    /// Predicted positions of all windows, each from its measured initial state displaced by its entry of `offsets`.
     pub fn predict<A: Arm<f64, N, P>, const P: usize>(
         &self,
         arm: &A,
         hypothesis: &Hypothesis<P>,
-        starts: &[Shift<N>],
+        offsets: &[InitialStateOffset<N>],
     ) -> Vec<f64> {
         let mut predicted = vec![DIVERGED; self.rows * N];
         let Some(plant) = hypothesis.plant(arm) else {
@@ -141,31 +147,33 @@ impl<const N: usize> Dataset<N> {
             .iter()
             .map(|track| hypothesis.command(&track.t, &track.held, &track.pushes, &track.tables))
             .collect();
-        let hidden = self.hidden(&plant, &commands);
-        let (mut together, mut alone) = (Vec::with_capacity(self.windows.len()), Vec::new());
+        let latent = self.latent(&plant, &commands);
+        let (mut batched, mut scalar) = (Vec::with_capacity(self.windows.len()), Vec::new());
         let mut rest = predicted.as_mut_slice();
-        for (window, shift) in self.windows.iter().zip(starts) {
+        for (window, shift) in self.windows.iter().zip(offsets) {
             let (positions, after) = rest.split_at_mut(window.rows() * N);
             rest = after;
             let track = &self.tracks[window.track];
             let torque = commands[window.track].as_deref().unwrap_or(&track.held);
-            let mut state = hypothesis.start(window.start.q + shift.q, window.start.dq + shift.dq);
-            if let Some(states) = &hidden[window.track] {
-                state.hidden = Hidden { anchor: state.q, ..states[window.first] };
+            let mut state = hypothesis
+                .initial_state(window.initial_state.q + shift.q, window.initial_state.dq + shift.dq);
+            if let Some(states) = &latent[window.track] {
+                state.latent = LatentState { anchor: state.q, ..states[window.first] };
             }
             let (t, torque) = (&track.t[window.first..=window.last], &torque[window.first..window.last]);
-            let runs = if plant.glides() || (plant.is_plain() && !self.is_near_edge(window, &plant)) {
-                &mut together
-            } else {
-                &mut alone
-            };
+            let runs =
+                if plant.only_modes_change() || (plant.is_plain() && !self.is_near_edge(window, &plant)) {
+                    &mut batched
+                } else {
+                    &mut scalar
+                };
             runs.push(Run { plant: &plant, t, torque, state, positions });
         }
         let level = Level::widest();
-        together
+        batched
             .par_chunks_mut(GROUP)
-            .for_each(|group| Together { runs: group, limit: DIVERGED }.make(level));
-        alone.par_chunks_mut(WIDTH).for_each(|group| group.iter_mut().for_each(make_alone));
+            .for_each(|group| BatchRollout { runs: group, limit: DIVERGED }.run_all(level));
+        scalar.par_chunks_mut(WIDTH).for_each(|group| group.iter_mut().for_each(run_scalar));
         if hypothesis.distorts() {
             for row in predicted.chunks_exact_mut(N) {
                 for (j, q) in row.iter_mut().enumerate().filter(|(_, q)| **q < DIVERGED) {
@@ -191,35 +199,35 @@ impl<const N: usize> Dataset<N> {
         })
     }
 
-    /// Hidden states of every track's samples, up to the start of its last window; none for a plant without any.
-    fn hidden<A: Arm<f64, N, P>, const P: usize>(
+    /// Latent states at every track's samples, up to the start of its last window; none for a plant without any.
+    fn latent<A: Arm<f64, N, P>, const P: usize>(
         &self,
         plant: &Plant<f64, A, N, P>,
-        commands: &[Option<Vec<[Pulse<f64>; N]>>],
-    ) -> Vec<Option<Vec<Hidden<f64, N>>>> {
+        commands: &[Option<Vec<[InputSegment<f64>; N]>>],
+    ) -> Vec<Option<Vec<LatentState<f64, N>>>> {
         let of = |(index, track): (usize, &Track<N>)| {
             let last = self.windows.iter().filter(|w| w.track == index).map(|w| w.first).max()?;
-            if !plant.drives().any() && !plant.remembers() {
+            if !plant.drivetrain().any() && !plant.has_hysteresis() {
                 return None;
             }
             let torque = commands[index].as_deref().unwrap_or(&track.held);
-            Some(hidden_states(track, plant, torque, last))
+            Some(latent_states(track, plant, torque, last))
         };
         self.tracks.iter().enumerate().map(of).collect()
     }
 }
 
-/// A displacement of a window's start state.
+/// An offset of a window's initial state.
 #[derive(Debug, Clone, Copy)]
-pub struct Shift<const N: usize> {
+pub struct InitialStateOffset<const N: usize> {
     /// Added to the positions.
     pub q: SVector<f64, N>,
     /// Added to the velocities.
     pub dq: SVector<f64, N>,
 }
 
-impl<const N: usize> Shift<N> {
-    /// No displacement.
+impl<const N: usize> InitialStateOffset<N> {
+    /// No offset.
     pub fn none() -> Self {
         Self { q: SVector::zeros(), dq: SVector::zeros() }
     }
@@ -231,10 +239,10 @@ const NEAR_EDGE: f64 = 0.3;
 /// Runs that share the lanes of one vector unit: enough that few lanes are idle at the end.
 const GROUP: usize = 4 * WIDTH;
 
-/// Makes one run, in as many steps per sample as its plant needs.
-fn make_alone<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
-    let most = match (run.plant.jumps(), run.plant.drives().any()) {
-        (true, _) => MAX_SUBSTEPS_KNOCKING,
+/// Simulates one run by the scalar integrator, in as many steps per sample as its plant needs.
+fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
+    let most = match (run.plant.jumps(), run.plant.drivetrain().any()) {
+        (true, _) => MAX_SUBSTEPS_IMPACT,
         (false, true) => MAX_SUBSTEPS_DRIVEN,
         (false, false) => MAX_SUBSTEPS,
     };

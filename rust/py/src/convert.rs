@@ -1,9 +1,9 @@
 //! Descriptions that both sides share: kinds of arm, effects, and their parameters.
 
-use armgap_core::arm::{Kind, LinkParameters, TwoLink};
+use armgap_core::arm::{ArmKind, LinkParameters, TwoLink};
 use armgap_core::effect::{Scope, catalogue, find};
 use armgap_fit::arm::ArmDescription;
-use armgap_fit::model::Placed;
+use armgap_fit::model::EffectInstance;
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 #[pyfunction]
 pub fn arm_kinds(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     let list = PyList::empty(py);
-    for kind in Kind::ALL {
+    for kind in ArmKind::ALL {
         let entry = PyDict::new(py);
         entry.set_item("kind", kind.name())?;
         entry.set_item("n_joints", kind.joints())?;
@@ -73,12 +73,12 @@ pub fn theta_from_links<'py>(
     let kind = kind_of(kind)?;
     let wrong = || PyValueError::new_err(format!("links of a {} need one entry per joint", kind.name()));
     let theta = match kind {
-        Kind::Axis => vec![one(&mass).ok_or_else(wrong)?, 0.0],
-        Kind::Pendulum => {
+        ArmKind::Axis => vec![one(&mass).ok_or_else(wrong)?, 0.0],
+        ArmKind::Pendulum => {
             let (m, c) = (one(&mass).ok_or_else(wrong)?, one(&com).ok_or_else(wrong)?);
             vec![m * c * c + one(&inertia).ok_or_else(wrong)?, m * gravity * c]
         }
-        Kind::TwoLink => {
+        ArmKind::TwoLink => {
             let two = |x: Vec<f64>| <[f64; 2]>::try_from(x).map_err(|_| wrong());
             let links = LinkParameters {
                 mass: two(mass)?,
@@ -97,18 +97,18 @@ fn one(x: &[f64]) -> Option<f64> {
 }
 
 /// A kind by name.
-pub fn kind_of(name: &str) -> PyResult<Kind> {
-    let known: Vec<&str> = Kind::ALL.iter().map(|k| k.name()).collect();
-    Kind::from_name(name).ok_or_else(|| {
+pub fn kind_of(name: &str) -> PyResult<ArmKind> {
+    let known: Vec<&str> = ArmKind::ALL.iter().map(|k| k.name()).collect();
+    ArmKind::from_name(name).ok_or_else(|| {
         PyValueError::new_err(format!("unknown kind of arm `{name}`; known: {}", known.join(", ")))
     })
 }
 
 /// Effects given as `(name, 1-based joint or None, {parameter: value})`.
-pub fn placed(
-    kind: Kind,
+pub fn effect_instances(
+    kind: ArmKind,
     effects: Vec<(String, Option<usize>, BTreeMap<String, f64>)>,
-) -> PyResult<Vec<Placed>> {
+) -> PyResult<Vec<EffectInstance>> {
     effects
         .into_iter()
         .map(|(name, joint, values)| {
@@ -147,7 +147,7 @@ pub fn placed(
             {
                 return Err(PyValueError::new_err(format!("`{name}` has no parameter `{extra}`")));
             }
-            Ok(Placed { law, joint, p })
+            Ok(EffectInstance { law, joint, p })
         })
         .collect()
 }

@@ -1,14 +1,15 @@
 //! `diagnose`.
 
 use crate::convert::{description, matrix, vector};
-use crate::watched::watched;
+use crate::progress::with_progress;
 use armgap_fit::diagnose::{LogData, Options, diagnose as run};
+use armgap_fit::refit::refit as rigid_fit;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Name, times, positions, torques, and the torques of the user's own effects.
+/// Name, times, positions, torques, and the torques of the custom effects.
 type PyLog<'py> = (
     String,
     PyReadonlyArray1<'py, f64>,
@@ -24,6 +25,34 @@ struct Owned {
     q: Vec<f64>,
     tau: Vec<f64>,
     tables: Vec<Vec<f64>>,
+}
+
+/// The arm's parameters estimated again without any effect: `theta`, `sigma`, and per joint the RMS errors `before` and `refit` and
+/// the RMS displacement `motion` on the holdout.
+#[pyfunction]
+pub fn refit<'py>(
+    py: Python<'py>,
+    arm: &Bound<'py, PyDict>,
+    training: Vec<PyLog<'py>>,
+    holdout: Vec<PyLog<'py>>,
+    horizon: f64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let arm = description(arm)?;
+    let n = arm.kind.joints();
+    let training = training.iter().map(|log| copy(log, n)).collect::<PyResult<Vec<_>>>()?;
+    let holdout = holdout.iter().map(|log| copy(log, n)).collect::<PyResult<Vec<_>>>()?;
+    let options = Options { horizon, ..Options::default() };
+    let found = with_progress(py, None, move |observer| {
+        rigid_fit(&arm, &views(&training), &views(&holdout), &options, observer).map_err(|e| e.to_string())
+    })?
+    .map_err(PyValueError::new_err)?;
+    let result = PyDict::new(py);
+    result.set_item("theta", found.theta)?;
+    result.set_item("sigma", found.sigma)?;
+    result.set_item("before", found.before)?;
+    result.set_item("refit", found.refit)?;
+    result.set_item("motion", found.motion)?;
+    Ok(result)
 }
 
 /// The diagnosis of training and holdout logs, as JSON; `progress(title, fraction)` is called now and then.
@@ -49,12 +78,12 @@ pub fn diagnose(
         chosen.max_causes = value.extract()?;
     }
     if let Some(value) = options.get_item("own")? {
-        chosen.own = value.extract()?;
+        chosen.custom_effects = value.extract()?;
     }
     if let Some(value) = options.get_item("seed")? {
         chosen.seed = value.extract()?;
     }
-    let result = watched(py, progress.as_ref(), move |observer| {
+    let result = with_progress(py, progress.as_ref(), move |observer| {
         let (training, holdout) = (views(&training), views(&holdout));
         let diagnosis = run(&arm, &training, &holdout, &chosen, observer).map_err(|e| e.to_string())?;
         serde_json::to_string(&diagnosis).map_err(|e| e.to_string())

@@ -1,8 +1,8 @@
 //! `Estimator`: the online estimator, one sample at a time or over arrays.
 
 use crate::convert::{kind_of, matrix, vector};
-use armgap_core::monitor::Watch;
-use armgap_core::online::{Choice, MOST_PARAMETERS, Online, Problem, Result as Outcome, When};
+use armgap_core::monitor::MonitorSettings;
+use armgap_core::online::{MOST_PARAMETERS, Online, OnlineError, OnlineSettings, SampleStatus, When};
 use armgap_core::real::{Real, lit};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::Form;
@@ -27,8 +27,8 @@ pub struct Estimator {
     joints: usize,
 }
 
-/// What the settings are, in the order of the Python class.
-fn choice<T: Real>(
+/// Settings from arguments in the order of the Python class.
+fn settings<T: Real>(
     kind: &str,
     scheme: &str,
     paper: bool,
@@ -36,7 +36,7 @@ fn choice<T: Real>(
     asymmetry: bool,
     numbers: [f64; 6],
     counts: [u32; 2],
-) -> PyResult<Choice<T>> {
+) -> PyResult<OnlineSettings<T>> {
     let scheme = Scheme::from_name(scheme)
         .ok_or_else(|| PyValueError::new_err(format!("unknown scheme `{scheme}`")))?;
     let form = match form {
@@ -46,24 +46,34 @@ fn choice<T: Real>(
         Some(other) => return Err(PyValueError::new_err(format!("unknown form `{other}`"))),
     };
     let [cutoff, forgetting, p0, memory, between, floor] = numbers.map(lit::<T>);
-    let watch = Watch { memory, settling: counts[0], learning: counts[1], between, floor };
+    let monitor = MonitorSettings { memory, settling: counts[0], learning: counts[1], between, floor };
     let variant = if paper { Variant::Paper } else { Variant::Exact };
-    Ok(Choice { kind: kind_of(kind)?, scheme, variant, form, asymmetry, cutoff, forgetting, p0, watch })
+    Ok(OnlineSettings {
+        kind: kind_of(kind)?,
+        scheme,
+        variant,
+        form,
+        asymmetry,
+        cutoff,
+        forgetting,
+        p0,
+        monitor,
+    })
 }
 
 /// Outcomes in the order of `armgap.estimator.OUTCOMES`.
-fn code(outcome: Outcome) -> u8 {
+fn code(outcome: SampleStatus) -> u8 {
     match outcome {
-        Outcome::Updated => 0,
-        Outcome::Starting => 1,
-        Outcome::Rejected => 2,
+        SampleStatus::Updated => 0,
+        SampleStatus::Starting => 1,
+        SampleStatus::Rejected => 2,
     }
 }
 
-fn complaint(problem: Problem) -> PyErr {
-    PyValueError::new_err(match problem {
-        Problem::Range(name) => format!("`{name}` is outside its range"),
-        Problem::Length { name, expected } => format!("`{name}` needs {expected} values"),
+fn complaint(error: OnlineError) -> PyErr {
+    PyValueError::new_err(match error {
+        OnlineError::Range(name) => format!("`{name}` is outside its range"),
+        OnlineError::Length { name, expected } => format!("`{name}` needs {expected} values"),
     })
 }
 
@@ -78,7 +88,7 @@ fn narrowed(x: &[f64]) -> ([f32; MOST_PARAMETERS], usize) {
 }
 
 impl Any {
-    fn update(&mut self, when: When<f64>, q: &[f64], dq: Option<&[f64]>, tau: &[f64]) -> Outcome {
+    fn update(&mut self, when: When<f64>, q: &[f64], dq: Option<&[f64]>, tau: &[f64]) -> SampleStatus {
         let outcome = match self {
             Self::Double(online) => online.update(when, q, dq, tau),
             Self::Single(online) => {
@@ -93,7 +103,7 @@ impl Any {
             }
         };
         // Lengths are checked where arrays come in.
-        outcome.unwrap_or(Outcome::Rejected)
+        outcome.unwrap_or(SampleStatus::Rejected)
     }
 
     /// Calls with what both precisions have, as doubles.
@@ -166,15 +176,18 @@ impl Estimator {
         theta0: Vec<f64>,
     ) -> PyResult<Self> {
         let any = if single {
-            let choice = choice::<f32>(kind, scheme, paper, form, asymmetry, numbers, counts)?;
+            let settings = settings::<f32>(kind, scheme, paper, form, asymmetry, numbers, counts)?;
             if theta0.len() > MOST_PARAMETERS {
-                return Err(complaint(Problem::Length { name: "theta0", expected: choice.parameters() }));
+                return Err(complaint(OnlineError::Length {
+                    name: "theta0",
+                    expected: settings.parameters(),
+                }));
             }
             let (theta0, count) = narrowed(&theta0);
-            Any::Single(Online::new(choice, &theta0[..count]).map_err(complaint)?)
+            Any::Single(Online::new(settings, &theta0[..count]).map_err(complaint)?)
         } else {
-            let choice = choice::<f64>(kind, scheme, paper, form, asymmetry, numbers, counts)?;
-            Any::Double(Online::new(choice, &theta0).map_err(complaint)?)
+            let settings = settings::<f64>(kind, scheme, paper, form, asymmetry, numbers, counts)?;
+            Any::Double(Online::new(settings, &theta0).map_err(complaint)?)
         };
         Ok(Self { any: Box::new(any), joints: kind_of(kind)?.joints() })
     }

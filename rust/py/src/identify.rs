@@ -1,15 +1,16 @@
 //! `identify` and `velocity`.
 
-use crate::convert::{kind_of, matrix, vector};
+use crate::convert::{description, kind_of, matrix, vector};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_fit::arm::ArmDescription;
 use armgap_fit::identify::{Identification, Velocity};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use armgap_fit::regression_rows::RegressionRows;
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// The course of an estimate over a log.
+/// History of an estimate over a log.
 #[pyfunction]
 pub fn identify<'py>(
     py: Python<'py>,
@@ -42,22 +43,44 @@ pub fn identify<'py>(
     let arm =
         ArmDescription { kind, gravity, theta, sigma, counts_per_rev: None, torque_limit: None, link_length };
     let work = Identification { scheme, variant, cutoff, forgetting, p0, theta0: &theta0, t, q, tau, dq };
-    let course = py
+    let history = py
         .detach(|| arm.dispatch(work))
         .flatten()
         .ok_or_else(|| PyValueError::new_err("`theta` or `theta0` has the wrong length for this arm"))?;
     let result = PyDict::new(py);
-    let r = course.parameters;
-    result.set_item("theta", table(py, course.theta, t.len(), r)?)?;
-    result.set_item("errors", table(py, course.errors, t.len(), course.outputs)?)?;
-    result.set_item("covariance", table(py, course.covariance, r, r)?)?;
-    result.set_item("updates", course.updates)?;
-    result.set_item("rejected", course.rejected)?;
+    let r = history.parameters;
+    result.set_item("theta", table(py, history.theta, t.len(), r)?)?;
+    result.set_item("errors", table(py, history.errors, t.len(), history.outputs)?)?;
+    result.set_item("covariance", table(py, history.covariance, r, r)?)?;
+    result.set_item("updates", history.updates)?;
+    result.set_item("rejected", history.rejected)?;
     Ok(result)
 }
 
 fn table(py: Python<'_>, x: Vec<f64>, rows: usize, columns: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {
     PyArray1::from_vec(py, x).reshape([rows, columns])
+}
+
+/// Rows of the filtered dynamic model: regressor (samples, joints, parameters) and filtered torques (samples, joints); NaN at the
+/// first two samples.
+#[pyfunction]
+pub fn regression_rows<'py>(
+    py: Python<'py>,
+    arm: &Bound<'py, PyDict>,
+    t: PyReadonlyArray1<'py, f64>,
+    q: PyReadonlyArray2<'py, f64>,
+    tau: PyReadonlyArray2<'py, f64>,
+    cutoff: f64,
+) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>)> {
+    let arm = description(arm)?;
+    let (n, p) = (arm.kind.joints(), arm.kind.parameters().len());
+    let t = vector(&t, "t")?;
+    let (q, tau) = (matrix(&q, "q", t.len(), n)?, matrix(&tau, "tau", t.len(), n)?);
+    let work = RegressionRows { cutoff, t, q, tau };
+    let rows = py
+        .detach(|| arm.dispatch(work))
+        .ok_or_else(|| PyValueError::new_err("`theta` has the wrong length for this arm"))?;
+    Ok((PyArray1::from_vec(py, rows.psi).reshape([t.len(), n, p])?, table(py, rows.y, t.len(), n)?))
 }
 
 /// Velocities from positions.

@@ -6,8 +6,8 @@ mod diagnose;
 mod estimator;
 mod fit;
 mod identify;
+mod progress;
 mod simulate;
-mod watched;
 
 use pyo3::prelude::*;
 
@@ -18,13 +18,13 @@ mod _native {
     #[pymodule_export]
     use crate::convert::{arm_kinds, effects, theta_from_links};
     #[pymodule_export]
-    use crate::diagnose::diagnose;
+    use crate::diagnose::{diagnose, refit};
     #[pymodule_export]
     use crate::estimator::Estimator;
     #[pymodule_export]
     use crate::fit::fit;
     #[pymodule_export]
-    use crate::identify::{identify, velocity};
+    use crate::identify::{identify, regression_rows, velocity};
     #[pymodule_export]
     use crate::simulate::{inertia, simulate};
 

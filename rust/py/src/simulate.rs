@@ -1,10 +1,10 @@
 //! `simulate` and `inertia`.
 
-use crate::convert::{kind_of, matrix, placed, vector};
-use crate::watched::watched;
+use crate::convert::{effect_instances, kind_of, matrix, vector};
+use crate::progress::with_progress;
 use armgap_fit::arm::ArmDescription;
-use armgap_fit::progress::{Observer, Watch, guarded};
-use armgap_fit::simulate::{Inertia, Simulation};
+use armgap_fit::progress::{Observer, ProgressReporter, guarded};
+use armgap_fit::simulate::{InertiaMatrices, Simulation};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -36,7 +36,7 @@ pub fn simulate<'py>(
     if q0.len() != n || dq0.len() != n {
         return Err(PyValueError::new_err(format!("`q0` and `dq0` need {n} values")));
     }
-    let effects = placed(kind, effects)?;
+    let effects = effect_instances(kind, effects)?;
     let arm = ArmDescription {
         kind,
         gravity,
@@ -48,8 +48,8 @@ pub fn simulate<'py>(
     };
     let rows = t.len();
     let (t, tau, q0, dq0) = (t.to_vec(), tau.to_vec(), q0.to_vec(), dq0.to_vec());
-    let ended = watched(py, progress.as_ref(), move |observer| {
-        let watch = Watch::new(Observer::clone(observer));
+    let ended = with_progress(py, progress.as_ref(), move |observer| {
+        let reporter = ProgressReporter::new(Observer::clone(observer));
         let work = Simulation {
             t: &t,
             tau: &tau,
@@ -58,7 +58,7 @@ pub fn simulate<'py>(
             effects: &effects,
             tolerance,
             smoothing,
-            watch: &watch,
+            progress: &reporter,
         };
         guarded(|| arm.dispatch(work))
     })?;
@@ -71,7 +71,7 @@ pub fn simulate<'py>(
     Ok((shape(trajectory.q)?, shape(trajectory.dq)?))
 }
 
-/// Inertia matrices at some poses, effects included.
+/// Inertia matrices at some positions, effects included.
 #[pyfunction]
 pub fn inertia<'py>(
     py: Python<'py>,
@@ -85,11 +85,11 @@ pub fn inertia<'py>(
     let kind = kind_of(kind)?;
     let (n, rows) = (kind.joints(), numpy::PyUntypedArrayMethods::shape(&*q)[0]);
     let q = matrix(&q, "q", rows, n)?;
-    let effects = placed(kind, effects)?;
+    let effects = effect_instances(kind, effects)?;
     let sigma = vec![1.0; theta.len()];
     let arm =
         ArmDescription { kind, gravity, theta, sigma, counts_per_rev: None, torque_limit: None, link_length };
-    let found = arm.dispatch(Inertia { q, effects: &effects }).flatten().ok_or_else(|| {
+    let found = arm.dispatch(InertiaMatrices { q, effects: &effects }).flatten().ok_or_else(|| {
         PyValueError::new_err("`theta` has the wrong length for this arm, or there are too many effects")
     })?;
     PyArray1::from_vec(py, found).reshape([rows, n, n])

@@ -11,10 +11,10 @@ from armgap.report.sections.causes import candidates, evidence, look_alikes, ran
 from armgap.report.sections.checks import checks, input_checks
 from armgap.report.sections.gap import first_picture, gap_map
 from armgap.report.sections.input import conventions
+from armgap.report.sections.model_labels import Data
 from armgap.report.sections.motion import free_run, horizons, predictions
 from armgap.report.sections.parameters import parameters
 from armgap.report.sections.silent import not_shown, ruled_out
-from armgap.report.sections.steps import Data
 
 __all__ = ["SECTIONS", "input_checks"]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
-from armgap.report.sections.steps import Data, length_unit, load_text
+from armgap.report.sections.model_labels import Data, length_unit, load_text
 from armgap.report.words import error_text, figure, joint_text, named, percent, sizes, symbol_text, title
 
 __all__ = ["candidates", "evidence", "look_alikes", "ranking"]
@@ -26,7 +26,7 @@ def evidence(data: Data) -> Section | None:
         return None
     what = load_text(data)
     text = (
-        f"Dots: the {what} that the model without this cause lacks, on held-out motion. Rings: its mean over a range, with the 95 % interval. "
+        f"Dots: the residual {what} of the model without this cause, on held-out motion. Rings: its mean over a range, with the 95 % interval. "
         "Line: what the fitted law adds in the same samples. A law that is right runs through the rings. Samples at rest are left out, "
         f"where dry friction hides every other {what}."
     )

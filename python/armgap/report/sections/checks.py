@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from armgap.report.page import Section, Table
-from armgap.report.sections.steps import Data
+from armgap.report.sections.model_labels import Data
 from armgap.report.words import joint_text
 
 __all__ = ["checks", "input_checks"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from armgap.report.conventions import section
 from armgap.report.page import Section
-from armgap.report.sections.steps import Data
+from armgap.report.sections.model_labels import Data
 
 __all__ = ["conventions"]
 

@@ -21,7 +21,10 @@ __all__ = ["all_of_it"]
 @duration_option
 @workers_option
 @limit_option
-@click.option("--peers/--no-peers", "with_peers", default=True, show_default=True, help="Let other methods answer too.")
+@click.option("--baselines/--no-baselines", default=True, show_default=True, help="Let other methods answer too.")
+@click.option(
+    "--peers/--no-peers", "former_name", default=None, hidden=True
+)  # former name of --baselines; goes with 0.3.0
 @json_option
 @md_option
 @quiet_option
@@ -32,19 +35,20 @@ def all_of_it(
     duration: float,
     workers: int,
     limit_s: float,
-    with_peers: bool,
+    baselines: bool,
+    former_name: bool | None,
     json_file: str | None,
     md_file: str | None,
     quiet: bool,
 ) -> None:
-    """Make cases, diagnose them, let peers name causes too, open the keys and score. Goes on where it stopped."""
+    """Make cases, diagnose them, let the baselines name causes too, open the keys and score. Goes on where it stopped."""
     from armgap.trial.commands.make import make_them
     from armgap.trial.commands.run import answer_all
     from armgap.trial.commands.score import score_all
     from armgap.trial.methods import methods
 
     check_outputs(json_file, md_file)
-    names = list(methods()) if with_peers else ["armgap"]
+    names = list(methods()) if (baselines if former_name is None else former_name) else ["armgap"]
     for name in names:
         methods()[name].check()  # what is not installed is missed now, not after the cases are made
     silent = quiet or "-" in (json_file, md_file)

@@ -29,7 +29,7 @@ md_option = click.option(
 @md_option
 @quiet_option
 def score(folder: Path, json_file: str | None, md_file: str | None, quiet: bool) -> None:
-    """Open the keys of DIR and score armgap and every peer that has answered all cases."""
+    """Open the keys of DIR and score armgap and every baseline that has answered all cases."""
     check_outputs(json_file, md_file)
     score_all(folder, json_file, md_file, quiet)
 

@@ -2,10 +2,10 @@
 //!
 //! `theta1` is the moving mass, `theta2` the component of its weight along the axis (0 when horizontal).
 
-use super::{Arm, Balance, Parameter};
+use super::{Arm, EquationTerms, Parameter};
 use crate::number::Number;
 use crate::real::Real;
-use crate::trig::Turn;
+use crate::trig::SinCos;
 use nalgebra::{SMatrix, SVector};
 
 /// A linear axis; `gravity` [m/s^2] is needed only when its base tilts.
@@ -42,20 +42,20 @@ impl<T: Real> Arm<T, 1, 4> for Axis<T> {
     }
 
     #[inline]
-    fn steady_inertia(&self, theta: &[T; 4]) -> [[T; 1]; 1] {
+    fn constant_inertia(&self, theta: &[T; 4]) -> [[T; 1]; 1] {
         [[theta[0]]]
     }
 
     #[inline(always)]
-    fn balance<V: Number<Real = T>>(
+    fn equation_terms<V: Number<Real = T>>(
         &self,
         theta: &[V; 4],
-        steady: &[[V; 1]; 1],
-        turns: &[Turn<V>; 1],
+        constant_inertia: &[[V; 1]; 1],
+        sincos: &[SinCos<V>; 1],
         _: &[V; 1],
-    ) -> Balance<V, 1> {
-        let along = theta[0] * V::of(self.gravity) * turns[0].sine;
-        Balance { inertia: *steady, bias: [theta[1].fused(turns[0].cosine, along)] }
+    ) -> EquationTerms<V, 1> {
+        let along = theta[0] * V::of(self.gravity) * sincos[0].sine;
+        EquationTerms { inertia: *constant_inertia, bias: [theta[1].fused(sincos[0].cosine, along)] }
     }
 
     #[inline(always)]

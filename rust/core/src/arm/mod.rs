@@ -8,7 +8,7 @@
 //!
 //! is linear in `theta`, so each arm also gives the regressors of its momentum, of the remaining forces, and of
 //! its energy. `theta` holds the arm's inertial base parameters, then `N` viscous, then `N` Coulomb coefficients:
-//! `P = INERTIAL + 2 N`. Adding an arm is one file here and one line in [`Kind::ALL`].
+//! `P = INERTIAL + 2 N`. Adding an arm is one file here and one line in [`ArmKind::ALL`].
 
 mod axis;
 mod pendulum;
@@ -20,12 +20,12 @@ pub use two_link::{LinkParameters, TwoLink};
 
 use crate::number::Number;
 use crate::real::{Real, sgn};
-use crate::trig::Turn;
+use crate::trig::SinCos;
 use nalgebra::{SMatrix, SVector};
 
-/// Inertia matrix, by rows, and `C dq + g` at a state.
+/// Terms of the equation of motion at a state: inertia matrix, by rows, and `C dq + g`.
 #[derive(Debug, Clone, Copy)]
-pub struct Balance<V, const N: usize> {
+pub struct EquationTerms<V, const N: usize> {
     /// `M(q)`.
     pub inertia: [[V; N]; N],
     /// `C(q, dq) dq + g(q)`.
@@ -43,7 +43,7 @@ pub struct Parameter {
 
 /// The kinds of arm an arm file can name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ArmKind {
     /// One prismatic joint.
     Axis,
     /// One rotary joint under gravity.
@@ -52,7 +52,7 @@ pub enum Kind {
     TwoLink,
 }
 
-impl Kind {
+impl ArmKind {
     /// Every kind, in the order of the documentation.
     pub const ALL: [Self; 3] = [Self::Axis, Self::Pendulum, Self::TwoLink];
 
@@ -140,20 +140,20 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Change of `theta` when a point `mass`, kg, is fixed `distance`, m, along the last link.
     fn payload(&self, theta: &[T; P], mass: T, distance: T) -> [T; P];
 
-    /// Angles whose sines and cosines [`Arm::balance`] needs, with the base turned by `tilt`.
+    /// Angles whose sines and cosines [`Arm::equation_terms`] needs, with the base turned by `tilt`.
     fn angles<V: Number<Real = T>>(&self, q: &[V; N], tilt: V) -> [V; N];
 
-    /// The part of the inertia matrix that is the same everywhere.
-    fn steady_inertia(&self, theta: &[T; P]) -> [[T; N]; N];
+    /// The part of the inertia matrix that does not depend on `q`.
+    fn constant_inertia(&self, theta: &[T; P]) -> [[T; N]; N];
 
-    /// Inertia matrix, given its steady part, and `C dq + g` together, for the integrator: of one arm, or of several side by side.
-    fn balance<V: Number<Real = T>>(
+    /// Inertia matrix, given its constant part, and `C dq + g` together, for the integrator: of one arm, or of several side by side.
+    fn equation_terms<V: Number<Real = T>>(
         &self,
         theta: &[V; P],
-        steady: &[[V; N]; N],
-        turns: &[Turn<V>; N],
+        constant_inertia: &[[V; N]; N],
+        sincos: &[SinCos<V>; N],
         dq: &[V; N],
-    ) -> Balance<V, N>;
+    ) -> EquationTerms<V, N>;
 
     /// Regressor of the whole equation of motion: `Y(q, dq, ddq) theta = tau`, equation (15).
     fn regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>, ddq: &SVector<T, N>) -> SMatrix<T, N, P>;

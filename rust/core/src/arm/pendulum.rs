@@ -2,10 +2,10 @@
 //!
 //! `theta1` is the inertia about the joint, `theta2 = m g l` the largest gravity torque.
 
-use super::{Arm, Balance, Parameter};
+use super::{Arm, EquationTerms, Parameter};
 use crate::number::Number;
 use crate::real::Real;
-use crate::trig::{Turn, sin_cos};
+use crate::trig::{SinCos, sin_cos};
 use nalgebra::{SMatrix, SVector};
 
 /// A physical pendulum with a motor in its pivot.
@@ -42,19 +42,19 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
     }
 
     #[inline]
-    fn steady_inertia(&self, theta: &[T; 4]) -> [[T; 1]; 1] {
+    fn constant_inertia(&self, theta: &[T; 4]) -> [[T; 1]; 1] {
         [[theta[0]]]
     }
 
     #[inline(always)]
-    fn balance<V: Number<Real = T>>(
+    fn equation_terms<V: Number<Real = T>>(
         &self,
         theta: &[V; 4],
-        steady: &[[V; 1]; 1],
-        turns: &[Turn<V>; 1],
+        constant_inertia: &[[V; 1]; 1],
+        sincos: &[SinCos<V>; 1],
         _: &[V; 1],
-    ) -> Balance<V, 1> {
-        Balance { inertia: *steady, bias: [theta[1] * turns[0].sine] }
+    ) -> EquationTerms<V, 1> {
+        EquationTerms { inertia: *constant_inertia, bias: [theta[1] * sincos[0].sine] }
     }
 
     #[inline(always)]

@@ -11,10 +11,10 @@
 //! `C` is the one of Christoffel's symbols, for which `dM/dt - 2 C` is skew-symmetric. The paper prints another with the same product
 //! `C dq`; for that one only `dq' (dM/dt - 2 C) dq = 0` holds.
 
-use super::{Arm, Balance, Parameter};
+use super::{Arm, EquationTerms, Parameter};
 use crate::number::Number;
 use crate::real::{Real, lit};
-use crate::trig::{Turn, sin_cos};
+use crate::trig::{SinCos, sin_cos};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// The two-link vertical arm.
@@ -95,26 +95,26 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
     }
 
     #[inline]
-    fn steady_inertia(&self, theta: &[T; 9]) -> [[T; 2]; 2] {
+    fn constant_inertia(&self, theta: &[T; 9]) -> [[T; 2]; 2] {
         [[theta[0], theta[2]], [theta[2], theta[2]]]
     }
 
     #[inline(always)]
-    fn balance<V: Number<Real = T>>(
+    fn equation_terms<V: Number<Real = T>>(
         &self,
         theta: &[V; 9],
-        steady: &[[V; 2]; 2],
-        turns: &[Turn<V>; 2],
+        constant_inertia: &[[V; 2]; 2],
+        sincos: &[SinCos<V>; 2],
         dq: &[V; 2],
-    ) -> Balance<V, 2> {
-        let [Turn { sine: s1, cosine: c1 }, Turn { sine: s2, cosine: c2 }] = *turns;
+    ) -> EquationTerms<V, 2> {
+        let [SinCos { sine: s1, cosine: c1 }, SinCos { sine: s2, cosine: c2 }] = *sincos;
         let outer = theta[4] * s1.fused(c2, c1 * s2);
         let (kc, ks, twice) = (theta[1] * c2, theta[1] * s2, V::of(lit(2.0)));
-        let [[own, coupled], [_, outer_own]] = *steady;
+        let [[own, coupled], [_, outer_own]] = *constant_inertia;
         let coupled = coupled + kc;
         let inertia = [[twice.fused(kc, own), coupled], [coupled, outer_own]];
         let bias1 = (-(ks * dq[1])).fused(twice.fused(dq[0], dq[1]), theta[3].fused(s1, outer));
-        Balance { inertia, bias: [bias1, (ks * dq[0]).fused(dq[0], outer)] }
+        EquationTerms { inertia, bias: [bias1, (ks * dq[0]).fused(dq[0], outer)] }
     }
 
     #[inline(always)]

@@ -3,7 +3,7 @@
 //! A delay that is no whole number of samples puts a step of the held command inside an interval; the interval then
 //! carries its exact mean and first moment. Before the log begins, the first command is taken to have been held.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::{Real, lit};
 
 /// Transport delay of the command.
@@ -19,7 +19,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     least_joints: 1,
     parameters: &[EffectParameter::bounded("delay", Quantity::Time, 0.0, 1.0)],
-    starts: &[[0.5, 0.0, 0.0], [3.0, 0.0, 0.0]],
+    initial_guesses: &[[0.5, 0.0, 0.0], [3.0, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::COMMAND,
 };
@@ -29,13 +29,13 @@ impl<T: Real> Effect<T> for ActuatorDelay {
         &SPEC
     }
 
-    fn command(&self, p: &[T; MAX_PARAMETERS], t: &[T], torque: &mut [Pulse<T>]) {
+    fn command(&self, p: &[T; MAX_PARAMETERS], t: &[T], torque: &mut [InputSegment<T>]) {
         for k in (0..torque.len()).rev() {
             let h = super::interval(t, k);
             let Some(&start) = t.get(k) else { continue };
             let (mean, moment) = held(t, torque, k, start - p[0], start - p[0] + h);
-            if let Some(pulse) = torque.get_mut(k) {
-                *pulse = Pulse::with_moment(mean, moment, h);
+            if let Some(segment) = torque.get_mut(k) {
+                *segment = InputSegment::with_moment(mean, moment, h);
             }
         }
     }
@@ -43,22 +43,22 @@ impl<T: Real> Effect<T> for ActuatorDelay {
 
 /// Mean over `[from, to]` of the held command, and its first moment about the middle; intervals up to `last` are read, and none is after
 /// it.
-fn held<T: Real>(t: &[T], torque: &[Pulse<T>], last: usize, from: T, to: T) -> (T, T) {
+fn held<T: Real>(t: &[T], torque: &[InputSegment<T>], last: usize, from: T, to: T) -> (T, T) {
     let (length, middle) = (to - from, lit::<T>(0.5) * (from + to));
     let (mut upper, mut sum, mut moment, mut i) = (to, T::zero(), T::zero(), last);
     loop {
-        let (Some(&begin), Some(pulse)) = (t.get(i), torque.get(i)) else {
+        let (Some(&begin), Some(segment)) = (t.get(i), torque.get(i)) else {
             return (T::zero(), T::zero());
         };
         let lower = if i == 0 { from } else { begin.max(from) };
         if upper > lower {
-            let piece = (upper - lower) * pulse.mean();
+            let piece = (upper - lower) * segment.mean();
             sum += piece;
             moment += piece * (lit::<T>(0.5) * (upper + lower) - middle);
             upper = lower;
         }
         if i == 0 || begin <= from {
-            return if length > T::zero() { (sum / length, moment) } else { (pulse.mean(), T::zero()) };
+            return if length > T::zero() { (sum / length, moment) } else { (segment.mean(), T::zero()) };
         }
         i -= 1;
     }

@@ -3,7 +3,7 @@
 //! With the command held over an interval of length `h`, the torque goes exponentially from its old value to the
 //! command. Its mean over the interval and its first moment are exact for every time constant down to zero.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::{Real, lit};
 
 /// First-order actuator.
@@ -19,7 +19,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     least_joints: 1,
     parameters: &[EffectParameter::bounded("time_constant", Quantity::Time, 0.0, 2.0)],
-    starts: &[[0.5, 0.0, 0.0], [4.0, 0.0, 0.0]],
+    initial_guesses: &[[0.5, 0.0, 0.0], [4.0, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::COMMAND,
 };
@@ -29,18 +29,18 @@ impl<T: Real> Effect<T> for ActuatorLag {
         &SPEC
     }
 
-    fn command(&self, p: &[T; MAX_PARAMETERS], t: &[T], torque: &mut [Pulse<T>]) {
+    fn command(&self, p: &[T; MAX_PARAMETERS], t: &[T], torque: &mut [InputSegment<T>]) {
         let Some(first) = torque.first() else { return };
         let mut lag = first.start;
-        for (k, pulse) in torque.iter_mut().enumerate() {
+        for (k, segment) in torque.iter_mut().enumerate() {
             let h = super::interval(t, k);
-            let (u, constant) = (pulse.mean(), p[0]);
+            let (u, constant) = (segment.mean(), p[0]);
             let behind = lag - u;
             let decay = if constant > T::zero() { (-h / constant).exp() } else { T::zero() };
             let held = if h > T::zero() { constant * (T::one() - decay) / h } else { T::zero() };
             let half = lit::<T>(0.5) * h;
             let moment = constant * (constant * (T::one() - decay) - half * (T::one() + decay));
-            *pulse = Pulse::with_moment(u + behind * held, behind * moment, h);
+            *segment = InputSegment::with_moment(u + behind * held, behind * moment, h);
             lag = u + behind * decay;
         }
     }

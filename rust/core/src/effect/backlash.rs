@@ -1,21 +1,21 @@
-//! Backlash: play between motor and link. While it is crossed the motor turns alone and the link is not driven.
+//! Backlash between motor and link. While it is crossed the motor turns alone and the link is not driven.
 //!
-//! The motor side carries a share of the joint's nominal inertia, so with the play closed the arm is the nominal one. It rides on the joints
-//! before it: a motor that sits on the link before turns with it (`riding = 1`), of one behind a gear of ratio n next to nothing does
-//! (`riding = 1 / n`). On the first joint that is of no consequence. Its flanks do not
-//! give ([`crate::drives`]); the stiffness and damping below hold a motor to a link that is only measured.
+//! The rotor carries a share of the joint's nominal inertia, so with the backlash closed the arm is the nominal one. Its coupling ratio to
+//! the joints before it (the parameter `riding`) is 1 for a motor that sits on the link before and `1 / n` behind a gear of ratio n; on the
+//! first joint it has no influence. The flanks are rigid ([`crate::drivetrain`]); the stiffness and damping below hold a motor to a link
+//! whose motion is measured, not simulated.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::{Real, lit};
-use crate::transmission::Drive;
+use crate::transmission::Transmission;
 
-/// Natural frequency of the motor side on the flanks of a measured link, 1/s.
+/// Natural frequency of the rotor on the flanks of a measured link, 1/s.
 const FLANK_RATE: f64 = 800.0;
 
 /// Damping ratio of the flanks: no rebound.
 const FLANK_DAMPING: f64 = 0.8;
 
-/// Play in the transmission.
+/// Backlash in the transmission.
 #[derive(Debug)]
 pub struct Backlash;
 
@@ -32,7 +32,7 @@ static SPEC: Spec = Spec {
         EffectParameter::shape("rotor_share", Quantity::Ratio, 0.005, 0.35),
         EffectParameter::shape("riding", Quantity::Ratio, 0.0, 1.0),
     ],
-    starts: &[
+    initial_guesses: &[
         [0.005, 0.03, 0.5],
         [0.01, 0.1, 0.5],
         [0.02, 0.03, 0.5],
@@ -49,16 +49,16 @@ impl<T: Real> Effect<T> for Backlash {
         &SPEC
     }
 
-    fn drive(&self, p: &[T; MAX_PARAMETERS], inertia: T) -> Option<Drive<T>> {
+    fn transmission(&self, p: &[T; MAX_PARAMETERS], inertia: T) -> Option<Transmission<T>> {
         let rotor = p[1] * inertia;
         let rate = lit::<T>(FLANK_RATE);
-        (p[0] > T::zero()).then_some(Drive {
+        (p[0] > T::zero()).then_some(Transmission {
             inertia: rotor,
             stiffness: rotor * rate * rate,
             damping: lit::<T>(2.0 * FLANK_DAMPING) * rotor * rate,
-            gap: p[0],
-            inside: true,
-            riding: p[2],
+            backlash: p[0],
+            part_of_link: true,
+            coupling_ratio: p[2],
         })
     }
 }

@@ -16,7 +16,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Arm,
     least_joints: 1,
     parameters: &[EffectParameter::bounded("angle", Quantity::Angle, -1.6, 1.6)],
-    starts: &[[0.02, 0.0, 0.0]],
+    initial_guesses: &[[0.02, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::NONE,
 };

@@ -1,9 +1,9 @@
-//! A stop: beyond a position, on the side away from zero, a spring and damper push back and never pull.
+//! A joint limit: beyond a position, on the side away from zero, a spring and damper push back and never pull.
 
 use super::{Edge, Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
-/// Contact with a stop.
+/// Contact with a joint limit.
 #[derive(Debug)]
 pub struct Contact;
 
@@ -17,11 +17,11 @@ static SPEC: Spec = Spec {
     least_joints: 1,
     parameters: &[
         EffectParameter::threshold("position", Quantity::Reach, f64::NEG_INFINITY),
-        EffectParameter::bounded("stiffness", Quantity::StopStiffness, 0.0, f64::INFINITY),
-        EffectParameter::bounded("damping", Quantity::StopDamping, 0.0, f64::INFINITY),
+        EffectParameter::bounded("stiffness", Quantity::ContactStiffness, 0.0, f64::INFINITY),
+        EffectParameter::bounded("damping", Quantity::ContactDamping, 0.0, f64::INFINITY),
     ],
     // Shares of the reach on either side.
-    starts: &[
+    initial_guesses: &[
         [0.99, 150.0, 0.5],
         [-0.99, 150.0, 0.5],
         [0.95, 30.0, 0.2],

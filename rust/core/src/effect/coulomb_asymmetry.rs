@@ -19,7 +19,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     least_joints: 1,
     parameters: &[EffectParameter::signed("delta", Quantity::Torque)],
-    starts: &[[0.05, 0.0, 0.0]],
+    initial_guesses: &[[0.05, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::COULOMB,
 };

@@ -18,7 +18,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     least_joints: 2,
     parameters: &[EffectParameter::signed("level", Quantity::Torque)],
-    starts: &[[0.05, 0.0, 0.0]],
+    initial_guesses: &[[0.05, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::FORCE,
 };

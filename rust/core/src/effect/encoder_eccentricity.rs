@@ -19,7 +19,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("a", Quantity::Angle, -0.5, 0.5),
         EffectParameter::bounded("b", Quantity::Angle, -0.5, 0.5),
     ],
-    starts: &[[0.01, 0.0, 0.0], [0.0, 0.01, 0.0]],
+    initial_guesses: &[[0.01, 0.0, 0.0], [0.0, 0.01, 0.0]],
     trial: Trial::Amplitudes(2),
     hooks: Hooks::MEASURED,
 };

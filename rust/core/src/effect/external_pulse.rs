@@ -1,12 +1,12 @@
-//! A push from outside: a constant torque of the given impulse for `duration` around `time`. It belongs to one log.
+//! External disturbance: a constant torque of the given impulse for `duration` around `time`. It belongs to one log.
 //!
-//! Each interval carries the exact mean and first moment of the push over it, so the speed and the way that a mass gains are exact whatever
+//! Each interval carries the exact mean and first moment of the torque over it, so a mass gains the exact speed and distance whatever
 //! the sample times.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::{Real, lit};
 
-/// A push at one time.
+/// External disturbance at one time.
 #[derive(Debug)]
 pub struct ExternalPulse;
 
@@ -23,8 +23,8 @@ static SPEC: Spec = Spec {
         EffectParameter::shape("time", Quantity::Duration, f64::NEG_INFINITY, f64::INFINITY),
         EffectParameter::shape("duration", Quantity::Duration, 1e-4, f64::INFINITY),
     ],
-    starts: &[],
-    trial: Trial::Event,
+    initial_guesses: &[],
+    trial: Trial::Disturbance,
     hooks: Hooks::COMMAND,
 };
 
@@ -33,16 +33,16 @@ impl<T: Real> Effect<T> for ExternalPulse {
         &SPEC
     }
 
-    fn command(&self, p: &[T; MAX_PARAMETERS], t: &[T], torque: &mut [Pulse<T>]) {
+    fn command(&self, p: &[T; MAX_PARAMETERS], t: &[T], torque: &mut [InputSegment<T>]) {
         let half = p[2] * lit(0.5);
         let (from, to) = (p[1] - half, p[1] + half);
-        for (k, (&start, pulse)) in t.iter().zip(torque.iter_mut()).enumerate() {
+        for (k, (&start, segment)) in t.iter().zip(torque.iter_mut()).enumerate() {
             let h = super::interval(t, k);
             let (begin, end) = (start.max(from), (start + h).min(to));
             if end > begin && h > T::zero() && p[2] > T::zero() {
                 let part = p[0] / p[2] * (end - begin);
                 let behind = lit::<T>(0.5) * (begin + end - h) - start;
-                *pulse = pulse.plus(Pulse::with_moment(part / h, part * behind, h));
+                *segment = segment.plus(InputSegment::with_moment(part / h, part * behind, h));
             }
         }
     }

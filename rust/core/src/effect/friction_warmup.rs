@@ -19,7 +19,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("amplitude", Quantity::Ratio, -0.95, 20.0),
         EffectParameter::shape("time_constant", Quantity::Duration, 0.05, 5000.0),
     ],
-    starts: &[[0.05, 1.0, 0.0], [0.05, 3.0, 0.0], [0.05, 10.0, 0.0]],
+    initial_guesses: &[[0.05, 1.0, 0.0], [0.05, 3.0, 0.0], [0.05, 10.0, 0.0]],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::COULOMB,
 };

@@ -18,7 +18,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     least_joints: 1,
     parameters: &[EffectParameter::bounded("loss", Quantity::Ratio, 0.0, 0.9)],
-    starts: &[[0.1, 0.0, 0.0]],
+    initial_guesses: &[[0.1, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::COULOMB,
 };

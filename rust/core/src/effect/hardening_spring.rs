@@ -20,7 +20,7 @@ static SPEC: Spec = Spec {
         EffectParameter::signed("k", Quantity::Stiffness),
         EffectParameter::shape("q0", Quantity::Rest, f64::NEG_INFINITY, f64::INFINITY),
     ],
-    starts: &[[0.1, 0.0, 0.0], [0.1, 0.0, 1.0], [0.1, 0.0, -1.0]],
+    initial_guesses: &[[0.1, 0.0, 0.0], [0.1, 0.0, 1.0], [0.1, 0.0, -1.0]],
     trial: Trial::Amplitudes(2),
     hooks: Hooks::FORCE,
 };

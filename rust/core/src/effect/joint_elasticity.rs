@@ -1,7 +1,7 @@
 //! Joint elasticity: the motor drives the link through a spring and damper (Spong 1987),
 //!
 //! ```text
-//! rotor_inertia d2(q + twist)/dt2 = tau - stiffness twist - damping dtwist
+//! rotor_inertia d2(q + deflection)/dt2 = tau - stiffness deflection - damping d(deflection)/dt
 //! ```
 //!
 //! The rotor comes in addition to the rigid arm; encoder and friction are on the link's side. A shaft of infinite stiffness is a
@@ -9,7 +9,7 @@
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, NEVER, Quantity, Scope, Spec, Trial};
 use crate::real::{Real, lit};
-use crate::transmission::Drive;
+use crate::transmission::Transmission;
 
 /// Elastic transmission.
 #[derive(Debug)]
@@ -28,8 +28,8 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("damping", Quantity::ShaftDamping, 0.0, f64::INFINITY),
         EffectParameter::bounded("rotor_inertia", Quantity::Inertia, 1e-6, f64::INFINITY),
     ],
-    // Motors of 3, 8 and 30 % of the link's inertia that swing at 8 to 40 Hz against it.
-    starts: &[
+    // Motors of 3, 8 and 30 % of the link's inertia that oscillate at 8 to 40 Hz against it.
+    initial_guesses: &[
         [0.15, 0.3, 0.03],
         [0.5, 0.5, 0.03],
         [1.8, 1.0, 0.03],
@@ -49,15 +49,15 @@ impl<T: Real> Effect<T> for JointElasticity {
         &SPEC
     }
 
-    fn drive(&self, p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Drive<T>> {
+    fn transmission(&self, p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Transmission<T>> {
         let rigid = p[0] >= lit(NEVER);
-        (!rigid).then_some(Drive {
+        (!rigid).then_some(Transmission {
             inertia: p[2],
             stiffness: p[0],
             damping: p[1],
-            gap: T::zero(),
-            inside: false,
-            riding: T::zero(),
+            backlash: T::zero(),
+            part_of_link: false,
+            coupling_ratio: T::zero(),
         })
     }
 }

@@ -19,7 +19,13 @@ static SPEC: Spec = Spec {
         EffectParameter::signed("k", Quantity::Stiffness),
         EffectParameter::shape("q0", Quantity::Rest, f64::NEG_INFINITY, f64::INFINITY),
     ],
-    starts: &[[0.05, 0.0, 0.0], [0.05, 1.5, 0.0], [0.05, -1.5, 0.0], [0.02, 6.0, 0.0], [0.02, -6.0, 0.0]],
+    initial_guesses: &[
+        [0.05, 0.0, 0.0],
+        [0.05, 1.5, 0.0],
+        [0.05, -1.5, 0.0],
+        [0.02, 6.0, 0.0],
+        [0.02, -6.0, 0.0],
+    ],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::FORCE,
 };

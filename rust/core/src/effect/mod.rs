@@ -37,7 +37,7 @@ mod torque_saturation;
 mod viscous_asymmetry;
 
 use crate::real::{Real, lit};
-use crate::transmission::Drive;
+use crate::transmission::Transmission;
 
 /// Most parameters an effect may have.
 pub const MAX_PARAMETERS: usize = 3;
@@ -105,14 +105,14 @@ pub enum Quantity {
     CubicDrag,
     /// Torque per position.
     Stiffness,
-    /// Torque per twist of a shaft.
+    /// Torque per deflection of a shaft.
     ShaftStiffness,
-    /// Torque per rate of twist of a shaft.
+    /// Torque per deflection rate of a shaft.
     ShaftDamping,
-    /// Torque per depth behind a stop.
-    StopStiffness,
-    /// Torque per speed behind a stop.
-    StopDamping,
+    /// Torque per depth behind a joint limit.
+    ContactStiffness,
+    /// Torque per speed behind a joint limit.
+    ContactDamping,
     /// Torque per cubed position.
     Hardening,
     /// Torque times time.
@@ -155,10 +155,10 @@ impl Quantity {
             (Self::Inertia, false) | (Self::Mass, _) => "kg",
             (Self::Drag, true) => "N m s^2/rad^2",
             (Self::Drag, false) => "N s^2/m^2",
-            (Self::Stiffness | Self::ShaftStiffness | Self::StopStiffness, true) => "N m/rad",
-            (Self::Stiffness | Self::ShaftStiffness | Self::StopStiffness, false) => "N/m",
-            (Self::Damping | Self::ShaftDamping | Self::StopDamping, true) => "N m s/rad",
-            (Self::Damping | Self::ShaftDamping | Self::StopDamping, false) => "N s/m",
+            (Self::Stiffness | Self::ShaftStiffness | Self::ContactStiffness, true) => "N m/rad",
+            (Self::Stiffness | Self::ShaftStiffness | Self::ContactStiffness, false) => "N/m",
+            (Self::Damping | Self::ShaftDamping | Self::ContactDamping, true) => "N m s/rad",
+            (Self::Damping | Self::ShaftDamping | Self::ContactDamping, false) => "N s/m",
             (Self::CubicDrag, true) => "N m s^3/rad^3",
             (Self::CubicDrag, false) => "N s^3/m^3",
             (Self::Impulse, true) => "N m s",
@@ -224,7 +224,7 @@ pub struct Hooks {
     pub command: bool,
     /// [`Effect::measured`].
     pub measured: bool,
-    /// [`Effect::remember`].
+    /// [`Effect::hysteresis_after`].
     pub memory: bool,
 }
 
@@ -261,8 +261,8 @@ pub struct Spec {
     pub least_joints: usize,
     /// Its parameters; the first one switches it off at its neutral value.
     pub parameters: &'static [EffectParameter],
-    /// Trial values, in units of the log's own scale of each quantity (see the fit's `scale`).
-    pub starts: &'static [[f64; MAX_PARAMETERS]],
+    /// Initial guesses, in units of the log's own scale of each quantity (see the fit's `scale`).
+    pub initial_guesses: &'static [[f64; MAX_PARAMETERS]],
     /// How it is tested before it is fitted.
     pub trial: Trial,
     /// Hooks in use.
@@ -276,8 +276,8 @@ pub enum Trial {
     Amplitudes(usize),
     /// By the derivative at neutral along a ray on which all parameters grow together.
     Ray,
-    /// Not at all: it belongs to one log and is looked for there.
-    Event,
+    /// Not at all: an external disturbance belongs to one log and is looked for there.
+    Disturbance,
     /// By the whole difference it makes at a trial value: a threshold has no derivative where it is never reached.
     Whole,
 }
@@ -302,11 +302,11 @@ pub struct JointPoint<T> {
     pub friction: T,
     /// Direction in which the next joint (after the last, the first) slides: -1, 0 or 1.
     pub other: T,
-    /// What the joint remembers of its path (see [`Effect::remember`]).
+    /// Hysteresis state of the joint (see [`Effect::hysteresis_after`]).
     pub memory: T,
 }
 
-/// A position at which a joint's torque jumps, and what it meets beyond, on the side away from zero.
+/// A position at which a joint's torque jumps, and the contact beyond it, on the side away from zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge<T> {
     /// Position.
@@ -324,7 +324,7 @@ impl<T: Real> Edge<T> {
         (q - self.position) * self.position > T::zero()
     }
 
-    /// Fastest rate, 1/s, of an inertia that has met it.
+    /// Fastest rate, 1/s, of an inertia in contact with it.
     pub fn rate(&self, inertia: T) -> T {
         (self.stiffness / inertia).sqrt().max(self.damping / inertia)
     }
@@ -390,13 +390,13 @@ pub trait Effect<T: Real>: Sync {
         T::zero()
     }
 
-    /// What the joint remembers after moving by `distance`, if it remembered `memory` before.
-    fn remember(&self, _p: &[T; MAX_PARAMETERS], memory: T, _distance: T) -> T {
+    /// Hysteresis state after moving by `distance` from a position where it was `memory`.
+    fn hysteresis_after(&self, _p: &[T; MAX_PARAMETERS], memory: T, _distance: T) -> T {
         memory
     }
 
-    /// The motor side of a joint whose own inertia at `q = 0` is `inertia`; none for a rigid joint.
-    fn drive(&self, _p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Drive<T>> {
+    /// Transmission of a joint whose own inertia at `q = 0` is `inertia`; none for a rigid joint.
+    fn transmission(&self, _p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Transmission<T>> {
         None
     }
 
@@ -406,7 +406,7 @@ pub trait Effect<T: Real>: Sync {
     }
 
     /// Rewrites a whole log's command of one joint, sample times `t`, into the torque that reaches the joint.
-    fn command(&self, _p: &[T; MAX_PARAMETERS], _t: &[T], _torque: &mut [Pulse<T>]) {}
+    fn command(&self, _p: &[T; MAX_PARAMETERS], _t: &[T], _torque: &mut [InputSegment<T>]) {}
 
     /// Position the encoder shows when the joint stands at `q`.
     fn measured(&self, _p: &[T; MAX_PARAMETERS], q: T) -> T {
@@ -417,9 +417,9 @@ pub trait Effect<T: Real>: Sync {
 /// Torque over one sample interval: its values at the start, the middle and the end.
 ///
 /// Between them it is quadratic, so Simpson's rule gives its mean. Laws that smear or shift a step choose the three values such that the
-/// mean and the first moment, and with them the speed and the way a mass gains, are exact however fast they are.
+/// mean and the first moment, and with them the speed and the distance a mass gains, are exact however fast they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pulse<T> {
+pub struct InputSegment<T> {
     /// At the sample.
     pub start: T,
     /// Half-way to the next sample.
@@ -428,7 +428,7 @@ pub struct Pulse<T> {
     pub end: T,
 }
 
-impl<T: Real> Pulse<T> {
+impl<T: Real> InputSegment<T> {
     /// A torque held constant over the interval.
     #[inline]
     pub fn held(tau: T) -> Self {
@@ -436,7 +436,7 @@ impl<T: Real> Pulse<T> {
     }
 
     /// The straight line with the given mean and first moment about the middle of an interval of length `h`: what moves a mass by the
-    /// same speed and the same way as the torque that has them.
+    /// same speed and the same distance as the torque that has them.
     pub fn with_moment(mean: T, moment: T, h: T) -> Self {
         let rise = if h > T::zero() { lit::<T>(6.0) * moment / (h * h) } else { T::zero() };
         Self { start: mean - rise, middle: mean, end: mean + rise }
@@ -458,7 +458,7 @@ impl<T: Real> Pulse<T> {
         l0 * self.start + l1 * self.middle + l2 * self.end
     }
 
-    /// Both torques together.
+    /// Sum of both torques.
     #[inline]
     pub fn plus(self, other: Self) -> Self {
         Self {
@@ -468,13 +468,13 @@ impl<T: Real> Pulse<T> {
         }
     }
 
-    /// The same law applied to each of the three values.
+    /// Applies `f` to each of the three values.
     pub fn map(self, f: impl Fn(T) -> T) -> Self {
         Self { start: f(self.start), middle: f(self.middle), end: f(self.end) }
     }
 }
 
-/// An effect placed on an arm with its parameters' values.
+/// An effect on a joint of an arm, with its parameters' values.
 #[derive(Clone, Copy)]
 pub struct Active<T: Real> {
     /// The law.

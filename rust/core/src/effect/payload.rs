@@ -22,7 +22,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("mass", Quantity::Mass, 0.0, f64::INFINITY),
         EffectParameter::bounded("distance", Quantity::Length, 0.0, f64::INFINITY),
     ],
-    starts: &[[0.05, 0.5, 0.0], [0.05, 1.0, 0.0]],
+    initial_guesses: &[[0.05, 0.5, 0.0], [0.05, 1.0, 0.0]],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::NONE,
 };

@@ -20,7 +20,7 @@ static SPEC: Spec = Spec {
         EffectParameter::signed("a", Quantity::Torque),
         EffectParameter::signed("b", Quantity::Torque),
     ],
-    starts: &[[0.05, 0.0, 0.0], [0.0, 0.05, 0.0]],
+    initial_guesses: &[[0.05, 0.0, 0.0], [0.0, 0.05, 0.0]],
     trial: Trial::Amplitudes(2),
     hooks: Hooks::COULOMB,
 };

@@ -27,7 +27,7 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("stiffness", Quantity::Stiffness, 0.0, f64::INFINITY),
     ],
     // Travelled distances of 0.3 to 10 % of the joint's RMS travel.
-    starts: &[[0.1, 30.0, 0.0], [0.1, 10.0, 0.0], [0.1, 3.0, 0.0], [0.1, 1.0, 0.0]],
+    initial_guesses: &[[0.1, 30.0, 0.0], [0.1, 10.0, 0.0], [0.1, 3.0, 0.0], [0.1, 1.0, 0.0]],
     trial: Trial::Ray,
     hooks: Hooks { force: true, memory: true, ..Hooks::NONE },
 };
@@ -41,7 +41,7 @@ impl<T: Real> Effect<T> for Presliding {
         -x.memory
     }
 
-    fn remember(&self, p: &[T; MAX_PARAMETERS], memory: T, distance: T) -> T {
+    fn hysteresis_after(&self, p: &[T; MAX_PARAMETERS], memory: T, distance: T) -> T {
         if p[0] <= T::zero() {
             return T::zero();
         }

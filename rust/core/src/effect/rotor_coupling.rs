@@ -19,7 +19,7 @@ static SPEC: Spec = Spec {
     least_joints: 2,
     parameters: &[EffectParameter::signed("inertia", Quantity::Inertia)],
     // Never searched for: the same motion as the opposite rotor_inertia of joint 2 with theta3 moved by as much.
-    starts: &[],
+    initial_guesses: &[],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::NONE,
 };

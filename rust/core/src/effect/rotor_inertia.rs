@@ -19,7 +19,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     least_joints: 1,
     parameters: &[EffectParameter::bounded("inertia", Quantity::Inertia, 0.0, f64::INFINITY)],
-    starts: &[[0.05, 0.0, 0.0]],
+    initial_guesses: &[[0.05, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::NONE,
 };

@@ -21,7 +21,13 @@ static SPEC: Spec = Spec {
         EffectParameter::bounded("amplitude", Quantity::Torque, 0.0, f64::INFINITY),
         EffectParameter::bounded("velocity", Quantity::Speed, 1e-3, f64::INFINITY),
     ],
-    starts: &[[0.05, 0.03, 0.0], [0.05, 0.1, 0.0], [0.05, 0.3, 0.0], [0.05, 0.8, 0.0], [0.05, 2.0, 0.0]],
+    initial_guesses: &[
+        [0.05, 0.03, 0.0],
+        [0.05, 0.1, 0.0],
+        [0.05, 0.3, 0.0],
+        [0.05, 0.8, 0.0],
+        [0.05, 2.0, 0.0],
+    ],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::COULOMB,
 };

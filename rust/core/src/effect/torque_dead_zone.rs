@@ -1,6 +1,6 @@
 //! Commands below a level give no torque; above it the excess acts: `sgn(tau) max(|tau| - level, 0)`.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Torque dead zone.
@@ -16,7 +16,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     least_joints: 1,
     parameters: &[EffectParameter::bounded("level", Quantity::Torque, 0.0, f64::INFINITY)],
-    starts: &[[0.05, 0.0, 0.0], [0.3, 0.0, 0.0]],
+    initial_guesses: &[[0.05, 0.0, 0.0], [0.3, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::COMMAND,
 };
@@ -26,9 +26,9 @@ impl<T: Real> Effect<T> for TorqueDeadZone {
         &SPEC
     }
 
-    fn command(&self, p: &[T; MAX_PARAMETERS], _t: &[T], torque: &mut [Pulse<T>]) {
-        for pulse in torque {
-            *pulse = pulse.map(|tau| tau - tau.max(-p[0]).min(p[0]));
+    fn command(&self, p: &[T; MAX_PARAMETERS], _t: &[T], torque: &mut [InputSegment<T>]) {
+        for segment in torque {
+            *segment = segment.map(|tau| tau - tau.max(-p[0]).min(p[0]));
         }
     }
 }

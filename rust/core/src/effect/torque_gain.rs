@@ -1,6 +1,6 @@
 //! The joint receives `gain` times the commanded torque: a wrong torque constant, gear ratio or amplifier gain.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Wrong gain from command to torque.
@@ -22,7 +22,7 @@ static SPEC: Spec = Spec {
         upper: 20.0,
         neutral: 1.0,
     }],
-    starts: &[[1.05, 0.0, 0.0]],
+    initial_guesses: &[[1.05, 0.0, 0.0]],
     trial: Trial::Amplitudes(1),
     hooks: Hooks::COMMAND,
 };
@@ -32,9 +32,9 @@ impl<T: Real> Effect<T> for TorqueGain {
         &SPEC
     }
 
-    fn command(&self, p: &[T; MAX_PARAMETERS], _t: &[T], torque: &mut [Pulse<T>]) {
-        for pulse in torque {
-            *pulse = pulse.map(|tau| p[0] * tau);
+    fn command(&self, p: &[T; MAX_PARAMETERS], _t: &[T], torque: &mut [InputSegment<T>]) {
+        for segment in torque {
+            *segment = segment.map(|tau| p[0] * tau);
         }
     }
 }

@@ -22,7 +22,7 @@ static SPEC: Spec = Spec {
         EffectParameter::shape("phase", Quantity::Angle, f64::NEG_INFINITY, f64::INFINITY),
     ],
     // Cycles over the travel; faster ones are found in the residual.
-    starts: &[
+    initial_guesses: &[
         [0.05, 0.5, 0.0],
         [0.05, 0.5, 1.571],
         [0.05, 1.0, 0.0],

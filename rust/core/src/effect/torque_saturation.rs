@@ -1,6 +1,6 @@
 //! The torque never exceeds a level, whatever is commanded.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Pulse, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
 use crate::real::Real;
 
 /// Torque saturation.
@@ -16,7 +16,7 @@ static SPEC: Spec = Spec {
     scope: Scope::Joint,
     least_joints: 1,
     parameters: &[EffectParameter::threshold("level", Quantity::Torque, 0.0)],
-    starts: &[[2.2, 0.0, 0.0], [1.7, 0.0, 0.0], [1.3, 0.0, 0.0], [0.9, 0.0, 0.0], [0.6, 0.0, 0.0]],
+    initial_guesses: &[[2.2, 0.0, 0.0], [1.7, 0.0, 0.0], [1.3, 0.0, 0.0], [0.9, 0.0, 0.0], [0.6, 0.0, 0.0]],
     trial: Trial::Whole,
     hooks: Hooks::COMMAND,
 };
@@ -26,9 +26,9 @@ impl<T: Real> Effect<T> for TorqueSaturation {
         &SPEC
     }
 
-    fn command(&self, p: &[T; MAX_PARAMETERS], _t: &[T], torque: &mut [Pulse<T>]) {
-        for pulse in torque {
-            *pulse = pulse.map(|tau| tau.max(-p[0]).min(p[0]));
+    fn command(&self, p: &[T; MAX_PARAMETERS], _t: &[T], torque: &mut [InputSegment<T>]) {
+        for segment in torque {
+            *segment = segment.map(|tau| tau.max(-p[0]).min(p[0]));
         }
     }
 }

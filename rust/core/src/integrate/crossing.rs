@@ -1,10 +1,10 @@
-//! Changes inside a step, of friction modes, plays and torques that jump: which comes first, and when.
+//! Events inside a step: changes of friction modes, backlash that closes or opens, torques that jump; which comes first, and when.
 
-use super::root::{Close, STRAIGHT, hermite_root};
-use super::{State, Step};
+use super::root::{STRAIGHT, VelocityZero, hermite_root};
+use super::{State, SubStep};
 use crate::arm::Arm;
-use crate::plant::{Mode, Motion};
-use crate::pose::Place;
+use crate::kinematics::JointState;
+use crate::plant::{Accelerations, Mode};
 use crate::real::{Real, lit};
 
 /// Corrections of the located instant; each squares the error of the last.
@@ -13,7 +13,7 @@ const MAX_REFINEMENTS: usize = 4;
 /// Attempts at the instant of a release.
 const MAX_FALSE_POSITIONS: usize = 12;
 
-/// A release is found where holding takes more than friction gives, but by less than this part of what the step changes.
+/// A release is located where the stiction violation is positive, but less than this part of its change over the step.
 const RELEASED: f64 = 1e-8;
 
 /// A joint that has crossed a position at which its torque jumps is put this far beyond it, rad or m.
@@ -22,36 +22,40 @@ const BESIDE: f64 = 1e-13;
 /// Attempts are made this part of a step beyond where the root is expected, so that they end on its far side.
 const BEYOND: f64 = 1e-9;
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N, P> {
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A, N, P> {
     /// The change that a trial step runs into first, if any.
     #[inline]
-    pub(super) fn first_event(&self, leap: &Leap<'_, T, N>, trial: &State<T, N>) -> Option<Event<T>> {
-        let &Leap { state, x, dt, k1 } = leap;
+    pub(super) fn first_event(
+        &self,
+        trial_step: &TrialStep<'_, T, N>,
+        trial: &State<T, N>,
+    ) -> Option<ModeEvent<T>> {
+        let &TrialStep { state, x, dt, k1 } = trial_step;
         let exact = self.plant.smoothing() == T::zero();
         let reverses =
             |j: usize| exact && self.plant.is_dry(j) && trial.dq[j] * state.modes[j].direction() < T::zero();
         let sticks = |j: usize| exact && state.modes[j] == Mode::Stuck;
-        let play = self.plant.drives().play();
+        let has_backlash = self.plant.drivetrain().has_backlash();
         let edge = |j: usize| self.plant.edge_between(j, state.q[j], trial.q[j]);
-        if !play && !(0..N).any(|j| edge(j).is_some()) && !(0..N).any(|j| sticks(j) || reverses(j)) {
+        if !has_backlash && !(0..N).any(|j| edge(j).is_some()) && !(0..N).any(|j| sticks(j) || reverses(j)) {
             return None;
         }
         let end = self.motion(x + dt, trial);
-        let mut first: Option<Event<T>> = None;
+        let mut first: Option<ModeEvent<T>> = None;
         for j in 0..N {
             let event = if reverses(j) {
                 let s = hermite_root(state.dq[j], k1.ddq[j] * dt, trial.dq[j], end.ddq[j] * dt);
-                Some(Event { joint: j, s, change: Change::Stop })
+                Some(ModeEvent { joint: j, s, change: Change::Standstill })
             } else if sticks(j) {
-                self.release(j, leap, trial, &end)
+                self.release(j, trial_step, trial, &end)
             } else {
                 None
             };
-            let flank = if play { self.flank(j, leap, trial, &end) } else { None };
+            let flank = if has_backlash { self.flank(j, trial_step, trial, &end) } else { None };
             let crossing = edge(j).map(|at| {
                 let (from, to) = (state.q[j] - at, trial.q[j] - at);
                 let s = hermite_root(from, state.dq[j] * dt, to, trial.dq[j] * dt);
-                Event { joint: j, s, change: Change::Cross { at } }
+                ModeEvent { joint: j, s, change: Change::Cross { at } }
             });
             for event in [event, flank, crossing].into_iter().flatten() {
                 if first.as_ref().is_none_or(|earliest| event.s < earliest.s) {
@@ -62,71 +66,71 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         first
     }
 
-    /// When a stuck joint breaks away within the step, by linear interpolation of the torque that it lacks.
+    /// When a stuck joint breaks away within the step, by linear interpolation of the stiction violation.
     fn release(
         &self,
         j: usize,
-        &Leap { state, x, dt, .. }: &Leap<'_, T, N>,
+        &TrialStep { state, x, dt, .. }: &TrialStep<'_, T, N>,
         trial: &State<T, N>,
-        end: &Motion<T, N>,
-    ) -> Option<Event<T>> {
-        let (after, direction) = self.excess(j, x + dt, trial, end);
+        end: &Accelerations<T, N>,
+    ) -> Option<ModeEvent<T>> {
+        let (after, direction) = self.stiction_violation(j, x + dt, trial, end);
         if after <= T::zero() {
             return None;
         }
-        let (before, _) = self.excess(j, x, state, &self.motion(x, state));
+        let (before, _) = self.stiction_violation(j, x, state, &self.motion(x, state));
         let s = if before < T::zero() { before / (before - after) } else { T::zero() };
-        let change = Change::Release { mode: Mode::of(direction), excess: [before, after] };
-        Some(Event { joint: j, s, change })
+        let change = Change::Release { mode: Mode::of(direction), stiction_violation: [before, after] };
+        Some(ModeEvent { joint: j, s, change })
     }
 
     /// Integrates up to the event.
     #[inline(never)]
-    pub(super) fn locate(&self, leap: &Leap<'_, T, N>, event: &Event<T>) -> Located<T, N> {
+    pub(super) fn locate(&self, trial_step: &TrialStep<'_, T, N>, event: &ModeEvent<T>) -> Located<T, N> {
         if event.joint >= N {
             // No event has such a joint; said here so that no index below needs a panic.
-            return Located { length: leap.dt, reached: *leap.state };
+            return Located { length: trial_step.dt, reached: *trial_step.state };
         }
         match event.change {
-            Change::Stop => self.locate_stop(leap, event),
-            Change::Release { excess, .. } if excess[0] < T::zero() => {
-                let lacks = |x: T, there: &State<T, N>, motion: &Motion<T, N>| {
-                    self.excess(event.joint, x, there, motion).0
+            Change::Standstill => self.locate_standstill(trial_step, event),
+            Change::Release { stiction_violation, .. } if stiction_violation[0] < T::zero() => {
+                let violation = |x: T, there: &State<T, N>, motion: &Accelerations<T, N>| {
+                    self.stiction_violation(event.joint, x, there, motion).0
                 };
-                self.locate_beyond(leap, excess, lacks)
+                self.locate_beyond(trial_step, stiction_violation, violation)
             }
-            Change::Open { pull } if pull[0] < T::zero() => {
-                let lacks = |x: T, there: &State<T, N>, motion: &Motion<T, N>| {
+            Change::Open { flank_tension } if flank_tension[0] < T::zero() => {
+                let violation = |x: T, there: &State<T, N>, motion: &Accelerations<T, N>| {
                     let tau = self.interval.torque_at(x)[event.joint];
                     self.plant
-                        .drives()
-                        .pull(event.joint, tau, &motion.ddq, &there.hidden)
+                        .drivetrain()
+                        .flank_tension(event.joint, tau, &motion.ddq, &there.latent)
                         .unwrap_or_else(T::zero)
                 };
-                self.locate_beyond(leap, pull, lacks)
+                self.locate_beyond(trial_step, flank_tension, violation)
             }
-            Change::Meet => self.locate_meeting(leap, event.joint, event.s),
+            Change::Impact => self.locate_impact(trial_step, event.joint, event.s),
             Change::Cross { at } => {
                 let beyond = |there: &State<T, N>| Some((there.q[event.joint] - at, there.dq[event.joint]));
-                self.locate_crossing(leap, event.s, beyond)
+                self.locate_crossing(trial_step, event.s, beyond)
             }
             Change::Release { .. } | Change::Open { .. } => {
-                Located { length: T::zero(), reached: *leap.state }
+                Located { length: T::zero(), reached: *trial_step.state }
             }
         }
     }
 
     /// The state just after an event.
-    pub(super) fn applied(&self, event: &Event<T>, mut state: State<T, N>) -> State<T, N> {
+    pub(super) fn applied(&self, event: &ModeEvent<T>, mut state: State<T, N>) -> State<T, N> {
         let j = event.joint;
         if j >= N {
             return state;
         }
         match event.change {
-            Change::Stop => (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck),
+            Change::Standstill => (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck),
             Change::Release { mode, .. } => state.modes[j] = mode,
-            Change::Open { .. } => state.hidden.side[j] = T::zero(),
-            Change::Meet => return self.met(j, state),
+            Change::Open { .. } => state.latent.side[j] = T::zero(),
+            Change::Impact => return self.after_impact(j, state),
             Change::Cross { at } => {
                 let ahead = if state.dq[j] < T::zero() { -T::one() } else { T::one() };
                 state.q[j] = at + ahead * lit(BESIDE);
@@ -136,24 +140,24 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
     }
 
     /// Integrates to where a velocity vanishes: Newton's method, its last correction so small that a straight line is exact.
-    fn locate_stop(&self, leap: &Leap<'_, T, N>, event: &Event<T>) -> Located<T, N> {
-        let &Leap { state, x, dt, k1 } = leap;
+    fn locate_standstill(&self, trial_step: &TrialStep<'_, T, N>, event: &ModeEvent<T>) -> Located<T, N> {
+        let &TrialStep { state, x, dt, k1 } = trial_step;
         let mut s = event.s;
         let mut reached = self.runge_kutta(state, x, s * dt, k1);
         for _ in 0..MAX_REFINEMENTS {
             let slope = self.motion(x + s * dt, &reached);
-            let place = Place { q: reached.q.into(), dq: reached.dq.into() };
+            let joints = JointState { q: reached.q.into(), dq: reached.dq.into() };
             let ddq = [&k1.ddq.into(), &slope.ddq.into()];
-            let close = Close { place: &place, j: event.joint, length: s * dt, ddq };
-            let correction = close.correction();
+            let zero = VelocityZero { joints: &joints, j: event.joint, length: s * dt, ddq };
+            let correction = zero.correction();
             let next = s + correction / dt;
             if !(next > T::zero() && next <= T::one()) {
                 break;
             }
-            if !self.plant.drives().any()
-                && let Some((more, place)) = close.reached(dt)
+            if !self.plant.drivetrain().any()
+                && let Some((more, joints)) = zero.reached(dt)
             {
-                (reached.q, reached.dq) = (place.q.into(), place.dq.into());
+                (reached.q, reached.dq) = (joints.q.into(), joints.dq.into());
                 return Located { length: s * dt + more, reached };
             }
             s = next;
@@ -169,7 +173,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
     /// Integrates to where a distance vanishes, by Newton's method; `beyond` gives it and its rate.
     pub(super) fn locate_crossing(
         &self,
-        &Leap { state, x, dt, k1 }: &Leap<'_, T, N>,
+        &TrialStep { state, x, dt, k1 }: &TrialStep<'_, T, N>,
         mut s: T,
         beyond: impl Fn(&State<T, N>) -> Option<(T, T)>,
     ) -> Located<T, N> {
@@ -187,15 +191,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
         Located { length: s * dt, reached }
     }
 
-    /// Integrates to just beyond where friction, or a flank, no longer holds: false position in Illinois' way (Dowell and Jarratt
-    /// 1971) between the start of the step, where it lacks `ends[0] < 0`, and its end, where it lacks `ends[1] > 0`.
+    /// Integrates to just beyond where static friction, or a closed flank, no longer holds: the Illinois variant of false position (Dowell
+    /// and Jarratt 1971) between the start of the step with the violation `ends[0] < 0` and its end with `ends[1] > 0`.
     fn locate_beyond(
         &self,
-        leap: &Leap<'_, T, N>,
+        trial_step: &TrialStep<'_, T, N>,
         ends: [T; 2],
-        lacks: impl Fn(T, &State<T, N>, &Motion<T, N>) -> T,
+        violation: impl Fn(T, &State<T, N>, &Accelerations<T, N>) -> T,
     ) -> Located<T, N> {
-        let &Leap { state, x, dt, k1 } = leap;
+        let &TrialStep { state, x, dt, k1 } = trial_step;
         let ([mut low, mut high], [mut before, mut after]) = ([T::zero(), T::one()], ends);
         let enough = (after - before) * lit(RELEASED);
         let mut last_high = None;
@@ -204,18 +208,18 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
             let s = (high - after * (high - low) / (after - before) + lit(BEYOND)).min(high);
             let there = self.runge_kutta(state, x, s * dt, k1);
             let motion = self.motion(x + s * dt, &there);
-            let lack = lacks(x + s * dt, &there, &motion);
-            let beyond = lack > T::zero();
+            let violation = violation(x + s * dt, &there, &motion);
+            let beyond = violation > T::zero();
             let again = last_high == Some(beyond);
             last_high = Some(beyond);
             if beyond {
-                (high, after, reached) = (s, lack, Some(there));
+                (high, after, reached) = (s, violation, Some(there));
                 before *= if again { lit(0.5) } else { T::one() };
             } else {
-                (low, before) = (s, lack);
+                (low, before) = (s, violation);
                 after *= if again { lit(0.5) } else { T::one() };
             }
-            if beyond && lack < enough {
+            if beyond && violation < enough {
                 break;
             }
         }
@@ -225,15 +229,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'_, T, A, N,
 }
 
 /// A step that may be cut short: where it starts, when, how long it is, and how the arm moves at its start.
-pub(super) struct Leap<'a, T, const N: usize> {
+pub(super) struct TrialStep<'a, T, const N: usize> {
     pub(super) state: &'a State<T, N>,
     pub(super) x: T,
     pub(super) dt: T,
-    pub(super) k1: &'a Motion<T, N>,
+    pub(super) k1: &'a Accelerations<T, N>,
 }
 
 /// A change of one joint's mode at the fraction `s` of a step.
-pub(super) struct Event<T> {
+pub(super) struct ModeEvent<T> {
     pub(super) joint: usize,
     pub(super) s: T,
     pub(super) change: Change<T>,
@@ -242,25 +246,25 @@ pub(super) struct Event<T> {
 /// What happens at an event.
 pub(super) enum Change<T> {
     /// The velocity reaches zero.
-    Stop,
-    /// Friction no longer holds; by how much it lacks at the start and at the end of the step.
+    Standstill,
+    /// Static friction no longer holds the joint.
     Release {
         /// The mode it changes to.
         mode: Mode,
-        /// What holding takes beyond friction's level at both ends of the step.
-        excess: [T; 2],
+        /// Stiction violation at both ends of the step.
+        stiction_violation: [T; 2],
     },
-    /// A rotor meets the flank of its play.
-    Meet,
+    /// A rotor hits the flank of its backlash.
+    Impact,
     /// A joint crosses a position at which its torque jumps.
     Cross {
         /// The position.
         at: T,
     },
-    /// A flank no longer pushes; by how much it would have to pull at both ends of the step.
+    /// A flank no longer pushes and the backlash opens.
     Open {
-        /// That pull.
-        pull: [T; 2],
+        /// Force by which the flank would have to pull, at both ends of the step; a flank can only push.
+        flank_tension: [T; 2],
     },
 }
 

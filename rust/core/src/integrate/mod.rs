@@ -3,21 +3,21 @@
 //! While no joint reverses, sticks or breaks away the right-hand side is smooth and the step is of order four. A joint whose
 //! velocity would change sign is stopped at the instant it reaches zero; there it either sticks, if friction can hold it, or
 //! goes on in the direction of the torque. A stuck joint breaks away at the instant the torque it needs exceeds its Coulomb
-//! level. So the arm left under a torque below that level does not creep, and a step across a reversal keeps its accuracy. In the same way
-//! a rotor meets the flank of its play, and leaves it, at an instant of its own.
+//! level. So the arm left under a torque below that level does not creep, and a step across a reversal keeps its accuracy. Impacts of
+//! a rotor on the flank of its backlash, and its separation, are located in the same way.
 
+mod backlash;
 mod crossing;
-mod play;
 pub(crate) mod root;
 
 use crate::arm::Arm;
-use crate::effect::Pulse;
-use crate::glide::{self, Modes, Signs, Span, glide};
-use crate::plant::{Mode, Motion, Plant};
-use crate::pose::{Place, Pose, Reach};
+use crate::effect::InputSegment;
+use crate::fixed_mode::{FixedModeStep, ModeCheck, Modes, Span, rk4_fixed_mode};
+use crate::kinematics::{AngleRange, JointState, KinematicState};
+use crate::plant::{Accelerations, Mode, Plant};
 use crate::real::{Real, lit};
-use crate::transmission::Hidden;
-use crossing::{Leap, Located};
+use crate::transmission::LatentState;
+use crossing::{Located, TrialStep};
 use nalgebra::SVector;
 
 /// Mode changes located within one sub-step before the rest of it is taken with all crossing joints held.
@@ -32,14 +32,14 @@ pub struct State<T, const N: usize> {
     pub dq: SVector<T, N>,
     /// Friction modes.
     pub modes: [Mode; N],
-    /// States that no encoder shows.
-    pub hidden: Hidden<T, N>,
+    /// Latent states of the transmissions and of hysteresis.
+    pub latent: LatentState<T, N>,
 }
 
 impl<T: Real, const N: usize> State<T, N> {
     /// A state whose modes follow from its velocities: a joint at rest starts stuck and is released if its torque demands it.
     pub fn new(q: SVector<T, N>, dq: SVector<T, N>) -> Self {
-        Self { q, dq, modes: core::array::from_fn(|j| Mode::of(dq[j])), hidden: Hidden::none(q) }
+        Self { q, dq, modes: core::array::from_fn(|j| Mode::of(dq[j])), latent: LatentState::none(q) }
     }
 
     /// Whether every number is finite.
@@ -56,7 +56,7 @@ pub struct Interval<'a, T, const N: usize> {
     /// Length, s.
     pub h: T,
     /// Torque of each joint over the interval.
-    pub torque: &'a [Pulse<T>; N],
+    pub torque: &'a [InputSegment<T>; N],
 }
 
 impl<T: Real, const N: usize> Interval<'_, T, N> {
@@ -65,8 +65,12 @@ impl<T: Real, const N: usize> Interval<'_, T, N> {
     pub(crate) fn torque_at(&self, x: T) -> SVector<T, N> {
         let s = x / self.h;
         SVector::from_fn(|j, _| {
-            let pulse = &self.torque[j];
-            if pulse.start == pulse.end && pulse.start == pulse.middle { pulse.start } else { pulse.at(s) }
+            let segment = &self.torque[j];
+            if segment.start == segment.end && segment.start == segment.middle {
+                segment.start
+            } else {
+                segment.at(s)
+            }
         })
     }
 }
@@ -83,23 +87,23 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
         return;
     }
     let count = substeps.max(1);
-    if count == 1 && plant.is_plain() && glided(plant, state, interval) {
+    if count == 1 && plant.is_plain() && fixed_mode_step(plant, state, interval) {
         return;
     }
     let dt = interval.h / lit(count as f64);
     for i in 0..count {
         let from = dt * lit(i as f64);
-        if plant.smoothing() > T::zero() && !plant.drives().play() {
-            *state = Step::new(plant, interval, state).smooth(state, from, dt);
+        if plant.smoothing() > T::zero() && !plant.drivetrain().has_backlash() {
+            *state = SubStep::new(plant, interval, state).smooth(state, from, dt);
         } else {
-            Step::new(plant, interval, state).exact(state, from, dt);
+            SubStep::new(plant, interval, state).exact(state, from, dt);
         }
     }
 }
 
 /// One sample interval in one step, if no friction mode changes within it.
 #[inline(always)]
-fn glided<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
+fn fixed_mode_step<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     plant: &Plant<T, A, N, P>,
     state: &mut State<T, N>,
     interval: &Interval<T, N>,
@@ -107,18 +111,21 @@ fn glided<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     let mut span = Span { t: interval.t, h: interval.h, tau: [[T::zero(); N]; 3] };
     let (mut direction, mut dry) = ([T::zero(); N], [T::zero(); N]);
     for j in 0..N {
-        let Pulse { start, middle, end } = interval.torque[j];
+        let InputSegment { start, middle, end } = interval.torque[j];
         (span.tau[0][j], span.tau[1][j], span.tau[2][j]) = (start, middle, end);
         (direction[j], dry[j]) = (state.modes[j].direction(), plant.dry(j));
     }
-    let start = plant.rigid().pose(&Place { q: state.q.into(), dq: state.dq.into() });
+    let start = plant.rigid().kinematics(&JointState { q: state.q.into(), dq: state.dq.into() });
     let modes = Modes::new(direction, dry);
-    let mut signs = Signs::none();
-    let pose = glide(&glide::Step { body: plant, start: &start, modes: &modes, span: &span }, &mut signs);
-    let crosses = |j: usize| plant.edge_between(j, state.q[j], pose.place.q[j]).is_some();
-    let right = signs.wrong <= T::zero() && !(plant.jumps() && (0..N).any(crosses));
+    let mut mode_check = ModeCheck::none();
+    let kinematics = rk4_fixed_mode(
+        &FixedModeStep { dynamics: plant, start: &start, modes: &modes, span: &span },
+        &mut mode_check,
+    );
+    let crosses = |j: usize| plant.edge_between(j, state.q[j], kinematics.joints.q[j]).is_some();
+    let right = mode_check.mode_violation <= T::zero() && !(plant.jumps() && (0..N).any(crosses));
     if right {
-        (state.q, state.dq) = (pose.place.q.into(), pose.place.dq.into());
+        (state.q, state.dq) = (kinematics.joints.q.into(), kinematics.joints.dq.into());
     }
     right
 }
@@ -131,49 +138,55 @@ pub(crate) fn exact<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     interval: &Interval<T, N>,
     done: T,
 ) {
-    Step::new(plant, interval, state).exact(state, done, interval.h - done);
+    SubStep::new(plant, interval, state).exact(state, done, interval.h - done);
 }
 
-/// One sub-step's surroundings.
-struct Step<'a, T: Real, A, const N: usize, const P: usize> {
+/// Context of one sub-step.
+struct SubStep<'a, T: Real, A, const N: usize, const P: usize> {
     plant: &'a Plant<T, A, N, P>,
     interval: &'a Interval<'a, T, N>,
-    /// Where the sub-step starts; sines and cosines within it are turned on from here.
-    origin: Pose<T, N>,
+    /// Kinematic state at its start; sines and cosines within it are rotated from here.
+    origin: KinematicState<T, N>,
 }
 
-impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A, N, P> {
+impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T, A, N, P> {
     #[inline]
     fn new(plant: &'a Plant<T, A, N, P>, interval: &'a Interval<'a, T, N>, state: &State<T, N>) -> Self {
-        let origin = plant.rigid().pose(&Place { q: state.q.into(), dq: state.dq.into() });
+        let origin = plant.rigid().kinematics(&JointState { q: state.q.into(), dq: state.dq.into() });
         Self { plant, interval, origin }
     }
 
     #[inline]
-    fn motion(&self, x: T, state: &State<T, N>) -> Motion<T, N> {
-        let place = Place { q: state.q.into(), dq: state.dq.into() };
+    fn motion(&self, x: T, state: &State<T, N>) -> Accelerations<T, N> {
+        let joints = JointState { q: state.q.into(), dq: state.dq.into() };
         let origin = &self.origin;
-        let pose = self.plant.rigid().near(&place, &origin.place.q, &origin.turns, Reach::Near);
+        let kinematics = self.plant.rigid().near(&joints, &origin.joints.q, &origin.sincos, AngleRange::Near);
         let tau = self.interval.torque_at(x);
-        self.plant.acceleration(self.interval.t + x, &pose, &tau, &state.modes, &state.hidden)
+        self.plant.acceleration(self.interval.t + x, &kinematics, &tau, &state.modes, &state.latent)
     }
 
     /// `state` moved on by `dt` with the rates `(dq, motion)` of some stage.
     #[inline]
-    fn moved(&self, state: &State<T, N>, dt: T, at: &State<T, N>, slope: &Motion<T, N>) -> State<T, N> {
+    fn moved(
+        &self,
+        state: &State<T, N>,
+        dt: T,
+        at: &State<T, N>,
+        slope: &Accelerations<T, N>,
+    ) -> State<T, N> {
         let mut next = *state;
         next.q = state.q + at.dq * dt;
         next.dq = state.dq + slope.ddq * dt;
-        if self.plant.drives().any() {
-            next.hidden.twist = state.hidden.twist + at.hidden.dtwist * dt;
-            next.hidden.dtwist = state.hidden.dtwist + slope.ddtwist * dt;
+        if self.plant.drivetrain().any() {
+            next.latent.deflection = state.latent.deflection + at.latent.deflection_rate * dt;
+            next.latent.deflection_rate = state.latent.deflection_rate + slope.deflection_acceleration * dt;
         }
         next
     }
 
     /// One Runge-Kutta step whose first stage is known.
     #[inline]
-    fn runge_kutta(&self, state: &State<T, N>, x: T, dt: T, k1: &Motion<T, N>) -> State<T, N> {
+    fn runge_kutta(&self, state: &State<T, N>, x: T, dt: T, k1: &Accelerations<T, N>) -> State<T, N> {
         let (half, sixth, two) = (dt * lit(0.5), dt / lit(6.0), lit::<T>(2.0));
         let s2 = self.moved(state, half, state, k1);
         let k2 = self.motion(x + half, &s2);
@@ -184,14 +197,22 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
         let mut next = *state;
         next.q = state.q + (state.dq + (s2.dq + s3.dq) * two + s4.dq) * sixth;
         next.dq = state.dq + (k1.ddq + (k2.ddq + k3.ddq) * two + k4.ddq) * sixth;
-        if self.plant.drives().any() {
-            let rates = [&state.hidden.dtwist, &s2.hidden.dtwist, &s3.hidden.dtwist, &s4.hidden.dtwist];
-            next.hidden.twist += (rates[0] + (rates[1] + rates[2]) * two + rates[3]) * sixth;
-            next.hidden.dtwist += (k1.ddtwist + (k2.ddtwist + k3.ddtwist) * two + k4.ddtwist) * sixth;
+        if self.plant.drivetrain().any() {
+            let rates = [
+                &state.latent.deflection_rate,
+                &s2.latent.deflection_rate,
+                &s3.latent.deflection_rate,
+                &s4.latent.deflection_rate,
+            ];
+            next.latent.deflection += (rates[0] + (rates[1] + rates[2]) * two + rates[3]) * sixth;
+            next.latent.deflection_rate += (k1.deflection_acceleration
+                + (k2.deflection_acceleration + k3.deflection_acceleration) * two
+                + k4.deflection_acceleration)
+                * sixth;
         }
-        if self.plant.remembers() {
-            next.hidden.memory = self.plant.memory(&next.q, &state.hidden);
-            next.hidden.anchor = next.q;
+        if self.plant.has_hysteresis() {
+            next.latent.memory = self.plant.memory(&next.q, &state.latent);
+            next.latent.anchor = next.q;
         }
         next
     }
@@ -209,12 +230,12 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
         for _ in 0..MAX_EVENTS {
             let k1 = self.settle(state, x);
             let trial = self.runge_kutta(state, x, left, &k1);
-            let leap = Leap { state, x, dt: left, k1: &k1 };
-            let Some(event) = self.first_event(&leap, &trial) else {
+            let trial_step = TrialStep { state, x, dt: left, k1: &k1 };
+            let Some(event) = self.first_event(&trial_step, &trial) else {
                 *state = trial;
                 return;
             };
-            let Located { length, reached } = self.locate(&leap, &event);
+            let Located { length, reached } = self.locate(&trial_step, &event);
             *state = self.applied(&event, reached);
             x += length;
             left -= length;
@@ -241,9 +262,9 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
 
     /// Releases stuck joints that friction cannot hold, and sticks joints that were released to no avail; returns the motion.
     #[inline]
-    fn settle(&self, state: &mut State<T, N>, x: T) -> Motion<T, N> {
+    fn settle(&self, state: &mut State<T, N>, x: T) -> Accelerations<T, N> {
         let mut motion = self.motion(x, state);
-        if self.plant.drives().play() && self.open(x, state, &motion) {
+        if self.plant.drivetrain().has_backlash() && self.open(x, state, &motion) {
             motion = self.motion(x, state);
         }
         let mut tried = [false; N];
@@ -258,11 +279,17 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
         motion
     }
 
-    /// By how much holding joint `j` takes more than friction gives, and the direction it would slide in.
+    /// Stiction violation of joint `j`, and the direction it would slide in.
     #[inline]
-    fn excess(&self, j: usize, x: T, state: &State<T, N>, motion: &Motion<T, N>) -> (T, T) {
-        let tau = self.plant.drives().reaching(&self.interval.torque_at(x), &state.hidden);
-        self.plant.excess(j, self.interval.t + x, state.q[j], tau[j], motion.holding[j])
+    fn stiction_violation(
+        &self,
+        j: usize,
+        x: T,
+        state: &State<T, N>,
+        motion: &Accelerations<T, N>,
+    ) -> (T, T) {
+        let tau = self.plant.drivetrain().torque_at_joints(&self.interval.torque_at(x), &state.latent);
+        self.plant.stiction_violation(j, self.interval.t + x, state.q[j], tau[j], motion.friction_at_rest[j])
     }
 
     /// The joint whose mode contradicts the motion most, and the mode it should have.
@@ -270,7 +297,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
     fn unsettled(
         &self,
         state: &State<T, N>,
-        motion: &Motion<T, N>,
+        motion: &Accelerations<T, N>,
         x: T,
         tried: &[bool; N],
     ) -> Option<(usize, Mode)> {
@@ -282,9 +309,9 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Step<'a, T, A
                     return Some((j, Mode::of(state.dq[j])));
                 }
             } else if state.modes[j] == Mode::Stuck {
-                let (excess, direction) = self.excess(j, x, state, motion);
-                if excess > worst && !tried[j] {
-                    (found, worst) = (Some((j, Mode::of(direction))), excess);
+                let (stiction_violation, direction) = self.stiction_violation(j, x, state, motion);
+                if stiction_violation > worst && !tried[j] {
+                    (found, worst) = (Some((j, Mode::of(direction))), stiction_violation);
                 }
             } else if self.plant.is_dry(j) && motion.ddq[j] * state.modes[j].direction() < T::zero() {
                 return Some((j, Mode::Stuck));

@@ -1,12 +1,12 @@
 //! Where a velocity vanishes within a step, from what is known at its ends.
 
-use crate::pose::Place;
+use crate::kinematics::JointState;
 use crate::real::{Real, lit};
 
 /// A correction of this part of a step is as good on a straight line: what is left out is of the order of its square.
 pub(super) const STRAIGHT: f64 = 1e-6;
 
-/// The same on a curve of constant rate of acceleration, whose error is of the order of its cube.
+/// A correction of this part of a step is as good on a curve of constant jerk: what is left out is of the order of its cube.
 const CURVED: f64 = 1e-3;
 
 /// The rate of acceleration over less than this part of a step is not known well enough.
@@ -16,25 +16,25 @@ const SHORT: f64 = 0.01;
 /// that curve.
 const ROOT: f64 = 1e-3;
 
-/// A place close to where joint `j`'s velocity vanishes, `length` after the start of a step, and the accelerations at both.
-pub(crate) struct Close<'a, T, const N: usize> {
-    pub(crate) place: &'a Place<T, N>,
+/// A joint state close to where joint `j`'s velocity vanishes, `length` after the start of a step, and the accelerations at both.
+pub(crate) struct VelocityZero<'a, T, const N: usize> {
+    pub(crate) joints: &'a JointState<T, N>,
     pub(crate) j: usize,
     pub(crate) length: T,
     pub(crate) ddq: [&'a [T; N]; 2],
 }
 
-impl<T: Real, const N: usize> Close<'_, T, N> {
+impl<T: Real, const N: usize> VelocityZero<'_, T, N> {
     /// By how much the velocity vanishes later, by Newton's method.
     #[inline]
     pub(crate) fn correction(&self) -> T {
-        -self.place.dq[self.j] / self.ddq[1][self.j]
+        -self.joints.dq[self.j] / self.ddq[1][self.j]
     }
 
-    /// The place where the velocity vanishes and the time from here to there, if it is so close within a step of `whole` that no
+    /// The joint state where the velocity vanishes and the time from here to there, if it is so close within a step of `whole` that no
     /// further step is needed.
     #[inline]
-    pub(crate) fn reached(&self, whole: T) -> Option<(T, Place<T, N>)> {
+    pub(crate) fn reached(&self, whole: T) -> Option<(T, JointState<T, N>)> {
         let correction = self.correction();
         let curved = correction.abs() < whole * lit(CURVED) && self.length > whole * lit(SHORT);
         let straight = correction.abs() < whole * lit(STRAIGHT);
@@ -49,10 +49,10 @@ impl<T: Real, const N: usize> Close<'_, T, N> {
             }
         }
         let (j, half): (usize, T) = (self.j, lit(0.5));
-        let d = -(self.place.dq[j] + half * rate[j] * correction * correction) / ddq[j];
-        let mut next = *self.place;
+        let d = -(self.joints.dq[j] + half * rate[j] * correction * correction) / ddq[j];
+        let mut next = *self.joints;
         for i in 0..N {
-            next.q[i] += (self.place.dq[i] + (ddq[i] + rate[i] * (d / lit(3.0))) * (half * d)) * d;
+            next.q[i] += (self.joints.dq[i] + (ddq[i] + rate[i] * (d / lit(3.0))) * (half * d)) * d;
             next.dq[i] += (ddq[i] + rate[i] * (half * d)) * d;
         }
         Some((d, next))

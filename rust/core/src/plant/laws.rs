@@ -1,4 +1,4 @@
-//! What friction and effects say at one joint and instant.
+//! Friction and effect torques at one joint and instant.
 
 use super::{Mode, Plant};
 use crate::arm::Arm;

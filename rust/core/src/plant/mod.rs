@@ -4,17 +4,17 @@
 //! its velocity exactly zero and whatever friction torque that takes. [`Plant::acceleration`] is smooth while no mode changes;
 //! [`crate::integrate`] decides when one does.
 
-mod body;
+mod dynamics;
 mod laws;
 mod rates;
 
-use crate::arm::{Arm, Balance};
-use crate::drives::Drives;
+use crate::arm::{Arm, EquationTerms};
+use crate::drivetrain::Drivetrain;
 use crate::effect::{Active, Hooks};
+use crate::kinematics::{JointState, KinematicState, RigidArm};
 use crate::linear::solve_positive_definite;
-use crate::pose::{Place, Pose, Rigid};
 use crate::real::Real;
-use crate::transmission::Hidden;
+use crate::transmission::LatentState;
 use nalgebra::SVector;
 
 /// Most effects one plant can carry.
@@ -57,24 +57,24 @@ impl Mode {
 
 /// Acceleration, and the friction torque that each stuck joint needs to stay at rest.
 #[derive(Debug, Clone, Copy)]
-pub struct Motion<T, const N: usize> {
+pub struct Accelerations<T, const N: usize> {
     /// `ddq`; exactly zero for stuck joints.
     pub ddq: SVector<T, N>,
     /// Friction torque of stuck joints; zero for sliding ones.
-    pub holding: SVector<T, N>,
-    /// Acceleration of the twist of driven joints; zero for rigid ones.
-    pub ddtwist: SVector<T, N>,
+    pub friction_at_rest: SVector<T, N>,
+    /// Acceleration of the transmissions' deflections; zero for rigid joints.
+    pub deflection_acceleration: SVector<T, N>,
 }
 
 /// An arm with parameter values, effects and a friction model.
 #[derive(Clone)]
 pub struct Plant<T: Real, A, const N: usize, const P: usize> {
-    rigid: Rigid<T, A, N, P>,
-    drives: Drives<T, N>,
+    rigid: RigidArm<T, A, N, P>,
+    drivetrain: Drivetrain<T, N>,
     smoothing: T,
     effects: [Option<Active<T>>; MAX_EFFECTS],
     hooks: [Hooks; N],
-    remembers: bool,
+    has_hysteresis: bool,
     jumps: bool,
 }
 
@@ -82,14 +82,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// The arm without effects and with exact Coulomb friction.
     pub fn new(arm: A, theta: [T; P]) -> Self {
         let (viscous, coulomb) = (arm.viscous(&theta).into(), arm.coulomb(&theta).into());
-        let (steady, tilt) = (arm.steady_inertia(&theta), T::zero());
+        let (constant_inertia, tilt) = (arm.constant_inertia(&theta), T::zero());
         Self {
-            rigid: Rigid { arm, theta, viscous, coulomb, steady, tilt },
-            drives: Drives::none(),
+            rigid: RigidArm { arm, theta, viscous, coulomb, constant_inertia, tilt },
+            drivetrain: Drivetrain::none(),
             smoothing: T::zero(),
             effects: [None; MAX_EFFECTS],
             hooks: [Hooks::NONE; N],
-            remembers: false,
+            has_hysteresis: false,
             jumps: false,
         }
     }
@@ -109,24 +109,24 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         let on_joint = self.hooks.get_mut(joint)?;
         on_joint.force |= hooks.force;
         on_joint.coulomb |= hooks.coulomb;
-        self.remembers |= hooks.memory;
+        self.has_hysteresis |= hooks.memory;
         self.jumps |= effect.law.edge(&effect.p).is_some();
         let rigid = &mut self.rigid;
         let own = *rigid.arm.inertia(&rigid.theta, &SVector::zeros()).get((joint, joint))?;
-        *rigid.steady.get_mut(joint)?.get_mut(joint)? += effect.law.inertia(&effect.p);
-        if let Some(drive) = effect.law.drive(&effect.p, own) {
-            self.drives.add(joint, drive, &mut rigid.steady)?;
+        *rigid.constant_inertia.get_mut(joint)?.get_mut(joint)? += effect.law.inertia(&effect.p);
+        if let Some(transmission) = effect.law.transmission(&effect.p, own) {
+            self.drivetrain.add(joint, transmission, &mut rigid.constant_inertia)?;
         }
         rigid.tilt += effect.law.tilt(&effect.p);
-        self.couple(effect.law.coupling(&effect.p));
+        self.add_coupling(effect.law.coupling(&effect.p));
         let rigid = &mut self.rigid;
         if let Some((mass, distance)) = effect.law.payload(&effect.p) {
             let delta = rigid.arm.payload(&rigid.theta, mass, distance);
             for (value, change) in rigid.theta.iter_mut().zip(delta) {
                 *value += change;
             }
-            let more = rigid.arm.steady_inertia(&delta);
-            for (value, change) in rigid.steady.iter_mut().flatten().zip(more.iter().flatten()) {
+            let more = rigid.arm.constant_inertia(&delta);
+            for (value, change) in rigid.constant_inertia.iter_mut().flatten().zip(more.iter().flatten()) {
                 *value += *change;
             }
         }
@@ -134,35 +134,36 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     }
 
     /// Adds to the inertia between the first two joints.
-    fn couple(&mut self, inertia: T) {
+    fn add_coupling(&mut self, inertia: T) {
         for (row, column) in [(0, 1), (1, 0)] {
-            if let Some(entry) = self.rigid.steady.get_mut(row).and_then(|row| row.get_mut(column)) {
+            if let Some(entry) = self.rigid.constant_inertia.get_mut(row).and_then(|row| row.get_mut(column))
+            {
                 *entry += inertia;
             }
         }
     }
 
-    /// The motor sides of its joints.
+    /// Transmissions between motors and links.
     #[inline]
-    pub fn drives(&self) -> &Drives<T, N> {
-        &self.drives
+    pub fn drivetrain(&self) -> &Drivetrain<T, N> {
+        &self.drivetrain
     }
 
-    /// Whether a joint remembers its path.
+    /// Whether a joint has a hysteresis state.
     #[inline]
-    pub fn remembers(&self) -> bool {
-        self.remembers
+    pub fn has_hysteresis(&self) -> bool {
+        self.has_hysteresis
     }
 
-    /// What the joints remember at `q`.
+    /// Hysteresis states of the joints at `q`.
     #[inline]
-    pub fn memory(&self, q: &SVector<T, N>, hidden: &Hidden<T, N>) -> SVector<T, N> {
-        let mut memory = hidden.memory;
-        if self.remembers {
+    pub fn memory(&self, q: &SVector<T, N>, latent: &LatentState<T, N>) -> SVector<T, N> {
+        let mut memory = latent.memory;
+        if self.has_hysteresis {
             for effect in self.effects.iter().flatten().filter(|e| e.law.spec().hooks.memory) {
                 let j = effect.joint;
-                if let (Some(z), Some(to), Some(from)) = (memory.get_mut(j), q.get(j), hidden.anchor.get(j)) {
-                    *z = effect.law.remember(&effect.p, *z, *to - *from);
+                if let (Some(z), Some(to), Some(from)) = (memory.get_mut(j), q.get(j), latent.anchor.get(j)) {
+                    *z = effect.law.hysteresis_after(&effect.p, *z, *to - *from);
                 }
             }
         }
@@ -170,7 +171,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     }
 
     /// The arm's numbers, payloads and other inertial effects included.
-    pub fn rigid(&self) -> &Rigid<T, A, N, P> {
+    pub fn rigid(&self) -> &RigidArm<T, A, N, P> {
         &self.rigid
     }
 
@@ -179,17 +180,17 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         &self.rigid.theta
     }
 
-    /// Whether nothing but friction modes can change during a step: exact friction, no states that no encoder shows, and no torque that
-    /// jumps at a position.
+    /// Whether nothing but friction modes can change during a step: exact friction, no latent states, and no torque that jumps at a
+    /// position.
     #[inline]
-    pub fn glides(&self) -> bool {
+    pub fn only_modes_change(&self) -> bool {
         self.is_plain() && !self.jumps
     }
 
-    /// The same but for torques that jump.
+    /// Whether friction is exact and there are no latent states; torques may jump at a position.
     #[inline]
     pub fn is_plain(&self) -> bool {
-        self.smoothing == T::zero() && !self.drives.any() && !self.remembers
+        self.smoothing == T::zero() && !self.drivetrain.any() && !self.has_hysteresis
     }
 
     /// Whether effects add a torque to joint `j`, and whether they change its Coulomb level.
@@ -209,7 +210,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.rigid.coulomb[j] > T::zero() || self.hooks.iter().any(|on| on.force || on.coulomb)
     }
 
-    /// 1 for a joint with dry friction, 0 for one that reverses without noticing.
+    /// 1 for a joint with dry friction, 0 for one without.
     #[inline]
     pub(crate) fn dry(&self, j: usize) -> T {
         if self.is_dry(j) { T::one() } else { T::zero() }
@@ -230,32 +231,40 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     pub fn acceleration(
         &self,
         t: T,
-        pose: &Pose<T, N>,
+        kinematics: &KinematicState<T, N>,
         tau: &SVector<T, N>,
         modes: &[Mode; N],
-        hidden: &Hidden<T, N>,
-    ) -> Motion<T, N> {
-        if !self.drives.any() {
-            return self.undriven(t, pose, tau, modes, hidden);
+        latent: &LatentState<T, N>,
+    ) -> Accelerations<T, N> {
+        if !self.drivetrain.any() {
+            return self.undriven(t, kinematics, tau, modes, latent);
         }
-        let mut closed = *pose;
-        self.drives.close(&mut closed.balance.inertia, hidden);
-        let motion = self.undriven(t, &closed, &self.drives.reaching(tau, hidden), modes, hidden);
-        Motion { ddtwist: self.drives.twisting(tau, &motion.ddq, hidden), ..motion }
+        let mut closed = *kinematics;
+        self.drivetrain.add_closed_rotors(&mut closed.equation_terms.inertia, latent);
+        let motion = self.undriven(t, &closed, &self.drivetrain.torque_at_joints(tau, latent), modes, latent);
+        Accelerations {
+            deflection_acceleration: self.drivetrain.deflection_accelerations(tau, &motion.ddq, latent),
+            ..motion
+        }
     }
 
-    /// The same for given torques at the joints.
+    /// Equation (1) solved for `ddq`, given the torques that reach the joints.
     #[inline]
     fn undriven(
         &self,
         t: T,
-        pose: &Pose<T, N>,
+        kinematics: &KinematicState<T, N>,
         tau: &SVector<T, N>,
         modes: &[Mode; N],
-        hidden: &Hidden<T, N>,
-    ) -> Motion<T, N> {
-        let Pose { place: Place { q, dq }, balance: Balance { inertia, bias }, .. } = pose;
-        let memory = if self.remembers { self.memory(&SVector::from(*q), hidden) } else { hidden.memory };
+        latent: &LatentState<T, N>,
+    ) -> Accelerations<T, N> {
+        let KinematicState {
+            joints: JointState { q, dq },
+            equation_terms: EquationTerms { inertia, bias },
+            ..
+        } = kinematics;
+        let memory =
+            if self.has_hysteresis { self.memory(&SVector::from(*q), latent) } else { latent.memory };
         let mut rhs = SVector::<T, N>::zeros();
         for j in 0..N {
             let hooks = self.hooks[j];
@@ -275,38 +284,38 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.solve(inertia, &rhs, modes)
     }
 
-    /// Equation (1) read the other way: the torque that a measured motion needs beyond `tau`, with motors riding rigidly on their
-    /// links and friction smoothed as set.
-    pub fn lacking(
+    /// Residual torque by inverse dynamics: the torque that a measured motion needs beyond `tau`, with rigid transmissions and friction
+    /// smoothed as set.
+    pub fn residual_torque(
         &self,
         t: T,
         motion: [&SVector<T, N>; 3],
         tau: &SVector<T, N>,
-        hidden: &Hidden<T, N>,
+        latent: &LatentState<T, N>,
     ) -> SVector<T, N> {
         let [q, dq, ddq] = motion;
-        let place = Place { q: core::array::from_fn(|j| q[j]), dq: core::array::from_fn(|j| dq[j]) };
-        let Balance { mut inertia, bias } = self.rigid.balance(&place);
-        self.drives.ride(&mut inertia);
-        let memory = self.memory(q, hidden);
+        let joints = JointState { q: core::array::from_fn(|j| q[j]), dq: core::array::from_fn(|j| dq[j]) };
+        let EquationTerms { mut inertia, bias } = self.rigid.equation_terms(&joints);
+        self.drivetrain.add_rotors(&mut inertia);
+        let memory = self.memory(q, latent);
         let modes: [Mode; N] = core::array::from_fn(|j| Mode::of(dq[j]));
-        let mut lack = -tau;
+        let mut residual = -tau;
         for j in 0..N {
             for k in 0..N {
-                lack[j] += inertia[j][k] * ddq[k];
+                residual[j] += inertia[j][k] * ddq[k];
             }
             let mut x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
-            x.other = self.sliding((j + 1) % N, &place.dq, &modes);
+            x.other = self.sliding((j + 1) % N, &joints.dq, &modes);
             x.memory = memory[j];
             let friction = self.rigid.viscous[j] * dq[j] + self.dry_friction(j, &x, modes[j]);
-            lack[j] += bias[j] + friction - self.force(j, &x);
+            residual[j] += bias[j] + friction - self.force(j, &x);
         }
-        lack
+        residual
     }
 
     /// `M ddq = rhs` with the rows and columns of stuck joints taken out.
     #[inline]
-    fn solve(&self, inertia: &[[T; N]; N], rhs: &SVector<T, N>, modes: &[Mode; N]) -> Motion<T, N> {
+    fn solve(&self, inertia: &[[T; N]; N], rhs: &SVector<T, N>, modes: &[Mode; N]) -> Accelerations<T, N> {
         let stuck = self.stuck(modes);
         let (mut reduced, mut b) = (*inertia, *rhs);
         for j in 0..N {
@@ -320,16 +329,16 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             }
         }
         let ddq = SVector::from(solve_positive_definite(reduced, b.into()));
-        let mut holding = SVector::zeros();
+        let mut friction_at_rest = SVector::zeros();
         for j in 0..N {
             if stuck[j] {
-                holding[j] = rhs[j];
+                friction_at_rest[j] = rhs[j];
                 for k in 0..N {
-                    holding[j] -= inertia[j][k] * ddq[k];
+                    friction_at_rest[j] -= inertia[j][k] * ddq[k];
                 }
             }
         }
-        Motion { ddq, holding, ddtwist: SVector::zeros() }
+        Accelerations { ddq, friction_at_rest, deflection_acceleration: SVector::zeros() }
     }
 
     /// Which joints are held; none with smoothed friction.
@@ -339,13 +348,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         core::array::from_fn(|j| exact && modes[j] == Mode::Stuck)
     }
 
-    /// By how much the holding torque of joint `j` exceeds what friction can give, and the direction it would slide in.
-    /// Not positive: it stays.
+    /// Stiction violation of joint `j` at rest (friction torque at rest less the Coulomb level), and the direction it would slide in.
+    /// Not positive: the joint stays stuck.
     #[inline]
-    pub fn excess(&self, j: usize, t: T, q: T, tau: T, holding: T) -> (T, T) {
-        let direction = if holding < T::zero() { -T::one() } else { T::one() };
+    pub fn stiction_violation(&self, j: usize, t: T, q: T, tau: T, friction_at_rest: T) -> (T, T) {
+        let direction = if friction_at_rest < T::zero() { -T::one() } else { T::one() };
         // At rest the load of a joint is what has to be held.
-        let x = self.point(j, t, q, T::zero(), tau, holding - tau);
-        (holding.abs() - self.level(j, &x, direction), direction)
+        let x = self.point(j, t, q, T::zero(), tau, friction_at_rest - tau);
+        (friction_at_rest.abs() - self.level(j, &x, direction), direction)
     }
 }

@@ -3,11 +3,11 @@
 use super::Plant;
 use crate::arm::Arm;
 use crate::effect::Edge;
-use crate::pose::Place;
+use crate::kinematics::JointState;
 use crate::real::{Real, lit};
 use nalgebra::SVector;
 
-/// How much shorter the steps of a knock are than those that only keep it stable.
+/// How much shorter the steps of an impact are than those that only keep it stable.
 const FOLLOWED: f64 = 4.0;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
@@ -47,23 +47,23 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         least.max(lit(1e-9))
     }
 
-    /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, a motor swings against its link, or a joint knocks
-    /// against a stop, which is to be followed and not only survived. Zero for a rigid arm with exact friction.
+    /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, a motor oscillates against its link, or a joint hits
+    /// a joint limit, an impact that is to be resolved and not only stable. Zero for a rigid arm with exact friction.
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
         let mut fastest = T::zero();
         let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));
-        if self.smoothing == T::zero() && !self.drives.any() && !behind {
+        if self.smoothing == T::zero() && !self.drivetrain.any() && !behind {
             return fastest;
         }
-        let inertia = self.rigid.balance(&Place { q: (*q).into(), dq: [T::zero(); N] }).inertia;
+        let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
         for j in 0..N {
             let free = Self::free_inertia(j, &inertia);
             if self.smoothing > T::zero() {
                 let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
                 fastest = fastest.max(self.level(j, &x, T::one()) / (self.smoothing * free));
             }
-            if let Some(drive) = self.drives.get(j).filter(|d| d.gap <= T::zero()) {
-                fastest = fastest.max(drive.rate(free));
+            if let Some(transmission) = self.drivetrain.get(j).filter(|d| d.backlash <= T::zero()) {
+                fastest = fastest.max(transmission.rate(free));
             }
             if behind {
                 let met = self.edges(j).filter(|edge| edge.is_behind(q[j]));

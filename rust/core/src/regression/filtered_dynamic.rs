@@ -4,7 +4,7 @@
 //! once filtered.
 
 use super::friction::Friction;
-use super::{Passage, Snapshot, Steps, Variant};
+use super::{SampleInterval, SegmentCoefficients, Snapshot, Variant};
 use crate::arm::Arm;
 use crate::cpu::Cpu;
 use crate::filter::Cutoff;
@@ -14,7 +14,7 @@ use nalgebra::{SMatrix, SVector};
 /// State of the scheme. Of the matrices over all parameters only the inertial columns are used.
 #[derive(Debug, Clone, Copy)]
 pub struct FilteredDynamic<T: Real, const N: usize, const P: usize> {
-    steps: Steps<T>,
+    steps: SegmentCoefficients<T>,
     last: Snapshot<T, N>,
     last_momentum: SMatrix<T, N, P>,
     last_potential: SMatrix<T, N, P>,
@@ -34,7 +34,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
             Variant::Exact => last_momentum,
         };
         Self {
-            steps: Steps::new(cutoff),
+            steps: SegmentCoefficients::new(cutoff),
             last: *now,
             last_momentum,
             last_potential,
@@ -45,20 +45,20 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
         }
     }
 
-    /// The rows and outputs at the next state, reached by `passage`.
+    /// The rows and outputs at the next state, reached by `interval`.
     #[inline(always)]
     pub fn update<C: Cpu, A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
         variant: Variant,
         now: &Snapshot<T, N>,
-        passage: &Passage<T, N>,
+        interval: &SampleInterval<T, N>,
     ) -> ([[T; R]; N], [T; N]) {
         let (momentum, potential) = arm.momentum_and_potential(&now.q, &now.dq);
         let mut psi = [[T::zero(); R]; N];
         match variant {
-            Variant::Paper => self.paper::<C, A, R>(&momentum, passage, &mut psi),
-            Variant::Exact => self.exact::<C, A, R>(&momentum, &potential, now, passage, &mut psi),
+            Variant::Paper => self.paper::<C, A, R>(&momentum, interval, &mut psi),
+            Variant::Exact => self.exact::<C, A, R>(&momentum, &potential, now, interval, &mut psi),
         }
         for i in 0..N {
             self.friction.write(A::INERTIAL, Some(i), |j, value| {
@@ -75,10 +75,10 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
     fn paper<C: Cpu, A: Arm<T, N, P>, const R: usize>(
         &mut self,
         momentum: &SMatrix<T, N, P>,
-        passage: &Passage<T, N>,
+        interval: &SampleInterval<T, N>,
         psi: &mut [[T; R]; N],
     ) {
-        let step = self.steps.whole(passage.h);
+        let step = self.steps.whole(interval.h);
         for j in 0..A::INERTIAL {
             for i in 0..N {
                 let (from, to) = (self.last_momentum[(i, j)], momentum[(i, j)]);
@@ -90,7 +90,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
         }
         self.friction.hold_torques::<C>(&step, &self.last.dq);
         for i in 0..N {
-            self.torque[i] = step.held::<C>(self.torque[i], passage.second[i]);
+            self.torque[i] = step.held::<C>(self.torque[i], interval.second[i]);
         }
     }
 
@@ -100,10 +100,10 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
         momentum: &SMatrix<T, N, P>,
         potential: &SMatrix<T, N, P>,
         now: &Snapshot<T, N>,
-        passage: &Passage<T, N>,
+        interval: &SampleInterval<T, N>,
         psi: &mut [[T; R]; N],
     ) {
-        let step = self.steps.whole(passage.h);
+        let step = self.steps.whole(interval.h);
         for j in 0..A::INERTIAL {
             for i in 0..N {
                 let low = step.ramp::<C>(self.momentum[(i, j)], self.last_momentum[(i, j)], momentum[(i, j)]);
@@ -114,10 +114,10 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
             }
         }
         self.friction.filter_torques::<C>(&step, &self.last.dq, &now.dq);
-        let parts = self.steps.parts(passage);
+        let parts = self.steps.parts(interval);
         for i in 0..N {
-            let middle = parts[0].held::<C>(self.torque[i], passage.first[i]);
-            self.torque[i] = parts[1].held::<C>(middle, passage.second[i]);
+            let middle = parts[0].held::<C>(self.torque[i], interval.first[i]);
+            self.torque[i] = parts[1].held::<C>(middle, interval.second[i]);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Filtered power model, equations (29) and (30): `F[tau.dq] = (D[E] + F[W]) theta`, the paper's own proposal.
 
 use super::friction::Friction;
-use super::{Passage, Snapshot, Steps, Variant};
+use super::{SampleInterval, SegmentCoefficients, Snapshot, Variant};
 use crate::arm::Arm;
 use crate::cpu::Cpu;
 use crate::filter::Cutoff;
@@ -11,7 +11,7 @@ use nalgebra::SVector;
 /// State of the scheme. Of the rows over all parameters only the inertial entries are used.
 #[derive(Debug, Clone, Copy)]
 pub struct FilteredPower<T: Real, const N: usize, const P: usize> {
-    steps: Steps<T>,
+    steps: SegmentCoefficients<T>,
     last: Snapshot<T, N>,
     last_energy: SVector<T, P>,
     last_supply: T,
@@ -36,7 +36,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
             Variant::Exact => last_energy,
         };
         Self {
-            steps: Steps::new(cutoff),
+            steps: SegmentCoefficients::new(cutoff),
             last: *now,
             last_energy,
             last_supply: tau.dot(&now.dq),
@@ -46,21 +46,21 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
         }
     }
 
-    /// The row and output at the next state, reached by `passage`; `tau` is the torque that acts from then on.
+    /// The row and output at the next state, reached by `interval`; `tau` is the torque that acts from then on.
     #[inline(always)]
     pub fn update<C: Cpu, A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
         variant: Variant,
         now: &Snapshot<T, N>,
-        passage: &Passage<T, N>,
+        interval: &SampleInterval<T, N>,
         tau: &SVector<T, N>,
     ) -> ([[T; R]; 1], [T; 1]) {
         let energy = arm.energy_regressor(&now.q, &now.dq);
         let mut psi = [T::zero(); R];
         match variant {
-            Variant::Paper => self.paper::<C, A, R>(&energy, passage, &mut psi),
-            Variant::Exact => self.exact::<C, A, R>(arm, &energy, now, passage, &mut psi),
+            Variant::Paper => self.paper::<C, A, R>(&energy, interval, &mut psi),
+            Variant::Exact => self.exact::<C, A, R>(arm, &energy, now, interval, &mut psi),
         }
         self.friction.write(A::INERTIAL, None, |j, value| {
             if j < R {
@@ -75,10 +75,10 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
     fn paper<C: Cpu, A: Arm<T, N, P>, const R: usize>(
         &mut self,
         energy: &SVector<T, P>,
-        passage: &Passage<T, N>,
+        interval: &SampleInterval<T, N>,
         psi: &mut [T; R],
     ) {
-        let step = self.steps.whole(passage.h);
+        let step = self.steps.whole(interval.h);
         for j in 0..A::INERTIAL {
             self.energy[j] = step.paper_derivative::<C>(self.energy[j], self.last_energy[j], energy[j]);
             psi[j] = self.energy[j];
@@ -93,11 +93,11 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
         arm: &A,
         energy: &SVector<T, P>,
         now: &Snapshot<T, N>,
-        passage: &Passage<T, N>,
+        interval: &SampleInterval<T, N>,
         psi: &mut [T; R],
     ) {
-        let step = self.steps.whole(passage.h);
-        let half_way = self.last.half_way(now, passage.h);
+        let step = self.steps.whole(interval.h);
+        let half_way = self.last.half_way(now, interval.h);
         let middle = arm.energy_regressor(&half_way.q, &half_way.dq);
         for j in 0..A::INERTIAL {
             let height = middle[j] - (energy[j] + self.last_energy[j]) * lit(0.5);
@@ -105,16 +105,16 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
             psi[j] = (energy[j] - self.energy[j]) * step.lambda;
         }
         self.friction.filter_powers::<C>(&step, &self.last.dq, &now.dq);
-        self.supply = self.exact_supply::<C>(now, passage);
+        self.supply = self.exact_supply::<C>(now, interval);
     }
 
     /// `F` of the power of torques that are held in two parts, velocity linear over the whole.
     #[inline(always)]
-    fn exact_supply<C: Cpu>(&mut self, now: &Snapshot<T, N>, passage: &Passage<T, N>) -> T {
-        let parts = self.steps.parts(passage);
+    fn exact_supply<C: Cpu>(&mut self, now: &Snapshot<T, N>, interval: &SampleInterval<T, N>) -> T {
+        let parts = self.steps.parts(interval);
         let from = self.last.dq;
-        let middle = from + (now.dq - from) * (passage.split / passage.h);
-        let (first, second) = (&passage.first, &passage.second);
+        let middle = from + (now.dq - from) * (interval.split / interval.h);
+        let (first, second) = (&interval.first, &interval.second);
         let half_way = parts[0].ramp::<C>(self.supply, first.dot(&from), first.dot(&middle));
         parts[1].ramp::<C>(half_way, second.dot(&middle), second.dot(&now.dq))
     }

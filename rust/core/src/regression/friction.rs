@@ -1,4 +1,4 @@
-//! Filters of friction over an interval in which joints may turn round.
+//! Filters of friction over an interval in which joints may reverse.
 //!
 //! A sampled `sgn(dq)` says only that the sign changed somewhere between two samples. Taken as a ramp it is wrong by up to half a period
 //! at every reversal, and a regressor with such an error draws its coefficient towards zero. With the velocity linear between states
@@ -15,35 +15,35 @@
 //! the asymmetry is estimated too.
 
 use crate::cpu::Cpu;
-use crate::filter::Step;
+use crate::filter::FilterCoefficients;
 use crate::real::{Real, lit, sgn};
 use nalgebra::SVector;
 
-/// What a velocity does between two states.
+/// A velocity that is linear between two states.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Swing<T> {
+pub(super) struct VelocitySegment<T> {
     from: T,
     to: T,
     /// Sign at the start.
     sign: T,
     /// Whether the sign changes.
-    turns: bool,
+    reverses: bool,
 }
 
-impl<T: Real> Swing<T> {
+impl<T: Real> VelocitySegment<T> {
     /// From one velocity to another, linear in between.
     #[inline(always)]
     pub(super) fn new(from: T, to: T) -> Self {
-        let turns = (from > T::zero() && to < T::zero()) || (from < T::zero() && to > T::zero());
-        let sign = if turns { sgn(from) } else { sgn(from + to) };
-        Self { from, to, sign, turns }
+        let reverses = (from > T::zero() && to < T::zero()) || (from < T::zero() && to > T::zero());
+        let sign = if reverses { sgn(from) } else { sgn(from + to) };
+        Self { from, to, sign, reverses }
     }
 
     /// `G`, what the sign adds to its filter.
     #[inline(always)]
-    pub(super) fn sign(&self, step: &Step<T>) -> T {
+    pub(super) fn sign(&self, step: &FilterCoefficients<T>) -> T {
         let mut end = T::one();
-        if self.turns {
+        if self.reverses {
             end = after_reversal(step.x, self.from, self.to);
         }
         self.sign * (end + end - T::one() - step.decay)
@@ -51,8 +51,8 @@ impl<T: Real> Swing<T> {
 
     /// `F` of the speed.
     #[inline(always)]
-    pub(super) fn speed<C: Cpu>(&self, step: &Step<T>, y: T) -> T {
-        if !self.turns {
+    pub(super) fn speed<C: Cpu>(&self, step: &FilterCoefficients<T>, y: T) -> T {
+        if !self.reverses {
             return step.ramp::<C>(y, self.from.abs(), self.to.abs());
         }
         let slope = (self.to - self.from) / step.x;
@@ -61,7 +61,7 @@ impl<T: Real> Swing<T> {
 
     /// `F` of the squared velocity.
     #[inline(always)]
-    pub(super) fn square<C: Cpu>(&self, step: &Step<T>, y: T) -> T {
+    pub(super) fn square<C: Cpu>(&self, step: &FilterCoefficients<T>, y: T) -> T {
         let change = self.to - self.from;
         step.curve::<C>(y, self.from * self.from, self.to * self.to, change * change * lit(-0.25))
     }
@@ -71,7 +71,7 @@ impl<T: Real> Swing<T> {
     pub(super) fn distance(&self) -> T {
         let (from, to) = (self.from.abs(), self.to.abs());
         let total = from + to;
-        let mean = if self.turns { (from * from + to * to) / total } else { total };
+        let mean = if self.reverses { (from * from + to * to) / total } else { total };
         mean * lit(0.5)
     }
 
@@ -105,7 +105,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
 
     /// Torques at a velocity, the paper's filter over them as held.
     #[inline(always)]
-    pub(super) fn hold_torques<C: Cpu>(&mut self, step: &Step<T>, dq: &SVector<T, N>) {
+    pub(super) fn hold_torques<C: Cpu>(&mut self, step: &FilterCoefficients<T>, dq: &SVector<T, N>) {
         for j in 0..N {
             self.viscous[j] = step.held::<C>(self.viscous[j], dq[j]);
             self.coulomb[j] = step.held::<C>(self.coulomb[j], sgn(dq[j]));
@@ -113,25 +113,25 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Torques over a swing.
+    /// Torques over a velocity segment.
     #[inline(always)]
     pub(super) fn filter_torques<C: Cpu>(
         &mut self,
-        step: &Step<T>,
+        step: &FilterCoefficients<T>,
         from: &SVector<T, N>,
         to: &SVector<T, N>,
     ) {
         for j in 0..N {
-            let swing = Swing::new(from[j], to[j]);
+            let segment = VelocitySegment::new(from[j], to[j]);
             self.viscous[j] = step.ramp::<C>(self.viscous[j], from[j], to[j]);
-            self.coulomb[j] = step.decay * self.coulomb[j] + swing.sign(step);
+            self.coulomb[j] = step.decay * self.coulomb[j] + segment.sign(step);
             self.constant[j] = step.held::<C>(self.constant[j], T::one());
         }
     }
 
     /// Dissipated powers at a velocity, the paper's filter over them as held.
     #[inline(always)]
-    pub(super) fn hold_powers<C: Cpu>(&mut self, step: &Step<T>, dq: &SVector<T, N>) {
+    pub(super) fn hold_powers<C: Cpu>(&mut self, step: &FilterCoefficients<T>, dq: &SVector<T, N>) {
         for j in 0..N {
             self.viscous[j] = step.held::<C>(self.viscous[j], dq[j] * dq[j]);
             self.coulomb[j] = step.held::<C>(self.coulomb[j], dq[j].abs());
@@ -139,18 +139,23 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Dissipated powers over a swing.
+    /// Dissipated powers over a velocity segment.
     #[inline(always)]
-    pub(super) fn filter_powers<C: Cpu>(&mut self, step: &Step<T>, from: &SVector<T, N>, to: &SVector<T, N>) {
+    pub(super) fn filter_powers<C: Cpu>(
+        &mut self,
+        step: &FilterCoefficients<T>,
+        from: &SVector<T, N>,
+        to: &SVector<T, N>,
+    ) {
         for j in 0..N {
-            let swing = Swing::new(from[j], to[j]);
-            self.viscous[j] = swing.square::<C>(step, self.viscous[j]);
-            self.coulomb[j] = swing.speed::<C>(step, self.coulomb[j]);
+            let segment = VelocitySegment::new(from[j], to[j]);
+            self.viscous[j] = segment.square::<C>(step, self.viscous[j]);
+            self.coulomb[j] = segment.speed::<C>(step, self.coulomb[j]);
             self.constant[j] = step.ramp::<C>(self.constant[j], from[j], to[j]);
         }
     }
 
-    /// Dissipated energies of a swing of `h` seconds by the trapezoidal rule, as in the paper.
+    /// Dissipated energies of a velocity segment of `h` seconds by the trapezoidal rule, as in the paper.
     #[inline(always)]
     pub(super) fn add_trapezes(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
         let half = h * lit(0.5);
@@ -161,13 +166,13 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Dissipated energies of a swing of `h` seconds.
+    /// Dissipated energies of a velocity segment of `h` seconds.
     #[inline(always)]
     pub(super) fn add_energies(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
         for j in 0..N {
-            let swing = Swing::new(from[j], to[j]);
-            self.viscous[j] += h * swing.distance_squared();
-            self.coulomb[j] += h * swing.distance();
+            let segment = VelocitySegment::new(from[j], to[j]);
+            self.viscous[j] += h * segment.distance_squared();
+            self.coulomb[j] += h * segment.distance();
             self.constant[j] += h * lit(0.5) * (from[j] + to[j]);
         }
     }
@@ -208,14 +213,14 @@ mod tests {
         for lambda in [5.0, 50.0, 900.0] {
             let step = Cutoff { rad_per_s: lambda }.step(STEP);
             for (from, to) in [(0.3, 1.1), (-1.0, 3.0), (1.0, -0.01), (0.0, 0.4), (-0.4, 0.0), (0.0, 0.0)] {
-                let (swing, y) = (Swing::new(from, to), 0.7);
+                let (segment, y) = (VelocitySegment::new(from, to), 0.7);
                 let close = |a: f64, of: fn(f64) -> f64| {
                     let b = numeric(lambda, y, (from, to), of);
                     assert!((a - b).abs() < 2e-5, "{lambda} rad/s, {from} to {to}: {a} and {b}");
                 };
-                close(step.decay * y + swing.sign(&step), sgn);
-                close(swing.speed::<Portable>(&step, y), f64::abs);
-                close(swing.square::<Portable>(&step, y), |v| v * v);
+                close(step.decay * y + segment.sign(&step), sgn);
+                close(segment.speed::<Portable>(&step, y), f64::abs);
+                close(segment.square::<Portable>(&step, y), |v| v * v);
             }
         }
     }
@@ -225,16 +230,16 @@ mod tests {
         for (from, to) in [(0.3_f64, 1.1), (-1.0, 3.0), (1.0, -0.01), (0.0, 0.4)] {
             let at = |k: u32| from + (to - from) * (f64::from(k) + 0.5) / f64::from(PIECES);
             let mean = |of: fn(f64) -> f64| (0..PIECES).map(|k| of(at(k))).sum::<f64>() / f64::from(PIECES);
-            let swing = Swing::new(from, to);
-            assert!((swing.distance() - mean(f64::abs)).abs() < 1e-9);
-            assert!((swing.distance_squared() - mean(|v| v * v)).abs() < 1e-9);
+            let segment = VelocitySegment::new(from, to);
+            assert!((segment.distance() - mean(f64::abs)).abs() < 1e-9);
+            assert!((segment.distance_squared() - mean(|v| v * v)).abs() < 1e-9);
         }
     }
 
     #[test]
     fn a_start_from_rest_already_has_its_sign() {
-        assert_eq!(Swing::new(0.0, 0.1).sign, 1.0);
-        assert_eq!(Swing::new(-0.1, 0.0).sign, -1.0);
-        assert_eq!(Swing::new(0.0, 0.0).sign, 0.0);
+        assert_eq!(VelocitySegment::new(0.0, 0.1).sign, 1.0);
+        assert_eq!(VelocitySegment::new(-0.1, 0.0).sign, -1.0);
+        assert_eq!(VelocitySegment::new(0.0, 0.0).sign, 0.0);
     }
 }

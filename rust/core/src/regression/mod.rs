@@ -7,7 +7,7 @@
 //! Two variants differ in the filters and in when signals are taken to be valid:
 //!
 //! * [`Variant::Paper`]: the filters as printed, and `q(k), dq(k), tau(k)` all of one sample.
-//! * [`Variant::Exact`]: consistent filters, the torque that really acted between two states ([`Passage`]), and Coulomb friction that
+//! * [`Variant::Exact`]: consistent filters, the torque that really acted between two states ([`SampleInterval`]), and Coulomb friction that
 //!   changes sign where the velocity does (`friction`), not half-way to the next sample.
 //!
 //! Adding a scheme is one file here and one line in [`Scheme::ALL`].
@@ -21,7 +21,7 @@ pub use filtered_dynamic::FilteredDynamic;
 pub use filtered_power::FilteredPower;
 pub use supplied_energy::SuppliedEnergy;
 
-use crate::filter::{Cutoff, Kept, Step};
+use crate::filter::{CachedCoefficients, Cutoff, FilterCoefficients};
 use crate::real::{Real, lit};
 use nalgebra::SVector;
 
@@ -73,12 +73,12 @@ pub struct Snapshot<T, const N: usize> {
     pub dq: SVector<T, N>,
 }
 
-/// The way from one state to the next in two parts, each under a constant torque.
+/// Interval from one state to the next in two parts, each under a constant torque.
 ///
 /// With states at the samples both parts have the same torque; with states half-way between samples, where a difference of positions
 /// is the velocity to second order, the sample in the middle is where the torque changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Passage<T, const N: usize> {
+pub struct SampleInterval<T, const N: usize> {
     /// Duration, s.
     pub h: T,
     /// Duration of the first part, s.
@@ -91,29 +91,29 @@ pub struct Passage<T, const N: usize> {
     pub middle: SVector<T, N>,
 }
 
-/// Coefficients of a passage and of its two parts, kept while they stay as long.
+/// Filter coefficients of a sample interval and of its two parts, cached while their lengths stay the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Steps<T> {
-    whole: Kept<T>,
-    first: Kept<T>,
-    second: Kept<T>,
+struct SegmentCoefficients<T> {
+    whole: CachedCoefficients<T>,
+    first: CachedCoefficients<T>,
+    second: CachedCoefficients<T>,
 }
 
-impl<T: Real> Steps<T> {
+impl<T: Real> SegmentCoefficients<T> {
     #[inline(always)]
     fn new(cutoff: &Cutoff<T>) -> Self {
-        let none = Kept::new(cutoff);
+        let none = CachedCoefficients::new(cutoff);
         Self { whole: none, first: none, second: none }
     }
 
     #[inline(always)]
-    fn whole(&mut self, h: T) -> Step<T> {
+    fn whole(&mut self, h: T) -> FilterCoefficients<T> {
         self.whole.step(h)
     }
 
     #[inline(always)]
-    fn parts<const N: usize>(&mut self, passage: &Passage<T, N>) -> [Step<T>; 2] {
-        [self.first.step(passage.split), self.second.step(passage.h - passage.split)]
+    fn parts<const N: usize>(&mut self, interval: &SampleInterval<T, N>) -> [FilterCoefficients<T>; 2] {
+        [self.first.step(interval.split), self.second.step(interval.h - interval.split)]
     }
 }
 

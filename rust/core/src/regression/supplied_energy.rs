@@ -4,7 +4,7 @@
 //! as for the others. The integrals have infinite gain at zero frequency: any constant error grows without bound.
 
 use super::friction::Friction;
-use super::{Passage, Snapshot, Variant};
+use super::{SampleInterval, Snapshot, Variant};
 use crate::arm::Arm;
 use crate::real::{Real, lit};
 use nalgebra::SVector;
@@ -31,26 +31,26 @@ impl<T: Real, const N: usize, const P: usize> SuppliedEnergy<T, N, P> {
         }
     }
 
-    /// The row and output at the next state, reached by `passage`; `tau` is the torque that acts from then on.
+    /// The row and output at the next state, reached by `interval`; `tau` is the torque that acts from then on.
     #[inline(always)]
     pub fn update<A: Arm<T, N, P>, const R: usize>(
         &mut self,
         arm: &A,
         variant: Variant,
         now: &Snapshot<T, N>,
-        passage: &Passage<T, N>,
+        interval: &SampleInterval<T, N>,
         tau: &SVector<T, N>,
     ) -> ([[T; R]; 1], [T; 1]) {
         let supply = tau.dot(&now.dq);
         match variant {
             Variant::Paper => {
-                self.friction.add_trapezes(passage.h, &self.last.dq, &now.dq);
-                self.work += (self.last_supply + supply) * (passage.h * lit(0.5));
+                self.friction.add_trapezes(interval.h, &self.last.dq, &now.dq);
+                self.work += (self.last_supply + supply) * (interval.h * lit(0.5));
             }
             Variant::Exact => {
-                self.friction.add_energies(passage.h, &self.last.dq, &now.dq);
-                self.work += passage.first.dot(&(passage.middle - self.last.q))
-                    + passage.second.dot(&(now.q - passage.middle));
+                self.friction.add_energies(interval.h, &self.last.dq, &now.dq);
+                self.work += interval.first.dot(&(interval.middle - self.last.q))
+                    + interval.second.dot(&(now.q - interval.middle));
             }
         }
         (self.last, self.last_supply) = (*now, supply);

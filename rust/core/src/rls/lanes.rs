@@ -6,7 +6,7 @@
 use crate::cpu::Cpu;
 use crate::real::Real;
 
-/// Entries taken together.
+/// Entries per vector.
 pub(super) const LANES: usize = 4;
 
 /// How many of `R` entries fill whole lanes.

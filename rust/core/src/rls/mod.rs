@@ -14,7 +14,7 @@ mod factorized;
 mod lanes;
 mod plain;
 
-use crate::cpu::{Cpu, Level, Work};
+use crate::cpu::{Cpu, Kernel, Level};
 use crate::real::{Real, lit};
 use factorized::Factorized;
 use nalgebra::{ArrayStorage, SMatrix, SVector};
@@ -79,7 +79,7 @@ impl<T: Real, const R: usize> Rls<T, R> {
         Self::with_covariance(theta0, SMatrix::identity() * p0, forgetting)
     }
 
-    /// The same with a full positive definite `P(0)`, of which the upper triangle counts.
+    /// `theta(0)`, a full positive definite `P(0)`, of which the upper triangle counts, and the forgetting factor `mu` in `(0, 1]`.
     pub fn with_covariance(theta0: SVector<T, R>, p0: SMatrix<T, R, R>, forgetting: T) -> Self {
         let limit: [T; R] = p0.diagonal().into();
         Self {
@@ -93,19 +93,19 @@ impl<T: Real, const R: usize> Rls<T, R> {
         }
     }
 
-    /// The same with `P` kept in another form.
+    /// Keeps `P` in another form.
     pub fn with_form(mut self, form: Form) -> Self {
         self.covariance = Covariance::of(&self.covariance(), form);
         self
     }
 
-    /// The same with other variances beyond which forgetting lifts none.
+    /// Sets the variances beyond which forgetting increases none.
     pub fn with_limit(mut self, limit: SVector<T, R>) -> Self {
         self.forgetting.limit = limit.into();
         self
     }
 
-    /// The same with other instructions than the most that the processor has.
+    /// Uses other instructions than the widest that the processor has.
     pub fn with_level(mut self, level: Level) -> Self {
         self.level = level;
         self
@@ -175,10 +175,10 @@ impl<T: Real, const R: usize> Rls<T, R> {
                 rows[m][j] = psi[(m, j)];
             }
         }
-        self.level.run(Sample { rls: self, rows, y: y.data.0[0] })
+        self.level.run(UpdateKernel { rls: self, rows, y: y.data.0[0] })
     }
 
-    /// The same within code that already runs with the instructions in use.
+    /// One sample with `M` errors, for code that already runs with the instructions in use.
     #[inline(always)]
     pub(crate) fn learn<C: Cpu, const M: usize>(&mut self, rows: &[[T; R]; M], y: &[T; M]) -> Update<T, M> {
         let mut error = *y;
@@ -207,13 +207,13 @@ impl<T: Real, const R: usize> Rls<T, R> {
 }
 
 /// One call of [`Rls::update`].
-struct Sample<'a, T: Real, const M: usize, const R: usize> {
+struct UpdateKernel<'a, T: Real, const M: usize, const R: usize> {
     rls: &'a mut Rls<T, R>,
     rows: [[T; R]; M],
     y: [T; M],
 }
 
-impl<T: Real, const M: usize, const R: usize> Work for Sample<'_, T, M, R> {
+impl<T: Real, const M: usize, const R: usize> Kernel for UpdateKernel<'_, T, M, R> {
     type Output = Update<T, M>;
 
     #[inline(always)]

@@ -1,8 +1,8 @@
-//! Where a lane is within an interval, and what it is about.
+//! A lane's progress within its sample interval, and the reversal it aims at.
 
 use crate::real::Real;
 
-/// Mode changes within one interval before the rest of it is taken alone.
+/// Mode changes within one interval before the scalar integrator takes the rest of it.
 pub(super) const MAX_CHANGES: usize = 12;
 
 /// One lane's time.
@@ -33,7 +33,7 @@ impl<T: Real, const N: usize> Clock<T, N> {
         self.done == T::zero() && self.goal.is_none()
     }
 
-    /// Goes on within the interval, at another instant.
+    /// Advances by `time` within the interval and forgets what was tried at the last instant.
     #[inline]
     pub(super) fn pass(&mut self, time: T) {
         (self.done, self.left) = (self.done + time, self.left - time);

@@ -1,12 +1,12 @@
 //! Sizes of a push by output error over the windows it touches: the push under which their predictions miss least.
 
 use super::own::Own;
-use super::{Event, Place, SHORTEST, State};
-use crate::metric::Metric;
-use crate::model::{Hypothesis, Placed};
+use super::{Disturbance, Place, PushState, SHORTEST};
+use crate::context::{DiagnosisContext, WindowSet};
+use crate::model::{EffectInstance, Hypothesis};
 use crate::solve::scaled_inverse;
-use crate::study::{Sample, Study};
-use crate::window::{Dataset, Shift};
+use crate::weighting::Weighting;
+use crate::window::{Dataset, InitialStateOffset};
 use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -19,7 +19,8 @@ const LONGEST: f64 = 2.5;
 /// A push that lowers the cost of the windows it touches by less than this share is not seen there.
 const HELPS: f64 = 0.01;
 
-/// The same, beside a remainder, where the model fitted to the recording with the push is compared to that fitted without it.
+/// Beside a remainder, a push that lowers the cost of the windows it touches by less than this share is not seen there; the model fitted to
+/// the recording with the push is compared to that fitted without it.
 const HELPS_OWN: f64 = 0.02;
 
 /// Least share of the cost of the windows it touches that a push must explain before its size by output error is believed.
@@ -48,30 +49,30 @@ const AXIS_STEP: f64 = 0.01;
 struct Touched<'a, A, const N: usize, const P: usize> {
     arm: &'a A,
     model: &'a Hypothesis<P>,
-    sample: Sample<N>,
-    metric: Metric<N>,
-    known: &'a [Placed],
-    push: Placed,
+    sample: WindowSet<N>,
+    weighting: Weighting<N>,
+    known: &'a [EffectInstance],
+    push: EffectInstance,
 }
 
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Whether a log misses by so much that a push in it could be of consequence. Beside a remainder that is no condition.
-    pub(super) fn could_hold_a_push(&self, (set, track): Place, state: &State<'_, N, P>) -> bool {
+    pub(super) fn could_hold_a_push(&self, (set, track): Place, state: &PushState<'_, N, P>) -> bool {
         if state.remainder {
             return true;
         }
         let whole = [&self.training, &self.holdout][set];
         let data = whole.data.of_track(track, |_| true).without_pushes();
-        let (metric, predicted) = self.at_measured_starts(&data, state);
-        let residual = metric.residual(&data.measured(), &predicted);
-        metric.costs(&data, &residual).iter().sum::<f64>() > least_gain(whole, state)
+        let (weighting, predicted) = self.at_measured_starts(&data, state);
+        let residual = weighting.residual(&data.measured(), &predicted);
+        weighting.costs(&data, &residual).iter().sum::<f64>() > least_gain(whole, state)
     }
 
     /// Weights around the model, every window from its measured start, and what it predicts.
-    fn at_measured_starts(&self, data: &Dataset<N>, state: &State<'_, N, P>) -> (Metric<N>, Vec<f64>) {
-        let starts = vec![Shift::none(); data.windows.len()];
-        let predicted = data.predict(&self.arm, state.model, &starts);
-        (Metric::new(data, &self.arm, state.model, state.scale, starts, &predicted), predicted)
+    fn at_measured_starts(&self, data: &Dataset<N>, state: &PushState<'_, N, P>) -> (Weighting<N>, Vec<f64>) {
+        let offsets = vec![InitialStateOffset::none(); data.windows.len()];
+        let predicted = data.predict(&self.arm, state.model, &offsets);
+        (Weighting::new(data, &self.arm, state.model, state.scale, offsets, &predicted), predicted)
     }
 
     /// The push with the values that output error gives it, and what it explains.
@@ -81,24 +82,25 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// without one, it then is none. `known` are the recording's other pushes.
     pub(super) fn sized(
         &self,
-        rough: Event,
-        state: &State<'_, N, P>,
+        rough: Disturbance,
+        state: &PushState<'_, N, P>,
         own: &Own<'_, A, N, P>,
-        known: &[Event],
-    ) -> Option<Event> {
+        known: &[Disturbance],
+    ) -> Option<Disturbance> {
         let whole = if rough.holdout { &self.holdout } else { &self.training };
-        let sample = Sample { data: whole.data.without_pushes(), measured: whole.measured.clone() };
+        let sample = WindowSet { data: whole.data.without_pushes(), measured: whole.measured.clone() };
         let data = around(&sample, &rough);
         if data.windows.is_empty() {
             return state.remainder.then_some(rough);
         }
         let least = least_gain(&sample, state);
-        let usual = self.metric(&sample, state.model, state.scale).typical * data.windows.len() as f64;
-        let (metric, _) = self.at_measured_starts(&data, state);
-        let sample = Sample::new(data);
-        let here: Vec<Placed> = known.iter().filter(|e| e.place() == rough.place()).map(|e| e.push).collect();
+        let usual = self.weighting(&sample, state.model, state.scale).typical * data.windows.len() as f64;
+        let (weighting, _) = self.at_measured_starts(&data, state);
+        let sample = WindowSet::new(data);
+        let here: Vec<EffectInstance> =
+            known.iter().filter(|e| e.place() == rough.place()).map(|e| e.push).collect();
         let mut touched =
-            Touched { arm: &self.arm, model: state.model, sample, metric, known: &here, push: rough.push };
+            Touched { arm: &self.arm, model: state.model, sample, weighting, known: &here, push: rough.push };
         let p = Vector3::from(rough.push.p);
         let none = Vector3::new(0.0, p[1], p[2]);
         let mut bare = touched.cost(&touched.residual_of(&none));
@@ -113,30 +115,30 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         if believed && close(&fitted, &p, state.remainder) {
             for _ in 0..ROUNDS {
                 touched.sample.data.tracks[0].pushes = touched.with(&fitted);
-                touched.metric = self.metric(&touched.sample, state.model, state.scale);
+                touched.weighting = self.weighting(&touched.sample, state.model, state.scale);
                 (fitted, _) = touched.minimise(fitted);
             }
-            let push = Placed { p: fitted.into(), ..rough.push };
+            let push = EffectInstance { p: fitted.into(), ..rough.push };
             let sigma = touched.sigma(&fitted, state.covariance)?;
-            return Some(Event { push, sigma, share: share(left), ..rough });
+            return Some(Disturbance { push, sigma, share: share(left), ..rough });
         }
         if !state.remainder {
             return None;
         }
         if share(seen) > HELPS {
-            return Some(Event { share: share(seen), ..rough });
+            return Some(Disturbance { share: share(seen), ..rough });
         }
-        let others: Vec<&Event> = known.iter().collect();
-        let with: Vec<&Event> = known.iter().chain([&rough]).collect();
+        let others: Vec<&Disturbance> = known.iter().collect();
+        let with: Vec<&Disturbance> = known.iter().chain([&rough]).collect();
         let without = touched.cost_under(self, &own.beside(&others), &none);
         let share = 1.0 - touched.cost_under(self, &own.beside(&with), &p) / without;
-        (share > HELPS_OWN).then_some(Event { share, ..rough })
+        (share > HELPS_OWN).then_some(Disturbance { share, ..rough })
     }
 }
 
 /// What a push of consequence lowers the cost of its windows by, at least.
-fn least_gain<const N: usize, const P: usize>(sample: &Sample<N>, state: &State<'_, N, P>) -> f64 {
-    state.noticeable.powi(2) * sample.motion(&state.scale)
+fn least_gain<const N: usize, const P: usize>(sample: &WindowSet<N>, state: &PushState<'_, N, P>) -> f64 {
+    state.min_relevance.powi(2) * sample.motion(&state.scale)
 }
 
 /// Whether output error has found the same push; beside a remainder also its size must be much the same, for the remainder may have
@@ -149,8 +151,8 @@ fn close(fitted: &Vector3<f64>, seen: &Vector3<f64>, remainder: bool) -> bool {
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
     /// The known pushes and one of these values.
-    fn with(&self, p: &Vector3<f64>) -> Vec<Placed> {
-        self.known.iter().copied().chain([Placed { p: (*p).into(), ..self.push }]).collect()
+    fn with(&self, p: &Vector3<f64>) -> Vec<EffectInstance> {
+        self.known.iter().copied().chain([EffectInstance { p: (*p).into(), ..self.push }]).collect()
     }
 
     /// Whitened residual under a push of these values.
@@ -158,27 +160,28 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         self.residual_under(self.model, p)
     }
 
-    /// The same under another model.
+    /// Whitened residual under another model and a push of these values.
     fn residual_under(&self, model: &Hypothesis<P>, p: &Vector3<f64>) -> Vec<f64> {
         let mut data = self.sample.data.clone();
         data.tracks[0].pushes = self.with(p);
-        let predicted = data.predict(self.arm, model, &self.metric.starts);
-        self.metric.residual(&self.sample.measured, &predicted)
+        let predicted = data.predict(self.arm, model, &self.weighting.offsets);
+        self.weighting.residual(&self.sample.measured, &predicted)
     }
 
     /// Cost of a push under another model, whose starts are fitted to it.
-    fn cost_under(&self, study: &Study<A, N, P>, own: &Hypothesis<P>, p: &Vector3<f64>) -> f64 {
+    fn cost_under(&self, context: &DiagnosisContext<A, N, P>, own: &Hypothesis<P>, p: &Vector3<f64>) -> f64 {
         let mut data = self.sample.data.clone();
         data.tracks[0].pushes = self.with(p);
-        let sample = Sample { data, measured: self.sample.measured.clone() };
-        let metric = study.metric(&sample, own, self.metric.scale);
-        let there = Touched { arm: self.arm, model: own, sample, metric, known: self.known, push: self.push };
+        let sample = WindowSet { data, measured: self.sample.measured.clone() };
+        let weighting = context.weighting(&sample, own, self.weighting.scale);
+        let there =
+            Touched { arm: self.arm, model: own, sample, weighting, known: self.known, push: self.push };
         let residual = there.residual_of(p);
-        there.metric.costs(&there.sample.data, &residual).iter().sum()
+        there.weighting.costs(&there.sample.data, &residual).iter().sum()
     }
 
     fn cost(&self, r: &[f64]) -> f64 {
-        self.metric.total(&self.metric.costs(&self.sample.data, r))
+        self.weighting.total(&self.weighting.costs(&self.sample.data, r))
     }
 
     /// The best of the minima that are reached from a first guess and from longer pushes around the same time.
@@ -194,8 +197,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         let (mut p, mut r) = (p, self.residual_of(&p));
         let (mut cost, mut damping) = (self.cost(&r), 1e-2);
         for _ in 0..ITERATIONS {
-            let slopes = self.slopes(&p, &r);
-            let gram = self.metric.gram(&self.sample.data, &slopes.each_ref().map(Vec::as_slice), &r).total;
+            let jacobian = self.jacobian(&p, &r);
+            let gram =
+                self.weighting.gram(&self.sample.data, &jacobian.each_ref().map(Vec::as_slice), &r).total;
             let before = cost;
             for _ in 0..ATTEMPTS {
                 let Some(next) = damped_step(&p, &gram, damping) else { return (p, cost) };
@@ -220,10 +224,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         let r = self.residual_of(p);
         let noise = (self.cost(&r) / (self.sample.data.rows * N) as f64).max(1.0);
         let doubts = self.doubts(p, &r, covariance);
-        let own = self.slopes(p, &r);
+        let own = self.jacobian(p, &r);
         let columns: Vec<&[f64]> = own.iter().chain(&doubts).map(Vec::as_slice).collect();
         let k = columns.len();
-        let gram = self.metric.gram(&self.sample.data, &columns, &r).total;
+        let gram = self.weighting.gram(&self.sample.data, &columns, &r).total;
         let mut normal = gram.view((0, 0), (k, k)).into_owned() / noise;
         for i in 3..k {
             normal[(i, i)] += 1.0;
@@ -255,7 +259,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
     }
 
     /// Derivatives of the prediction by impulse, time and duration.
-    fn slopes(&self, p: &Vector3<f64>, r: &[f64]) -> [Vec<f64>; 3] {
+    fn jacobian(&self, p: &Vector3<f64>, r: &[f64]) -> [Vec<f64>; 3] {
         let steps = [1e-4 * p[0].abs().max(1e-12), 1e-5, 1e-5];
         let slope = |i: usize| {
             let mut moved = *p;
@@ -279,9 +283,11 @@ fn damped_step(p: &Vector3<f64>, gram: &DMatrix<f64>, damping: f64) -> Option<Ve
 }
 
 /// Windows of a push's log that it touches, as a dataset of that log alone.
-fn around<const N: usize>(sample: &Sample<N>, event: &Event) -> Dataset<N> {
-    let track = &sample.data.tracks[event.track];
-    let [_, time, duration] = event.push.p;
+fn around<const N: usize>(sample: &WindowSet<N>, disturbance: &Disturbance) -> Dataset<N> {
+    let track = &sample.data.tracks[disturbance.track];
+    let [_, time, duration] = disturbance.push.p;
     let reach = 0.75 * duration + AROUND;
-    sample.data.of_track(event.track, |w| track.t[w.first] < time + reach && track.t[w.last] > time - reach)
+    sample
+        .data
+        .of_track(disturbance.track, |w| track.t[w.first] < time + reach && track.t[w.last] > time - reach)
 }

@@ -3,12 +3,12 @@
 //! A cause shows in the typical window; a limit that is reached once or twice in one log does not, and is found as pushes against the command.
 //! One level that explains what all of them explain needs fewer values than they do.
 
-use super::Event;
+use super::Disturbance;
 use crate::belief::Cause;
-use crate::course::Attribution;
+use crate::context::{DiagnosisContext, SplitWeighting};
 use crate::minimum::minimum;
-use crate::model::{Hypothesis, Placed};
-use crate::study::{Study, Weights};
+use crate::model::{EffectInstance, Hypothesis};
+use crate::model_search::Attribution;
 use crate::track::Track;
 use armgap_core::arm::Arm;
 use armgap_core::effect::find;
@@ -31,20 +31,20 @@ const HALVINGS: usize = 40;
 
 /// What all windows miss by under a model that gives no more than a level, by that level.
 struct ByLevel<'a, A, const N: usize, const P: usize> {
-    study: &'a Study<A, N, P>,
-    weights: &'a Weights<N>,
+    context: &'a DiagnosisContext<A, N, P>,
+    weights: &'a SplitWeighting<N>,
     model: &'a Hypothesis<P>,
     joint: usize,
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> ByLevel<'_, A, N, P> {
-    fn limited_to(&self, level: f64) -> Option<Placed> {
-        find::<f64>(LAW).map(|law| Placed { law, joint: self.joint, p: [level, 0.0, 0.0] })
+    fn limited_to(&self, level: f64) -> Option<EffectInstance> {
+        find::<f64>(LAW).map(|law| EffectInstance { law, joint: self.joint, p: [level, 0.0, 0.0] })
     }
 
     fn cost_of(&self, level: f64) -> f64 {
         self.limited_to(level)
-            .map_or(f64::INFINITY, |limit| cost(self.study, self.weights, &self.model.with(limit)))
+            .map_or(f64::INFINITY, |limit| cost(self.context, self.weights, &self.model.with(limit)))
     }
 
     /// Standard deviation of the best level, if what is left is one error per window.
@@ -52,35 +52,41 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> ByLevel<'_, A, N, P> {
         let step = STEP * best;
         let [below, least, above] = [-step, 0.0, step].map(|h| self.cost_of(best + h));
         let curvature = (below - 2.0 * least + above) / step.powi(2);
-        let windows = self.study.training.data.windows.len() + self.study.holdout.data.windows.len();
+        let windows = self.context.training.data.windows.len() + self.context.holdout.data.windows.len();
         (curvature > 0.0).then(|| (2.0 * least / windows as f64 / curvature).sqrt())
     }
 }
 
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// The limit of a joint's torque that explains what its pushes explain, if there is one.
-    pub(super) fn limit(&mut self, alone: &Attribution<N, P>, events: &[Event]) -> Option<Cause> {
+    pub(super) fn limit(&mut self, alone: &Attribution<N, P>, disturbances: &[Disturbance]) -> Option<Cause> {
         let effects = &alone.model.hypothesis.effects;
         let limited = |j: usize| effects.iter().any(|e| e.joint == j && e.law.spec().name == LAW);
         (0..N).filter(|j| !limited(*j)).find_map(|joint| {
-            let own: Vec<Event> = events.iter().filter(|e| e.push.joint == joint).cloned().collect();
+            let own: Vec<Disturbance> =
+                disturbances.iter().filter(|e| e.push.joint == joint).cloned().collect();
             if own.is_empty() { None } else { self.limit_of(joint, alone, &own) }
         })
     }
 
-    fn limit_of(&mut self, joint: usize, alone: &Attribution<N, P>, events: &[Event]) -> Option<Cause> {
+    fn limit_of(
+        &mut self,
+        joint: usize,
+        alone: &Attribution<N, P>,
+        disturbances: &[Disturbance],
+    ) -> Option<Cause> {
         let levels: Vec<f64> =
-            events.iter().map(|e| level(self.track(e.place()), &e.push)).collect::<Option<_>>()?;
+            disturbances.iter().map(|e| level(self.track(e.place()), &e.push)).collect::<Option<_>>()?;
         let model = &alone.model.hypothesis;
-        let weights = &alone.stages.last()?.weights;
-        self.set_pushes(events);
+        let weights = &alone.nodes.last()?.weights;
+        self.set_pushes(disturbances);
         let pushed = cost(self, weights, model);
         self.set_pushes(&[]);
         let bare = cost(self, weights, model);
         if pushed >= bare {
             return None;
         }
-        let by_level = ByLevel { study: self, weights, model, joint };
+        let by_level = ByLevel { context: self, weights, model, joint };
         let guess =
             levels.into_iter().min_by(|a, b| by_level.cost_of(*a).total_cmp(&by_level.cost_of(*b)))?;
         let near = [(1.0 - NEAR) * guess, (1.0 + NEAR) * guess];
@@ -91,7 +97,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         }
         let share = explained / bare;
         let sigma = vec![by_level.sigma(best)?];
-        let probability = events.iter().map(|e| e.probability).fold(0.0, f64::max);
+        let probability = disturbances.iter().map(|e| e.probability).fold(0.0, f64::max);
         let effect = by_level.limited_to(best)?;
         Some(Cause { effect, sigma, probability, share, relevance: 0.0, look_alikes: Vec::new() })
     }
@@ -99,19 +105,19 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
 
 /// What all windows miss by, none of them trusted less than others.
 fn cost<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    study: &Study<A, N, P>,
-    weights: &Weights<N>,
+    context: &DiagnosisContext<A, N, P>,
+    weights: &SplitWeighting<N>,
     model: &Hypothesis<P>,
 ) -> f64 {
     let (training, holdout) = rayon::join(
-        || study.problem(&weights.training).raw_costs(model),
-        || study.judge(&weights.holdout).raw_costs(model),
+        || context.problem(&weights.training).raw_costs(model),
+        || context.judge(&weights.holdout).raw_costs(model),
     );
     training.iter().chain(&holdout).sum()
 }
 
 /// Level beyond which the command around a push against it amounts to the push's impulse.
-fn level<const N: usize>(track: &Track<N>, push: &Placed) -> Option<f64> {
+fn level<const N: usize>(track: &Track<N>, push: &EffectInstance) -> Option<f64> {
     let [impulse, time, duration] = push.p;
     let first = track.t.partition_point(|t| *t < time - duration);
     let last = track.t.partition_point(|t| *t <= time + duration).min(track.len() - 1);

@@ -14,12 +14,12 @@ mod residual;
 mod scatter;
 mod search;
 
+use crate::acceptance::{FAINTEST, min_relevance};
 use crate::belief::{belief_beside, left_beside, left_over};
-use crate::course::Attribution;
-use crate::decide::{FAINTEST, noticeable};
-use crate::model::{Hypothesis, Placed};
-use crate::progress::Work;
-use crate::study::Study;
+use crate::context::DiagnosisContext;
+use crate::model::{EffectInstance, Hypothesis};
+use crate::model_search::Attribution;
+use crate::progress::Phase;
 use crate::track::Track;
 use armgap_core::arm::Arm;
 use armgap_core::effect::find;
@@ -53,13 +53,13 @@ const SHORTEST_LOG: f64 = 1.5;
 
 /// A push that was found.
 #[derive(Debug, Clone)]
-pub struct Event {
+pub struct Disturbance {
     /// Whether it lies in a holdout log rather than a training log.
     pub holdout: bool,
     /// Index of the log.
     pub track: usize,
     /// The push.
-    pub push: Placed,
+    pub push: EffectInstance,
     /// Standard deviations of its values.
     pub sigma: [f64; 3],
     /// Share of the cost of the windows it touches that it explains.
@@ -69,7 +69,7 @@ pub struct Event {
 }
 
 /// What pushes are judged against.
-struct State<'a, const N: usize, const P: usize> {
+struct PushState<'a, const N: usize, const P: usize> {
     /// The model with all named causes.
     model: &'a Hypothesis<P>,
     /// Covariance of its values.
@@ -79,15 +79,15 @@ struct State<'a, const N: usize, const P: usize> {
     /// Whether it leaves more unexplained than noise.
     remainder: bool,
     /// Improvement relative to the motion below which nothing is worth a name.
-    noticeable: f64,
-    /// The same for what stands far out of noise.
+    min_relevance: f64,
+    /// Improvement relative to the motion below which nothing is worth a name, for what stands far out of noise.
     faintest: f64,
 }
 
 /// Where a piece of a log is kept: whether in the holdout, and its index there.
 type Place = (usize, usize);
 
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// An attribution of the logs as they are, with all pushes accounted for.
     ///
     /// Where that model describes the arm, pushes are looked for again under it. Beside a remainder they are kept as they were found: there
@@ -98,121 +98,126 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
         mut alone: Attribution<N, P>,
         max_causes: usize,
         seed: u64,
-    ) -> (Attribution<N, P>, Vec<Event>) {
+    ) -> (Attribution<N, P>, Vec<Disturbance>) {
         let faint = alone.causes.is_empty();
-        let mut events = self.events(&alone, faint);
-        let limit = self.limit(&alone, &events);
+        let mut disturbances = self.disturbances(&alone, faint);
+        let limit = self.limit(&alone, &disturbances);
         if limit.is_some() {
             alone = self.attribute(max_causes, seed, limit.clone());
-            events = self.events(&alone, faint);
+            disturbances = self.disturbances(&alone, faint);
         }
-        if events.is_empty() {
-            return (alone, events);
+        if disturbances.is_empty() {
+            return (alone, disturbances);
         }
-        self.set_pushes(&events);
+        self.set_pushes(&disturbances);
         let beside = self.attribute(max_causes, seed, limit);
         let harmful = beside.error() > MUCH_WORSE * alone.error();
         if harmful {
-            events.clear();
+            disturbances.clear();
         } else if !alone.is_unexplained() {
-            events = self.events(&beside, faint);
+            disturbances = self.disturbances(&beside, faint);
         }
-        self.set_pushes(&events);
-        if events.is_empty() {
-            return (alone, events);
+        self.set_pushes(&disturbances);
+        if disturbances.is_empty() {
+            return (alone, disturbances);
         }
         // Like a further cause, a push answers for the gap it was taken up for.
-        let left = left_over(&beside.stages).max(left_beside(&alone.stages, &beside.stages));
+        let left = left_over(&beside.nodes).max(left_beside(&alone.nodes, &beside.nodes));
         let belief = belief_beside(left, REMAINDER_DOUBT);
-        for event in &mut events {
-            event.probability *= belief;
+        for disturbance in &mut disturbances {
+            disturbance.probability *= belief;
         }
-        (beside, events)
+        (beside, disturbances)
     }
 
     /// Pushes that the model of an attribution leaves unexplained, log by log; faint ones too where no greater cause was found without them.
-    fn events(&self, attribution: &Attribution<N, P>, faint: bool) -> Vec<Event> {
-        let (first, last) = (&attribution.stages[0], &attribution.stages[attribution.stages.len() - 1]);
-        let state = State {
+    fn disturbances(&self, attribution: &Attribution<N, P>, faint: bool) -> Vec<Disturbance> {
+        let (first, last) = (&attribution.nodes[0], &attribution.nodes[attribution.nodes.len() - 1]);
+        let state = PushState {
             model: &attribution.model.hypothesis,
-            covariance: &attribution.model.spread.covariance,
+            covariance: &attribution.model.covariance.matrix,
             scale: last.weights.training.scale,
             remainder: attribution.is_unexplained(),
-            noticeable: noticeable(first.relative_error()),
-            faintest: if faint { FAINTEST } else { noticeable(first.relative_error()) },
+            min_relevance: min_relevance(first.relative_error()),
+            faintest: if faint { FAINTEST } else { min_relevance(first.relative_error()) },
         };
         let recordings = self.recordings();
-        self.watch.begin(Work::Pushes, recordings.len());
-        let found: Vec<Vec<Event>> = recordings
+        self.progress.begin(Phase::Pushes, recordings.len());
+        let found: Vec<Vec<Disturbance>> = recordings
             .par_iter()
             .map(|places| {
-                self.watch.unit();
+                self.progress.unit();
                 self.in_recording(places, &state)
             })
             .collect();
         found.into_iter().flatten().collect()
     }
 
-    fn in_recording(&self, places: &[Place], state: &State<'_, N, P>) -> Vec<Event> {
+    fn in_recording(&self, places: &[Place], state: &PushState<'_, N, P>) -> Vec<Disturbance> {
         let own = Own::new(self, places, state);
-        let mut events = Vec::new();
+        let mut disturbances = Vec::new();
         if places.iter().any(|place| self.could_hold_a_push(*place, state)) {
-            events = self.of_bells(places, state, &own);
+            disturbances = self.of_bells(places, state, &own);
         }
         if !state.remainder {
             for place in places {
-                self.in_outlying_windows(*place, state, &own, &mut events);
+                self.in_outlying_windows(*place, state, &own, &mut disturbances);
             }
-            let all: Vec<Bell> = events.iter().map(Event::as_bell).collect();
-            events.retain(|e| !self.meets_an_end(e, &all));
+            let all: Vec<Bell> = disturbances.iter().map(Disturbance::as_bell).collect();
+            disturbances.retain(|e| !self.meets_an_end(e, &all));
         }
         // So many are no rare events, but something that the arm does again and again.
-        if events.len() < MOST { events } else { Vec::new() }
+        if disturbances.len() < MOST { disturbances } else { Vec::new() }
     }
 
     /// Pushes that stand out of the torque that a recording lacks.
-    fn of_bells(&self, places: &[Place], state: &State<'_, N, P>, own: &Own<'_, A, N, P>) -> Vec<Event> {
+    fn of_bells(
+        &self,
+        places: &[Place],
+        state: &PushState<'_, N, P>,
+        own: &Own<'_, A, N, P>,
+    ) -> Vec<Disturbance> {
         let pieces: Vec<&Track<N>> = places.iter().map(|p| self.track(*p)).collect();
         let whole = Track::joined(&pieces).filter(|t| t.t[t.len() - 1] - t.t[0] > SHORTEST_LOG);
         let residual = whole.and_then(|track| Residual::new(&self.arm, &track, state.model, &self.prior));
         let Some(found) = residual.and_then(|r| search(&r, state.remainder)) else { return Vec::new() };
-        let mut events: Vec<Event> = Vec::new();
+        let mut disturbances: Vec<Disturbance> = Vec::new();
         for bell in &found.bells {
             let Some(rough) = self.rough(places, bell, found.rest) else { continue };
-            events.extend(self.sized(rough, state, own, &events));
+            disturbances.extend(self.sized(rough, state, own, &disturbances));
         }
-        events.retain(|e| e.is_known() && !self.meets_an_end(e, &found.bells));
-        events
+        disturbances.retain(|e| e.is_known() && !self.meets_an_end(e, &found.bells));
+        disturbances
     }
 
     /// Whether a push and another one on its joint both drive it back from the same end of its travel: that is where it touches something.
-    fn meets_an_end(&self, event: &Event, bells: &[Bell]) -> bool {
-        let joint = event.push.joint;
+    fn meets_an_end(&self, disturbance: &Disturbance, bells: &[Bell]) -> bool {
+        let joint = disturbance.push.joint;
         let [from, to] = self.scales.travel[joint];
         let end = |q: f64, height: f64| -> i8 {
             let depth = (q - from) / (to - from);
             i8::from(depth > 1.0 - NEAR_END && height < 0.0) - i8::from(depth < NEAR_END && height > 0.0)
         };
-        let track = self.track(event.place());
+        let track = self.track(disturbance.place());
         let at = |t: f64| track.q[track.t.partition_point(|x| *x < t).min(track.len() - 1)][joint];
-        let own = end(at(event.push.p[1]), event.push.p[0]);
+        let own = end(at(disturbance.push.p[1]), disturbance.push.p[0]);
         let inside =
             |b: &&Bell| b.joint == joint && (track.t[0]..=track.t[track.len() - 1]).contains(&b.time);
         own != 0 && bells.iter().filter(inside).filter(|b| end(at(b.time), b.height) == own).count() > 1
     }
 
     /// A push as the lacking torque shows it.
-    fn rough(&self, places: &[Place], bell: &Bell, rest: f64) -> Option<Event> {
+    fn rough(&self, places: &[Place], bell: &Bell, rest: f64) -> Option<Disturbance> {
         let covers = |p: &&Place| self.track(**p).t[0] <= bell.time;
         let &(set, track) = places.iter().rfind(covers)?;
         let law = find::<f64>("external_pulse")?;
         let duration = bell.duration().max(SHORTEST);
         let impulse = bell.impulse();
         let sigma = bell.sigma / bell.height.abs().max(1e-300);
-        Some(Event {
+        Some(Disturbance {
             holdout: set == 1,
             track,
-            push: Placed { law, joint: bell.joint, p: [impulse, bell.time, duration] },
+            push: EffectInstance { law, joint: bell.joint, p: [impulse, bell.time, duration] },
             sigma: [sigma * impulse.abs(), sigma * bell.width, sigma * duration],
             share: 0.0,
             probability: 1.0 - 0.5 * (rest / bell.z).powi(2).min(1.0),
@@ -247,16 +252,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     }
 
     /// Puts pushes into the logs they belong to, in place of those known before.
-    pub fn set_pushes(&mut self, events: &[Event]) {
+    pub fn set_pushes(&mut self, disturbances: &[Disturbance]) {
         for (set, sample) in [&mut self.training, &mut self.holdout].into_iter().enumerate() {
             for (index, track) in sample.data.tracks.iter_mut().enumerate() {
-                track.pushes = events.iter().filter(|e| e.place() == (set, index)).map(|e| e.push).collect();
+                track.pushes =
+                    disturbances.iter().filter(|e| e.place() == (set, index)).map(|e| e.push).collect();
             }
         }
     }
 }
 
-impl Event {
+impl Disturbance {
     /// Whether its impulse is known not to be zero.
     fn is_known(&self) -> bool {
         self.push.p[0].abs() > KNOWN * self.sigma[0]

@@ -5,10 +5,10 @@
 //! noise, those few are looked into: the push that would explain most of a window, to first order, is where its fit starts.
 
 use super::own::Own;
-use super::{Event, MOST, Place, State};
-use crate::metric::Metric;
-use crate::model::Placed;
-use crate::study::{Sample, Study};
+use super::{Disturbance, MOST, Place, PushState};
+use crate::context::{DiagnosisContext, WindowSet};
+use crate::model::EffectInstance;
+use crate::weighting::Weighting;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Quantity, find};
 use nalgebra::DMatrix;
@@ -31,50 +31,57 @@ const STEP: f64 = 0.02;
 /// Impulse of the push that slopes are taken by, relative to the typical one.
 const SLIGHT: f64 = 1e-6;
 
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// Adds to the pushes of a log those that explain what single windows miss beside them.
     pub(super) fn in_outlying_windows(
         &self,
         place: Place,
-        state: &State<'_, N, P>,
+        state: &PushState<'_, N, P>,
         own: &Own<'_, A, N, P>,
-        events: &mut Vec<Event>,
+        disturbances: &mut Vec<Disturbance>,
     ) {
-        let state = &State { noticeable: state.faintest, ..*state };
-        while events.len() < MOST {
-            let rough = self.in_worst_window(place, state, events);
-            let sized = rough.and_then(|rough| self.sized(rough, state, own, events));
-            let Some(event) = sized.filter(|e| e.share > CLEAR && e.push.p[0].abs() > KNOWN * e.sigma[0])
+        let state = &PushState { min_relevance: state.faintest, ..*state };
+        while disturbances.len() < MOST {
+            let rough = self.in_worst_window(place, state, disturbances);
+            let sized = rough.and_then(|rough| self.sized(rough, state, own, disturbances));
+            let Some(disturbance) =
+                sized.filter(|e| e.share > CLEAR && e.push.p[0].abs() > KNOWN * e.sigma[0])
             else {
                 return;
             };
-            events.push(event);
+            disturbances.push(disturbance);
         }
     }
 
     /// The push that explains most of the window that is missed by most, if that is far more than typical.
-    fn in_worst_window(&self, place: Place, state: &State<'_, N, P>, events: &[Event]) -> Option<Event> {
-        let known: Vec<Placed> = events.iter().filter(|e| e.place() == place).map(|e| e.push).collect();
+    fn in_worst_window(
+        &self,
+        place: Place,
+        state: &PushState<'_, N, P>,
+        disturbances: &[Disturbance],
+    ) -> Option<Disturbance> {
+        let known: Vec<EffectInstance> =
+            disturbances.iter().filter(|e| e.place() == place).map(|e| e.push).collect();
         let windows = |wanted: &dyn Fn(usize) -> bool| {
             let whole = [&self.training, &self.holdout][place.0];
             let mut data = whole.data.of_track(place.1, |w| wanted(w.first));
             data.tracks[0].pushes.clone_from(&known);
-            let sample = Sample::new(data);
-            let metric = self.metric(&sample, state.model, state.scale);
-            let predicted = sample.data.predict(&self.arm, state.model, &metric.starts);
-            let residual = metric.residual(&sample.measured, &predicted);
-            (sample, metric, residual)
+            let sample = WindowSet::new(data);
+            let weighting = self.weighting(&sample, state.model, state.scale);
+            let predicted = sample.data.predict(&self.arm, state.model, &weighting.offsets);
+            let residual = weighting.residual(&sample.measured, &predicted);
+            (sample, weighting, residual)
         };
-        let (all, metric, residual) = windows(&|_| true);
-        let costs = metric.costs(&all.data, &residual);
+        let (all, weighting, residual) = windows(&|_| true);
+        let costs = weighting.costs(&all.data, &residual);
         let worst = (0..costs.len()).max_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
-        let doubt = OUTLYING * metric.typical / costs[worst];
+        let doubt = OUTLYING * weighting.typical / costs[worst];
         if doubt > 1.0 {
             return None;
         }
         let firsts: Vec<usize> = all.data.windows.iter().map(|w| w.first).collect();
         let near = worst.saturating_sub(1)..(worst + 2).min(firsts.len());
-        let (sample, metric, residual) = windows(&|first| firsts[near.clone()].contains(&first));
+        let (sample, weighting, residual) = windows(&|first| firsts[near.clone()].contains(&first));
         let (window, track) = (&all.data.windows[worst], &sample.data.tracks[0]);
         let (from, to) = (track.t[window.first], track.t[window.last]);
         let law = find::<f64>("external_pulse")?;
@@ -85,19 +92,19 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
                 (0..=count).map(move |i| (joint, duration, from - 0.5 * duration + i as f64 * STEP))
             })
             .collect();
-        let gains: Vec<(f64, Placed)> = tried
+        let gains: Vec<(f64, EffectInstance)> = tried
             .into_par_iter()
             .filter_map(|(joint, duration, time)| {
-                let push = Placed {
+                let push = EffectInstance {
                     law,
                     joint,
                     p: [SLIGHT * self.scales.size(Quantity::Impulse, joint), time, duration],
                 };
-                self.first_order(&sample, &metric, &residual, &known, push, state)
+                self.first_order(&sample, &weighting, &residual, &known, push, state)
             })
             .collect();
         let (_, push) = gains.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(Event {
+        Some(Disturbance {
             holdout: place.0 == 1,
             track: place.1,
             push,
@@ -110,23 +117,23 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Study<A, N, P> {
     /// What a push at this time, of this duration, would explain to first order, and its impulse.
     fn first_order(
         &self,
-        sample: &Sample<N>,
-        metric: &Metric<N>,
+        sample: &WindowSet<N>,
+        weighting: &Weighting<N>,
         residual: &[f64],
-        known: &[Placed],
-        push: Placed,
-        state: &State<'_, N, P>,
-    ) -> Option<(f64, Placed)> {
+        known: &[EffectInstance],
+        push: EffectInstance,
+        state: &PushState<'_, N, P>,
+    ) -> Option<(f64, EffectInstance)> {
         let mut data = sample.data.clone();
         data.tracks[0].pushes = known.iter().copied().chain([push]).collect();
-        let predicted = data.predict(&self.arm, state.model, &metric.starts);
-        let pushed = metric.residual(&sample.measured, &predicted);
+        let predicted = data.predict(&self.arm, state.model, &weighting.offsets);
+        let pushed = weighting.residual(&sample.measured, &predicted);
         let slope: Vec<f64> = residual.iter().zip(&pushed).map(|(r, p)| (r - p) / push.p[0]).collect();
-        let gram: DMatrix<f64> = metric.gram(&sample.data, &[&slope], residual).total;
+        let gram: DMatrix<f64> = weighting.gram(&sample.data, &[&slope], residual).total;
         let (square, product) = (gram[(0, 0)], gram[(0, 1)]);
         (square > 0.0).then(|| {
             let [_, time, duration] = push.p;
-            (product * product / square, Placed { p: [product / square, time, duration], ..push })
+            (product * product / square, EffectInstance { p: [product / square, time, duration], ..push })
         })
     }
 }

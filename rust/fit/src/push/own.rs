@@ -1,23 +1,27 @@
 //! One recording by itself: the model fitted to it alone, without pushes and with some.
 
-use super::{Event, Place, State};
-use crate::model::{Hypothesis, Placed};
-use crate::study::{Sample, Study};
+use super::{Disturbance, Place, PushState};
+use crate::context::{DiagnosisContext, WindowSet};
+use crate::model::{EffectInstance, Hypothesis};
 use crate::window::Dataset;
 use armgap_core::arm::Arm;
 use std::cell::OnceCell;
 
 /// A recording, and what the model becomes if nothing else counts.
 pub(super) struct Own<'a, A, const N: usize, const P: usize> {
-    whole: &'a Study<A, N, P>,
+    whole: &'a DiagnosisContext<A, N, P>,
     places: &'a [Place],
-    state: &'a State<'a, N, P>,
+    state: &'a PushState<'a, N, P>,
     bare: OnceCell<Hypothesis<P>>,
 }
 
 impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> Own<'a, A, N, P> {
     /// The recording whose pieces lie at `places` of a study.
-    pub fn new(whole: &'a Study<A, N, P>, places: &'a [Place], state: &'a State<'a, N, P>) -> Self {
+    pub fn new(
+        whole: &'a DiagnosisContext<A, N, P>,
+        places: &'a [Place],
+        state: &'a PushState<'a, N, P>,
+    ) -> Self {
         Self { whole, places, state, bare: OnceCell::new() }
     }
 
@@ -27,27 +31,27 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> Own<'a, A, N, P> {
     }
 
     /// The model fitted with these pushes in their pieces.
-    pub fn beside(&self, events: &[&Event]) -> Hypothesis<P> {
+    pub fn beside(&self, disturbances: &[&Disturbance]) -> Hypothesis<P> {
         let piece = |place: &Place| {
             let mut data =
                 [&self.whole.training, &self.whole.holdout][place.0].data.of_track(place.1, |_| true);
-            let here = events.iter().filter(|e| e.place() == *place);
-            data.tracks[0].pushes = here.map(|e| e.push).collect::<Vec<Placed>>();
+            let here = disturbances.iter().filter(|e| e.place() == *place);
+            data.tracks[0].pushes = here.map(|e| e.push).collect::<Vec<EffectInstance>>();
             data
         };
         let Some(data) = self.places.iter().map(piece).reduce(Dataset::and) else {
             return self.state.model.clone();
         };
-        let study = Study {
+        let context = DiagnosisContext {
             arm: self.whole.arm.clone(),
             prior: self.whole.prior,
             scales: self.whole.scales.clone(),
-            training: Sample::new(data.clone()),
-            holdout: Sample::new(data),
+            training: WindowSet::new(data.clone()),
+            holdout: WindowSet::new(data),
             noise: self.whole.noise,
-            own: self.whole.own.clone(),
-            watch: self.whole.watch.aside(),
+            custom_effects: self.whole.custom_effects.clone(),
+            progress: self.whole.progress.aside(),
         };
-        study.settle(self.state.model, self.state.scale).0.hypothesis
+        context.settle(self.state.model, self.state.scale).0.hypothesis
     }
 }

@@ -4,9 +4,9 @@
 //! it, goes through the same low-pass, so that neither a lag nor the noise of the acceleration enters one of them alone. A push is
 //! what no combination of the columns explains: it does not come back with the state.
 
-use crate::lacking::{Lacking, lacking};
 use crate::model::Hypothesis;
 use crate::products::product;
+use crate::residual_torque::{InverseDynamicsResidual, inverse_dynamics_residuals};
 use crate::smooth::local_cubic;
 use crate::solve::Prior;
 use crate::track::Track;
@@ -207,13 +207,13 @@ fn rows<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 ) -> Option<Vec<Row<N>>> {
     let slowest = slow.iter().copied().fold(f64::INFINITY, f64::min);
     let low: [f64; N] = std::array::from_fn(|j| LOW_SPEED / SLOW * slow[j]);
-    let row = |Lacking { t, motion, tau, lack }: Lacking<N>| {
+    let row = |InverseDynamicsResidual { t, motion, tau, residual: lack }: InverseDynamicsResidual<N>| {
         let [q, dq, ddq] = &motion;
         let columns = columns(arm, [q, dq, ddq], &tau, slow, &low, &model.theta);
         let rest = SVector::from_fn(|j, _| f64::from(u8::from(dq[j].abs() < slow[j])));
         Row { t, lack, needed: lack + tau, columns, rest, motion, tau }
     };
-    let samples = lacking(arm, track, model, &[], half_width(track), slowest)?;
+    let samples = inverse_dynamics_residuals(arm, track, model, &[], half_width(track), slowest)?;
     Some(samples.into_iter().map(row).collect())
 }
 

@@ -110,8 +110,8 @@ impl<const N: usize> Search<'_, N> {
         Some(())
     }
 
-    /// The same for what stands out only as long as it is fitted: beside a remainder a bell takes what the model lacks there for its own,
-    /// and so seems to stand in a calm place.
+    /// Takes out, the weakest first, what stands out only as long as it is fitted: beside a remainder a bell takes what the model lacks there
+    /// for its own, and so seems to stand in a calm place.
     fn drop_aided(&mut self, found: &mut Found) -> Option<()> {
         while !found.bells.is_empty() {
             let bells = &found.bells;

@@ -1,0 +1,197 @@
+//! The transmissions of all joints: the torques that reach the links, and the motion of the rotors.
+//!
+//! Backlash is open or closed. Open, rotor and link move independently; closed, they move as one body for as long as the flank
+//! pushes. At an impact they stay together, and the rotor's momentum goes over to the arm at once (a plastic impact,
+//! Brogliato 1999, chapter 4).
+
+use crate::linear::solve_positive_definite;
+use crate::real::Real;
+use crate::transmission::{LatentState, Transmission};
+use nalgebra::SVector;
+
+/// An inertia matrix, by rows.
+type InertiaMatrix<T, const N: usize> = [[T; N]; N];
+
+/// The transmissions of all joints; a rigid joint has none. Loops count joints by their index, so that compilers see none out of range.
+#[derive(Debug, Clone, Copy)]
+pub struct Drivetrain<T, const N: usize> {
+    of: [Option<Transmission<T>>; N],
+    any: bool,
+    has_backlash: bool,
+}
+
+impl<T: Real, const N: usize> Drivetrain<T, N> {
+    /// All joints rigid.
+    pub(crate) fn none() -> Self {
+        Self { of: [None; N], any: false, has_backlash: false }
+    }
+
+    /// Puts a transmission on joint `j`, if there is such a joint, and takes the rotor's inertia out of the link's if it is a part of that.
+    pub(crate) fn add(
+        &mut self,
+        j: usize,
+        transmission: Transmission<T>,
+        inertia: &mut InertiaMatrix<T, N>,
+    ) -> Option<()> {
+        *self.of.get_mut(j)? = Some(transmission);
+        self.any = true;
+        self.has_backlash |= transmission.backlash > T::zero();
+        if transmission.part_of_link {
+            add_rotor_inertia(inertia, -transmission.inertia, &transmission.rotor_jacobian(j));
+        }
+        Some(())
+    }
+
+    /// Whether any joint has a transmission.
+    #[inline]
+    pub fn any(&self) -> bool {
+        self.any
+    }
+
+    /// Whether any transmission has backlash.
+    #[inline]
+    pub fn has_backlash(&self) -> bool {
+        self.has_backlash
+    }
+
+    /// The transmission of joint `j`.
+    #[inline]
+    pub fn get(&self, j: usize) -> Option<&Transmission<T>> {
+        self.of.get(j)?.as_ref()
+    }
+
+    /// Joints with a transmission.
+    #[inline]
+    pub fn iter(&self) -> impl Iterator<Item = (usize, &Transmission<T>)> {
+        self.of.iter().enumerate().filter_map(|(j, transmission)| Some((j, transmission.as_ref()?)))
+    }
+
+    /// Part of joint `j`'s motor torque that accelerates the rotor instead of reaching the link; zero with closed backlash, where rotor and
+    /// link move as one.
+    #[inline]
+    fn retained(j: usize, transmission: &Transmission<T>, tau: T, latent: &LatentState<T, N>) -> T {
+        if transmission.backlash > T::zero() {
+            return if latent.side[j] == T::zero() { tau } else { T::zero() };
+        }
+        tau - transmission.transmitted(latent.deflection[j], latent.deflection_rate[j])
+    }
+
+    /// Torques that reach the joints when the motors give `tau`.
+    #[inline]
+    pub fn torque_at_joints(&self, tau: &SVector<T, N>, latent: &LatentState<T, N>) -> SVector<T, N> {
+        let mut torque_at_joints = *tau;
+        for j in 0..N {
+            let Some(transmission) = &self.of[j] else { continue };
+            let retained = Self::retained(j, transmission, tau[j], latent);
+            for (torque, part) in torque_at_joints.iter_mut().zip(transmission.rotor_jacobian::<N>(j)) {
+                *torque -= part * retained;
+            }
+        }
+        torque_at_joints
+    }
+
+    /// Adds the inertia of rotors that move with their links because their backlash is closed.
+    #[inline]
+    pub(crate) fn add_closed_rotors(&self, inertia: &mut InertiaMatrix<T, N>, latent: &LatentState<T, N>) {
+        for j in 0..N {
+            let Some(transmission) = &self.of[j] else { continue };
+            if latent.side[j] != T::zero() {
+                add_rotor_inertia(inertia, transmission.inertia, &transmission.rotor_jacobian(j));
+            }
+        }
+    }
+
+    /// Adds the inertia of all rotors, as if they moved with their links.
+    pub(crate) fn add_rotors(&self, inertia: &mut InertiaMatrix<T, N>) {
+        for (j, transmission) in self.iter() {
+            add_rotor_inertia(inertia, transmission.inertia, &transmission.rotor_jacobian(j));
+        }
+    }
+
+    /// Accelerations of the transmissions' deflections, given those of the joints.
+    #[inline]
+    pub(crate) fn deflection_accelerations(
+        &self,
+        tau: &SVector<T, N>,
+        ddq: &SVector<T, N>,
+        latent: &LatentState<T, N>,
+    ) -> SVector<T, N> {
+        let mut deflection_acceleration = SVector::zeros();
+        for j in 0..N {
+            let Some(transmission) = &self.of[j] else { continue };
+            if latent.side[j] == T::zero() {
+                let retained = Self::retained(j, transmission, tau[j], latent);
+                deflection_acceleration[j] = retained / transmission.inertia
+                    - SVector::from(transmission.rotor_jacobian::<N>(j)).dot(ddq);
+            }
+        }
+        deflection_acceleration
+    }
+
+    /// Force by which the flank of joint `j`'s closed backlash would have to pull; positive where it opens. None for other joints.
+    #[inline]
+    pub(crate) fn flank_tension(
+        &self,
+        j: usize,
+        tau: T,
+        ddq: &SVector<T, N>,
+        latent: &LatentState<T, N>,
+    ) -> Option<T> {
+        let transmission = self.get(j)?;
+        let side = *latent.side.get(j).filter(|side| **side != T::zero())?;
+        Some(
+            (transmission.inertia * SVector::from(transmission.rotor_jacobian::<N>(j)).dot(ddq) - tau) * side,
+        )
+    }
+
+    /// Depth of joint `j`'s rotor behind the nearer flank of its open backlash. None for other joints.
+    #[inline]
+    pub(crate) fn depth(&self, j: usize, latent: &LatentState<T, N>) -> Option<T> {
+        let transmission = self.get(j).filter(|d| d.backlash > T::zero())?;
+        let open = *latent.side.get(j)? == T::zero();
+        open.then(|| latent.deflection[j].abs() - transmission.half_backlash())
+    }
+
+    /// Plastic impact of joint `j`'s rotor on the flank it is at, in an arm with this inertia: velocities and deflection rates jump.
+    pub(crate) fn impact(
+        &self,
+        j: usize,
+        inertia: &InertiaMatrix<T, N>,
+        dq: &mut SVector<T, N>,
+        latent: &mut LatentState<T, N>,
+    ) {
+        if j >= N {
+            return;
+        }
+        let Some(transmission) = &self.of[j] else { return };
+        let side = if latent.deflection[j] < T::zero() { -T::one() } else { T::one() };
+        let rate = latent.deflection_rate[j];
+        (latent.side[j], latent.deflection[j]) = (side, side * transmission.half_backlash());
+        let mut combined = *inertia;
+        self.add_closed_rotors(&mut combined, latent);
+        let gained = transmission.rotor_jacobian::<N>(j).map(|part| part * transmission.inertia * rate);
+        let change = SVector::from(solve_positive_definite(combined, gained));
+        *dq += change;
+        for k in 0..N {
+            let Some(other) = &self.of[k] else { continue };
+            if latent.side[k] == T::zero() {
+                latent.deflection_rate[k] -= SVector::from(other.rotor_jacobian::<N>(k)).dot(&change);
+            }
+        }
+        latent.deflection_rate[j] = T::zero();
+    }
+}
+
+/// Adds the inertia of a rotor whose velocity is `rotor_jacobian . dq`.
+#[inline]
+fn add_rotor_inertia<T: Real, const N: usize>(
+    matrix: &mut InertiaMatrix<T, N>,
+    inertia: T,
+    rotor_jacobian: &[T; N],
+) {
+    for (row, a) in matrix.iter_mut().zip(rotor_jacobian) {
+        for (entry, b) in row.iter_mut().zip(rotor_jacobian) {
+            *entry += inertia * *a * *b;
+        }
+    }
+}

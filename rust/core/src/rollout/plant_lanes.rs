@@ -1,0 +1,272 @@
+//! Plants side by side, one in each lane.
+
+use crate::arm::Arm;
+use crate::cpu::Cpu;
+use crate::effect::{Hooks, JointPoint};
+use crate::fixed_mode::{Dynamics, Instant, Modes};
+use crate::kinematics::{AngleRange, JointState, KinematicState, RigidArm};
+use crate::lanes::Lanes;
+use crate::number::Number;
+use crate::plant::Plant;
+use crate::real::Real;
+use crate::trig::{Rotation, SinCos};
+use core::array::from_fn;
+
+/// A joint at an instant. What an effect gets is a copy, made where there is one: whatever a function outside can see has to be kept in
+/// memory throughout.
+struct JointInstant<V> {
+    t: V,
+    q: V,
+    dq: V,
+    tau: V,
+    bias: V,
+}
+
+impl<V: Copy> JointInstant<V> {
+    #[inline(always)]
+    fn of<const N: usize>(at: &Instant<'_, V, N>, j: usize) -> Self {
+        let JointState { q, dq } = &at.kinematics.joints;
+        Self { t: at.t, q: q[j], dq: dq[j], tau: at.tau[j], bias: at.kinematics.equation_terms.bias[j] }
+    }
+}
+
+/// Plants side by side.
+pub(super) struct PlantLanes<'a, T: Real, C, A, const W: usize, const N: usize, const P: usize> {
+    pub(super) plants: [&'a Plant<T, A, N, P>; W],
+    pub(super) rigid: RigidArm<Lanes<T, C, W>, A, N, P>,
+    /// One plant in all lanes.
+    same_plant: bool,
+    /// Hooks in use on each joint, in any lane.
+    hooks: [Hooks; N],
+    /// 1 where a joint has dry friction.
+    pub(super) dry: [Lanes<T, C, W>; N],
+}
+
+impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: usize>
+    PlantLanes<'a, T, C, A, W, N, P>
+{
+    /// One plant, copied into all lanes.
+    pub(super) fn new(plant: &'a Plant<T, A, N, P>) -> Self {
+        let RigidArm { arm, theta, viscous, coulomb, constant_inertia, tilt } = plant.rigid();
+        let rigid = RigidArm {
+            arm: arm.clone(),
+            theta: theta.map(Lanes::of),
+            viscous: viscous.map(Lanes::of),
+            coulomb: coulomb.map(|level| Lanes::of(level.max(T::zero()))),
+            constant_inertia: constant_inertia.map(|row| row.map(Lanes::of)),
+            tilt: Lanes::of(*tilt),
+        };
+        let (hooks, dry) = (from_fn(|j| plant.hooks(j)), from_fn(|j| Lanes::of(plant.dry(j))));
+        Self { plants: [plant; W], rigid, same_plant: true, hooks, dry }
+    }
+
+    /// Whether any joint in any lane has effects.
+    #[inline(always)]
+    pub(super) fn has_effects(&self) -> bool {
+        let mut any = false;
+        for j in 0..N {
+            any |= self.hooks[j].force | self.hooks[j].coulomb;
+        }
+        any
+    }
+
+    /// Puts a plant into lane `l`.
+    pub(super) fn put(&mut self, l: usize, plant: &'a Plant<T, A, N, P>) {
+        if core::ptr::eq(self.plants[l], plant) {
+            return;
+        }
+        self.plants[l] = plant;
+        self.same_plant = self.plants.iter().all(|other| core::ptr::eq(*other, plant));
+        let (own, rigid) = (plant.rigid(), &mut self.rigid);
+        for i in 0..P {
+            rigid.theta[i].0[l] = own.theta[i];
+        }
+        for j in 0..N {
+            rigid.viscous[j].0[l] = own.viscous[j];
+            rigid.coulomb[j].0[l] = own.coulomb[j].max(T::zero());
+            for k in 0..N {
+                rigid.constant_inertia[j][k].0[l] = own.constant_inertia[j][k];
+            }
+            self.dry[j].0[l] = plant.dry(j);
+            self.hooks[j].force = self.plants.iter().any(|plant| plant.hooks(j).force);
+            self.hooks[j].coulomb = self.plants.iter().any(|plant| plant.hooks(j).coulomb);
+        }
+        rigid.tilt.0[l] = own.tilt;
+    }
+
+    /// Coulomb levels of sliding joints, and torques of the effects.
+    #[inline(never)]
+    fn laws(
+        &self,
+        at: &JointInstant<Lanes<T, C, W>>,
+        direction: &[Lanes<T, C, W>; N],
+        j: usize,
+    ) -> [Lanes<T, C, W>; 2] {
+        let mut x = [self.point(at, j, 0); W];
+        for l in 1..W {
+            x[l] = self.point(at, j, l);
+        }
+        let (mut level, mut force) = (self.rigid.coulomb[j], Lanes::of(T::zero()));
+        if self.hooks[j].coulomb {
+            level = self.levels(&x, direction[j], j);
+        }
+        if self.hooks[j].force {
+            for l in 0..W {
+                x[l].other = direction[(j + 1) % N].0[l];
+            }
+            force = self.forces(&x, j);
+        }
+        [level, force]
+    }
+
+    #[inline]
+    fn point(&self, at: &JointInstant<Lanes<T, C, W>>, j: usize, l: usize) -> JointPoint<T> {
+        self.plants[l].point(j, at.t.0[l], at.q.0[l], at.dq.0[l], at.tau.0[l], at.bias.0[l])
+    }
+
+    /// Coulomb levels of joint `j` in the lanes where it slides.
+    #[inline]
+    fn levels(&self, x: &[JointPoint<T>; W], direction: Lanes<T, C, W>, j: usize) -> Lanes<T, C, W> {
+        let mut levels = self.rigid.coulomb[j];
+        if !self.same_plant {
+            for l in 0..W {
+                levels.0[l] = self.plants[l].level(j, &x[l], direction.0[l]);
+            }
+            return levels;
+        }
+        let (mut sliding, mut count) = ([0; W], 0);
+        let (mut points, mut along, mut sums) = (*x, direction.0, [T::zero(); W]);
+        for l in 0..W {
+            if direction.0[l] != T::zero() {
+                (sliding[count], points[count], along[count]) = (l, x[l], direction.0[l]);
+                sums[count] = self.plants[0].rigid().coulomb[j];
+                count += 1;
+            }
+        }
+        for effect in self.plants[0].effects() {
+            if effect.joint == j && effect.law.spec().hooks.coulomb {
+                effect.law.add_coulombs(&effect.p, &points[..count], &along[..count], &mut sums[..count]);
+            }
+        }
+        for i in 0..count {
+            levels.0[sliding[i]] = sums[i].max(T::zero());
+        }
+        levels
+    }
+
+    /// Torques of the effects on joint `j`.
+    #[inline]
+    fn forces(&self, x: &[JointPoint<T>; W], j: usize) -> Lanes<T, C, W> {
+        let mut sums = [T::zero(); W];
+        if self.same_plant {
+            for effect in self.plants[0].effects() {
+                if effect.joint == j && effect.law.spec().hooks.force {
+                    effect.law.add_forces(&effect.p, x, &mut sums);
+                }
+            }
+        } else {
+            for l in 0..W {
+                sums[l] = self.plants[l].force(j, &x[l]);
+            }
+        }
+        Lanes::new(sums)
+    }
+
+    /// Stiction violation of joint `j` in the lanes where it is stuck.
+    #[inline(never)]
+    fn stiction_violations(
+        &self,
+        at: &JointInstant<Lanes<T, C, W>>,
+        friction_at_rest: Lanes<T, C, W>,
+        direction: Lanes<T, C, W>,
+        j: usize,
+    ) -> Lanes<T, C, W> {
+        let mut stiction_violation = Lanes::of(T::zero());
+        for l in 0..W {
+            if direction.0[l] == T::zero() {
+                stiction_violation.0[l] = self.plants[l]
+                    .stiction_violation(j, at.t.0[l], at.q.0[l], at.tau.0[l], friction_at_rest.0[l])
+                    .0;
+            }
+        }
+        stiction_violation
+    }
+}
+
+/// Dynamics of the lanes. Without effects it is known whether any joint is stuck, and a step is code without a branch.
+pub(super) struct LaneDynamics<'b, B, const EFFECTS: bool, const ANY_STUCK: bool>(pub(super) &'b B);
+
+impl<
+    T: Real,
+    C: Cpu,
+    A: Arm<T, N, P>,
+    const W: usize,
+    const N: usize,
+    const P: usize,
+    const EFFECTS: bool,
+    const ANY_STUCK: bool,
+> Dynamics<Lanes<T, C, W>, N> for LaneDynamics<'_, PlantLanes<'_, T, C, A, W, N, P>, EFFECTS, ANY_STUCK>
+{
+    #[inline(always)]
+    fn rotations(
+        &self,
+        by: &[Lanes<T, C, W>; N],
+        reach: AngleRange,
+    ) -> ([Rotation<Lanes<T, C, W>>; N], Lanes<T, C, W>) {
+        self.0.rigid.rotations(by, reach)
+    }
+
+    #[inline(always)]
+    fn rotated(
+        &self,
+        joints: &JointState<Lanes<T, C, W>, N>,
+        sincos: [SinCos<Lanes<T, C, W>>; N],
+    ) -> KinematicState<Lanes<T, C, W>, N> {
+        self.0.rigid.rotated(joints, sincos)
+    }
+
+    #[inline(always)]
+    fn any_stuck(&self, modes: &Modes<Lanes<T, C, W>, N>) -> bool {
+        if EFFECTS { modes.any_stuck } else { ANY_STUCK }
+    }
+
+    #[inline(always)]
+    fn generalized_force(
+        &self,
+        at: &Instant<'_, Lanes<T, C, W>, N>,
+        direction: &[Lanes<T, C, W>; N],
+    ) -> [Lanes<T, C, W>; N] {
+        let mut generalized_force = *at.tau;
+        for j in 0..N {
+            let (mut level, viscous) = (self.0.rigid.coulomb[j], self.0.rigid.viscous[j]);
+            if EFFECTS && (self.0.hooks[j].force || self.0.hooks[j].coulomb) {
+                let [own, force] = self.0.laws(&JointInstant::of(at, j), direction, j);
+                (level, generalized_force[j]) = (own, generalized_force[j] + force);
+            }
+            // What is known first is subtracted first: the bias is not.
+            let driven = (-viscous)
+                .fused(at.kinematics.joints.dq[j], (-level).fused(direction[j], generalized_force[j]));
+            generalized_force[j] = driven - at.kinematics.equation_terms.bias[j];
+        }
+        generalized_force
+    }
+
+    #[inline(always)]
+    fn stiction_violation(
+        &self,
+        at: &Instant<'_, Lanes<T, C, W>, N>,
+        friction_at_rest: &[Lanes<T, C, W>; N],
+        direction: &[Lanes<T, C, W>; N],
+    ) -> [Lanes<T, C, W>; N] {
+        let mut stiction_violation = *friction_at_rest;
+        for j in 0..N {
+            stiction_violation[j] = if EFFECTS && self.0.hooks[j].coulomb {
+                self.0.stiction_violations(&JointInstant::of(at, j), friction_at_rest[j], direction[j], j)
+            } else {
+                let slides = direction[j] * direction[j];
+                (friction_at_rest[j].size() - self.0.rigid.coulomb[j]) * (Lanes::of(T::one()) - slides)
+            };
+        }
+        stiction_violation
+    }
+}

@@ -1,0 +1,84 @@
+//! Custom effects: a torque per unit of size, given by the user at every sample of every log.
+//!
+//! What a function of time, position, velocity and torque says along the *measured* motion is a torque of its own on the joint; its size
+//! is fitted and takes part in the ranking like any other. Within a window the predicted motion stays close to the measured one, so
+//! evaluating the function there and not along the prediction is an error of second order.
+
+use armgap_core::effect::{
+    Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial,
+};
+
+/// Most custom effects in one diagnosis.
+pub const MOST: usize = 4;
+
+/// Name of a custom effect, and the joint it acts on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CustomEffect {
+    /// Name in results.
+    pub name: String,
+    /// 0-based joint.
+    pub joint: usize,
+}
+
+/// The law of custom effect `index`; its torques lie in the logs' tables.
+#[derive(Debug)]
+struct Tabulated(usize);
+
+static LAWS: [Tabulated; MOST] = [Tabulated(0), Tabulated(1), Tabulated(2), Tabulated(3)];
+
+static PARAMETERS: [EffectParameter; 1] = [EffectParameter::signed("size", Quantity::Torque)];
+static STARTS: [[f64; MAX_PARAMETERS]; 1] = [[0.05, 0.0, 0.0]];
+
+const fn spec(name: &'static str) -> Spec {
+    Spec {
+        name,
+        title: "effect of the user's own",
+        equation: "tau_joint = tau + size f(t, q, dq, tau)",
+        source: "the user",
+        excited_by: "samples at which the function is not zero",
+        scope: Scope::Joint,
+        least_joints: 1,
+        parameters: &PARAMETERS,
+        initial_guesses: &STARTS,
+        trial: Trial::Amplitudes(1),
+        hooks: Hooks::COMMAND,
+    }
+}
+
+static SPECS: [Spec; MOST] =
+    [spec("user_effect_1"), spec("user_effect_2"), spec("user_effect_3"), spec("user_effect_4")];
+
+impl Effect<f64> for Tabulated {
+    fn spec(&self) -> &'static Spec {
+        &SPECS[self.0]
+    }
+}
+
+/// The law of custom effect `index`.
+pub fn law(index: usize) -> &'static dyn Effect<f64> {
+    &LAWS[index]
+}
+
+/// Index of a law among the custom effects, if it is one.
+fn index(law: &dyn Effect<f64>) -> Option<usize> {
+    SPECS.iter().position(|spec| std::ptr::eq(spec, law.spec()))
+}
+
+/// Applies a law to one joint's commands: its own rule, or the user's table.
+pub fn command(
+    law: &dyn Effect<f64>,
+    p: &[f64; MAX_PARAMETERS],
+    t: &[f64],
+    tables: &[Vec<f64>],
+    torque: &mut [InputSegment<f64>],
+) {
+    let Some(index) = index(law) else {
+        law.command(p, t, torque);
+        return;
+    };
+    if let Some(table) = tables.get(index) {
+        for (segment, unit) in torque.iter_mut().zip(table) {
+            *segment = segment.map(|tau| tau + p[0] * unit);
+        }
+    }
+}

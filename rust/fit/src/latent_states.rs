@@ -1,0 +1,191 @@
+//! Latent states, which no encoder measures, at the start of every window: simulated along the measured motion from the start of the log.
+//!
+//! The hysteresis state of a joint depends on its path, and a motor behind a shaft or backlash moves under the logged torque against the
+//! measured position of its link; neither needs an initial guess.
+
+use crate::track::Track;
+use armgap_core::arm::Arm;
+use armgap_core::effect::{InputSegment, interval};
+use armgap_core::plant::Plant;
+use armgap_core::transmission::{LatentState, Transmission};
+use nalgebra::SVector;
+
+/// Measured state at one sample.
+#[derive(Debug, Clone, Copy)]
+pub struct MeasuredState<const N: usize> {
+    /// Positions.
+    pub q: SVector<f64, N>,
+    /// Velocities.
+    pub dq: SVector<f64, N>,
+}
+
+/// Natural frequency of the motor times the step length, at most.
+const STEP: f64 = 1.0;
+
+/// Steps per sample at most.
+const MAX_STEPS: usize = 8;
+
+/// A position or its rate beyond this [SI] is cut: the hypothesis is wrong, and its cost will say so.
+const LIMIT: f64 = 1e3;
+
+/// Latent states of a plant at every sample of a track up to `last`, under these torques.
+pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    track: &Track<N>,
+    plant: &Plant<f64, A, N, P>,
+    torque: &[[InputSegment<f64>; N]],
+    last: usize,
+) -> Vec<LatentState<f64, N>> {
+    let path = track.path();
+    let mut now = LatentState::none(path[0].q);
+    let mut all = Vec::with_capacity(last + 1);
+    for k in 0..=last {
+        now.memory = plant.memory(&path[k].q, &now);
+        now.anchor = path[k].q;
+        all.push(rigid(&now, plant));
+        let next = path.get(k + 1).unwrap_or(&path[k]);
+        for j in 0..N {
+            if let Some(transmission) = plant.drivetrain().get(j) {
+                let h = interval(&track.t, k);
+                let ends = [(path[k].q[j], path[k].dq[j]), (next.q[j], next.dq[j])];
+                let carried: f64 = (0..j).map(|i| next.dq[i] - path[k].dq[i]).sum();
+                let held =
+                    transmission.coupling_ratio * transmission.inertia * carried / h.max(f64::MIN_POSITIVE);
+                let torque = torque[k][j].map(|tau| tau - held);
+                let motor_motion = MotorMotion { transmission, torque: &torque, h, ends };
+                let (at, rate) =
+                    motor_motion.advance(ends[0].0 + now.deflection[j], ends[0].1 + now.deflection_rate[j]);
+                (now.deflection[j], now.deflection_rate[j]) = (at - ends[1].0, rate - ends[1].1);
+            }
+        }
+    }
+    all
+}
+
+/// These latent states with rigid flanks: a rotor behind a flank is put onto it.
+fn rigid<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    state: &LatentState<f64, N>,
+    plant: &Plant<f64, A, N, P>,
+) -> LatentState<f64, N> {
+    let mut rigid = *state;
+    for (j, transmission) in plant.drivetrain().iter().filter(|(_, transmission)| transmission.backlash > 0.0)
+    {
+        if state.deflection[j].abs() >= transmission.half_backlash() {
+            rigid.side[j] = state.deflection[j].signum();
+            (rigid.deflection[j], rigid.deflection_rate[j]) =
+                (rigid.side[j] * transmission.half_backlash(), 0.0);
+        }
+    }
+    rigid
+}
+
+/// One motor over one sample interval.
+struct MotorMotion<'a> {
+    transmission: &'a Transmission<f64>,
+    torque: &'a InputSegment<f64>,
+    h: f64,
+    /// Position and velocity of the link at both ends.
+    ends: [(f64, f64); 2],
+}
+
+impl MotorMotion<'_> {
+    /// Position and velocity of the link at the fraction `s` of the interval, by Hermite's cubic.
+    fn link(&self, s: f64) -> (f64, f64) {
+        let [(q0, v0), (q1, v1)] = self.ends;
+        let (d0, d1) = (v0 * self.h, v1 * self.h);
+        let (c2, c3) = (3.0 * (q1 - q0) - 2.0 * d0 - d1, 2.0 * (q0 - q1) + d0 + d1);
+        (q0 + s * (d0 + s * (c2 + s * c3)), (d0 + s * (2.0 * c2 + 3.0 * s * c3)) / self.h)
+    }
+
+    /// Torque on the motor, and position and velocity of the link, at the fraction `s` of the interval.
+    fn drawn(&self, s: f64) -> [f64; 3] {
+        let (q, dq) = self.link(s);
+        [self.torque.at(s), q, dq]
+    }
+
+    /// Acceleration of the motor under this torque, against this link.
+    fn slope(&self, [torque, q, dq]: &[f64; 3], at: f64, rate: f64) -> f64 {
+        (torque - self.transmission.transmitted(at - q, rate - dq)) / self.transmission.inertia
+    }
+
+    /// Acceleration at the fraction `s` of the interval of a motor at rest at zero, on a shaft without backlash.
+    fn push(&self, s: f64) -> f64 {
+        let (q, dq) = self.link(s);
+        (self.torque.at(s) + self.transmission.stiffness * q + self.transmission.damping * dq)
+            / self.transmission.inertia
+    }
+
+    /// Position and velocity of the motor at the end of the interval.
+    fn advance(&self, e: f64, v: f64) -> (f64, f64) {
+        if self.transmission.backlash > 0.0 {
+            return self.steps((e, v), |s| self.drawn(s), |here, e, v| self.slope(here, e, v));
+        }
+        // Without backlash everything is linear.
+        let Transmission { stiffness, damping, inertia, .. } = self.transmission;
+        let (pull, brake) = (stiffness / inertia, damping / inertia);
+        self.steps((e, v), |s| self.push(s), |push, e, v| push - pull * e - brake * v)
+    }
+
+    /// Position and velocity of the motor at the end of the interval by Runge-Kutta, given its input at a fraction of the interval and the
+    /// acceleration under that input.
+    #[inline(always)]
+    fn steps<D>(
+        &self,
+        (mut e, mut v): (f64, f64),
+        drawn: impl Fn(f64) -> D,
+        slope: impl Fn(&D, f64, f64) -> f64,
+    ) -> (f64, f64) {
+        let count = ((self.h * self.transmission.rate(f64::MAX) / STEP).ceil() as usize).clamp(1, MAX_STEPS);
+        let (dt, ds) = (self.h / count as f64, 1.0 / count as f64);
+        let (half, sixth) = (0.5 * dt, dt / 6.0);
+        let mut here = drawn(0.0);
+        for i in 0..count {
+            let s = i as f64 * ds;
+            let (middle, end) = (drawn(s + 0.5 * ds), drawn(s + ds));
+            let a1 = slope(&here, e, v);
+            let v2 = v + half * a1;
+            let a2 = slope(&middle, e + half * v, v2);
+            let v3 = v + half * a2;
+            let a3 = slope(&middle, e + half * v2, v3);
+            let v4 = v + dt * a3;
+            let a4 = slope(&end, e + dt * v3, v4);
+            e += sixth * (v + 2.0 * (v2 + v3) + v4);
+            v += sixth * (a1 + 2.0 * (a2 + a3) + a4);
+            here = end;
+        }
+        (e.clamp(-LIMIT, LIMIT), v.clamp(-LIMIT, LIMIT))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motor_behind_a_shaft_swings_as_its_equation_says() {
+        let (inertia, rate, torque, h) = (0.02, 150.0, 0.3, 0.002);
+        let stiffness = inertia * rate * rate;
+        let transmission = Transmission {
+            inertia,
+            stiffness,
+            damping: 0.0,
+            backlash: 0.0,
+            part_of_link: false,
+            coupling_ratio: 0.0,
+        };
+        let (speed, segment) = (0.4, InputSegment::held(torque));
+        // Behind a link at constant speed: a motor that starts with it oscillates about the deflection that carries the torque.
+        let (mut at, mut velocity) = (0.0, speed);
+        for k in 0..50 {
+            let t = f64::from(k) * h;
+            let ends = [(speed * t, speed), (speed * (t + h), speed)];
+            (at, velocity) =
+                MotorMotion { transmission: &transmission, torque: &segment, h, ends }.advance(at, velocity);
+            let phase = rate * (t + h);
+            let deflection = torque / stiffness * (1.0 - phase.cos());
+            assert!(
+                (at - speed * (t + h) - deflection).abs() < 1e-3 * torque / stiffness,
+                "{k}: {at} {deflection}"
+            );
+        }
+    }
+}

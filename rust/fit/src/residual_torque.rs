@@ -1,0 +1,54 @@
+//! Residual torque of a log under a model by inverse dynamics: what the measured motion needs beyond the given torque.
+
+use crate::latent_states::latent_states;
+use crate::model::{EffectInstance, Hypothesis};
+use crate::smooth::{Local, local_cubic};
+use crate::track::Track;
+use armgap_core::arm::Arm;
+use armgap_core::transmission::LatentState;
+use nalgebra::SVector;
+
+/// Residual torque at one sample.
+pub struct InverseDynamicsResidual<const N: usize> {
+    /// Its time, s.
+    pub t: f64,
+    /// Position, velocity and acceleration.
+    pub motion: [SVector<f64, N>; 3],
+    /// Given torque, mean of the intervals before and after.
+    pub tau: SVector<f64, N>,
+    /// Residual torque.
+    pub residual: SVector<f64, N>,
+}
+
+/// Every sample of a log but the `half` at either end, with derivatives from local cubics of that half width, friction regularised below
+/// the speed `slow`, and the disturbances `pushes` given; none if the model cannot be simulated.
+pub fn inverse_dynamics_residuals<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    arm: &A,
+    track: &Track<N>,
+    model: &Hypothesis<P>,
+    pushes: &[EffectInstance],
+    half: usize,
+    slow: f64,
+) -> Option<Vec<InverseDynamicsResidual<N>>> {
+    let held = model.command(&track.t, &track.held, pushes, &track.tables);
+    let held = held.as_deref().unwrap_or(&track.held);
+    let plant = model.plant(arm)?;
+    let has_latent = plant.drivetrain().any() || plant.has_hysteresis();
+    let latent = has_latent.then(|| latent_states(track, &plant, held, track.len() - 1));
+    let soft = plant.with_smoothing(slow.max(model.smoothing));
+    let sample = |k: usize| {
+        let at: [Local; N] =
+            std::array::from_fn(|j| local_cubic(&track.t, |i| model.actual(j, track.q[i][j]), k, half));
+        let motion = [
+            SVector::from_fn(|j, _| at[j].q),
+            SVector::from_fn(|j, _| at[j].dq),
+            SVector::from_fn(|j, _| at[j].ddq),
+        ];
+        let tau = SVector::from_fn(|j, _| 0.5 * (held[k.saturating_sub(1)][j].mean() + held[k][j].mean()));
+        let [q, dq, ddq] = &motion;
+        let latent = latent.as_ref().map_or_else(|| LatentState::none(*q), |latent| latent[k]);
+        let residual = soft.residual_torque(track.t[k], [q, dq, ddq], &tau, &latent);
+        InverseDynamicsResidual { t: track.t[k], motion, tau, residual }
+    };
+    Some((half..track.len().saturating_sub(half)).map(sample).collect())
+}

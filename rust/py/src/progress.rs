@@ -1,0 +1,115 @@
+//! Progress callback: long work on a thread of its own, while the calling thread reports progress to Python and checks for signals.
+//!
+//! Only the calling thread enters Python: for signals 25 times a second, to report progress 8 times. When it is interrupted it returns at once; the work is told to
+//! stop, and ends at its next unit without anyone waiting for it, which is why it owns its data.
+
+use armgap_fit::progress::{Control, Observer, Progress};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// Time between two checks for signals.
+const CHECK: Duration = Duration::from_millis(40);
+
+/// Signal checks from one progress report to the next.
+const CHECKS_PER_REPORT: u32 = 3;
+
+/// What the two threads share.
+#[derive(Default)]
+struct Shared {
+    latest: Mutex<Option<Progress>>,
+    stop: AtomicBool,
+}
+
+/// Runs `work`, which is given an observer; `callback(title, fraction)` is called with the progress. Without it, work is short: it is done on
+/// this thread, and nothing interrupts it.
+pub fn with_progress<T: Send + 'static>(
+    py: Python<'_>,
+    callback: Option<&Py<PyAny>>,
+    work: impl FnOnce(&Observer) -> T + Send + 'static,
+) -> PyResult<T> {
+    let Some(callback) = callback else {
+        let nobody: Observer = Arc::new(|_| Control::Go);
+        let ended = py.detach(move || catch_unwind(AssertUnwindSafe(|| work(&nobody))));
+        return ended.map_err(defect);
+    };
+    let shared = Arc::new(Shared::default());
+    let observer = observer(&shared);
+    let (send, ended) = sync_channel(1);
+    let thread = std::thread::spawn(move || {
+        // Nobody listens any more after an interrupt.
+        let _ = send.send(work(&observer));
+    });
+    let looked = Arc::clone(&shared);
+    let result = py.detach(move || wait(&ended, &looked, callback));
+    match result {
+        Ok(Some(result)) => {
+            report(py, &shared, callback, true)?;
+            Ok(result)
+        }
+        Ok(None) => match thread.join() {
+            Err(panic) => Err(defect(panic)),
+            Ok(()) => unreachable!("a thread that ends without a result has panicked"),
+        },
+        Err(error) => {
+            shared.stop.store(true, Relaxed);
+            Err(error)
+        }
+    }
+}
+
+/// A panic as an error for Python: what the work said last, and that it should not have.
+#[expect(clippy::needless_pass_by_value, reason = "a panic's payload is given away")]
+fn defect(panic: Box<dyn Any + Send>) -> PyErr {
+    let said =
+        panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
+    let said = said.unwrap_or("no message");
+    PyRuntimeError::new_err(format!(
+        "armgap failed inside ({said}); this is a defect of armgap, please report it with the arm file and the logs"
+    ))
+}
+
+/// Waits for the result; none if the thread ended without.
+fn wait<T>(ended: &Receiver<T>, shared: &Shared, callback: &Py<PyAny>) -> PyResult<Option<T>> {
+    let mut checks = 0;
+    loop {
+        checks += 1;
+        match ended.recv_timeout(CHECK) {
+            Ok(result) => return Ok(Some(result)),
+            Err(RecvTimeoutError::Disconnected) => return Ok(None),
+            Err(RecvTimeoutError::Timeout) => {
+                let callback = (checks % CHECKS_PER_REPORT == 1).then_some(callback);
+                Python::attach(|py| poll(py, shared, callback))?;
+            }
+        }
+    }
+}
+
+/// Lets Python handle its signals, and reports the progress if a callback is given.
+fn poll(py: Python<'_>, shared: &Shared, callback: Option<&Py<PyAny>>) -> PyResult<()> {
+    py.check_signals()?;
+    callback.map_or(Ok(()), |callback| report(py, shared, callback, false))
+}
+
+/// Calls back with the progress; with 1 once the work has ended.
+fn report(py: Python<'_>, shared: &Shared, callback: &Py<PyAny>, ended: bool) -> PyResult<()> {
+    let latest = *shared.latest.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(progress) = latest {
+        let fraction = if ended { 1.0 } else { progress.fraction };
+        callback.call1(py, (progress.phase.title(), fraction))?;
+    }
+    Ok(())
+}
+
+fn observer(shared: &Arc<Shared>) -> Observer {
+    let shared = Arc::clone(shared);
+    Arc::new(move |progress| {
+        *shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(progress);
+        if shared.stop.load(Relaxed) { Control::ContactGuess } else { Control::Go }
+    })
+}
