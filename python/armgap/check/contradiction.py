@@ -53,6 +53,8 @@ _MOST_SUSPECTS = 3
 _BETTER = 0.7
 # With parameters that no arm has the log as it stands explains nothing; the other reading must then do about as well.
 _AS_GOOD = 1.3
+# A reading that explains a log predicts it: errors stay below this part of the motion. Unmodelled effects leave up to a tenth.
+_EXPLAINS = 0.3
 # Errors below this part of the motion are as good as none.
 _NEGLIGIBLE = 1e-3
 # Other readings whose predictions are as good to this part are named beside it.
@@ -85,9 +87,14 @@ class Refit:
         return bool(np.all(self.theta[:b] >= (low - slack)[:b]) and np.all(self.theta[:b] <= (high + slack)[:b]))
 
     def against(self, other: Refit) -> float:
-        """Return this error as a part of another one, the geometric mean over the joints."""
-        floor = _NEGLIGIBLE * np.maximum(self.motion, other.motion)
-        return float(np.exp(np.mean(np.log(np.maximum(self.error, floor) / np.maximum(other.error, floor)))))
+        """Return this error as a part of another one, each relative to its own motion."""
+        return self.relative / other.relative
+
+    @property
+    def relative(self) -> float:
+        """RMS error as a part of the RMS displacement within a window, the geometric mean over the joints."""
+        moved = np.maximum(self.motion, np.finfo(float).tiny)
+        return float(np.exp(np.mean(np.log(np.maximum(self.error / moved, _NEGLIGIBLE)))))
 
 
 @dataclass(frozen=True)
@@ -174,7 +181,7 @@ def confirm(
         corrections = suspect.reading.corrections
         read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
         refit = Refit.of(corrections.on_arm(arm), read[0], read[1], horizon)
-        if refit.possible(corrections.on_arm(arm)):
+        if refit.possible(corrections.on_arm(arm)) and refit.relative < _EXPLAINS:
             tried.append((refit.against(as_is), suspect, refit))
     tried.sort(key=lambda entry: entry[0])
     if not tried or tried[0][0] > limit:

@@ -29,17 +29,24 @@ _COLOURED = 1.3
 _WHITE_COUNTS = 1.0
 # A joint moves where it gets on by more than this part of its usual fast pace, per row.
 _MOVES = 0.05
+# Positions that are held in this share of the rows in motion are another defect.
+_HELD = 0.1
 # Rows in motion that have to speak, and reversals that an exact log has to pass smoothly.
 _FEWEST, _REVERSALS = 200, 4
-# Numbers are exact within so many roundings.
-_EXACT = 20.0
-# Interpolation leaves this share of the fourth differences exact, and others this much larger: times what is exact, and steps of a grid
-# (rounding to a grid makes them 2.4 steps).
-_PIECEWISE, _KNOTS, _KNOTS_COUNTS = 0.05, 1e3, 100.0
+# Numbers are exact within so many roundings, fourth differences within so many times more.
+_EXACT, _FOURTH = 20.0, 8.0
+# Rows whose neighbours are a period away within this part: differences mean something there.
+_EVEN = 0.2
+# Interpolation leaves this share of the fourth differences exact, and others this much larger than what is exact. Rounding to a grid
+# makes up to so many steps of it more often than none.
+_PIECEWISE, _KNOTS, _FEW_COUNTS = 0.05, 1e3, 5
+# Those others are of any size: what one in ten exceeds is so many times what one in twenty stays below. Steps of a grid make it 4.
+_ANY_SIZE, _FEWEST_KNOTS = 20.0, 20
 # Torques that explain this share of the high frequencies, with an inertia above zero, speak for motion. A controller's torques follow
 # the encoder's noise, and so does what a low-pass leaves of it, by half or so.
 _EXPLAINED = 0.9
 _HALF = 6
+_DOUBLE = float(np.finfo(np.float64).eps)
 
 
 def look(log: Log, arm: Arm | None) -> Outcome:
@@ -63,35 +70,61 @@ def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
     paces = [travel_per_row(q, _HALF) for q in pieces]
     usual = float(np.quantile(np.concatenate(paces), 0.9))
     grid = grid_step(np.concatenate(pieces))
-    slowest = max(_MOVES * usual, _WHITE_COUNTS * (step if step is not None else grid or 0.0))
+    slowest = max(_MOVES * usual, _WHITE_COUNTS * max(step or 0.0, grid or 0.0))
     moving = [p > slowest for p in paces]
     count = sum(int(np.count_nonzero(m)) for m in moving)
-    if count < _FEWEST:
+    if count < _FEWEST or _stale(pieces, moving) > _HELD * count:
         return ""
-    exact = _EXACT * max(rounding(q) for q in pieces)
-    if (share := _between_knots(pieces, moving, max(exact, 0.01 * (grid or 0.0)), grid or 0.0)) > _PIECEWISE:
-        return (
-            f"lies exactly on straight lines or cubics between knots in {100 * share:.0f} % of the rows: interpolated"
-        )
-    squares, middle = noise_by_order(pieces, moving)
-    if middle[-1] <= exact:
-        smooth = squares[-1] <= exact and dry and _reversals(pieces, moving) >= _REVERSALS
-        return (
-            "is smooth to its last digit, reversals included: filtered, fitted or computed, not measured"
-            if smooth
-            else ""
-        )
-    least = min(float(squares.min()), _over_times(log, j, rows, moving))
-    if step is not None and least < _OF_ENCODER * step / np.sqrt(12) and not _driven(log, j, rows, moving):
+    even = [m & _even(log.t[r], log.sample_period) for r, m in zip(rows, moving, strict=True)]
+    spaced = sum(int(np.count_nonzero(m)) for m in even) >= _FEWEST
+    least = _over_times(log, j, rows, moving)
+    if spaced:
+        squares, middle = noise_by_order(pieces, even)
+        exact = _EXACT * max(rounding(q) for q in pieces)
+        if why := _unmeasured(pieces, even, exact, grid or 0.0):
+            return why
+        if middle[-1] <= exact:
+            smooth = (
+                dry and squares[-1] <= _EXACT * _DOUBLE * _largest(pieces) and _reversals(pieces, even) >= _REVERSALS
+            )
+            return "is smooth to its last digit, reversals included: filtered, fitted or computed" if smooth else ""
+        least = min(least, float(squares.min()))
+    driven = _driven(log, j, rows, even) if spaced else False
+    if step is not None and least < _OF_ENCODER * step / np.sqrt(12) and not driven:
         return (
             f"has noise of {least:.2g} at high frequencies where the encoder's step of {step:.3g} makes {step / np.sqrt(12):.2g}: "
             "filtered, interpolated, or of a finer encoder than the arm file's"
         )
-    ratio = squares[ORDERS.index(6)] / squares[-1]
-    by_median = middle[ORDERS.index(6)] / middle[-1]
-    if grid is None and min(ratio, by_median) > _COLOURED and not _driven(log, j, rows, moving):
-        return f"has noise that falls towards high frequencies (by a factor of {ratio:.2g}), as no encoder's does: filtered"
+    if grid is not None and least < _OF_ENCODER * grid / np.sqrt(12) and not driven:
+        return f"has noise of {least:.2g} at high frequencies, less than its own steps of {grid:.3g} make: filtered"
+    if spaced and grid is None and not driven:
+        falls = min(float(of[ORDERS.index(6)] / of[-1]) for of in (squares, middle))
+        if falls > _COLOURED:
+            return f"has noise that falls towards high frequencies (by a factor of {falls:.2g}), as no encoder's does: filtered"
     return ""
+
+
+def _even(t: Array, period: float) -> NDArray[np.bool_]:
+    """Return the rows whose neighbours, on either side, lie a period apart."""
+    off = np.append(0, np.cumsum(np.abs(np.diff(t) / period - 1) > _EVEN))
+    rows = np.arange(len(t))
+    return np.asarray(off[np.minimum(rows + _HALF, len(t) - 1)] == off[np.maximum(rows - _HALF, 0)])
+
+
+def _unmeasured(pieces: list[Array], moving: list[NDArray[np.bool_]], exact: float, grid: float) -> str:
+    share = _between_knots(pieces, moving, max(_FOURTH * exact, 0.01 * grid), grid)
+    if share <= _PIECEWISE:
+        return ""
+    return f"lies exactly on straight lines or cubics between knots in {100 * share:.0f} % of the rows: interpolated"
+
+
+def _stale(pieces: list[Array], moving: list[NDArray[np.bool_]]) -> int:
+    """Return how many rows in motion repeat the position before."""
+    return sum(int(np.count_nonzero((q[1:] == q[:-1]) & m[1:])) for q, m in zip(pieces, moving, strict=True))
+
+
+def _largest(pieces: list[Array]) -> float:
+    return max(float(np.max(np.abs(q))) for q in pieces)
 
 
 def _between_knots(pieces: list[Array], moving: list[NDArray[np.bool_]], exact: float, grid: float) -> float:
@@ -99,7 +132,12 @@ def _between_knots(pieces: list[Array], moving: list[NDArray[np.bool_]], exact: 
     bends = np.concatenate([np.abs(np.diff(q, n=4)[m[2:-2]]) for q, m in zip(pieces, moving, strict=True)])
     zero = bends <= exact
     others = bends[~zero]
-    if not len(others) or float(np.median(others)) < max(_KNOTS * exact, _KNOTS_COUNTS * grid):
+    if len(others) < _FEWEST_KNOTS:
+        return 0.0
+    small, large = np.quantile(others, (0.05, 0.9))
+    if large < max(_KNOTS * exact, _ANY_SIZE * small):
+        return 0.0
+    if np.count_nonzero(others < (_FEW_COUNTS + 0.5) * grid) > 0.5 * np.count_nonzero(zero):
         return 0.0
     return float(np.mean(zero))
 

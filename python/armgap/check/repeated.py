@@ -123,23 +123,23 @@ def _agree(held: _Held, other: _Held) -> bool:
     both = held.fast & other.fast
     if np.count_nonzero(both) < _FEWEST:
         return True
-    either = np.count_nonzero((held.again | other.again) & both)
-    return either == 0 or np.count_nonzero(held.again & other.again & both) >= _AGREE * either
+    # The rarer of the two: a joint that stops now and then repeats its position by itself there.
+    one, two = np.count_nonzero(held.again & both), np.count_nonzero(other.again & both)
+    rarer = min(one, two) if other.share >= _SHARE else one
+    return bool(np.count_nonzero(held.again & other.again & both) >= _AGREE * rarer)
 
 
 def _fresh(log: Log, held: list[_Held]) -> NDArray[np.intp]:
-    """Return the rows with fresh positions: at a regular beat throughout, otherwise wherever some joint's is fresh or rests."""
+    """Return the rows with fresh positions: at a regular beat throughout, otherwise wherever no moving joint is held."""
     rows = np.arange(len(log))
     beat = _beat(held)
     if beat is not None:
         period, phase = beat
         return np.flatnonzero((rows % period == phase) | (rows == 0))
-    stale = np.ones(len(log), dtype=bool)
-    some = np.zeros(len(log), dtype=bool)
+    stale = np.zeros(len(log), dtype=bool)
     for h in held:
-        stale &= h.again | ~h.moves
-        some |= h.again & h.moves
-    return np.flatnonzero(~(stale & some))
+        stale |= h.again & h.moves
+    return np.flatnonzero(~stale)
 
 
 def _beat(held: list[_Held]) -> tuple[int, int] | None:

@@ -38,7 +38,7 @@ _LONG, _LATE = 1.3, 0.6
 _ROUNDS = 12
 # Rows to either side whose mean lateness is compared.
 _BESIDE = 12
-# Even times stay within this part of a period of the stamps' mean over so many rows.
+# Even times stay within this part of a period of the stamps' mean over so many rows; a clock's drift bends by less, too.
 _NEAR, _MEAN_ROWS = 0.35, 25
 # A drift of the clock is followed over so many rows if it stands out by so many deviations.
 _DRIFT_ROWS, _DRIFT_STANDS_OUT = 128, 4.0
@@ -50,8 +50,8 @@ def look(log: Log, arm: Arm | None) -> Outcome:
         return NOTHING
     period = log.sample_period
     steps = np.diff(log.t)
-    off = np.minimum(np.abs(steps / period - 1), 1.0)
-    if float(np.mean(off)) < _EVEN:
+    # Whole periods, rows missing or not, are even.
+    if float(np.mean(np.abs(steps / period - np.maximum(np.round(steps / period), 1)))) < _EVEN:
         return NOTHING
     even = _even_times(log.t, steps, period)
     if even is None:
@@ -116,6 +116,9 @@ def _even_times(t: Array, steps: Array, period: float) -> Array | None:
         start, period = _straight(index, t)
     late = t - start - period * index
     drift = _drift(late)
+    bends = drift[2 * _DRIFT_ROWS :] - 2 * drift[_DRIFT_ROWS:-_DRIFT_ROWS] + drift[: -2 * _DRIFT_ROWS]
+    if float(np.max(np.abs(bends), initial=0.0)) > _NEAR * period:
+        return None
     even = start + period * index + drift
     late = late - drift
     if len(t) > _MEAN_ROWS:
@@ -142,10 +145,11 @@ def _missing(t: Array, steps: Array, period: float) -> NDArray[np.intp]:
     shift = (mean(at + 1, at + 1 + _BESIDE) - mean(at + 1 - _BESIDE, at + 1)) / period
     clear = shift > _LATE
     at, shift = at[clear], shift[clear]
+    first, last = np.searchsorted(at, at - _BESIDE + 1), np.searchsorted(at, at + _BESIDE)
     # The same missing row shifts the means beside it too: the longest step among close ones has it.
     for i in np.argsort(-steps[at]):
-        close = (np.abs(at - at[i]) < _BESIDE) & (missing[at] > 0)
-        left = shift[i] - float(np.sum(missing[at[close]] * (1 - np.abs(at[close] - at[i]) / _BESIDE)))
+        close = at[first[i] : last[i]]
+        left = shift[i] - float(np.sum(missing[close] * (1 - np.abs(close - at[i]) / _BESIDE)))
         longest = steps[at[i]] / period - 1 + 2 * _LATE
         if left > _LATE:
             missing[at[i]] = round(min(left, longest))
@@ -211,4 +215,4 @@ def _drift(late: Array) -> Array:
         slope = (means[end] - means[inner]) / (centres[end] - centres[inner])
         rows = np.arange(int(centres[0]) + 1) if end == 0 else np.arange(int(centres[-1]), len(late))
         slow[rows] = means[end] + slope * (rows - centres[end])
-    return slow
+    return np.asarray(slow)
