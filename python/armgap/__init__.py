@@ -9,6 +9,7 @@ from armgap._native import __version__
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
+    from armgap.check import CheckName, Severity
     from armgap.custom_effect import CustomEffect
     from armgap.diagnosis import Diagnosis, diagnose
     from armgap.errors import ArmgapError
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from armgap.fitting import ArmFit, fit
     from armgap.identification import Identification, identify
     from armgap.inspection import Inspection, inspect
+    from armgap.literals import Filters, Scheme, Status, Verdict
     from armgap.log import Finding, Log
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
@@ -25,15 +27,21 @@ __all__ = [
     "Arm",
     "ArmFit",
     "ArmgapError",
+    "CheckName",
     "Corrected",
     "CustomEffect",
     "Diagnosis",
     "Estimator",
+    "Filters",
     "Finding",
     "Identification",
     "Inspection",
     "Log",
     "Reproduction",
+    "Scheme",
+    "Severity",
+    "Status",
+    "Verdict",
     "__version__",
     "correct",
     "diagnose",
@@ -49,6 +57,12 @@ __all__ = [
 _HOMES = {
     "Arm": "armgap.arm",
     "ArmgapError": "armgap.errors",
+    "CheckName": "armgap.check",
+    "Severity": "armgap.check",
+    "Filters": "armgap.literals",
+    "Scheme": "armgap.literals",
+    "Status": "armgap.literals",
+    "Verdict": "armgap.literals",
     "Corrected": "armgap.export",
     "correct": "armgap.export",
     "Diagnosis": "armgap.diagnosis",

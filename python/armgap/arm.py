@@ -133,6 +133,18 @@ class Arm:
             return None
         return (2 * np.pi if self.rotary else 1.0) / self.counts_per_rev
 
+    def _repr_html_(self) -> str:
+        """Return kind, conventions and parameters as HTML for a notebook."""
+        from armgap.report.shown import arm_facts
+
+        return arm_facts(self).html()
+
+    def _repr_markdown_(self) -> str:
+        """Return kind, conventions and parameters as Markdown."""
+        from armgap.report.shown import arm_facts
+
+        return arm_facts(self).markdown()
+
     def to_native(self) -> dict[str, Any]:
         """Return the arm as the compiled core takes it."""
 

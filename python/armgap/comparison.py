@@ -10,6 +10,7 @@ from typing import Any
 
 from armgap.diagnosis import Cause, Diagnosis, RuledOut, Value
 from armgap.errors import OptionError
+from armgap.literals import CauseStatus, GapOutcome, Verdict
 
 __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare", "read_diagnosis"]
 
@@ -62,7 +63,7 @@ class CauseChange:
 
     effect: str
     joint: int | None
-    status: str
+    status: CauseStatus
     before: dict[str, Value] | None
     after: dict[str, Value] | None
     why: str
@@ -115,11 +116,13 @@ class Comparison:
         Prediction horizon of both [s].
     names : tuple of str
         What the two diagnoses are called.
+    kind : str
+        Kind of the arm.
     """
 
-    outcome: str
-    verdict_before: str
-    verdict_after: str
+    outcome: GapOutcome
+    verdict_before: Verdict
+    verdict_after: Verdict
     gap: tuple[GapChange, ...]
     causes: tuple[CauseChange, ...]
     parameters: tuple[ParameterChange, ...]
@@ -127,6 +130,7 @@ class Comparison:
     unit: str
     horizon_s: float
     names: tuple[str, str]
+    kind: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object, schema ``armgap.comparison/1``."""
@@ -191,6 +195,7 @@ def compare(before: Diagnosis, after: Diagnosis, names: tuple[str, str] = ("befo
         str(before.to_dict()["gap"].get("unit", "rad")),
         before.gap.horizon_s,
         names,
+        str((before.to_dict().get("arm") or {}).get("kind", "")),
     )
 
 
@@ -222,7 +227,7 @@ def _above(diagnosis: Diagnosis, values: tuple[float, ...]) -> list[float]:
     return [max(v - f, 0.0) for v, f in zip(values, diagnosis.gap.floor, strict=True)]
 
 
-def _outcome(factor: float | None, after: Diagnosis) -> str:
+def _outcome(factor: float | None, after: Diagnosis) -> GapOutcome:
     if factor is None:
         return "none" if after.verdict == "none" else "larger"
     if factor < SMALLER:
@@ -260,7 +265,9 @@ def _placed(diagnosis: Diagnosis) -> dict[_Key, Cause]:
     return found
 
 
-def _vanished(place: tuple[str, int | None], after: Diagnosis, alike: tuple[str, int | None] | None) -> tuple[str, str]:
+def _vanished(
+    place: tuple[str, int | None], after: Diagnosis, alike: tuple[str, int | None] | None
+) -> tuple[CauseStatus, str]:
     """Status of a cause that the later diagnosis does not name."""
     if alike is not None:
         return "renamed", f"{alike[0]} is named instead, which motion does not tell from it"
@@ -289,7 +296,7 @@ def _earlier(found: RuledOut | None) -> str:
     return f"{found.status} before"
 
 
-def _resized(before: dict[str, Value], after: dict[str, Value]) -> tuple[str, str]:
+def _resized(before: dict[str, Value], after: dict[str, Value]) -> tuple[CauseStatus, str]:
     """Status of a cause that both name, by its first parameter that has changed."""
     for name in before:
         change = _change(name, before[name], after[name]) if name in after else None

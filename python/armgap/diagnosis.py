@@ -20,9 +20,11 @@ from armgap.check.time_shift import causal
 from armgap.custom_effect import CustomEffect, TorqueTables
 from armgap.errors import LogShapeError, OptionError
 from armgap.evidence import laws, plausibility
+from armgap.literals import Status, Verdict
 from armgap.log import Log, gather
 from armgap.log.findings import remarks
 from armgap.log.stretches import choose
+from armgap.log.units import si
 from armgap.progress import ProgressCallback, report_progress, use_callback
 from armgap.report.notebook import NotebookDisplay
 
@@ -144,7 +146,7 @@ class RuledOut:
 
     effect: str
     joint: int | None
-    status: str
+    status: Status
     bound: Bound | None
     why: str | None
 
@@ -158,7 +160,7 @@ class Diagnosis(NotebookDisplay):
 
     Attributes
     ----------
-    verdict : str
+    verdict : {"none", "parameters", "effect", "unexplained", "input"}
         ``"none"``: the gap is within noise; ``"parameters"``: right structure, wrong values; ``"effect"``: causes
         named; ``"unexplained"``: a gap that no effect in the library explains; ``"input"``: logs and arm file contradict each other.
     gap : Gap
@@ -177,7 +179,7 @@ class Diagnosis(NotebookDisplay):
         What a report draws besides: curves, ranking, options.
     """
 
-    verdict: str
+    verdict: Verdict
     gap: Gap
     where: tuple[Location, ...]
     causes: tuple[Cause, ...]
@@ -439,12 +441,32 @@ def _diagnose(given: _Input, options: dict[str, Any], effects: Sequence[CustomEf
     count = len(training)
     data["laws"] = laws(known, arm, corrected_logs[:count], corrected_logs[count:])
     data["plausibility"] = plausibility(known, arm)
+    data["input"] = _input(arm, training, held)
     data["log_findings"] = [
         {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
         for log in (*training, *held)
         for f in log.findings
     ]
     return Diagnosis.from_dict(data)
+
+
+def _input(arm: Arm, training: list[Log], held: list[Log]) -> dict[str, Any]:
+    """Which columns of which files were used, in which units; stretches of one log are one entry."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for use, logs in (("training", training), ("holdout", held)):
+        for log in logs:
+            name = _STRETCH.sub("", log.name)
+            file = None if log.path is None else str(log.path)
+            entry = {
+                "name": name,
+                "file": file,
+                "set": use,
+                "rows": 0,
+                "columns": dict(log.columns),
+                "units": dict(log.units),
+            }
+            found.setdefault((use, name), entry)["rows"] += len(log)
+    return {"logs": list(found.values()), "units": si(arm.rotary)}
 
 
 def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> list[Check]:

@@ -10,11 +10,11 @@ import click
 
 from armgap.cli.common import check_outputs, console, interruptible, json_option, quiet_option, write
 from armgap.cli.progress import working
+from armgap.literals import SCHEMES
 from armgap.progress import report_progress
 
 __all__ = ["command", "measure"]
 
-SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
 FIELDS = ("typical_ns", "median_ns", "p99_ns", "p9999_ns", "max_ns")
 SCHEMA = "armgap.bench/1"
 

@@ -23,23 +23,23 @@ from armgap.cli.common import (
     write,
 )
 from armgap.cli.progress import working
+from armgap.literals import FILTERS, SCHEMES
 from armgap.progress import part_callback, use_callback
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
     from armgap.identification import Identification
+    from armgap.literals import Scheme
     from armgap.log import Log
 
 __all__ = ["command"]
-
-SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
 
 
 @click.command("identify")
 @click.argument("logs", nargs=-1, required=True, metavar="LOG…")
 @arm_option
 @click.option("--scheme", type=click.Choice([*SCHEMES, "all"]), default="all", show_default=True)
-@click.option("--filters", type=click.Choice(["paper", "exact"]), default="exact", show_default=True)
+@click.option("--filters", type=click.Choice(FILTERS), default="exact", show_default=True)
 @click.option("--cutoff", default=50.0, show_default=True, help="Filter cut-off [rad/s].")
 @click.option(
     "--velocity",
@@ -76,7 +76,7 @@ def command(
 
     check_outputs(json_file)
     arm = read_arm(arm_file, corrections)
-    schemes = SCHEMES if scheme == "all" else (scheme,)
+    schemes = [s for s in SCHEMES if scheme in (s, "all")]
     with working("reading", quiet=quiet):
         read = gather(logs, arm, columns=parse_columns(columns), units=parse_units(units))
         settings: dict[str, Any] = {"filters": filters, "cutoff": cutoff, "velocity": velocity, "asymmetry": asymmetry}
@@ -107,7 +107,7 @@ def command(
 
 
 def _identified(
-    logs: Sequence[Log], arm: Arm, schemes: Sequence[str], settings: dict[str, Any]
+    logs: Sequence[Log], arm: Arm, schemes: Sequence[Scheme], settings: dict[str, Any]
 ) -> list[Identification]:
     """Every scheme on every log."""
     from armgap.identification import identify

@@ -45,6 +45,8 @@ class Inspection:
         The log itself.
     rotary : bool, optional
         Whether the joints turn; None without an arm.
+    kind : str
+        Kind of the arm; empty without one.
     checks : tuple of Check
         What was noticed about the log by itself and against the arm file.
     """
@@ -57,6 +59,7 @@ class Inspection:
     findings: tuple[Finding, ...]
     source: Log = field(repr=False, compare=False)
     rotary: bool | None = None
+    kind: str = ""
     checks: tuple[Check, ...] = ()
 
     @property
@@ -140,6 +143,7 @@ def inspect(log: Any, arm: Arm | None = None, *, repair: bool = True) -> Inspect
         findings=log.findings,
         source=log,
         rotary=None if arm is None else arm.rotary,
+        kind="" if arm is None else arm.kind,
         checks=checks,
     )
 

@@ -54,6 +54,8 @@ class Log:
         Name of the log that it is a part of.
     first_row : int
         Row of that log, from 0, that it begins with.
+    units : mapping
+        Unit that each of these columns had in the file, by standard name; the arrays are in SI units.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Log:
     moment: NDArray[np.float64] | None = None
     part_of: str | None = None
     first_row: int = 0
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def read(
@@ -185,19 +188,24 @@ class Log:
         names, said = columns.resolve(recording, place, mapping or {}, arm)
         scales = units.stated(names, declared or {}, arm, place)
         raw = columns.extract(recording, place, names)
+        ticks = clocks.ticks(raw, scales, names, arm, place)
         arrays, timed = clocks.in_seconds(raw, scales, names, arm, place)
         arrays = units.scaled(arrays, scales)
         checks.order(arrays, place, names)
         arrays, cleaned = checks.without_repeats(arrays)
         checks.motion(arrays, place, names)
+        declared_only = arrays
         arrays, converted = units.recognised(arrays, names, arm, scales.settled)
+        there = units.in_file(
+            names, scales, ticks, arm, degrees=(arrays.q is not declared_only.q, arrays.dq is not declared_only.dq)
+        )
         units.check(arrays, place, names, arm, scales.settled)
         noticed = [
             *recording.findings, *said, *scales.findings, *timed, *cleaned, *converted,
             *checks.notice(arrays, names, arm), *checks.unused(recording, names),
         ]  # fmt: skip
         arrays.t.__isub__(arrays.t[0])
-        log = cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key)
+        log = cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key, units=there)
         return log if arm is None or arm.corrections is None else arm.corrections.on_log(log)
 
     def __post_init__(self) -> None:
@@ -234,6 +242,18 @@ class Log:
         """Name of the whole log, also of a part of it."""
         return self.part_of or self.name
 
+    def _repr_html_(self) -> str:
+        """Return length, rate and columns as HTML for a notebook."""
+        from armgap.report.shown import log_facts
+
+        return log_facts(self).html()
+
+    def _repr_markdown_(self) -> str:
+        """Return length, rate and columns as Markdown."""
+        from armgap.report.shown import log_facts
+
+        return log_facts(self).markdown()
+
     def part(self, first: int, last: int, name: str, *, findings: tuple[Finding, ...] | None = None) -> Log:
         """Return the samples `first` up to, not including, `last` as a log of its own, with the times of this one.
 
@@ -244,7 +264,7 @@ class Log:
         found = self.findings if findings is None else findings
         part = Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
         moment = None if self.moment is None else self.moment[rows]
-        return replace(part, moment=moment, part_of=self.recording, first_row=self.first_row + first)
+        return replace(part, units=self.units, moment=moment, part_of=self.recording, first_row=self.first_row + first)
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
         """Return the log with other findings."""

@@ -19,7 +19,7 @@ from armgap.log.turns import TURN, unwrapped
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["FACTORS", "Scales", "check", "recognised", "scaled", "stated"]
+__all__ = ["FACTORS", "Scales", "check", "in_file", "recognised", "scaled", "si", "stated"]
 
 _DEGREE = math.pi / 180
 
@@ -189,6 +189,47 @@ def _degrees(arrays: Arrays, names: Names, arm: Arm | None) -> str:
         elif ratio > 0 and names.dq is not None:
             reasons.append(f"`{name}` moves {ratio:.3g} times faster than `{names.dq[j]}` says")
     return reasons[0] if reasons else ""
+
+
+def si(rotary: bool | None) -> dict[str, str]:
+    """Return the SI unit of each group of columns; both kinds where it is not known whether the joints turn."""
+    turns = {"t": "s", "q": "rad", "dq": "rad/s", "tau": "N m"}
+    slides = {"t": "s", "q": "m", "dq": "m/s", "tau": "N"}
+    if rotary is None:
+        return {group: unit if unit == slides[group] else f"{unit} or {slides[group]}" for group, unit in turns.items()}
+    return turns if rotary else slides
+
+
+def in_file(
+    names: Names, scales: Scales, ticks: Mapping[str, float], arm: Arm | None, *, degrees: tuple[bool, bool]
+) -> dict[str, str]:
+    """Return the unit that each column had in the file, by standard name.
+
+    Parameters
+    ----------
+    names, scales
+        Columns, and their factors to SI as far as they were declared or stated.
+    ticks : mapping
+        Seconds per unit of the time columns.
+    arm : Arm, optional
+        Says whether joints turn.
+    degrees : tuple of bool
+        Whether positions and velocities were recognised as degrees.
+    """
+    found: dict[str, str] = {}
+    q, dq = (_DEGREE if recognised else 1.0 for recognised in degrees)
+    groups = {"q": scales.q * q, "tau": scales.tau, "dq": np.empty(0) if scales.dq is None else scales.dq * dq}
+    for key, column in names.pairs:
+        group = key.rstrip("0123456789")
+        factor = ticks[key] if key in ticks else float(groups[group][int(key[len(group) :]) - 1])
+        found[key] = _named(group.partition("_")[0], factor, names.units.get(column), arm)
+    return found
+
+
+def _named(group: str, factor: float, spelt: str | None, arm: Arm | None) -> str:
+    """Return the unit of a group with this factor: as the file spells it, or those that suit the arm."""
+    fits = [unit for unit, f in FACTORS[group].items() if math.isclose(f, factor) and _suits(group, unit, arm)]
+    return spelt if spelt in fits else " or ".join(fits)
 
 
 def check(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None, declared: frozenset[str]) -> None:

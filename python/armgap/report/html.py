@@ -17,7 +17,14 @@ def page_of(document: Document) -> str:
     """Return a report as one HTML page that loads nothing from elsewhere."""
     from armgap.report import page
 
-    return page.render(document.title, document.lead, document.answers, document.sections)
+    return page.render(
+        document.title,
+        document.lead,
+        document.answers,
+        document.sections,
+        brief=document.brief,
+        before=document.before,
+    )
 
 
 def render_html(diagnosis: Diagnosis | dict[str, Any]) -> str:

@@ -67,17 +67,33 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Tile:
-    """One field of a map: its text, its depth from 0 to 1, what it stands for, and whether it is outlined."""
+    """One field of a map.
+
+    Attributes
+    ----------
+    text : str
+        Its value.
+    depth : float
+        How dark it is, from 0 to 1.
+    tip : str
+        What it stands for.
+    marked : bool
+        Whether it is outlined.
+    low, high : str
+        The limits of its range, in the unit of its row; empty where it has none.
+    """
 
     text: str
     depth: float
     tip: str = ""
     marked: bool = False
+    low: str = ""
+    high: str = ""
 
 
 @dataclass(frozen=True)
 class HeatMap:
-    """A map in rows of tiles."""
+    """A map in rows of tiles, each row with its label."""
 
     caption: str
     rows: Sequence[tuple[str, Sequence[Tile]]]
@@ -103,6 +119,12 @@ class Section:
         Paragraphs after the pictures.
     columns : int
         Charts side by side where the page is wide.
+    sketch : str
+        A drawing of the program's own as an SVG element; never a string of the input.
+    points : sequence of str
+        A list, beside the drawing where there is one.
+    name : str
+        What a link calls the section, such as ``"conventions"`` in ``#conventions``; by default its number.
     """
 
     title: str
@@ -112,6 +134,9 @@ class Section:
     tables: Sequence[Table | tuple[Sequence[str], Sequence[Sequence[Cell]]]] = ()
     notes: Sequence[str] = ()
     columns: int = 1
+    sketch: str = ""
+    points: Sequence[str] = ()
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -121,9 +146,18 @@ class _Part:
     section: Section
     charts: Sequence[tuple[str, str]]
     tables: Sequence[Table]
+    anchor: str = ""
 
 
-def render(title: str, lead: str, answers: Sequence[SummaryAnswer], sections: Sequence[Section]) -> str:
+def render(
+    title: str,
+    lead: str,
+    answers: Sequence[SummaryAnswer],
+    sections: Sequence[Section],
+    *,
+    brief: str = "",
+    before: Section | None = None,
+) -> str:
     """Return a page as HTML.
 
     Parameters
@@ -134,15 +168,21 @@ def render(title: str, lead: str, answers: Sequence[SummaryAnswer], sections: Se
         The first screen.
     sections : sequence of Section
         What follows; the first one's pictures belong to the first screen.
+    brief : str
+        The arm's conventions in one line, with a link to the section named ``conventions``.
+    before : Section, optional
+        What stands before the answers, without charts.
     """
     drawings = [[_drawing(f) for f in section.figures] for section in sections]
     script, library, divs = _embedded([d.chart for several in drawings for d in several])
     remaining = iter(divs)
     parts = [
-        _Part(s, [(d.caption, next(remaining)) for d in several], [_table(t) for t in s.tables])
-        for s, several in zip(sections, drawings, strict=True)
+        _Part(s, [(d.caption, next(remaining)) for d in several], [_table(t) for t in s.tables], s.name or f"part-{i}")
+        for i, (s, several) in enumerate(zip(sections, drawings, strict=True), start=1)
     ]
-    return str(_template().render(title=title, lead=lead, answers=answers, parts=parts, script=script, library=library))
+    head = None if before is None else _Part(before, (), [_table(t) for t in before.tables], before.name or "before")
+    page = {"title": title, "lead": lead, "brief": brief, "answers": answers, "parts": parts, "head": head}
+    return str(_template().render(**page, script=script, library=library))
 
 
 def _drawing(figure: Any) -> Drawing:

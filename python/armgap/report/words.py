@@ -52,6 +52,7 @@ _VERDICTS = {
     "parameters": "The model has the right form but the wrong values.",
     "effect": "The arm does something that its model leaves out.",
     "unexplained": "There is a gap, and no effect in the library explains it.",
+    "input": "Logs and arm file contradict each other.",
 }
 _NO_CAUSE = {
     "none": ("No cause", "Nothing is left to explain."),
@@ -60,6 +61,7 @@ _NO_CAUSE = {
         "None that the library knows",
         "Every known effect was tried and none explains the gap; naming one would mislead.",
     ),
+    "input": ("None is named", "While the input contradicts itself, any effect would only imitate the contradiction."),
 }
 _ARROW = "\N{NO-BREAK SPACE}→\N{NO-BREAK SPACE}"
 _FRICTION = {"viscous": "viscous friction", "coulomb": "Coulomb friction"}
@@ -217,18 +219,49 @@ def doubtful(data: Data) -> bool:
 
 def verdict(data: Data) -> str:
     """The verdict as a sentence."""
+    if data["verdict"] == "input":
+        return _contradiction(data)
     if doubtful(data):
         return "The arm does something that its model leaves out, and part of the gap stays unexplained."
     return _VERDICTS.get(data["verdict"], str(data["verdict"]))
 
 
+def _contradiction(data: Data) -> str:
+    """What contradicts what, and the remedy."""
+    found = _errors(data)
+    if not found:
+        return _VERDICTS["input"]
+    remedies = dict.fromkeys(text for c in found if (text := c.get("remedy")))
+    remedy = f" Remedy: {'; '.join(remedies)}" if remedies else ""
+    return f"{_VERDICTS['input'].rstrip('.')}: {', '.join(dict.fromkeys(map(_check_text, found)))}.{remedy}"
+
+
+def _errors(data: Data) -> list[Data]:
+    return [c for c in data.get("checks") or [] if c["severity"] == "error"]
+
+
+def _check_text(check: Data) -> str:
+    """Name and place of a check."""
+    name = check["check"].replace("_", " ")
+    return name if check.get("joint") is None else f"{name} of joint {check['joint']}"
+
+
 def answers(data: Data) -> list[SummaryAnswer]:
     """The three questions with their answers."""
+    first = SummaryAnswer("Where is the gap?", *_where(data))
+    if data["verdict"] == "input":
+        first = SummaryAnswer("What contradicts what?", *_contradicts(data))
     return [
-        SummaryAnswer("Where is the gap?", *_where(data)),
+        first,
         SummaryAnswer("Which effect causes it?", *_which(data)),
         SummaryAnswer("How far does it shrink?", *_how_far(data)),
     ]
+
+
+def _contradicts(data: Data) -> tuple[str, str]:
+    found = _errors(data)
+    headline = ", ".join(dict.fromkeys(map(_check_text, found))) or "See the checks of the input"
+    return _capital(headline), " ".join(_capital(f"{c['message'].rstrip('.')}.") for c in found)
 
 
 def _where(data: Data) -> tuple[str, str]:
@@ -237,13 +270,14 @@ def _where(data: Data) -> tuple[str, str]:
         return "No part of the motion stands out", ""
     first = places[0]
     ranged = bool(first.get("range"))
-    headline = f"Joint {first['joint']}, {_regime(first)}"
+    limits = _limits(data, first)
+    headline = f"Joint {first['joint']}, {_regime(first)}" + (f": {limits}" if limits else "")
     load = "force" if data["gap"].get("unit") == "m" else "torque"
     text = f"{percent(first['share'])} of what is missing from the model acts on joint {first['joint']}"
     if len(data["gap"]["before"]) == 1:
         text = f"The {load} that is missing from the model acts throughout"
     if ranged:
-        text += f", most of it {_inside(first)}"
+        text += f", and is largest {_inside(first)}"
     others = [f"{percent(p['share'])} on joint {p['joint']}" for p in places[1:] if p["share"] >= MINOR_JOINT]
     text += f"; {', '.join(others)}." if others else "."
     return headline, text if data[
@@ -259,14 +293,27 @@ def _regime(place: Data) -> str:
 
 
 def _inside(place: Data) -> str:
-    """The regime of a place in figures."""
+    """The regime of a place as its detail follows."""
     span = place["range"]
     if span["variable"].startswith("reversal"):
         return str(place["detail"])
-    unit = str(place["detail"]).rpartition(f"{span['to']:.3f}")[2].strip()
     name = variable_text(span["variable"])
-    what = "t" if name == "time" else f"its {name}"
-    return f"where {what} is {figure(span['from'])} to {figure(span['to'])} {unit}".strip()
+    return f"in that {'stretch' if name == 'time' else 'range'} of {name}"
+
+
+def _limits(data: Data, place: Data) -> str:
+    """The range of a place beside all that the joint went through: ``0.02 to 0.53 of at most 4.1 rad/s``."""
+    span = place.get("range")
+    if not span or span["variable"].startswith("reversal"):
+        return ""
+    text = f"{figure(span['from'], 2)} to {figure(span['to'], 2)}"
+    for r in data.get("regimes") or []:
+        if (r["joint"], r["variable"]) == (place["joint"], span["variable"]):
+            low, high = figure(r["edges"][0], 2), figure(r["edges"][-1], 2)
+            whole = f"at most {high}" if r["variable"].startswith("abs(") else f"{low} to {high}"
+            return f"{text} of {whole} {unit_text(r['unit'])}".strip()
+    unit = str(place["detail"]).rpartition(f"{span['to']:.3f}")[2].strip()
+    return f"{text} {unit}".strip()
 
 
 def symbol_text(variable: str) -> str:
@@ -329,7 +376,9 @@ def _capital(text: str) -> str:
 def _how_far(data: Data) -> tuple[str, str]:
     gap = data["gap"]
     unit = gap.get("unit", "rad")
-    if data["verdict"] == "none":
+    if data["verdict"] == "input":
+        headline, errors = "With the remedy applied", each_joint(gap["before"], gap["refit"], unit=unit)
+    elif data["verdict"] == "none":
         headline, errors = "Nothing to shrink", each_joint(gap["after"], unit=unit)
     elif data["verdict"] == "unexplained":
         headline, errors = "It stays", each_joint(gap["after"], unit=unit)
@@ -339,7 +388,7 @@ def _how_far(data: Data) -> tuple[str, str]:
         f"{errors}: RMS error of predictions over {gap['horizon_s']:g} s on held-out motion. Re-estimating the arm file's own values alone "
         f"leaves {millis(gap['refit'], unit)}, sensor noise {millis(gap['floor'], unit)}."
     )
-    if data["verdict"] != "none":
+    if data["verdict"] not in ("none", "input"):
         low, high = gap["closed_ci"]
         detail += f" 95\N{NO-BREAK SPACE}% interval of the share closed: {percent(low)} to {percent(high)}."
     return headline, detail

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from armgap.identification import SCHEMES, Identification
+from armgap.identification import Identification
+from armgap.literals import SCHEMES, Scheme
 from armgap.report import Document, charts
 from armgap.report.html import page_of
 from armgap.report.page import Drawing, Section
@@ -104,7 +105,7 @@ def _responses(r: Reproduction, title: str, label: str) -> Section:
     return Section(title, text=[_distance(r, label)], figures=_response(r, label), columns=2)
 
 
-def _estimate_section(r: Reproduction, title: str, scheme: str) -> Section:
+def _estimate_section(r: Reproduction, title: str, scheme: Scheme) -> Section:
     return Section(title, figures=_estimates(r, [("estimate", r.steps[scheme][0], charts.AFTER)]), columns=3)
 
 
