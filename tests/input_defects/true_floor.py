@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 
+from armgap.trial.actuator import Encoder
 from armgap.trial.arms import TrialArm, random_arm
 from armgap.trial.case import simulated_arm_of
-from armgap.trial.actuator import Encoder
 from armgap.trial.plant import Plant
 from armgap.trial.simulated_arm import SimulatedArm
 
