@@ -50,7 +50,7 @@ class Corrections:
     flip : tuple of str
         Columns that count the other way: ``"q1"``, ``"tau2"``.
     zero : mapping of str to float
-        What a position column reads where the model's joint is at zero [rad or m].
+        Where the zero of a position column lies in the model's position [rad or m]; it is added to the column.
     swap : tuple of (str, str)
         Columns that stand for each other: ``("q1", "q2")``.
     absolute : tuple of str
@@ -224,7 +224,7 @@ class Corrections:
             for values in _of(columns, _TOGETHER[kind]):
                 values[:, j] *= -1.0
         for column, value in self.zero.items():
-            columns["q"][:, _split(column)[1]] -= value
+            columns["q"][:, _split(column)[1]] += value
         for names, sign in ((self.absolute, -1.0), (self.relative, 1.0)):
             for column in names:
                 _, j = _split(column)

@@ -59,7 +59,7 @@ report_option = click.option(
 )
 _CORRECTIONS = {
     "flip": ("tau1,…", "Columns that count the other way than the arm file means."),
-    "zero": ("q1=180deg", "What a position column reads where the model's joint is at zero."),
+    "zero": ("q1=180deg", "Where the zero of a position column lies in the model's angle; it is added."),
     "swap": ("q1,q2", "Two columns that stand for each other."),
     "absolute": ("q2", "Position columns that count from the world, not from the link before."),
     "relative": ("q2", "Position columns that count from the link before, not from the world."),
