@@ -12,15 +12,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from armgap import _native
+from armgap import _native, options
 from armgap.arm import Arm
 from armgap.errors import LogShapeError, OptionError
 from armgap.evidence import laws, plausibility
 from armgap.log import Log, gather
 from armgap.log.findings import remarks
 from armgap.log.stretches import choose
-from armgap.own import OwnEffect, Tables
+from armgap.own import OwnEffect, Tables, check_effects
 from armgap.progress import Told, following, tell
+from armgap.reading import printable
 from armgap.report.notebook import Shown
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
@@ -30,6 +31,10 @@ _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
 #: What a stretch of a log is called after the log's own name.
 _STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 _HELD_OUT = 0.4
+MOST_BYTES = 2**28
+"""Size of a diagnosis' file; the largest hold some MB."""
+MOST_CAUSES = 1000
+"""More than the library can name on any arm."""
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
 
@@ -330,10 +335,9 @@ def _diagnose(
 ) -> Diagnosis:
     """Check, read, split, choose; hand over to the core; and add what is known on this side."""
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
-    if not (np.isfinite(horizon) and horizon > 0):
-        raise OptionError(f"the horizon is {horizon}", remedy="give a positive number of seconds")
-    if max_causes < 0:
-        raise OptionError(f"the number of causes is {max_causes}", remedy="give 0 or more")
+    horizon, seed = options.positive(horizon, "horizon"), options.seed(seed)
+    max_causes = options.whole(max_causes, "number of causes", 0, MOST_CAUSES)
+    check_effects(effects)
     training = _logs(logs, arm)
     notes = []
     if holdout is None:
@@ -352,9 +356,9 @@ def _diagnose(
             )
     own = Tables.of(effects, training, held)
     joints = [e.joint - 1 for e in effects]
-    options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed), "own": joints}
+    settings = {"horizon": horizon, "max_causes": max_causes, "seed": seed, "own": joints}
     try:
-        text = _native.diagnose(arm.to_native(), _columns(training, own), _columns(held, own), options, tell)
+        text = _native.diagnose(arm.to_native(), _columns(training, own), _columns(held, own), settings, tell)
     except ValueError as error:
         raise _refused(str(error), training, held) from None
     data = own.named(json.loads(text))
@@ -414,7 +418,7 @@ def _tell_apart(training: list[Log], held: list[Log]) -> tuple[list[Log], list[L
 
 
 def _with_folder(log: Log, _: int) -> Log:
-    return log if log.path is None else replace(log, name=f"{log.path.resolve().parent.name}/{log.name}")
+    return log if log.path is None else replace(log, name=f"{printable(log.path.resolve().parent.name)}/{log.name}")
 
 
 def _with_number(log: Log, number: int) -> Log:

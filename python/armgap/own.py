@@ -123,6 +123,20 @@ class Tables:
         return rest, changed
 
 
+def check_effects(effects: Any) -> None:
+    """Raise if what was given are no effects of one's own.
+
+    Raises
+    ------
+    OptionError
+        It shows the first that is none.
+    """
+    for effect in (effects,) if isinstance(effects, str | OwnEffect) else effects:
+        if not isinstance(effect, OwnEffect) or effect is effects:
+            remedy = "give a list of armgap.OwnEffect; effects of the library are looked for by themselves"
+            raise OptionError(f"`effects` holds {effect!r}", remedy=remedy)
+
+
 def _check(effects: Sequence[OwnEffect], joints: int) -> None:
     if len(effects) > MOST:
         raise OptionError(f"{len(effects)} effects of your own were given", remedy=f"give at most {MOST} at once")

@@ -10,7 +10,6 @@ import click
 
 from armgap.cli.common import (
     arm_option,
-    check_outputs,
     columns_option,
     console,
     interruptible,
@@ -19,9 +18,10 @@ from armgap.cli.common import (
     parse_units,
     quiet_option,
     units_option,
-    write,
 )
+from armgap.cli.files import Command, InputFile
 from armgap.cli.progress import working
+from armgap.output import is_stdout, write
 from armgap.progress import following, of_many
 
 if TYPE_CHECKING:
@@ -34,8 +34,8 @@ __all__ = ["command"]
 SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
 
 
-@click.command("identify")
-@click.argument("logs", nargs=-1, required=True, metavar="LOG…")
+@click.command("identify", cls=Command)
+@click.argument("logs", nargs=-1, required=True, type=InputFile(), metavar="LOG…")
 @arm_option
 @click.option("--scheme", type=click.Choice([*SCHEMES, "all"]), default="all", show_default=True)
 @click.option("--filters", type=click.Choice(["paper", "exact"]), default="exact", show_default=True)
@@ -72,7 +72,6 @@ def command(
     from armgap.log import gather
     from armgap.log.findings import remarks
 
-    check_outputs(json_file)
     arm = Arm.read(Path(arm_file))
     schemes = SCHEMES if scheme == "all" else (scheme,)
     with working("reading", quiet=quiet):
@@ -81,7 +80,7 @@ def command(
         results = interruptible(lambda: _identified(read, arm, schemes, settings))
     if json_file is not None:
         write(json_file, json.dumps([r.to_dict() for r in results], indent=2))
-    if quiet or json_file == "-":
+    if quiet or is_stdout(json_file):
         return
     noticed = [{"log": log.name, "kind": f.kind, "message": f.message} for log in read for f in log.findings]
     for remark in remarks(noticed):

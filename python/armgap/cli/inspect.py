@@ -7,7 +7,6 @@ from pathlib import Path
 import click
 
 from armgap.cli.common import (
-    check_outputs,
     columns_option,
     console,
     interruptible,
@@ -16,17 +15,24 @@ from armgap.cli.common import (
     parse_units,
     quiet_option,
     units_option,
-    write,
 )
+from armgap.cli.files import Command, InputFile, OutputFile
 from armgap.cli.progress import working
+from armgap.output import is_stdout, write
 
 __all__ = ["command"]
 
 
-@click.command("inspect")
-@click.argument("logs", nargs=-1, required=True, metavar="LOG…")
-@click.option("--arm", "arm_file", metavar="ARM.toml", help="Arm file; tells what the log says about its parameters.")
-@click.option("--report", "report_file", metavar="OUT.html", help="Write a page with pictures.")
+@click.command("inspect", cls=Command)
+@click.argument("logs", nargs=-1, required=True, type=InputFile(), metavar="LOG…")
+@click.option(
+    "--arm",
+    "arm_file",
+    type=InputFile(),
+    metavar="ARM.toml",
+    help="Arm file; tells what the log says about its parameters.",
+)
+@click.option("--report", "report_file", type=OutputFile(), metavar="OUT.html", help="Write a page with pictures.")
 @json_option
 @columns_option
 @units_option
@@ -47,7 +53,6 @@ def command(
     from armgap.inspection import inspect
     from armgap.log import Log, paths
 
-    check_outputs(json_file, report_file)
     naming = {"columns": parse_columns(columns), "units": parse_units(units)}
     arm = Arm.read(Path(arm_file)) if arm_file is not None else None
     with working("reading", quiet=quiet):
@@ -59,7 +64,7 @@ def command(
     if json_file is not None:
         results = [f.to_dict() for f in found]
         write(json_file, json.dumps(results[0] if len(results) == 1 else results, indent=2, allow_nan=False))
-    if quiet or json_file == "-":
+    if quiet or is_stdout(json_file, report_file):
         return
     from armgap.inspection.terminal import tables
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import TypeVar
 
 import click
+
+from armgap.cli.files import InputFolder, OutputFolder
+from armgap.trial.layout import belongs
 
 __all__ = [
     "cases_option",
@@ -21,14 +23,14 @@ __all__ = [
 
 Item = TypeVar("Item")
 
-folder_argument = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path, exists=True, file_okay=False))
+folder_argument = click.argument("folder", metavar="DIR", type=InputFolder(belongs, exists=True))
 output_option = click.option(
     "-o",
     "--output",
     "folder",
     required=True,
     metavar="DIR",
-    type=click.Path(path_type=Path),
+    type=OutputFolder(belongs),
     help="Folder of the trial.",
 )
 cases_option = click.option(

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from armgap.cli.common import console, quiet_option
+from armgap.cli.files import Command, Words
 from armgap.trial.commands.common import folder_argument, progress, workers_option
 
 __all__ = ["answer_all", "limit_option", "peers", "run"]
@@ -23,7 +24,7 @@ limit_option = click.option(
 again_option = click.option("--again", is_flag=True, help="Answer anew what is answered already.")
 
 
-@click.command("run")
+@click.command("run", cls=Command)
 @folder_argument
 @workers_option
 @limit_option
@@ -34,9 +35,15 @@ def run(folder: Path, workers: int, limit_s: float, again: bool, quiet: bool) ->
     answer_all(folder, ["armgap"], workers, limit_s, again, quiet)
 
 
-@click.command("peers")
+@click.command("peers", cls=Command)
 @folder_argument
-@click.option("--only", multiple=True, metavar="NAME", help="Only this method; may be repeated. All peers by default.")
+@click.option(
+    "--only",
+    multiple=True,
+    type=Words(),
+    metavar="NAME",
+    help="Only this method; may be repeated. All peers by default.",
+)
 @workers_option
 @limit_option
 @again_option
