@@ -8,6 +8,7 @@ extended attributes of the file it replaces. Symbolic links stay and are followe
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import shutil
 import stat
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from armgap.errors import ResultError
+from armgap.reading import is_text
 
 __all__ = ["STANDARD_STREAM", "Content", "check_writable", "descriptor", "is_stdout", "write", "write_folder"]
 
@@ -26,6 +28,8 @@ STANDARD_STREAM = "-"
 Content: TypeAlias = str | bytes | Callable[[Path], Any]
 _PLACE = "choose another place"
 _STDOUT, _STDERR = 1, 2
+_OS_ERROR = re.compile(r"\(os error ([0-9]+)\)")
+"""How libraries written in Rust pass on what the system said."""
 _NEW_FILE = 0o666  # less the umask
 
 
@@ -188,11 +192,13 @@ def _replace(target: Path, content: Content) -> None:
     if old is not None:
         _check_replaceable(target, old)
         mode = stat.S_IMODE(old.st_mode)
+    if callable(content) and not is_text(target):
+        content = _bytes(content)  # libraries take names that are text only
     temporary = _beside(target)
     try:
         os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode))
         if callable(content):
-            content(temporary)
+            _fill(temporary, content)
         with open(temporary, "rb+" if callable(content) else "wb") as stream:
             if not callable(content):
                 stream.write(_bytes(content))
@@ -203,6 +209,18 @@ def _replace(target: Path, content: Content) -> None:
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _fill(file: Path, content: Callable[[Path], Any]) -> None:
+    """Let a function fill a file; what the system said to a library that has errors of its own is said by `OSError` again."""
+    try:
+        content(file)
+    except Exception as error:
+        said = _OS_ERROR.search(str(error))
+        if isinstance(error, OSError) or said is None:
+            raise
+        number = int(said[1])
+        raise OSError(number, os.strerror(number)) from error
 
 
 def _check_open(number: int, path: str | os.PathLike[str]) -> None:
@@ -248,7 +266,7 @@ def _bytes(content: Content) -> bytes:
     with tempfile.TemporaryDirectory(prefix="armgap-") as folder:
         file = Path(folder) / "result"
         file.touch()
-        content(file)
+        _fill(file, content)
         return file.read_bytes()
 
 

@@ -7,7 +7,16 @@ import os
 import sys
 from pathlib import Path
 
-__all__ = ["printable", "read_bounded"]
+__all__ = ["is_text", "printable", "read_bounded"]
+
+
+def is_text(path: str | os.PathLike[str]) -> bool:
+    """Whether a file's name is text, as it need not be."""
+    try:
+        os.fspath(path).encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def printable(name: str) -> str:

@@ -149,6 +149,8 @@ def simulate(
     OptionError
         If a shape, an effect or a value is impossible, or the motion diverges.
     """
+    seed = options.seed(seed)
+    _check_effects(effects)
     t = np.ascontiguousarray(t, dtype=np.float64)
     tau = np.ascontiguousarray(tau, dtype=np.float64)
     tau = np.ascontiguousarray(tau[:, None]) if tau.ndim == 1 else tau
@@ -161,8 +163,6 @@ def simulate(
         raise OptionError(f"the noise is {noise}", remedy="give its standard deviation, 0 or more")
     placed = [(e.name, e.joint, dict(e.parameters)) for e in effects]
     lengths = None if arm.link_length is None else arm.link_length.tolist()
-    seed = options.seed(seed)
-    _check_effects(effects)
     try:
         q, dq = _native.simulate(
             arm.kind, arm.gravity, lengths, arm.theta.tolist(), t, tau, start, speed, placed, tolerance, smoothing, tell
@@ -170,7 +170,8 @@ def simulate(
     except (ValueError, TypeError, OverflowError) as error:
         raise OptionError(str(error), remedy="see `armgap.effects()` and the arm file") from None
     if noise > 0:
-        q = q + noise * np.random.default_rng(seed).standard_normal(q.shape)
+        with np.errstate(over="ignore"):
+            q = q + noise * np.random.default_rng(seed).standard_normal(q.shape)
     if not np.isfinite(q).all():
         raise OptionError(f"positions under a noise of {noise} are not finite", remedy="give less noise")
     step = arm.encoder_step
@@ -184,6 +185,6 @@ def _check_effects(effects: Any) -> None:
     for effect in (effects,) if isinstance(effects, str | Effect) else effects:
         if not isinstance(effect, Effect) or effect is effects:
             remedy = (
-                "give a list of armgap.Effect, such as [armgap.Effect.parse('stribeck:1:amplitude=1,velocity=0.1')]"
+                "give a list of armgap.simulation.Effect, such as [Effect.parse('stribeck:1:amplitude=1,velocity=0.1')]"
             )
             raise OptionError(f"`effects` holds {effect!r}", remedy=remedy)

@@ -133,6 +133,8 @@ def _unreachable(error: OSError) -> NoReturn:
 def _fail(message: str) -> NoReturn:
     with suppress(OSError):
         click.echo(f"armgap: {message}", err=True)
-    with suppress(OSError):
+    try:
         sys.stdout.flush()
+    except OSError:
+        abandon_stdout()
     sys.exit(UNUSABLE_INPUT)

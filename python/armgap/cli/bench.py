@@ -10,6 +10,7 @@ import click
 
 from armgap.cli.common import console, interruptible, json_option, quiet_option
 from armgap.cli.files import Command
+from armgap.cli.numbers import Number
 from armgap.cli.progress import working
 from armgap.output import is_stdout, write
 from armgap.progress import tell
@@ -23,9 +24,7 @@ SCHEMA = "armgap.bench/1"
 
 @click.command("bench", cls=Command)
 @click.option("--samples", type=click.IntRange(1000, 100_000_000), default=1_000_000, show_default=True)
-@click.option(
-    "--period", type=click.FloatRange(1e-6, 10.0), default=0.0025, show_default=True, help="Sample period [s]."
-)
+@click.option("--period", type=Number(1e-6, 10.0), default=0.0025, show_default=True, help="Sample period [s].")
 @click.option("--all", "everything", is_flag=True, help="The form of the covariance that is not the default too.")
 @json_option
 @quiet_option

@@ -21,6 +21,7 @@ from armgap.cli.common import (
     units_option,
 )
 from armgap.cli.files import InputFile, InputFolder, OutputFile
+from armgap.cli.numbers import Seed
 from armgap.cli.progress import working
 from armgap.errors import OptionError
 from armgap.output import is_stdout, write
@@ -43,7 +44,7 @@ CASE_FOLDER = PACKAGE / "demo_case"
 @click.option("--arm", "arm_file", type=InputFile(), metavar="ARM.toml", help="Arm file, for logs of your own.")
 @click.option("--holdout", multiple=True, type=InputFile(), metavar="LOG…", help="Logs of your own to judge on.")
 @click.option("--case", "case_folder", type=InputFolder(), metavar="DIR", help="Folder of another sealed case.")
-@click.option("--fresh", type=click.IntRange(min=0), metavar="SEED", help="Make a new sealed case (needs MuJoCo).")
+@click.option("--fresh", type=Seed(), metavar="SEED", help="Make a new sealed case (needs MuJoCo).")
 @click.option(
     "--report",
     "report_file",

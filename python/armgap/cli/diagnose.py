@@ -19,8 +19,8 @@ from armgap.cli.common import (
     units_option,
 )
 from armgap.cli.files import InputFile
+from armgap.cli.numbers import Seed
 from armgap.cli.progress import working
-from armgap.options import LARGEST_SEED
 from armgap.output import is_stdout, write
 
 __all__ = ["command"]
@@ -38,8 +38,7 @@ __all__ = ["command"]
     "--seed",
     default=1,
     show_default=True,
-    type=click.IntRange(0, LARGEST_SEED),
-    metavar="INTEGER",
+    type=Seed(),
     help="Seed of the resampling.",
 )
 @report_option

@@ -18,9 +18,9 @@ from armgap.cli.common import (
     units_option,
 )
 from armgap.cli.files import Command, InputFile, OutputFile, Words
+from armgap.cli.numbers import Seed
 from armgap.cli.progress import working
 from armgap.errors import OptionError, ResultError
-from armgap.options import LARGEST_SEED
 from armgap.output import STANDARD_STREAM, is_stdout, write
 
 if TYPE_CHECKING:
@@ -60,8 +60,7 @@ SEED = "seed"
     "--seed",
     default=0,
     show_default=True,
-    type=click.IntRange(0, LARGEST_SEED),
-    metavar="INTEGER",
+    type=Seed(),
     help="Seed of the noise.",
 )
 @click.option(

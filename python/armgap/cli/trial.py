@@ -17,12 +17,14 @@ import click
 
 from armgap.cli.common import console, interruptible, json_option, quiet_option
 from armgap.cli.files import Group, InputFolder, OutputFolder
+from armgap.cli.numbers import Seed
 from armgap.cli.progress import working
 from armgap.errors import OptionError
+from armgap.options import positive
 from armgap.output import is_stdout, write
 from armgap.progress import following, tell
 from armgap.trial.commands import all_of_it, make, peers, run, score
-from armgap.trial.layout import belongs, case_folders_in
+from armgap.trial.layout import MOST_CASES, belongs, case_folders_in
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -33,8 +35,10 @@ __all__ = ["command"]
 
 
 @click.group("trial", cls=Group, invoke_without_command=True)
-@click.option("--cases", default=10, show_default=True, type=click.IntRange(min=1), help="Number of cases to make.")
-@click.option("--seed", type=click.IntRange(min=0), help="Seed of the cases; a fresh one by default.")
+@click.option(
+    "--cases", default=10, show_default=True, type=click.IntRange(1, MOST_CASES), help="Number of cases to make."
+)
+@click.option("--seed", type=Seed(), help="Seed of the cases; a fresh one by default.")
 @click.option("--duration", default=10.0, show_default=True, help="Length of each log [s].")
 @click.option("--horizon", default=0.25, show_default=True, help="Prediction horizon [s].")
 @click.option("--folder", type=OutputFolder(belongs), metavar="DIR", help="Keep the cases in a new folder.")
@@ -60,6 +64,9 @@ def command(
         _only(context)
         return
     _check(folder, make_only, made, duration)
+    horizon = positive(horizon, "horizon")
+    if made is None and horizon > duration:
+        raise OptionError(f"the horizon is {horizon:g} s", remedy=f"give less than the {duration:g} s of a log")
     say = console()
     say.quiet = quiet or is_stdout(json_file)
     with _cases(made, folder, lambda target: _make(target, cases, seed, duration, quiet)) as found:

@@ -56,6 +56,9 @@ def predicted(model: Hypothesis, log: Log, horizon: float) -> Array:
     OptionError
         If a window cannot be simulated.
     """
+    if not horizon >= log.sample_period:
+        remedy = f"give at least the sample period of {log.sample_period:g} s"
+        raise OptionError(f"the horizon is {horizon:g} s", remedy=remedy)
     q, t = np.ascontiguousarray(log.q), np.ascontiguousarray(log.t)
     dq = _native.velocity(t, q, "local-cubic", HALF_WIDTH)
     starts = np.searchsorted(t, np.arange(t[0], t[-1], horizon))

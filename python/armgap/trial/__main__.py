@@ -7,12 +7,13 @@ from pathlib import Path
 import click
 
 from armgap.cli.files import Command, OutputFolder
+from armgap.cli.numbers import Seed
 from armgap.errors import OptionError
 from armgap.trial.demo import DEMO_SEED, make_demo_case
 
 
 @click.command(cls=Command)
-@click.option("--seed", type=int, default=DEMO_SEED, show_default=True, help="Number that decides everything.")
+@click.option("--seed", type=Seed(), default=DEMO_SEED, show_default=True, help="Number that decides everything.")
 @click.option("-o", "--output", type=OutputFolder(), required=True, metavar="DIR", help="New folder to write.")
 def main(seed: int, output: Path) -> None:
     """Make a sealed demo case: one arm, one hidden effect, two logs."""

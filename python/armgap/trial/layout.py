@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["ANSWERS", "ARM_FILE", "MANIFEST", "belongs", "case_folders_in", "case_name"]
+__all__ = ["ANSWERS", "ARM_FILE", "MANIFEST", "MOST_CASES", "belongs", "case_folders_in", "case_name"]
 
 MANIFEST = "trial.json"
 ANSWERS = "answers"
 ARM_FILE = "arm.toml"
+MOST_CASES = 100_000
 _CASE = "case-"
 
 

@@ -9,16 +9,19 @@ import click
 
 from armgap.cli.common import console, quiet_option
 from armgap.cli.files import Command, Words
+from armgap.cli.numbers import Number
 from armgap.trial.commands.common import folder_argument, progress, workers_option
 
 __all__ = ["answer_all", "limit_option", "peers", "run"]
 
+LONGEST_S = 1e6
+"""Of one case: eleven days; a system's clocks do not wait for ever."""
 limit_option = click.option(
     "--limit",
     "limit_s",
     default=300.0,
     show_default=True,
-    type=click.FloatRange(min=1.0),
+    type=Number(1.0, LONGEST_S),
     help="Longest time for one case [s].",
 )
 again_option = click.option("--again", is_flag=True, help="Answer anew what is answered already.")
