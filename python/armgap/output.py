@@ -217,7 +217,7 @@ def _fill(file: Path, content: Callable[[Path], Any]) -> None:
         content(file)
     except Exception as error:
         said = _OS_ERROR.search(str(error))
-        if isinstance(error, OSError) or said is None:
+        if said is None or getattr(error, "errno", None) is not None:
             raise
         number = int(said[1])
         raise OSError(number, os.strerror(number)) from error

@@ -18,7 +18,6 @@ from armgap.cli.common import (
 from armgap.cli.files import Command, InputFile, OutputFile
 from armgap.cli.progress import working
 from armgap.errors import OptionError
-from armgap.output import write
 
 __all__ = ["command"]
 
@@ -73,6 +72,6 @@ def command(
     diagnosis = None if diagnosis_file is None else read_diagnosis(diagnosis_file)
     with working("predicting", quiet=quiet):
         curves = {name: predicted(model, log, horizon) for name, model in models(arm, diagnosis).items()}
-    write(output, lambda path: write_replay(curves, log, arm, path))
+    write_replay(curves, log, arm, output)
     if not quiet:
         console().print(f"recording: {output} (open it with: rerun {output})", highlight=False, markup=False)
