@@ -12,11 +12,12 @@ import numpy as np
 import polars as pl
 from numpy.typing import ArrayLike, NDArray
 
-from armgap.errors import OptionError, ResultError
+from armgap.errors import OptionError
 from armgap.log import checks, clocks, columns, frames, units
 from armgap.log.findings import Finding
 from armgap.log.formats import record
 from armgap.log.recording import Recording
+from armgap.output import write
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
@@ -279,16 +280,6 @@ class Log:
         return pl.DataFrame(data)
 
     def write(self, path: str | Path) -> None:
-        """Write the log as Parquet, or as CSV if the name ends in ``.csv``; nothing is left behind if that fails."""
-        path = Path(path)
-        temporary = path.with_name(path.name + ".partial")
-        try:
-            if path.suffix.lower() == ".csv":
-                self.to_polars().write_csv(temporary)
-            else:
-                self.to_polars().write_parquet(temporary)
-            temporary.replace(path)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            reason = error.strerror or str(error)
-            raise ResultError(f"cannot be written ({reason})", remedy="choose another place", file=path) from None
+        """Write the log as Parquet, or as CSV if the name ends in ``.csv``; see `armgap.output.write`."""
+        frame = self.to_polars()
+        write(path, frame.write_csv if Path(path).suffix.lower() == ".csv" else frame.write_parquet)
