@@ -23,7 +23,7 @@ import click
 import pytest
 
 import armgap
-from armgap import Log, OwnEffect, diagnose, simulate
+from armgap import CustomEffect, Log, diagnose, simulate
 from armgap.cli import COMMANDS, cli
 from armgap.cli.files import Command, Group, InputFile, InputFolder, OutputFile, OutputFolder, Words
 from armgap.errors import OptionError, ResultError
@@ -609,10 +609,10 @@ def test_impossible_options_in_python(options, arm, seed_log):
 
 
 def test_effects_of_the_other_function(arm, seed_log):
-    own = OwnEffect("drag", 1, lambda t, q, dq, tau: dq[:, 0])
+    own = CustomEffect("drag", 1, lambda t, q, dq, tau: dq[:, 0])
     with pytest.raises(OptionError, match="Effect"):
         simulate(arm, seed_log.t, seed_log.tau, effects=[own])  # type: ignore[list-item]
-    with pytest.raises(OptionError, match="OwnEffect"):
+    with pytest.raises(OptionError, match="CustomEffect"):
         diagnose(seed_log, arm, effects=[Effect("stribeck", 1)])  # type: ignore[list-item]
     with pytest.raises(OptionError):
         simulate(arm, seed_log.t, seed_log.tau, effects=[Effect("torque_offset", -1, {"offset": 1.0})])

@@ -20,6 +20,8 @@ __all__ = ["Examined", "examine"]
 
 # Readings whose mean log share of unexplained torque differs by less are told apart by predictions.
 _CLOSE = 1.0
+# Rows of the equation of motion that a comparison needs.
+_FEWEST_ROWS = 100
 # Columns do not belong together if this share of a joint's torque stays unexplained. Effects of the library leave less than a tenth on
 # simulated logs, and less than a quarter on logs of a real arm.
 _UNRELATED = 0.5
@@ -90,6 +92,8 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
     """Look for another reading of the columns: a factor on torques, or anything that `contradiction.READINGS` offers."""
     logs = [*now.training, *now.holdout]
     base = EquationError([Rows.of(log, now.arm) for log in logs], now.arm)
+    if len(base) < _FEWEST_ROWS:
+        return now
     stands, suspects = screen(base, logs, now.arm)
     factors = torque_unit.find(base, now.arm)
     if factors is not None and _prefers(factors, suspects, base, now, horizon):

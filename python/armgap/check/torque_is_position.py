@@ -33,6 +33,8 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
     """Return the torque columns that are commanded positions."""
     rows = [Rows.of(log, arm) for log in logs]
     base = EquationError(rows, arm)
+    if not len(base):
+        return []
     torque = base.fit(*bounds(arm)).share * base.scale / np.maximum(base.square, 1e-30)
     checks = []
     for j in range(arm.n_joints):

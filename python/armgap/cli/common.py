@@ -84,7 +84,7 @@ def corrections_options(command: Callable[..., Any]) -> Callable[..., Any]:
         command
     )
     for name, (metavar, text) in reversed(_CORRECTIONS.items()):
-        command = click.option(f"--{name}", multiple=True, metavar=metavar, help=text)(command)
+        command = click.option(f"--{name}", multiple=True, type=Words(), metavar=metavar, help=text)(command)
     return command
 
 

@@ -64,7 +64,7 @@ def baselines(folder: Path, only: tuple[str, ...], workers: int, limit_s: float,
 
 
 #: Former name of the command; goes with 0.3.0.
-former_name = click.Command(
+former_name = Command(
     "peers", callback=baselines.callback, params=baselines.params, help=baselines.help, hidden=True, deprecated=True
 )
 
