@@ -106,12 +106,15 @@ def said(factors: Mapping[str, float], severity: Severity = "repaired", *, share
 
 
 def refined(factors: Mapping[str, float], causes: Sequence[Mapping[str, Any]], n_joints: int) -> dict[str, float]:
-    """Return repaired factors with the gains that a diagnosis named on their joints; empty where it named none.
+    """Return repaired factors with the gains that a diagnosis named; empty where it named none.
 
-    A column of unknown unit has no gain of its own: what the fit finds there is what the factor was off by.
+    A column of unknown unit has no gain of its own: what the fit finds there is what the factor was off by. A gain of another joint is the
+    inverse on this one, as the size of all parameters is only trusted to a few percent.
     """
     gains = {c["joint"]: c["parameters"]["gain"]["value"] for c in causes if c["effect"] == "torque_gain"}
     by_joint = {j: factors.get(f"tau{j}", factors.get("tau")) for j in range(1, n_joints + 1)}
-    if not any(by_joint[j] is not None for j in gains):
+    repaired = {j: c for j, c in by_joint.items() if c is not None}
+    if not gains or not repaired:
         return {}
-    return {f"tau{j}": float(f"{c * gains.get(j, 1.0):.4g}") for j, c in by_joint.items() if c is not None}
+    elsewhere = math.prod(gain for j, gain in gains.items() if j not in repaired)
+    return {f"tau{j}": float(f"{c * gains.get(j, 1.0) / elsewhere:.4g}") for j, c in repaired.items()}
