@@ -100,6 +100,8 @@ def said(factors: Mapping[str, float], severity: Severity = "repaired", *, share
         if shared:
             remedies.append(f"all values of theta and friction in the arm file divided by {c:.4g}")
         message = f"`{column}` times {c:.4g} is the torque that the arm file expects: a current, a percentage, or the motor's side of a gear?"
+        if severity == "warning" and shared:
+            message += " Or the arm file's values are off by that much: they are trusted no further than that"
         joint = int(column[3:]) if column != "tau" else None
         checks.append(Check("torque_unit", severity, message, tuple(remedies), joint))
     return checks
