@@ -89,6 +89,9 @@ def command(
 
         say = console()
         say.print(summary_table(result))
+        for check in result.checks:
+            if check.severity != "error":
+                say.print(check.line(), highlight=False, markup=False)
         for remark in result.remarks:
             say.print(f"note: {remark}", highlight=False, markup=False)
         if report_file is not None:

@@ -89,6 +89,8 @@ def command(
             say.print(column_table(one, str(path)))
             continue
         say.print(tables(one))
+        for check in one.checks:
+            say.print(check.line(one.log), highlight=False, markup=False)
         for finding in one.findings:
             say.print(f"note: {one.log}: {finding.message}", highlight=False, markup=False)
     if report_file is not None:

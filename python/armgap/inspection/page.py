@@ -56,7 +56,8 @@ def _brief(found: Inspection) -> str:
 
 def _sections(found: Inspection, *, single: bool) -> list[Section]:
     before = "" if single else f"{found.log}: "
-    notes = [f"{f.message}." for f in found.findings]
+    notes = [f"{c.line(found.log)}." for c in found.checks]
+    notes += [f"{f.message}." for f in found.findings]
     (_, joints), *parameters = words.grids(found)
     text = [] if single else [f"{question}: {answer}" for question, answer in words.overview(found)]
     return [
