@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armgap import Arm, Log, diagnose, simulate
-from armgap.check import CORRECTIONS, NAMES, Check, Corrections, examine
+from armgap.check import CORRECTIONS, NAMES, Check, Corrections, examine, time_shift, torque_unit
 from armgap.check.contradiction import READINGS
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.errors import ColumnError, OptionError
@@ -266,3 +266,25 @@ def test_every_check_is_offered_somewhere(arm: Arm, pendulum: Arm) -> None:
         "gravity",
         "unit",
     }
+
+
+def test_a_gain_beside_a_repaired_column_is_what_its_factor_was_off_by() -> None:
+    def gain(joint: int, value: float) -> dict[str, object]:
+        return {"effect": "torque_gain", "joint": joint, "parameters": {"gain": {"value": value}}}
+
+    assert torque_unit.refined({"tau2": 10.0}, [gain(2, 0.9)], 2) == {"tau2": 9.0}
+    assert torque_unit.refined({"tau2": 10.0}, [gain(1, 0.8)], 2) == {"tau2": 12.5}
+    assert torque_unit.refined({"tau": 10.0}, [gain(1, 1.1)], 2) == {"tau1": 11.0, "tau2": 10.0}
+    assert torque_unit.refined({}, [gain(1, 1.1)], 2) == {}
+    assert torque_unit.refined({"tau2": 10.0}, [{"effect": "stribeck", "joint": 2, "parameters": {}}], 2) == {}
+
+
+def test_equal_delays_of_all_joints_may_be_a_shift_of_the_file() -> None:
+    def delay(joint: int, value: float) -> dict[str, object]:
+        return {"effect": "actuator_delay", "joint": joint, "parameters": {"delay": {"value": value, "sigma": 1e-5}}}
+
+    check = time_shift.causal([delay(1, 0.005), delay(2, 0.005)], 2, 0.002)
+    assert check is not None
+    assert (check.severity, check.remedy) == ("warning", "--shift tau=0.005")
+    assert time_shift.causal([delay(1, 0.005), delay(2, 0.009)], 2, 0.002) is None
+    assert time_shift.causal([delay(1, 0.005)], 2, 0.002) is None

@@ -5,18 +5,23 @@ The motions are sines, their torques inverse dynamics written down here, so that
 
 from __future__ import annotations
 
+import copy
 import math
-from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from armgap.check import NAMES
-from input_defects.case import Inputs, NotApplicableError, Table, Truth, toml
+from armgap.trial import make_case
+from input_defects.case import Inputs, Table, Truth, toml
 from input_defects.defect import ANY
 from input_defects.defects import DEFECTS, REPAIRED, chosen
 from input_defects.expected import Expected, Option, listed, remedies
+from input_defects.floors import contradicts
 from input_defects.judging import judged, wrong_effects
+from input_defects.making import keep, read
+from input_defects.true_floor import cut, measured_again, measured_start, true_floor
 
 PERIOD = 0.001
 THETA = {
@@ -54,9 +59,8 @@ def table(kind, seed):
     return Table(t, q, tau, q, dq)
 
 
-@pytest.fixture(scope="module", params=ANY)
-def case(request):
-    kind = request.param
+@cache
+def case_of(kind):
     n, theta = (2 if kind == "two-link" else 1), THETA[kind]
     split = len(theta) - 2 * n
     friction = {"viscous": theta[split : split + n], "coulomb": theta[split + n :]}
@@ -68,15 +72,17 @@ def case(request):
     return Inputs(*logs, arm), Truth(kind, kind, np.array(theta), steps, np.full(n, 10.0), PERIOD)
 
 
-def spoilt(case, name, seed=3):
-    """The spoilt inputs and what is expected; skips where the arm has no such defect."""
-    inputs, truth = case
-    if truth.kind not in DEFECTS[name].kinds:
-        pytest.skip("not on this kind of arm")
-    try:
-        return DEFECTS[name].apply(inputs, truth, np.random.default_rng(seed))
-    except NotApplicableError as reason:
-        pytest.skip(str(reason))
+def pairs(*beginnings):
+    """Kinds of arm and defects that they have."""
+    return pytest.mark.parametrize(
+        ("kind", "name"), [(kind, d.name) for d in chosen([*beginnings]) for kind in d.kinds]
+    )
+
+
+def spoilt(kind, name, seed=3):
+    """The spoilt inputs, what is expected, and the truth."""
+    inputs, truth = case_of(kind)
+    return *DEFECTS[name].apply(inputs, truth, np.random.default_rng(seed)), truth
 
 
 def changes(before, after):
@@ -100,20 +106,21 @@ def test_every_check_has_a_variant_and_there_are_enough():
     assert all(set(names) <= set(DEFECTS) for names in REPAIRED.values())
 
 
-@pytest.mark.parametrize("name", DEFECTS)
-def test_a_defect_changes_what_it_says_and_nothing_else(case, name):
-    before = {log: replace(x, q=x.q.copy(), tau=x.tau.copy()) for log, x in case[0].logs.items()}
-    after, expected = spoilt(case, name)
-    assert changes(case[0], after) == set(DEFECTS[name].changes)
-    assert all(np.array_equal(x.tau, before[log].tau) for log, x in case[0].logs.items())
+@pairs()
+def test_a_defect_changes_what_it_says_and_nothing_else(kind, name):
+    inputs, _ = case_of(kind)
+    before = copy.deepcopy(inputs)
+    after, expected, _ = spoilt(kind, name)
+    assert changes(inputs, after) == set(DEFECTS[name].changes)
+    assert changes(before, inputs) == set()
     assert all(np.all(np.diff(x.t) > 0) and np.all(np.isfinite(x.q)) for x in after.logs.values())
     assert set(expected.checks) <= {*NAMES, "*"}
     assert Expected.from_dict(expected.to_dict()) == expected
 
 
-@pytest.mark.parametrize("name", DEFECTS)
-def test_the_same_seed_spoils_alike(case, name):
-    (a, first), (b, second) = (spoilt(case, name) for _ in range(2))
+@pairs()
+def test_the_same_seed_spoils_alike(kind, name):
+    (a, first, _), (b, second, _) = (spoilt(kind, name) for _ in range(2))
     assert first == second
     assert changes(a, b) == set()
 
@@ -134,8 +141,7 @@ def changed(x, truth, o):
     if o.name == "flip":
         return x.with_column(o.target, -x.column(o.target))
     if o.name == "swap":
-        group = o.target[:-4] if o.target.startswith("tau") else "q"
-        group = "tau" if o.target.startswith("tau") else group
+        group = "tau" if o.target.startswith("tau") else "q"
         return x.changed(**{group: getattr(x, group)[:, ::-1]})
     if o.name in ("absolute", "relative"):
         sign = -1 if o.name == "absolute" else 1
@@ -169,33 +175,33 @@ def residual(inputs, truth):
     return float(np.max((np.abs(np.mean(missed, axis=0)) + np.std(missed, axis=0)) / size))
 
 
-WITH_REMEDY = [name for name in DEFECTS if not name.startswith(("torque_is_position", "arm_file"))]
+CONVENTIONS = ("torque_sign", "position_sign", "position_zero", "joint_order", "relative_angle", "gravity")
 
 
-@pytest.mark.parametrize("name", WITH_REMEDY)
-def test_every_expected_remedy_undoes_the_defect(case, name):
-    after, expected = spoilt(case, name)
-    for text in expected.remedies:
-        for remedy in remedies(text, case[1].n_joints):
-            assert residual(undone(after, case[1], remedy), case[1]) < SAME
+@pairs(*CONVENTIONS, "torque_unit", "position_unit", "time_shift")
+def test_every_expected_remedy_undoes_the_defect(kind, name):
+    after, expected, truth = spoilt(kind, name)
+    alternatives = [r for text in expected.remedies for r in remedies(text, truth.n_joints)]
+    assert alternatives
+    for remedy in alternatives:
+        assert residual(undone(after, truth, remedy), truth) < SAME
 
 
-@pytest.mark.parametrize(
-    "name", [n for n in WITH_REMEDY if n.startswith(("torque_sign", "position", "joint", "rel", "gravity"))]
-)
-def test_a_defect_of_convention_is_one_and_no_flip_beside_its_remedies_undoes_it(case, name):
-    after, expected = spoilt(case, name)
-    n = case[1].n_joints
+@pairs(*CONVENTIONS)
+def test_no_flip_beside_its_remedies_undoes_a_defect_of_convention(kind, name):
+    after, expected, truth = spoilt(kind, name)
+    n = truth.n_joints
     known = [set(r) for text in (*expected.remedies, *expected.also) for r in remedies(text, n)]
-    assert residual(after, case[1]) > OTHER
+    assert residual(after, truth) > OTHER
     for text in ("--flip q", "--flip tau", *(f"--flip {g}{j + 1}" for g in ("q", "tau") for j in range(n))):
         remedy = remedies(text, n)[0]
         if set(remedy) not in known:
-            assert residual(undone(after, case[1], remedy), case[1]) > 2 * SAME
+            assert residual(undone(after, truth, remedy), truth) > OTHER
 
 
-def test_sines_fit_their_own_inverse_dynamics(case):
-    assert residual(*case) < SAME
+@pytest.mark.parametrize("kind", ANY)
+def test_sines_fit_their_own_inverse_dynamics(kind):
+    assert residual(*case_of(kind)) < SAME
 
 
 @pytest.mark.parametrize(("text", "alternatives"), [
@@ -292,3 +298,40 @@ def test_defects_are_chosen_by_the_beginning_of_their_names():
     assert len(chosen([])) == len(DEFECTS)
     with pytest.raises(ValueError, match="no defect begins with"):
         chosen(["torque_sgn"])
+
+
+def test_measured_starts_are_exact_on_a_cubic():
+    t = PERIOD * np.arange(200)
+    q = np.column_stack([1 + 2 * t - 3 * t**2 + 4 * t**3, np.full(len(t), 0.5)])
+    for row in (0, 3, 100, 199):
+        start, rate = measured_start(t, q, row, np.array([1e-6, 1e-6]))
+        np.testing.assert_allclose(start, q[row], atol=1e-9)
+        np.testing.assert_allclose(rate, [2 - 6 * t[row] + 12 * t[row] ** 2, 0.0], atol=1e-6)
+
+
+def test_windows_follow_each_other():
+    windows = cut(PERIOD * np.arange(1001))
+    assert windows == [(0, 250), (250, 500), (500, 750), (750, 1000)]
+
+
+def test_the_true_floor_is_above_rounding_and_grows_with_the_noise(tmp_path):
+    keep(make_case(8, model="pendulum", nominal="exact", duration=2.0, style="tracked"), tmp_path / "case")
+    case = read(tmp_path / "case")
+    assert case.hidden == ()
+    np.testing.assert_allclose(case.truth.theta[:2], case.inputs.arm["inertial"]["theta"])
+    step, floors = case.truth.step, []
+    for counts in (0.0, 4.0):
+        rng = np.random.default_rng(1)
+        noisy = measured_again(case, counts * step, rng)
+        floors.append(true_floor(noisy, counts * step, rng)["floor_cut"][0])
+        assert floors[-1] > math.hypot(counts * step[0], step[0] / math.sqrt(12))
+    assert floors[1] > 2 * floors[0]
+
+
+def test_verdicts_that_contradict_their_tables_are_found():
+    gap = {"before": [1e-3, 1e-3], "after": [1e-3, 1e-5], "floor": [1e-4, 1e-5]}
+    answer = {"gap": gap, "true": {"floor": [1e-4, 1e-5], "travel": [0.1, 0.1]}}
+    assert len(contradicts({**answer, "verdict": "none"})) == 2
+    assert len(contradicts({**answer, "verdict": "parameters"})) == 1
+    assert contradicts({**answer, "verdict": "unexplained"}) == []
+    assert contradicts({**answer, "verdict": "none", "true": {"floor": [1e-4, 1e-5], "travel": [2.0, 2.0]}}) == []

@@ -167,7 +167,7 @@ def odd(tmp_path, seed_log: Log):
 def test_without_a_mapping_the_columns_are_listed_and_one_is_proposed(run, odd):
     found = columns_of(odd)
     assert [c.name for c in found.columns][:3] == ["note", "Timestamp", "shoulderPos"]
-    assert {c.name: c.course for c in found.columns if c.course != "varies"} == {
+    assert {c.name: c.trend for c in found.columns if c.trend != "varies"} == {
         "note": "text",
         "Timestamp": "rising",
         "target_position": "constant",

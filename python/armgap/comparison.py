@@ -8,9 +8,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from armgap.diagnosis import Cause, Diagnosis, RuledOut, Value
+from armgap.diagnosis import MOST_BYTES, Cause, Diagnosis, RuledOut, Value
 from armgap.errors import OptionError
 from armgap.literals import CauseStatus, GapOutcome, Verdict
+from armgap.reading import read_bounded
 
 __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare", "read_diagnosis"]
 
@@ -151,10 +152,10 @@ def read_diagnosis(path: str | Path) -> Diagnosis:
     """
     remedy = "give a file that armgap diagnose --json wrote"
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        data = json.loads(read_bounded(path, MOST_BYTES))
     except OSError as error:
         raise OptionError(f"cannot be read ({error.strerror or error})", remedy=remedy, file=path) from None
-    except ValueError:
+    except (ValueError, RecursionError):
         raise OptionError("is not JSON", remedy=remedy, file=path) from None
     schema = data.get("schema") if isinstance(data, dict) else None
     if schema != SCHEMA:

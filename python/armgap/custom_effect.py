@@ -58,6 +58,20 @@ class CustomEffect:
     torque: Callable[[Array, Array, Array, Array], Any]
 
 
+def check_effects(effects: Any) -> None:
+    """Raise if what was given are no custom effects.
+
+    Raises
+    ------
+    OptionError
+        It shows the first that is none.
+    """
+    for effect in (effects,) if isinstance(effects, str | CustomEffect) else effects:
+        if not isinstance(effect, CustomEffect) or effect is effects:
+            remedy = "give a list of armgap.CustomEffect; effects of the library are looked for by themselves"
+            raise OptionError(f"`effects` holds {effect!r}", remedy=remedy)
+
+
 @dataclass(frozen=True)
 class TorqueTables:
     """Custom effects evaluated on the logs of a diagnosis.

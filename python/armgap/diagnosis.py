@@ -5,19 +5,19 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from armgap import _native
+from armgap import _native, options
 from armgap._renamed import old_names
 from armgap.arm import Arm
-from armgap.check import Check, Corrections, copied_holdout, data_checks, examine
+from armgap.check import Check, Corrections, copied_holdout, data_checks, examine, torque_unit
 from armgap.check.time_shift import causal
-from armgap.custom_effect import CustomEffect, TorqueTables
+from armgap.custom_effect import CustomEffect, TorqueTables, check_effects
 from armgap.errors import LogShapeError, OptionError
 from armgap.evidence import laws, plausibility
 from armgap.literals import Status, Verdict
@@ -26,6 +26,7 @@ from armgap.log.findings import remarks
 from armgap.log.stretches import choose
 from armgap.log.units import si
 from armgap.progress import ProgressCallback, report_progress, use_callback
+from armgap.reading import printable
 from armgap.report.notebook import NotebookDisplay
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Location", "RuledOut", "Value", "diagnose"]
@@ -38,6 +39,10 @@ _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
 #: What a stretch of a log is called after the log's own name.
 _STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 _HELD_OUT = 0.4
+MOST_BYTES = 2**28
+"""Size of a diagnosis' file; the largest hold some MB."""
+MOST_CAUSES = 1000
+"""More than the library can name on any arm."""
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
 
@@ -333,15 +338,16 @@ def diagnose(
     KeyboardInterrupt
         On an interrupt, within a fifth of a second.
     """
-    if not (np.isfinite(horizon) and horizon > 0):
-        raise OptionError(f"the horizon is {horizon}", remedy="give a positive number of seconds")
-    if max_causes < 0:
-        raise OptionError(f"the number of causes is {max_causes}", remedy="give 0 or more")
+    settings = {
+        "horizon": options.positive(horizon, "horizon"),
+        "max_causes": options.whole(max_causes, "number of causes", 0, MOST_CAUSES),
+        "seed": options.seed(seed),
+    }
+    check_effects(effects)
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
-    options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed)}
     with use_callback(progress):
         given = _given(logs, holdout, arm, corrections or Corrections(), repair=repair)
-        return _diagnose(_examined(given, horizon, repair=repair), options, effects)
+        return _diagnose(_examined(given, settings["horizon"], repair=repair), settings, effects)
 
 
 @dataclass(frozen=True)
@@ -353,6 +359,23 @@ class _Input:
     arm: Arm
     notes: tuple[str, ...]
     checks: tuple[Check, ...]
+    factors: Mapping[str, float] = field(default_factory=dict)
+
+    def with_factors(self, factors: Mapping[str, float]) -> _Input:
+        """Return the input with other factors on its torque columns than those that it was repaired with."""
+        by_column = {
+            f"tau{j + 1}": self.factors.get(f"tau{j + 1}", self.factors.get("tau", 1.0))
+            for j in range(self.arm.n_joints)
+        }
+        ratio = Corrections(factor={column: c / by_column[column] for column, c in factors.items()})
+        checks = [c for c in self.checks if c.check != "torque_unit"]
+        return replace(
+            self,
+            training=[replace(ratio.on_log(log), findings=log.findings) for log in self.training],
+            holdout=[replace(ratio.on_log(log), findings=log.findings) for log in self.holdout],
+            checks=(*torque_unit.said(factors), *checks),
+            factors=factors,
+        )
 
 
 def _given(
@@ -389,25 +412,28 @@ def _examined(given: _Input, horizon: float, *, repair: bool) -> _Input:
         found = examine(training, held, given.arm, horizon=horizon, repair=repair)
     except ValueError as error:
         raise _refused(str(error), training, held) from None
-    return _Input(found.training, found.holdout, found.arm, given.notes, (*found.checks, *given.checks))
+    checks = (*found.checks, *given.checks)
+    return _Input(found.training, found.holdout, found.arm, given.notes, checks, found.corrections.factor)
 
 
-def _diagnose(given: _Input, options: dict[str, Any], effects: Sequence[CustomEffect]) -> Diagnosis:
+def _diagnose(given: _Input, settings: dict[str, Any], effects: Sequence[CustomEffect]) -> Diagnosis:
     """Hand over to the core, and add what is known on this side."""
     training, held, arm = given.training, given.holdout, given.arm
     contradictory = any(check.severity == "error" for check in given.checks)
     if contradictory:
         # No effect is asked to explain a contradiction: the figures are those of the arm's own parameters.
-        options = options | {"max_causes": 0}
+        settings = settings | {"max_causes": 0}
     tables = TorqueTables.of(effects, training, held)
-    options = options | {"own": [e.joint - 1 for e in effects]}
+    settings = settings | {"own": [e.joint - 1 for e in effects]}
     try:
         text = _native.diagnose(
-            arm.to_native(), _columns(training, tables), _columns(held, tables), options, report_progress
+            arm.to_native(), _columns(training, tables), _columns(held, tables), settings, report_progress
         )
     except ValueError as error:
         raise _refused(str(error), training, held) from None
     data = tables.named(json.loads(text))
+    if factors := torque_unit.refined(given.factors, data["causes"], arm.n_joints):
+        return _diagnose(replace(given.with_factors(factors), factors={}), settings, effects)
     if contradictory:
         data = _contradicted(data)
     data["arm"]["name"] = arm.name
@@ -509,7 +535,7 @@ def _tell_apart(training: list[Log], held: list[Log]) -> tuple[list[Log], list[L
 
 
 def _with_folder(log: Log, _: int) -> Log:
-    return log if log.path is None else replace(log, name=f"{log.path.resolve().parent.name}/{log.name}")
+    return log if log.path is None else replace(log, name=f"{printable(log.path.resolve().parent.name)}/{log.name}")
 
 
 def _with_number(log: Log, number: int) -> Log:
@@ -525,6 +551,10 @@ def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
     return training, held
 
 
-def _columns(logs: list[Log], tables: TorqueTables) -> list[tuple[str, Any, Any, Any, list[Any]]]:
+def _columns(logs: list[Log], tables: TorqueTables) -> list[tuple[str, Any, Any, Any, list[Any], Any]]:
     fix = np.ascontiguousarray
-    return [(log.name, fix(log.t), fix(log.q), fix(log.tau), tables.by_log[log.name]) for log in logs]
+    moments = [None if log.moment is None else fix(log.moment) for log in logs]
+    return [
+        (log.name, fix(log.t), fix(log.q), fix(log.tau), tables.by_log[log.name], moment)
+        for log, moment in zip(logs, moments, strict=True)
+    ]

@@ -9,7 +9,8 @@ has to say; the diagnosis gets the spoilt files and nothing else. From the top o
     python -m tests.input_defects.run --mode floor --seed 1 --cases 300 --cache /tmp/cases -o floor.jsonl
     python -m tests.input_defects.score defects.jsonl clean.jsonl repaired.jsonl floor.jsonl -o docs/input-defects.md
 
-Every run goes on where it stopped: what stands in the output file is not asked again (``--again`` does so).
+Every run goes on where it stopped: what this build has answered in the output file is not asked again (``--again`` does so). A record
+keeps what was expected of it; ``score --cache`` judges by the catalogue as it is now.
 
 ==============  ============================================================================================
 file            what
@@ -25,7 +26,8 @@ file            what
 `answering`     one spoilt case diagnosed
 `true_floor`    the floor that a case has, from its true motion and its known noise
 `judging`       one answer against what was expected
-`run`, `score`  the two commands
+`floors`        claimed floors against true ones; verdicts against what remains
+`run`, `score`  the two commands; `tables` writes Markdown
 ==============  ============================================================================================
 
 Nothing here reads or imports ``armgap.check``: a mistake made there is not made here again.

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import tempfile
 import time
 import zlib
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ import numpy as np
 
 from .case import Inputs, NotApplicableError, toml
 from .defects import DEFECTS
+from .expected import Expected
 from .making import Kept, read
 from .true_floor import measured_again, true_floor
 
@@ -36,19 +39,42 @@ def answer(folder: str, defect: str, seed: int) -> Record:
         With the names of case and defect it decides everything random about the defect.
     """
     case = read(Path(folder))
-    record: Record = {**about(case), "defect": defect}
-    inputs = case.inputs
-    if defect != WHOLE:
-        why = conflict(case, defect)
-        if why:
-            return {**record, "skipped": why}
-        rng = np.random.default_rng([seed, zlib.crc32(f"{case.name}/{defect}".encode())])
-        try:
-            inputs, expected = DEFECTS[defect].apply(inputs, case.truth, rng)
-        except NotApplicableError as reason:
-            return {**record, "skipped": str(reason)}
-        record["expected"] = expected.to_dict()
-    return {**record, **diagnosed(inputs)}
+    record: Record = {**about(case), "version": build(), "defect": defect}
+    if defect == WHOLE:
+        return {**record, **diagnosed(case.inputs)}
+    try:
+        inputs, expected = spoilt(case, defect, seed)
+    except NotApplicableError as reason:
+        return {**record, "skipped": str(reason)}
+    return {**record, "expected": expected.to_dict(), **diagnosed(inputs)}
+
+
+def spoilt(case: Kept, defect: str, seed: int) -> tuple[Inputs, Expected]:
+    """The inputs with a defect, and what the answer has to say.
+
+    Raises
+    ------
+    NotApplicableError
+        The arm does not have the defect, or the hidden effect is of its kind.
+    """
+    d = DEFECTS[defect]
+    if case.truth.kind not in d.kinds:
+        raise NotApplicableError(f"not on {case.truth.kind} arms")
+    equal = [effect for effect, _ in case.hidden if effect in d.conflicts]
+    if equal:
+        raise NotApplicableError(f"the hidden {equal[0]} is of its kind")
+    return d.apply(case.inputs, case.truth, np.random.default_rng([seed, zlib.crc32(f"{case.name}/{defect}".encode())]))
+
+
+@cache
+def build() -> str:
+    """Version of armgap with a mark of its files: answers of another build are given again."""
+    import armgap
+
+    folder = Path(armgap.__file__).parent
+    files = sorted(p for p in folder.rglob("*") if p.suffix in (".py", ".so", ".pyd"))
+    mark = hashlib.sha256(b"".join(p.read_bytes() for p in files)).hexdigest()
+    return f"{armgap.__version__}+{mark[:8]}"
 
 
 def answer_floor(folder: str, defect: str, seed: int) -> Record:
@@ -58,7 +84,7 @@ def answer_floor(folder: str, defect: str, seed: int) -> Record:
     counts = float(np.exp(rng.uniform(*np.log(NOISE)))) if rng.uniform() < 0.5 else 0.0
     noise = counts * case.truth.step
     case = measured_again(case, noise, rng)
-    record = {**about(case), "defect": defect, "noise_counts": counts, **diagnosed(case.inputs)}
+    record = {**about(case), "version": build(), "defect": defect, "noise_counts": counts, **diagnosed(case.inputs)}
     return {**record, "true": true_floor(case, noise, rng)}
 
 
@@ -76,15 +102,6 @@ def about(case: Kept) -> Record:
     }
 
 
-def conflict(case: Kept, defect: str) -> str:
-    """Why a case cannot show a defect; empty if it can."""
-    d = DEFECTS[defect]
-    if case.truth.kind not in d.kinds:
-        return f"not on {case.truth.kind} arms"
-    equal = [effect for effect, _ in case.hidden if effect in d.conflicts]
-    return f"the hidden {equal[0]} is of its kind" if equal else ""
-
-
 def diagnosed(inputs: Inputs) -> Record:
     """Write the inputs, diagnose them, and record the answer or the refusal."""
     import armgap
@@ -92,13 +109,12 @@ def diagnosed(inputs: Inputs) -> Record:
     with tempfile.TemporaryDirectory() as place:
         arm, groups = _write(inputs, Path(place))
         start = time.perf_counter()
-        record: Record = {"version": armgap.__version__}
         try:
             found = armgap.diagnose(groups[0], arm, holdout=groups[1]).to_dict()
         except armgap.ArmgapError as error:
             refused = {"type": type(error).__name__, "message": str(error).replace(place, "")}
-            return {**record, "verdict": "refused", "refused": refused, "seconds": time.perf_counter() - start}
-        return {**record, **_kept(found), "seconds": time.perf_counter() - start}
+            return {"verdict": "refused", "refused": refused, "seconds": time.perf_counter() - start}
+        return {**_kept(found), "seconds": time.perf_counter() - start}
 
 
 def _write(inputs: Inputs, place: Path) -> tuple[Path, tuple[list[Path], list[Path]]]:

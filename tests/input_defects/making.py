@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from armgap.trial.arms import MODELS
-from armgap.trial.case import NoMotionError, possible
+from armgap.trial.case import Case, NoMotionError, possible
 from armgap.trial.key import Key, open_key
 from armgap.trial.trial import Plan, plan_trial
 
@@ -93,19 +93,23 @@ def make(plan: Plan, folder: Path) -> bool:
         return False
     if folder.exists():
         return True
-    partial = folder.with_name(f".{folder.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
     try:
-        case = plan.make()
+        keep(plan.make(), folder)
     except NoMotionError:
         folder.mkdir(parents=True)
         (folder / NONE).touch()
         return False
+    return True
+
+
+def keep(case: Case, folder: Path) -> None:
+    """Write a case and its true motion; the folder appears when it is whole."""
+    partial = folder.with_name(f".{folder.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
     case.write(partial)
     motion = {f"{log}/{name}": getattr(x, name) for log, x in case.logs.items() for name in FIELDS}
     np.savez_compressed(partial / TRUE_MOTION, **motion)
     partial.rename(folder)
-    return True
 
 
 def read(folder: Path) -> Kept:

@@ -18,7 +18,7 @@ from armgap.trial.arms import MODELS
 from armgap.trial.engine import worker_pool
 from armgap.trial.trial import Plan
 
-from .answering import WHOLE, Record, about, answer, answer_floor
+from .answering import WHOLE, Record, about, answer, answer_floor, build
 from .defects import REPAIRED, chosen
 from .making import make, plans, read, trial_plans
 
@@ -110,11 +110,11 @@ def _tasks(options: argparse.Namespace, cases: list[str], names: list[str]) -> I
 
 
 def _done(options: argparse.Namespace) -> set[Task]:
-    """Tasks whose answers stand in the output, of this mode and seed; what failed is asked again."""
+    """Tasks whose answers by this build stand in the output, of this mode and seed; what failed is asked again."""
     if not options.output.exists():
         return set()
     records = [json.loads(line) for line in options.output.read_text(encoding="utf-8").splitlines()]
-    same = [r for r in records if (r["mode"], r["seed"]) == (options.mode, options.seed)]
+    same = [r for r in records if (r["mode"], r["seed"], r.get("version")) == (options.mode, options.seed, build())]
     return {Task(r["case"], r["defect"]) for r in same if "failed" not in r}
 
 

@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .answering import WHOLE
+from .answering import WHOLE, spoilt
 from .defects import DEFECTS, REPAIRED
 from .floors import floor_section
 from .judging import Judged, Record, checks, first_right, judged
+from .making import read
 from .tables import percent, table
 
 INTRODUCTION = """\
@@ -34,8 +35,10 @@ def main(words: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.input_defects.score", description=__doc__)
     parser.add_argument("records", nargs="+", type=Path, metavar="JSONL")
     parser.add_argument("-o", "--output", type=Path, metavar="MD", help="the page; on standard output by default")
+    parser.add_argument("--cache", type=Path, metavar="DIR", help="of the run: judge by the catalogue as it is now")
     options = parser.parse_args(words)
-    text = page(load(options.records))
+    records = load(options.records)
+    text = page(expected_now(records, options.cache) if options.cache else records)
     if options.output is None:
         print(text, end="")
     else:
@@ -47,6 +50,16 @@ def load(paths: Iterable[Path]) -> list[Record]:
     lines = [line for path in paths for line in path.read_text(encoding="utf-8").splitlines()]
     records = [json.loads(line) for line in lines]
     return list({(r["mode"], r["seed"], r["case"], r["defect"]): r for r in records}.values())
+
+
+def expected_now(records: list[Record], cache: Path) -> list[Record]:
+    """Records with what the catalogue expects now, where that has changed since they were made."""
+    return [
+        {**r, "expected": spoilt(read(cache / r["case"]), r["defect"], r["seed"])[1].to_dict()}
+        if "expected" in r
+        else r
+        for r in records
+    ]
 
 
 def page(records: list[Record]) -> str:

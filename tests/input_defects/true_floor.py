@@ -22,11 +22,11 @@ from typing import Any
 
 import numpy as np
 
+from armgap.trial.actuator import Encoder
 from armgap.trial.arms import TrialArm, random_arm
-from armgap.trial.case import build_rig
-from armgap.trial.chain import Encoder
+from armgap.trial.case import simulated_arm_of
 from armgap.trial.plant import Plant
-from armgap.trial.rig import Rig
+from armgap.trial.simulated_arm import SimulatedArm
 
 from .case import Array
 from .making import Kept
@@ -92,7 +92,7 @@ def _measure(shown: Array, noise: Array, step: Array, rng: np.random.Generator, 
 
 
 def _encoders(case: Kept, log: str) -> list[Encoder]:
-    return build_rig(arm_of(case), case.key.effects, log).encoders
+    return simulated_arm_of(arm_of(case), case.key.effects, log).encoders
 
 
 def shown_by(encoders: list[Encoder], q: Array) -> Array:
@@ -116,8 +116,8 @@ def _missed(
 ) -> Iterator[Array]:
     """Mean square error of every window and draw, shape (n_joints,)."""
     table, encoders = case.inputs.holdout[name], _encoders(case, name)
-    rig = build_rig(arm_of(case), case.key.effects, name)
-    plant = Plant(rig.build)
+    rig = simulated_arm_of(arm_of(case), case.key.effects, name)
+    plant = Plant(rig.config)
     now = 0
     for first, last in windows:
         _run(plant, rig, table.tau[now:first])
@@ -131,10 +131,10 @@ def _missed(
             yield np.mean((q[first + 1 : last + 1] - shown_by(encoders, run)) ** 2, axis=0)
 
 
-def _displaced(plant: Plant, rig: Rig, error_q: Array, error_dq: Array, tau: Array) -> Array:
+def _displaced(plant: Plant, rig: SimulatedArm, error_q: Array, error_dq: Array, tau: Array) -> Array:
     """Positions after a displaced start, with everything that the arm remembers as it is."""
     rig = copy.deepcopy(rig)
-    twin: Any = Plant(rig.build)
+    twin: Any = Plant(rig.config)
     twin.data.time = plant.data.time
     twin._slope = list(plant._slope)
     twin.data.qpos[:], twin.data.qvel[:] = plant.data.qpos, plant.data.qvel
@@ -145,7 +145,7 @@ def _displaced(plant: Plant, rig: Rig, error_q: Array, error_dq: Array, tau: Arr
     return _run(twin, rig, tau)
 
 
-def _run(plant: Plant, rig: Rig, tau: Array) -> Array:
+def _run(plant: Plant, rig: SimulatedArm, tau: Array) -> Array:
     """Positions after each of the rows of held commands."""
     q = np.empty((len(tau), plant.n))
     for k, command in enumerate(tau.tolist()):

@@ -29,7 +29,9 @@ from armgap.check.equation_error import EquationError, Fit, Rows, bounds
 from armgap.check.reading import Reading
 from armgap.log import Log
 
-__all__ = ["READINGS", "Found", "Refit", "Suspect", "confirm", "screen"]
+Array = NDArray[np.float64]
+
+__all__ = ["EXPLAINS", "READINGS", "Found", "Refit", "Suspect", "confirm", "screen"]
 
 READINGS: tuple[Callable[[Arm, float], Iterable[Reading]], ...] = (
     torque_sign.readings,
@@ -54,7 +56,7 @@ _BETTER = 0.7
 # With parameters that no arm has the log as it stands explains nothing; the other reading must then do about as well.
 _AS_GOOD = 1.3
 # A reading that explains a log predicts it: errors stay below this part of the motion. Unmodelled effects leave up to a tenth.
-_EXPLAINS = 0.3
+EXPLAINS = 0.3
 # Errors below this part of the motion are as good as none.
 _NEGLIGIBLE = 1e-3
 # Other readings whose predictions are as good to this part are named beside it.
@@ -181,7 +183,7 @@ def confirm(
         corrections = suspect.reading.corrections
         read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
         refit = Refit.of(corrections.on_arm(arm), read[0], read[1], horizon)
-        if refit.possible(corrections.on_arm(arm)) and refit.relative < _EXPLAINS:
+        if refit.possible(corrections.on_arm(arm)) and refit.relative < EXPLAINS:
             tried.append((refit.against(as_is), suspect, refit))
     tried.sort(key=lambda entry: entry[0])
     if not tried or tried[0][0] > limit:
@@ -192,8 +194,9 @@ def confirm(
     return Found(best.reading, alike, shares, (as_is.error, refit.error))
 
 
-def _columns(
-    logs: Sequence[Log],
-) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], list[NDArray[np.float64]]]]:
+def _columns(logs: Sequence[Log]) -> list[tuple[str, Array, Array, Array, list[Array], Array | None]]:
     fix = np.ascontiguousarray
-    return [(log.name, fix(log.t), fix(log.q), fix(log.tau), []) for log in logs]
+    moments = [None if log.moment is None else fix(log.moment) for log in logs]
+    return [
+        (log.name, fix(log.t), fix(log.q), fix(log.tau), [], moment) for log, moment in zip(logs, moments, strict=True)
+    ]

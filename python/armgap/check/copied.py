@@ -41,9 +41,9 @@ def copied_holdout(training: Sequence[Log], holdout: Sequence[Log]) -> list[Chec
     known = [_rows(log) for log in training]
     checks = []
     for held in holdout:
-        own = _rows(held)
+        its_rows = _rows(held)
         for log, theirs in zip(training, known, strict=True):
-            rows = _common(log, theirs, held, own)
+            rows = _common(log, theirs, held, its_rows)
             if len(rows):
                 said = (
                     f"{100 * len(rows) / len(held):.0f} % of its rows are rows of {log.name}, which is learnt from: "
@@ -70,13 +70,13 @@ def _common(
     log: Log,
     theirs: tuple[NDArray[np.uint64], NDArray[np.intp]],
     held: Log,
-    own: tuple[NDArray[np.uint64], NDArray[np.intp]],
+    its_rows: tuple[NDArray[np.uint64], NDArray[np.intp]],
 ) -> NDArray[np.intp]:
     """Return the rows of the holdout log that stand in the training log at one distance in time."""
-    _, here, there = np.intersect1d(own[0], theirs[0], assume_unique=True, return_indices=True)
+    _, here, there = np.intersect1d(its_rows[0], theirs[0], assume_unique=True, return_indices=True)
     if len(here) < _FEWEST:
         return np.arange(0)
-    mine, its = own[1][here], theirs[1][there]
+    mine, its = its_rows[1][here], theirs[1][there]
     apart = np.round((held.t[mine] - log.t[its]) / (_APART * held.sample_period))
     distances, counts = np.unique(apart, return_counts=True)
     best = distances[np.argmax(counts)]

@@ -26,6 +26,11 @@ PositionUnit = Literal["deg", "turns"]
 _COLUMN = re.compile(r"(q|dq|tau)([1-9]\d*)")
 _POSITION = re.compile(r"q([1-9]\d*)")
 _TORQUE = re.compile(r"tau([1-9]\d*)?")
+_SIGNALS = ("q", "tau", "dq", "moment")
+# A shift this near to a whole number of sample periods is one.
+_WHOLE = 0.05
+# Arrays of a log that a column of each kind stands for.
+_TOGETHER = {"q": ("q", "dq"), "dq": ("dq",), "tau": ("tau", "moment")}
 _ANGLE = re.compile(r"(?P<number>[-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|m|turns)?")
 _ANGLE_UNITS = {"deg": math.pi / 180, "rad": 1.0, "m": 1.0, "turns": 2 * math.pi, None: 1.0}
 _SPAN = re.compile(r"(?:(?P<log>.+):)?(?P<first>[\d.]+)-(?P<last>[\d.]+)")
@@ -45,7 +50,7 @@ class Corrections:
     flip : tuple of str
         Columns that count the other way: ``"q1"``, ``"tau2"``.
     zero : mapping of str to float
-        What a position column reads where the model's joint is at zero [rad or m].
+        Where the zero of a position column lies in the model's position [rad or m]; it is added to the column.
     swap : tuple of (str, str)
         Columns that stand for each other: ``("q1", "q2")``.
     absolute : tuple of str
@@ -186,45 +191,45 @@ class Corrections:
         about_log = replace(self, gravity=None)
         if not about_log:
             return log
-        q, tau = log.q.copy(), log.tau.copy()
-        dq = None if log.dq is None else log.dq.copy()
-        arrays = {"q": q, "tau": tau, "dq": dq}
         self._check_joints(log)
-        if self.unit is not None:
-            q *= _ANGLE_UNITS[self.unit]
-        for a, b in self.swap:
-            kind, i, j = _split(a)[0], _split(a)[1], _split(b)[1]
-            for name in ("q", "dq") if kind == "q" else (kind,):
-                values = arrays[name]
-                if values is not None:
-                    values[:, [i, j]] = values[:, [j, i]]
-        for column in self.flip:
-            kind, j = _split(column)
-            for name in ("q", "dq") if kind == "q" else (kind,):
-                values = arrays[name]
-                if values is not None:
-                    values[:, j] *= -1.0
-        for column, value in self.zero.items():
-            q[:, _split(column)[1]] -= value
-        for columns, sign in ((self.absolute, -1.0), (self.relative, 1.0)):
-            for column in columns:
-                j = _split(column)[1]
-                q[:, j] += sign * q[:, j - 1]
-                if dq is not None:
-                    dq[:, j] += sign * dq[:, j - 1]
+        columns: dict[str, Any] = {
+            name: None if (values := getattr(log, name)) is None else values.copy() for name in ("t", *_SIGNALS)
+        }
+        self._positions(columns)
         for column, value in self.factor.items():
-            tau[:, _torques(column)] *= value
+            for values in _of(columns, _TOGETHER["tau"]):
+                values[:, _torques(column)] *= value
         if self.skip:
             keep = ~self._skipped(log)
             if not keep.any():
                 raise OptionError(f"--skip leaves nothing of {log.name}", remedy="leave out less")
-            log = replace(log, t=log.t[keep])
-            q, tau, dq = q[keep], tau[keep], None if dq is None else dq[keep]
+            columns = {name: None if x is None else x[keep] for name, x in columns.items()}
         if self.shift:
-            log, tau, keep = _shifted(log, tau, self.shift.get("tau", 0.0))
-            q, dq = q[keep], None if dq is None else dq[keep]
+            keep, held = _shifted(columns["t"], log.sample_period, self.shift.get("tau", 0.0))
+            rows = {name: held if name in _TOGETHER["tau"] else keep for name in columns}
+            columns = {name: None if x is None else x[rows[name]] for name, x in columns.items()}
         said = Finding("corrected", f"read with {' '.join(about_log.options())}")
-        return replace(log, q=q, tau=tau, dq=dq, findings=(*log.findings, said))
+        return replace(log, **columns, findings=(*log.findings, said))
+
+    def _positions(self, columns: dict[str, Any]) -> None:
+        """Correct unit, order, signs, zeros and reference of the columns in place."""
+        if self.unit is not None:
+            columns["q"] *= _ANGLE_UNITS[self.unit]
+        for a, b in self.swap:
+            (kind, i), (_, j) = _split(a), _split(b)
+            for values in _of(columns, _TOGETHER[kind]):
+                values[:, [i, j]] = values[:, [j, i]]
+        for column in self.flip:
+            kind, j = _split(column)
+            for values in _of(columns, _TOGETHER[kind]):
+                values[:, j] *= -1.0
+        for column, value in self.zero.items():
+            columns["q"][:, _split(column)[1]] += value
+        for names, sign in ((self.absolute, -1.0), (self.relative, 1.0)):
+            for column in names:
+                _, j = _split(column)
+                for values in _of(columns, _TOGETHER["q"]):
+                    values[:, j] += sign * values[:, j - 1]
 
     def _skipped(self, log: Log) -> Any:
         """Return which samples are left out."""
@@ -270,12 +275,24 @@ class Corrections:
 CORRECTIONS: tuple[str, ...] = tuple(f.name for f in fields(Corrections))
 
 
-def _shifted(log: Log, tau: Any, seconds: float) -> tuple[Log, Any, Any]:
-    """Return the log from and up to where shifted torques are known; a torque is held from its time until the next."""
-    stamps = log.t + seconds
-    held = np.searchsorted(stamps, log.t + 1e-9, side="right") - 1
-    keep = (held >= 0) & (log.t <= stamps[-1] + 1e-9)
-    return replace(log, t=log.t[keep]), tau[held[keep]], keep
+def _of(columns: Mapping[str, Any], names: Iterable[str]) -> list[Any]:
+    return [columns[name] for name in names if columns[name] is not None]
+
+
+def _shifted(t: Any, period: float, seconds: float) -> tuple[Any, Any]:
+    """Return the rows whose shifted torques are known, and the rows that these torques stand in; each is held until the next.
+
+    A shift by whole sample periods takes every torque to the row so many rows away, however stamps scatter.
+    """
+    rows = np.arange(len(t))
+    samples = seconds / period
+    if abs(samples - round(samples)) < _WHOLE:
+        held = rows - round(samples)
+    else:
+        held = np.searchsorted(t + seconds, t + 1e-9, side="right") - 1
+        held[t > t[-1] + seconds] = -1
+    keep = (held >= 0) & (held < len(t))
+    return rows[keep], held[keep]
 
 
 def _split(column: str) -> tuple[str, int]:

@@ -170,8 +170,8 @@ class EquationError:
 
     def size_of(self, theta: Array) -> Array:
         """Return per joint the factor that makes the arm file's torques of those of `theta`, by least squares."""
-        own = np.einsum("i,jil,l->j", theta, self.gram, theta)
-        size: Array = np.einsum("i,jil,l->j", self.arm.theta, self.gram, theta) / np.maximum(own, 1e-30)
+        squares = np.einsum("i,jil,l->j", theta, self.gram, theta)
+        size: Array = np.einsum("i,jil,l->j", self.arm.theta, self.gram, theta) / np.maximum(squares, 1e-30)
         return size
 
     def __len__(self) -> int:

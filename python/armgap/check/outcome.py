@@ -66,7 +66,8 @@ def seconds(time: float) -> str:
 def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None = None) -> Log:
     """Return some rows of a log, each with the mean torque from its time to that of the next one.
 
-    The torque's impulse over every interval is what it was, so that an arm gains the same momentum.
+    The torque's impulse over every interval and its first moment are what they were, so that an arm gains the same momentum and goes the
+    same way.
 
     Parameters
     ----------
@@ -90,4 +91,21 @@ def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None 
     for row, j in np.argwhere(empty):
         tau[row, j] = tau[row - 1, j] if row else 0.0
     dq = None if log.dq is None else log.dq[kept]
-    return replace(log, t=log.t[kept], q=log.q[kept], tau=tau, dq=dq)
+    return replace(log, t=log.t[kept], q=log.q[kept], tau=tau, dq=dq, moment=_moment(log, kept, tau, valid))
+
+
+def _moment(
+    log: Log, kept: NDArray[np.intp], mean: NDArray[np.float64], valid: NDArray[np.bool_] | None
+) -> NDArray[np.float64]:
+    """Return the first moment of the torque about the middle of every interval between kept rows; zero where a torque does not count."""
+    first, counts = int(kept[0]), np.diff(np.append(kept, len(log)))
+    ends = np.append(log.t[1:], log.t[-1] + log.sample_period)
+    middle = np.repeat(0.5 * (log.t[kept] + np.append(log.t[kept[1:]], ends[-1])), counts)
+    held, centre = (ends - log.t)[first:], 0.5 * (ends + log.t)[first:]
+    apart = (log.tau[first:] - np.repeat(mean, counts, axis=0)) * (held * (centre - middle))[:, None]
+    moment = np.add.reduceat(apart, kept - first)
+    if log.moment is not None:
+        moment += np.add.reduceat(log.moment[first:], kept - first)
+    if valid is not None:
+        moment[~np.logical_and.reduceat(valid[first:], kept - first)] = 0.0
+    return moment

@@ -25,7 +25,7 @@ def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
     for j in range(1, arm.n_joints + 1):
         for degrees in OFFSETS:
             corrections = Corrections(zero={f"q{j}": math.radians(degrees)})
-            what = f"`q{j}` reads {degrees} degrees where the model's joint {j} is at zero"
+            what = f"`q{j}` counts from {degrees} degrees of the model's joint {j}"
             if j == 1 and degrees == 180:
                 if arm.expects_weight:
                     upright = Corrections(gravity="reversed")

@@ -17,9 +17,13 @@ from armgap.log import Log
 
 __all__ = ["find"]
 
+# Units that a reference may be in where positions are in rad: rad, degrees, turns.
+_UNITS = (1.0, 180.0 / np.pi, 0.5 / np.pi)
 # The column follows the position by a factor this near to one, and from the same zero to this part of the travel.
 _NEAR_ONE = 0.15
 _NEAR_ZERO = 0.15
+# A servo answers within this time [s]: its inertia term is smaller than that squared. An arm that hangs swings more slowly.
+_SLOWEST = 0.1
 # Share of the column's variance that the servo's equation may leave, and the part of what the arm's own equation leaves.
 _LEFT = 0.05
 _BETTER = 0.2
@@ -31,7 +35,9 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
     """Return the torque columns that are commanded positions."""
     rows = [Rows.of(log, arm) for log in logs]
     base = EquationError(rows, arm)
-    torque = base.fit(*bounds(arm)).share * base.scale / np.maximum(base.square, 1e-30)
+    if not len(base):
+        return []
+    torque = np.minimum(base.of_torques(base.fit(*bounds(arm))).share, _in_any_unit(base, arm))
     checks = []
     for j in range(arm.n_joints):
         left = max(_servo(log, j) for log in logs)
@@ -45,6 +51,14 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
     return checks
 
 
+def _in_any_unit(base: EquationError, arm: Arm) -> NDArray[np.float64]:
+    """Return the share that stays unexplained of every column as a torque of whatever unit."""
+    factors = base.expected()
+    if np.any(factors <= 0):
+        return np.ones(len(factors))
+    return base.with_factors(*bounds(arm), factors).share
+
+
 def _servo(log: Log, j: int) -> float:
     """Return the share of a torque column's variance that is no reference of a servo; 1 if it is none."""
     t, q, tau = log.t[:_MOST], log.q[:_MOST, j], log.tau[:_MOST, j]
@@ -56,7 +70,8 @@ def _servo(log: Log, j: int) -> float:
     a = np.column_stack([np.ones_like(q), q, dq, ddq])
     size = np.maximum(np.abs(a).max(axis=0), 1e-30)
     x = np.linalg.lstsq(a / size, tau, rcond=None)[0] / size
-    follows = abs(x[1] - 1.0) < _NEAR_ONE and abs(x[0]) < _NEAR_ZERO * float(np.ptp(q))
+    follows = any(abs(x[1] / unit - 1.0) < _NEAR_ONE for unit in _UNITS) and abs(x[0]) < _NEAR_ZERO * float(np.ptp(tau))
+    follows &= abs(x[3]) < _SLOWEST**2 * abs(x[1])
     return float(np.var(tau - a @ x)) / variance if follows else 1.0
 
 

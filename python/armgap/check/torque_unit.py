@@ -7,8 +7,9 @@ there only another order of magnitude is a unit; anything closer is left to the 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from armgap.check.check import Check, Severity
 from armgap.check.corrections import Corrections
 from armgap.check.equation_error import EquationError, bounds
 
-__all__ = ["Factors", "find"]
+__all__ = ["Factors", "find", "refined", "said"]
 
 # A factor within these bounds is a gain of the drive (an effect), or wrong parameters.
 _GAIN = 2.0
@@ -88,12 +89,34 @@ def _said(factors: NDArray[np.float64], odd: Sequence[int], shared: bool) -> tup
         severity = "warning"
     elif largest > _LARGEST:
         severity = "error"
+    return corrections, said(corrections.factor, severity, shared=shared)
+
+
+def said(factors: Mapping[str, float], severity: Severity = "repaired", *, shared: bool = False) -> list[Check]:
+    """Return one check per column; a factor that all columns share is also one of all parameters."""
     checks = []
-    for column, c in corrections.factor.items():
+    for column, c in factors.items():
         remedies = [f"--factor {column}={c:.4g}"]
         if shared:
             remedies.append(f"all values of theta and friction in the arm file divided by {c:.4g}")
         message = f"`{column}` times {c:.4g} is the torque that the arm file expects: a current, a percentage, or the motor's side of a gear?"
+        if severity == "warning" and shared:
+            message += " Or the arm file's values are off by that much: they are trusted no further than that"
         joint = int(column[3:]) if column != "tau" else None
         checks.append(Check("torque_unit", severity, message, tuple(remedies), joint))
-    return corrections, checks
+    return checks
+
+
+def refined(factors: Mapping[str, float], causes: Sequence[Mapping[str, Any]], n_joints: int) -> dict[str, float]:
+    """Return repaired factors with the gains that a diagnosis named; empty where it named none.
+
+    A column of unknown unit has no gain of its own: what the fit finds there is what the factor was off by. A gain of another joint is the
+    inverse on this one, as the size of all parameters is only trusted to a few percent.
+    """
+    gains = {c["joint"]: c["parameters"]["gain"]["value"] for c in causes if c["effect"] == "torque_gain"}
+    by_joint = {j: factors.get(f"tau{j}", factors.get("tau")) for j in range(1, n_joints + 1)}
+    repaired = {j: c for j, c in by_joint.items() if c is not None}
+    if not gains or not repaired:
+        return {}
+    elsewhere = math.prod(gain for j, gain in gains.items() if j not in repaired)
+    return {f"tau{j}": float(f"{c * gains.get(j, 1.0) / elsewhere:.4g}") for j, c in repaired.items()}

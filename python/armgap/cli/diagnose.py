@@ -9,7 +9,6 @@ import click
 from armgap.cli.common import (
     ManyValues,
     arm_option,
-    check_outputs,
     columns_option,
     console,
     corrections_options,
@@ -20,20 +19,30 @@ from armgap.cli.common import (
     read_arm,
     report_option,
     units_option,
-    write,
 )
+from armgap.cli.files import InputFile
+from armgap.cli.numbers import Seed
 from armgap.cli.progress import working
+from armgap.output import is_stdout, write
 
 __all__ = ["command"]
 
 
 @click.command("diagnose", cls=ManyValues)
-@click.argument("logs", nargs=-1, required=True, metavar="LOG…")
+@click.argument("logs", nargs=-1, required=True, type=InputFile(), metavar="LOG…")
 @arm_option
-@click.option("--holdout", multiple=True, metavar="LOG…", help="Logs to judge on; after the LOGs to learn from.")
+@click.option(
+    "--holdout", multiple=True, type=InputFile(), metavar="LOG…", help="Logs to judge on; after the LOGs to learn from."
+)
 @click.option("--horizon", default=0.25, show_default=True, help="Prediction horizon [s].")
 @click.option("--max-causes", default=4, show_default=True, help="Causes named at most.")
-@click.option("--seed", default=1, show_default=True, help="Seed of the resampling.")
+@click.option(
+    "--seed",
+    default=1,
+    show_default=True,
+    type=Seed(),
+    help="Seed of the resampling.",
+)
 @click.option("--no-repair", is_flag=True, help="Say what is wrong with the logs and repair nothing.")
 @corrections_options
 @report_option
@@ -61,7 +70,6 @@ def command(
     from armgap.log import gather
     from armgap.report import check_report, diagnosis_report, prepare_report
 
-    check_outputs(json_file, report_file)
     check_report(report_file)
     arm = read_arm(arm_file, corrections)
     mapping, declared = parse_columns(columns), parse_units(units)
@@ -76,7 +84,7 @@ def command(
         write(report_file, diagnosis_report(result, report_file))
     if json_file is not None:
         write(json_file, result.to_json(indent=2))
-    if not quiet and json_file != "-":
+    if not (quiet or is_stdout(json_file, report_file)):
         from armgap.report import summary_table
 
         say = console()

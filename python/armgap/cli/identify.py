@@ -9,7 +9,6 @@ import click
 
 from armgap.cli.common import (
     arm_option,
-    check_outputs,
     columns_option,
     console,
     corrections_options,
@@ -20,10 +19,11 @@ from armgap.cli.common import (
     quiet_option,
     read_arm,
     units_option,
-    write,
 )
+from armgap.cli.files import Command, InputFile
 from armgap.cli.progress import working
 from armgap.literals import FILTERS, SCHEMES
+from armgap.output import is_stdout, write
 from armgap.progress import part_callback, use_callback
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command("identify")
-@click.argument("logs", nargs=-1, required=True, metavar="LOG…")
+@click.command("identify", cls=Command)
+@click.argument("logs", nargs=-1, required=True, type=InputFile(), metavar="LOG…")
 @arm_option
 @click.option("--scheme", type=click.Choice([*SCHEMES, "all"]), default="all", show_default=True)
 @click.option("--filters", type=click.Choice(FILTERS), default="exact", show_default=True)
@@ -74,7 +74,6 @@ def command(
     from armgap.log import gather
     from armgap.log.findings import remarks
 
-    check_outputs(json_file)
     arm = read_arm(arm_file, corrections)
     schemes = [s for s in SCHEMES if scheme in (s, "all")]
     with working("reading", quiet=quiet):
@@ -83,7 +82,7 @@ def command(
         results = interruptible(lambda: _identified(read, arm, schemes, settings))
     if json_file is not None:
         write(json_file, json.dumps([r.to_dict() for r in results], indent=2))
-    if quiet or json_file == "-":
+    if quiet or is_stdout(json_file):
         return
     noticed = [{"log": log.name, "kind": f.kind, "message": f.message} for log in read for f in log.findings]
     for remark in remarks(noticed):

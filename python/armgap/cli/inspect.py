@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from armgap.cli.common import (
-    check_outputs,
     columns_option,
     console,
     corrections_options,
@@ -19,9 +18,10 @@ from armgap.cli.common import (
     quiet_option,
     read_arm,
     units_option,
-    write,
 )
+from armgap.cli.files import Command, InputFile, OutputFile
 from armgap.cli.progress import working
+from armgap.output import is_stdout, write
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
@@ -30,10 +30,16 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command("inspect")
-@click.argument("logs", nargs=-1, required=True, metavar="LOG…")
-@click.option("--arm", "arm_file", metavar="ARM.toml", help="Arm file; tells what the log says about its parameters.")
-@click.option("--report", "report_file", metavar="OUT.html", help="Write a page with pictures.")
+@click.command("inspect", cls=Command)
+@click.argument("logs", nargs=-1, required=True, type=InputFile(), metavar="LOG…")
+@click.option(
+    "--arm",
+    "arm_file",
+    type=InputFile(),
+    metavar="ARM.toml",
+    help="Arm file; tells what the log says about its parameters.",
+)
+@click.option("--report", "report_file", type=OutputFile(), metavar="OUT.html", help="Write a page with pictures.")
 @click.option("--no-repair", is_flag=True, help="Say what is wrong with the logs and repair nothing.")
 @corrections_options
 @json_option
@@ -60,7 +66,6 @@ def command(
     from armgap.inspection import Columns
     from armgap.log import paths
 
-    check_outputs(json_file, report_file)
     naming = {"columns": parse_columns(columns), "units": parse_units(units)}
     arm = read_arm(arm_file, corrections) if arm_file is not None else None
     with working("reading", quiet=quiet):
@@ -74,7 +79,7 @@ def command(
     if json_file is not None:
         results = [f.to_dict() for f in found]
         write(json_file, json.dumps(results[0] if len(results) == 1 else results, indent=2, allow_nan=False))
-    if quiet or json_file == "-":
+    if quiet or is_stdout(json_file, report_file):
         return
     from armgap.inspection.terminal import column_table, tables
 

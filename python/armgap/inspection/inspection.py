@@ -154,9 +154,12 @@ def _checked(log: Log, arm: Arm | None, *, repair: bool) -> tuple[Log, tuple[Che
     if arm is None or log.duration < 4 * _HORIZON_S:
         return log, tuple(checks)
     cut = int(len(log) * _LEARNT)
-    examined = examine(
-        [log.part(0, cut, log.name)], [log.part(cut, len(log), log.name)], arm, horizon=_HORIZON_S, repair=repair
-    )
+    parts = [log.part(0, cut, log.name)], [log.part(cut, len(log), log.name)]
+    try:
+        examined = examine(*parts, arm, horizon=_HORIZON_S, repair=repair)
+    except ValueError as error:
+        said = Finding("checks", f"not checked against the arm file: {error}")
+        return log.with_findings((*log.findings, said)), tuple(checks)
     return log, (*examined.checks, *checks)
 
 

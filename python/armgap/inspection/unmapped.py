@@ -1,4 +1,4 @@
-"""A file whose columns nobody has named yet: what each column holds, and a mapping that its name and course suggest.
+"""A file whose columns nobody has named yet: what each column holds, and a mapping that its name and trend suggest.
 
 What is proposed is for the user to confirm: nothing is read by it.
 """
@@ -54,7 +54,7 @@ class Column:
         Rows, and rows without a finite number.
     low, high : float or None
         Range of its numbers; None where it holds none.
-    course : str
+    trend : str
         ``"rising"`` (as times do), ``"constant"``, ``"varies"``, or ``"text"``.
     """
 
@@ -65,7 +65,7 @@ class Column:
     missing: int
     low: float | None
     high: float | None
-    course: str
+    trend: str
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Columns:
 
 
 def columns_of(path: str | Path, arm: Arm | None = None) -> Columns:
-    """List the columns of a file, and propose a mapping by their names and their course.
+    """List the columns of a file, and propose a mapping by their names and their trend.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def _proposed(columns: tuple[Column, ...], n_joints: int | None) -> dict[str, st
     """Standard names in their order, each with the column that suggests itself."""
     usable = [c for c in columns if c.low is not None]
     kinds = {c.name: _kind(c) for c in usable}
-    rising = [c.name for c in usable if c.course == "rising"]
+    rising = [c.name for c in usable if c.trend == "rising"]
     time = next((name for name in rising if kinds[name] == "t"), rising[0] if rising else _PLACEHOLDER)
     groups = {kind: _numbered([c.name for c in usable if kinds[c.name] == kind and c.name != time]) for kind in _JOINT}
     n = n_joints or max(len(groups["q"]), len(groups["tau"]), 1)
@@ -180,7 +180,7 @@ def _numbered(names: list[str]) -> list[str]:
 def _kind(column: Column) -> str | None:
     """What a column seems to be: by the words of its name; a rising column with a name of time is time."""
     words = [w for w in re.split(r"[^a-z0-9]+", _spread(column.name)) if w]
-    if column.course == "rising" and any(_TIME.fullmatch(w) for w in words):
+    if column.trend == "rising" and any(_TIME.fullmatch(w) for w in words):
         return "t"
     for kind, pattern in _WORDS.items():
         if any(pattern.fullmatch(w) for w in words):

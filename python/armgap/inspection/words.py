@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["COLUMN_HEADER", "column_rows", "grids", "overview", "proposal"]
 
 Grid = tuple[list[str], list[list[str]]]
-COLUMN_HEADER = ("column", "type", "unit", "lowest", "highest", "course", "missing")
+COLUMN_HEADER = ("column", "type", "unit", "lowest", "highest", "trend", "missing")
 """What is said of each column of a file that nobody has mapped."""
 _UNKNOWN = 10.0  # ten times the value
 _RECOMMENDED = 100.0  # condition number up to which a motion counts as a good one
@@ -141,7 +141,7 @@ def column_rows(found: Columns) -> list[tuple[str, ...]]:
         return "" if value is None else f"{value:.6g}"
 
     return [
-        (c.name, c.dtype, c.unit or "", number(c.low), number(c.high), c.course, str(c.missing or ""))
+        (c.name, c.dtype, c.unit or "", number(c.low), number(c.high), c.trend, str(c.missing or ""))
         for c in found.columns
     ]
 

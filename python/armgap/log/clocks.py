@@ -80,8 +80,8 @@ def ticks(raw: Raw, scales: Scales, names: Names, arm: Arm | None, place: Path |
     factor = raw.tick_s or scales.t or _unit(raw.t, names.t, arm, place, [])
     if raw.t_tau is None or names.t_tau is None:
         return {"t": factor}
-    own = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, arm, place, [])
-    return {"t": factor, "t_tau": own}
+    tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, arm, place, [])
+    return {"t": factor, "t_tau": tau_factor}
 
 
 def _seconds(times: Times, start: np.int64 | np.float64, factor: float) -> NDArray[np.float64]:

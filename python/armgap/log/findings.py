@@ -20,7 +20,7 @@ class Finding:
     kind : str
         How the log was understood: ``"format"``, ``"units"``, ``"joints"``, ``"torque"``, ``"clock"``, ``"columns"``. What
         was changed: ``"cleaned"``, ``"corrected"``, ``"stretches"``. What is worth knowing: ``"sampling"``, ``"period"``, ``"gap"``,
-        ``"constant"``, ``"limit"``.
+        ``"constant"``, ``"limit"``, ``"checks"``.
     message : str
         In words.
     times : tuple of float

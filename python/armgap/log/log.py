@@ -12,11 +12,12 @@ import numpy as np
 import polars as pl
 from numpy.typing import ArrayLike, NDArray
 
-from armgap.errors import OptionError, ResultError
+from armgap.errors import OptionError
 from armgap.log import checks, clocks, columns, frames, units
 from armgap.log.findings import Finding
 from armgap.log.formats import record
 from armgap.log.recording import Recording
+from armgap.output import write
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
@@ -48,6 +49,8 @@ class Log:
         File it was read from.
     columns : mapping
         The file's own name of each column in use, by standard name.
+    moment : ndarray, shape (n_samples, n_joints), optional
+        First moment of every torque about the middle of its interval, where it is the mean of several [N m s^2 or N s^2].
     part_of : str, optional
         Name of the log that it is a part of.
     first_row : int
@@ -64,6 +67,7 @@ class Log:
     findings: tuple[Finding, ...] = ()
     path: Path | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
+    moment: NDArray[np.float64] | None = None
     part_of: str | None = None
     first_row: int = 0
     units: Mapping[str, str] = field(default_factory=dict)
@@ -208,7 +212,7 @@ class Log:
     def __post_init__(self) -> None:
         """Put times on whole nanoseconds, so that a log is the same log in every format, and make the arrays read-only."""
         object.__setattr__(self, "t", np.rint(self.t * _NS) / _NS)
-        for name in ("t", "q", "tau", "dq"):
+        for name in ("t", "q", "tau", "dq", "moment"):
             values = getattr(self, name)
             if values is not None:
                 view = values.view()
@@ -260,7 +264,8 @@ class Log:
         dq = None if self.dq is None else self.dq[rows]
         found = self.findings if findings is None else findings
         part = Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
-        return replace(part, units=self.units, part_of=self.recording, first_row=self.first_row + first)
+        moment = None if self.moment is None else self.moment[rows]
+        return replace(part, units=self.units, moment=moment, part_of=self.recording, first_row=self.first_row + first)
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
         """Return the log with other findings."""
@@ -275,16 +280,6 @@ class Log:
         return pl.DataFrame(data)
 
     def write(self, path: str | Path) -> None:
-        """Write the log as Parquet, or as CSV if the name ends in ``.csv``; nothing is left behind if that fails."""
-        path = Path(path)
-        temporary = path.with_name(path.name + ".partial")
-        try:
-            if path.suffix.lower() == ".csv":
-                self.to_polars().write_csv(temporary)
-            else:
-                self.to_polars().write_parquet(temporary)
-            temporary.replace(path)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            reason = error.strerror or str(error)
-            raise ResultError(f"cannot be written ({reason})", remedy="choose another place", file=path) from None
+        """Write the log as Parquet, or as CSV if the name ends in ``.csv``; see `armgap.output.write`."""
+        frame = self.to_polars()
+        write(path, frame.write_csv if Path(path).suffix.lower() == ".csv" else frame.write_parquet)

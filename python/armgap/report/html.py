@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from armgap.output import write
 from armgap.report.document import Document, diagnosis_document
 
 if TYPE_CHECKING:
@@ -40,4 +41,4 @@ def render_html(diagnosis: Diagnosis | dict[str, Any]) -> str:
 
 def write_html(diagnosis: Diagnosis | dict[str, Any], path: str | Path) -> None:
     """Write the report of a diagnosis to a file."""
-    Path(path).write_text(render_html(diagnosis), encoding="utf-8")
+    write(path, render_html(diagnosis))

@@ -63,6 +63,10 @@ _NO_CAUSE = {
     ),
     "input": ("None is named", "While the input contradicts itself, any effect would only imitate the contradiction."),
 }
+_NONE_ALLOWED = (
+    "None was allowed",
+    "The number of causes was limited to 0, so no effect was tried as one; allow at least one (--max-causes 1).",
+)
 _ARROW = "\N{NO-BREAK SPACE}→\N{NO-BREAK SPACE}"
 _FRICTION = {"viscous": "viscous friction", "coulomb": "Coulomb friction"}
 _INERTIAL = {
@@ -217,12 +221,19 @@ def doubtful(data: Data) -> bool:
     return bool(causes) and causes[0]["probability"] < DOUBTFUL
 
 
+def none_allowed(data: Data) -> bool:
+    """Whether a gap is left and no cause could be named, because the number of causes was limited to none."""
+    return data["verdict"] == "unexplained" and (data.get("options") or {}).get("max_causes") == 0
+
+
 def verdict(data: Data) -> str:
     """The verdict as a sentence."""
     if data["verdict"] == "input":
         return _contradiction(data)
     if doubtful(data):
         return "The arm does something that its model leaves out, and part of the gap stays unexplained."
+    if none_allowed(data):
+        return "There is a gap; no cause was allowed, so none is named."
     return _VERDICTS.get(data["verdict"], str(data["verdict"]))
 
 
@@ -343,6 +354,8 @@ def variable_text(variable: str) -> str:
 
 def _which(data: Data) -> tuple[str, str]:
     causes = data.get("causes") or []
+    if not causes and none_allowed(data):
+        return _NONE_ALLOWED
     if not causes:
         return _NO_CAUSE.get(data["verdict"], ("No cause was named", ""))
     headline = _capital(" and ".join(_counted([f"{title(c['effect'])}, {joint_text(c['joint'])}" for c in causes])))

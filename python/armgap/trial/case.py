@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from armgap.errors import ArmgapError
+from armgap.output import write
 from armgap.trial.armfile import arm_toml, draw_nominal
 from armgap.trial.arms import TrialArm, random_arm
 from armgap.trial.effects import REGISTRY, Draw, NoTravelError, usage
 from armgap.trial.engine import mujoco
 from armgap.trial.excitation import STYLES, Excitation, Tracked, acceptable, draw_excitation, rings
 from armgap.trial.key import KEY_FILE, HiddenEffect, Key
+from armgap.trial.layout import ARM_FILE
 from armgap.trial.plant import PlantConfig
 from armgap.trial.simulated_arm import SimulatedArm, Trace, run
 from armgap.trial.visibility import Visibility, visibility
@@ -66,10 +68,10 @@ class Case:
         """Write ``arm.toml``, one Parquet file per log, and ``key.json``."""
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
-        (target / "arm.toml").write_text(self.arm_file, encoding="utf-8")
-        (target / KEY_FILE).write_bytes(self.key.to_json().encode())
+        write(target / ARM_FILE, self.arm_file)
+        write(target / KEY_FILE, self.key.to_json())
         for name, trace in self.logs.items():
-            _frame(trace).write_parquet(target / f"{name}.parquet", compression="zstd")
+            write(target / f"{name}.parquet", partial(_frame(trace).write_parquet, compression="zstd"))
         return target
 
 

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from armgap.output import write_folder
 from armgap.trial.arms import MODELS
 from armgap.trial.case import Case, EffectRequest, NoMotionError, make_case, possible
+from armgap.trial.layout import case_name
 
 #: Families of cases and their usual shares.
 FAMILIES = {"single": 0.65, "null": 0.08, "parameters": 0.07, "pair": 0.12, "outside": 0.08}
@@ -131,7 +133,8 @@ def make_trial(
         The case folders.
     """
     plans = [replace(p, duration=duration) for p in plan_trial(seed, n_cases, families)]
-    targets = [Path(folder) / f"case-{i:04d}" for i in range(n_cases)]
+    targets = [Path(folder) / case_name(i) for i in range(n_cases)]
+    Path(folder).mkdir(parents=True, exist_ok=True)
     if workers == 1:
         return [_make(p, t) for p, t in zip(plans, targets, strict=True)]
     with ProcessPoolExecutor(workers) as pool:
@@ -139,7 +142,7 @@ def make_trial(
 
 
 def _make(plan: Plan, target: Path) -> Path:
-    return plan.make().write(target)
+    return write_folder(target, plan.make().write)
 
 
 def _deal(shares: Mapping[str, float], n: int) -> list[str]:

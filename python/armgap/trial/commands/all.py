@@ -6,7 +6,9 @@ from pathlib import Path
 
 import click
 
-from armgap.cli.common import check_outputs, json_option, quiet_option
+from armgap.cli.common import json_option, quiet_option
+from armgap.cli.files import Command
+from armgap.output import is_stdout
 from armgap.trial.commands.common import cases_option, duration_option, output_option, seed_option, workers_option
 from armgap.trial.commands.run import limit_option
 from armgap.trial.commands.score import md_option
@@ -14,7 +16,7 @@ from armgap.trial.commands.score import md_option
 __all__ = ["all_of_it"]
 
 
-@click.command("all")
+@click.command("all", cls=Command)
 @cases_option
 @seed_option
 @output_option
@@ -47,11 +49,10 @@ def all_of_it(
     from armgap.trial.commands.score import score_all
     from armgap.trial.methods import methods
 
-    check_outputs(json_file, md_file)
     names = list(methods()) if (baselines if former_name is None else former_name) else ["armgap"]
     for name in names:
         methods()[name].check()  # what is not installed is missed now, not after the cases are made
-    silent = quiet or "-" in (json_file, md_file)
+    silent = quiet or is_stdout(json_file, md_file)
     make_them(folder, cases, seed, duration, workers, silent)
     answer_all(folder, names, workers, limit_s, False, silent)
     score_all(folder, json_file, md_file, silent)

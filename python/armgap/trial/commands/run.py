@@ -8,22 +8,26 @@ from pathlib import Path
 import click
 
 from armgap.cli.common import console, quiet_option
+from armgap.cli.files import Command, Words
+from armgap.cli.numbers import Number
 from armgap.trial.commands.common import folder_argument, progress, workers_option
 
 __all__ = ["answer_all", "baselines", "former_name", "limit_option", "run"]
 
+LONGEST_S = 1e6
+"""Of one case: eleven days; a system's clocks do not wait for ever."""
 limit_option = click.option(
     "--limit",
     "limit_s",
     default=300.0,
     show_default=True,
-    type=click.FloatRange(min=1.0),
+    type=Number(1.0, LONGEST_S),
     help="Longest time for one case [s].",
 )
 again_option = click.option("--again", is_flag=True, help="Answer anew what is answered already.")
 
 
-@click.command("run")
+@click.command("run", cls=Command)
 @folder_argument
 @workers_option
 @limit_option
@@ -34,10 +38,14 @@ def run(folder: Path, workers: int, limit_s: float, again: bool, quiet: bool) ->
     answer_all(folder, ["armgap"], workers, limit_s, again, quiet)
 
 
-@click.command("baselines")
+@click.command("baselines", cls=Command)
 @folder_argument
 @click.option(
-    "--only", multiple=True, metavar="NAME", help="Only this method; may be repeated. All baselines by default."
+    "--only",
+    multiple=True,
+    type=Words(),
+    metavar="NAME",
+    help="Only this method; may be repeated. All baselines by default.",
 )
 @workers_option
 @limit_option
@@ -56,7 +64,7 @@ def baselines(folder: Path, only: tuple[str, ...], workers: int, limit_s: float,
 
 
 #: Former name of the command; goes with 0.3.0.
-former_name = click.Command(
+former_name = Command(
     "peers", callback=baselines.callback, params=baselines.params, help=baselines.help, hidden=True, deprecated=True
 )
 
