@@ -114,7 +114,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
             raise ResultError("cannot be written to", remedy=_PLACE, file=path)
         return
     target = Path(os.path.realpath(path))
-    if not target.parent.is_dir():
+    if not os.path.isdir(target.parent):
         raise ResultError("its folder does not exist", remedy="make the folder first", file=path)
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise ResultError("its folder cannot be written to", remedy=_PLACE, file=path)
