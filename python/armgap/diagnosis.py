@@ -23,7 +23,7 @@ from armgap.own import OwnEffect, Tables
 from armgap.progress import Told, following, tell
 from armgap.report.notebook import Shown
 
-__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Value", "diagnose"]
+__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Sanity", "Value", "diagnose"]
 
 #: What a part of a log is called after the log's own name.
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
@@ -62,8 +62,8 @@ class Gap:
     horizon_s : float
         Prediction horizon [s].
     before, refit, after, floor : tuple of float
-        With the arm file as it is, with its parameters re-estimated, with the causes added, and what measurement noise
-        alone leaves [rad or m].
+        With the arm file as it is, with its parameters re-estimated, with the named causes added, and what measurement
+        noise alone leaves [rad or m].
     closed : float
         Share of the gap above the floor that is closed, over all joints.
     closed_ci : tuple of float
@@ -72,6 +72,8 @@ class Gap:
         The same over the whole holdout, simulated from its first sample.
     horizons : tuple of AtHorizon
         The same at other prediction horizons, as far as the logs are long enough.
+    motion : tuple of float
+        RMS displacement over the horizon [rad or m].
     """
 
     horizon_s: float
@@ -84,6 +86,7 @@ class Gap:
     free_run_before: tuple[float, ...]
     free_run_after: tuple[float, ...]
     horizons: tuple[AtHorizon, ...] = ()
+    motion: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,7 @@ class Equivalent:
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause; a push belongs to one log."""
+    """A named cause, or a candidate, which says `why` it is not named; a push belongs to one log."""
 
     effect: str
     title: str
@@ -120,6 +123,7 @@ class Cause:
     closed: float
     equivalents: tuple[Equivalent, ...]
     log: str | None = None
+    why: str | None = None
 
 
 @dataclass(frozen=True)
@@ -143,7 +147,27 @@ class RuledOut:
     why: str | None
 
 
-_Record = TypeVar("_Record", Value, Equivalent, Bound)
+@dataclass(frozen=True)
+class Sanity:
+    """A re-estimated parameter that is not to be believed as it stands.
+
+    Attributes
+    ----------
+    parameter : str
+        Name as in the arm's parameters.
+    kind : str
+        ``"sign"``: gravity turned over; ``"sigma"``: more than five of the arm file's standard deviations away; ``"zero"``: friction
+        of the arm file is gone; ``"unmoved"``: it stayed where it began, beside a gap.
+    message : str
+        The same in words, with the figures.
+    """
+
+    parameter: str
+    kind: str
+    message: str
+
+
+_Record = TypeVar("_Record", Value, Equivalent, Bound, Sanity)
 
 
 @dataclass(frozen=True)
@@ -165,6 +189,10 @@ class Diagnosis(Shown):
         What was looked for and not found.
     parameters : dict
         ``nominal``, ``refit`` and ``with_causes``: name to `Value`.
+    candidates : tuple of Cause
+        What was found and is not fit to be named, each with its `why`; not part of the model with causes.
+    sanity : tuple of Sanity
+        Re-estimated parameters of the model with causes that are not to be believed as they stand.
     extra : dict
         What a report draws besides: curves, ranking, options.
     """
@@ -175,13 +203,15 @@ class Diagnosis(Shown):
     causes: tuple[Cause, ...]
     ruled_out: tuple[RuledOut, ...]
     parameters: dict[str, dict[str, Value]]
+    candidates: tuple[Cause, ...] = ()
+    sanity: tuple[Sanity, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict, repr=False)
     _data: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Diagnosis:
         """Build a diagnosis from its JSON object."""
-        known = {"schema", "verdict", "gap", "where", "causes", "ruled_out", "parameters"}
+        known = {"schema", "verdict", "gap", "where", "causes", "candidates", "ruled_out", "parameters", "sanity"}
         gap = data["gap"]
         parameters = {
             stage: {name: _take(Value, value) for name, value in values.items()}
@@ -200,11 +230,14 @@ class Diagnosis(Shown):
                 tuple(gap["free_run"]["before"]),
                 tuple(gap["free_run"]["after"]),
                 tuple(_at_horizon(h) for h in gap.get("horizons", ())),
+                tuple(gap.get("motion", ())),
             ),
             where=tuple(_place(p) for p in data["where"]),
             causes=tuple(_cause(c) for c in data["causes"]),
             ruled_out=tuple(_ruled_out(r) for r in data["ruled_out"]),
             parameters=parameters,
+            candidates=tuple(_cause(c) for c in data.get("candidates", ())),
+            sanity=tuple(_take(Sanity, s) for s in data.get("sanity", ())),
             extra={key: value for key, value in data.items() if key not in known},
             _data=data,
         )
@@ -258,6 +291,7 @@ def _cause(data: dict[str, Any]) -> Cause:
         data["closed"],
         tuple(_take(Equivalent, e) for e in data["equivalents"]),
         data.get("log"),
+        data.get("why"),
     )
 
 
@@ -359,7 +393,7 @@ def _diagnose(
         raise _refused(str(error), training, held) from None
     data = own.named(json.loads(text))
     data["arm"]["name"] = arm.name
-    for cause in data["causes"]:
+    for cause in (*data["causes"], *data["candidates"]):
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = notes + data["notes"]
