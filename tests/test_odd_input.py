@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 import pytest
 
-from armgap import Log, OwnEffect, diagnose, simulate
+from armgap import Log, CustomEffect, diagnose, simulate
 from armgap.errors import OptionError
 from armgap.simulation import Effect
 from commands import EVERY, armgap_process, refused, snapshot
@@ -112,10 +112,10 @@ def test_impossible_options_in_python(options, arm, seed_log):
 
 
 def test_effects_of_the_other_function(arm, seed_log):
-    own = OwnEffect("drag", 1, lambda t, q, dq, tau: dq[:, 0])
+    own = CustomEffect("drag", 1, lambda t, q, dq, tau: dq[:, 0])
     with pytest.raises(OptionError, match="Effect"):
         simulate(arm, seed_log.t, seed_log.tau, effects=[own])  # type: ignore[list-item]
-    with pytest.raises(OptionError, match="OwnEffect"):
+    with pytest.raises(OptionError, match="CustomEffect"):
         diagnose(seed_log, arm, effects=[Effect("stribeck", 1)])  # type: ignore[list-item]
     with pytest.raises(OptionError):
         simulate(arm, seed_log.t, seed_log.tau, effects=[Effect("torque_offset", -1, {"offset": 1.0})])

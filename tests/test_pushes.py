@@ -47,6 +47,7 @@ def run(seed: int, *, pushed: bool) -> Log:
 
 
 def judged(log: Log) -> Diagnosis:
+    """What is found with no cause allowed: pushes, as candidates."""
     return diagnose(log, ARM, max_causes=0)
 
 
@@ -56,8 +57,8 @@ def pushed() -> Diagnosis:
 
 
 def test_every_push_is_found_on_its_joint_at_its_time(pushed: Diagnosis) -> None:
-    assert [c.effect for c in pushed.causes] == ["external_pulse"] * 2
-    found = sorted((c.joint, c.parameters["time"].value, c.parameters["impulse"].value) for c in pushed.causes)
+    assert [c.effect for c in pushed.candidates] == ["external_pulse"] * 2
+    found = sorted((c.joint, c.parameters["time"].value, c.parameters["impulse"].value) for c in pushed.candidates)
     for (joint, time, impulse), (true_joint, centre, width, height) in zip(found, PUSHES, strict=True):
         assert joint == true_joint
         assert time == pytest.approx(centre, abs=0.1)
@@ -65,14 +66,14 @@ def test_every_push_is_found_on_its_joint_at_its_time(pushed: Diagnosis) -> None
 
 
 def test_a_push_beside_a_remainder_is_doubtful_and_belongs_to_its_log(pushed: Diagnosis) -> None:
-    for cause in pushed.causes:
+    for cause in pushed.candidates:
         assert cause.log == "log"
         assert 0.4 < cause.probability < 0.6
 
 
 def test_the_same_motion_without_pushes_shows_none() -> None:
     found = judged(run(3, pushed=False))
-    assert found.causes == ()
+    assert found.causes == found.candidates == ()
     assert found.verdict == "unexplained"
 
 
@@ -82,7 +83,7 @@ def test_an_end_that_is_met_again_and_again_is_no_push() -> None:
     stop = {"position": float(np.quantile(free.q[:, 0], 0.9)), "stiffness": 60.0, "damping": 0.1}
     met = [*UNMODELLED, Effect("contact", 1, stop)]
     log = simulate(TRUE, free.t, free.tau, effects=met, noise=1e-4, seed=4, name="log", tolerance=1e-5)
-    assert judged(replace(log, tau=free.tau)).causes == ()
+    assert judged(replace(log, tau=free.tau)).candidates == ()
 
 
 def limited(arm: Arm, reached_in: str, *pushes: Effect) -> tuple[Diagnosis, float]:

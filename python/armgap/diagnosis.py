@@ -29,7 +29,7 @@ from armgap.progress import ProgressCallback, report_progress, use_callback
 from armgap.reading import printable
 from armgap.report.notebook import NotebookDisplay
 
-__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Location", "RuledOut", "Value", "diagnose"]
+__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Location", "RuledOut", "Sanity", "Value", "diagnose"]
 
 if not TYPE_CHECKING:
     __getattr__ = old_names(__name__)
@@ -75,8 +75,8 @@ class Gap:
     horizon_s : float
         Prediction horizon [s].
     before, refit, after, floor : tuple of float
-        With the arm file as it is, with its parameters re-estimated, with the causes added, and what measurement noise
-        alone leaves [rad or m].
+        With the arm file as it is, with its parameters re-estimated, with the named causes added, and what measurement
+        noise alone leaves [rad or m].
     closed : float
         Share of the gap above the floor that is closed, over all joints.
     closed_ci : tuple of float
@@ -85,6 +85,8 @@ class Gap:
         RMS error over the whole holdout, simulated from its first sample [rad or m].
     horizons : tuple of GapAtHorizon
         RMS errors at other prediction horizons, as far as the logs are long enough.
+    motion : tuple of float
+        RMS displacement over the horizon [rad or m].
     """
 
     horizon_s: float
@@ -97,6 +99,7 @@ class Gap:
     free_run_before: tuple[float, ...]
     free_run_after: tuple[float, ...]
     horizons: tuple[GapAtHorizon, ...] = ()
+    motion: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,7 @@ class Equivalent:
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause; a push belongs to one log."""
+    """A named cause, or a candidate, which says `why` it is not named; a push belongs to one log."""
 
     effect: str
     title: str
@@ -133,6 +136,7 @@ class Cause:
     closed: float
     equivalents: tuple[Equivalent, ...]
     log: str | None = None
+    why: str | None = None
 
 
 @dataclass(frozen=True)
@@ -156,7 +160,27 @@ class RuledOut:
     why: str | None
 
 
-_Record = TypeVar("_Record", Value, Equivalent, Bound)
+@dataclass(frozen=True)
+class Sanity:
+    """A re-estimated parameter that is not to be believed as it stands.
+
+    Attributes
+    ----------
+    parameter : str
+        Name as in the arm's parameters.
+    kind : str
+        ``"sign"``: gravity turned over; ``"sigma"``: more than five of the arm file's standard deviations away; ``"zero"``: friction
+        of the arm file is gone; ``"unmoved"``: it stayed where it began, beside a gap.
+    message : str
+        The same in words, with the figures.
+    """
+
+    parameter: str
+    kind: str
+    message: str
+
+
+_Record = TypeVar("_Record", Value, Equivalent, Bound, Sanity)
 
 
 @dataclass(frozen=True)
@@ -180,6 +204,10 @@ class Diagnosis(NotebookDisplay):
         ``nominal``, ``refit`` and ``with_causes``: name to `Value`.
     checks : tuple of Check
         What was noticed about the input, errors first.
+    candidates : tuple of Cause
+        What was found and is not fit to be named, each with its `why`; not part of the model with causes.
+    sanity : tuple of Sanity
+        Re-estimated parameters of the model with causes that are not to be believed as they stand.
     extra : dict
         What a report draws besides: curves, ranking, options.
     """
@@ -191,13 +219,17 @@ class Diagnosis(NotebookDisplay):
     ruled_out: tuple[RuledOut, ...]
     parameters: dict[str, dict[str, Value]]
     checks: tuple[Check, ...] = ()
+    candidates: tuple[Cause, ...] = ()
+    sanity: tuple[Sanity, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict, repr=False)
     _data: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Diagnosis:
         """Build a diagnosis from its JSON object."""
-        known = {"schema", "verdict", "gap", "where", "causes", "ruled_out", "parameters", "checks"}
+        known = {
+            "schema", "verdict", "gap", "where", "causes", "candidates", "ruled_out", "parameters", "sanity", "checks",
+        }  # fmt: skip
         gap = data["gap"]
         parameters = {
             stage: {name: _take(Value, value) for name, value in values.items()}
@@ -216,12 +248,15 @@ class Diagnosis(NotebookDisplay):
                 tuple(gap["free_run"]["before"]),
                 tuple(gap["free_run"]["after"]),
                 tuple(_at_horizon(h) for h in gap.get("horizons", ())),
+                tuple(gap.get("motion", ())),
             ),
             where=tuple(_location(p) for p in data["where"]),
             causes=tuple(_cause(c) for c in data["causes"]),
             ruled_out=tuple(_ruled_out(r) for r in data["ruled_out"]),
             parameters=parameters,
             checks=tuple(Check.from_dict(c) for c in data.get("checks", ())),
+            candidates=tuple(_cause(c) for c in data.get("candidates", ())),
+            sanity=tuple(_take(Sanity, s) for s in data.get("sanity", ())),
             extra={key: value for key, value in data.items() if key not in known},
             _data=data,
         )
@@ -275,6 +310,7 @@ def _cause(data: dict[str, Any]) -> Cause:
         data["closed"],
         tuple(_take(Equivalent, e) for e in data["equivalents"]),
         data.get("log"),
+        data.get("why"),
     )
 
 
@@ -437,7 +473,7 @@ def _diagnose(given: _Input, settings: dict[str, Any], effects: Sequence[CustomE
     if contradictory:
         data = _contradicted(data)
     data["arm"]["name"] = arm.name
-    for cause in data["causes"]:
+    for cause in (*data["causes"], *data["candidates"]):
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = [*given.notes, *data["notes"]]

@@ -1,7 +1,8 @@
-"""Whether fitted values are physically possible: positive definite inertia, positive masses and friction.
+"""Whether fitted values are physically possible: positive definite inertia, gravity that pulls the same way, positive friction.
 
 A base parameter set belongs to some arm of rigid bodies only if its inertia matrix is positive definite in every pose;
-friction that feeds energy into the arm is impossible at any speed.
+friction that feeds energy into the arm is impossible at any speed; gravity that has turned over belongs to another zero of the
+positions, another sign or another mount, not to this arm.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ def plausibility(data: dict[str, Any], arm: Arm) -> list[dict[str, Any]]:
     """
     model = Hypothesis.of(data, arm)
     found = data["parameters"]["with_causes"]
-    return [_inertia(model), *(_friction(name, found[name]) for name in arm.parameter_names[arm.n_inertial :])]
+    friction = (_friction(name, found[name]) for name in arm.parameter_names[arm.n_inertial :])
+    return [_inertia(model), *_gravity(data), *friction]
 
 
 def _inertia(model: Hypothesis) -> dict[str, Any]:
@@ -42,6 +44,20 @@ def _inertia(model: Hypothesis) -> dict[str, Any]:
         "holds": stiffest is not None,
         "figure": figure,
     }
+
+
+def _gravity(data: dict[str, Any]) -> list[dict[str, Any]]:
+    """Parameters whose gravity has turned over; nothing where none has."""
+    tables = data["parameters"]
+    return [
+        {
+            "check": f"gravity on {s['parameter']} has the arm file's sign",
+            "holds": False,
+            "figure": " → ".join(_rounded(**tables[t][s["parameter"]]) for t in ("nominal", "with_causes")),
+        }
+        for s in data.get("sanity", ())
+        if s["kind"] == "sign"
+    ]
 
 
 def _largest_compliance(model: Hypothesis) -> float | None:
@@ -72,9 +88,9 @@ def _friction(name: str, value: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _rounded(number: float, sigma: float, unit: str) -> str:
+def _rounded(value: float, sigma: float, unit: str) -> str:
     """A value and its uncertainty to the same place."""
     if sigma <= 0:
-        return f"{number:.3g} {unit}"
+        return f"{value:.3g} {unit}"
     places = max(0, 1 - math.floor(math.log10(sigma)))
-    return f"{number:.{places}f} ± {sigma:.{places}f} {unit}"
+    return f"{value:.{places}f} ± {sigma:.{places}f} {unit}"

@@ -8,16 +8,19 @@ use crate::diagnose::Options;
 use crate::disturbance::shares;
 use crate::energy::energy;
 use crate::gap::{Errors, FreeRuns, gap, rms};
+use crate::headline::Headline;
 use crate::locate::{self, ResidualTorques, places, regimes};
 use crate::model::{EffectInstance, Hypothesis};
 use crate::model_search::Attribution;
 use crate::push::Disturbance;
 use crate::report::{
-    ArmSummary, Cause, Diagnosis, EquivalentSummary, Gap, LogSummary, Named, Noise, OptionSummary,
+    self, ArmSummary, Cause, Diagnosis, EquivalentSummary, LogSummary, Named, Noise, OptionSummary,
     Parameters, Ranked, StageSummary, Value,
 };
 use crate::ruled_out::ruled_out;
+use crate::sanity::{Estimate, Sanity, bounded_sigma, sanity};
 use crate::solve::Fit;
+use crate::verdict::{Evidence, Verdict};
 use crate::weighting::Weighting;
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
@@ -38,42 +41,53 @@ pub struct Compared<const P: usize> {
 /// The diagnosis as data.
 pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
-    (attribution, disturbances): &(Attribution<N, P>, Vec<Disturbance>),
+    headline: &Headline<N, P>,
     description: &ArmDescription,
     options: &Options,
 ) -> Diagnosis {
+    let Headline { attribution, disturbances, .. } = headline;
     let compared = Compared {
         before: Hypothesis::rigid(context.prior.theta),
         refit: attribution.refit.hypothesis.clone(),
-        after: attribution.model.hypothesis.clone(),
+        after: headline.model.hypothesis.clone(),
     };
     let rotary = description.kind.rotary();
-    let last = &attribution.nodes[attribution.nodes.len() - 1];
     let figures = || {
         let (errors, free) = (Errors::new(context, &compared), FreeRuns::new(context, &compared));
         (gap(context, &compared, &errors, &free, description, options), errors.series(context), free.series())
     };
     let residual = || {
-        let residuals = residual_torques(context, &compared, &last.weights.holdout);
+        let residuals = residual_torques(context, &compared, &headline.weights.holdout);
         let regimes = regimes(&residuals, rotary);
         (residuals, regimes)
     };
     let candidates = || (ruled_out(context, attribution, rotary), ranking(context, attribution, rotary));
     let ((absent, ranking), ((gap, series, free_run_series), (residuals, regimes))) =
         rayon::join(candidates, || rayon::join(figures, residual));
-    let verdict = if disturbances.is_empty() { verdict(attribution, &gap) } else { "effect" };
+    let evidence = Evidence {
+        named: !headline.causes.is_empty() || !disturbances.is_empty(),
+        open: headline.open,
+        before: &gap.before,
+        refit: &gap.refit,
+        after: &gap.after,
+        floor: &gap.floor,
+        motion: &gap.motion,
+    };
+    let (verdict, remains) = (evidence.verdict(), evidence.remains());
+    let sanity = sanity(description.kind, &estimates(&headline.model, description), remains);
     Diagnosis {
         schema: "armgap.diagnosis/1",
         verdict,
-        places: places(&joint_shares(context, (attribution, disturbances), &compared, verdict), &regimes),
+        places: places(&joint_shares(context, headline, &compared, verdict), &regimes),
         energy: energy(&residuals),
         gap,
-        causes: attribution
+        causes: headline
             .causes
             .iter()
             .map(|c| cause(c, N, rotary))
             .chain(disturbances.iter().map(|e| push(context, e, rotary)))
             .collect(),
+        candidates: unnamed(context, headline, rotary),
         ruled_out: absent
             .into_iter()
             .filter(|r| {
@@ -81,9 +95,9 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             })
             .collect(),
         parameters: Parameters {
-            nominal: nominal(context, description),
+            nominal: nominal(description),
             refit: values(&attribution.refit, description),
-            with_causes: values(&attribution.model, description),
+            with_causes: values(&headline.model, description),
         },
         arm: arm_summary(description),
         training: logs(&context.training),
@@ -98,11 +112,12 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             horizon_s: options.horizon,
             max_causes: options.max_causes,
             seed: options.seed,
-            friction_smoothing: attribution.model.hypothesis.smoothing,
+            friction_smoothing: headline.model.hypothesis.smoothing,
         },
         version: env!("CARGO_PKG_VERSION"),
         seconds: 0.0,
-        notes: notes(attribution),
+        notes: notes(headline, options.max_causes, remains, &sanity, description),
+        sanity,
     }
 }
 
@@ -123,18 +138,17 @@ fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 /// its own joint says more than the residual torque does.
 fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
-    (attribution, disturbances): (&Attribution<N, P>, &[Disturbance]),
+    Headline { attribution, weights, causes, disturbances, .. }: &Headline<N, P>,
     compared: &Compared<P>,
-    verdict: &str,
+    verdict: Verdict,
 ) -> [f64; N] {
-    let last = &attribution.nodes[attribution.nodes.len() - 1];
-    let of = |hypothesis: &Hypothesis<P>| shares(context, hypothesis, &last.weights.holdout.offsets);
-    let causes = attribution.causes.iter().map(|c| (c.effect.joint_number(), c.share, c.probability));
+    let of = |hypothesis: &Hypothesis<P>| shares(context, hypothesis, &weights.holdout.offsets);
+    let causes = causes.iter().map(|c| (c.effect.joint_number(), c.share, c.probability));
     let pushes = disturbances.iter().map(|e| (e.push.joint_number(), e.share.clamp(0.0, 1.0), e.probability));
     let placed: Vec<(Option<usize>, f64, f64)> = causes.chain(pushes).collect();
     let total: f64 = placed.iter().map(|(_, share, _)| share).sum();
     if total <= 0.0 {
-        return of(if verdict == "parameters" { &compared.before } else { &compared.refit });
+        return of(if verdict == Verdict::Parameters { &compared.before } else { &compared.refit });
     }
     let left = left_over(&attribution.nodes);
     let mut told = [0.0; N];
@@ -149,19 +163,26 @@ fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     std::array::from_fn(|j| told[j] + open * whole[j] + left * rest[j])
 }
 
-/// The verdict.
-fn verdict<const N: usize, const P: usize>(attribution: &Attribution<N, P>, gap: &Gap) -> &'static str {
-    if !attribution.causes.is_empty() {
-        return "effect";
-    }
-    if attribution.is_unexplained() {
-        return "unexplained";
-    }
-    let steps = gap.before.iter().zip(&gap.refit).zip(&gap.floor);
-    let improved = steps
-        .into_iter()
-        .any(|((before, refit), floor)| before - refit > 0.2 * before && *before > 2.0 * floor);
-    if improved { "parameters" } else { "none" }
+/// What was found and is not named.
+fn unnamed<A, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    headline: &Headline<N, P>,
+    rotary: bool,
+) -> Vec<report::Candidate> {
+    let effects = headline.candidates.iter().map(|u| (cause(&u.found, N, rotary), &u.why));
+    let pushes = headline.disturbance_candidates.iter().map(|u| (push(context, &u.found, rotary), &u.why));
+    effects.chain(pushes).map(|(cause, why)| report::Candidate { cause, why: why.clone() }).collect()
+}
+
+/// Parameters before and after their estimation.
+fn estimates<const P: usize>(fit: &Fit<P>, description: &ArmDescription) -> Vec<Estimate> {
+    let one = |i: usize| Estimate {
+        nominal: description.theta[i],
+        prior: description.sigma[i],
+        value: fit.hypothesis.theta[i],
+        sigma: fit.sigma(i),
+    };
+    (0..P).map(one).collect()
 }
 
 fn cause(cause: &crate::belief::Cause, joints: usize, rotary: bool) -> Cause {
@@ -271,17 +292,12 @@ fn nodes<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     attribution.nodes.iter().enumerate().map(summary).collect()
 }
 
-fn nominal<A, const N: usize, const P: usize>(
-    context: &DiagnosisContext<A, N, P>,
-    description: &ArmDescription,
-) -> Named<Value> {
+fn nominal(description: &ArmDescription) -> Named<Value> {
     let names = description.kind.parameters().iter().enumerate();
     names
         .map(|(i, p)| {
-            (
-                p.name.to_owned(),
-                Value { value: context.prior.theta[i], sigma: context.prior.sigma[i], unit: p.unit },
-            )
+            let (value, sigma) = (description.theta[i], description.sigma[i]);
+            (p.name.to_owned(), Value { value, sigma, unit: p.unit })
         })
         .collect()
 }
@@ -324,16 +340,45 @@ fn noise<A, const N: usize, const P: usize>(context: &DiagnosisContext<A, N, P>)
     Noise { position_sigma: context.noise.to_vec(), encoder_step: step.to_vec() }
 }
 
-fn notes<const N: usize, const P: usize>(attribution: &Attribution<N, P>) -> Vec<String> {
+/// Remarks on the result: what was fitted beside the causes, what is left, what was not allowed, and what is hard to believe.
+fn notes<const N: usize, const P: usize>(
+    headline: &Headline<N, P>,
+    max_causes: usize,
+    remains: bool,
+    sanity: &[Sanity],
+    description: &ArmDescription,
+) -> Vec<String> {
     let mut notes = Vec::new();
-    let smoothing = attribution.model.hypothesis.smoothing;
+    let smoothing = headline.model.hypothesis.smoothing;
     if smoothing > 0.0 {
         notes.push(format!(
             "the logs fit friction smoothed over {smoothing:.3} rad/s better than dry friction"
         ));
     }
-    if !attribution.causes.is_empty() && attribution.is_unexplained() {
+    let named = !headline.causes.is_empty() || !headline.disturbances.is_empty();
+    if max_causes == 0 {
+        notes.push("no cause was allowed: a gap was not searched for one".to_owned());
+    } else if named && remains {
         notes.push("a gap remains that no further effect in the library explains".to_owned());
     }
+    notes.extend(sanity.iter().map(|s| s.message.clone()));
+    notes.extend(narrowed(description));
     notes
+}
+
+/// Which standard deviations of the arm file were taken for smaller ones.
+fn narrowed(description: &ArmDescription) -> Option<String> {
+    let bounded = bounded_sigma(description.kind, &description.theta, &description.sigma);
+    let parameters = description.kind.parameters().iter();
+    let wide: Vec<&str> = parameters
+        .zip(bounded.iter().zip(&description.sigma))
+        .filter(|(_, (bounded, sigma))| bounded < sigma)
+        .map(|(parameter, _)| parameter.name)
+        .collect();
+    let names = wide.join(", ");
+    (!wide.is_empty()).then(|| {
+        format!(
+            "sigma of {names} is wider than ten times the value, which is taken instead: no log could tell"
+        )
+    })
 }

@@ -5,7 +5,7 @@ use crate::progress::{Phase, ProgressReporter};
 use crate::scale::Scales;
 use crate::solve::{Effort, Fit, FitProblem, Prior};
 use crate::weighting::Weighting;
-use crate::window::{Dataset, InitialStateOffset};
+use crate::window::{Dataset, InitialStateOffset, Window};
 use armgap_core::arm::Arm;
 
 /// Rounds of re-weighting at most.
@@ -47,6 +47,12 @@ impl<const N: usize> WindowSet<N> {
     pub fn new(data: Dataset<N>) -> Self {
         let measured = data.measured();
         Self { data, measured }
+    }
+
+    /// Positions of an arm that stays at the initial position of each window, in the order of the flat vector.
+    pub fn still(&self) -> Vec<f64> {
+        let window = |w: &Window<N>| w.initial_state.q.as_slice().repeat(w.rows());
+        self.data.windows.iter().flat_map(window).collect()
     }
 
     /// Cost, in these scales, of predicting that every joint stays at the initial position of its window.

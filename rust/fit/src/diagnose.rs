@@ -5,10 +5,10 @@ use crate::context::{DiagnosisContext, WindowSet};
 use crate::crosswise::{crosswise, explains};
 use crate::custom_effect;
 use crate::model::EffectInstance;
-use crate::model_search::Attribution;
 use crate::progress::{Observer, Phase, ProgressReporter, guarded};
-use crate::push::Disturbance;
+use crate::push::Conclusion;
 use crate::report::Diagnosis;
+use crate::sanity::bounded_sigma;
 use crate::scale::Scales;
 use crate::solve::Prior;
 use crate::track::Track;
@@ -112,9 +112,6 @@ const CROSSWISE: &str = "effects fitted to the training logs did not explain the
 /// Probability from which an external disturbance counts as named.
 const NAMED: f64 = 0.5;
 
-/// An attribution and the external disturbances beside it.
-type Conclusion<const N: usize, const P: usize> = (Attribution<N, P>, Vec<Disturbance>);
-
 /// Diagnoses the gap between an arm and its logs; `observer` gets the progress and may cancel.
 pub fn diagnose(
     arm: &ArmDescription,
@@ -193,10 +190,11 @@ impl WithArm for Request<'_> {
         if let Some(instead) = instead {
             (context, conclusion) = instead;
         }
-        let attribution = &conclusion.0;
+        let headline = context.headline(conclusion, max_causes);
+        let attribution = &headline.attribution;
         let open = context.open_candidates(&attribution.model.hypothesis).len();
         context.progress.begin(Phase::Result, open + attribution.nodes[0].field.len());
-        let mut diagnosis = crate::assemble::assemble(&context, &conclusion, self.arm, self.options);
+        let mut diagnosis = crate::assemble::assemble(&context, &headline, self.arm, self.options);
         if is_crosswise {
             diagnosis.notes.insert(0, CROSSWISE.to_owned());
         }
@@ -214,8 +212,8 @@ impl Request<'_> {
         first: &Conclusion<N, P>,
     ) -> Result<Option<(DiagnosisContext<A, N, P>, Conclusion<N, P>)>, DiagnoseError> {
         let Options { max_causes, seed, horizon, .. } = *self.options;
-        let pushed = first.1.iter().any(|e| e.probability > NAMED);
-        if !first.0.is_unexplained() && !pushed {
+        let pushed = first.disturbances.iter().any(|e| e.probability > NAMED);
+        if !first.attribution.is_unexplained() && !pushed {
             return Ok(None);
         }
         let Some([training, holdout]) = crosswise(self.training, self.holdout, horizon) else {
@@ -228,11 +226,11 @@ impl Request<'_> {
             Err(error) => return Err(error),
         };
         let attribution = context.attribute(max_causes, seed, None);
-        if !explains(&attribution, &first.0) {
+        if !explains(&attribution, &first.attribution) {
             return Ok(None);
         }
         let conclusion = context.conclude(attribution, max_causes, seed);
-        Ok((!pushed || conclusion.1.is_empty()).then_some((context, conclusion)))
+        Ok((!pushed || conclusion.disturbances.is_empty()).then_some((context, conclusion)))
     }
 
     /// Windows of both sets, scales and priors.
@@ -247,7 +245,8 @@ impl Request<'_> {
         let holdout = self.sample::<N>("holdout", holdout)?;
         let length = self.arm.link_length.as_ref().and_then(|l| l.last().copied());
         let scales = Scales::new(&arm, &theta, &training.data.tracks, self.arm.gravity, length);
-        let sigma = std::array::from_fn(|i| self.arm.sigma[i]);
+        let bounded = bounded_sigma(self.arm.kind, &theta, &self.arm.sigma);
+        let sigma = std::array::from_fn(|i| bounded[i]);
         let prior = Prior { theta, sigma, inertial: A::INERTIAL };
         let noise = std::array::from_fn(|j| {
             crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())

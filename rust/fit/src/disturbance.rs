@@ -123,7 +123,8 @@ impl<const N: usize> PredictionErrors<N> {
             let mut filter = start.clone();
             misses.iter().map(|miss| filter.step(miss, &self.noise, intensity)).sum::<f64>()
         };
-        self.windows.par_iter().map(of).sum()
+        // Added up in the order of the windows, so that the sum is the same with any number of threads.
+        self.windows.par_iter().map(of).collect::<Vec<f64>>().iter().sum()
     }
 }
 

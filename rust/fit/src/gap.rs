@@ -155,6 +155,7 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         closed: closed(&before, &after, &floor),
         closed_ci: closed_interval(context, errors, &floor, options.seed),
         refit: rms::<N>(measured, &errors.refit),
+        motion: rms::<N>(measured, &context.holdout.still()),
         horizons: HORIZONS.par_iter().filter_map(|h| at_horizon(context, compared, *h)).collect(),
         free_run: FreeRun {
             before: rms::<N>(&free.measured, &free.before),

@@ -2,7 +2,7 @@
 
 use crate::custom_effect;
 use armgap_core::arm::Arm;
-use armgap_core::effect::{Active, Effect, InputSegment, MAX_PARAMETERS, Quantity, Scope};
+use armgap_core::effect::{Active, Effect, InputSegment, MAX_PARAMETERS, Quantity, Scope, Trial};
 use armgap_core::integrate::State;
 use armgap_core::plant::Plant;
 use nalgebra::SVector;
@@ -33,6 +33,15 @@ impl EffectInstance {
     /// An effect without parameters does not exist.
     pub fn is_empty(&self) -> bool {
         false
+    }
+
+    /// Number of its first parameters that switch it off together at their neutral values.
+    pub fn amplitudes(&self) -> usize {
+        match self.law.spec().trial {
+            Trial::Amplitudes(count) => count,
+            Trial::Ray => self.len(),
+            Trial::Whole | Trial::Disturbance => 1,
+        }
     }
 
     /// Whether `other` is the same effect on the same joint, whatever its values.

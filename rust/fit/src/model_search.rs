@@ -233,7 +233,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 }
 
 /// Values and standard deviations of the causes from the final model.
-fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
+pub(crate) fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
     for cause in causes.iter_mut() {
         let mut first = P;
         for effect in &model.hypothesis.effects {

@@ -60,17 +60,12 @@ impl WithArm for RigidFit<'_> {
         let missed = |hypothesis: &Hypothesis<P>| {
             rms::<N>(measured, &data.predict(&context.arm, hypothesis, &data.zero_offsets()))
         };
-        let still: Vec<f64> = data
-            .windows
-            .iter()
-            .flat_map(|w| (0..w.rows()).flat_map(|_| w.initial_state.q.iter().copied().collect::<Vec<_>>()))
-            .collect();
         Ok(Refit {
             theta: fit.hypothesis.theta.to_vec(),
             sigma: (0..P).map(|i| fit.sigma(i)).collect(),
             before: missed(&nominal),
             refit: missed(&fit.hypothesis),
-            motion: rms::<N>(measured, &still),
+            motion: rms::<N>(measured, &context.holdout.still()),
         })
     }
 }

@@ -2,6 +2,8 @@
 
 use crate::energy::Energy;
 use crate::locate::{Location, Regime};
+use crate::sanity::Sanity;
+use crate::verdict::Verdict;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -24,8 +26,8 @@ pub struct Value {
 pub struct Diagnosis {
     /// Name of this schema.
     pub schema: &'static str,
-    /// `none`, `parameters`, `effect` or `unexplained`.
-    pub verdict: &'static str,
+    /// What it comes to.
+    pub verdict: Verdict,
     /// How far.
     pub gap: Gap,
     /// Where.
@@ -35,10 +37,14 @@ pub struct Diagnosis {
     pub energy: Vec<Energy>,
     /// Which.
     pub causes: Vec<Cause>,
+    /// What was found and is not fit to be named.
+    pub candidates: Vec<Candidate>,
     /// What was looked for and not found.
     pub ruled_out: Vec<RuledOut>,
     /// The arm's parameters.
     pub parameters: Parameters,
+    /// Re-estimated parameters, of the model reported, that are not to be believed as they stand.
+    pub sanity: Vec<Sanity>,
     /// The arm.
     pub arm: ArmSummary,
     /// Logs the model was fitted to.
@@ -78,10 +84,12 @@ pub struct Gap {
     pub before: Vec<f64>,
     /// Parameters re-estimated.
     pub refit: Vec<f64>,
-    /// Causes added.
+    /// The named causes added.
     pub after: Vec<f64>,
     /// What measurement noise alone leaves.
     pub floor: Vec<f64>,
+    /// RMS displacement of the arm over the horizon.
+    pub motion: Vec<f64>,
     /// Share of the gap above the floor that is closed.
     pub closed: f64,
     /// 95 % interval of it.
@@ -136,6 +144,16 @@ pub struct Cause {
     /// The log that an external disturbance belongs to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,
+}
+
+/// A cause that is not named.
+#[derive(Debug, Clone, Serialize)]
+pub struct Candidate {
+    /// The cause.
+    #[serde(flatten)]
+    pub cause: Cause,
+    /// Why it is not fit to be named.
+    pub why: String,
 }
 
 /// A look-alike.

@@ -11,7 +11,6 @@ use crate::scale::Scales;
 use crate::weighting::{Gram, Weighting};
 use crate::window::Dataset;
 use armgap_core::arm::Arm;
-use armgap_core::effect::Trial;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -332,13 +331,7 @@ pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// The effect switched off: its amplitudes at neutral, its shape as it is.
 pub fn neutral(effect: &EffectInstance) -> EffectInstance {
     let mut off = *effect;
-    let spec = effect.law.spec();
-    let amplitudes = match spec.trial {
-        Trial::Amplitudes(count) => count,
-        Trial::Ray => off.len(),
-        Trial::Whole | Trial::Disturbance => 1,
-    };
-    for (value, parameter) in off.p.iter_mut().zip(spec.parameters).take(amplitudes) {
+    for (value, parameter) in off.p.iter_mut().zip(effect.law.spec().parameters).take(effect.amplitudes()) {
         *value = parameter.neutral;
     }
     off

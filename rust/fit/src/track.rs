@@ -2,6 +2,7 @@
 
 use crate::latent_states::MeasuredState;
 use crate::model::EffectInstance;
+use crate::noise::noise_level;
 use crate::smooth::{Local, local_cubic};
 use armgap_core::effect::InputSegment;
 use nalgebra::SVector;
@@ -194,14 +195,4 @@ fn smallest_step(q: &[f64]) -> f64 {
     let step = steps[steps.len() / 200];
     let on_grid = steps.iter().filter(|d| ((*d / step).round() * step - *d).abs() < 0.05 * step).count();
     if on_grid * 10 > steps.len() * 9 { step } else { 0.0 }
-}
-
-/// Standard deviation of the measurement: what a narrow local cubic leaves in most places, at least a uniform encoder's.
-fn noise_level(t: &[f64], q: &[f64], step: f64) -> f64 {
-    let half = 3;
-    let residuals = (half..t.len().saturating_sub(half)).step_by(3);
-    let misfits: Vec<f64> = residuals.map(|at| local_cubic(t, |k| q[k], at, half).misfit).collect();
-    // The median of a chi-squared variable with three degrees of freedom is 0.789 of its mean.
-    let typical = (median(misfits) / 0.789).sqrt();
-    typical.max(step / 12.0_f64.sqrt()).max(1e-9)
 }

@@ -68,6 +68,22 @@ pub struct Disturbance {
     pub probability: f64,
 }
 
+/// An attribution, and the external disturbances beside it.
+pub struct Conclusion<const N: usize, const P: usize> {
+    /// The attribution beside the disturbances.
+    pub attribution: Attribution<N, P>,
+    /// The one without them, where there are any.
+    pub alone: Option<Attribution<N, P>>,
+    /// The disturbances.
+    pub disturbances: Vec<Disturbance>,
+}
+
+impl<const N: usize, const P: usize> Conclusion<N, P> {
+    fn without(attribution: Attribution<N, P>) -> Self {
+        Self { attribution, alone: None, disturbances: Vec::new() }
+    }
+}
+
 /// What pushes are judged against.
 struct PushState<'a, const N: usize, const P: usize> {
     /// The model with all named causes.
@@ -98,7 +114,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         mut alone: Attribution<N, P>,
         max_causes: usize,
         seed: u64,
-    ) -> (Attribution<N, P>, Vec<Disturbance>) {
+    ) -> Conclusion<N, P> {
         let faint = alone.causes.is_empty();
         let mut disturbances = self.disturbances(&alone, faint);
         let limit = self.limit(&alone, &disturbances);
@@ -107,7 +123,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             disturbances = self.disturbances(&alone, faint);
         }
         if disturbances.is_empty() {
-            return (alone, disturbances);
+            return Conclusion::without(alone);
         }
         self.set_pushes(&disturbances);
         let beside = self.attribute(max_causes, seed, limit);
@@ -119,7 +135,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
         self.set_pushes(&disturbances);
         if disturbances.is_empty() {
-            return (alone, disturbances);
+            return Conclusion::without(alone);
         }
         // Like a further cause, a push answers for the gap it was taken up for.
         let left = left_over(&beside.nodes).max(left_beside(&alone.nodes, &beside.nodes));
@@ -127,7 +143,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         for disturbance in &mut disturbances {
             disturbance.probability *= belief;
         }
-        (beside, disturbances)
+        Conclusion { attribution: beside, alone: Some(alone), disturbances }
     }
 
     /// Pushes that the model of an attribution leaves unexplained, log by log; faint ones too where no greater cause was found without them.
@@ -265,7 +281,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 impl Disturbance {
     /// Whether its impulse is known not to be zero.
     fn is_known(&self) -> bool {
-        self.push.p[0].abs() > KNOWN * self.sigma[0]
+        self.clarity() > KNOWN
+    }
+
+    /// Its impulse in standard deviations.
+    pub fn clarity(&self) -> f64 {
+        self.push.p[0].abs() / self.sigma[0]
     }
 
     /// When, where and which way.

@@ -1,0 +1,160 @@
+"""Verdicts that agree with their tables, values that are not believed, candidates that are not named, and the same bytes every time."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import report_cases
+from armgap import Arm, Diagnosis, Log, _native, diagnose
+from armgap.evidence import plausibility
+from armgap.simulation import Effect
+from swings import off, swing
+
+SEVERAL, CONSEQUENCE = 4.0, 1e-3
+STRIBECK = Effect("stribeck", 1, {"amplitude": 0.15, "velocity": 0.3})
+PUSHES = [Effect("external_pulse", 1, {"impulse": 0.05, "time": time, "duration": 0.06}) for time in (2.0, 4.0, 6.0)]
+
+
+def as_they_stand(arm: Arm, training: Log, holdout: Log, **options: Any) -> dict[str, Any]:
+    """The diagnosis of logs as they are, before anything checks or repairs them."""
+    logs = [[(log.name, log.t, np.ascontiguousarray(log.q), log.tau, [])] for log in (training, holdout)]
+    return json.loads(_native.diagnose(arm.to_native(), *logs, {"horizon": 0.25, "max_causes": 4, **options}))
+
+
+def contradicts(data: dict[str, Any]) -> bool:
+    """Whether a verdict says that nothing is left where several floors are, of consequence beside the motion."""
+    gap = data["gap"]
+    left = any(
+        after > SEVERAL * floor and after > CONSEQUENCE * motion
+        for after, floor, motion in zip(gap["after"], gap["floor"], gap["motion"], strict=True)
+    )
+    return left and data["verdict"] in ("none", "parameters")
+
+
+def held(log: Log, rows: int) -> Log:
+    return replace(log, q=log.q[np.arange(len(log.t)) // rows * rows])
+
+
+@pytest.mark.parametrize("rows", [2, 3, 5])
+def test_held_positions_do_not_pass_for_noise(pendulum: Arm, rows: int) -> None:
+    data = as_they_stand(pendulum, held(swing(off(pendulum), 1), rows), held(swing(off(pendulum), 2), rows))
+    [floor], [after] = data["gap"]["floor"], data["gap"]["after"]
+    assert data["noise"]["position_sigma"][0] < 1.4 * 2e-4
+    assert after > SEVERAL * floor
+    assert not contradicts(data)
+
+
+def test_known_noise_is_the_floor(pendulum: Arm) -> None:
+    data = as_they_stand(pendulum, swing(off(pendulum), 1), swing(off(pendulum), 2))
+    [floor], [after] = data["gap"]["floor"], data["gap"]["after"]
+    assert data["verdict"] in ("none", "parameters")
+    assert data["noise"]["position_sigma"] == [pytest.approx(2e-4, rel=0.1)]
+    assert 0.7 < floor / after < 1.4
+
+
+@pytest.fixture(scope="module")
+def turned(pendulum: Arm) -> dict[str, Any]:
+    """An arm file whose gravity pulls the other way."""
+    wrong = replace(pendulum, theta=pendulum.theta * [1, -1, 1, 1])
+    data = as_they_stand(wrong, swing(pendulum, 1), swing(pendulum, 2), max_causes=0)
+    return {**data, "plausibility": plausibility(data, wrong)}
+
+
+def test_gravity_turned_over_is_said_and_not_plausible(turned: dict[str, Any]) -> None:
+    [sanity] = [s for s in turned["sanity"] if s["kind"] == "sign"]
+    assert sanity["parameter"] == "theta2"
+    assert sanity["message"] in turned["notes"]
+    [check] = [p for p in turned["plausibility"] if "gravity" in p["check"]]
+    assert not check["holds"]
+
+
+def test_sanity_and_candidates_are_read_back(turned: dict[str, Any]) -> None:
+    data = copy.deepcopy(turned)
+    data["candidates"] = [{**report_cases.named().to_dict()["causes"][0], "why": "its probability is 0.20"}]
+    found = Diagnosis.from_dict(data)
+    assert [(s.parameter, s.kind) for s in found.sanity] == [(s["parameter"], s["kind"]) for s in data["sanity"]]
+    [candidate] = found.candidates
+    assert (candidate.effect, candidate.why) == ("stribeck", "its probability is 0.20")
+    assert found.to_dict() == data
+
+
+def test_sigmas_without_bound_do_not_stop_the_fit(pendulum: Arm) -> None:
+    free = replace(pendulum, theta=1.2 * pendulum.theta, sigma=np.full(4, 1e12))
+    data = as_they_stand(free, swing(pendulum, 1), swing(pendulum, 2))
+    assert data["verdict"] == "parameters"
+    for name, true in zip(("theta1", "theta2"), pendulum.theta, strict=False):
+        assert data["parameters"]["with_causes"][name]["value"] == pytest.approx(true, rel=0.02)
+    assert any("sigma of theta1" in note for note in data["notes"])
+
+
+def test_an_arm_that_cannot_be_moved_is_said_to_be_stuck(pendulum: Arm) -> None:
+    theta = pendulum.theta * [1e7, 1e7, 1, 1]
+    heavy = replace(pendulum, theta=theta, sigma=0.1 * theta)
+    data = as_they_stand(heavy, swing(pendulum, 1), swing(pendulum, 2), max_causes=0)
+    assert data["verdict"] == "unexplained"
+    assert data["sanity"]
+
+
+def test_a_value_that_no_arm_has_is_a_candidate(pendulum: Arm) -> None:
+    """Torques at the motor's side of a gear of 50: whatever is found, no gain of 50 is named."""
+    logs = [replace(log, tau=log.tau / 50) for log in (swing(pendulum, 1), swing(pendulum, 2))]
+    data = as_they_stand(pendulum, *logs)
+    gains = [c for c in data["causes"] if c["effect"] == "torque_gain"]
+    assert all(0.5 <= c["parameters"]["gain"]["value"] <= 2.0 for c in gains)
+    assert all(c["probability"] >= 0.3 for c in data["causes"])
+    assert all(c["why"] for c in data["candidates"])
+    assert not contradicts(data)
+    if not data["causes"] and not data["options"]["friction_smoothing"]:
+        assert data["gap"]["after"] == data["gap"]["refit"]
+
+
+@pytest.fixture(scope="module")
+def pushed(pendulum: Arm) -> list[Log]:
+    return [swing(pendulum, 1, *PUSHES), swing(pendulum, 2)]
+
+
+@pytest.mark.parametrize("most", [0, 1, 4])
+def test_pushes_count_against_the_causes_allowed(pendulum: Arm, pushed: list[Log], most: int) -> None:
+    found = diagnose(pushed[0], pendulum, holdout=pushed[1], max_causes=most)
+    assert len(found.causes) == min(most, 3)
+    assert len(found.candidates) == 3 - min(most, 3)
+    assert {c.effect for c in (*found.causes, *found.candidates)} == {"external_pulse"}
+    assert {c.log for c in found.candidates} <= {"run 1"}
+    assert any("no cause was allowed" in note for note in found.extra["notes"]) == (most == 0)
+    if most == 0:
+        assert found.gap.after == found.gap.refit
+
+
+_RUN = """
+import json, sys
+from armgap import Arm, diagnose
+from armgap.simulation import Effect
+from swings import swing
+arm = Arm.read(sys.argv[1])
+hidden = Effect("stribeck", 1, {"amplitude": 0.15, "velocity": 0.3})
+data = diagnose(swing(arm, 1, hidden), arm, holdout=swing(arm, 3, hidden)).to_dict()
+del data["seconds"]
+print(json.dumps(data))
+"""
+
+
+def test_one_thread_and_two_give_the_same_bytes(tmp_path: Any) -> None:
+    from swings import PENDULUM
+
+    file = tmp_path / "pendulum.toml"
+    file.write_text(PENDULUM)
+
+    def result(threads: int) -> bytes:
+        env = {**os.environ, "RAYON_NUM_THREADS": str(threads), "PYTHONPATH": os.pathsep.join(sys.path)}
+        return subprocess.run([sys.executable, "-c", _RUN, file], env=env, capture_output=True, check=True).stdout
+
+    assert result(1) == result(2)
