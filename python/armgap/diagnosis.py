@@ -26,6 +26,7 @@ from armgap.log.findings import remarks
 from armgap.log.stretches import choose
 from armgap.log.units import si
 from armgap.progress import ProgressCallback, report_progress, use_callback
+from armgap.provenance import provenance
 from armgap.reading import printable
 from armgap.report.notebook import NotebookDisplay
 
@@ -382,7 +383,10 @@ def diagnose(
     check_effects(effects)
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
     with use_callback(progress):
-        given = _given(logs, holdout, arm, corrections or Corrections(), repair=repair)
+        read = {"training": _gathered(logs, arm), "holdout": [] if holdout is None else _gathered(holdout, arm)}
+        asked = settings | {"repair": repair, "corrections": (corrections or Corrections()).to_dict()}
+        given = _given(read["training"], read["holdout"], arm, corrections or Corrections(), repair=repair)
+        given = replace(given, provenance=provenance(arm, read, asked))
         return _diagnose(_examined(given, settings["horizon"], repair=repair), settings, effects)
 
 
@@ -396,6 +400,7 @@ class _Input:
     notes: tuple[str, ...]
     checks: tuple[Check, ...]
     factors: Mapping[str, float] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def with_factors(self, factors: Mapping[str, float]) -> _Input:
         """Return the input with other factors on its torque columns than those that it was repaired with."""
@@ -414,22 +419,15 @@ class _Input:
         )
 
 
-def _given(
-    logs: LogLike | Sequence[LogLike],
-    holdout: LogLike | Sequence[LogLike] | None,
-    arm: Arm,
-    corrections: Corrections,
-    *,
-    repair: bool,
-) -> _Input:
-    """Read, correct and repair the logs, each by itself, and split them where nothing is held out."""
-    training, checks = _logs(logs, arm, corrections, repair=repair)
+def _given(logs: Sequence[Log], holdout: Sequence[Log], arm: Arm, corrections: Corrections, *, repair: bool) -> _Input:
+    """Correct and repair the logs, each by itself, and split them where nothing is held out."""
+    training, checks = _repaired(logs, arm, corrections, repair=repair)
     arm = corrections.on_arm(arm)
-    if holdout is None:
+    if not holdout:
         training, held = _split(_tell_apart(training, [])[0])
         note = f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out"
         return _Input(training, held, arm, (note,), tuple(checks))
-    held, more = _logs(holdout, arm, corrections, repair=repair)
+    held, more = _repaired(holdout, arm, corrections, repair=repair)
     checks += [*more, *copied_holdout(training, held)]
     return _Input(*_tell_apart(training, held), arm, (), tuple(checks))
 
@@ -449,7 +447,14 @@ def _examined(given: _Input, horizon: float, *, repair: bool) -> _Input:
     except ValueError as error:
         raise _refused(str(error), training, held) from None
     checks = (*found.checks, *given.checks)
-    return _Input(found.training, found.holdout, found.arm, given.notes, checks, found.corrections.factor)
+    return replace(
+        given,
+        training=found.training,
+        holdout=found.holdout,
+        arm=found.arm,
+        checks=checks,
+        factors=found.corrections.factor,
+    )
 
 
 def _diagnose(given: _Input, settings: dict[str, Any], effects: Sequence[CustomEffect]) -> Diagnosis:
@@ -484,6 +489,7 @@ def _diagnose(given: _Input, settings: dict[str, Any], effects: Sequence[CustomE
     data["laws"] = laws(known, arm, corrected_logs[:count], corrected_logs[count:])
     data["plausibility"] = plausibility(known, arm)
     data["input"] = _input(arm, training, held)
+    data["provenance"] = given.provenance
     data["log_findings"] = [
         {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
         for log in (*training, *held)
@@ -528,14 +534,13 @@ def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> lis
 def _contradicted(data: dict[str, Any]) -> dict[str, Any]:
     """Return the result of logs and arm file that contradict each other: figures with the remedy applied, no causes."""
     gap = data["gap"] | {"after": data["gap"]["refit"]}
-    return data | {"verdict": "input", "causes": [], "gap": gap}
+    return data | {"verdict": "input", "causes": [], "candidates": [], "gap": gap}
 
 
-def _logs(
-    logs: LogLike | Sequence[LogLike], arm: Arm, corrections: Corrections, *, repair: bool
+def _repaired(
+    logs: Sequence[Log], arm: Arm, corrections: Corrections, *, repair: bool
 ) -> tuple[list[Log], list[Check]]:
-    read = [corrections.on_log(log) for log in _gathered(logs, arm)]
-    examined = [data_checks(log, arm, repair=repair) for log in read]
+    examined = [data_checks(corrections.on_log(log), arm, repair=repair) for log in logs]
     return [log for log, _ in examined], [check.of(check.log or log.name) for log, found in examined for check in found]
 
 
