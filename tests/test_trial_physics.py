@@ -16,7 +16,7 @@ from armgap.trial.effects import REGISTRY
 from armgap.trial.excitation import Tracked, rings
 from armgap.trial.key import HiddenEffect
 from armgap.trial.plant import PlantConfig
-from armgap.trial.simulated_arm import SimulatedArm, CommandSource, Trace, run
+from armgap.trial.simulated_arm import CommandSource, SimulatedArm, Trace, run
 from dry_friction import DryArm
 
 TH = np.array(DIRECT_DRIVE.theta)
