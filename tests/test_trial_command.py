@@ -162,6 +162,19 @@ def test_another_trial_is_not_mixed_in(trial, run):
     assert "another trial" in err
 
 
+def test_former_names_of_the_baselines_still_work(run, tmp_path, monkeypatch):
+    """``trial peers`` warns; ``--no-peers`` is taken; neither is shown."""
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run("trial", "peers", ".", "--only", "oracle")
+    assert (status, out, err.count("\n")) == (2, "", 2)
+    assert "'peers' is deprecated" in err
+    assert "no method `oracle`" in err
+    status, out, _ = run("trial", "all", "-n", "1", "--duration", "1", "-o", "DIR", "--no-peers", "--help")
+    assert status == 0
+    assert "peers" not in out
+    assert "peers" not in run("trial", "--help")[1]
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [

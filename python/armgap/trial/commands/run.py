@@ -52,7 +52,7 @@ def run(folder: Path, workers: int, limit_s: float, again: bool, quiet: bool) ->
 @again_option
 @quiet_option
 def baselines(folder: Path, only: tuple[str, ...], workers: int, limit_s: float, again: bool, quiet: bool) -> None:
-    """Let the baselines, other methods, name the causes in DIR, keys closed. Goes on where it stopped."""
+    """Let other methods, the baselines, name the causes in DIR, keys closed. Goes on where it stopped."""
     from armgap.errors import OptionError
     from armgap.trial.methods import methods
 
