@@ -10,10 +10,11 @@ from pathlib import Path
 import click
 import pytest
 
-from armgap import Log, CustomEffect, diagnose, simulate
+from armgap import CustomEffect, Log, diagnose, simulate
+from armgap.cli.files import InputFolder, OutputFile
 from armgap.errors import OptionError
 from armgap.simulation import Effect
-from commands import EVERY, armgap_process, refused, snapshot
+from commands import EVERY, armgap_process, called, parameters, refused, snapshot
 
 # Streams that fail
 
@@ -79,6 +80,32 @@ def test_impossible_numbers(value, words, command, parameter, here, run):
     before = snapshot(here)
     refused(run, [*words, *given])
     assert snapshot(here) == before
+
+
+ODD_NAMES = ["", "a" * 300, "none/out.json", "x/" * 2500, "file/out.json", "circle", "."]
+OUTPUTS = [(words, command, p) for words, command in EVERY for p in parameters(command, OutputFile)]
+
+
+@pytest.mark.parametrize(
+    "name", ODD_NAMES, ids=["empty", "long", "no folder", "long path", "no folder but a file", "circle", "folder"]
+)
+@pytest.mark.parametrize(
+    ("words", "command", "output"), OUTPUTS, ids=[f"{' '.join(w)} {p.name}" for w, _, p in OUTPUTS]
+)
+def test_names_under_which_nothing_can_be_written(name, words, command, output, here, run):
+    """They are refused before any work, not after it."""
+    (here / "file").touch()
+    (here / "circle").symlink_to("circle")
+    given = [output.opts[0], name]
+    for other in command.params:
+        if other.required and other is not output:
+            value = "." if isinstance(other.type, InputFolder) else f"none-{other.name}"
+            given += [value] if isinstance(other, click.Argument) else [other.opts[0], value]
+    before = sorted(here.iterdir())
+    err = refused(run, [*words, *given])
+    assert name[:20] in err or not name
+    assert called(output) in err or Path(name).name in err
+    assert sorted(here.iterdir()) == before
 
 
 @pytest.mark.parametrize("option", ["--seed", "--max-causes", "--horizon"])

@@ -114,6 +114,12 @@ def check_writable(path: str | os.PathLike[str]) -> None:
             raise ResultError("cannot be written to", remedy=_PLACE, file=path)
         return
     target = Path(os.path.realpath(path))
+    try:
+        os.stat(target)
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        pass  # said more plainly below
+    except (OSError, ValueError) as error:  # a name that is too long, links in a circle
+        raise _refused(path, error) from None
     if not os.path.isdir(target.parent):
         raise ResultError("its folder does not exist", remedy="make the folder first", file=path)
     if not os.access(target.parent, os.W_OK | os.X_OK):
