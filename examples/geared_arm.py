@@ -28,7 +28,7 @@ worn = diagnose(shake(1), arm, holdout=shake(2))
 print(worn.summary())
 for law in worn.to_dict()["laws"]:
     print(
-        f"evidence: over {law['variable']}, the law explains {law['explained']:.0%} of what the model without it lacks"
+        f"evidence: over {law['variable']}, the law explains {law['explained']:.0%} of the residual torque of the model without it"
     )
 print(worn.to_polars().filter(status="not excited").select("effect", "joint"))
 

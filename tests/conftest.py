@@ -65,7 +65,7 @@ def seed_log(arm: Arm) -> Log:
 
 @pytest.fixture
 def frame(seed_log: Log) -> pl.DataFrame:
-    """The same log as a table."""
+    """The columns of a log as a table."""
     return seed_log.to_polars()
 
 
@@ -81,3 +81,11 @@ def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str
         return int(stop.value.code or 0), out, err
 
     return call
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder

@@ -1,4 +1,4 @@
-"""The same log in every format, written through the formats' own libraries."""
+"""One log in every format, written through the formats' own libraries."""
 
 from __future__ import annotations
 

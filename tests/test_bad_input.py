@@ -284,7 +284,7 @@ ARMS: list[tuple[Case, str, str]] = [
 # Options after `diagnose LOG --arm ARM`.
 OPTIONS: list[tuple[Case, list[str]]] = [
     (Case("no horizon", OptionError, ("horizon", "positive")), ["--horizon", "0"]),
-    (Case("horizon is no number", OptionError, ("horizon",)), ["--horizon", "nan"]),
+    (Case("horizon is NaN", OptionError, ("horizon",)), ["--horizon", "nan"]),
     (Case("fewer than no causes", OptionError, ("-1",)), ["--max-causes", "-1"]),
     (Case("mapping without a name", OptionError, ("--columns", "q1=NAME")), ["--columns", "q1"]),
     (Case("mapping given twice", OptionError, ("given twice",)), ["--columns", "q1=a,q1=b"]),

@@ -115,7 +115,7 @@ def test_log_from_standard_input(arm_file, seed_log):
 
 
 def test_columns_and_units_on_the_command_line(arm_file, log_file, tmp_path, run):
-    """The same log under other names and units gives the same estimate."""
+    """A log under other names and units gives the same estimate."""
     frame = pl.read_parquet(log_file)
     other = frame.select(
         time=pl.col("t") * 1e3,

@@ -11,8 +11,9 @@ import polars as pl
 import pytest
 
 from armgap import Log
-from armgap.cli.common import ManyValues, write
+from armgap.cli.common import ManyValues
 from armgap.errors import ResultError
+from armgap.output import write
 
 
 @click.command(cls=ManyValues)

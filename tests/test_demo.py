@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from armgap.cli.demo import CASE_FOLDER as CASE
-from armgap.trial.key import Hidden, Key, open_key
+from armgap.trial.key import HiddenEffect, Key, open_key
 from armgap.trial.verdict import judge
 from doc_blocks import agrees, blocks
 
@@ -31,7 +31,7 @@ class Answer:
 
 
 def key(*effects: tuple[str, int | None]) -> Key:
-    return Key(tuple(Hidden(e, j, {}) for e, j in effects), "off", (), {}, "")
+    return Key(tuple(HiddenEffect(e, j, {}) for e, j in effects), "off", (), {}, "")
 
 
 @pytest.mark.parametrize(

@@ -95,9 +95,9 @@ def test_every_effect_has_its_picture_and_its_family(pictures: Any, hooks: Any) 
 )
 def test_a_picture_shows_the_effect_and_nothing_else(pictures: Any, name: str, law: Any) -> None:
     _, q, tau = pictures.motion(name)
-    seen = pictures.lacking(pictures.SIGNATURES[name].kind, q, tau)
+    seen = pictures.residual_torque(pictures.SIGNATURES[name].kind, q, tau)
     moving = np.abs(seen["dq"]) > 0.1  # at rest friction takes any value up to its level
-    error = np.abs(seen["lack"] - law(seen))[moving]
+    error = np.abs(seen["residual"] - law(seen))[moving]
     assert np.quantile(error, 0.95) < 0.02 * np.max(np.abs(law(seen)))
 
 

@@ -266,6 +266,6 @@ def test_impossible_options(arm: Arm, real: Log, option: dict[str, object]) -> N
         identify(real, arm, **option)  # type: ignore[arg-type]
 
 
-def test_sensor_velocities_that_a_log_lacks(arm: Arm, real: Log) -> None:
+def test_sensor_velocities_that_a_log_does_not_hold(arm: Arm, real: Log) -> None:
     with pytest.raises(ColumnError, match="dq1"):
         identify(dataclasses.replace(real, dq=None), arm, velocity="sensor")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 
 import numpy as np
 import polars as pl
@@ -11,6 +12,7 @@ import pytest
 from armgap import Arm, Log, inspect
 from armgap.cli.demo import CASE_FOLDER as DEMO
 from armgap.errors import LogShapeError, OptionError
+from armgap.inspection import columns_of
 from armgap.inspection.channels import step_of
 from armgap.inspection.page import render
 
@@ -141,3 +143,103 @@ def test_what_was_left_out_and_where_gaps_are_is_counted_listed_and_drawn():
     text = render([found])
     assert '"left out"' in text
     assert '"gap"' in text
+
+
+@pytest.fixture
+def odd(tmp_path, seed_log: Log):
+    """Two seconds in milliseconds and degrees, under names that no standard knows, beside columns of other things."""
+    table = pl.DataFrame(
+        {
+            "note": ["go"] * len(seed_log),
+            "Timestamp": 1000 * seed_log.t,
+            "shoulderPos": np.degrees(seed_log.q[:, 0]),
+            "elbowPos": np.degrees(seed_log.q[:, 1]),
+            "target_position": np.zeros(len(seed_log)),
+            "shoulder_effort": seed_log.tau[:, 0],
+            "elbow_effort": seed_log.tau[:, 1],
+        }
+    )
+    path = tmp_path / "odd log.csv"
+    table.write_csv(path, separator=";")
+    return path
+
+
+def test_without_a_mapping_the_columns_are_listed_and_one_is_proposed(run, odd):
+    found = columns_of(odd)
+    assert [c.name for c in found.columns][:3] == ["note", "Timestamp", "shoulderPos"]
+    assert {c.name: c.trend for c in found.columns if c.trend != "varies"} == {
+        "note": "text",
+        "Timestamp": "rising",
+        "target_position": "constant",
+    }
+    stamps = found.columns[1]
+    assert (stamps.low, stamps.high, stamps.rows, stamps.missing) == (0.0, pytest.approx(1997.5), 800, 0)
+    assert found.proposed == {
+        "t": "Timestamp",
+        "q1": "shoulderPos",
+        "q2": "elbowPos",
+        "tau1": "shoulder_effort",
+        "tau2": "elbow_effort",
+    }
+    assert found.units == {"t": "ms", "q": "deg"}
+    status, out, err = run("inspect", odd)
+    assert (status, err) == (0, "")
+    assert found.options in " ".join(out.split())
+    assert "positive where they turn the joint towards greater q" in " ".join(out.split())
+
+
+def test_what_is_proposed_can_be_run_as_it_stands(run, odd):
+    words = shlex.split(columns_of(odd).options)
+    status, out, _ = run("inspect", odd, *words)
+    assert status == 0
+    assert "q2 = elbowPos" in " ".join(out.split())
+
+
+def test_the_listing_as_data(run, odd):
+    status, out, _ = run("inspect", odd, "--json", "-")
+    assert status == 0
+    data = json.loads(out)
+    assert data["schema"] == "armgap.columns/1"
+    assert data["proposed"]["tau2"] == "elbow_effort"
+    assert data["columns"][0] | {"rows": 800} == data["columns"][0]
+
+
+def test_nothing_is_proposed_where_no_name_suggests_it(run, tmp_path):
+    file = tmp_path / "x.csv"
+    pl.DataFrame({"a": np.arange(30.0), "b": np.cos(np.arange(30.0)), "c": np.sin(np.arange(30.0))}).write_csv(file)
+    assert columns_of(file).proposed == {"t": "a", "q1": "NAME", "tau1": "NAME"}
+    status, out, _ = run("inspect", file)
+    assert status == 0
+    assert "no column suggests itself for q1, tau1" in " ".join(out.split())
+
+
+def test_joints_are_in_the_order_of_their_numbers_and_as_many_as_the_arms(arm, tmp_path):
+    t = np.arange(40) * 0.0025
+    names = ("pos_2", "pos_1", "trq_2", "trq_1", "vel_2", "vel_1")
+    pl.DataFrame({"time": t} | {n: np.sin(9 * t + i) for i, n in enumerate(names)}).write_csv(tmp_path / "x.csv")
+    proposed = columns_of(tmp_path / "x.csv", arm).proposed
+    assert proposed == {
+        "t": "time",
+        "q1": "pos_1",
+        "q2": "pos_2",
+        "tau1": "trq_1",
+        "tau2": "trq_2",
+        "dq1": "vel_1",
+        "dq2": "vel_2",
+    }
+
+
+def test_a_mapping_that_is_wrong_is_refused_as_before(run, odd, tmp_path):
+    status, out, err = run("inspect", odd, "--columns", "t=Timestamp,q1=nowhere")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "nowhere" in err
+    status, _, err = run("inspect", odd, "--report", tmp_path / "x.html")
+    assert (status, err.count("\n")) == (2, 1)
+    assert not (tmp_path / "x.html").exists()
+
+
+def test_the_page_has_the_conventions_of_its_arm(arm, seed_log):
+    page = render([inspect(seed_log, arm)])
+    assert 'id="conventions"' in page
+    assert "relative to link 1" in page
+    assert 'id="conventions"' not in render([inspect(seed_log)])

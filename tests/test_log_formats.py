@@ -1,4 +1,4 @@
-"""The same run in every format is the same log."""
+"""One run, read from every format, gives equal logs."""
 
 from __future__ import annotations
 

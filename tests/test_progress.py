@@ -1,4 +1,4 @@
-"""Progress and interrupts: what is told, what a terminal shows, and what an interrupt leaves."""
+"""Progress and interrupts: what is reports, what a terminal shows, and what an interrupt leaves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pytest
 
 from armgap import Arm, Log, diagnose, seed_torque, simulate
 from armgap.cli.progress import left
-from armgap.progress import following, of_many, tell
+from armgap.progress import part_callback, report_progress, use_callback
 from armgap.simulation import Effect
 
 CONTROL_C = b"\x03"
@@ -72,10 +72,10 @@ def _own_terminal() -> None:
 
 
 def test_a_diagnosis_tells_what_it_does_and_never_falls_back(arm, motion):
-    told: list[tuple[str, float]] = []
-    diagnose([motion], arm, progress=lambda work, fraction: told.append((work, fraction)))
-    fractions = np.array([fraction for _, fraction in told])
-    assert all(work for work, _ in told)
+    reports: list[tuple[str, float]] = []
+    diagnose([motion], arm, progress=lambda work, fraction: reports.append((work, fraction)))
+    fractions = np.array([fraction for _, fraction in reports])
+    assert all(work for work, _ in reports)
     assert np.all(np.diff(fractions) >= 0)
     assert 0 <= fractions[0] < fractions[-1] == 1
 
@@ -106,22 +106,22 @@ def test_an_interrupt_or_an_error_of_the_callback_ends_a_diagnosis(arm, motion):
 @pytest.mark.parametrize("name", ["log.parquet", "log.csv"])
 def test_reading_tells_the_file_and_how_much_of_it(name, seed_log, tmp_path):
     seed_log.write(tmp_path / name)
-    told: list[tuple[str, float]] = []
-    with following(lambda work, fraction: told.append((work, fraction))):
+    reports: list[tuple[str, float]] = []
+    with use_callback(lambda work, fraction: reports.append((work, fraction))):
         Log.read(tmp_path / name)
-    assert {work for work, _ in told} == {f"reading {name}"}
-    assert max(fraction for _, fraction in told) > 0.5
+    assert {work for work, _ in reports} == {f"reading {name}"}
+    assert max(fraction for _, fraction in reports) > 0.5
 
 
 def test_parts_of_many_share_the_whole():
-    told: list[tuple[str, float]] = []
-    with following(lambda work, fraction: told.append((work, fraction))):
+    reports: list[tuple[str, float]] = []
+    with use_callback(lambda work, fraction: reports.append((work, fraction))):
         for part in range(2):
-            with following(of_many("both", part, 2)):
-                tell("one", 0.0)
-                tell("one", 1.0)
-        tell("after", 0.5)
-    assert told == [("both", 0.0), ("both", 0.5), ("both", 0.5), ("both", 1.0), ("after", 0.5)]
+            with use_callback(part_callback("both", part, 2)):
+                report_progress("one", 0.0)
+                report_progress("one", 1.0)
+        report_progress("after", 0.5)
+    assert reports == [("both", 0.0), ("both", 0.5), ("both", 0.5), ("both", 1.0), ("after", 0.5)]
 
 
 def test_the_time_left_follows_the_work_done():

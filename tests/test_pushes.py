@@ -1,4 +1,4 @@
-"""Smooth, long pushes on an arm whose model lacks several things at once: found beside that remainder, and nowhere else."""
+"""Smooth, long pushes on an arm whose model leaves several effects out: found beside that remainder, and nowhere else."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_values_of_one_log_that_differ_are_not_taken_for_pushes(arm: Arm) -> Non
 
 
 @pytest.mark.parametrize(("joint", "impulse"), [(1, 0.05), (2, 0.02)])
-def test_a_push_too_light_for_the_lacking_torque_is_found_in_the_window_it_moves(joint: int, impulse: float) -> None:
+def test_a_push_too_light_for_the_residual_torque_is_found_in_the_window_it_moves(joint: int, impulse: float) -> None:
     """Lost in the noise of accelerations, and of no consequence to the whole log; predictions of one window miss by it."""
     arm = Arm.read(CASE_FOLDER / "arm.toml")
     t = np.arange(2400) * arm.sample_period

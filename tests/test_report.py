@@ -12,12 +12,14 @@ import pytest
 from bokeh.core.validation.check import check_integrity
 
 import report_cases as cases
-from armgap import Arm, diagnose, simulate
+from armgap import Arm, Diagnosis, diagnose, simulate
 from armgap.errors import OptionError
 from armgap.report import check_report, diagnosis_document, diagnosis_report, render_html, summary_table
+from armgap.report.advice import next_steps
 from armgap.report.sections import SECTIONS
+from armgap.report.sections.gap import first_picture
 from armgap.report.sections.motion import _whole_run
-from armgap.report.words import answers, figure, percent, value, verdict
+from armgap.report.words import answers, figure, percent, value, variable_text, verdict
 from armgap.simulation import Effect
 
 LARGEST_REPORT = 5_000_000  # bytes
@@ -169,6 +171,156 @@ def test_an_older_diagnosis_without_what_was_added_since_still_has_a_report() ->
     least = {key: whole[key] for key in needed}
     assert len([s for s in SECTIONS if s(least) is not None]) >= 5
     assert "Stribeck" in render_html(least)
+
+
+SIGN = {
+    "check": "torque_sign",
+    "joint": 1,
+    "log": "run 1",
+    "severity": "error",
+    "message": "with tau1 counted the other way predictions over 0.25 s miss by 2 mrad, as it stands by 400 mrad",
+    "remedies": ["--flip tau1", "--flip q1"],
+    "remedy": "--flip tau1 or --flip q1",
+    "rows": [],
+}
+SPIKE = SIGN | {
+    "check": "spike",
+    "severity": "warning",
+    "message": f"one row jumps, says {cases.HOSTILE}",
+    "remedies": [],
+    "remedy": "",
+    "rows": [[12, 12], [40, 44]],
+}
+
+
+def contradicted() -> dict:
+    """A diagnosis whose input contradicts its arm file."""
+    data = copy.deepcopy(cases.none().to_dict())
+    return data | {"verdict": "input", "causes": [], "checks": [SPIKE, SIGN]}
+
+
+def test_a_contradiction_of_the_input_comes_first_with_its_remedy() -> None:
+    data = contradicted()
+    assert (
+        verdict(data)
+        == "Logs and arm file contradict each other: torque sign of joint 1. Remedy: --flip tau1 or --flip q1"
+    )
+    first, which, far = answers(data)
+    assert first.headline == "Torque sign of joint 1"
+    assert "400 mrad" in first.detail
+    assert which.headline == "None is named"
+    assert far.headline == "With the remedy applied"
+    page = html.unescape(render_html(data))
+    assert (
+        page.index("Checks of the input") < page.index("What contradicts what?") < page.index("Which effect causes it?")
+    )
+    assert page.count("<h2>Checks of the input</h2>") == 1
+    assert page.index("<td>contradiction</td>") < page.index("<td>warning</td>"), "errors first"
+    assert "rows 13, 41 to 45" in page
+    assert "<code>--flip tau1</code> or <code>--flip q1</code>" in page
+    text = diagnosis_report(Diagnosis.from_dict(data), "x.md")
+    assert text.index("Checks of the input") < text.index("What contradicts what?")
+    assert "`--flip tau1`" in text
+    assert "<script>" not in text
+    assert "Remedy: --flip tau1" in Diagnosis.from_dict(data).summary()
+
+
+def test_a_contradiction_without_details_still_has_its_words() -> None:
+    data = contradicted() | {"checks": []}
+    assert verdict(data) == "Logs and arm file contradict each other."
+    assert "Checks of the input" not in render_html(data)
+    assert next_steps(data)
+
+
+def test_repairs_and_warnings_stand_beside_any_verdict() -> None:
+    data = copy.deepcopy(cases.named().to_dict())
+    assert "Checks of the input" not in render_html(data)
+    data["checks"] = [SPIKE, SPIKE | {"severity": "repaired", "check": "wrapped_positions"}]
+    page = render_html(data)
+    assert page.index("Where is the gap?") < page.index("<h2>Checks of the input")
+    assert page.index("<td>repaired</td>") < page.index("<td>warning</td>")
+    assert "wrapped positions" in page
+
+
+def test_candidates_stand_below_the_causes_with_their_reason() -> None:
+    data = copy.deepcopy(cases.named().to_dict())
+    assert "not fit for the headline" not in render_html(data)
+    data["candidates"] = [
+        data["causes"][0] | {"effect": "torque_gain", "probability": 0.1, "why": "no arm has a gain of 20"}
+    ]
+    page = render_html(data)
+    assert page.index("Ranking of causes</h2>") < page.index("Candidates not fit for the headline</h2>")
+    assert "no arm has a gain of 20" in page
+    assert "no arm has a gain of 20" in diagnosis_report(Diagnosis.from_dict(data), "x.md")
+
+
+def test_the_place_of_the_gap_is_given_in_the_joints_own_range() -> None:
+    data = copy.deepcopy(cases.named().to_dict())
+    data["regimes"][0] |= {"variable": "abs(dq1)", "unit": "rad/s", "edges": [0.0, 0.021, 0.532, 4.06]}
+    data["where"][0] |= {
+        "regime": "medium speed",
+        "detail": "abs(dq1) from 0.021 to 0.532 rad/s",
+        "range": {"variable": "abs(dq1)", "from": 0.021, "to": 0.532},
+    }
+    assert answers(data)[0].headline == "Joint 1, at medium speed: 0.021 to 0.53 of at most 4.1 rad/s"
+    data["regimes"] = []
+    assert answers(data)[0].headline == "Joint 1, at medium speed: 0.021 to 0.53 rad/s"
+
+
+def test_every_range_of_the_map_has_its_limits() -> None:
+    data = cases.named().to_dict()
+    [heat] = first_picture(data).heats
+    ranged = {label: tiles for label, tiles in heat.rows if "reversal" not in label}
+    assert all(re.search(r"\[(rad/s|rad|N\sm|s)\]$", label) for label in ranged)
+    for r in data["regimes"]:
+        if not r["variable"].startswith("reversal"):
+            [tiles] = [
+                t
+                for label, t in ranged.items()
+                if label.startswith(f"joint {r['joint']}: {variable_text(r['variable'])} ")
+            ]
+            limits = [float(t.low) for t in tiles] + [float(tiles[-1].high)]
+            largest = max(map(abs, r["edges"]))
+            assert limits == pytest.approx(r["edges"], rel=0.05, abs=1e-4 * largest)
+            assert [t.high for t in tiles[:-1]] == [t.low for t in tiles[1:]]
+
+
+def test_logarithmic_bars_run_over_whole_decades_and_say_so() -> None:
+    chart = first_picture(cases.named().to_dict()).figures[0].chart
+    assert "log scale" in chart.yaxis[0].axis_label
+    for end in (chart.y_range.start, chart.y_range.end):
+        assert np.log10(end) == pytest.approx(round(np.log10(end)))
+    ticks = chart.yaxis[0].ticker
+    assert len(ticks.ticks) >= 2
+    assert len(ticks.minor_ticks) == 8 * (len(ticks.ticks) - 1)
+    labels = chart.yaxis[0].major_label_overrides
+    assert sorted(float(text) for text in labels.values()) == pytest.approx(ticks.ticks)
+
+
+@EVERY_CASE
+def test_every_report_ends_with_what_to_do_next(case) -> None:
+    steps = next_steps(case().to_dict())
+    assert steps
+    assert diagnosis_document(case()).sections[-1].points == steps
+    assert "What to do next" in diagnosis_report(case(), "x.md")
+
+
+def test_what_to_do_next_follows_from_the_verdict_and_the_result() -> None:
+    effect, none, unexplained = (copy.deepcopy(case().to_dict()) for case in cases.CASES.values())
+    assert "armgap export" in " ".join(next_steps(effect))
+    assert "do not tell" not in " ".join(next_steps(effect))
+    effect["causes"][0]["equivalents"] = [{"effect": "backlash", "joint": 1, "why": "both act at reversals"}]
+    assert "do not tell Stribeck friction (stiction), joint 1, from backlash" in next_steps(effect)[0]
+    effect["gap"]["closed"] = 0.5
+    assert "50\N{NO-BREAK SPACE}% of the gap above the floor stays" in next_steps(effect)[-1]
+    assert "keep the arm file" in next_steps(none)[0]
+    none["ruled_out"][0] |= {"effect": "backlash", "status": "not excited"}
+    assert "acklash" in next_steps(none)[-1]
+    assert "armgap export" in next_steps(none | {"verdict": "parameters"})[0]
+    assert "effects=[...]" in " ".join(next_steps(unexplained))
+    assert "`--flip tau1` or `--flip q1`" in next_steps(contradicted())[0]
+    none["plausibility"][0] |= {"holds": False}
+    assert next_steps(none)[0].startswith("First find out why")
 
 
 def test_an_impossible_arm_is_pointed_out() -> None:

@@ -12,7 +12,7 @@ from armgap import Diagnosis
 from armgap.comparison import compare, read_diagnosis
 from armgap.errors import OptionError
 from armgap.report import render_report
-from armgap.report.compared import answers, comparison_document
+from armgap.report.compared import answers, comparison_document, lead
 
 
 def changed(diagnosis: Diagnosis, change) -> Diagnosis:
@@ -72,6 +72,27 @@ def test_a_look_alike_named_later_is_the_same_cause_under_another_name() -> None
 
     result = compare(changed(cases.named(), alike), changed(cases.named(), other))
     assert [(c.effect, c.status) for c in result.causes] == [("stribeck", "renamed"), ("backlash", "new")]
+
+
+def test_what_went_and_what_came_is_said_first() -> None:
+    """Also where the gap of the arm file stays about what it was, because other values of it are wrong."""
+
+    def as_before(data: dict) -> None:
+        data["gap"]["before"] = list(cases.named().to_dict()["gap"]["before"])
+
+    cured = compare(cases.named(), changed(cases.none(), as_before))
+    assert cured.outcome == "unchanged"
+    assert lead(cured).startswith("Gone: Stribeck friction (stiction), joint 1. The gap")
+    assert answers(cured)[0].headline == "Stribeck friction (stiction), joint 1: gone"
+    came = compare(cases.none(), cases.named())
+    assert lead(came).startswith("New: Stribeck friction (stiction), joint 1. ")
+    assert lead(compare(cases.named(), cases.named())).startswith("The gap")
+
+
+def test_the_report_of_a_comparison_has_the_conventions_of_its_arm() -> None:
+    result = compare(cases.named(), cases.none())
+    assert result.kind == "pendulum"
+    assert any(s.name == "conventions" for s in comparison_document(result).sections)
 
 
 def test_every_push_of_a_log_is_kept() -> None:

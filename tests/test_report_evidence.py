@@ -10,7 +10,7 @@ import pytest
 import report_cases as cases
 from armgap import effects
 from armgap.evidence import laws, plausibility
-from armgap.evidence.hypothesis import Hypothesis, Placed, delivered, true_positions
+from armgap.evidence.hypothesis import EffectInstance, Hypothesis, delivered, true_positions
 from armgap.evidence.laws import VARIABLES
 from armgap.simulation import Effect
 
@@ -41,9 +41,9 @@ def test_inertia_of_the_two_link_arm_is_the_papers(arm) -> None:
 def test_delivered_torque_follows_each_law_of_the_command() -> None:
     t = np.arange(200) * 0.002
     tau = np.sin(20 * t)[:, None]
-    clipped = delivered(t, tau, [Placed("torque_saturation", 1, {"level": 0.5})])
+    clipped = delivered(t, tau, [EffectInstance("torque_saturation", 1, {"level": 0.5})])
     np.testing.assert_allclose(clipped[:-1], np.clip(tau, -0.5, 0.5)[:-1], atol=1e-9)
-    late = delivered(t, tau, [Placed("actuator_delay", 1, {"delay": 0.004})])
+    late = delivered(t, tau, [EffectInstance("actuator_delay", 1, {"delay": 0.004})])
     np.testing.assert_allclose(late[2:-1], tau[:-3], atol=1e-9)
     np.testing.assert_array_equal(delivered(t, tau, []), tau)
 
@@ -51,7 +51,7 @@ def test_delivered_torque_follows_each_law_of_the_command() -> None:
 def test_true_positions_undo_encoder_errors() -> None:
     q = np.linspace(-3, 3, 500)[:, None]
     shown = q + 0.05 * np.sin(q) + 0.02 * np.cos(q)
-    back = true_positions(shown, [Placed("encoder_eccentricity", 1, {"a": 0.05, "b": 0.02})])
+    back = true_positions(shown, [EffectInstance("encoder_eccentricity", 1, {"a": 0.05, "b": 0.02})])
     np.testing.assert_allclose(back, q, atol=1e-6)
 
 

@@ -7,9 +7,10 @@ import sys
 import pytest
 
 import report_cases as cases
-from armgap import Diagnosis
+from armgap import Diagnosis, Log
 from armgap.errors import OptionError
 from armgap.report.notebook import PlotLibraryMissingError
+from armgap.report.words import figure
 
 
 @pytest.fixture
@@ -79,3 +80,29 @@ def test_the_table_has_every_candidate_once(case) -> None:
     named = table.filter(status="named")
     assert set(named["effect"]) == {c.effect for c in diagnosis.causes}
     assert named["value"].null_count() == 0
+
+
+def test_an_arm_shows_its_conventions_and_parameters_and_no_markup_of_its_name() -> None:
+    shown = cases.ARM._repr_html_()
+    assert "<svg" in shown
+    assert "gravity torque of the level link" in shown
+    assert "0.600 ± 0.060 N m" in shown
+    assert "<script" not in shown
+    text = cases.ARM._repr_markdown_()
+    assert "| theta2 | gravity torque of the level link | 0.600 ± 0.060 N m |" in text
+    assert "\\<script" in text
+    assert "hangs straight down" in text
+
+
+def test_a_log_shows_its_columns_with_their_ranges() -> None:
+    log = cases.swing(1, name=cases.HOSTILE)
+    named = Log.from_frame(
+        log.to_polars().rename({"q1": "<b>"}), columns={"q1": "<b>"}, arm=cases.ARM, name=cases.HOSTILE
+    )
+    shown, text = named._repr_html_(), named._repr_markdown_()
+    assert f"{cases.SAMPLES} samples over 5.996 s, 250 Hz" in shown
+    assert "&lt;b&gt;" in shown
+    assert "<b>" not in shown
+    assert "<script" not in shown
+    assert "\\<script" in text
+    assert f"| q1 | \\<b\\> | {figure(log.q.min())} to {figure(log.q.max())} | rad |" in text

@@ -24,15 +24,15 @@ from armgap.trial import (
     plan_trial,
     possible,
 )
+from armgap.trial.actuator import Actuator, DeadZone, Delay, Encoder, Lag, Saturation
 from armgap.trial.arms import AXIS, DIRECT_DRIVE, GEARED, PENDULUM, TrialArm, random_arm
-from armgap.trial.case import NoMotionError, _one, build_rig
-from armgap.trial.chain import Actuator, DeadZone, Delay, Encoder, Lag, Saturation
+from armgap.trial.case import NoMotionError, _one, simulated_arm_of
 from armgap.trial.effects import REGISTRY, Draw, usage
-from armgap.trial.effects.base import Use
+from armgap.trial.effects.base import JointUsage
 from armgap.trial.excitation import draw_excitation
-from armgap.trial.key import Hidden, Key
-from armgap.trial.plant import Build, Flexure, Plant, Rotor
-from armgap.trial.rig import Rig, run
+from armgap.trial.key import HiddenEffect, Key
+from armgap.trial.plant import Flexure, Plant, PlantConfig, Rotor
+from armgap.trial.simulated_arm import SimulatedArm, run
 from armgap.trial.verdict import equivalent
 
 DEMO_CASE = Path(__file__).parents[1] / "python" / "armgap" / "demo_case"
@@ -85,13 +85,13 @@ def inertia_and_bias(theta, q, dq):
 
 @pytest.fixture(scope="module")
 def paper_run():
-    return run(Rig(Build(DIRECT_DRIVE)), paper_torques, 4.0)
+    return run(SimulatedArm(PlantConfig(DIRECT_DRIVE)), paper_torques, 4.0)
 
 
 def test_power_balance_without_friction():
     """Energy gained equals the work of the held torques."""
     arm = replace(DIRECT_DRIVE, viscous=(0.0, 0.0), coulomb=(0.0, 0.0))
-    x = run(Rig(Build(arm)), lambda t, q: [0.4 * u for u in paper_torques(t, q)], 2.0)
+    x = run(SimulatedArm(PlantConfig(arm)), lambda t, q: [0.4 * u for u in paper_torques(t, q)], 2.0)
     work = np.sum(x.tau[:-1] * np.diff(x.q_true, axis=0))
 
     def energy(q, dq):
@@ -102,18 +102,18 @@ def test_power_balance_without_friction():
     assert energy(x.q_true[-1], x.dq_true[-1]) == pytest.approx(work, rel=1e-9)
 
 
-@pytest.mark.parametrize(("build", "change"), [
-    (Build(DIRECT_DRIVE), {}),
-    (Build(DIRECT_DRIVE, payload=(0.8, 0.2)), {"payload": (0.8, 0.2)}),
-    (Build(DIRECT_DRIVE, armature={1: 0.05}), {"armature": 0.05}),
-    (Build(DIRECT_DRIVE, tilt=0.1), {"tilt": 0.1}),
-    (Build(DIRECT_DRIVE, coupling=(2e-4, -6.0)), {"coupling": (2e-4, -6.0)}),
+@pytest.mark.parametrize(("config", "change"), [
+    (PlantConfig(DIRECT_DRIVE), {}),
+    (PlantConfig(DIRECT_DRIVE, payload=(0.8, 0.2)), {"payload": (0.8, 0.2)}),
+    (PlantConfig(DIRECT_DRIVE, armature={1: 0.05}), {"armature": 0.05}),
+    (PlantConfig(DIRECT_DRIVE, tilt=0.1), {"tilt": 0.1}),
+    (PlantConfig(DIRECT_DRIVE, coupling=(2e-4, -6.0)), {"coupling": (2e-4, -6.0)}),
 ])  # fmt: skip
-def test_engine_has_the_stated_inertia_and_gravity(build, change):
+def test_engine_has_the_stated_inertia_and_gravity(config, change):
     """M(q) and C dq + g of the engine's model equal the arm's equations at random states."""
     import mujoco
 
-    arm, plant, rng = DIRECT_DRIVE, Plant(build), np.random.default_rng(5)
+    arm, plant, rng = DIRECT_DRIVE, Plant(config), np.random.default_rng(5)
     theta = np.array(arm.theta)
     if "payload" in change:
         (m, d), l1, g = change["payload"], arm.length[0], arm.gravity
@@ -136,7 +136,7 @@ def test_engine_has_the_stated_inertia_and_gravity(build, change):
 @pytest.mark.parametrize("arm", [PENDULUM, AXIS, GEARED], ids=["pendulum", "axis", "geared"])
 def test_friction_holds_below_its_level_and_gives_way_above(arm):
     def after(factor: float) -> float:
-        plant = Plant(Build(arm))
+        plant = Plant(PlantConfig(arm))
         for _ in range(800):
             plant.hold([0.0] * (arm.n_joints - 1) + [factor * arm.coulomb[-1]])
         return abs(plant.position()[-1])
@@ -148,11 +148,11 @@ def test_friction_holds_below_its_level_and_gives_way_above(arm):
 def test_closed_play_and_stiff_flexure_leave_the_nominal_arm(paper_run):
     """Both keep the link's mass and inertia: without play, or nearly rigid, the motion is the nominal one."""
     inertia = 0.1 * DIRECT_DRIVE.inertia[1]
-    for build in (
-        Build(DIRECT_DRIVE, rotors={1: Rotor(inertia, stiffness=5e4, damping=20.0, part_of_link=True)}),
-        Build(DIRECT_DRIVE, flexure=Flexure(stiffness=5e4, damping=20.0)),
+    for config in (
+        PlantConfig(DIRECT_DRIVE, rotors={1: Rotor(inertia, stiffness=5e4, damping=20.0, part_of_link=True)}),
+        PlantConfig(DIRECT_DRIVE, flexure=Flexure(stiffness=5e4, damping=20.0)),
     ):
-        x = run(Rig(build), paper_torques, 1.0)
+        x = run(SimulatedArm(config), paper_torques, 1.0)
         assert np.max(np.abs(x.q_true - paper_run.q_true[:400])) < 2e-4
 
 
@@ -192,7 +192,7 @@ def moved():
         rng = np.random.default_rng(11)
         arm = random_arm(rng, model, 0.0025)
         motion = draw_excitation(rng, arm, "tracked", 1.0)
-        runs[arm.kind] = (arm, motion, run(Rig(Build(arm)), motion.source(arm), 2.0))
+        runs[arm.kind] = (arm, motion, run(SimulatedArm(PlantConfig(arm)), motion.source(arm), 2.0))
     return runs
 
 
@@ -206,8 +206,8 @@ def test_every_effect_moves_the_arm(name, moved):
         parameters = entry.draw(draw)
         if name in STANDARD:
             assert set(parameters) == STANDARD[name]
-        hidden = Hidden(name, joint + 1 if entry.per_joint else None, parameters)
-        x = run(build_rig(arm, [hidden]), motion.source(arm), 2.0)
+        hidden = HiddenEffect(name, joint + 1 if entry.per_joint else None, parameters)
+        x = run(simulated_arm_of(arm, [hidden]), motion.source(arm), 2.0)
         assert np.all(np.isfinite(x.q))
         assert np.max(np.abs(x.q - plain.q) / arm.step) > 20
 
@@ -216,7 +216,7 @@ def test_asymmetry_is_an_offset_of_the_opposite_sign(moved):
     """The exact look-alike, also at rest: bit for bit the same logs."""
     arm, motion, _ = moved["pendulum"]
     logs = [
-        run(build_rig(arm, [Hidden(name, 1, {key: value})]), motion.source(arm), 1.0).q
+        run(simulated_arm_of(arm, [HiddenEffect(name, 1, {key: value})]), motion.source(arm), 1.0).q
         for name, key, value in (("coulomb_asymmetry", "delta", 0.2), ("torque_offset", "offset", -0.2))
     ]
     np.testing.assert_array_equal(*logs)
@@ -224,9 +224,9 @@ def test_asymmetry_is_an_offset_of_the_opposite_sign(moved):
 
 def test_pulse_acts_only_in_its_log(moved):
     arm, motion, plain = moved["pendulum"]
-    pulse = Hidden("external_pulse", 1, {"time": 1.0, "duration": 0.1, "impulse": 0.5}, log="train-1")
-    elsewhere = run(build_rig(arm, [pulse], "holdout-1"), motion.source(arm), 2.0)
-    here = run(build_rig(arm, [pulse], "train-1"), motion.source(arm), 2.0)
+    pulse = HiddenEffect("external_pulse", 1, {"time": 1.0, "duration": 0.1, "impulse": 0.5}, log="train-1")
+    elsewhere = run(simulated_arm_of(arm, [pulse], "holdout-1"), motion.source(arm), 2.0)
+    here = run(simulated_arm_of(arm, [pulse], "train-1"), motion.source(arm), 2.0)
     np.testing.assert_array_equal(elsewhere.q, plain.q)
     first = np.flatnonzero(np.any(here.q != plain.q, axis=1))[0]
     assert 0.95 <= here.t[first] <= 0.97
@@ -295,13 +295,13 @@ def test_key_text_is_its_hash(case):
 
 
 def test_impossible_wishes_are_refused():
-    for wish in (("stribeck", 3), ("payload", 1), ("no_such_effect", 1)):
-        with pytest.raises(ValueError, match=wish[0]):
-            make_case(1, [wish])
+    for wanted in (("stribeck", 3), ("payload", 1), ("no_such_effect", 1)):
+        with pytest.raises(ValueError, match=wanted[0]):
+            make_case(1, [wanted])
 
 
 def test_logs_that_move_on_different_sides_are_refused():
-    use = Use(torque=1.0, peak=1.0, slew=1.0, speed=1.0, low=0.0, high=0.1, span=1.0, duration=10.0)
+    use = JointUsage(torque=1.0, peak=1.0, slew=1.0, speed=1.0, low=0.0, high=0.1, span=1.0, duration=10.0)
     draw = Draw(np.random.default_rng(0), 0.5, random_arm(np.random.default_rng(0), "pendulum"), 0, use)
     with pytest.raises(NoMotionError, match="in common"):
         _one(draw, "presliding", 1)

@@ -67,7 +67,7 @@ def test_words_that_make_no_sense(words, says, run):
 
 @pytest.fixture(scope="module")
 def trial(tmp_path_factory):
-    """A whole trial without peers, made, answered and scored by one command; its folder and its page."""
+    """A whole trial without baselines, made, answered and scored by one command; its folder and its page."""
     from armgap.cli import main
 
     pytest.importorskip("pebble", reason="answering cases needs armgap[trial]")
@@ -75,7 +75,7 @@ def trial(tmp_path_factory):
     page = target / "scores.md"
     words = ["trial", "all", "-n", "2", "--seed", "6", "--duration", "2", "--workers", "1", "-o", str(target / "cases")]
     with pytest.raises(SystemExit) as stop:
-        main([*words, "--no-peers", "--md", str(page), "--quiet"])
+        main([*words, "--no-baselines", "--md", str(page), "--quiet"])
     assert not stop.value.code
     return target / "cases", page.read_text()
 
@@ -162,13 +162,26 @@ def test_another_trial_is_not_mixed_in(trial, run):
     assert "another trial" in err
 
 
+def test_former_names_of_the_baselines_still_work(run, tmp_path, monkeypatch):
+    """``trial peers`` warns; ``--no-peers`` is taken; neither is shown."""
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run("trial", "peers", ".", "--only", "oracle")
+    assert (status, out, err.count("\n")) == (2, "", 2)
+    assert "'peers' is deprecated" in err
+    assert "no method `oracle`" in err
+    status, out, _ = run("trial", "all", "-n", "1", "--duration", "1", "-o", "DIR", "--no-peers", "--help")
+    assert status == 0
+    assert "peers" not in out
+    assert "peers" not in run("trial", "--help")[1]
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
         (["--cases", "3", "run", "."], "before `run`"),
         (["score", "."], "no cases"),
         (["run", "none"], "none"),
-        (["peers", ".", "--only", "oracle"], "oracle"),
+        (["baselines", ".", "--only", "oracle"], "oracle"),
         (["all", "-n", "2"], "--output"),
         (["make", "-n", "0", "-o", "x"], "-n"),
     ],

@@ -11,12 +11,12 @@ pytest.importorskip("mujoco", reason="making cases needs armgap[trial]")
 pytest.importorskip("scipy")
 
 from armgap.trial.arms import DIRECT_DRIVE, GEARED, TrialArm
-from armgap.trial.case import build_rig, make_case
+from armgap.trial.case import make_case, simulated_arm_of
 from armgap.trial.effects import REGISTRY
 from armgap.trial.excitation import Tracked, rings
-from armgap.trial.key import Hidden
-from armgap.trial.plant import Build
-from armgap.trial.rig import Rig, Source, Trace, run
+from armgap.trial.key import HiddenEffect
+from armgap.trial.plant import PlantConfig
+from armgap.trial.simulated_arm import CommandSource, SimulatedArm, Trace, run
 from dry_friction import DryArm
 
 TH = np.array(DIRECT_DRIVE.theta)
@@ -57,7 +57,7 @@ ORACLES = {
 }
 
 
-def paper_torque(scale: tuple[float, float] = (1.0, 1.0)) -> Source:
+def paper_torque(scale: tuple[float, float] = (1.0, 1.0)) -> CommandSource:
     """Equations (31)-(32) of Reyes and Kelly (1997), scaled per joint."""
 
     def command(t: float, _q: list[float]) -> list[float]:
@@ -80,7 +80,7 @@ def worst_deviation(arm: TrialArm, trace: Trace, oracle: DryArm, window: int = 1
 
 @pytest.mark.parametrize(("arm", "scale"), [(DIRECT_DRIVE, (1.0, 1.0)), (GEARED, (0.035, 0.12))])
 def test_the_nominal_arm_to_a_fraction_of_an_encoder_step(arm: TrialArm, scale: tuple[float, float]) -> None:
-    trace = run(Rig(Build(arm)), paper_torque(scale), 3.0)
+    trace = run(SimulatedArm(PlantConfig(arm)), paper_torque(scale), 3.0)
     moving = np.sign(trace.dq_true[np.abs(trace.dq_true[:, 1]) > 0.02, 1])
     assert np.sum(moving[1:] != moving[:-1]) > 10  # or dry friction would not be tested
     assert worst_deviation(arm, trace, DryArm(arm.theta)) < 0.25
@@ -89,8 +89,8 @@ def test_the_nominal_arm_to_a_fraction_of_an_encoder_step(arm: TrialArm, scale: 
 @pytest.mark.parametrize("name", ORACLES)
 def test_an_effect_to_half_an_encoder_step(name: str) -> None:
     parameters, oracle = ORACLES[name]
-    hidden = Hidden(name, 2 if REGISTRY[name].per_joint else None, parameters)
-    trace = run(build_rig(DIRECT_DRIVE, [hidden]), paper_torque(), 1.8)
+    hidden = HiddenEffect(name, 2 if REGISTRY[name].per_joint else None, parameters)
+    trace = run(simulated_arm_of(DIRECT_DRIVE, [hidden]), paper_torque(), 1.8)
     assert worst_deviation(DIRECT_DRIVE, trace, oracle) < 0.5
     assert worst_deviation(DIRECT_DRIVE, trace, DryArm(TH)) > 20  # the nominal arm would not do
 
@@ -108,7 +108,9 @@ def test_a_loop_that_oscillates_on_an_elastic_joint_is_made_softer() -> None:
         damping=1.4 * np.array(GEARED.joint_inertia) * 18.0,
         limit=np.array(GEARED.torque_limit),
     )
-    spring = [Hidden("joint_elasticity", 2, {"stiffness": 127.0, "damping": 0.046, "rotor_inertia": 0.0021})]
-    before, after = (run(build_rig(GEARED, spring), m.source(GEARED), 2.0) for m in (stiff, stiff.softer().softer()))
+    spring = [HiddenEffect("joint_elasticity", 2, {"stiffness": 127.0, "damping": 0.046, "rotor_inertia": 0.0021})]
+    before, after = (
+        run(simulated_arm_of(GEARED, spring), m.source(GEARED), 2.0) for m in (stiff, stiff.softer().softer())
+    )
     assert rings(before)
     assert not rings(after)

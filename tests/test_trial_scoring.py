@@ -12,38 +12,38 @@ pytest.importorskip("mujoco", reason="MuJoCo is missing: pip install 'armgap[tri
 from armgap import effects
 from armgap.errors import OptionError
 from armgap.trial import make_case
-from armgap.trial.answers import Answer, Limit, Named, Reach, Size, read_answer
+from armgap.trial.answers import AbsentEffect, Answer, NamedCause, PredictionErrors, Size, read_answer
 from armgap.trial.arms import AXIS, PENDULUM, TrialArm
-from armgap.trial.case import build_rig
+from armgap.trial.case import simulated_arm_of
 from armgap.trial.effects import REGISTRY
 from armgap.trial.excitation import draw_excitation
-from armgap.trial.key import Hidden, Key
-from armgap.trial.rig import Trace, run
+from armgap.trial.key import HiddenEffect, Key
 from armgap.trial.scoring import score_case
 from armgap.trial.scoring.calibration import calibrate, wilson
 from armgap.trial.scoring.case_score import GROUPS
 from armgap.trial.scoring.closing import HISTORY, closing
 from armgap.trial.scoring.sizes import MAIN, VECTOR, bound_scores, size_scores
+from armgap.trial.simulated_arm import Trace, run
 from armgap.trial.visibility import MULTIPLE, SIGMAS, visibility
 from armgap.trial.windows import Mechanism, cut, misses, refit
 
-STRIBECK = Hidden("stribeck", 2, {"amplitude": 0.5, "velocity": 0.1})
-DRAG = Hidden("quadratic_drag", 1, {"c": 0.2})
-TILT = Hidden("base_tilt", None, {"angle": 0.1})
-UNKNOWN = Hidden("speed_ripple", 1, {"amplitude": 1.0, "n": 8.0}, family="outside")
+STRIBECK = HiddenEffect("stribeck", 2, {"amplitude": 0.5, "velocity": 0.1})
+DRAG = HiddenEffect("quadratic_drag", 1, {"c": 0.2})
+TILT = HiddenEffect("base_tilt", None, {"angle": 0.1})
+UNKNOWN = HiddenEffect("speed_ripple", 1, {"amplitude": 1.0, "n": 8.0}, family="outside")
 
 
-def key(*hidden: Hidden, nominal: str = "off", visible: bool = True) -> Key:
+def key(*hidden: HiddenEffect, nominal: str = "off", visible: bool = True) -> Key:
     details = {"model": "geared", "motions": {"train-1": "paper"}, "visible": visible, "visibility": {}}
     return Key(hidden, nominal, (1.0,), details, "00")
 
 
-def answer(*named: Named, **others: object) -> Answer:
+def answer(*named: NamedCause, **others: object) -> Answer:
     return replace(Answer("armgap", "effect" if named else "none", tuple(named)), **others)  # type: ignore[arg-type]
 
 
-def named(effect: str, joint: int | None, p: float = 0.95, *alike: tuple[str, int | None]) -> Named:
-    return Named(effect, joint, p, {}, alike)
+def named(effect: str, joint: int | None, p: float = 0.95, *alike: tuple[str, int | None]) -> NamedCause:
+    return NamedCause(effect, joint, p, {}, alike)
 
 
 @pytest.mark.parametrize(("truth", "named_causes", "group", "right"), [
@@ -102,18 +102,22 @@ def test_interval_of_a_share_holds_the_share(right, of):
 
 
 def test_sizes_and_intervals():
-    told = Named("stribeck", 2, 0.9, {"amplitude": Size(0.55, 0.02), "velocity": Size(0.1, 0.01)})
-    [score] = size_scores(answer(told), key(STRIBECK))
+    stated = NamedCause("stribeck", 2, 0.9, {"amplitude": Size(0.55, 0.02), "velocity": Size(0.1, 0.01)})
+    [score] = size_scores(answer(stated), key(STRIBECK))
     assert (round(score.error, 9), score.covered) == (0.1, False)
-    gain = Hidden("torque_gain", 1, {"gain": 0.8})
-    [score] = size_scores(answer(Named("torque_gain", 1, 0.9, {"gain": Size(0.81, 0.01)})), key(gain))
+    gain = HiddenEffect("torque_gain", 1, {"gain": 0.8})
+    [score] = size_scores(answer(NamedCause("torque_gain", 1, 0.9, {"gain": Size(0.81, 0.01)})), key(gain))
     assert (round(score.error, 9), score.covered) == (0.05, True)  # of the 0.2 that are missing
-    vector = Hidden("encoder_eccentricity", 1, {"a": 0.03, "b": 0.04})
+    vector = HiddenEffect("encoder_eccentricity", 1, {"a": 0.03, "b": 0.04})
     sizes = {"a": Size(0.03, 0.001), "b": Size(0.045, 0.001)}
-    [score] = size_scores(answer(Named("encoder_eccentricity", 1, 0.9, sizes)), key(vector))
+    [score] = size_scores(answer(NamedCause("encoder_eccentricity", 1, 0.9, sizes)), key(vector))
     assert (round(score.error, 9), score.covered) == (0.1, False)
-    coupling = Hidden("rotor_coupling", None, {"inertia": 0.001, "gear": -6.0})  # told as what it adds off the diagonal
-    [score] = size_scores(answer(Named("rotor_coupling", None, 0.9, {"inertia": Size(-0.006, 1e-4)})), key(coupling))
+    coupling = HiddenEffect(
+        "rotor_coupling", None, {"inertia": 0.001, "gear": -6.0}
+    )  # told as what it adds off the diagonal
+    [score] = size_scores(
+        answer(NamedCause("rotor_coupling", None, 0.9, {"inertia": Size(-0.006, 1e-4)})), key(coupling)
+    )
     assert (round(score.error, 9), score.covered) == (0.0, True)
     assert size_scores(answer(named("encoder_offset", 1)), key(TILT)) == []
 
@@ -128,7 +132,7 @@ def test_every_effect_of_the_library_has_a_size_to_judge():
 
 
 def test_bounds_of_what_is_called_absent():
-    limits = (Limit("quadratic_drag", 1, "c", 0.3), Limit("stribeck", 2, "amplitude", 0.2))
+    limits = (AbsentEffect("quadratic_drag", 1, "c", 0.3), AbsentEffect("stribeck", 2, "amplitude", 0.2))
     held, broken = bound_scores(answer(limits=limits), key(DRAG, STRIBECK))
     assert (held.holds, broken.holds) == (True, False)
     assert bound_scores(answer(named("stribeck", 2), limits=limits), key(STRIBECK)) == []
@@ -138,9 +142,9 @@ def test_answer_reads_back_and_a_damaged_one_is_refused(tmp_path):
     full = Answer(
         "armgap",
         "effect",
-        (Named("payload", None, 0.5, {"mass": Size(1.0)}, (("torque_gain", 1),)),),
-        (Limit("backlash", 1, "gap", 1e-3),),
-        Reach(0.25, (1.0,), (0.5,), (0.1,), (0.05,)),
+        (NamedCause("payload", None, 0.5, {"mass": Size(1.0)}, (("torque_gain", 1),)),),
+        (AbsentEffect("backlash", 1, "gap", 1e-3),),
+        PredictionErrors(0.25, (1.0,), (0.5,), (0.1,), (0.05,)),
         (1.0, 2.0),
     )
     path = tmp_path / "case-0000.json"
@@ -152,10 +156,10 @@ def test_answer_reads_back_and_a_damaged_one_is_refused(tmp_path):
             read_answer(path)
 
 
-def moved(arm: TrialArm, *hidden: Hidden, seconds: float = 3.0) -> dict[str, Trace]:
+def moved(arm: TrialArm, *hidden: HiddenEffect, seconds: float = 3.0) -> dict[str, Trace]:
     rng = np.random.default_rng(2)
     motions = {name: draw_excitation(rng, arm, "tracked", 1.0) for name in ("train-1", "holdout-1")}
-    return {name: run(build_rig(arm, hidden, name), m.source(arm), seconds) for name, m in motions.items()}
+    return {name: run(simulated_arm_of(arm, hidden, name), m.source(arm), seconds) for name, m in motions.items()}
 
 
 @pytest.fixture(scope="module")
@@ -176,8 +180,12 @@ def test_refit_finds_the_arm_that_the_engine_moved(pendulum):
 def test_what_re_estimation_swallows_is_seen_by_the_parameters_only():
     """A torque offset on an axis is its weight; rotor inertia of a pendulum is its inertia."""
     for arm, small, large in (
-        (AXIS, Hidden("torque_offset", 1, {"offset": 1.0}), Hidden("torque_offset", 1, {"offset": 20.0})),
-        (PENDULUM, Hidden("rotor_inertia", 1, {"inertia": 0.01}), Hidden("rotor_inertia", 1, {"inertia": 0.2})),
+        (AXIS, HiddenEffect("torque_offset", 1, {"offset": 1.0}), HiddenEffect("torque_offset", 1, {"offset": 20.0})),
+        (
+            PENDULUM,
+            HiddenEffect("rotor_inertia", 1, {"inertia": 0.01}),
+            HiddenEffect("rotor_inertia", 1, {"inertia": 0.2}),
+        ),
     ):
         plain = moved(arm)
         faint, clear = (visibility(arm, plain, moved(arm, h)) for h in (small, large))
@@ -188,7 +196,10 @@ def test_what_re_estimation_swallows_is_seen_by_the_parameters_only():
 
 
 def test_what_re_estimation_leaves_is_seen_by_the_predictions(pendulum):
-    seen = [visibility(PENDULUM, pendulum, moved(PENDULUM, Hidden("quadratic_drag", 1, {"c": c}))) for c in (1e-6, 0.3)]
+    seen = [
+        visibility(PENDULUM, pendulum, moved(PENDULUM, HiddenEffect("quadratic_drag", 1, {"c": c})))
+        for c in (1e-6, 0.3)
+    ]
     assert [v.visible for v in seen] == [False, True]
     assert seen[0].above_floor == pytest.approx(1.0, abs=0.2)
     assert seen[1].above_floor > MULTIPLE
@@ -196,18 +207,18 @@ def test_what_re_estimation_leaves_is_seen_by_the_predictions(pendulum):
 
 @pytest.mark.parametrize(("log", "seen"), [("train-1", True), ("holdout-1", False)])
 def test_a_push_is_looked_for_in_training(log, seen, pendulum):
-    push = Hidden("external_pulse", 1, {"time": 1.5, "duration": 0.1, "impulse": 0.05}, log=log)
+    push = HiddenEffect("external_pulse", 1, {"time": 1.5, "duration": 0.1, "impulse": 0.05}, log=log)
     assert visibility(PENDULUM, pendulum, moved(PENDULUM, push), everywhere=False).visible is seen
 
 
-@pytest.mark.parametrize("wish", [("stribeck", 1), ("encoder_offset", 1), ("encoder_eccentricity", 1)])
-def test_the_truth_closes_all_of_the_gap_and_the_arm_file_none(wish, tmp_path):
+@pytest.mark.parametrize("wanted", [("stribeck", 1), ("encoder_offset", 1), ("encoder_eccentricity", 1)])
+def test_the_truth_closes_all_of_the_gap_and_the_arm_file_none(wanted, tmp_path):
     """armgap's own form of an effect at its true size predicts the engine's motion to the noise."""
-    case = make_case(4, [wish], model="pendulum", size=0.5, duration=3.0, style="tracked", sample_period=0.0025)
+    case = make_case(4, [wanted], model="pendulum", size=0.5, duration=3.0, style="tracked", sample_period=0.0025)
     case.write(tmp_path)
     hidden = case.key.effects[0]
     sizes = {k: Size(v) for k, v in hidden.parameters.items()}
-    truth = closing(tmp_path, answer(Named(hidden.effect, 1, 1.0, sizes), theta=case.key.theta), case.key)
+    truth = closing(tmp_path, answer(NamedCause(hidden.effect, 1, 1.0, sizes), theta=case.key.theta), case.key)
     nominal = tuple(float(x) for x in _stated(case.arm_file))
     none = closing(tmp_path, answer(theta=nominal), case.key)
     assert truth is not None
@@ -218,7 +229,7 @@ def test_the_truth_closes_all_of_the_gap_and_the_arm_file_none(wish, tmp_path):
 
 def test_effects_with_a_state_are_not_compared(tmp_path):
     assert {"actuator_delay", "presliding"} <= HISTORY
-    assert closing(tmp_path, answer(theta=(1.0,)), key(Hidden("presliding", 1, {}))) is None
+    assert closing(tmp_path, answer(theta=(1.0,)), key(HiddenEffect("presliding", 1, {}))) is None
     assert closing(tmp_path, answer(), key(STRIBECK)) is None  # a method that gives no model
 
 

@@ -35,7 +35,7 @@ def diagnosed(joint: int, noise: float, counts: bool) -> Diagnosis:
 
 @pytest.mark.parametrize("joint", [1, 2])
 @pytest.mark.parametrize(("noise", "counts"), [(0.0, True), (2e-5, True), (0.0, False)])
-def test_the_joint_that_lacks_torque_is_the_first_place(joint, noise, counts):
+def test_the_joint_with_the_residual_torque_is_the_first_place(joint, noise, counts):
     result = diagnosed(joint, noise, counts)
     assert result.verdict == "unexplained"
     assert result.where[0].joint == joint

@@ -196,7 +196,7 @@ def facts(name: str) -> str:
         f"| source | {entry['source']} |",
         f"| excited by | {entry['excited_by']} |",
         "",
-        f"![{_title(entry)}: position with and without it, and the torque the model lacks]({name}.svg)",
+        f"![{_title(entry)}: position with and without it, and the residual torque]({name}.svg)",
         "",
         f"*{_bench(name)} with {_sizes(name)}. {_reading(name)}*",
         "",
@@ -230,7 +230,7 @@ def _sizes(name: str) -> str:
 
 def _reading(name: str) -> str:
     against = site_pictures.AXES[site_pictures.SIGNATURES[name].against].rpartition(" [")[0]
-    return f"Left: positions under the same torques. Right: the torque the model lacks, over {against}."
+    return f"Left: positions under the same torques. Right: the residual torque of the nominal model, over {against}."
 
 
 def _parameter(p: dict[str, Any], *, first: bool) -> str:
@@ -263,7 +263,7 @@ def _fields(name: str) -> list[str]:
 
 def commands() -> str:
     """Every command's own help, sub-commands below their group."""
-    lead = "`armgap COMMAND --help` says the same. Exit status: 0 done, 2 unusable input, 130 interrupted.\n"
+    lead = "`armgap COMMAND --help` prints these texts. Exit status: 0 done, 2 unusable input, 130 interrupted.\n"
     context = cli.make_context("armgap", [], resilient_parsing=True)
     return "\n".join(["# Commands\n", lead, *(line for name in COMMANDS for line in _help(cli, context, (name,)))])
 
@@ -272,5 +272,5 @@ def _help(group: click.Group, context: click.Context, words: tuple[str, ...]) ->
     shown = CliRunner().invoke(cli, [*words, "--help"], prog_name="armgap", terminal_width=100)
     lines = [f"{'#' * (len(words) + 1)} {' '.join(words)}\n", "```text", shown.output.rstrip(), "```\n"]
     command = group.get_command(context, words[-1])
-    below = sorted(command.commands) if isinstance(command, click.Group) else []
+    below = sorted(n for n, c in command.commands.items() if not c.hidden) if isinstance(command, click.Group) else []
     return lines + [line for name in below for line in _help(command, context, (*words, name))]  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""The picture of an effect's signature: the same torques with and without it, and the torque the model lacks.
+"""The picture of an effect's signature: the same torques with and without it, and the residual torque of the nominal model.
 
 Everything is simulated when the site is built; nothing is drawn from memory.
 """
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armgap import Arm, effects, simulate
 from armgap.simulation import Effect
 
-__all__ = ["SIGNATURES", "Signature", "draw", "lacking"]
+__all__ = ["SIGNATURES", "Signature", "draw", "residual_torque"]
 
 PERIOD_S = 0.002
 DURATION_S = 8.0
@@ -92,8 +92,8 @@ SIGNATURES: dict[str, Signature] = {
 """One per effect; sizes are large enough to be seen with the naked eye."""
 
 
-def lacking(kind: str, q: NDArray[np.float64], tau: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """Torque that joint 1 of the nominal arm lacks, and what it may depend on.
+def residual_torque(kind: str, q: NDArray[np.float64], tau: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Residual torque of joint 1 of the nominal arm, and what it may depend on.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def lacking(kind: str, q: NDArray[np.float64], tau: NDArray[np.float64]) -> dict
     Returns
     -------
     dict of ndarray, shape (n - 2,)
-        Keys of `AXES` and ``"lack"``, at all samples but the outer ones.
+        Keys of `AXES` and ``"residual"``, at all samples but the outer ones.
     """
     dq = (q[2:] - q[:-2]) / (2 * PERIOD_S)
     ddq = (q[2:] - 2 * q[1:-1] + q[:-2]) / PERIOD_S**2
@@ -113,7 +113,7 @@ def lacking(kind: str, q: NDArray[np.float64], tau: NDArray[np.float64]) -> dict
     rigid, gravity = _first_joint(kind, middle, dq, ddq)
     other = min(1, q.shape[1] - 1)
     return {
-        "lack": rigid + gravity - held[:, 0],
+        "residual": rigid + gravity - held[:, 0],
         "q": middle[:, 0],
         "dq": dq[:, 0],
         "ddq": ddq[:, 0],
@@ -176,11 +176,11 @@ def draw(name: str) -> bytes:
     left.plot(t[::16], with_it[::16, 0], color=WITH, linestyle="--", label="with the effect")
     left.legend(frameon=False, labelcolor=INK, fontsize=8)
     _dress(left, "the same torques", "time t [s]", "measured position [rad]")
-    seen = lacking(shown.kind, with_it, tau)
+    seen = residual_torque(shown.kind, with_it, tau)
     # A joint that stands takes any torque; the samples at which it stops or starts mix two accelerations.
-    quiet = (np.abs(seen["dq"]) > 1e-3) & (np.abs(seen["lack"]) < 4 * np.quantile(np.abs(seen["lack"]), 0.98))
-    right.plot(seen[shown.against][quiet][::5], seen["lack"][quiet][::5], ".", markersize=1.8, color=WITH)
-    _dress(right, "what the model lacks", AXES[shown.against], "torque [N m]")
+    quiet = (np.abs(seen["dq"]) > 1e-3) & (np.abs(seen["residual"]) < 4 * np.quantile(np.abs(seen["residual"]), 0.98))
+    right.plot(seen[shown.against][quiet][::5], seen["residual"][quiet][::5], ".", markersize=1.8, color=WITH)
+    _dress(right, "residual torque", AXES[shown.against], "torque [N m]")
     out = io.BytesIO()
     figure.savefig(out, format="svg", metadata={"Date": None})
     return out.getvalue()

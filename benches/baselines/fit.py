@@ -147,7 +147,7 @@ def by_scipy(case: Case, predict: Rollout) -> Fit:
 
 def by_sysid(case: Case) -> Fit:
     """``mujoco.sysid.optimize`` with its own optimiser."""
-    from armgap.trial.peers.mujoco_model import build_spec, set_coulomb, set_inertial
+    from armgap.trial.baselines.mujoco_model import build_spec, set_coulomb, set_inertial
 
     sysid = importlib.import_module("mujoco.sysid")
     arm = Arm("arm", "two-link", 9.81, H, START, 0.1 * START)

@@ -9,6 +9,8 @@ from armgap._native import __version__
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
+    from armgap.check import CheckName, Severity
+    from armgap.custom_effect import CustomEffect
     from armgap.diagnosis import Diagnosis, diagnose
     from armgap.errors import ArmgapError
     from armgap.estimator import Estimator
@@ -16,8 +18,8 @@ if TYPE_CHECKING:
     from armgap.fitting import ArmFit, fit
     from armgap.identification import Identification, identify
     from armgap.inspection import Inspection, inspect
+    from armgap.literals import Filters, Scheme, Status, Verdict
     from armgap.log import Finding, Log
-    from armgap.own import OwnEffect
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
 
@@ -25,15 +27,21 @@ __all__ = [
     "Arm",
     "ArmFit",
     "ArmgapError",
+    "CheckName",
     "Corrected",
+    "CustomEffect",
     "Diagnosis",
     "Estimator",
+    "Filters",
     "Finding",
     "Identification",
     "Inspection",
     "Log",
-    "OwnEffect",
     "Reproduction",
+    "Scheme",
+    "Severity",
+    "Status",
+    "Verdict",
     "__version__",
     "correct",
     "diagnose",
@@ -49,6 +57,12 @@ __all__ = [
 _HOMES = {
     "Arm": "armgap.arm",
     "ArmgapError": "armgap.errors",
+    "CheckName": "armgap.check",
+    "Severity": "armgap.check",
+    "Filters": "armgap.literals",
+    "Scheme": "armgap.literals",
+    "Status": "armgap.literals",
+    "Verdict": "armgap.literals",
     "Corrected": "armgap.export",
     "correct": "armgap.export",
     "Diagnosis": "armgap.diagnosis",
@@ -58,7 +72,7 @@ _HOMES = {
     "ArmFit": "armgap.fitting",
     "fit": "armgap.fitting",
     "Log": "armgap.log",
-    "OwnEffect": "armgap.own",
+    "CustomEffect": "armgap.custom_effect",
     "Identification": "armgap.identification",
     "identify": "armgap.identification",
     "Reproduction": "armgap.reproduction",
@@ -74,7 +88,7 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     """Load a public name when it is first used, so that importing the package stays fast."""
     if name not in _HOMES:
-        raise AttributeError(f"module 'armgap' has no attribute {name!r}")
+        return import_module("armgap._renamed").old_names(__name__, stacklevel=3)(name)
     value = getattr(import_module(_HOMES[name]), name)
     globals()[name] = value
     return value

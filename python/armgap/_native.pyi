@@ -24,7 +24,7 @@ __all__ = [
 __version__: str
 
 _Floats = NDArray[np.float64]
-_Log = tuple[str, _Floats, _Floats, _Floats, Sequence[_Floats]]
+_Log = tuple[str, _Floats, _Floats, _Floats, Sequence[_Floats], _Floats | None]
 
 def arm_kinds() -> list[dict[str, Any]]: ...
 def effects() -> list[dict[str, Any]]: ...

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
+
+if TYPE_CHECKING:
+    from armgap.check.corrections import Corrections
 
 __all__ = ["Arm", "kinds"]
 
@@ -44,6 +47,8 @@ class Arm:
         SHA-256 of a sealed key that belongs to the arm's logs.
     path : Path, optional
         File it was read from.
+    corrections : Corrections, optional
+        How columns of the arm's logs are to be read otherwise than they stand.
     """
 
     name: str
@@ -59,6 +64,7 @@ class Arm:
     sealed: str | None = None
     path: Path | None = None
     link_mass: NDArray[np.float64] | None = None
+    corrections: Corrections | None = None
 
     @classmethod
     def read(cls, path: str | Path) -> Arm:
@@ -76,7 +82,8 @@ class Arm:
         """
         from armgap.arm_file import ArmFile
 
-        return cls(**ArmFile.load(Path(path)).fields())
+        arm = cls(**ArmFile.load(Path(path)).fields())
+        return arm if arm.corrections is None else arm.corrections.on_arm(arm)
 
     @property
     def n_joints(self) -> int:
@@ -110,6 +117,12 @@ class Arm:
         return np.array([i for i in range(self.n_inertial) if self.parameter_units[i] == weight], dtype=np.intp)
 
     @property
+    def expects_weight(self) -> bool:
+        """Whether the weights in `theta` are those of an arm that hangs down at zero: none negative, one positive."""
+        weights = self.theta[self.gravity_parameters]
+        return bool(np.all(weights >= 0) and np.any(weights > 0))
+
+    @property
     def _kind(self) -> dict[str, Any]:
         return kinds()[self.kind]
 
@@ -119,6 +132,18 @@ class Arm:
         if self.counts_per_rev is None:
             return None
         return (2 * np.pi if self.rotary else 1.0) / self.counts_per_rev
+
+    def _repr_html_(self) -> str:
+        """Return kind, conventions and parameters as HTML for a notebook."""
+        from armgap.report.shown import arm_facts
+
+        return arm_facts(self).html()
+
+    def _repr_markdown_(self) -> str:
+        """Return kind, conventions and parameters as Markdown."""
+        from armgap.report.shown import arm_facts
+
+        return arm_facts(self).markdown()
 
     def to_native(self) -> dict[str, Any]:
         """Return the arm as the compiled core takes it."""
@@ -166,6 +191,8 @@ class Arm:
                 lines += [*(() if opened else ("", f"[{table}]")), f"{key} = {_listed(value)}"]
         if self.columns:
             lines += ["", "[columns]", *(f"{k} = {_quoted(v)}" for k, v in self.columns.items())]
+        if self.corrections:
+            lines += ["", "[corrections]", *self.corrections.toml_lines()]
         if self.sealed is not None:
             lines += ["", "[sealed]", f"sha256 = {_quoted(self.sealed)}"]
         return "\n".join(lines) + "\n"

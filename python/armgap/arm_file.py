@@ -7,14 +7,18 @@ import math
 import re
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.arm import kinds
-from armgap.errors import ArmFileError
+from armgap.errors import ArmFileError, OptionError
+from armgap.reading import printable, read_bounded
+
+if TYPE_CHECKING:
+    from armgap.check.corrections import Corrections
 
 __all__ = ["ArmFile"]
 
@@ -26,9 +30,17 @@ _TABLES: dict[str, tuple[str, ...]] = {
     "actuator": ("torque_limit",),
     "geometry": ("link_length", "link_mass"),
     "columns": (),
+    "corrections": (),
     "sealed": ("sha256",),
 }
 _SCALARS = ("name", "kind", "gravity", "sample_period")
+MOST_BYTES = 2**20
+"""Size of an arm file: a thousand times what one needs."""
+_FORMATS = "docs/formats.md, Arm file"
+_CLOSE_KIND = 0.75
+"""Likeness from which another kind is suggested: a slip of the pen, not another machine (`six-axis` and `axis` have 0.67)."""
+_MARKUP = {"robot": "a URDF", "sdf": "an SDF model", "mujoco": "an MJCF model"}
+_REMEDY_MARKUP = f"write an arm file in TOML, of the kind {', '.join(kinds())}; see {_FORMATS}"
 _INERTIAL_SIGMA = 0.1
 _FRICTION_SIGMA = 0.5
 _STRONGEST_GRAVITY = 30.0  # m/s^2
@@ -48,13 +60,15 @@ class ArmFile:
     def load(cls, path: Path) -> ArmFile:
         """Read the file's TOML."""
         try:
-            text = path.read_text(encoding="utf-8")
+            text = read_bounded(path, MOST_BYTES).decode("utf-8-sig")
         except OSError as error:
             raise ArmFileError(
                 f"cannot be read ({error.strerror or error})", remedy="give the path of an arm file", file=path
             ) from None
         except UnicodeDecodeError:
             raise ArmFileError("is not text", remedy="an arm file is TOML in UTF-8", file=path) from None
+        if text.lstrip().startswith("<"):
+            raise ArmFileError(f"is {_markup(text)} and no arm file", remedy=_REMEDY_MARKUP, file=path)
         try:
             data = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
@@ -81,7 +95,7 @@ class ArmFile:
         columns = self._columns(n)
         self._check_inertia(kind, inertial)
         return dict(
-            name=self._text("name", default=self.path.stem),
+            name=self._text("name", default=printable(self.path.stem)),
             kind=kind,
             gravity=gravity,
             sample_period=period,
@@ -92,6 +106,7 @@ class ArmFile:
             link_length=self._lengths(n),
             link_mass=self._masses(n),
             columns=columns,
+            corrections=self._corrections(),
             sealed=self._sealed(),
             path=self.path,
         )
@@ -111,7 +126,8 @@ class ArmFile:
     def _kind(self) -> str:
         kind = self._text("kind")
         if kind not in kinds():
-            raise self._error("kind", f"`{kind}` is not a kind of arm", _suggest(kind, list(kinds())))
+            remedy = _suggest(kind, list(kinds()), _CLOSE_KIND)
+            raise self._error("kind", f"`{kind}` is not a kind of arm", f"{remedy}; see {_FORMATS}")
         return kind
 
     def _text(self, key: str, default: str | None = None) -> str:
@@ -205,6 +221,19 @@ class ArmFile:
                 raise self._error(f"columns.{key}", f"`{value}` is mapped twice", "map each column once")
         return dict(mapping)
 
+    def _corrections(self) -> Corrections:
+        """Return how the logs' columns are to be read otherwise than they stand."""
+        from armgap.check.corrections import CORRECTIONS, Corrections
+
+        given = self.data.get("corrections", {})
+        for key in given:
+            if key not in CORRECTIONS:
+                raise self._error(f"corrections.{key}", "is not a correction", _suggest(key, list(CORRECTIONS)))
+        try:
+            return Corrections.parse(**given)
+        except OptionError as error:
+            raise self._error("corrections", error.problem, error.remedy) from None
+
     def _sealed(self) -> str | None:
         value = self.data.get("sealed", {}).get("sha256")
         if value is not None and not (isinstance(value, str) and re.fullmatch(r"[0-9a-f]{64}", value)):
@@ -227,7 +256,14 @@ class ArmFile:
                     )
 
 
-def _suggest(word: str, known: list[str] | tuple[str, ...]) -> str:
-    close = difflib.get_close_matches(word, known, n=1)
+def _markup(text: str) -> str:
+    """What kind of model a text in angle brackets is."""
+    root = re.search(r"<([A-Za-z][\w:.-]*)", re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL))
+    return _MARKUP.get(root[1] if root else "", "XML")
+
+
+def _suggest(word: str, known: list[str] | tuple[str, ...], cutoff: float = 0.6) -> str:
+    """Name what is known, and first what is spelt nearly so."""
+    close = difflib.get_close_matches(word, known, n=1, cutoff=cutoff)
     listed = ", ".join(known)
     return f"did you mean `{close[0]}`? (known: {listed})" if close else f"known: {listed}"

@@ -8,8 +8,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from armgap.diagnosis import Cause, Diagnosis, RuledOut, Value
+from armgap.diagnosis import MOST_BYTES, Cause, Diagnosis, RuledOut, Value
 from armgap.errors import OptionError
+from armgap.literals import CauseStatus, GapOutcome, Verdict
+from armgap.reading import read_bounded
 
 __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare", "read_diagnosis"]
 
@@ -62,7 +64,7 @@ class CauseChange:
 
     effect: str
     joint: int | None
-    status: str
+    status: CauseStatus
     before: dict[str, Value] | None
     after: dict[str, Value] | None
     why: str
@@ -115,11 +117,13 @@ class Comparison:
         Prediction horizon of both [s].
     names : tuple of str
         What the two diagnoses are called.
+    kind : str
+        Kind of the arm.
     """
 
-    outcome: str
-    verdict_before: str
-    verdict_after: str
+    outcome: GapOutcome
+    verdict_before: Verdict
+    verdict_after: Verdict
     gap: tuple[GapChange, ...]
     causes: tuple[CauseChange, ...]
     parameters: tuple[ParameterChange, ...]
@@ -127,6 +131,7 @@ class Comparison:
     unit: str
     horizon_s: float
     names: tuple[str, str]
+    kind: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object, schema ``armgap.comparison/1``."""
@@ -147,10 +152,10 @@ def read_diagnosis(path: str | Path) -> Diagnosis:
     """
     remedy = "give a file that armgap diagnose --json wrote"
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        data = json.loads(read_bounded(path, MOST_BYTES))
     except OSError as error:
         raise OptionError(f"cannot be read ({error.strerror or error})", remedy=remedy, file=path) from None
-    except ValueError:
+    except (ValueError, RecursionError):
         raise OptionError("is not JSON", remedy=remedy, file=path) from None
     schema = data.get("schema") if isinstance(data, dict) else None
     if schema != SCHEMA:
@@ -191,6 +196,7 @@ def compare(before: Diagnosis, after: Diagnosis, names: tuple[str, str] = ("befo
         str(before.to_dict()["gap"].get("unit", "rad")),
         before.gap.horizon_s,
         names,
+        str((before.to_dict().get("arm") or {}).get("kind", "")),
     )
 
 
@@ -222,7 +228,7 @@ def _above(diagnosis: Diagnosis, values: tuple[float, ...]) -> list[float]:
     return [max(v - f, 0.0) for v, f in zip(values, diagnosis.gap.floor, strict=True)]
 
 
-def _outcome(factor: float | None, after: Diagnosis) -> str:
+def _outcome(factor: float | None, after: Diagnosis) -> GapOutcome:
     if factor is None:
         return "none" if after.verdict == "none" else "larger"
     if factor < SMALLER:
@@ -260,7 +266,9 @@ def _placed(diagnosis: Diagnosis) -> dict[_Key, Cause]:
     return found
 
 
-def _vanished(place: tuple[str, int | None], after: Diagnosis, alike: tuple[str, int | None] | None) -> tuple[str, str]:
+def _vanished(
+    place: tuple[str, int | None], after: Diagnosis, alike: tuple[str, int | None] | None
+) -> tuple[CauseStatus, str]:
     """Status of a cause that the later diagnosis does not name."""
     if alike is not None:
         return "renamed", f"{alike[0]} is named instead, which motion does not tell from it"
@@ -289,7 +297,7 @@ def _earlier(found: RuledOut | None) -> str:
     return f"{found.status} before"
 
 
-def _resized(before: dict[str, Value], after: dict[str, Value]) -> tuple[str, str]:
+def _resized(before: dict[str, Value], after: dict[str, Value]) -> tuple[CauseStatus, str]:
     """Status of a cause that both name, by its first parameter that has changed."""
     for name in before:
         change = _change(name, before[name], after[name]) if name in after else None

@@ -5,31 +5,45 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from armgap import _native
+from armgap import _native, options
+from armgap._renamed import old_names
 from armgap.arm import Arm
+from armgap.check import Check, Corrections, copied_holdout, data_checks, examine, torque_unit
+from armgap.check.time_shift import causal
+from armgap.custom_effect import CustomEffect, TorqueTables, check_effects
 from armgap.errors import LogShapeError, OptionError
 from armgap.evidence import laws, plausibility
+from armgap.literals import Status, Verdict
 from armgap.log import Log, gather
 from armgap.log.findings import remarks
 from armgap.log.stretches import choose
-from armgap.own import OwnEffect, Tables
-from armgap.progress import Told, following, tell
-from armgap.report.notebook import Shown
+from armgap.log.units import si
+from armgap.progress import ProgressCallback, report_progress, use_callback
+from armgap.provenance import provenance
+from armgap.reading import printable
+from armgap.report.notebook import NotebookDisplay
 
-__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Place", "RuledOut", "Sanity", "Value", "diagnose"]
+__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Location", "RuledOut", "Sanity", "Value", "diagnose"]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
 
 #: What a part of a log is called after the log's own name.
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
 #: What a stretch of a log is called after the log's own name.
 _STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 _HELD_OUT = 0.4
+MOST_BYTES = 2**28
+"""Size of a diagnosis' file; the largest hold some MB."""
+MOST_CAUSES = 1000
+"""More than the library can name on any arm."""
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
 
@@ -43,7 +57,7 @@ class Value:
 
 
 @dataclass(frozen=True)
-class AtHorizon:
+class GapAtHorizon:
     """RMS position error per joint on the holdout at one prediction horizon [s]; fields as in `Gap` [rad or m]."""
 
     horizon_s: float
@@ -69,9 +83,9 @@ class Gap:
     closed_ci : tuple of float
         95 % interval of it, from resampled windows.
     free_run_before, free_run_after : tuple of float
-        The same over the whole holdout, simulated from its first sample.
-    horizons : tuple of AtHorizon
-        The same at other prediction horizons, as far as the logs are long enough.
+        RMS error over the whole holdout, simulated from its first sample [rad or m].
+    horizons : tuple of GapAtHorizon
+        RMS errors at other prediction horizons, as far as the logs are long enough.
     motion : tuple of float
         RMS displacement over the horizon [rad or m].
     """
@@ -85,12 +99,12 @@ class Gap:
     closed_ci: tuple[float, float]
     free_run_before: tuple[float, ...]
     free_run_after: tuple[float, ...]
-    horizons: tuple[AtHorizon, ...] = ()
+    horizons: tuple[GapAtHorizon, ...] = ()
     motion: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
-class Place:
+class Location:
     """Where a part of the gap lies."""
 
     joint: int
@@ -142,7 +156,7 @@ class RuledOut:
 
     effect: str
     joint: int | None
-    status: str
+    status: Status
     bound: Bound | None
     why: str | None
 
@@ -171,17 +185,17 @@ _Record = TypeVar("_Record", Value, Equivalent, Bound, Sanity)
 
 
 @dataclass(frozen=True)
-class Diagnosis(Shown):
+class Diagnosis(NotebookDisplay):
     """The result of `diagnose`.
 
     Attributes
     ----------
-    verdict : str
+    verdict : {"none", "parameters", "effect", "unexplained", "input"}
         ``"none"``: the gap is within noise; ``"parameters"``: right structure, wrong values; ``"effect"``: causes
-        named; ``"unexplained"``: a gap that no effect in the library explains.
+        named; ``"unexplained"``: a gap that no effect in the library explains; ``"input"``: logs and arm file contradict each other.
     gap : Gap
         How far.
-    where : tuple of Place
+    where : tuple of Location
         Where, most of the gap first.
     causes : tuple of Cause
         Which, strongest first.
@@ -189,6 +203,8 @@ class Diagnosis(Shown):
         What was looked for and not found.
     parameters : dict
         ``nominal``, ``refit`` and ``with_causes``: name to `Value`.
+    checks : tuple of Check
+        What was noticed about the input, errors first.
     candidates : tuple of Cause
         What was found and is not fit to be named, each with its `why`; not part of the model with causes.
     sanity : tuple of Sanity
@@ -197,12 +213,13 @@ class Diagnosis(Shown):
         What a report draws besides: curves, ranking, options.
     """
 
-    verdict: str
+    verdict: Verdict
     gap: Gap
-    where: tuple[Place, ...]
+    where: tuple[Location, ...]
     causes: tuple[Cause, ...]
     ruled_out: tuple[RuledOut, ...]
     parameters: dict[str, dict[str, Value]]
+    checks: tuple[Check, ...] = ()
     candidates: tuple[Cause, ...] = ()
     sanity: tuple[Sanity, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict, repr=False)
@@ -211,7 +228,9 @@ class Diagnosis(Shown):
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Diagnosis:
         """Build a diagnosis from its JSON object."""
-        known = {"schema", "verdict", "gap", "where", "causes", "candidates", "ruled_out", "parameters", "sanity"}
+        known = {
+            "schema", "verdict", "gap", "where", "causes", "candidates", "ruled_out", "parameters", "sanity", "checks",
+        }  # fmt: skip
         gap = data["gap"]
         parameters = {
             stage: {name: _take(Value, value) for name, value in values.items()}
@@ -232,10 +251,11 @@ class Diagnosis(Shown):
                 tuple(_at_horizon(h) for h in gap.get("horizons", ())),
                 tuple(gap.get("motion", ())),
             ),
-            where=tuple(_place(p) for p in data["where"]),
+            where=tuple(_location(p) for p in data["where"]),
             causes=tuple(_cause(c) for c in data["causes"]),
             ruled_out=tuple(_ruled_out(r) for r in data["ruled_out"]),
             parameters=parameters,
+            checks=tuple(Check.from_dict(c) for c in data.get("checks", ())),
             candidates=tuple(_cause(c) for c in data.get("candidates", ())),
             sanity=tuple(_take(Sanity, s) for s in data.get("sanity", ())),
             extra={key: value for key, value in data.items() if key not in known},
@@ -268,14 +288,14 @@ def _take(kind: type[_Record], data: dict[str, Any]) -> _Record:
     return kind(**{f.name: data[f.name] for f in fields(kind) if f.name in data})
 
 
-def _at_horizon(data: dict[str, Any]) -> AtHorizon:
+def _at_horizon(data: dict[str, Any]) -> GapAtHorizon:
     errors = (tuple(data[key]) for key in ("before", "refit", "after", "floor"))
-    return AtHorizon(data["horizon_s"], *errors)
+    return GapAtHorizon(data["horizon_s"], *errors)
 
 
-def _place(data: dict[str, Any]) -> Place:
+def _location(data: dict[str, Any]) -> Location:
     spread = data.get("range") or {}
-    return Place(
+    return Location(
         data["joint"], data["share"], data["regime"], data["detail"],
         spread.get("variable"), spread.get("from"), spread.get("to"),
     )  # fmt: skip
@@ -310,8 +330,10 @@ def diagnose(
     horizon: float = 0.25,
     max_causes: int = 4,
     seed: int = 1,
-    effects: Sequence[OwnEffect] = (),
-    progress: Told | None = None,
+    effects: Sequence[CustomEffect] = (),
+    repair: bool = True,
+    corrections: Corrections | None = None,
+    progress: ProgressCallback | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between an arm's nominal model and its logs.
 
@@ -324,7 +346,7 @@ def diagnose(
         Training logs: anything that `Log.read` or `Log.from_frame` takes, and patterns such as ``"logs/*.parquet"``.
     arm : Arm or path
         Nominal model.
-    holdout : the same, optional
+    holdout : Log, path, pattern, table, or sequence of these, optional
         Logs to judge on. Without it the last 40 % of every training log are held out.
     horizon : float, default 0.25
         Prediction horizon [s].
@@ -332,8 +354,12 @@ def diagnose(
         Causes named at most.
     seed : int, default 1
         Seed of the resampling behind probabilities and intervals.
-    effects : sequence of OwnEffect, default none
-        Effects of your own that take part in the ranking, four at most.
+    effects : sequence of CustomEffect, default none
+        Custom effects that take part in the ranking, four at most.
+    repair : bool, default True
+        Whether defects of the input are repaired that leave nothing to guess (see `armgap.check`); without it they are only said.
+    corrections : Corrections, optional
+        How columns are to be read otherwise than they stand, on top of what the arm file says.
     progress : callable, optional
         ``progress(work, fraction)`` is called now and then with what is being done and an estimate of how much of it is done, from 0
         to 1.
@@ -349,34 +375,66 @@ def diagnose(
     KeyboardInterrupt
         On an interrupt, within a fifth of a second.
     """
-    with following(progress):
-        return _diagnose(logs, arm, holdout, horizon, max_causes, seed, effects)
-
-
-def _diagnose(
-    logs: LogLike | Sequence[LogLike],
-    arm: Arm | str | os.PathLike[str],
-    holdout: LogLike | Sequence[LogLike] | None,
-    horizon: float,
-    max_causes: int,
-    seed: int,
-    effects: Sequence[OwnEffect],
-) -> Diagnosis:
-    """Check, read, split, choose; hand over to the core; and add what is known on this side."""
+    settings = {
+        "horizon": options.positive(horizon, "horizon"),
+        "max_causes": options.whole(max_causes, "number of causes", 0, MOST_CAUSES),
+        "seed": options.seed(seed),
+    }
+    check_effects(effects)
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
-    if not (np.isfinite(horizon) and horizon > 0):
-        raise OptionError(f"the horizon is {horizon}", remedy="give a positive number of seconds")
-    if max_causes < 0:
-        raise OptionError(f"the number of causes is {max_causes}", remedy="give 0 or more")
-    training = _logs(logs, arm)
-    notes = []
-    if holdout is None:
-        training, held = _split(training)
-        notes.append(f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out")
-    else:
-        held = _logs(holdout, arm)
-        notes += _overlap(training, held)
-    training, held = (choose(group, horizon=horizon) for group in _tell_apart(training, held))
+    with use_callback(progress):
+        read = {"training": _gathered(logs, arm), "holdout": [] if holdout is None else _gathered(holdout, arm)}
+        asked = settings | {"repair": repair, "corrections": (corrections or Corrections()).to_dict()}
+        given = _given(read["training"], read["holdout"], arm, corrections or Corrections(), repair=repair)
+        given = replace(given, provenance=provenance(arm, read, asked))
+        return _diagnose(_examined(given, settings["horizon"], repair=repair), settings, effects)
+
+
+@dataclass(frozen=True)
+class _Input:
+    """Logs and arm, and what is to be said about them."""
+
+    training: list[Log]
+    holdout: list[Log]
+    arm: Arm
+    notes: tuple[str, ...]
+    checks: tuple[Check, ...]
+    factors: Mapping[str, float] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def with_factors(self, factors: Mapping[str, float]) -> _Input:
+        """Return the input with other factors on its torque columns than those that it was repaired with."""
+        by_column = {
+            f"tau{j + 1}": self.factors.get(f"tau{j + 1}", self.factors.get("tau", 1.0))
+            for j in range(self.arm.n_joints)
+        }
+        ratio = Corrections(factor={column: c / by_column[column] for column, c in factors.items()})
+        checks = [c for c in self.checks if c.check != "torque_unit"]
+        return replace(
+            self,
+            training=[replace(ratio.on_log(log), findings=log.findings) for log in self.training],
+            holdout=[replace(ratio.on_log(log), findings=log.findings) for log in self.holdout],
+            checks=(*torque_unit.said(factors), *checks),
+            factors=factors,
+        )
+
+
+def _given(logs: Sequence[Log], holdout: Sequence[Log], arm: Arm, corrections: Corrections, *, repair: bool) -> _Input:
+    """Correct and repair the logs, each by itself, and split them where nothing is held out."""
+    training, checks = _repaired(logs, arm, corrections, repair=repair)
+    arm = corrections.on_arm(arm)
+    if not holdout:
+        training, held = _split(_tell_apart(training, [])[0])
+        note = f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out"
+        return _Input(training, held, arm, (note,), tuple(checks))
+    held, more = _repaired(holdout, arm, corrections, repair=repair)
+    checks += [*more, *copied_holdout(training, held)]
+    return _Input(*_tell_apart(training, held), arm, (), tuple(checks))
+
+
+def _examined(given: _Input, horizon: float, *, repair: bool) -> _Input:
+    """Choose stretches of long logs, and compare logs and arm file with and without each defect."""
+    training, held = (choose(group, horizon=horizon) for group in (given.training, given.holdout))
     for log in (*training, *held):
         if log.duration < horizon:
             raise LogShapeError(
@@ -384,23 +442,54 @@ def _diagnose(
                 remedy="give a longer log or a shorter --horizon",
                 file=log.path or log.name,
             )
-    own = Tables.of(effects, training, held)
-    joints = [e.joint - 1 for e in effects]
-    options = {"horizon": float(horizon), "max_causes": int(max_causes), "seed": int(seed), "own": joints}
     try:
-        text = _native.diagnose(arm.to_native(), _columns(training, own), _columns(held, own), options, tell)
+        found = examine(training, held, given.arm, horizon=horizon, repair=repair)
     except ValueError as error:
         raise _refused(str(error), training, held) from None
-    data = own.named(json.loads(text))
+    checks = (*found.checks, *given.checks)
+    return replace(
+        given,
+        training=found.training,
+        holdout=found.holdout,
+        arm=found.arm,
+        checks=checks,
+        factors=found.corrections.factor,
+    )
+
+
+def _diagnose(given: _Input, settings: dict[str, Any], effects: Sequence[CustomEffect]) -> Diagnosis:
+    """Hand over to the core, and add what is known on this side."""
+    training, held, arm = given.training, given.holdout, given.arm
+    contradictory = any(check.severity == "error" for check in given.checks)
+    if contradictory:
+        # No effect is asked to explain a contradiction: the figures are those of the arm's own parameters.
+        settings = settings | {"max_causes": 0}
+    tables = TorqueTables.of(effects, training, held)
+    settings = settings | {"own": [e.joint - 1 for e in effects]}
+    try:
+        text = _native.diagnose(
+            arm.to_native(), _columns(training, tables), _columns(held, tables), settings, report_progress
+        )
+    except ValueError as error:
+        raise _refused(str(error), training, held) from None
+    data = tables.named(json.loads(text))
+    if factors := torque_unit.refined(given.factors, data["causes"], arm.n_joints):
+        return _diagnose(replace(given.with_factors(factors), factors={}), settings, effects)
+    if contradictory:
+        data = _contradicted(data)
     data["arm"]["name"] = arm.name
     for cause in (*data["causes"], *data["candidates"]):
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
-    data["notes"] = notes + data["notes"]
-    known, logs_with_own = own.applied(data, (*training, *held))
+    data["notes"] = [*given.notes, *data["notes"]]
+    checks = [*given.checks, *_ambiguous_delay(data, training, arm)]
+    data["checks"] = [check.to_dict() for check in checks]
+    known, corrected_logs = tables.applied(data, (*training, *held))
     count = len(training)
-    data["laws"] = laws(known, arm, logs_with_own[:count], logs_with_own[count:])
+    data["laws"] = laws(known, arm, corrected_logs[:count], corrected_logs[count:])
     data["plausibility"] = plausibility(known, arm)
+    data["input"] = _input(arm, training, held)
+    data["provenance"] = given.provenance
     data["log_findings"] = [
         {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
         for log in (*training, *held)
@@ -409,7 +498,53 @@ def _diagnose(
     return Diagnosis.from_dict(data)
 
 
-def _logs(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:
+def _input(arm: Arm, training: list[Log], held: list[Log]) -> dict[str, Any]:
+    """Which columns of which files were used, in which units; stretches of one log are one entry."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for use, logs in (("training", training), ("holdout", held)):
+        for log in logs:
+            name = _STRETCH.sub("", log.name)
+            file = None if log.path is None else str(log.path)
+            entry = {
+                "name": name,
+                "file": file,
+                "set": use,
+                "rows": 0,
+                "columns": dict(log.columns),
+                "units": dict(log.units),
+            }
+            found.setdefault((use, name), entry)["rows"] += len(log)
+    return {"logs": list(found.values()), "units": si(arm.rotary)}
+
+
+def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> list[Check]:
+    """List the shift of the file among the equivalents of delays that are equal on all joints, and warn of it."""
+    period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
+    check = causal(data["causes"], arm.n_joints, period)
+    if check is None:
+        return []
+    for cause in data["causes"]:
+        if cause["effect"] == "actuator_delay":
+            cause["equivalents"].append(
+                {"effect": "time_shift", "joint": None, "why": "torques early in the file by as much"}
+            )
+    return [check]
+
+
+def _contradicted(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the result of logs and arm file that contradict each other: figures with the remedy applied, no causes."""
+    gap = data["gap"] | {"after": data["gap"]["refit"]}
+    return data | {"verdict": "input", "causes": [], "candidates": [], "gap": gap}
+
+
+def _repaired(
+    logs: Sequence[Log], arm: Arm, corrections: Corrections, *, repair: bool
+) -> tuple[list[Log], list[Check]]:
+    examined = [data_checks(corrections.on_log(log), arm, repair=repair) for log in logs]
+    return [log for log, _ in examined], [check.of(check.log or log.name) for log, found in examined for check in found]
+
+
+def _gathered(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:
     read = gather(logs, arm)
     if not read:
         raise OptionError("no log was given", remedy="give at least one")
@@ -431,13 +566,6 @@ def _refused(message: str, training: list[Log], held: list[Log]) -> LogShapeErro
     return LogShapeError(problem, remedy=remedy or "see the log and the options", file=files)
 
 
-def _overlap(training: list[Log], held: list[Log]) -> list[str]:
-    """Say which logs are both learnt from and judged on."""
-    seen = {log.path.resolve() for log in training if log.path is not None}
-    both = [log.name for log in held if log.path is not None and log.path.resolve() in seen]
-    return [f"{name} is learnt from and judged on too: its figures flatter" for name in both]
-
-
 def _tell_apart(training: list[Log], held: list[Log]) -> tuple[list[Log], list[Log]]:
     """Give logs of the same name their folder's name, then a number."""
     logs = [*training, *held]
@@ -448,7 +576,7 @@ def _tell_apart(training: list[Log], held: list[Log]) -> tuple[list[Log], list[L
 
 
 def _with_folder(log: Log, _: int) -> Log:
-    return log if log.path is None else replace(log, name=f"{log.path.resolve().parent.name}/{log.name}")
+    return log if log.path is None else replace(log, name=f"{printable(log.path.resolve().parent.name)}/{log.name}")
 
 
 def _with_number(log: Log, number: int) -> Log:
@@ -464,6 +592,10 @@ def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
     return training, held
 
 
-def _columns(logs: list[Log], own: Tables) -> list[tuple[str, Any, Any, Any, list[Any]]]:
+def _columns(logs: list[Log], tables: TorqueTables) -> list[tuple[str, Any, Any, Any, list[Any], Any]]:
     fix = np.ascontiguousarray
-    return [(log.name, fix(log.t), fix(log.q), fix(log.tau), own.by_log[log.name]) for log in logs]
+    moments = [None if log.moment is None else fix(log.moment) for log in logs]
+    return [
+        (log.name, fix(log.t), fix(log.q), fix(log.tau), tables.by_log[log.name], moment)
+        for log, moment in zip(logs, moments, strict=True)
+    ]

@@ -61,6 +61,9 @@ class ArmgapError(Exception):
         place += [f"{self.part} `{column}`"] if column is not None else []
         place += [f"row {row}"] if row is not None else []
         text = f"{', '.join(place)}: {problem}" if place else problem
+        text = text.encode("utf-8", "surrogateescape").decode(
+            "utf-8", "backslashreplace"
+        )  # names of files may be any bytes
         super().__init__(" ".join((f"{text}; {remedy}" if remedy else text).split()))
 
 

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from armgap import _native
 from armgap.arm import Arm, kinds
 from armgap.errors import OptionError
+from armgap.literals import FILTERS, SCHEMES, Filters, Scheme
 
 __all__ = ["OUTCOMES", "Estimator", "Run"]
 
 OUTCOMES: tuple[str, ...] = ("updated", "starting", "rejected")
 """What can become of a sample."""
 
-_SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
 _FORMS = ("plain", "factorized")
 
 
@@ -40,7 +40,7 @@ class Run:
 class Estimator:
     """Recursive estimation of an arm's parameters, as a controller runs it.
 
-    The same compiled code as in the C library: it allocates nothing per sample and gives the same numbers.
+    It runs the compiled code of the C library, allocates nothing per sample and gives the same numbers.
 
     Parameters
     ----------
@@ -96,8 +96,8 @@ class Estimator:
         self,
         arm: Arm | str,
         *,
-        scheme: str = "filtered-power",
-        filters: str = "exact",
+        scheme: Scheme = "filtered-power",
+        filters: Filters = "exact",
         cutoff: float = 50.0,
         forgetting: float = 1.0,
         p0: float = 1000.0,
@@ -114,8 +114,8 @@ class Estimator:
         kind = arm if isinstance(arm, str) else arm.kind
         for name, value, known in (
             ("arm", kind, tuple(kinds())),
-            ("scheme", scheme, _SCHEMES),
-            ("filters", filters, ("exact", "paper")),
+            ("scheme", scheme, SCHEMES),
+            ("filters", filters, FILTERS),
             ("form", form or _FORMS[0], _FORMS),
         ):
             if value not in known:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap import _native
+from armgap import _native, options
 from armgap.arm import Arm
-from armgap.errors import LogShapeError, OptionError
+from armgap.errors import LogShapeError
 from armgap.log import Log
 
 __all__ = ["ArmFit", "fit"]
@@ -90,8 +90,7 @@ def fit(log: Log, arm: Arm, *, horizon: float = 0.25) -> ArmFit:
     ----------
     L. Ljung, *System Identification: Theory for the User* (1999), section 7.2.
     """
-    if not (np.isfinite(horizon) and horizon > 0):
-        raise OptionError(f"the horizon is {horizon}", remedy="give a positive number of seconds")
+    horizon = options.positive(horizon, "horizon")
     if log.n_joints != arm.n_joints:
         raise LogShapeError(
             f"has {log.n_joints} joints, the arm has {arm.n_joints}",
@@ -99,7 +98,7 @@ def fit(log: Log, arm: Arm, *, horizon: float = 0.25) -> ArmFit:
             file=log.path or log.name,
         )
     t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.tau))
-    found = _native.fit(arm.to_native(), t, q, tau, float(horizon))
+    found = _native.fit(arm.to_native(), t, q, tau, horizon)
     if found is None:
         raise LogShapeError(
             f"lasts {log.duration:.3g} s, too short for {len(arm.theta)} parameters in windows of {horizon:g} s",

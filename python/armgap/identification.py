@@ -12,16 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from armgap import _native
 from armgap.arm import Arm
 from armgap.errors import ColumnError, OptionError
+from armgap.literals import FILTERS, SCHEMES, VELOCITIES, Filters, Scheme, VelocityMethod
 from armgap.log import Log
-from armgap.progress import tell
+from armgap.progress import report_progress
 
 __all__ = ["SCHEMES", "Identification", "identify", "velocity"]
-
-SCHEMES: tuple[str, ...] = ("filtered-dynamic", "supplied-energy", "filtered-power")
-"""The regression models, in the paper's order."""
-
-VELOCITIES: tuple[str, ...] = ("backward", "central", "local-cubic", "sensor", "midpoint")
-"""Ways to get velocities."""
 
 # An estimate depends on the cut-off when halving it moves the estimate by more than both: on noise-free and encoder-noise runs of the
 # right model the movement stays below 3 sigma or 1 %, on the real arm of docs/real-arm.md it is 10 to 30 sigma and 15 to 35 %.
@@ -59,9 +54,9 @@ class Identification:
     """
 
     log: str
-    scheme: str
-    filters: str
-    velocity: str
+    scheme: Scheme
+    filters: Filters
+    velocity: VelocityMethod
     cutoff: float
     parameter_names: tuple[str, ...]
     parameter_units: tuple[str, ...]
@@ -156,14 +151,14 @@ def identify(
     log: Log,
     arm: Arm,
     *,
-    scheme: str = "filtered-power",
-    filters: str = "exact",
+    scheme: Scheme = "filtered-power",
+    filters: Filters = "exact",
     cutoff: float = 50.0,
     forgetting: float = 1.0,
     p0: float = 1000.0,
     theta0: ArrayLike | None = None,
     asymmetry: bool = False,
-    velocity: str | None = None,
+    velocity: VelocityMethod | None = None,
 ) -> Identification:
     """Estimate the parameters of an arm from a log.
 
@@ -217,12 +212,12 @@ def identify(
         raise OptionError(f"`theta0` has shape {start.shape}", remedy=f"give {len(names)} finite values")
     dq = _velocities(log, velocity)
 
-    def course(cutoff: float) -> dict[str, Any]:
-        return _course(log, arm, dq, start, (scheme, filters == "paper", cutoff, forgetting, p0))
+    def estimates(cutoff: float) -> dict[str, Any]:
+        return _estimates(log, arm, dq, start, (scheme, filters == "paper", cutoff, forgetting, p0))
 
-    tell(scheme, 0.0)
-    whole = course(cutoff)
-    tell(scheme, 0.5)
+    report_progress(scheme, 0.0)
+    whole = estimates(cutoff)
+    report_progress(scheme, 0.5)
     theta = whole["theta"][-1].copy()
     return Identification(
         log=log.name,
@@ -234,7 +229,7 @@ def identify(
         parameter_units=tuple(units),
         theta=theta,
         sigma=_sigma(whole["errors"], whole["covariance"]),
-        cutoff_drift=None if scheme == "supplied-energy" else theta - course(cutoff / 2)["theta"][-1],
+        cutoff_drift=None if scheme == "supplied-energy" else theta - estimates(cutoff / 2)["theta"][-1],
         updates=whole["updates"],
         rejected=whole["rejected"],
         t=log.t,
@@ -243,7 +238,7 @@ def identify(
     )
 
 
-def _course(
+def _estimates(
     log: Log,
     arm: Arm,
     dq: NDArray[np.float64] | None,
@@ -283,7 +278,7 @@ def _velocities(log: Log, method: str) -> NDArray[np.float64] | None:
 def _check(scheme: str, filters: str, cutoff: float, forgetting: float, p0: float, velocity: str) -> None:
     for name, value, known in (
         ("scheme", scheme, SCHEMES),
-        ("filters", filters, ("exact", "paper")),
+        ("filters", filters, FILTERS),
         ("velocity", velocity, VELOCITIES),
     ):
         if value not in known:

@@ -1,7 +1,7 @@
-"""How far long work is, told to whoever wants to know.
+"""Progress of long work, reported to a callback.
 
-Whoever works says so with `tell`; whoever wants to know says so with `following`. Neither needs to know the other, so that a reader of
-files deep inside a diagnosis can be followed without handing a callback through everything above it.
+Code that takes its time calls `report_progress`; `use_callback` sets the function that receives the reports inside a block. The callback is
+kept in a context variable, so that a reader of files deep inside a diagnosis reports without a parameter for it in every function above.
 """
 
 from __future__ import annotations
@@ -10,54 +10,67 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import partial
+from typing import TYPE_CHECKING
 
-__all__ = ["Told", "following", "of_many", "tell"]
+from armgap._renamed import old_names
 
-#: Called with what is being done, and the fraction of it that is done: from 0 to 1, never falling while the words stay the same task.
-Told = Callable[[str, float], object]
+__all__ = ["ProgressCallback", "part_callback", "report_progress", "use_callback"]
 
-_told: ContextVar[Told | None] = ContextVar("armgap_progress", default=None)
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
+
+#: Called with a task in words and the fraction of it that is done, from 0 to 1, which never falls while the task is the same.
+ProgressCallback = Callable[[str, float], object]
+
+_callback: ContextVar[ProgressCallback | None] = ContextVar("armgap_progress", default=None)
 
 
 @contextmanager
-def following(told: Told | None) -> Iterator[None]:
-    """Have `told` called as work goes on inside the block; None leaves things as they are.
+def use_callback(callback: ProgressCallback | None) -> Iterator[None]:
+    """Report progress of work inside the block to `callback`; None keeps the callback that is set.
 
     Examples
     --------
-    >>> with following(lambda work, fraction: print(f"{work}: {fraction:.0%}")):
-    ...     tell("reading", 0.5)
+    >>> with use_callback(lambda work, fraction: print(f"{work}: {fraction:.0%}")):
+    ...     report_progress("reading", 0.5)
     reading: 50%
     """
-    if told is None:
+    if callback is None:
         yield
         return
-    token = _told.set(told)
+    token = _callback.set(callback)
     try:
         yield
     finally:
-        _told.reset(token)
+        _callback.reset(token)
 
 
-def tell(work: str, fraction: float) -> None:
-    """Say what is being done and which fraction of it is done."""
-    told = _told.get()
-    if told is not None:
-        told(work, fraction)
+def report_progress(work: str, fraction: float) -> None:
+    """Report a task in words and the fraction of it that is done, from 0 to 1."""
+    callback = _callback.get()
+    if callback is not None:
+        callback(work, fraction)
 
 
-def of_many(work: str, number: int, count: int) -> Told:
-    """Return a callback for part `number` (from 0) of `count` parts of `work`, whatever that part calls itself.
+def part_callback(work: str, number: int, count: int) -> ProgressCallback:
+    """Return a callback that counts a part's progress as progress of the whole.
+
+    Parameters
+    ----------
+    work : str
+        The whole task; what the part calls itself is not passed on.
+    number, count : int
+        Number of the part, from 0, and number of parts.
 
     Examples
     --------
-    >>> with following(lambda work, fraction: print(f"{work}: {fraction:.0%}")):
-    ...     of_many("two cases", 1, 2)("reading", 0.5)
+    >>> with use_callback(lambda work, fraction: print(f"{work}: {fraction:.0%}")):
+    ...     part_callback("two cases", 1, 2)("reading", 0.5)
     two cases: 75%
     """
-    return partial(_part, _told.get(), work, number, count)
+    return partial(_part, _callback.get(), work, number, count)
 
 
-def _part(told: Told | None, work: str, number: int, count: int, _: str, fraction: float) -> None:
-    if told is not None:
-        told(work, (number + fraction) / count)
+def _part(callback: ProgressCallback | None, work: str, number: int, count: int, _: str, fraction: float) -> None:
+    if callback is not None:
+        callback(work, (number + fraction) / count)

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armgap import _native
+from armgap import _native, options
 from armgap.arm import Arm
 from armgap.errors import OptionError
 from armgap.log import Log
-from armgap.progress import tell
+from armgap.progress import report_progress
 
 __all__ = ["Effect", "effects", "seed_torque", "simulate"]
 
@@ -149,6 +149,8 @@ def simulate(
     OptionError
         If a shape, an effect or a value is impossible, or the motion diverges.
     """
+    seed = options.seed(seed)
+    _check_effects(effects)
     t = np.ascontiguousarray(t, dtype=np.float64)
     tau = np.ascontiguousarray(tau, dtype=np.float64)
     tau = np.ascontiguousarray(tau[:, None]) if tau.ndim == 1 else tau
@@ -163,13 +165,37 @@ def simulate(
     lengths = None if arm.link_length is None else arm.link_length.tolist()
     try:
         q, dq = _native.simulate(
-            arm.kind, arm.gravity, lengths, arm.theta.tolist(), t, tau, start, speed, placed, tolerance, smoothing, tell
+            arm.kind,
+            arm.gravity,
+            lengths,
+            arm.theta.tolist(),
+            t,
+            tau,
+            start,
+            speed,
+            placed,
+            tolerance,
+            smoothing,
+            report_progress,
         )
-    except ValueError as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise OptionError(str(error), remedy="see `armgap.effects()` and the arm file") from None
     if noise > 0:
-        q = q + noise * np.random.default_rng(seed).standard_normal(q.shape)
+        with np.errstate(over="ignore"):
+            q = q + noise * np.random.default_rng(seed).standard_normal(q.shape)
+    if not np.isfinite(q).all():
+        raise OptionError(f"positions under a noise of {noise} are not finite", remedy="give less noise")
     step = arm.encoder_step
     if encoder and step is not None:
         q = np.round(q / step) * step
     return Log(name, t - t[0], q, tau, dq if sensor else None)
+
+
+def _check_effects(effects: Any) -> None:
+    """Raise if what was given are no effects."""
+    for effect in (effects,) if isinstance(effects, str | Effect) else effects:
+        if not isinstance(effect, Effect) or effect is effects:
+            remedy = (
+                "give a list of armgap.simulation.Effect, such as [Effect.parse('stribeck:1:amplitude=1,velocity=0.1')]"
+            )
+            raise OptionError(f"`effects` holds {effect!r}", remedy=remedy)

@@ -70,6 +70,12 @@ class Check:
         """All remedies in one line."""
         return " or ".join(self.remedies)
 
+    def line(self, log: str | None = None) -> str:
+        """Return it in one line for people, of the log with that name where it names none."""
+        place = f"{name}: " if (name := self.log or log) else ""
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return f"{self.severity}: {place}{self.message}{remedy}"
+
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of a diagnosis' ``checks``."""
         return {

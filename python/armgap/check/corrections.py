@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -11,20 +12,28 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from armgap.errors import ColumnError, OptionError
-from armgap.log import Finding, Log
+from armgap.log.findings import Finding
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
+    from armgap.log import Log
 
-__all__ = ["CORRECTIONS", "Corrections", "GravityCorrection"]
+__all__ = ["CORRECTIONS", "Corrections", "GravityCorrection", "PositionUnit"]
 
 GravityCorrection = Literal["reversed", "compensated"]
+PositionUnit = Literal["deg", "turns"]
 
 _COLUMN = re.compile(r"(q|dq|tau)([1-9]\d*)")
 _POSITION = re.compile(r"q([1-9]\d*)")
 _TORQUE = re.compile(r"tau([1-9]\d*)?")
+_SIGNALS = ("q", "tau", "dq", "moment")
+# A shift this near to a whole number of sample periods is one.
+_WHOLE = 0.05
+# Arrays of a log that a column of each kind stands for.
+_TOGETHER = {"q": ("q", "dq"), "dq": ("dq",), "tau": ("tau", "moment")}
 _ANGLE = re.compile(r"(?P<number>[-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|m|turns)?")
 _ANGLE_UNITS = {"deg": math.pi / 180, "rad": 1.0, "m": 1.0, "turns": 2 * math.pi, None: 1.0}
+_SPAN = re.compile(r"(?:(?P<log>.+):)?(?P<first>[\d.]+)-(?P<last>[\d.]+)")
 # Standard deviation [SI] left to gravity parameters that are known to be zero.
 _NO_GRAVITY_SIGMA = 1e-9
 
@@ -33,14 +42,15 @@ _NO_GRAVITY_SIGMA = 1e-9
 class Corrections:
     """How the columns of the logs differ from what the arm file means.
 
-    They are applied in this order: `swap`, `flip`, `zero`, `absolute` and `relative`, `factor`, `shift`; `gravity` is about the arm.
+    They are applied in this order: `unit`, `swap`, `flip`, `zero`, `absolute` and `relative`, `factor`, `skip`, `shift`; `gravity` is about
+    the arm.
 
     Attributes
     ----------
     flip : tuple of str
         Columns that count the other way: ``"q1"``, ``"tau2"``.
     zero : mapping of str to float
-        What a position column reads where the model's joint is at zero [rad or m].
+        Where the zero of a position column lies in the model's position [rad or m]; it is added to the column.
     swap : tuple of (str, str)
         Columns that stand for each other: ``("q1", "q2")``.
     absolute : tuple of str
@@ -54,6 +64,10 @@ class Corrections:
     gravity : {"reversed", "compensated"}, optional
         ``"reversed"``: gravity acts the other way than the arm file says; ``"compensated"``: torques were logged without what
         carries the arm's weight, or the arm moves in a horizontal plane.
+    unit : {"deg", "turns"}, optional
+        Unit of all positions where it is not rad.
+    skip : tuple of str
+        Times of a log that are left out, in seconds from its first sample: ``"0-2.5"``, or ``"run1:0-2.5"`` of one log.
 
     Examples
     --------
@@ -69,6 +83,8 @@ class Corrections:
     factor: Mapping[str, float] = field(default_factory=dict)
     shift: Mapping[str, float] = field(default_factory=dict)
     gravity: GravityCorrection | None = None
+    unit: PositionUnit | None = None
+    skip: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         """Whether there is anything to correct."""
@@ -96,6 +112,9 @@ class Corrections:
         gravity = given.get("gravity")
         if gravity is not None and gravity not in get_args(GravityCorrection):
             raise OptionError(f"gravity cannot be `{gravity}`", remedy="write reversed or compensated")
+        unit = given.get("unit")
+        if unit is not None and unit not in get_args(PositionUnit):
+            raise OptionError(f"positions cannot be in `{unit}`", remedy="write deg or turns")
         return cls(
             flip=tuple(_column("flip", word) for word in _words(given.get("flip", ()))),
             zero={k: _angle(v) for k, v in _pairs("zero", given.get("zero", ()), _POSITION, "q1=180deg")},
@@ -107,6 +126,8 @@ class Corrections:
             },
             shift={k: _seconds(v) for k, v in _pairs("shift", given.get("shift", ()), _TORQUE, "tau=-0.005")},
             gravity=gravity,
+            unit=unit,
+            skip=tuple(_span(word) for word in _words(given.get("skip", ()))),
         )
 
     def merged(self, other: Corrections) -> Corrections:
@@ -120,24 +141,44 @@ class Corrections:
             factor={**self.factor, **other.factor},
             shift={**self.shift, **other.shift},
             gravity=other.gravity or self.gravity,
+            unit=other.unit or self.unit,
+            skip=tuple(dict.fromkeys((*self.skip, *other.skip))),
         )
 
     def options(self) -> tuple[str, ...]:
         """Return the command line's options for this."""
-        words = [f"--flip {','.join(self.flip)}"] if self.flip else []
+        words = [f"--units q={self.unit}"] if self.unit else []
+        words += [f"--flip {','.join(self.flip)}"] if self.flip else []
         words += [f"--zero {column}={_in_degrees(value)}" for column, value in self.zero.items()]
         words += [f"--swap {a},{b}" for a, b in self.swap]
         words += [f"--absolute {column}" for column in self.absolute]
         words += [f"--relative {column}" for column in self.relative]
         words += [f"--factor {column}={value:.4g}" for column, value in self.factor.items()]
         words += [f"--shift {column}={value:.4g}" for column, value in self.shift.items()]
+        words += [f"--skip {span}" for span in self.skip]
         return (*words, *((f"--gravity {self.gravity}",) if self.gravity else ()))
 
     def to_dict(self) -> dict[str, Any]:
         """Return what there is to correct, ready for JSON."""
         given = {f.name: getattr(self, f.name) for f in fields(self)}
-        plain = {k: list(v) if isinstance(v, tuple) else dict(v) if isinstance(v, Mapping) else v for k, v in given.items()}
+        plain = {
+            k: list(v) if isinstance(v, tuple) else dict(v) if isinstance(v, Mapping) else v for k, v in given.items()
+        }
         return {k: v for k, v in plain.items() if v}
+
+    def toml_lines(self) -> list[str]:
+        """Return the lines of an arm file's ``[corrections]`` table, but for gravity, which the arm's values hold already."""
+        lines = [f"unit = {json.dumps(self.unit)}"] if self.unit else []
+        lines += [
+            f"{name} = {json.dumps(list(getattr(self, name)))}"
+            for name in ("flip", "absolute", "relative", "skip")
+            if getattr(self, name)
+        ]
+        lines += [f"swap = {json.dumps([list(pair) for pair in self.swap])}"] if self.swap else []
+        for name in ("zero", "factor", "shift"):
+            if values := getattr(self, name):
+                lines.append(f"{name} = {{ {', '.join(f'{k} = {v!r}' for k, v in values.items())} }}")
+        return lines
 
     def on_log(self, log: Log) -> Log:
         """Return the log with its columns read so, and say so among its findings.
@@ -150,37 +191,55 @@ class Corrections:
         about_log = replace(self, gravity=None)
         if not about_log:
             return log
-        q, tau = log.q.copy(), log.tau.copy()
-        dq = None if log.dq is None else log.dq.copy()
-        arrays = {"q": q, "tau": tau, "dq": dq}
         self._check_joints(log)
+        columns: dict[str, Any] = {
+            name: None if (values := getattr(log, name)) is None else values.copy() for name in ("t", *_SIGNALS)
+        }
+        self._positions(columns)
+        for column, value in self.factor.items():
+            for values in _of(columns, _TOGETHER["tau"]):
+                values[:, _torques(column)] *= value
+        if self.skip:
+            keep = ~self._skipped(log)
+            if not keep.any():
+                raise OptionError(f"--skip leaves nothing of {log.name}", remedy="leave out less")
+            columns = {name: None if x is None else x[keep] for name, x in columns.items()}
+        if self.shift:
+            keep, held = _shifted(columns["t"], log.sample_period, self.shift.get("tau", 0.0))
+            rows = {name: held if name in _TOGETHER["tau"] else keep for name in columns}
+            columns = {name: None if x is None else x[rows[name]] for name, x in columns.items()}
+        said = Finding("corrected", f"read with {' '.join(about_log.options())}")
+        return replace(log, **columns, findings=(*log.findings, said))
+
+    def _positions(self, columns: dict[str, Any]) -> None:
+        """Correct unit, order, signs, zeros and reference of the columns in place."""
+        if self.unit is not None:
+            columns["q"] *= _ANGLE_UNITS[self.unit]
         for a, b in self.swap:
-            kind, i, j = _split(a)[0], _split(a)[1], _split(b)[1]
-            for name in ("q", "dq") if kind == "q" else (kind,):
-                values = arrays[name]
-                if values is not None:
-                    values[:, [i, j]] = values[:, [j, i]]
+            (kind, i), (_, j) = _split(a), _split(b)
+            for values in _of(columns, _TOGETHER[kind]):
+                values[:, [i, j]] = values[:, [j, i]]
         for column in self.flip:
             kind, j = _split(column)
-            for name in ("q", "dq") if kind == "q" else (kind,):
-                values = arrays[name]
-                if values is not None:
-                    values[:, j] *= -1.0
+            for values in _of(columns, _TOGETHER[kind]):
+                values[:, j] *= -1.0
         for column, value in self.zero.items():
-            q[:, _split(column)[1]] -= value
-        for columns, sign in ((self.absolute, -1.0), (self.relative, 1.0)):
-            for column in columns:
-                j = _split(column)[1]
-                q[:, j] += sign * q[:, j - 1]
-                if dq is not None:
-                    dq[:, j] += sign * dq[:, j - 1]
-        for column, value in self.factor.items():
-            tau[:, _torques(column)] *= value
-        if self.shift:
-            log, tau, keep = _shifted(log, tau, self.shift.get("tau", 0.0))
-            q, dq = q[keep], None if dq is None else dq[keep]
-        said = Finding("corrected", f"read with {' '.join(about_log.options())}")
-        return replace(log, q=q, tau=tau, dq=dq, findings=(*log.findings, said))
+            columns["q"][:, _split(column)[1]] += value
+        for names, sign in ((self.absolute, -1.0), (self.relative, 1.0)):
+            for column in names:
+                _, j = _split(column)
+                for values in _of(columns, _TOGETHER["q"]):
+                    values[:, j] += sign * values[:, j - 1]
+
+    def _skipped(self, log: Log) -> Any:
+        """Return which samples are left out."""
+        skipped = np.zeros(len(log), dtype=bool)
+        for span in self.skip:
+            match = _SPAN.fullmatch(span)
+            assert match is not None
+            if match["log"] in (None, log.recording):
+                skipped |= (log.t >= float(match["first"])) & (log.t <= float(match["last"]))
+        return skipped
 
     def on_arm(self, arm: Arm) -> Arm:
         """Return the arm with gravity as these corrections say."""
@@ -216,12 +275,24 @@ class Corrections:
 CORRECTIONS: tuple[str, ...] = tuple(f.name for f in fields(Corrections))
 
 
-def _shifted(log: Log, tau: Any, seconds: float) -> tuple[Log, Any, Any]:
-    """Return the log from and up to where shifted torques are known; a torque is held from its time until the next."""
-    stamps = log.t + seconds
-    held = np.searchsorted(stamps, log.t + 1e-9, side="right") - 1
-    keep = (held >= 0) & (log.t <= stamps[-1] + 1e-9)
-    return replace(log, t=log.t[keep]), tau[held[keep]], keep
+def _of(columns: Mapping[str, Any], names: Iterable[str]) -> list[Any]:
+    return [columns[name] for name in names if columns[name] is not None]
+
+
+def _shifted(t: Any, period: float, seconds: float) -> tuple[Any, Any]:
+    """Return the rows whose shifted torques are known, and the rows that these torques stand in; each is held until the next.
+
+    A shift by whole sample periods takes every torque to the row so many rows away, however stamps scatter.
+    """
+    rows = np.arange(len(t))
+    samples = seconds / period
+    if abs(samples - round(samples)) < _WHOLE:
+        held = rows - round(samples)
+    else:
+        held = np.searchsorted(t + seconds, t + 1e-9, side="right") - 1
+        held[t > t[-1] + seconds] = -1
+    keep = (held >= 0) & (held < len(t))
+    return rows[keep], held[keep]
 
 
 def _split(column: str) -> tuple[str, int]:
@@ -243,7 +314,9 @@ def _words(value: str | Iterable[str]) -> list[str]:
 
 def _column(option: str, word: str) -> str:
     if not _COLUMN.fullmatch(word):
-        raise OptionError(f"--{option}: `{word}` is no column of a log", remedy=f"write --{option} tau1 or --{option} q1")
+        raise OptionError(
+            f"--{option}: `{word}` is no column of a log", remedy=f"write --{option} tau1 or --{option} q1"
+        )
     return word
 
 
@@ -265,7 +338,9 @@ def _pairs(option: str, value: Any, column: re.Pattern[str], example: str) -> li
             pairs.append((key, number))
     for key, _ in pairs:
         if not column.fullmatch(key):
-            raise OptionError(f"--{option}: `{key}` is not a column that it is about", remedy=f"write --{option} {example}")
+            raise OptionError(
+                f"--{option}: `{key}` is not a column that it is about", remedy=f"write --{option} {example}"
+            )
     return pairs
 
 
@@ -276,7 +351,8 @@ def _exchanges(value: Any) -> tuple[tuple[str, str], ...]:
         kinds = {match[1] for word in pair if (match := _COLUMN.fullmatch(word))}
         if len(pair) != 2 or len(kinds) != 1 or pair[0] == pair[1] or not all(_COLUMN.fullmatch(w) for w in pair):
             raise OptionError(
-                f"--swap: `{','.join(pair)}` are not two columns of one kind", remedy="write --swap q1,q2 or --swap tau1,tau2"
+                f"--swap: `{','.join(pair)}` are not two columns of one kind",
+                remedy="write --swap q1,q2 or --swap tau1,tau2",
             )
     return tuple((a, b) for a, b in pairs)
 
@@ -308,6 +384,19 @@ def _finite(option: str, number: float) -> float:
     if not math.isfinite(number):
         raise OptionError(f"--{option}: {number} is not a finite number", remedy="correct it")
     return number
+
+
+def _span(word: str) -> str:
+    match = _SPAN.fullmatch(word)
+    try:
+        good = match is not None and float(match["first"]) < float(match["last"])
+    except ValueError:
+        good = False
+    if not good:
+        raise OptionError(
+            f"--skip: `{word}` are no times", remedy="write --skip 0-2.5 or --skip NAME:0-2.5, in seconds"
+        )
+    return word
 
 
 def _in_degrees(value: float) -> str:

@@ -8,7 +8,7 @@ positive. So a log that is read the wrong way cannot be explained by an arm that
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,12 @@ from armgap import _native
 from armgap.arm import Arm
 from armgap.log import Log
 
-__all__ = ["EquationError", "Fit", "Rows", "bounds"]
+__all__ = ["CUTOFF", "EquationError", "Fit", "Rows", "bounds"]
 
 Array = NDArray[np.float64]
 
 # Cut-off of the filters [rad/s]: above the motion of arms (a few hertz), below what encoders add; at 2.5 ms it is 0.075 of the sample rate.
-_CUTOFF = 30.0
+CUTOFF = 30.0
 # The cut-off at most, in parts of the sample rate, where logs are slow.
 _LARGEST_CUTOFF = 0.5
 # Time constants of the filters that pass before a row counts, after the start and after a hole in the samples.
@@ -35,6 +35,8 @@ _TRUST_FACTOR = 5.0
 _LARGEST_LOG = 4000
 # Share of a joint's torque below which a residual counts as explained: what unmodelled effects leave of healthy logs of real arms.
 _EXPLAINED = 0.02
+# Share of a joint's torque that nothing tells from none.
+_EXACT = 1e-5
 # A bound is left if that lowers the cost by more than this part of the largest moment.
 _SETTLED = 1e-9
 # Rounds of the active set method per parameter at most, and what keeps columns that a log does not excite solvable.
@@ -61,14 +63,14 @@ class Rows:
     samples: NDArray[np.intp]
 
     @classmethod
-    def of(cls, log: Log, arm: Arm) -> Rows:
-        """Return the rows of a log, of a stretch from its middle if it is long."""
+    def of(cls, log: Log, arm: Arm, cutoff: float = CUTOFF) -> Rows:
+        """Return the rows of a log, of a stretch from its middle if it is long; `cutoff` is that of the filters [rad/s]."""
         first = max(0, (len(log) - _LARGEST_LOG) // 2)
         part = slice(first, first + _LARGEST_LOG)
         t, q, tau = (np.ascontiguousarray(x[part]) for x in (log.t, log.q, log.tau))
         steps = np.diff(t)
         period = float(np.median(steps))
-        cutoff = min(_CUTOFF, _LARGEST_CUTOFF / period)
+        cutoff = min(cutoff, _LARGEST_CUTOFF / period)
         psi, y = _native.regression_rows(arm.to_native(), t, q, tau, cutoff)
         settled = _settled(t, _HOLE * period, _SETTLING / cutoff)
         settled &= np.isfinite(y).all(axis=1)
@@ -104,40 +106,76 @@ class Fit:
         """Mean over the joints of the logarithm of the unexplained share."""
         return float(np.mean(np.log(self.share + _EXPLAINED)))
 
+    @property
+    def closeness(self) -> float:
+        """Mean over the joints of the logarithm of the unexplained share itself, for readings that all explain nearly everything."""
+        return float(np.mean(np.log(self.share + _EXACT)))
+
 
 class EquationError:
-    """Rows of several logs, and what bounded parameters leave of their torques."""
+    """Normal equations of several logs, joint by joint, and what bounded parameters leave of their torques."""
 
     def __init__(self, rows: Sequence[Rows], arm: Arm, scale: Array | None = None) -> None:
         self.arm = arm
-        self.psi = np.concatenate([r.psi for r in rows])
-        self.y = np.concatenate([r.y for r in rows])
+        self.rows = tuple(rows)
+        self.count = sum(len(r.y) for r in rows)
+        self.gram = sum(np.einsum("kji,kjl->jil", r.psi, r.psi, optimize=True) for r in rows) / max(self.count, 1)
+        self.moment, self.square = self._moments([r.y for r in rows])
         self.scale = self._scale() if scale is None else scale
+
+    def _moments(self, torques: Sequence[Array]) -> tuple[Array, Array]:
+        """Return the products of the regressor with torques, and of torques with themselves, per joint."""
+        pairs = list(zip(self.rows, torques, strict=True))
+        moment = sum(np.einsum("kji,kj->ji", r.psi, y) for r, y in pairs) / max(self.count, 1)
+        square = sum(np.sum(y**2, axis=0) for y in torques) / max(self.count, 1)
+        return np.asarray(moment), np.asarray(square)
 
     def _scale(self) -> Array:
         """Mean square per joint of the torque, or of the largest term of the equation of motion as the arm file has it.
 
         Inertia and weight cancel near a resonance, where the torque alone would be a small measure.
         """
-        terms = np.mean((self.psi * self.arm.theta) ** 2, axis=0).max(axis=1)
-        return np.maximum(np.maximum(np.mean(self.y**2, axis=0), terms), 1e-30)
+        terms = (np.diagonal(self.gram, axis1=1, axis2=2) * self.arm.theta**2).max(axis=1)
+        scale: Array = np.maximum(np.maximum(self.square, terms), 1e-30)
+        return scale
 
-    def fit(self, low: Array, high: Array, y: Array | None = None) -> Fit:
-        """Return the parameters between `low` and `high` that explain the torques best."""
-        n, p = self.psi.shape[1:]
-        y = self.y if y is None else y
-        weight = np.sqrt(1.0 / self.scale)
-        a = (self.psi * weight[:, None]).reshape(-1, p)
-        b = (y * weight).reshape(-1)
-        size = np.linalg.norm(a, axis=0)
+    def fit(self, low: Array, high: Array, torques: Sequence[Array] | None = None) -> Fit:
+        """Return the parameters between `low` and `high` that explain the torques, or others in their place, best."""
+        moment, square = (self.moment, self.square) if torques is None else self._moments(torques)
+        return self._solve(low, high, moment, square, self.scale)
+
+    def with_factors(self, low: Array, high: Array, factors: Array) -> Fit:
+        """Return the fit to torques times a factor per joint; shares are of the torques, whatever their unit."""
+        square = self.square * factors**2
+        return self._solve(low, high, self.moment * factors[:, None], square, np.maximum(square, 1e-30))
+
+    def of_torques(self, fit: Fit) -> Fit:
+        """Return a fit with its shares taken of the torques alone."""
+        return replace(fit, share=fit.share * self.scale / np.maximum(self.square, 1e-30))
+
+    def _solve(self, low: Array, high: Array, moment: Array, square: Array, scale: Array) -> Fit:
+        gram = np.einsum("jil,j->il", self.gram, 1.0 / scale)
+        size = np.sqrt(np.diag(gram))
         size[size == 0] = 1.0
-        a = a / size
-        theta = _bounded(a.T @ a, a.T @ b, low * size, high * size) / size
-        residual = y - self.psi @ theta
-        return Fit(theta, np.mean(residual**2, axis=0) / self.scale)
+        theta = (
+            _bounded(gram / np.outer(size, size), (moment / scale[:, None]).sum(axis=0) / size, low * size, high * size)
+            / size
+        )
+        left = square - 2.0 * moment @ theta + np.einsum("i,jil,l->j", theta, self.gram, theta)
+        return Fit(theta, np.maximum(left, 0.0) / scale)
+
+    def expected(self) -> Array:
+        """Return per joint the factor that makes the arm file's own torques of the logged ones, by least squares."""
+        return (self.moment @ self.arm.theta) / np.maximum(self.square, 1e-30)
+
+    def size_of(self, theta: Array) -> Array:
+        """Return per joint the factor that makes the arm file's torques of those of `theta`, by least squares."""
+        squares = np.einsum("i,jil,l->j", theta, self.gram, theta)
+        size: Array = np.einsum("i,jil,l->j", self.arm.theta, self.gram, theta) / np.maximum(squares, 1e-30)
+        return size
 
     def __len__(self) -> int:
-        return len(self.y)
+        return self.count
 
 
 def bounds(arm: Arm, factor: float = _TRUST_FACTOR) -> tuple[Array, Array]:

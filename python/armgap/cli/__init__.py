@@ -6,12 +6,14 @@ import atexit
 import gc
 import os
 import sys
+from contextlib import suppress
 from importlib import import_module
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
 from armgap import __version__
+from armgap.cli.streams import EndedError, abandon_stdout, ended_by_signals, open_streams
 from armgap.errors import ArmgapError
 
 __all__ = ["main"]
@@ -33,6 +35,8 @@ COMMANDS = {
 
 UNUSABLE_INPUT = 2
 INTERRUPTED = 130
+_SIGNALLED = 128
+"""Status of a program that a signal ended, less the signal's number."""
 
 _GARBAGE_EVERY = 50_000
 """Objects between two searches for garbage: most of what a command makes, modules and charts, stays until it ends."""
@@ -40,6 +44,14 @@ _GARBAGE_EVERY = 50_000
 
 class LazyGroup(click.Group):
     """A group whose commands are imported when they are asked for."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the sub-command; a reader of standard output that has seen enough ends it quietly."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            abandon_stdout()
+            raise click.exceptions.Exit(0) from None
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """List the names of all sub-commands."""
@@ -73,28 +85,56 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line; unusable input ends it with status 2 and one line on standard error."""
     gc.set_threshold(_GARBAGE_EVERY)
     atexit.register(gc.freeze)  # what is left at the end goes with the process, without being searched
+    open_streams()
     try:
-        status = cli.main(args=arguments, prog_name="armgap", standalone_mode=False)
+        with ended_by_signals():
+            status = _run(arguments)
+            sys.stdout.flush()  # a full disk may show itself only now
     except ArmgapError as error:
         _fail(str(error))
-    except click.exceptions.Exit as stop:
-        sys.exit(stop.exit_code)
     except click.ClickException as error:
         _fail(" ".join(error.format_message().split()))
-    except (click.Abort, KeyboardInterrupt):
-        _interrupted()
+    except (click.Abort, KeyboardInterrupt) as stop:
+        cause = stop if isinstance(stop, EndedError) else stop.__cause__
+        _interrupted(_SIGNALLED + cause.number if isinstance(cause, EndedError) else INTERRUPTED)
     except BrokenPipeError:
+        abandon_stdout()
         sys.exit(0)
-    sys.exit(status if isinstance(status, int) else 0)
+    except OSError as error:
+        _unreachable(error)
+    except MemoryError:
+        _fail("there is not enough memory for this; give less at once")
+    sys.exit(status)
 
 
-def _interrupted() -> NoReturn:
+def _run(arguments: list[str] | None) -> int:
+    try:
+        status = cli.main(args=arguments, prog_name="armgap", standalone_mode=False)
+    except click.exceptions.Exit as stop:
+        return stop.exit_code
+    return status if isinstance(status, int) else 0
+
+
+def _interrupted(status: int) -> NoReturn:
     """End at once: everything half done has been cleared away on the way here, and threads that still compute are not waited for."""
     click.echo("armgap: interrupted", err=True)
-    sys.stdout.flush()
-    os._exit(INTERRUPTED)
+    with suppress(OSError):
+        sys.stdout.flush()
+    os._exit(status)
 
 
-def _fail(message: str) -> None:
-    click.echo(f"armgap: {message}", err=True)
+def _unreachable(error: OSError) -> NoReturn:
+    """A file or stream failed outside of what reads logs and writes results: as a rule the summary on standard output."""
+    abandon_stdout()
+    place = error.filename if error.filename is not None else "standard output"
+    _fail(f"{place}: cannot be used ({error.strerror or error}); choose another place")
+
+
+def _fail(message: str) -> NoReturn:
+    with suppress(OSError):
+        click.echo(f"armgap: {message}", err=True)
+    try:
+        sys.stdout.flush()
+    except OSError:
+        abandon_stdout()
     sys.exit(UNUSABLE_INPUT)

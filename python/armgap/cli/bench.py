@@ -8,33 +8,33 @@ from typing import Any
 
 import click
 
-from armgap.cli.common import check_outputs, console, interruptible, json_option, quiet_option, write
+from armgap.cli.common import console, interruptible, json_option, quiet_option
+from armgap.cli.files import Command
+from armgap.cli.numbers import Number
 from armgap.cli.progress import working
-from armgap.progress import tell
+from armgap.literals import SCHEMES
+from armgap.output import is_stdout, write
+from armgap.progress import report_progress
 
 __all__ = ["command", "measure"]
 
-SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
 FIELDS = ("typical_ns", "median_ns", "p99_ns", "p9999_ns", "max_ns")
 SCHEMA = "armgap.bench/1"
 
 
-@click.command("bench")
+@click.command("bench", cls=Command)
 @click.option("--samples", type=click.IntRange(1000, 100_000_000), default=1_000_000, show_default=True)
-@click.option(
-    "--period", type=click.FloatRange(1e-6, 10.0), default=0.0025, show_default=True, help="Sample period [s]."
-)
+@click.option("--period", type=Number(1e-6, 10.0), default=0.0025, show_default=True, help="Sample period [s].")
 @click.option("--all", "everything", is_flag=True, help="The form of the covariance that is not the default too.")
 @json_option
 @quiet_option
 def command(samples: int, period: float, everything: bool, json_file: str | None, quiet: bool) -> None:
     """Cost of one sample of the online estimator on this machine, against the sample period."""
-    check_outputs(json_file)
     with working("measuring", quiet=quiet):
         result = interruptible(lambda: measure(samples, period, everything=everything))
     if json_file is not None:
         write(json_file, json.dumps(result, indent=2))
-    if not (quiet or json_file == "-"):
+    if not (quiet or is_stdout(json_file)):
         _show(result)
 
 
@@ -48,7 +48,7 @@ def measure(samples: int, period: float, *, everything: bool = False) -> dict[st
     for scheme in SCHEMES:
         for filters in ("paper", "exact"):
             for single in (False, True):
-                tell("measuring", len(rows) / count)
+                report_progress("measuring", len(rows) / count)
                 for plain in (True, False) if everything else (not single,):
                     times = _native.bench(scheme, filters == "paper", plain, single, samples)
                     row: dict[str, Any] = {

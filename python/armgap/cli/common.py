@@ -1,67 +1,122 @@
-"""What the sub-commands share: options, column mappings, interrupts, and writing results whole or not at all."""
+"""What the sub-commands share: options, column mappings, consoles and interrupts."""
 
 from __future__ import annotations
 
 import os
 import sys
-import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextvars import copy_context
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import click
 from rich.console import Console
 
-from armgap.errors import OptionError, ResultError
+from armgap.cli.files import Command, InputFile, OutputFile, Words
+from armgap.errors import OptionError
+
+if TYPE_CHECKING:
+    from armgap.arm import Arm
 
 __all__ = [
     "ManyValues",
     "arm_option",
-    "check_outputs",
     "columns_option",
     "console",
+    "corrections_options",
     "interruptible",
     "json_option",
     "parse_columns",
     "parse_units",
     "quiet_option",
+    "read_arm",
     "report_option",
     "units_option",
-    "write",
 ]
 
 Result = TypeVar("Result")
 _POLL_S = 0.05
 _PIPE_WIDTH = 120
 
-arm_option = click.option("--arm", "arm_file", required=True, metavar="ARM.toml", help="Arm file: the nominal model.")
+arm_option = click.option(
+    "--arm", "arm_file", type=InputFile(), required=True, metavar="ARM.toml", help="Arm file: the nominal model."
+)
 columns_option = click.option(
     "--columns",
+    type=Words(),
     metavar="q1=NAME,…",
     help="The log's own names of its columns, for example t=time,q1=shoulder_pos.",
 )
 units_option = click.option(
     "--units",
+    type=Words(),
     metavar="t=ms,q=deg",
     help="Units of the log where they are not SI; also settles what looks like another unit.",
 )
-json_option = click.option("--json", "json_file", metavar="OUT", help="Write the result as JSON; - is standard output.")
-report_option = click.option(
-    "--report", "report_file", metavar="OUT", help="Write the report: .html, .md for pull requests, or .json."
+json_option = click.option(
+    "--json", "json_file", type=OutputFile(), metavar="OUT", help="Write the result as JSON; - is standard output."
 )
+report_option = click.option(
+    "--report",
+    "report_file",
+    type=OutputFile(),
+    metavar="OUT",
+    help="Write the report: .html, .md for pull requests, or .json.",
+)
+_CORRECTIONS = {
+    "flip": ("tau1,…", "Columns that count the other way than the arm file means."),
+    "zero": ("q1=180deg", "Where the zero of a position column lies in the model's angle; it is added."),
+    "swap": ("q1,q2", "Two columns that stand for each other."),
+    "absolute": ("q2", "Position columns that count from the world, not from the link before."),
+    "relative": ("q2", "Position columns that count from the link before, not from the world."),
+    "factor": ("tau1=12.5", "Factor that makes torques of a torque column."),
+    "shift": ("tau=-0.005", "Seconds to be added to the times of all torques."),
+    "skip": ("[LOG:]0-2.5", "Times of a log, in seconds from its start, that are left out."),
+}
+
+
+def corrections_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that say how columns are to be read otherwise than they stand."""
+    gravity = click.Choice(["reversed", "compensated"])
+    command = click.option("--gravity", type=gravity, help="Gravity acts the other way, or torques carry no weight.")(
+        command
+    )
+    for name, (metavar, text) in reversed(_CORRECTIONS.items()):
+        command = click.option(f"--{name}", multiple=True, type=Words(), metavar=metavar, help=text)(command)
+    return command
+
+
+def read_arm(path: str, given: Mapping[str, Any]) -> Arm:
+    """Read an arm file, with the values of `corrections_options` on top of its own corrections."""
+    from armgap.arm import Arm
+    from armgap.check.corrections import Corrections
+
+    arm = Arm.read(Path(path))
+    wanted = Corrections.parse(**{name: given[name] for name in (*_CORRECTIONS, "gravity")})
+    merged = wanted if arm.corrections is None else arm.corrections.merged(wanted)
+    return wanted.on_arm(replace(arm, corrections=merged or None))
+
+
 quiet_option = click.option("--quiet", is_flag=True, help="No progress and no summary.")
 
 
+class _Console(Console):
+    def on_broken_pipe(self) -> NoReturn:
+        """Leave the end of the program to `main`."""
+        self.quiet = True
+        raise
+
+
 def console(*, error: bool = False) -> Console:
-    """Return a console that honours ``NO_COLOR`` and pipes."""
+    """Return a console that honours ``NO_COLOR`` and pipes, and raises `BrokenPipeError` like any stream."""
     stream = sys.stderr if error else sys.stdout
     width = None if stream.isatty() else _PIPE_WIDTH
-    return Console(stderr=error, width=width, no_color=bool(os.environ.get("NO_COLOR")) or None)
+    return _Console(stderr=error, width=width, no_color=bool(os.environ.get("NO_COLOR")) or None)
 
 
-class ManyValues(click.Command):
+class ManyValues(Command):
     """A command whose ``--holdout`` takes every value up to the next option."""
 
     spread = ("--holdout",)
@@ -106,20 +161,6 @@ def _pairs(option: str, text: str | None, example: str) -> dict[str, str]:
     return mapping
 
 
-def check_outputs(*paths: str | None) -> None:
-    """Raise before any work is done if a result could not be written where it is asked for."""
-    for path in filter(None, paths):
-        target = Path(path)
-        if path == "-":
-            continue
-        if target.is_dir():
-            raise ResultError("is a folder", remedy="name a file", file=path)
-        if not target.parent.is_dir():
-            raise ResultError("its folder does not exist", remedy="make the folder first", file=path)
-        if not os.access(target.parent, os.W_OK):
-            raise ResultError("its folder cannot be written to", remedy="choose another place", file=path)
-
-
 def interruptible(work: Callable[[], Result]) -> Result:
     """Do long work in a thread, so that an interrupt ends the program at once; the work writes nothing by itself."""
     done: list[Result] = []
@@ -138,33 +179,3 @@ def interruptible(work: Callable[[], Result]) -> Result:
     if failed:
         raise failed[0]
     return done[0]
-
-
-def write(path: str | Path, content: str | Callable[[Path], Any]) -> None:
-    """Write text, or let `content` write, to a temporary file that takes its place only when it is complete."""
-    if str(path) == "-":
-        _to_stdout(content)
-        return
-    target = Path(path)
-    temporary = target.with_name(f".{target.name}.partial")
-    try:
-        if isinstance(content, str):
-            temporary.write_text(content, encoding="utf-8")
-        else:
-            content(temporary)
-        temporary.replace(target)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ResultError(f"cannot be written ({reason})", remedy="choose another place", file=target) from None
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _to_stdout(content: str | Callable[[Path], Any]) -> None:
-    if isinstance(content, str):
-        click.echo(content)
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "out"
-        content(file)
-        click.echo(file.read_text(encoding="utf-8"))

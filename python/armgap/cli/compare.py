@@ -6,14 +6,17 @@ from pathlib import Path
 
 import click
 
-from armgap.cli.common import check_outputs, console, json_option, quiet_option, report_option, write
+from armgap.cli.common import console, json_option, quiet_option, report_option
+from armgap.cli.files import Command, InputFile
+from armgap.output import is_stdout, write
+from armgap.reading import printable
 
 __all__ = ["command"]
 
 
-@click.command("compare")
-@click.argument("before", metavar="BEFORE.json")
-@click.argument("after", metavar="AFTER.json")
+@click.command("compare", cls=Command)
+@click.argument("before", type=InputFile(), metavar="BEFORE.json")
+@click.argument("after", type=InputFile(), metavar="AFTER.json")
 @report_option
 @json_option
 @quiet_option
@@ -23,14 +26,13 @@ def command(before: str, after: str, report_file: str | None, json_file: str | N
     from armgap.report import check_report, render_report
     from armgap.report.compared import comparison_document, comparison_summary
 
-    check_outputs(report_file, json_file)
     check_report(report_file)
     result = compare(read_diagnosis(before), read_diagnosis(after), _names(before, after))
     if report_file is not None:
         write(report_file, render_report(comparison_document(result), result.to_dict(), report_file))
     if json_file is not None:
         write(json_file, result.to_json(indent=2))
-    if not quiet and json_file != "-":
+    if not (quiet or is_stdout(json_file, report_file)):
         say = console()
         say.print(comparison_summary(result))
         for note in result.notes:
@@ -41,5 +43,5 @@ def command(before: str, after: str, report_file: str | None, json_file: str | N
 
 def _names(before: str, after: str) -> tuple[str, str]:
     """The files' names, or before and after where they do not differ."""
-    names = Path(before).stem, Path(after).stem
+    names = printable(Path(before).stem), printable(Path(after).stem)
     return names if names[0] != names[1] else ("before", "after")

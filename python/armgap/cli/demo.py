@@ -12,7 +12,6 @@ import click
 
 from armgap.cli.common import (
     ManyValues,
-    check_outputs,
     columns_option,
     console,
     json_option,
@@ -20,10 +19,12 @@ from armgap.cli.common import (
     parse_units,
     quiet_option,
     units_option,
-    write,
 )
+from armgap.cli.files import InputFile, InputFolder, OutputFile
+from armgap.cli.numbers import Seed
 from armgap.cli.progress import working
 from armgap.errors import OptionError
+from armgap.output import is_stdout, write
 
 if TYPE_CHECKING:
     from armgap.diagnosis import Diagnosis
@@ -38,15 +39,16 @@ PACKAGE = Path(__file__).resolve().parents[1]
 CASE_FOLDER = PACKAGE / "demo_case"
 
 
-@click.command("demo", cls=ManyValues)
-@click.argument("logs", nargs=-1, metavar="[LOG…]")
-@click.option("--arm", "arm_file", metavar="ARM.toml", help="Arm file, for logs of your own.")
-@click.option("--holdout", multiple=True, metavar="LOG…", help="Logs of your own to judge on.")
-@click.option("--case", "case_folder", metavar="DIR", help="Folder of another sealed case.")
-@click.option("--fresh", type=click.IntRange(min=0), metavar="SEED", help="Make a new sealed case (needs MuJoCo).")
+@click.command("demo", cls=ManyValues, reads=(CASE_FOLDER,))
+@click.argument("logs", nargs=-1, type=InputFile(), metavar="[LOG…]")
+@click.option("--arm", "arm_file", type=InputFile(), metavar="ARM.toml", help="Arm file, for logs of your own.")
+@click.option("--holdout", multiple=True, type=InputFile(), metavar="LOG…", help="Logs of your own to judge on.")
+@click.option("--case", "case_folder", type=InputFolder(), metavar="DIR", help="Folder of another sealed case.")
+@click.option("--fresh", type=Seed(), metavar="SEED", help="Make a new sealed case (needs MuJoCo).")
 @click.option(
     "--report",
     "report_file",
+    type=OutputFile(),
     default=REPORT,
     show_default=True,
     metavar="OUT",
@@ -60,7 +62,7 @@ def command(
     logs: tuple[str, ...],
     arm_file: str | None,
     holdout: tuple[str, ...],
-    case_folder: str | None,
+    case_folder: Path | None,
     fresh: int | None,
     report_file: str,
     json_file: str | None,
@@ -71,7 +73,6 @@ def command(
     """Diagnose a sample log whose hidden cause is sealed, then open the key; or diagnose LOGs of your own."""
     from armgap.report import check_report
 
-    check_outputs(report_file, json_file)
     check_report(report_file)
     outputs = (report_file, json_file, quiet)
     if logs or arm_file or holdout:
@@ -142,15 +143,15 @@ def _diagnose(
 def _voice(outputs: tuple[str, str | None, bool]) -> Any:
     """The console, silent where the summary is not wanted on standard output."""
     say = console()
-    say.quiet = outputs[2] or outputs[1] == "-"
+    say.quiet = outputs[2] or is_stdout(*outputs[:2])
     return say
 
 
 @contextmanager
-def _case(folder: str | None, fresh: int | None, *, quiet: bool) -> Iterator[Path]:
+def _case(folder: Path | None, fresh: int | None, *, quiet: bool) -> Iterator[Path]:
     """The case folder that was asked for; a fresh one lasts as long as the command."""
     if fresh is None:
-        yield Path(folder) if folder is not None else CASE_FOLDER
+        yield folder if folder is not None else CASE_FOLDER
         return
     if folder is not None:
         raise OptionError("--case and --fresh were both given", remedy="give one of the two")

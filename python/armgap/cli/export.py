@@ -6,18 +6,27 @@ from pathlib import Path
 
 import click
 
-from armgap.cli.common import arm_option, check_outputs, quiet_option, write
+from armgap.cli.common import arm_option, quiet_option
+from armgap.cli.files import Command, InputFile, OutputFile
 from armgap.errors import OptionError
+from armgap.output import write
 
 __all__ = ["command"]
 
 _FORMATS = {".xml": "mjcf", ".mjcf": "mjcf", ".urdf": "urdf", ".toml": "toml", ".json": "json"}
 
 
-@click.command("export")
-@click.argument("diagnosis_file", metavar="DIAGNOSIS.json")
+@click.command("export", cls=Command)
+@click.argument("diagnosis_file", type=InputFile(), metavar="DIAGNOSIS.json")
 @arm_option
-@click.option("-o", "--output", required=True, metavar="OUT", help="File to write: .xml, .urdf, .toml, .json; or -.")
+@click.option(
+    "-o",
+    "--output",
+    type=OutputFile(),
+    required=True,
+    metavar="OUT",
+    help="File to write: .xml, .urdf, .toml, .json; or -.",
+)
 @click.option(
     "--format",
     "form",
@@ -42,14 +51,12 @@ def command(
     from armgap.arm import Arm
     from armgap.export import correct, read_diagnosis
 
-    check_outputs(output)
     chosen = form or _FORMATS.get(Path(output).suffix.lower())
     if chosen is None:
         raise OptionError(
             f"`{output}` does not tell the format", remedy="end it in .xml, .urdf, .toml or .json, or give --format"
         )
     model = correct(read_diagnosis(diagnosis_file), Arm.read(Path(arm_file)), stage=stage, keep_lengths=keep_lengths)
-    text = model.render(chosen)
-    write(output, text.rstrip("\n") if output == "-" else text)
+    write(output, model.render(chosen))
     for line in () if quiet else model.remarks(chosen):
         click.echo(f"note: {line}", err=True)

@@ -3,42 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from armgap.cli.common import (
     arm_option,
-    check_outputs,
     columns_option,
     console,
+    corrections_options,
     interruptible,
     json_option,
     parse_columns,
     parse_units,
     quiet_option,
+    read_arm,
     units_option,
-    write,
 )
+from armgap.cli.files import Command, InputFile
 from armgap.cli.progress import working
-from armgap.progress import following, of_many
+from armgap.literals import FILTERS, SCHEMES
+from armgap.output import is_stdout, write
+from armgap.progress import part_callback, use_callback
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
     from armgap.identification import Identification
+    from armgap.literals import Scheme
     from armgap.log import Log
 
 __all__ = ["command"]
 
-SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
 
-
-@click.command("identify")
-@click.argument("logs", nargs=-1, required=True, metavar="LOG…")
+@click.command("identify", cls=Command)
+@click.argument("logs", nargs=-1, required=True, type=InputFile(), metavar="LOG…")
 @arm_option
 @click.option("--scheme", type=click.Choice([*SCHEMES, "all"]), default="all", show_default=True)
-@click.option("--filters", type=click.Choice(["paper", "exact"]), default="exact", show_default=True)
+@click.option("--filters", type=click.Choice(FILTERS), default="exact", show_default=True)
 @click.option("--cutoff", default=50.0, show_default=True, help="Filter cut-off [rad/s].")
 @click.option(
     "--velocity",
@@ -46,6 +47,7 @@ SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
     help="Velocity estimate; backward for the paper's filters, central for the exact ones. midpoint: as online.",
 )
 @click.option("--asymmetry", is_flag=True, help="Estimate a torque offset per joint (asymmetric Coulomb friction) too.")
+@corrections_options
 @json_option
 @columns_option
 @units_option
@@ -62,26 +64,25 @@ def command(
     columns: str | None,
     units: str | None,
     quiet: bool,
+    **corrections: Any,
 ) -> None:
     """Estimate the arm's parameters from LOGs by recursive least squares, with the seed paper's three schemes."""
     import json
 
     from rich.table import Table
 
-    from armgap.arm import Arm
     from armgap.log import gather
     from armgap.log.findings import remarks
 
-    check_outputs(json_file)
-    arm = Arm.read(Path(arm_file))
-    schemes = SCHEMES if scheme == "all" else (scheme,)
+    arm = read_arm(arm_file, corrections)
+    schemes = [s for s in SCHEMES if scheme in (s, "all")]
     with working("reading", quiet=quiet):
         read = gather(logs, arm, columns=parse_columns(columns), units=parse_units(units))
         settings: dict[str, Any] = {"filters": filters, "cutoff": cutoff, "velocity": velocity, "asymmetry": asymmetry}
         results = interruptible(lambda: _identified(read, arm, schemes, settings))
     if json_file is not None:
         write(json_file, json.dumps([r.to_dict() for r in results], indent=2))
-    if quiet or json_file == "-":
+    if quiet or is_stdout(json_file):
         return
     noticed = [{"log": log.name, "kind": f.kind, "message": f.message} for log in read for f in log.findings]
     for remark in remarks(noticed):
@@ -105,7 +106,7 @@ def command(
 
 
 def _identified(
-    logs: Sequence[Log], arm: Arm, schemes: Sequence[str], settings: dict[str, Any]
+    logs: Sequence[Log], arm: Arm, schemes: Sequence[Scheme], settings: dict[str, Any]
 ) -> list[Identification]:
     """Every scheme on every log."""
     from armgap.identification import identify
@@ -113,6 +114,6 @@ def _identified(
     work = [(log, scheme) for log in logs for scheme in schemes]
     results = []
     for number, (log, scheme) in enumerate(work):
-        with following(of_many("identifying", number, len(work))):
+        with use_callback(part_callback("identifying", number, len(work))):
             results.append(identify(log, arm, scheme=scheme, **settings))
     return results

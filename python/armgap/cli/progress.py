@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from armgap.cli.common import console
-from armgap.progress import following
+from armgap.progress import use_callback
 
 if TYPE_CHECKING:
     from rich.progress import Progress, Task
@@ -26,12 +26,12 @@ _GUESS_AFTER_PART = 0.03
 def working(message: str, *, quiet: bool) -> Iterator[None]:
     """Show on standard error how far the work inside the block is, unless quiet, not at a terminal, or asked for plain text by ``NO_COLOR``.
 
-    What the work says of itself with `armgap.progress.tell` replaces the message.
+    What is reported with `armgap.progress.report_progress` replaces the message.
     """
     if quiet or os.environ.get("NO_COLOR") or not sys.stderr.isatty():
         yield
         return
-    with _bar() as bar, following(_Line(bar, message).show):
+    with _bar() as bar, use_callback(_Line(bar, message).show):
         yield
 
 

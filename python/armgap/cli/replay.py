@@ -8,15 +8,14 @@ import click
 
 from armgap.cli.common import (
     arm_option,
-    check_outputs,
     columns_option,
     console,
     parse_columns,
     parse_units,
     quiet_option,
     units_option,
-    write,
 )
+from armgap.cli.files import Command, InputFile, OutputFile
 from armgap.cli.progress import working
 from armgap.errors import OptionError
 
@@ -25,12 +24,26 @@ __all__ = ["command"]
 SUFFIX = ".rrd"
 
 
-@click.command("replay")
-@click.argument("log_file", metavar="LOG")
+@click.command("replay", cls=Command)
+@click.argument("log_file", type=InputFile(), metavar="LOG")
 @arm_option
-@click.option("--diagnosis", "diagnosis_file", metavar="D.json", help="Diagnosis whose causes are predicted with too.")
+@click.option(
+    "--diagnosis",
+    "diagnosis_file",
+    type=InputFile(),
+    metavar="D.json",
+    help="Diagnosis whose causes are predicted with too.",
+)
 @click.option("--horizon", default=0.25, show_default=True, help="Length of a predicted window [s].")
-@click.option("-o", "--output", default="replay.rrd", show_default=True, metavar="OUT.rrd", help="Recording to write.")
+@click.option(
+    "-o",
+    "--output",
+    type=OutputFile(),
+    default="replay.rrd",
+    show_default=True,
+    metavar="OUT.rrd",
+    help="Recording to write.",
+)
 @columns_option
 @units_option
 @quiet_option
@@ -50,7 +63,6 @@ def command(
     from armgap.log import Log
     from armgap.report.replay import models, predicted, write_replay
 
-    check_outputs(output)
     if Path(output).suffix != SUFFIX:
         raise OptionError("a recording has another extension", remedy=f"name it {SUFFIX}", file=output)
     if not horizon > 0:
@@ -60,6 +72,6 @@ def command(
     diagnosis = None if diagnosis_file is None else read_diagnosis(diagnosis_file)
     with working("predicting", quiet=quiet):
         curves = {name: predicted(model, log, horizon) for name, model in models(arm, diagnosis).items()}
-    write(output, lambda path: write_replay(curves, log, arm, path))
+    write_replay(curves, log, arm, output)
     if not quiet:
         console().print(f"recording: {output} (open it with: rerun {output})", highlight=False, markup=False)

@@ -15,11 +15,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armgap.cli.common import check_outputs, console, interruptible, json_option, quiet_option, write
+from armgap.cli.common import console, interruptible, json_option, quiet_option
+from armgap.cli.files import Group, InputFolder, OutputFolder
+from armgap.cli.numbers import Seed
 from armgap.cli.progress import working
 from armgap.errors import OptionError
-from armgap.progress import following, tell
-from armgap.trial.commands import all_of_it, make, peers, run, score
+from armgap.options import positive
+from armgap.output import is_stdout, write
+from armgap.progress import report_progress, use_callback
+from armgap.trial.commands import all_of_it, baselines, former_name, make, run, score
+from armgap.trial.layout import MOST_CASES, belongs, case_folders_in
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -29,14 +34,16 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.group("trial", invoke_without_command=True)
-@click.option("--cases", default=10, show_default=True, type=click.IntRange(min=1), help="Number of cases to make.")
-@click.option("--seed", type=click.IntRange(min=0), help="Seed of the cases; a fresh one by default.")
+@click.group("trial", cls=Group, invoke_without_command=True)
+@click.option(
+    "--cases", default=10, show_default=True, type=click.IntRange(1, MOST_CASES), help="Number of cases to make."
+)
+@click.option("--seed", type=Seed(), help="Seed of the cases; a fresh one by default.")
 @click.option("--duration", default=10.0, show_default=True, help="Length of each log [s].")
 @click.option("--horizon", default=0.25, show_default=True, help="Prediction horizon [s].")
-@click.option("--folder", type=click.Path(path_type=Path), metavar="DIR", help="Keep the cases in a new folder.")
+@click.option("--folder", type=OutputFolder(belongs), metavar="DIR", help="Keep the cases in a new folder.")
 @click.option("--make-only", is_flag=True, help="Make the cases and stop; needs --folder.")
-@click.option("--score", "made", type=click.Path(path_type=Path), metavar="DIR", help="Score the cases of a folder.")
+@click.option("--score", "made", type=InputFolder(belongs), metavar="DIR", help="Score the cases of a folder.")
 @json_option
 @quiet_option
 @click.pass_context
@@ -56,10 +63,12 @@ def command(
     if context.invoked_subcommand is not None:
         _only(context)
         return
-    check_outputs(json_file)
     _check(folder, make_only, made, duration)
+    horizon = positive(horizon, "horizon")
+    if made is None and horizon > duration:
+        raise OptionError(f"the horizon is {horizon:g} s", remedy=f"give less than the {duration:g} s of a log")
     say = console()
-    say.quiet = quiet or json_file == "-"
+    say.quiet = quiet or is_stdout(json_file)
     with _cases(made, folder, lambda target: _make(target, cases, seed, duration, quiet)) as found:
         if make_only:
             say.print(f"{folder}: {len(found)} sealed cases")
@@ -67,8 +76,8 @@ def command(
         scores = []
         with working("diagnosing", quiet=quiet):
             for i, case in enumerate(found):
-                tell(f"diagnosing case {i + 1} of {len(found)}", i / len(found))
-                with following(_nobody):
+                report_progress(f"diagnosing case {i + 1} of {len(found)}", i / len(found))
+                with use_callback(_ignore):
                     scores.append(interruptible(partial(_score, case, horizon)))
     right = sum(judgement.right for _, judgement, _ in scores)
     if json_file is not None:
@@ -77,7 +86,7 @@ def command(
     say.print(f"right: {right} of {len(scores)}")
 
 
-for _step in (make, run, score, peers, all_of_it):
+for _step in (make, run, score, baselines, former_name, all_of_it):
     command.add_command(_step)
 
 
@@ -106,7 +115,7 @@ def _check(folder: Path | None, make_only: bool, made: Path | None, duration: fl
 def _cases(made: Path | None, folder: Path | None, make: Callable[[Path], list[Path]]) -> Iterator[list[Path]]:
     """The case folders: those that exist, or new ones in a folder that lasts as asked."""
     if made is not None:
-        found = sorted(path.parent for path in made.glob("*/arm.toml"))
+        found = case_folders_in(made)
         if not found:
             raise OptionError("holds no cases", remedy="make some with --make-only --folder", file=made)
         yield found
@@ -125,8 +134,8 @@ def _make(target: Path, cases: int, seed: int | None, duration: float, quiet: bo
         return make_trial(chosen, cases, folder=target, duration=duration)
 
 
-def _nobody(_: str, __: float) -> None:
-    """Follow nothing: what a case tells of itself is less than what all cases tell."""
+def _ignore(_: str, __: float) -> None:
+    """Drop the progress of one case: the bar shows that of all cases."""
 
 
 def _score(case: Path, horizon: float) -> tuple[str, Judgement, float]:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
+from armgap._renamed import old_names
 from armgap.arm import Arm
 
-__all__ = ["Hypothesis", "Placed"]
+__all__ = ["EffectInstance", "Hypothesis"]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
 
 Array = NDArray[np.float64]
 
@@ -24,7 +28,7 @@ ON_INERTIA = ("rotor_inertia", "rotor_coupling", "payload")
 TABLE = 4001
 
 
-class Placed(NamedTuple):
+class EffectInstance(NamedTuple):
     """An effect with its values; `log` names the only log that it acts in."""
 
     effect: str
@@ -47,7 +51,7 @@ class Hypothesis:
         Kind, gravity and lengths.
     theta : tuple of float
         Parameters [SI].
-    effects : tuple of Placed
+    effects : tuple of EffectInstance
         Effects with their values.
     smoothing : float
         Width of the smoothed sign of friction [rad/s]; 0 is dry friction.
@@ -55,7 +59,7 @@ class Hypothesis:
 
     arm: Arm
     theta: tuple[float, ...]
-    effects: tuple[Placed, ...] = ()
+    effects: tuple[EffectInstance, ...] = ()
     smoothing: float = 0.0
 
     @classmethod
@@ -63,13 +67,15 @@ class Hypothesis:
         """Return the model with causes of a diagnosis."""
         found = data["parameters"]["with_causes"]
         effects = tuple(
-            Placed(c["effect"], c["joint"], {name: p["value"] for name, p in c["parameters"].items()}, c.get("log"))
+            EffectInstance(
+                c["effect"], c["joint"], {name: p["value"] for name, p in c["parameters"].items()}, c.get("log")
+            )
             for c in data.get("causes") or []
         )
         smoothing = float((data.get("options") or {}).get("friction_smoothing") or 0.0)
         return cls(arm, tuple(float(found[name]["value"]) for name in arm.parameter_names), effects, smoothing)
 
-    def only(self, effects: Sequence[Placed]) -> Hypothesis:
+    def only(self, effects: Sequence[EffectInstance]) -> Hypothesis:
         """Return the same model with other effects."""
         return replace(self, effects=tuple(effects))
 
@@ -103,7 +109,7 @@ class Hypothesis:
         return _native.inertia(arm.kind, arm.gravity, lengths, list(self.theta), poses, inertial)
 
 
-def delivered(t: Array, tau: Array, effects: Sequence[Placed]) -> Array:
+def delivered(t: Array, tau: Array, effects: Sequence[EffectInstance]) -> Array:
     """Torque at the joints when effects act on the command, mean of each sample; shape of `tau`.
 
     Each joint's command drives a unit mass that has these effects and no others: its acceleration is the torque.
@@ -118,7 +124,7 @@ def delivered(t: Array, tau: Array, effects: Sequence[Placed]) -> Array:
     return found
 
 
-def true_positions(q: Array, effects: Sequence[Placed]) -> Array:
+def true_positions(q: Array, effects: Sequence[EffectInstance]) -> Array:
     """Positions behind measured ones when effects act on the encoders; shape of `q`.
 
     A free unit inertia sweeps the range at constant speed; what its encoder shows is the table to look up.

@@ -1,9 +1,10 @@
-"""A cause against its own variable: the torque that the model without it lacks, and the fitted law through it.
+"""A cause against its own variable: the residual torque of the model without it, and the fitted law through it.
 
 Short windows of the held-out logs are predicted twice under the logged torque, without the cause and with it. The second
-derivative of "measured minus predicted without" times the inertia matrix is the torque that the model without the cause
-lacks; the same of "predicted with minus predicted without" is the law, seen through the same filter. Both are averaged
-over ranges of the variable that the cause depends on: speed for friction, position for ripple, and so on.
+derivative of "measured minus predicted without" times the inertia matrix is the residual torque of the model without the
+cause. The second derivative of "predicted with minus predicted without" times the inertia matrix is the law, seen through
+the same filter. Both are averaged over ranges of the variable that the cause depends on: speed for friction, position for
+ripple, and so on.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.arm import Arm
-from armgap.evidence.hypothesis import Array, Hypothesis, Placed, delivered, true_positions
+from armgap.evidence.hypothesis import Array, EffectInstance, Hypothesis, delivered, true_positions
 from armgap.log import Log
 
 __all__ = ["laws"]
@@ -41,7 +42,7 @@ ON_ENCODER = ("encoder_offset", "encoder_eccentricity")
 
 
 @dataclass(frozen=True)
-class Point:
+class EvidenceSamples:
     """Samples that evidence is taken from; arrays of shape (n, n_joints) unless noted."""
 
     t: Array  # (n,)
@@ -51,7 +52,7 @@ class Point:
     ddq: Array
     tau: Array
     rate: Array
-    lack: Array
+    residual: Array
     law: Array
 
 
@@ -64,7 +65,7 @@ class Variable:
 
     name: str
     units: tuple[str, str]
-    value: Callable[[Point, int, dict[str, float]], Array]
+    value: Callable[[EvidenceSamples, int, dict[str, float]], Array]
     folded: bool = False
 
 
@@ -76,7 +77,7 @@ _ALONG = Variable("q{}", ("rad", "m"), lambda x, j, p: x.q[:, j], folded=True)
 _CYCLE = Variable(
     "q{} within one cycle", ("rad", "m"), lambda x, j, p: np.mod(x.q[:, j], 2 * np.pi / max(abs(p["n"]), 1e-9))
 )
-_OWN = Variable("torque that the law adds on joint {}", ("N m", "N"), lambda x, j, p: x.law[:, j])
+_LAW_TORQUE = Variable("torque that the law adds on joint {}", ("N m", "N"), lambda x, j, p: x.law[:, j])
 
 VARIABLES = {
     "coulomb_asymmetry": _SPEED,
@@ -124,19 +125,19 @@ def laws(data: dict[str, Any], arm: Arm, training: Sequence[Log], held: Sequence
         ``points`` (``x``, ``y``), ``bins`` (``x``, ``mean``, ``error`` at 95 %, ``law``) and ``explained``.
     """
     model = Hypothesis.of(data, arm)
-    return [_law(model, cause, _witnesses(cause, training, held)) for cause in model.effects]
+    return [_law(model, cause, _evidence_logs(cause, training, held)) for cause in model.effects]
 
 
-def _witnesses(cause: Placed, training: Sequence[Log], held: Sequence[Log]) -> list[Log]:
+def _evidence_logs(cause: EffectInstance, training: Sequence[Log], held: Sequence[Log]) -> list[Log]:
     return list(held) if cause.log is None else [log for log in (*training, *held) if _is_in(log, cause)]
 
 
-def _is_in(log: Log, effect: Placed) -> bool:
+def _is_in(log: Log, effect: EffectInstance) -> bool:
     """Whether an effect acts in a log, or in the log that this one is a part of."""
     return effect.log is None or log.name in (effect.log, f"{effect.log} (first part)", f"{effect.log} (last part)")
 
 
-def _law(model: Hypothesis, cause: Placed, logs: Sequence[Log]) -> dict[str, Any]:
+def _law(model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]) -> dict[str, Any]:
     effect, joint, values = cause[:3]
     points, windows, failures = _points(model, cause, logs)
     entry: dict[str, Any] = {"effect": effect, "joint": joint, "windows": windows, "failed": len(failures)}
@@ -150,12 +151,12 @@ def _law(model: Hypothesis, cause: Placed, logs: Sequence[Log]) -> dict[str, Any
     moves = _moves(points.dq[:, shown])
     if np.count_nonzero(moves) < ENOUGH:
         return entry  # too few samples to say anything
-    variable = VARIABLES.get(effect, _OWN)
+    variable = VARIABLES.get(effect, _LAW_TORQUE)
     if not np.any(points.law[moves, shown]):
         return entry  # the law adds nothing to these logs
     x = variable.value(points, shown, values)[moves]
     sign = np.sign(points.dq[moves, shown]) if variable.folded else np.ones(len(x))
-    y, law = sign * points.lack[moves, shown], sign * points.law[moves, shown]
+    y, law = sign * points.residual[moves, shown], sign * points.law[moves, shown]
     rotary = model.arm.rotary
     entry |= {
         "shown_joint": shown + 1,
@@ -177,45 +178,47 @@ def _moves(dq: Array) -> NDArray[np.bool_]:
     return np.asarray(speed > REST * np.quantile(speed, 0.99))
 
 
-def _most_moved(points: Point) -> int:
-    """The joint whose torque the law changes most, against what it lacks at random."""
-    scale = np.sqrt(np.mean((points.lack - points.law) ** 2, axis=0)) + 1e-300
+def _most_moved(points: EvidenceSamples) -> int:
+    """The joint whose torque the law changes most, relative to the residual torque that the law does not explain."""
+    scale = np.sqrt(np.mean((points.residual - points.law) ** 2, axis=0)) + 1e-300
     return int(np.argmax(np.sqrt(np.mean(points.law**2, axis=0)) / scale))
 
 
-def _points(model: Hypothesis, cause: Placed, logs: Sequence[Log]) -> tuple[Point | None, int, list[str]]:
+def _points(
+    model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]
+) -> tuple[EvidenceSamples | None, int, list[str]]:
     """Evidence from windows spread over all logs; how many, and why others could not be simulated."""
-    found: list[Point] = []
+    found: list[EvidenceSamples] = []
     failed: list[str] = []
     whole = sum(log.duration for log in logs)
     for log in logs:
         wanted = max(1, round(WINDOWS * log.duration / whole))
         try:
-            scene = _Scene(model, cause, log)
+            comparison = _CauseComparison(model, cause, log)
         except ValueError as error:
             failed += wanted * [str(error)]
             continue
-        for first in scene.starts(wanted):
+        for first in comparison.starts(wanted):
             try:
-                found.append(scene.window(first))
+                found.append(comparison.window(first))
             except ValueError as error:
                 failed.append(str(error))
     if not found:
         return None, 0, failed
     numbered = [replace(p, window=np.full(len(p.t), float(i))) for i, p in enumerate(found)]
-    joined = {f.name: np.concatenate([getattr(p, f.name) for p in numbered]) for f in fields(Point)}
-    return Point(**joined), len(found), failed
+    joined = {f.name: np.concatenate([getattr(p, f.name) for p in numbered]) for f in fields(EvidenceSamples)}
+    return EvidenceSamples(**joined), len(found), failed
 
 
-class _Scene:
+class _CauseComparison:
     """One log with and without one cause."""
 
-    def __init__(self, model: Hypothesis, cause: Placed, log: Log) -> None:
+    def __init__(self, model: Hypothesis, cause: EffectInstance, log: Log) -> None:
         rest = [e for e in model.effects if e is not cause and _is_in(log, e)]
         self.half = max(HALF_SAMPLES, round(HALF_S / log.sample_period))
         self.log = log
-        self.without = _Side(model, rest, log, self.half)
-        self.full = _Side(model, [*rest, cause], log, self.half)
+        self.without = _ModelledLog(model, rest, log, self.half)
+        self.full = _ModelledLog(model, [*rest, cause], log, self.half)
         self.dq = self.full.dq
         self.rate = np.gradient(log.tau, log.t, axis=0)
         self.around = _around(cause, log)
@@ -227,7 +230,7 @@ class _Scene:
         fitting = (last - first) // (4 * self.half + 1) + 1
         return [int(k) for k in np.linspace(first, last, min(wanted, fitting))] if last >= first else []
 
-    def window(self, first: int) -> Point:
+    def window(self, first: int) -> EvidenceSamples:
         rows = slice(first, first + 6 * self.half + 1)
         log = self.log
         without, full = self.without.predict(rows), self.full.predict(rows)
@@ -236,8 +239,8 @@ class _Scene:
         inertia = self.without.model.inertia(self.full.q[at])
         curvature = _curvature(log.t[rows], np.hstack([log.q[rows] - without, full - without, log.q[rows]]), inner)
         n = log.n_joints
-        lack, law = (np.einsum("kij,kj->ki", inertia, curvature[:, s : s + n]) for s in (0, n))
-        return Point(
+        residual, law = (np.einsum("kij,kj->ki", inertia, curvature[:, s : s + n]) for s in (0, n))
+        return EvidenceSamples(
             t=log.t[at],
             window=np.zeros(len(at)),
             q=log.q[at],
@@ -245,12 +248,12 @@ class _Scene:
             ddq=curvature[:, 2 * n :],
             tau=log.tau[at],
             rate=self.rate[at],
-            lack=lack,
+            residual=residual,
             law=law,
         )
 
 
-def _around(cause: Placed, log: Log) -> tuple[int, int]:
+def _around(cause: EffectInstance, log: Log) -> tuple[int, int]:
     """Rows to look at: all, or those around an event."""
     if "time" not in cause.parameters:
         return 0, len(log)
@@ -259,10 +262,10 @@ def _around(cause: Placed, log: Log) -> tuple[int, int]:
     return int(first), int(last)
 
 
-class _Side:
+class _ModelledLog:
     """A log as one model sees it: the torque that arrives, and true positions and velocities."""
 
-    def __init__(self, model: Hypothesis, effects: Sequence[Placed], log: Log, half: int) -> None:
+    def __init__(self, model: Hypothesis, effects: Sequence[EffectInstance], log: Log, half: int) -> None:
         commanded = [e for e in effects if e.effect in ON_COMMAND]
         self.model = model.only([e for e in effects if e.effect not in ON_COMMAND])
         self.t = log.t

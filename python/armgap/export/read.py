@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
-from armgap.diagnosis import Diagnosis
+from armgap.diagnosis import MOST_BYTES, Diagnosis
 from armgap.export.errors import DiagnosisFileError
+from armgap.reading import read_bounded
 
 __all__ = ["read_diagnosis"]
 
@@ -44,11 +44,10 @@ def read_diagnosis(path: str | Path) -> Diagnosis:
 
 def _load(path: str | Path) -> Any:
     try:
-        text = sys.stdin.read() if str(path) == "-" else Path(path).read_text(encoding="utf-8")
-        return json.loads(text)
+        return json.loads(read_bounded(path, MOST_BYTES))
     except OSError as error:
         raise DiagnosisFileError(f"cannot be read ({error.strerror or error})", remedy=_REMEDY, file=path) from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise DiagnosisFileError(f"is not JSON ({error})", remedy=_REMEDY, file=path) from None
 
 

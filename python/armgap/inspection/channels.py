@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armgap._renamed import old_names
 from armgap.arm import Arm
 from armgap.log import Log
 
-__all__ = ["FlatTop", "Joint", "joint", "step_of"]
+__all__ = ["FlatTop", "JointChannels", "joint", "step_of"]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
 
 # So many changes between samples tell the step of a channel.
 _ENOUGH = 200_000
@@ -36,7 +41,7 @@ class FlatTop:
 
 
 @dataclass(frozen=True)
-class Joint:
+class JointChannels:
     """One joint's channels.
 
     Attributes
@@ -72,7 +77,7 @@ class Joint:
     flat_tops: tuple[FlatTop, ...]
 
 
-def joint(log: Log, j: int, arm: Arm | None) -> Joint:
+def joint(log: Log, j: int, arm: Arm | None) -> JointChannels:
     """Return what the channels of joint `j` (from 0) look like."""
     q, tau = np.ascontiguousarray(log.q[:, j]), np.ascontiguousarray(log.tau[:, j])
     step = step_of(q)
@@ -80,7 +85,7 @@ def joint(log: Log, j: int, arm: Arm | None) -> Joint:
     top = float(np.quantile(np.abs(dq), 0.99)) if len(dq) else 0.0
     still = np.abs(dq) <= max(_REST_STEPS * (step or _smallest(q)) / _SPAN_S, _REST_SHARE * top)
     moving = np.sign(dq[~still])
-    return Joint(
+    return JointChannels(
         joint=j + 1,
         q_range=(float(q.min()), float(q.max())),
         q_step=step,

@@ -12,16 +12,21 @@ J. Swevers et al., Optimal robot excitation and identification, IEEE Trans. Robo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
+from armgap._renamed import old_names
 from armgap.arm import Arm
 from armgap.log import Log
 from armgap.log.stretches import choose
 
-__all__ = ["Excitation", "Parameter", "excitation"]
+__all__ = ["Excitation", "ParameterExcitation", "excitation"]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
 
 _P0 = 1e9
 _CUTOFF = 50.0  # rad/s
@@ -34,7 +39,7 @@ _WELL, _HARDLY = 0.05, 0.5
 
 
 @dataclass(frozen=True)
-class Parameter:
+class ParameterExcitation:
     """What a log tells about one parameter.
 
     Attributes
@@ -46,7 +51,7 @@ class Parameter:
     sigma : float
         Standard deviation, as part of the value, that a white error of 1 % of the RMS torque leaves.
     alone : float
-        The same if all other parameters were known.
+        Standard deviation, as part of the value, if all other parameters were known.
     excited : str
         ``"well"`` (sigma below 5 %), ``"weakly"`` or ``"not"`` (above 50 %).
     """
@@ -65,8 +70,8 @@ class Excitation:
     Attributes
     ----------
     condition : float
-        Condition number of the regressor with parameters in units of the arm file's values; infinite if it lacks a direction.
-    parameters : tuple of Parameter
+        Condition number of the regressor with parameters in units of the arm file's values; infinite if some combination is not excited.
+    parameters : tuple of ParameterExcitation
         In the arm's order.
     weakest : str
         The combination of parameters that the log tells least about.
@@ -75,7 +80,7 @@ class Excitation:
     """
 
     condition: float
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ParameterExcitation, ...]
     weakest: str
     samples: int
 
@@ -94,7 +99,7 @@ def excitation(log: Log, arm: Arm) -> Excitation:
         alone = 1.0 / np.sqrt(np.diag(scaled))
     condition = float(np.sqrt(values[-1] / values[0])) if values[0] > floor else float("inf")
     parameters = tuple(
-        Parameter(name, float(value), float(s), float(a), _word(float(s)))
+        ParameterExcitation(name, float(value), float(s), float(a), _word(float(s)))
         for name, value, s, a in zip(
             arm.parameter_names, arm.theta, _ERROR * torque * spread, _ERROR * torque * alone, strict=True
         )
@@ -109,10 +114,10 @@ def _information(log: Log, arm: Arm) -> NDArray[np.float64]:
     zero = [0.0] * len(arm.theta)
     settings = ("filtered-dynamic", False, _CUTOFF, 1.0, _P0)
     dq = _native.velocity(t, q, "local-cubic", 3)
-    course = _native.identify(arm.kind, arm.gravity, lengths, arm.theta.tolist(), *settings, zero, t, q, tau, dq)
-    values, vectors = np.linalg.eigh(course["covariance"])
-    told = np.maximum(1.0 / np.maximum(values, np.finfo(float).tiny) - 1.0 / _P0, 0.0)
-    return np.asarray((vectors * told) @ vectors.T)
+    history = _native.identify(arm.kind, arm.gravity, lengths, arm.theta.tolist(), *settings, zero, t, q, tau, dq)
+    values, vectors = np.linalg.eigh(history["covariance"])
+    information = np.maximum(1.0 / np.maximum(values, np.finfo(float).tiny) - 1.0 / _P0, 0.0)
+    return np.asarray((vectors * information) @ vectors.T)
 
 
 def _word(sigma: float) -> str:

@@ -8,14 +8,19 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from armgap.arm import Arm
+from armgap.check import Check, data_checks, examine
 from armgap.errors import LogShapeError, OptionError
-from armgap.inspection.channels import Joint, joint
+from armgap.inspection.channels import JointChannels, joint
 from armgap.inspection.excitation import Excitation, excitation
 from armgap.inspection.sampling import Sampling, sampling
 from armgap.log import Finding, Log, gather
-from armgap.progress import tell
+from armgap.progress import report_progress
 
 __all__ = ["Inspection", "inspect"]
+
+# Checks against the arm predict over this time [s], from parameters that this part of the log has taught.
+_HORIZON_S = 0.25
+_LEARNT = 0.6
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,7 @@ class Inspection:
         The file's own names by standard name.
     sampling : Sampling
         When samples were taken.
-    joints : tuple of Joint
+    joints : tuple of JointChannels
         Positions and torques of each joint.
     excitation : Excitation, optional
         What the log tells about the arm's parameters; None without an arm.
@@ -40,16 +45,22 @@ class Inspection:
         The log itself.
     rotary : bool, optional
         Whether the joints turn; None without an arm.
+    kind : str
+        Kind of the arm; empty without one.
+    checks : tuple of Check
+        What was noticed about the log by itself and against the arm file.
     """
 
     log: str
     columns: dict[str, str]
     sampling: Sampling
-    joints: tuple[Joint, ...]
+    joints: tuple[JointChannels, ...]
     excitation: Excitation | None
     findings: tuple[Finding, ...]
     source: Log = field(repr=False, compare=False)
     rotary: bool | None = None
+    kind: str = ""
+    checks: tuple[Check, ...] = ()
 
     @property
     def units(self) -> tuple[str, str]:
@@ -64,6 +75,7 @@ class Inspection:
         found["sampling"] = asdict(self.sampling)
         found["joints"] = [asdict(j) for j in self.joints]
         found["excitation"] = None if self.excitation is None else asdict(self.excitation)
+        found["checks"] = [check.to_dict() for check in self.checks]
         found["findings"] = [asdict(f) for f in self.findings]
         plain: dict[str, Any] = _finite(found)
         return plain
@@ -73,7 +85,7 @@ class Inspection:
         return json.dumps(self.to_dict(), indent=indent, allow_nan=False)
 
 
-def inspect(log: Any, arm: Arm | None = None) -> Inspection:
+def inspect(log: Any, arm: Arm | None = None, *, repair: bool = True) -> Inspection:
     """Say what a log holds.
 
     Parameters
@@ -81,7 +93,9 @@ def inspect(log: Any, arm: Arm | None = None) -> Inspection:
     log : Log, path or table
         The log, or anything that `Log.read` and `Log.from_frame` take.
     arm : Arm, optional
-        The arm it belongs to; needed for what the log tells about parameters.
+        The arm it belongs to; needed for what the log tells about parameters, and for checks against the arm file.
+    repair : bool, default True
+        Whether what can be repaired without guessing is repaired before the figures are taken.
 
     Returns
     -------
@@ -111,14 +125,15 @@ def inspect(log: Any, arm: Arm | None = None) -> Inspection:
             remedy="use the arm file that belongs to this log",
             file=log.path or log.name,
         )
+    log, checks = _checked(log, arm, repair=repair)
     steps = log.n_joints + 2
-    tell(f"inspecting {log.name}", 0.0)
+    report_progress(f"inspecting {log.name}", 0.0)
     sampled = sampling(log)
     joints = []
     for j in range(log.n_joints):
-        tell(f"inspecting {log.name}", (j + 1) / steps)
+        report_progress(f"inspecting {log.name}", (j + 1) / steps)
         joints.append(joint(log, j, arm))
-    tell(f"inspecting {log.name}", (log.n_joints + 1) / steps)
+    report_progress(f"inspecting {log.name}", (log.n_joints + 1) / steps)
     return Inspection(
         log=log.name,
         columns=dict(log.columns),
@@ -128,7 +143,24 @@ def inspect(log: Any, arm: Arm | None = None) -> Inspection:
         findings=log.findings,
         source=log,
         rotary=None if arm is None else arm.rotary,
+        kind="" if arm is None else arm.kind,
+        checks=checks,
     )
+
+
+def _checked(log: Log, arm: Arm | None, *, repair: bool) -> tuple[Log, tuple[Check, ...]]:
+    """Return the log, repaired, and what is to be said about it; an arm's own checks judge the last part on the first."""
+    log, checks = data_checks(log, arm, repair=repair)
+    if arm is None or log.duration < 4 * _HORIZON_S:
+        return log, tuple(checks)
+    cut = int(len(log) * _LEARNT)
+    parts = [log.part(0, cut, log.name)], [log.part(cut, len(log), log.name)]
+    try:
+        examined = examine(*parts, arm, horizon=_HORIZON_S, repair=repair)
+    except ValueError as error:
+        said = Finding("checks", f"not checked against the arm file: {error}")
+        return log.with_findings((*log.findings, said)), tuple(checks)
+    return log, (*examined.checks, *checks)
 
 
 def _finite(value: Any) -> Any:

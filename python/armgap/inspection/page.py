@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from armgap.inspection import words
 from armgap.inspection.inspection import Inspection
+from armgap.log.units import si
 from armgap.report import charts, page
+from armgap.report.conventions import brief, section
 from armgap.report.page import Section
-from armgap.report.words import Answer
+from armgap.report.words import SummaryAnswer
 
 __all__ = ["render"]
 
@@ -28,9 +30,18 @@ def render(inspections: Sequence[Inspection]) -> str:
     title = f"Log: {inspections[0].log}" if single else f"{len(inspections)} logs"
     lead = "What the log holds, how it was sampled, and what its motion tells."
     pairs = words.overview(inspections[0]) if single else [(found.log, _brief(found)) for found in inspections]
-    answers = [Answer(question, *_headline(answer)) for question, answer in pairs]
-    sections = [section for found in inspections for section in _sections(found, single=single)]
-    return page.render(title, lead, answers, sections)
+    answers = [SummaryAnswer(question, *_headline(answer)) for question, answer in pairs]
+    sections = [part for found in inspections for part in _sections(found, single=single)]
+    kind = inspections[0].kind
+    conventions = section(kind, [_read(found) for found in inspections], si(inspections[0].rotary))
+    if conventions is not None:
+        sections.insert(1, conventions)
+    return page.render(title, lead, answers, sections, brief=brief(kind))
+
+
+def _read(found: Inspection) -> dict[str, Any]:
+    """Columns and units of a log as the section of the conventions takes them."""
+    return {"name": found.log, "columns": dict(found.source.columns), "units": dict(found.source.units)}
 
 
 def _headline(answer: str) -> tuple[str, str]:
@@ -45,7 +56,8 @@ def _brief(found: Inspection) -> str:
 
 def _sections(found: Inspection, *, single: bool) -> list[Section]:
     before = "" if single else f"{found.log}: "
-    notes = [f"{f.message}." for f in found.findings]
+    notes = [f"{c.line(found.log)}." for c in found.checks]
+    notes += [f"{f.message}." for f in found.findings]
     (_, joints), *parameters = words.grids(found)
     text = [] if single else [f"{question}: {answer}" for question, answer in words.overview(found)]
     return [

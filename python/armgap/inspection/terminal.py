@@ -10,8 +10,9 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from armgap.inspection.inspection import Inspection
+    from armgap.inspection.unmapped import Columns
 
-__all__ = ["tables"]
+__all__ = ["column_table", "tables"]
 
 
 def tables(found: Inspection) -> RenderableType:
@@ -36,3 +37,19 @@ def tables(found: Inspection) -> RenderableType:
             grid.add_row(*(Text(cell) for cell in row))
         parts.append(grid)
     return Group(*parts)
+
+
+def column_table(found: Columns, file: str) -> RenderableType:
+    """Return what `rich` prints of a file that nobody has mapped: its columns, and a mapping to confirm."""
+    from rich import box
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    grid = Table(box=box.SIMPLE, pad_edge=False)
+    for name in words.COLUMN_HEADER:
+        grid.add_column(name, overflow="fold")
+    for row in words.column_rows(found):
+        grid.add_row(*(Text(cell) for cell in row))
+    said = [Text(line, overflow="fold") for line in words.proposal(found, file)]
+    return Group(Text(found.log, style="bold"), grid, *said)

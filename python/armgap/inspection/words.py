@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+import shlex
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from armgap.inspection.channels import Joint
+    from armgap.inspection.channels import JointChannels
     from armgap.inspection.excitation import Excitation
     from armgap.inspection.inspection import Inspection
+    from armgap.inspection.unmapped import Columns
 
-__all__ = ["grids", "overview"]
+__all__ = ["COLUMN_HEADER", "column_rows", "grids", "overview", "proposal"]
 
 Grid = tuple[list[str], list[list[str]]]
+COLUMN_HEADER = ("column", "type", "unit", "lowest", "highest", "trend", "missing")
+"""What is said of each column of a file that nobody has mapped."""
 _UNKNOWN = 10.0  # ten times the value
 _RECOMMENDED = 100.0  # condition number up to which a motion counts as a good one
 
@@ -77,7 +81,7 @@ def _excitation(e: Excitation) -> str:
         "good" if e.condition <= _RECOMMENDED else f"above {_RECOMMENDED:g} parameters can stand in for each other"
     )
     said = f"condition number {_plain(e.condition)} ({quality})"
-    said += f"; told least: {e.weakest}" if weak else ""
+    said += f"; least excited: {e.weakest}" if weak else ""
     return f"{said}; not well excited: {', '.join(weak)}" if weak else f"{said}; every parameter is well excited"
 
 
@@ -111,14 +115,14 @@ def _rate(length: str) -> str:
     return " or ".join(f"{unit}/s" for unit in length.split(" or "))
 
 
-def _position_step(j: Joint) -> str:
+def _position_step(j: JointChannels) -> str:
     said = "none" if j.q_step is None else f"{j.q_step:.5g}"
     if j.q_step_arm is None or (j.q_step is not None and abs(j.q_step / j.q_step_arm - 1) < 0.01):
         return said
     return f"{said} (arm file: {j.q_step_arm:.5g})"
 
 
-def _flat(j: Joint) -> str:
+def _flat(j: JointChannels) -> str:
     return "; ".join(f"at {f.level:.4g}: {100 * f.share:.1f} %, up to {f.longest_s:.3g} s" for f in j.flat_tops) or "no"
 
 
@@ -128,3 +132,28 @@ def _parameters(e: Excitation) -> Grid:
 
     rows = [[p.name, f"{p.value:.4g}", percent(p.alone), percent(p.sigma), p.excited] for p in e.parameters]
     return ["parameter", "arm file", "alone", "with all others", "excited"], rows
+
+
+def column_rows(found: Columns) -> list[tuple[str, ...]]:
+    """Return a row per column of the file."""
+
+    def number(value: float | None) -> str:
+        return "" if value is None else f"{value:.6g}"
+
+    return [
+        (c.name, c.dtype, c.unit or "", number(c.low), number(c.high), c.trend, str(c.missing or ""))
+        for c in found.columns
+    ]
+
+
+def proposal(found: Columns, file: str) -> list[str]:
+    """Return what to try next, and what to make sure of."""
+    lines = [
+        "not all of t, q1, tau1 and so on are there, and no mapping was given; by their names these may be meant:",
+        f"armgap inspect {shlex.quote(file)} {found.options}",
+        "make sure of each: t times, q positions as measured, tau torques at the joint, positive where they turn the joint towards greater q",
+    ]
+    open_names = [key for key, name in found.proposed.items() if name == "NAME"]
+    if open_names:
+        lines.append(f"no column suggests itself for {', '.join(open_names)}: put its name in place of NAME")
+    return lines

@@ -22,7 +22,7 @@ from armgap.log.units import FACTORS, Scales
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["in_seconds"]
+__all__ = ["in_seconds", "ticks"]
 
 Times = NDArray[np.float64] | NDArray[np.int64]
 
@@ -73,6 +73,15 @@ def in_seconds(
     t = _Clock(_seconds(raw.t, start, factor), names.t)
     t_tau = _Clock(_seconds(raw.t_tau, tau_start, tau_factor) + offset, names.t_tau)
     return _hold(raw, t, t_tau, place, findings), findings
+
+
+def ticks(raw: Raw, scales: Scales, names: Names, arm: Arm | None, place: Path | str) -> dict[str, float]:
+    """Return the seconds per unit of the time columns, by standard name; errors as `in_seconds`."""
+    factor = raw.tick_s or scales.t or _unit(raw.t, names.t, arm, place, [])
+    if raw.t_tau is None or names.t_tau is None:
+        return {"t": factor}
+    tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, arm, place, [])
+    return {"t": factor, "t_tau": tau_factor}
 
 
 def _seconds(times: Times, start: np.int64 | np.float64, factor: float) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from armgap.errors import ColumnError, LogShapeError, SampleError
 from armgap.log.findings import Finding
 from armgap.log.index import Index
 from armgap.log.recording import Recording
-from armgap.progress import tell
+from armgap.progress import report_progress
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
@@ -263,7 +263,7 @@ def extract(recording: Recording, place: Path | str, names: Names) -> Raw:
     def several(group: tuple[str, ...]) -> NDArray[np.float64]:
         values: NDArray[np.float64] | None = None
         for j, name in enumerate(group):
-            tell(f"reading {label}", names.order(name))
+            report_progress(f"reading {label}", names.order(name))
             column = _column(recording.stream_of(name).fetch(name), place, name)
             values = np.empty((len(column), len(group))) if values is None else values
             values[:, j] = column

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 __all__ = ["Finding", "counted", "remarks"]
 
 # What was changed about a log, or how it was understood, is told of each log; the rest once per kind.
-_TOLD_EACH = frozenset({"units", "format", "joints", "torque", "clock", "cleaned", "stretches"})
+_TOLD_EACH = frozenset({"units", "format", "joints", "torque", "clock", "cleaned", "corrected", "stretches"})
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,8 @@ class Finding:
     ----------
     kind : str
         How the log was understood: ``"format"``, ``"units"``, ``"joints"``, ``"torque"``, ``"clock"``, ``"columns"``. What
-        was changed: ``"cleaned"``, ``"stretches"``. What is worth knowing: ``"sampling"``, ``"period"``, ``"gap"``,
-        ``"constant"``, ``"limit"``.
+        was changed: ``"cleaned"``, ``"corrected"``, ``"stretches"``. What is worth knowing: ``"sampling"``, ``"period"``, ``"gap"``,
+        ``"constant"``, ``"limit"``, ``"checks"``.
     message : str
         In words.
     times : tuple of float

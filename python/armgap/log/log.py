@@ -12,11 +12,12 @@ import numpy as np
 import polars as pl
 from numpy.typing import ArrayLike, NDArray
 
-from armgap.errors import OptionError, ResultError
+from armgap.errors import OptionError
 from armgap.log import checks, clocks, columns, frames, units
 from armgap.log.findings import Finding
 from armgap.log.formats import record
 from armgap.log.recording import Recording
+from armgap.output import write
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
@@ -48,6 +49,14 @@ class Log:
         File it was read from.
     columns : mapping
         The file's own name of each column in use, by standard name.
+    moment : ndarray, shape (n_samples, n_joints), optional
+        First moment of every torque about the middle of its interval, where it is the mean of several [N m s^2 or N s^2].
+    part_of : str, optional
+        Name of the log that it is a part of.
+    first_row : int
+        Row of that log, from 0, that it begins with.
+    units : mapping
+        Unit that each of these columns had in the file, by standard name; the arrays are in SI units.
     """
 
     name: str
@@ -58,6 +67,10 @@ class Log:
     findings: tuple[Finding, ...] = ()
     path: Path | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
+    moment: NDArray[np.float64] | None = None
+    part_of: str | None = None
+    first_row: int = 0
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def read(
@@ -176,24 +189,30 @@ class Log:
         names, said = columns.resolve(recording, place, mapping or {}, arm)
         scales = units.stated(names, declared or {}, arm, place)
         raw = columns.extract(recording, place, names)
+        ticks = clocks.ticks(raw, scales, names, arm, place)
         arrays, timed = clocks.in_seconds(raw, scales, names, arm, place)
         arrays = units.scaled(arrays, scales)
         checks.order(arrays, place, names)
         arrays, cleaned = checks.without_repeats(arrays)
         checks.motion(arrays, place, names)
+        declared_only = arrays
         arrays, converted = units.recognised(arrays, names, arm, scales.settled)
+        there = units.in_file(
+            names, scales, ticks, arm, degrees=(arrays.q is not declared_only.q, arrays.dq is not declared_only.dq)
+        )
         units.check(arrays, place, names, arm, scales.settled)
         noticed = [
             *recording.findings, *said, *scales.findings, *timed, *cleaned, *converted,
             *checks.notice(arrays, names, arm), *checks.unused(recording, names),
         ]  # fmt: skip
         arrays.t.__isub__(arrays.t[0])
-        return cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key)
+        log = cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key, units=there)
+        return log if arm is None or arm.corrections is None else arm.corrections.on_log(log)
 
     def __post_init__(self) -> None:
         """Put times on whole nanoseconds, so that a log is the same log in every format, and make the arrays read-only."""
         object.__setattr__(self, "t", np.rint(self.t * _NS) / _NS)
-        for name in ("t", "q", "tau", "dq"):
+        for name in ("t", "q", "tau", "dq", "moment"):
             values = getattr(self, name)
             if values is not None:
                 view = values.view()
@@ -219,6 +238,23 @@ class Log:
         """Return the number of samples."""
         return len(self.t)
 
+    @property
+    def recording(self) -> str:
+        """Name of the whole log, also of a part of it."""
+        return self.part_of or self.name
+
+    def _repr_html_(self) -> str:
+        """Return length, rate and columns as HTML for a notebook."""
+        from armgap.report.shown import log_facts
+
+        return log_facts(self).html()
+
+    def _repr_markdown_(self) -> str:
+        """Return length, rate and columns as Markdown."""
+        from armgap.report.shown import log_facts
+
+        return log_facts(self).markdown()
+
     def part(self, first: int, last: int, name: str, *, findings: tuple[Finding, ...] | None = None) -> Log:
         """Return the samples `first` up to, not including, `last` as a log of its own, with the times of this one.
 
@@ -227,7 +263,9 @@ class Log:
         rows = slice(first, last)
         dq = None if self.dq is None else self.dq[rows]
         found = self.findings if findings is None else findings
-        return Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
+        part = Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
+        moment = None if self.moment is None else self.moment[rows]
+        return replace(part, units=self.units, moment=moment, part_of=self.recording, first_row=self.first_row + first)
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
         """Return the log with other findings."""
@@ -242,16 +280,6 @@ class Log:
         return pl.DataFrame(data)
 
     def write(self, path: str | Path) -> None:
-        """Write the log as Parquet, or as CSV if the name ends in ``.csv``; nothing is left behind if that fails."""
-        path = Path(path)
-        temporary = path.with_name(path.name + ".partial")
-        try:
-            if path.suffix.lower() == ".csv":
-                self.to_polars().write_csv(temporary)
-            else:
-                self.to_polars().write_parquet(temporary)
-            temporary.replace(path)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            reason = error.strerror or str(error)
-            raise ResultError(f"cannot be written ({reason})", remedy="choose another place", file=path) from None
+        """Write the log as Parquet, or as CSV if the name ends in ``.csv``; see `armgap.output.write`."""
+        frame = self.to_polars()
+        write(path, frame.write_csv if Path(path).suffix.lower() == ".csv" else frame.write_parquet)

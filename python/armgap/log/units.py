@@ -14,17 +14,18 @@ from numpy.typing import NDArray
 from armgap.errors import OptionError, UnitError
 from armgap.log.columns import Arrays, Names
 from armgap.log.findings import Finding
+from armgap.log.turns import TURN, unwrapped
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["FACTORS", "Scales", "check", "recognised", "scaled", "stated"]
+__all__ = ["FACTORS", "Scales", "check", "in_file", "recognised", "scaled", "si", "stated"]
 
 _DEGREE = math.pi / 180
 
 FACTORS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "q": {"rad": 1.0, "deg": _DEGREE, "m": 1.0, "mm": 1e-3},
+    "q": {"rad": 1.0, "deg": _DEGREE, "turns": 2 * math.pi, "m": 1.0, "mm": 1e-3},
     "dq": {"rad/s": 1.0, "deg/s": _DEGREE, "m/s": 1.0, "mm/s": 1e-3},
     "tau": {"Nm": 1.0, "mNm": 1e-3, "N": 1.0, "kN": 1e3},
 }
@@ -46,6 +47,8 @@ _SURE_RATIO = (52.0, 63.0)
 _MILLI_RATIO = (700.0, 1400.0)
 # An arm's commanded torque does not exceed its limit by this factor, except in another unit.
 _TORQUE_FACTOR = 20.0
+# A unit changes all rows; what this share of them does is a defect of its own, seen later.
+_WILD_SHARE = 0.002
 
 
 @dataclass(frozen=True)
@@ -149,7 +152,7 @@ def _factor(group: str, unit: str, arm: Arm | None) -> float:
 
 
 def _suits(group: str, unit: str, arm: Arm | None) -> bool:
-    angular = unit.startswith(("rad", "deg")) or unit.endswith("Nm")
+    angular = unit.startswith(("rad", "deg", "turns")) or unit.endswith("Nm")
     return arm is None or group == "t" or angular == arm.rotary
 
 
@@ -188,6 +191,47 @@ def _degrees(arrays: Arrays, names: Names, arm: Arm | None) -> str:
     return reasons[0] if reasons else ""
 
 
+def si(rotary: bool | None) -> dict[str, str]:
+    """Return the SI unit of each group of columns; both kinds where it is not known whether the joints turn."""
+    turns = {"t": "s", "q": "rad", "dq": "rad/s", "tau": "N m"}
+    slides = {"t": "s", "q": "m", "dq": "m/s", "tau": "N"}
+    if rotary is None:
+        return {group: unit if unit == slides[group] else f"{unit} or {slides[group]}" for group, unit in turns.items()}
+    return turns if rotary else slides
+
+
+def in_file(
+    names: Names, scales: Scales, ticks: Mapping[str, float], arm: Arm | None, *, degrees: tuple[bool, bool]
+) -> dict[str, str]:
+    """Return the unit that each column had in the file, by standard name.
+
+    Parameters
+    ----------
+    names, scales
+        Columns, and their factors to SI as far as they were declared or stated.
+    ticks : mapping
+        Seconds per unit of the time columns.
+    arm : Arm, optional
+        Says whether joints turn.
+    degrees : tuple of bool
+        Whether positions and velocities were recognised as degrees.
+    """
+    found: dict[str, str] = {}
+    q, dq = (_DEGREE if recognised else 1.0 for recognised in degrees)
+    groups = {"q": scales.q * q, "tau": scales.tau, "dq": np.empty(0) if scales.dq is None else scales.dq * dq}
+    for key, column in names.pairs:
+        group = key.rstrip("0123456789")
+        factor = ticks[key] if key in ticks else float(groups[group][int(key[len(group) :]) - 1])
+        found[key] = _named(group.partition("_")[0], factor, names.units.get(column), arm)
+    return found
+
+
+def _named(group: str, factor: float, spelt: str | None, arm: Arm | None) -> str:
+    """Return the unit of a group with this factor: as the file spells it, or those that suit the arm."""
+    fits = [unit for unit, f in FACTORS[group].items() if math.isclose(f, factor) and _suits(group, unit, arm)]
+    return spelt if spelt in fits else " or ".join(fits)
+
+
 def check(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None, declared: frozenset[str]) -> None:
     """Raise `UnitError` where an unstated group of columns has the magnitude of another unit."""
     if "dq" not in declared:
@@ -224,7 +268,7 @@ def _velocity(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
 def _speed_ratio(arrays: Arrays, j: int) -> float:
     """Return the slope of the differenced position over the velocity column; 0 where there is none."""
     assert arrays.dq is not None
-    moved = np.diff(arrays.q[:, j])
+    moved = np.diff(_without_turns(arrays.q[:, j]))
     said = 0.5 * (arrays.dq[1:, j] + arrays.dq[:-1, j]) * np.diff(arrays.t)
     power = float(said @ said)
     return float(moved @ said) / power if power > 0 else 0.0
@@ -235,7 +279,7 @@ def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
     if _slides(arm):
         farthest, fastest, unit = _FARTHEST_M, math.inf, "mm"
     for j, name in enumerate(names.q):
-        travel, speed = float(np.ptp(arrays.q[:, j])), _peak_speed(arrays, j)
+        travel, speed = _travel(arrays.q[:, j]), _peak_speed(arrays, j)
         counts = not _slides(arm) and _moves_in_counts(arrays, arm, j, _DEGREE)
         if travel > farthest or speed > fastest or counts:
             si = "m" if _slides(arm) else "rad"
@@ -252,8 +296,20 @@ def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
 def _peak_speed(arrays: Arrays, j: int) -> float:
     """Return the speed that is exceeded for 1 % of the log."""
     stride = max(1, round(_SPEED_SPAN_S / float(np.median(np.diff(arrays.t[:_ENOUGH])))))
-    t, q = arrays.t[::stride], arrays.q[::stride, j]
+    t, q = arrays.t[::stride], _without_turns(arrays.q[:, j])[::stride]
     return float(np.quantile(np.abs(np.diff(q) / np.diff(t)), 0.99)) if len(t) > 1 else 0.0
+
+
+def _travel(q: NDArray[np.float64]) -> float:
+    """Return the range of positions; a few wild rows do not count."""
+    wild = int(_WILD_SHARE * len(q))
+    ends = np.partition(q, (wild, len(q) - 1 - wild))
+    return float(ends[len(q) - 1 - wild] - ends[wild])
+
+
+def _without_turns(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return positions without the jumps of a wrapped encoder, in radians or in degrees: they are no speed."""
+    return unwrapped(unwrapped(q, TURN), 360.0)
 
 
 def _moves_in_counts(arrays: Arrays, arm: Arm | None, j: int, factor: float) -> bool:
@@ -273,7 +329,9 @@ def _torque(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) ->
     if arm is None or arm.torque_limit is None:
         return
     for j, name in enumerate(names.tau):
-        peak, limit = float(np.max(np.abs(arrays.tau[:, j]))), float(arm.torque_limit[j])
+        wild = int(_WILD_SHARE * len(arrays.tau))
+        peak = float(np.partition(np.abs(arrays.tau[:, j]), -1 - wild)[-1 - wild])
+        limit = float(arm.torque_limit[j])
         if peak > _TORQUE_FACTOR * limit:
             si = "Nm" if arm.rotary else "N"
             raise UnitError(

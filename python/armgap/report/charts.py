@@ -5,6 +5,7 @@ Texts, axes and grids take their colour from the page's style sheet (``--bk-…`
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -128,7 +129,7 @@ def bars(
     x_label: str = "",
     **options: Any,
 ) -> Any:
-    """Grouped bars; with `log` the axis is logarithmic and values of zero are left out, with `labels` each bar has its value."""
+    """Grouped bars; with `log` the axis is logarithmic, over whole decades, and values of zero are left out; with `labels` each bar has its value."""
     from bokeh.models import ColumnDataSource, FactorRange, LabelSet
 
     factors = [(group, label) for group in groups for label, _, _ in series]
@@ -136,9 +137,9 @@ def bars(
     fixed = {"tools": "", "toolbar_location": None}
     f = figure(title, x_label, y_label, x_range=FactorRange(*factors), **(fixed | scale | options))
     positive = [v for _, values, _ in series for v in values if v > 0]
-    if positive:
-        f.y_range.end = max(positive) * (2.5 if log else 1.15)
-    bottom = 0.5 * min(positive) if log and positive else 0.0
+    bottom = _decades(f, min(positive), max(positive)) if log and positive else 0.0
+    if positive and not log:
+        f.y_range.end = max(positive) * 1.15
     for i, (label, values, colour) in enumerate(series):
         tops = [v if v > 0 or not log else bottom for v in values]
         data = {
@@ -159,6 +160,21 @@ def bars(
     f.xgrid.visible = False
     _legend(f)
     return f
+
+
+def _decades(f: Any, low: float, high: float) -> float:
+    """Let a logarithmic axis run over whole decades, with every decade and its parts marked; return where it begins."""
+    from bokeh.models import FixedTicker
+
+    first, last = math.floor(math.log10(0.8 * low)), math.ceil(math.log10(1.6 * high))
+    decades = [10.0**k for k in range(first, last + 1)]
+    parts = [m * d for d in decades[:-1] for m in range(2, 10)]
+    f.y_range.start, f.y_range.end = decades[0], decades[-1]
+    f.yaxis.ticker = f.ygrid.ticker = FixedTicker(ticks=decades, minor_ticks=parts)
+    f.yaxis.major_label_overrides = {d: f"{d:g}" for d in decades}
+    f.yaxis.minor_tick_line_color = MEASURED
+    f.ygrid.minor_grid_line_color, f.ygrid.minor_grid_line_alpha = MEASURED, 0.15
+    return decades[0]
 
 
 def law(entry: dict[str, Any]) -> Any:
@@ -182,7 +198,7 @@ def law(entry: dict[str, Any]) -> Any:
     f.add_layout(Whisker(base="x", lower="low", upper="high", source=ColumnDataSource(ends), line_color=BEFORE))
     f.line(bins["x"], bins["law"], color=AFTER, line_width=2.5, legend_label="fitted law")
     rings = {"size": 8, "color": BEFORE, "fill_color": None, "line_width": 2}
-    f.scatter(bins["x"], bins["mean"], legend_label="mean lacking torque", **rings)
+    f.scatter(bins["x"], bins["mean"], legend_label="mean residual torque", **rings)
     _reach(f, [*ends["low"], *ends["high"], *bins["law"]])
     _legend(f)
     return f

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 from armgap.comparison import SHARE, SIGMAS, CauseChange, Comparison
 from armgap.diagnosis import Value
 from armgap.report import charts
+from armgap.report.conventions import brief, section
 from armgap.report.document import Document
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
-from armgap.report.words import Answer, each_joint, error_text, figure, joint_text, percent, sizes, title, value
+from armgap.report.words import SummaryAnswer, each_joint, error_text, figure, joint_text, percent, sizes, title, value
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-__all__ = ["comparison_document", "comparison_summary"]
+__all__ = ["comparison_document", "comparison_summary", "lead"]
 
 _MODELS = {"before": "arm file", "refit": "re-estimated", "after": "with causes"}
 _COLOURS = (charts.BEFORE, charts.AFTER)
@@ -25,20 +26,39 @@ _LEADS = {
     "unchanged": "The gap between the arm and its model is about what it was.",
     "none": "There is no gap, neither before nor after.",
 }
+#: Statuses in the order in which they are said: what went and what came first.
+_ORDER = ("gone", "new", "renamed", "smaller", "larger", "unchanged", "undecided", "unseen")
 
 
 def comparison_document(c: Comparison) -> Document:
     """Return the report of a comparison."""
     heading = f"Compared: {c.names[0]} and {c.names[1]}"
-    return Document(heading, _LEADS[c.outcome], answers(c), [_gap(c), _causes(c), _parameters(c), _method(c)])
+    conventions = section(c.kind)
+    sections = [_gap(c), _causes(c), _parameters(c), *([conventions] if conventions else []), _method(c)]
+    return Document(heading, lead(c), answers(c), sections, brief(c.kind))
 
 
-def answers(c: Comparison) -> list[Answer]:
-    """Three questions about a repair."""
+def lead(c: Comparison) -> str:
+    """What went, what came, and then what became of the gap."""
+    return " ".join([*_went_and_came(c), _LEADS[c.outcome]])
+
+
+def _went_and_came(c: Comparison) -> list[str]:
+    named = {status: [_name(x) for x in _by_status(c) if x.status == status] for status in ("gone", "new")}
+    said = {"gone": "Gone", "new": "New"}
+    return [f"{said[status]}: {'; '.join(names)}." for status, names in named.items() if names]
+
+
+def _by_status(c: Comparison) -> list[CauseChange]:
+    return sorted(c.causes, key=lambda x: _ORDER.index(x.status))
+
+
+def answers(c: Comparison) -> list[SummaryAnswer]:
+    """Three questions about a repair: what went and what came, then how far."""
     return [
-        Answer("Did the gap shrink?", *_shrunk(c)),
-        Answer("What became of the causes?", *_became(c)),
-        Answer("Did the arm's own values change?", *_moved(c)),
+        SummaryAnswer("What became of the causes?", *_became(c)),
+        SummaryAnswer("Did the gap shrink?", *_shrunk(c)),
+        SummaryAnswer("Did the arm's own values change?", *_moved(c)),
     ]
 
 
@@ -59,8 +79,9 @@ def _times(factor: float) -> str:
 def _became(c: Comparison) -> tuple[str, str]:
     if not c.causes:
         return "None was named, before or after", ""
-    headline = "; ".join(f"{_name(x)}: {x.status}" for x in c.causes)
-    return headline[:1].upper() + headline[1:], " ".join(f"{_name(x)}: {x.why}." for x in c.causes)
+    found = _by_status(c)
+    headline = "; ".join(f"{_name(x)}: {x.status}" for x in found)
+    return headline[:1].upper() + headline[1:], " ".join(f"{_name(x)}: {x.why}." for x in found)
 
 
 def _moved(c: Comparison) -> tuple[str, str]:
@@ -93,11 +114,11 @@ def _bars(c: Comparison, i: int, joints: list[str]) -> Drawing:
         for name, values, colour in pair
     ]
     table = Table(("joint", "diagnosis", caption.replace(", log scale", "")), rows)
-    return Drawing(caption, charts.bars("", "", joints, series, log=True, height=260), table)
+    return Drawing(caption, charts.bars("", f"m{c.unit}, log scale", joints, series, log=True, height=260), table)
 
 
 def _causes(c: Comparison) -> Section:
-    rows = [(_name(x), x.status, _sizes(x.before), _sizes(x.after), x.why) for x in c.causes]
+    rows = [(_name(x), x.status, _sizes(x.before), _sizes(x.after), x.why) for x in _by_status(c)]
     text = (
         "Gone: looked for and found absent. Unseen: the later log could not have shown it. Undecided: it leaves a trace, but not on held-out motion. "
         "Renamed: a look-alike is named instead."
@@ -159,4 +180,4 @@ def comparison_summary(c: Comparison) -> RenderableType:
         for g in c.gap:
             grid.add_row(str(j + 1), _MODELS[g.model], error_text(1e3 * g.before[j]), error_text(1e3 * g.after[j]))
     lines = [line for a in answers(c) for line in answer_lines(a)]
-    return Group(Text(_LEADS[c.outcome], style="bold reverse"), Text(), *lines, grid)
+    return Group(Text(lead(c), style="bold reverse"), Text(), *lines, grid)

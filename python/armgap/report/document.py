@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from armgap.report import words
+from armgap.report import conventions, words
 from armgap.report.page import Section
 
 if TYPE_CHECKING:
@@ -23,23 +23,36 @@ class Document:
     ----------
     title, lead : str
         Heading and the sentence below it.
-    answers : sequence of Answer
+    answers : sequence of SummaryAnswer
         The first screen.
     sections : sequence of Section
         What follows; the first one's pictures belong to the first screen.
+    brief : str
+        The arm's conventions in one line.
+    before : Section, optional
+        What stands before the answers.
     """
 
     title: str
     lead: str
-    answers: Sequence[words.Answer]
+    answers: Sequence[words.SummaryAnswer]
     sections: Sequence[Section]
+    brief: str = ""
+    before: Section | None = None
 
 
 def diagnosis_document(diagnosis: Diagnosis | dict[str, Any]) -> Document:
     """Return the report of a diagnosis, or of its JSON object."""
-    from armgap.report.sections import SECTIONS
+    from armgap.report.sections import SECTIONS, input_checks
 
     data = diagnosis if isinstance(diagnosis, dict) else diagnosis.to_dict()
-    name = (data.get("arm") or {}).get("name") or "arm"
+    arm = data.get("arm") or {}
     sections = [made for section in SECTIONS if (made := section(data)) is not None]
-    return Document(f"Diagnosis: {name}", words.verdict(data), words.answers(data), sections)
+    return Document(
+        f"Diagnosis: {arm.get('name') or 'arm'}",
+        words.verdict(data),
+        words.answers(data),
+        sections,
+        conventions.brief(str(arm.get("kind", ""))),
+        input_checks(data) if data["verdict"] == "input" else None,
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from armgap.output import write
 from armgap.report.document import Document, diagnosis_document
 
 if TYPE_CHECKING:
@@ -17,7 +18,14 @@ def page_of(document: Document) -> str:
     """Return a report as one HTML page that loads nothing from elsewhere."""
     from armgap.report import page
 
-    return page.render(document.title, document.lead, document.answers, document.sections)
+    return page.render(
+        document.title,
+        document.lead,
+        document.answers,
+        document.sections,
+        brief=document.brief,
+        before=document.before,
+    )
 
 
 def render_html(diagnosis: Diagnosis | dict[str, Any]) -> str:
@@ -33,4 +41,4 @@ def render_html(diagnosis: Diagnosis | dict[str, Any]) -> str:
 
 def write_html(diagnosis: Diagnosis | dict[str, Any], path: str | Path) -> None:
     """Write the report of a diagnosis to a file."""
-    Path(path).write_text(render_html(diagnosis), encoding="utf-8")
+    write(path, render_html(diagnosis))

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator, Sequence
 
 from armgap.report.document import Document
-from armgap.report.page import Bar, Cell, Drawing, Heat, Section, Table, Track
-from armgap.report.words import Answer
+from armgap.report.page import Bar, Cell, Drawing, HeatMap, IntervalLine, Section, Table, Tile
+from armgap.report.words import SummaryAnswer
 
 __all__ = ["markdown_of"]
 
@@ -35,13 +35,17 @@ def markdown_of(document: Document) -> str:
 def _blocks(document: Document) -> Iterator[str]:
     yield f"## {escape(document.title)}"
     yield f"**{escape(document.lead)}**"
+    if document.brief:
+        yield escape(f"Conventions: {document.brief}")
+    if document.before is not None:
+        yield from _section(document.before)
     rows = [(escape(a.question), _answer(a)) for a in document.answers]
     yield _grid(["", ""], rows)
     for section in document.sections:
         yield from _section(section)
 
 
-def _answer(answer: Answer) -> str:
+def _answer(answer: SummaryAnswer) -> str:
     headline = f"**{escape(answer.headline)}**" if answer.headline else ""
     return "<br>".join(filter(None, (headline, escape(answer.detail))))
 
@@ -49,15 +53,31 @@ def _answer(answer: Answer) -> str:
 def _section(section: Section) -> Iterator[str]:
     tables = [f.table for f in section.figures if isinstance(f, Drawing) and f.table is not None]
     tables += [t if isinstance(t, Table) else Table(*t) for t in section.tables]
-    if not (tables or section.heats or section.notes):
+    if not (tables or section.heats or section.notes or section.points):
         return  # only pictures
     if section.title:
         yield f"### {escape(section.title)}"
+    if section.points:
+        yield "\n".join(f"- {_coded(point)}" for point in section.points)
     yield from (_table(t) for t in tables if not t.fold)
     yield from (_folded(h.caption, _grid(*_heat(h))) for h in section.heats)
     yield from (_table(t) for t in tables if t.fold)
     if section.notes:
         yield "\n".join(f"- {escape(note)}" for note in section.notes)
+
+
+def _coded(text: str, *, cell: bool = False) -> str:
+    """Text whose words between backticks stay code; the rest of it escaped. A bar would end a cell even in code."""
+    parts = text.split("`")
+    if len(parts) % 2 == 0:
+        return escape(text)
+    code = [" ".join(p.split()).replace("|", "\\|" if cell else "|") for p in parts]
+    return "".join(f"`{code[i]}`" if i % 2 else _escaped_within(p) for i, p in enumerate(parts))
+
+
+def _escaped_within(text: str) -> str:
+    """Escaped text that keeps the blanks at its ends."""
+    return _SPECIAL.sub(r"\\\1", re.sub(r"\s+", " ", text))
 
 
 def _table(table: Table) -> str:
@@ -85,7 +105,7 @@ def _entities(text: str) -> str:
 def _cell(cell: Cell) -> str:
     if isinstance(cell, Bar):
         return f"`{bar(cell.share)}` {escape(cell.text)}"
-    return escape(cell.text if isinstance(cell, Track) else cell)
+    return escape(cell.text) if isinstance(cell, IntervalLine) else _coded(cell, cell=True)
 
 
 def bar(share: float, width: int = BAR) -> str:
@@ -101,16 +121,22 @@ def bar(share: float, width: int = BAR) -> str:
     return head + "░" * (width - len(head))
 
 
-def _heat(heat: Heat) -> tuple[list[str], list[list[str]]]:
+def _heat(heat: HeatMap) -> tuple[list[str], list[list[str]]]:
     """A map as a table; the tile that stands out is bold."""
     width = max(len(tiles) for _, tiles in heat.rows)
     header = ["", *(["low"] + [""] * (width - 2) + ["high"] if width > 1 else [""])]
     rows = [
         [
             escape(label),
-            *(f"**{escape(t.text)}**" if t.marked else escape(t.text) for t in tiles),
+            *(_tile(t) for t in tiles),
             *([""] * (width - len(tiles))),
         ]
         for label, tiles in heat.rows
     ]
     return header, rows
+
+
+def _tile(tile: Tile) -> str:
+    """The value of a tile, and its limits below it."""
+    text = f"**{escape(tile.text)}**" if tile.marked else escape(tile.text)
+    return f"{text}<br>{escape(tile.low)} to {escape(tile.high)}" if tile.low else text

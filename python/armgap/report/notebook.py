@@ -7,15 +7,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
+from armgap._renamed import old_names
 from armgap.errors import ArmgapError, OptionError
 from armgap.report import charts, words
-from armgap.report.sections.steps import length_unit, steps, torque_unit
+from armgap.report.sections.model_labels import length_unit, model_labels, torque_unit
 
 if TYPE_CHECKING:
     import polars as pl
     from matplotlib.axes import Axes
 
-__all__ = ["PlotLibraryMissingError", "Shown"]
+__all__ = ["NotebookDisplay", "PlotLibraryMissingError"]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
 
 Data = dict[str, Any]
 
@@ -24,7 +28,7 @@ class PlotLibraryMissingError(ArmgapError, ImportError):
     """Plots were asked for and matplotlib is not installed."""
 
 
-class _Finding(Protocol):
+class _EffectOnJoint(Protocol):
     """What a cause and a look-alike have in common."""
 
     @property
@@ -33,7 +37,7 @@ class _Finding(Protocol):
     def joint(self) -> int | None: ...
 
 
-class Shown:
+class NotebookDisplay:
     """What a notebook shows of a result whose JSON object `to_dict` returns."""
 
     def to_dict(self) -> Data:
@@ -45,7 +49,7 @@ class Shown:
         return card(self.to_dict())
 
     def plot(
-        self, finding: str | _Finding = "gap", *, joint: int = 1, log: str | None = None, ax: Axes | None = None
+        self, finding: str | _EffectOnJoint = "gap", *, joint: int = 1, log: str | None = None, ax: Axes | None = None
     ) -> Axes:
         """Draw one finding with matplotlib.
 
@@ -156,7 +160,7 @@ def _axes(ax: Axes | None) -> Axes:
 
 def _gap(data: Data, ax: Axes) -> Axes:
     gap = data["gap"]
-    shown = [*steps(data), ("sensor noise alone", "floor", charts.FLOOR)]
+    shown = [*model_labels(data), ("sensor noise alone", "floor", charts.FLOOR)]
     width = 0.8 / len(shown)
     for i, (label, key, colour) in enumerate(shown):
         at = [j + (i - (len(shown) - 1) / 2) * width for j in range(len(gap[key]))]
@@ -175,7 +179,7 @@ def _where(data: Data, ax: Axes) -> Axes:
     image = ax.imshow(tiles, aspect="auto", cmap="cividis")
     ax.set_yticks(range(len(regimes)), [f"joint {r['joint']}: {words.variable_text(r['variable'])}" for r in regimes])
     ax.set_xticks([0, width - 1], ["low", "high"])
-    ax.figure.colorbar(image, ax=ax, label=f"torque the re-estimated model lacks, RMS [{torque_unit(data)}]")
+    ax.figure.colorbar(image, ax=ax, label=f"residual torque of the re-estimated model, RMS [{torque_unit(data)}]")
     return ax
 
 
@@ -188,7 +192,7 @@ def _ranking(data: Data, ax: Axes) -> Axes:
     return ax
 
 
-def _law(data: Data, cause: _Finding, ax: Axes) -> Axes:
+def _law(data: Data, cause: _EffectOnJoint, ax: Axes) -> Axes:
     place = (cause.effect, cause.joint, getattr(cause, "log", None))
     drawn = [x for x in data.get("laws") or [] if x.get("bins")]
     law = next((x for x in drawn if (x["effect"], x["joint"], x.get("log")) == place), None)
@@ -197,7 +201,7 @@ def _law(data: Data, cause: _Finding, ax: Axes) -> Axes:
     bins, points = law["bins"], law["points"]
     ax.plot(points["x"], points["y"], ".", color=charts.MEASURED, alpha=0.5, label="samples")
     ax.errorbar(
-        bins["x"], bins["mean"], bins["error"], fmt="o", color=charts.BEFORE, mfc="none", label="mean lacking torque"
+        bins["x"], bins["mean"], bins["error"], fmt="o", color=charts.BEFORE, mfc="none", label="mean residual torque"
     )
     ax.plot(bins["x"], bins["law"], color=charts.AFTER, lw=2, label="fitted law")
     x = f"{law['variable']} [{words.unit_text(law['unit'])}]"
@@ -213,7 +217,7 @@ def _curves(data: Data, what: str, joint: int, log: str | None, ax: Axes) -> Axe
     unit = length_unit(data)
     if what == "prediction":
         ax.plot(found["t"], found["measured"], color=charts.MEASURED, lw=2.5, label="measured")
-    for label, key, colour in steps(data):
+    for label, key, colour in model_labels(data):
         y = (
             found[key]
             if what == "prediction"

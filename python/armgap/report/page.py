@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from armgap.report.words import Answer
+from armgap._renamed import old_names
+from armgap.report.words import SummaryAnswer
 
-__all__ = ["Bar", "Cell", "Drawing", "Heat", "Section", "Table", "Tile", "Track", "render"]
+__all__ = ["Bar", "Cell", "Drawing", "HeatMap", "IntervalLine", "Section", "Table", "Tile", "render"]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
 
 
 @dataclass(frozen=True)
@@ -22,7 +26,7 @@ class Bar:
 
 
 @dataclass(frozen=True)
-class Track:
+class IntervalLine:
     """A cell that holds dots on a line from -1 to 1 around a shaded middle.
 
     Attributes
@@ -32,7 +36,7 @@ class Track:
     middle : float
         Half width of the shaded middle.
     text : str
-        The same in words, for a reader without the picture.
+        The positions in words, for a reader without the picture.
     """
 
     dots: Sequence[tuple[float, str]]
@@ -40,7 +44,7 @@ class Track:
     text: str
 
 
-Cell = str | Bar | Track
+Cell = str | Bar | IntervalLine
 
 
 @dataclass(frozen=True)
@@ -63,17 +67,33 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Tile:
-    """One field of a map: its text, its depth from 0 to 1, what it stands for, and whether it is outlined."""
+    """One field of a map.
+
+    Attributes
+    ----------
+    text : str
+        Its value.
+    depth : float
+        How dark it is, from 0 to 1.
+    tip : str
+        What it stands for.
+    marked : bool
+        Whether it is outlined.
+    low, high : str
+        The limits of its range, in the unit of its row; empty where it has none.
+    """
 
     text: str
     depth: float
     tip: str = ""
     marked: bool = False
+    low: str = ""
+    high: str = ""
 
 
 @dataclass(frozen=True)
-class Heat:
-    """A map in rows of tiles."""
+class HeatMap:
+    """A map in rows of tiles, each row with its label."""
 
     caption: str
     rows: Sequence[tuple[str, Sequence[Tile]]]
@@ -91,7 +111,7 @@ class Section:
         Paragraphs.
     figures : sequence
         Charts: bokeh models, or `Drawing`.
-    heats : sequence of Heat
+    heats : sequence of HeatMap
         Maps beside the charts.
     tables : sequence of Table or (header, rows)
         Tables.
@@ -99,15 +119,24 @@ class Section:
         Paragraphs after the pictures.
     columns : int
         Charts side by side where the page is wide.
+    sketch : str
+        A drawing of the program's own as an SVG element; never a string of the input.
+    points : sequence of str
+        A list, beside the drawing where there is one.
+    name : str
+        What a link calls the section, such as ``"conventions"`` in ``#conventions``; by default its number.
     """
 
     title: str
     text: Sequence[str] = ()
     figures: Sequence[Any] = ()
-    heats: Sequence[Heat] = ()
+    heats: Sequence[HeatMap] = ()
     tables: Sequence[Table | tuple[Sequence[str], Sequence[Sequence[Cell]]]] = ()
     notes: Sequence[str] = ()
     columns: int = 1
+    sketch: str = ""
+    points: Sequence[str] = ()
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -117,28 +146,43 @@ class _Part:
     section: Section
     charts: Sequence[tuple[str, str]]
     tables: Sequence[Table]
+    anchor: str = ""
 
 
-def render(title: str, lead: str, answers: Sequence[Answer], sections: Sequence[Section]) -> str:
+def render(
+    title: str,
+    lead: str,
+    answers: Sequence[SummaryAnswer],
+    sections: Sequence[Section],
+    *,
+    brief: str = "",
+    before: Section | None = None,
+) -> str:
     """Return a page as HTML.
 
     Parameters
     ----------
     title, lead : str
         Heading and the sentence below it.
-    answers : sequence of Answer
+    answers : sequence of SummaryAnswer
         The first screen.
     sections : sequence of Section
         What follows; the first one's pictures belong to the first screen.
+    brief : str
+        The arm's conventions in one line, with a link to the section named ``conventions``.
+    before : Section, optional
+        What stands before the answers, without charts.
     """
     drawings = [[_drawing(f) for f in section.figures] for section in sections]
     script, library, divs = _embedded([d.chart for several in drawings for d in several])
     remaining = iter(divs)
     parts = [
-        _Part(s, [(d.caption, next(remaining)) for d in several], [_table(t) for t in s.tables])
-        for s, several in zip(sections, drawings, strict=True)
+        _Part(s, [(d.caption, next(remaining)) for d in several], [_table(t) for t in s.tables], s.name or f"part-{i}")
+        for i, (s, several) in enumerate(zip(sections, drawings, strict=True), start=1)
     ]
-    return str(_template().render(title=title, lead=lead, answers=answers, parts=parts, script=script, library=library))
+    head = None if before is None else _Part(before, (), [_table(t) for t in before.tables], before.name or "before")
+    page = {"title": title, "lead": lead, "brief": brief, "answers": answers, "parts": parts, "head": head}
+    return str(_template().render(**page, script=script, library=library))
 
 
 def _drawing(figure: Any) -> Drawing:

@@ -16,6 +16,7 @@ from armgap.arm import Arm
 from armgap.errors import ArmgapError, OptionError
 from armgap.evidence.hypothesis import Array, Hypothesis
 from armgap.log import Log
+from armgap.output import write
 from armgap.report import charts
 
 if TYPE_CHECKING:
@@ -56,6 +57,9 @@ def predicted(model: Hypothesis, log: Log, horizon: float) -> Array:
     OptionError
         If a window cannot be simulated.
     """
+    if not horizon >= log.sample_period:
+        remedy = f"give at least the sample period of {log.sample_period:g} s"
+        raise OptionError(f"the horizon is {horizon:g} s", remedy=remedy)
     q, t = np.ascontiguousarray(log.q), np.ascontiguousarray(log.t)
     dq = _native.velocity(t, q, "local-cubic", HALF_WIDTH)
     starts = np.searchsorted(t, np.arange(t[0], t[-1], horizon))
@@ -111,6 +115,8 @@ def write_replay(curves: Mapping[str, Array], log: Log, arm: Arm, path: str | Pa
     ------
     RerunMissingError
         If the Rerun SDK is not installed.
+    ResultError
+        If it cannot be written.
     """
     rr, blueprint = _rerun()
     shown = {"measured": log.q, **curves}
@@ -120,14 +126,16 @@ def write_replay(curves: Mapping[str, Array], log: Log, arm: Arm, path: str | Pa
         blueprint.Vertical(*(blueprint.TimeSeriesView(origin=f"q{j + 1}") for j in range(arm.n_joints))),
     )
     recording = rr.RecordingStream("armgap")
-    recording.save(str(path), default_blueprint=layout)
+    memory = recording.memory_recording()  # the SDK's own files fail by a message of their own
+    recording.send_blueprint(layout, make_active=False)
     times = [rr.TimeColumn("time", duration=log.t)]
     for place, (name, q) in enumerate(shown.items()):
         _log_arm(rr, recording, times, name, _picture(drawn[name], place))
         for j in range(arm.n_joints):
             recording.send_columns(f"q{j + 1}/{_entity(name)}", times, rr.Scalars.columns(scalars=q[:, j]), strict=True)
-    recording.flush()
+    data = memory.drain_as_bytes()
     recording.disconnect()
+    write(path, data)
 
 
 def _picture(strips: Array, place: int) -> Array:

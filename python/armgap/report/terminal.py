@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from armgap.report import words
+from armgap.report.advice import next_steps
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -29,10 +30,21 @@ def summary_table(diagnosis: Diagnosis | Data) -> RenderableType:
     parts: list[RenderableType] = [Text(words.verdict(data), style="bold reverse"), Text()]
     for answer in words.answers(data):
         parts += answer_lines(answer)
-    return Group(*parts, gap_table(data))
+    return Group(*parts, gap_table(data), *_steps(data))
 
 
-def answer_lines(answer: words.Answer) -> list[RenderableType]:
+def _steps(data: Data) -> list[RenderableType]:
+    """What to do next, one thing a line."""
+    from rich.padding import Padding
+    from rich.text import Text
+
+    lines: list[RenderableType] = [Text("What to do next", style="dim")]
+    for step in next_steps(data):
+        lines.append(Padding(Text(step.replace("`", "")), (0, 0, 0, 2)))
+    return [*lines, Text()]
+
+
+def answer_lines(answer: words.SummaryAnswer) -> list[RenderableType]:
     """A question with its answer, and an empty line."""
     from rich.padding import Padding
     from rich.text import Text

@@ -7,12 +7,13 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from armgap import _native
+from armgap._renamed import old_names
 
 __all__ = [
-    "Answer",
+    "SummaryAnswer",
     "answers",
     "doubtful",
     "each_joint",
@@ -32,6 +33,9 @@ __all__ = [
     "verdict",
 ]
 
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
+
 Data = dict[str, Any]
 
 #: Causes less probable than this are called the best candidate, not the cause.
@@ -48,6 +52,7 @@ _VERDICTS = {
     "parameters": "The model has the right form but the wrong values.",
     "effect": "The arm does something that its model leaves out.",
     "unexplained": "There is a gap, and no effect in the library explains it.",
+    "input": "Logs and arm file contradict each other.",
 }
 _NO_CAUSE = {
     "none": ("No cause", "Nothing is left to explain."),
@@ -56,7 +61,12 @@ _NO_CAUSE = {
         "None that the library knows",
         "Every known effect was tried and none explains the gap; naming one would mislead.",
     ),
+    "input": ("None is named", "While the input contradicts itself, any effect would only imitate the contradiction."),
 }
+_NONE_ALLOWED = (
+    "None was allowed",
+    "The number of causes was limited to 0, so no effect was tried as one; allow at least one (--max-causes 1).",
+)
 _ARROW = "\N{NO-BREAK SPACE}→\N{NO-BREAK SPACE}"
 _FRICTION = {"viscous": "viscous friction", "coulomb": "Coulomb friction"}
 _INERTIAL = {
@@ -76,7 +86,7 @@ _VARIABLES = {"dq": "speed", "reversal": "near a reversal", "q": "position", "ta
 
 
 @dataclass(frozen=True)
-class Answer:
+class SummaryAnswer:
     """One of the three questions.
 
     Attributes
@@ -211,20 +221,58 @@ def doubtful(data: Data) -> bool:
     return bool(causes) and causes[0]["probability"] < DOUBTFUL
 
 
+def none_allowed(data: Data) -> bool:
+    """Whether a gap is left and no cause could be named, because the number of causes was limited to none."""
+    return data["verdict"] == "unexplained" and (data.get("options") or {}).get("max_causes") == 0
+
+
 def verdict(data: Data) -> str:
     """The verdict as a sentence."""
+    if data["verdict"] == "input":
+        return _contradiction(data)
     if doubtful(data):
         return "The arm does something that its model leaves out, and part of the gap stays unexplained."
+    if none_allowed(data):
+        return "There is a gap; no cause was allowed, so none is named."
     return _VERDICTS.get(data["verdict"], str(data["verdict"]))
 
 
-def answers(data: Data) -> list[Answer]:
+def _contradiction(data: Data) -> str:
+    """What contradicts what, and the remedy."""
+    found = _errors(data)
+    if not found:
+        return _VERDICTS["input"]
+    remedies = dict.fromkeys(text for c in found if (text := c.get("remedy")))
+    remedy = f" Remedy: {'; '.join(remedies)}" if remedies else ""
+    return f"{_VERDICTS['input'].rstrip('.')}: {', '.join(dict.fromkeys(map(_check_text, found)))}.{remedy}"
+
+
+def _errors(data: Data) -> list[Data]:
+    return [c for c in data.get("checks") or [] if c["severity"] == "error"]
+
+
+def _check_text(check: Data) -> str:
+    """Name and place of a check."""
+    name = check["check"].replace("_", " ")
+    return name if check.get("joint") is None else f"{name} of joint {check['joint']}"
+
+
+def answers(data: Data) -> list[SummaryAnswer]:
     """The three questions with their answers."""
+    first = SummaryAnswer("Where is the gap?", *_where(data))
+    if data["verdict"] == "input":
+        first = SummaryAnswer("What contradicts what?", *_contradicts(data))
     return [
-        Answer("Where is the gap?", *_where(data)),
-        Answer("Which effect causes it?", *_which(data)),
-        Answer("How far does it shrink?", *_how_far(data)),
+        first,
+        SummaryAnswer("Which effect causes it?", *_which(data)),
+        SummaryAnswer("How far does it shrink?", *_how_far(data)),
     ]
+
+
+def _contradicts(data: Data) -> tuple[str, str]:
+    found = _errors(data)
+    headline = ", ".join(dict.fromkeys(map(_check_text, found))) or "See the checks of the input"
+    return _capital(headline), " ".join(_capital(f"{c['message'].rstrip('.')}.") for c in found)
 
 
 def _where(data: Data) -> tuple[str, str]:
@@ -233,13 +281,14 @@ def _where(data: Data) -> tuple[str, str]:
         return "No part of the motion stands out", ""
     first = places[0]
     ranged = bool(first.get("range"))
-    headline = f"Joint {first['joint']}, {_regime(first)}"
+    limits = _limits(data, first)
+    headline = f"Joint {first['joint']}, {_regime(first)}" + (f": {limits}" if limits else "")
     load = "force" if data["gap"].get("unit") == "m" else "torque"
     text = f"{percent(first['share'])} of what is missing from the model acts on joint {first['joint']}"
     if len(data["gap"]["before"]) == 1:
         text = f"The {load} that is missing from the model acts throughout"
     if ranged:
-        text += f", most of it {_inside(first)}"
+        text += f", and is largest {_inside(first)}"
     others = [f"{percent(p['share'])} on joint {p['joint']}" for p in places[1:] if p["share"] >= MINOR_JOINT]
     text += f"; {', '.join(others)}." if others else "."
     return headline, text if data[
@@ -255,14 +304,27 @@ def _regime(place: Data) -> str:
 
 
 def _inside(place: Data) -> str:
-    """The regime of a place in figures."""
+    """The regime of a place as its detail follows."""
     span = place["range"]
     if span["variable"].startswith("reversal"):
         return str(place["detail"])
-    unit = str(place["detail"]).rpartition(f"{span['to']:.3f}")[2].strip()
     name = variable_text(span["variable"])
-    what = "t" if name == "time" else f"its {name}"
-    return f"where {what} is {figure(span['from'])} to {figure(span['to'])} {unit}".strip()
+    return f"in that {'stretch' if name == 'time' else 'range'} of {name}"
+
+
+def _limits(data: Data, place: Data) -> str:
+    """The range of a place beside all that the joint went through: ``0.02 to 0.53 of at most 4.1 rad/s``."""
+    span = place.get("range")
+    if not span or span["variable"].startswith("reversal"):
+        return ""
+    text = f"{figure(span['from'], 2)} to {figure(span['to'], 2)}"
+    for r in data.get("regimes") or []:
+        if (r["joint"], r["variable"]) == (place["joint"], span["variable"]):
+            low, high = figure(r["edges"][0], 2), figure(r["edges"][-1], 2)
+            whole = f"at most {high}" if r["variable"].startswith("abs(") else f"{low} to {high}"
+            return f"{text} of {whole} {unit_text(r['unit'])}".strip()
+    unit = str(place["detail"]).rpartition(f"{span['to']:.3f}")[2].strip()
+    return f"{text} {unit}".strip()
 
 
 def symbol_text(variable: str) -> str:
@@ -292,6 +354,8 @@ def variable_text(variable: str) -> str:
 
 def _which(data: Data) -> tuple[str, str]:
     causes = data.get("causes") or []
+    if not causes and none_allowed(data):
+        return _NONE_ALLOWED
     if not causes:
         return _NO_CAUSE.get(data["verdict"], ("No cause was named", ""))
     headline = _capital(" and ".join(_counted([f"{title(c['effect'])}, {joint_text(c['joint'])}" for c in causes])))
@@ -325,7 +389,9 @@ def _capital(text: str) -> str:
 def _how_far(data: Data) -> tuple[str, str]:
     gap = data["gap"]
     unit = gap.get("unit", "rad")
-    if data["verdict"] == "none":
+    if data["verdict"] == "input":
+        headline, errors = "With the remedy applied", each_joint(gap["before"], gap["refit"], unit=unit)
+    elif data["verdict"] == "none":
         headline, errors = "Nothing to shrink", each_joint(gap["after"], unit=unit)
     elif data["verdict"] == "unexplained":
         headline, errors = "It stays", each_joint(gap["after"], unit=unit)
@@ -335,7 +401,7 @@ def _how_far(data: Data) -> tuple[str, str]:
         f"{errors}: RMS error of predictions over {gap['horizon_s']:g} s on held-out motion. Re-estimating the arm file's own values alone "
         f"leaves {millis(gap['refit'], unit)}, sensor noise {millis(gap['floor'], unit)}."
     )
-    if data["verdict"] != "none":
+    if data["verdict"] not in ("none", "input"):
         low, high = gap["closed_ci"]
         detail += f" 95\N{NO-BREAK SPACE}% interval of the share closed: {percent(low)} to {percent(high)}."
     return headline, detail

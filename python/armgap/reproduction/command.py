@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armgap.cli.files import Command, OutputFile
+from armgap.output import is_stdout, write
 from armgap.reproduction.experiment import Reproduction, reproduce
 
 if TYPE_CHECKING:
@@ -18,25 +20,38 @@ __all__ = ["command"]
 NARROW = 100
 
 
-@click.command("reproduce")
-@click.option("--report", "report_file", default="armgap-reproduction.html", show_default=True, metavar="OUT")
-@click.option("--json", "json_file", metavar="OUT", help="Write estimates and findings as JSON; - is standard output.")
+@click.command("reproduce", cls=Command)
+@click.option(
+    "--report",
+    "report_file",
+    type=OutputFile(),
+    default="armgap-reproduction.html",
+    show_default=True,
+    metavar="OUT",
+    help="Report to write: .html, .md or .json.",
+)
+@click.option(
+    "--json",
+    "json_file",
+    type=OutputFile(),
+    metavar="OUT",
+    help="Write estimates and findings as JSON; - is standard output.",
+)
 @click.option("--quiet", is_flag=True, help="No summary.")
 def command(report_file: str, json_file: str | None, quiet: bool) -> None:
     """Repeat the seed paper's experiment: Table II, Figures 2 to 7, and what explains their deviations."""
-    from armgap.cli.common import check_outputs, interruptible, write
+    from armgap.cli.common import interruptible
     from armgap.cli.progress import working
     from armgap.report import check_report, render_report
     from armgap.reproduction.page import document
 
-    check_outputs(report_file, json_file)
     check_report(report_file)
     with working("simulating and identifying", quiet=quiet):
         result = interruptible(reproduce)
     write(report_file, render_report(document(result), json.loads(result.to_json()), report_file))
     if json_file is not None:
         write(json_file, result.to_json(indent=2))
-    if not quiet and json_file != "-":
+    if not (quiet or is_stdout(json_file, report_file)):
         _summarise(result, report_file)
 
 

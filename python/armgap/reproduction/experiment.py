@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.arm import Arm
-from armgap.identification import SCHEMES, Identification, identify
+from armgap.identification import Identification, identify
+from armgap.literals import SCHEMES, Filters, Scheme, VelocityMethod
 from armgap.log import Log
 from armgap.simulation import Effect, seed_torque, simulate
 
@@ -44,8 +45,8 @@ WANDER_SEEDS = tuple(range(10))
 # The estimates' first seconds belong to the choice of P(0).
 SETTLED_S = 3.0
 
-Step = tuple[str, str, str, bool]
-LADDER: tuple[Step, ...] = (
+LadderStep = tuple[str, Filters, VelocityMethod, bool]
+LADDER: tuple[LadderStep, ...] = (
     ("as in the paper", "paper", "backward", False),
     ("consistent filters", "exact", "backward", False),
     ("and central velocities", "exact", "central", False),
@@ -76,17 +77,17 @@ class Reproduction:
 
     arm: Arm
     log: Log
-    steps: dict[str, tuple[Identification, ...]]
-    wandering: dict[str, tuple[Identification, ...]] = field(repr=False)
+    steps: dict[Scheme, tuple[Identification, ...]]
+    wandering: dict[Scheme, tuple[Identification, ...]] = field(repr=False)
     ideal: dict[tuple[str, float], Identification] = field(repr=False)
     responses: dict[str, Log] = field(repr=False)
 
-    def deviation(self, scheme: str, step: int) -> NDArray[np.float64]:
+    def deviation(self, scheme: Scheme, step: int) -> NDArray[np.float64]:
         """Relative deviation of the nine estimates from the truth at a step of the ladder."""
         estimate = self.steps[scheme][step].theta[: len(self.arm.theta)]
         return np.asarray(estimate / self.arm.theta - 1.0)
 
-    def decomposition(self, scheme: str) -> dict[str, list[float | None]]:
+    def decomposition(self, scheme: Scheme) -> dict[str, list[float | None]]:
         """What explains Table II's deviations from "measured", in percent of the measured value, for one scheme."""
         d = [100 * self.deviation(scheme, i) for i in range(len(LADDER))]
         paper = [
@@ -205,7 +206,7 @@ def reproduce() -> Reproduction:
     return Reproduction(arm, log, steps, wandering, ideal, responses)
 
 
-def _identify(log: Log, arm: Arm, scheme: str, step: Step) -> Identification:
+def _identify(log: Log, arm: Arm, scheme: Scheme, step: LadderStep) -> Identification:
     _, filters, velocity, asymmetry = step
     return identify(
         log, arm, scheme=scheme, filters=filters, velocity=velocity, asymmetry=asymmetry, cutoff=CUTOFF_RAD_S

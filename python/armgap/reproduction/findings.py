@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armgap.identification import SCHEMES
+from armgap.literals import SCHEMES, Scheme
 from armgap.reproduction.experiment import (
     COULOMB_BACKWARD,
     COULOMB_FORWARD,
@@ -20,7 +20,9 @@ from armgap.reproduction.experiment import (
 
 __all__ = ["FINDINGS", "percent"]
 
-DYNAMIC, ENERGY, POWER = "filtered-dynamic", "supplied-energy", "filtered-power"
+DYNAMIC: Scheme = "filtered-dynamic"
+ENERGY: Scheme = "supplied-energy"
+POWER: Scheme = "filtered-power"
 WIDE_RAD_S = 2 * np.pi * CUTOFF_RAD_S
 
 
@@ -75,7 +77,7 @@ def unexplained(r: Reproduction) -> tuple[str, str]:
     """What of Table II's deviations the three causes leave, scheme by scheme."""
     names = [(0, "theta1"), (2, "theta3"), (7, "theta8"), (8, "theta9")]
 
-    def listed(scheme: str, part: str) -> str:
+    def listed(scheme: Scheme, part: str) -> str:
         values = r.decomposition(scheme)[part]
         return ", ".join(f"{name} {percent(values[i], 0)}" for i, name in names)
 

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from armgap.identification import SCHEMES, Identification
+from armgap.identification import Identification
+from armgap.literals import SCHEMES, Scheme
 from armgap.report import Document, charts
 from armgap.report.html import page_of
 from armgap.report.page import Drawing, Section
-from armgap.report.words import Answer, unit_text
+from armgap.report.words import SummaryAnswer, unit_text
 from armgap.reproduction.experiment import LADDER, PAPER_ESTIMATES, PAPER_MEASURED, Reproduction
 from armgap.reproduction.findings import percent
 
@@ -104,7 +105,7 @@ def _responses(r: Reproduction, title: str, label: str) -> Section:
     return Section(title, text=[_distance(r, label)], figures=_response(r, label), columns=2)
 
 
-def _course(r: Reproduction, title: str, scheme: str) -> Section:
+def _estimate_section(r: Reproduction, title: str, scheme: Scheme) -> Section:
     return Section(title, figures=_estimates(r, [("estimate", r.steps[scheme][0], charts.AFTER)]), columns=3)
 
 
@@ -132,11 +133,11 @@ def _sections(r: Reproduction) -> list[Section]:
             tables=[(["scheme", "part", *names], _parts(r))],
         ),
         _responses(r, "Figure 2: the run, and Table I with one Coulomb level", "Table I"),
-        _course(r, "Figure 3: estimates of the filtered dynamic model", "filtered-dynamic"),
+        _estimate_section(r, "Figure 3: estimates of the filtered dynamic model", "filtered-dynamic"),
         _responses(r, "Figure 4: open loop with the filtered dynamic estimates", "filtered-dynamic"),
-        _course(r, "Figure 5: estimates of the supplied energy model", "supplied-energy"),
+        _estimate_section(r, "Figure 5: estimates of the supplied energy model", "supplied-energy"),
         _drift(r),
-        _course(r, "Figure 6: estimates of the filtered power model", "filtered-power"),
+        _estimate_section(r, "Figure 6: estimates of the filtered power model", "filtered-power"),
         _responses(r, "Figure 7: open loop with the filtered power estimates", "filtered-power"),
     ]
 
@@ -145,7 +146,7 @@ def document(r: Reproduction) -> Document:
     """Return the report."""
     lead = "Reyes and Kelly 1997 on a simulated arm of Table I: asymmetric Coulomb friction, encoder counts, backward differences."
     return Document(
-        "The seed reproduced", lead, [Answer(title, "", text) for title, text in r.findings()], _sections(r)
+        "The seed reproduced", lead, [SummaryAnswer(title, "", text) for title, text in r.findings()], _sections(r)
     )
 
 

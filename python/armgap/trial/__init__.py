@@ -4,17 +4,20 @@ MuJoCo (``pip install 'armgap[trial]'``) moves the arm; actuators and encoders a
 armgap's own dynamics takes part, so that a diagnosis cannot be right merely because both sides share an error.
 """
 
+from typing import TYPE_CHECKING
+
+from armgap._renamed import old_names
 from armgap.trial.case import Case, NoMotionError, make_case, possible
 from armgap.trial.demo import DEMO_SEED, make_demo_case
 from armgap.trial.engine import TrialEngineMissingError
-from armgap.trial.key import Hidden, Key, SealError, open_key
+from armgap.trial.key import HiddenEffect, Key, SealError, open_key
 from armgap.trial.trial import DEVELOPMENT_SEED, fresh_seed, make_trial, plan_trial
 
 __all__ = [
     "DEMO_SEED",
     "DEVELOPMENT_SEED",
     "Case",
-    "Hidden",
+    "HiddenEffect",
     "Key",
     "NoMotionError",
     "SealError",
@@ -27,3 +30,6 @@ __all__ = [
     "plan_trial",
     "possible",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)

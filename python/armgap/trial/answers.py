@@ -26,7 +26,7 @@ class Size:
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedCause:
     """A named cause.
 
     Attributes
@@ -54,7 +54,7 @@ class Named:
 
 
 @dataclass(frozen=True)
-class Limit:
+class AbsentEffect:
     """An effect called absent: its size is said to stay below `value`, with 95 % confidence."""
 
     effect: str
@@ -64,7 +64,7 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Reach:
+class PredictionErrors:
     """RMS position errors per joint on the holdout, rad (m): as the arm file has it, re-estimated, with causes, floor."""
 
     horizon_s: float
@@ -84,11 +84,11 @@ class Answer:
         Name of the method.
     verdict : str
         ``"none"``, ``"parameters"``, ``"effect"`` or ``"unexplained"``.
-    causes : tuple of Named
+    causes : tuple of NamedCause
         First the one the method believes most.
-    limits : tuple of Limit
+    limits : tuple of AbsentEffect
         Effects called absent, with bounds.
-    reach : Reach, optional
+    reach : PredictionErrors, optional
         How far predictions miss, where the method predicts.
     theta : tuple of float
         The arm's parameters beside the causes, in the arm file's order, where the method gives them.
@@ -106,9 +106,9 @@ class Answer:
 
     method: str
     verdict: str
-    causes: tuple[Named, ...] = ()
-    limits: tuple[Limit, ...] = ()
-    reach: Reach | None = None
+    causes: tuple[NamedCause, ...] = ()
+    limits: tuple[AbsentEffect, ...] = ()
+    reach: PredictionErrors | None = None
     theta: tuple[float, ...] = ()
     place: int | None = None
     error: str | None = None
@@ -118,7 +118,7 @@ class Answer:
     version: str = ""
 
     def stamped(self, seal: str, version: str, seconds: float) -> Answer:
-        """The same answer with where it belongs and what it cost."""
+        """Return this answer with the case's seal, the version and the CPU time filled in."""
         return replace(self, seal=seal, version=version, seconds=round(seconds, 4))
 
     def to_json(self) -> str:
@@ -139,7 +139,7 @@ class Answer:
             raise ValueError(f"not an answer of schema {SCHEMA}")
         try:
             data["causes"] = tuple(_named(c) for c in data["causes"])
-            data["limits"] = tuple(Limit(**x) for x in data["limits"])
+            data["limits"] = tuple(AbsentEffect(**x) for x in data["limits"])
             data["reach"] = _reach(data["reach"])
             data["theta"] = tuple(data["theta"])
             return cls(**data)
@@ -163,13 +163,13 @@ def read_answer(path: Path) -> Answer:
         ) from None
 
 
-def _named(data: dict[str, Any]) -> Named:
+def _named(data: dict[str, Any]) -> NamedCause:
     sizes = {key: Size(**value) for key, value in data["sizes"].items()}
     alike = tuple((effect, joint) for effect, joint in data["look_alikes"])
-    return Named(data["effect"], data["joint"], data["probability"], sizes, alike)
+    return NamedCause(data["effect"], data["joint"], data["probability"], sizes, alike)
 
 
-def _reach(data: dict[str, Any] | None) -> Reach | None:
+def _reach(data: dict[str, Any] | None) -> PredictionErrors | None:
     if data is None:
         return None
-    return Reach(data["horizon_s"], *(tuple(data[key]) for key in ("before", "refit", "after", "floor")))
+    return PredictionErrors(data["horizon_s"], *(tuple(data[key]) for key in ("before", "refit", "after", "floor")))

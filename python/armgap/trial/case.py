@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from armgap.errors import ArmgapError
+from armgap.output import write
 from armgap.trial.armfile import arm_toml, draw_nominal
 from armgap.trial.arms import TrialArm, random_arm
 from armgap.trial.effects import REGISTRY, Draw, NoTravelError, usage
 from armgap.trial.engine import mujoco
 from armgap.trial.excitation import STYLES, Excitation, Tracked, acceptable, draw_excitation, rings
-from armgap.trial.key import KEY_FILE, Hidden, Key
-from armgap.trial.plant import Build
-from armgap.trial.rig import Rig, Trace, run
+from armgap.trial.key import KEY_FILE, HiddenEffect, Key
+from armgap.trial.layout import ARM_FILE
+from armgap.trial.plant import PlantConfig
+from armgap.trial.simulated_arm import SimulatedArm, Trace, run
 from armgap.trial.visibility import Visibility, visibility
 
 #: Motions drawn before a case is given up.
@@ -26,15 +28,15 @@ ATTEMPTS = 30
 #: An effect that cannot be seen is made larger this often, by this much each time.
 GROWTHS, GROWTH = 8, 0.15
 #: One effect in this many is made as small as can still be seen, in at most so many steps of that size.
-FAINT, SHRINKS, SHRINK = 5, 6, 0.4
+SHRUNK_ONE_IN, SHRINKS, SHRINK = 5, 6, 0.4
 #: An arm that goes farther or faster with its effects has run away, rad and rad/s (m and m/s).
 REACH, SPEED = 10.0, 30.0
 #: Controllers tried on an altered arm, each half as stiff as the one before.
 DETUNINGS = 6
 
-Wish = tuple[str, int | None]
+EffectRequest = tuple[str, int | None]
 #: An effect as hidden, its size, and how far it stands out.
-Sized = tuple[list[Hidden], float, Visibility]
+SizedEffects = tuple[list[HiddenEffect], float, Visibility]
 
 
 class NoMotionError(ArmgapError, RuntimeError):
@@ -66,16 +68,16 @@ class Case:
         """Write ``arm.toml``, one Parquet file per log, and ``key.json``."""
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
-        (target / "arm.toml").write_text(self.arm_file, encoding="utf-8")
-        (target / KEY_FILE).write_bytes(self.key.to_json().encode())
+        write(target / ARM_FILE, self.arm_file)
+        write(target / KEY_FILE, self.key.to_json())
         for name, trace in self.logs.items():
-            _frame(trace).write_parquet(target / f"{name}.parquet", compression="zstd")
+            write(target / f"{name}.parquet", partial(_frame(trace).write_parquet, compression="zstd"))
         return target
 
 
 def make_case(
     seed: int | Sequence[int],
-    effects: Sequence[Wish] = (),
+    effects: Sequence[EffectRequest] = (),
     *,
     model: str = "direct-drive",
     size: float | None = None,
@@ -135,29 +137,29 @@ def make_case(
     return Case(model, arm_toml(arm, stated, f"trial arm ({model})", key.sha256), logs, key)
 
 
-def build_rig(arm: TrialArm, hidden: Sequence[Hidden], log: str | None = None) -> Rig:
-    """Put hidden effects into a fresh rig, as they act in one log."""
-    rig = Rig(Build(arm))
+def simulated_arm_of(arm: TrialArm, hidden: Sequence[HiddenEffect], log: str | None = None) -> SimulatedArm:
+    """Put hidden effects into a fresh simulated arm, as they act in one log."""
+    sim = SimulatedArm(PlantConfig(arm))
     for h in hidden:
         if h.log in (None, log):
-            REGISTRY[h.effect].apply(rig, (h.joint or 1) - 1, h.parameters)
-    return rig
+            REGISTRY[h.effect].apply(sim, (h.joint or 1) - 1, h.parameters)
+    return sim
 
 
-def possible(kind: str, n_joints: int, families: Sequence[str] = ("library",)) -> list[Wish]:
+def possible(kind: str, n_joints: int, families: Sequence[str] = ("library",)) -> list[EffectRequest]:
     """All effects and joints that make sense on a kind of arm."""
-    wishes: list[Wish] = []
+    requests: list[EffectRequest] = []
     for e in REGISTRY.values():
         if e.family in families and kind in e.kinds:
-            wishes += [(e.name, j + 1) for j in range(n_joints)] if e.per_joint else [(e.name, None)]
-    return wishes
+            requests += [(e.name, j + 1) for j in range(n_joints)] if e.per_joint else [(e.name, None)]
+    return requests
 
 
-def _check(arm: TrialArm, effects: Sequence[Wish]) -> None:
+def _check(arm: TrialArm, effects: Sequence[EffectRequest]) -> None:
     allowed = possible(arm.kind, arm.n_joints, ("library", "further", "outside"))
-    for wish in effects:
-        if tuple(wish) not in allowed:
-            raise ValueError(f"no effect {wish[0]!r} on joint {wish[1]} of a {arm.kind} arm")
+    for request in effects:
+        if tuple(request) not in allowed:
+            raise ValueError(f"no effect {request[0]!r} on joint {request[1]} of a {arm.kind} arm")
 
 
 def _draw_motions(
@@ -176,7 +178,7 @@ def _draw_motion(
     for _ in range(ATTEMPTS):
         chosen = style or str(rng.choice(STYLES, p=[0.4, 0.2, 0.4]))
         motion = draw_excitation(rng, arm, chosen, vigour)
-        trace = run(Rig(Build(arm)), motion.source(arm), duration)
+        trace = run(SimulatedArm(PlantConfig(arm)), motion.source(arm), duration)
         good, factor = acceptable(trace, arm)
         if good:
             return (chosen, motion), trace
@@ -187,24 +189,24 @@ def _draw_motion(
 def _hide(
     rng: np.random.Generator,
     arm: TrialArm,
-    effects: Sequence[Wish],
+    effects: Sequence[EffectRequest],
     size: float | None,
     motions: dict[str, tuple[str, Excitation]],
     plain: dict[str, Trace],
     duration: float,
-) -> tuple[tuple[Hidden, ...], dict[str, Trace], dict[str, Any]]:
+) -> tuple[tuple[HiddenEffect, ...], dict[str, Trace], dict[str, Any]]:
     """Draw the effects, enlarge those that cannot be seen, and run the logs with all of them."""
     draws = [int(x) for x in rng.integers(0, 2**63, len(effects))]
-    hidden: list[Hidden] = []
+    hidden: list[HiddenEffect] = []
     sizes, seen = [], {}
-    for number, wish in zip(draws, effects, strict=True):
+    for number, request in zip(draws, effects, strict=True):
         first = float(rng.uniform()) if size is None else size
-        sized = _fit_size(number, first, size is None, partial(_alone, arm, number, wish, motions, plain, duration))
+        sized = _fit_size(number, first, size is None, partial(_alone, arm, number, request, motions, plain, duration))
         if sized is None:
-            raise NoMotionError(f"{wish[0]} drives the arm away", remedy="take another seed")
+            raise NoMotionError(f"{request[0]} drives the arm away", remedy="take another seed")
         hidden += sized[0]
         sizes.append(round(sized[1], 3))
-        seen[f"{wish[0]}:{wish[1] or ''}"] = sized[2].to_dict()
+        seen[f"{request[0]}:{request[1] or ''}"] = sized[2].to_dict()
     logs = _measure(arm, hidden, motions, duration)
     if not _sane(logs):
         raise NoMotionError("the effects drive the arm away", remedy="take another seed")
@@ -215,28 +217,30 @@ def _hide(
 def _alone(
     arm: TrialArm,
     number: int,
-    wish: Wish,
+    request: EffectRequest,
     motions: dict[str, tuple[str, Excitation]],
     plain: dict[str, Trace],
     duration: float,
     size: float,
-) -> Sized | None:
+) -> SizedEffects | None:
     """One effect of a size, alone on the arm, and how far it stands out; None if the arm is driven away."""
-    hidden = list(_draw_hidden([number], [size], arm, [wish], list(plain.values()), list(plain)))
+    hidden = list(_draw_hidden([number], [size], arm, [request], list(plain.values()), list(plain)))
     logs = _measure(arm, hidden, motions, duration)
     if not _sane(logs):
         return None
     return hidden, size, visibility(arm, plain, logs, everywhere=all(h.log is None for h in hidden))
 
 
-def _fit_size(number: int, size: float, may_shrink: bool, at: Callable[[float], Sized | None]) -> Sized | None:
-    """Enlarge an effect until it can be seen, or as far as it goes; shrink one in :data:`FAINT` to where it just can."""
+def _fit_size(
+    number: int, size: float, may_shrink: bool, at: Callable[[float], SizedEffects | None]
+) -> SizedEffects | None:
+    """Enlarge an effect until it can be seen, or as far as it goes; shrink one in :data:`SHRUNK_ONE_IN` to where it just can."""
     best = at(size)
     for growth in range(1, GROWTHS):
         if best is None or best[2].visible:
             break
         best = at(size + GROWTH * growth) or best
-    if best is None or not best[2].visible or not may_shrink or number % FAINT:
+    if best is None or not best[2].visible or not may_shrink or number % SHRUNK_ONE_IN:
         return best
     for _ in range(SHRINKS):
         smaller = at(best[1] - SHRINK)
@@ -247,9 +251,14 @@ def _fit_size(number: int, size: float, may_shrink: bool, at: Callable[[float], 
 
 
 def _draw_hidden(
-    draws: Any, sizes: list[float], arm: TrialArm, effects: Sequence[Wish], plain: list[Trace], names: list[str]
-) -> tuple[Hidden, ...]:
-    hidden: list[Hidden] = []
+    draws: Any,
+    sizes: list[float],
+    arm: TrialArm,
+    effects: Sequence[EffectRequest],
+    plain: list[Trace],
+    names: list[str],
+) -> tuple[HiddenEffect, ...]:
+    hidden: list[HiddenEffect] = []
     for number, size, (name, joint) in zip(draws, sizes, effects, strict=True):
         rng, index = np.random.default_rng(int(number)), (joint or 1) - 1
         d = Draw(rng, size, arm, index, usage(plain, index))
@@ -257,17 +266,17 @@ def _draw_hidden(
     return tuple(hidden)
 
 
-def _one(d: Draw, name: str, joint: int | None, log: str | None = None) -> Hidden:
+def _one(d: Draw, name: str, joint: int | None, log: str | None = None) -> HiddenEffect:
     try:
         drawn = {key: float(f"{value:.6g}") for key, value in REGISTRY[name].draw(d).items()}
     except NoTravelError:
         raise NoMotionError(
             f"the logs have next to no positions of joint {joint} in common", remedy="take another seed"
         ) from None
-    return Hidden(name, joint, drawn, log, REGISTRY[name].family)
+    return HiddenEffect(name, joint, drawn, log, REGISTRY[name].family)
 
 
-def _events(d: Draw, joint: int | None) -> list[Hidden]:
+def _events(d: Draw, joint: int | None) -> list[HiddenEffect]:
     pulses = [_one(d, "external_pulse", joint, "train-1") for _ in range(int(d.rng.integers(1, 4)))]
     pulses.sort(key=lambda p: p.parameters["time"])
     apart = [pulses[0]]
@@ -278,15 +287,15 @@ def _events(d: Draw, joint: int | None) -> list[Hidden]:
 
 
 def _measure(
-    arm: TrialArm, hidden: Sequence[Hidden], motions: dict[str, tuple[str, Excitation]], duration: float
+    arm: TrialArm, hidden: Sequence[HiddenEffect], motions: dict[str, tuple[str, Excitation]], duration: float
 ) -> dict[str, Trace]:
     return {name: _log(arm, hidden, name, motion, duration) for name, (_, motion) in motions.items()}
 
 
-def _log(arm: TrialArm, hidden: Sequence[Hidden], name: str, motion: Excitation, duration: float) -> Trace:
+def _log(arm: TrialArm, hidden: Sequence[HiddenEffect], name: str, motion: Excitation, duration: float) -> Trace:
     """Run one log; a controller that oscillates on the altered arm is made softer first, as anyone would."""
     for _ in range(DETUNINGS):
-        trace = run(build_rig(arm, hidden, name), motion.source(arm), duration)
+        trace = run(simulated_arm_of(arm, hidden, name), motion.source(arm), duration)
         if not (isinstance(motion, Tracked) and rings(trace)):
             break
         motion = motion.softer()

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armgap.trial.arms import DIRECT_DRIVE, TrialArm
-from armgap.trial.rig import Array, Source, Trace
+from armgap.trial.simulated_arm import Array, CommandSource, Trace
 
 STYLES = ("multisine", "paper", "tracked")
 #: A tracked motion holds nothing above this frequency, Hz.
@@ -45,7 +45,7 @@ class Multisine:
     phase: Array
     limit: Array
 
-    def source(self, arm: TrialArm) -> Source:
+    def source(self, arm: TrialArm) -> CommandSource:
         """Commands over time."""
 
         def command(t: float, _q: list[float]) -> list[float]:
@@ -86,7 +86,7 @@ class Tracked:
         rate = np.sum(self.amplitude * self.omega * np.cos(angle), axis=1)
         return blend * wave, blend * rate + rise * wave
 
-    def source(self, arm: TrialArm) -> Source:
+    def source(self, arm: TrialArm) -> CommandSource:
         """A fresh controller."""
         last: list[Array] = []
 
@@ -101,7 +101,7 @@ class Tracked:
         return command
 
     def softer(self) -> Tracked:
-        """The same motion under a controller of half the stiffness."""
+        """Return this motion under a controller of half the stiffness."""
         return replace(self, stiffness=0.5 * self.stiffness, damping=0.6 * self.damping)
 
 

@@ -7,9 +7,13 @@ import json
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from armgap._renamed import old_names
 from armgap.errors import OptionError
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
 
 KEY_FILE = "key.json"
 SCHEMA = "armgap.key/1"
@@ -20,7 +24,7 @@ class SealError(OptionError):
 
 
 @dataclass(frozen=True)
-class Hidden:
+class HiddenEffect:
     """One hidden effect.
 
     Attributes
@@ -60,7 +64,7 @@ class Key:
 
     Attributes
     ----------
-    effects : tuple of Hidden
+    effects : tuple of HiddenEffect
         Empty for a case without effects.
     nominal : {"exact", "off"}
         Whether the arm file's values are the true ones.
@@ -72,7 +76,7 @@ class Key:
         Random; without it the hash of a short key could be searched for.
     """
 
-    effects: tuple[Hidden, ...]
+    effects: tuple[HiddenEffect, ...]
     nominal: str
     theta: tuple[float, ...]
     details: dict[str, Any]
@@ -108,7 +112,7 @@ class Key:
         if not isinstance(data, dict) or data.get("schema") != SCHEMA:
             raise ValueError(f"not a key of schema {SCHEMA}")
         return cls(
-            effects=tuple(Hidden(**e) for e in data["effects"]),
+            effects=tuple(HiddenEffect(**e) for e in data["effects"]),
             nominal=data["nominal"],
             theta=tuple(data["theta"]),
             details=data["details"],

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -16,14 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import armgap
-from armgap.errors import OptionError
+from armgap.errors import OptionError, ResultError
+from armgap.output import write, write_folder
 from armgap.trial.engine import mujoco
 from armgap.trial.key import sealed_hash
+from armgap.trial.layout import MANIFEST, case_name
 from armgap.trial.trial import Plan, plan_trial
 
 __all__ = ["MANIFEST", "Manifest", "make_cases", "read_manifest", "seal_of_all"]
 
-MANIFEST = "trial.json"
 SCHEMA = "armgap.trial-cases/1"
 
 
@@ -79,7 +79,7 @@ def make_cases(folder: Path, seed: int, cases: int, duration: float = 10.0, work
     wanted = Manifest(seed, cases, duration, armgap.__version__, f"mujoco {mujoco().__version__}")
     _claim(folder, wanted)
     plans = [replace(p, duration=duration) for p in plan_trial(seed, cases)]
-    targets = [folder / f"case-{i:04d}" for i in range(cases)]
+    targets = [folder / case_name(i) for i in range(cases)]
     if workers == 1:
         yield from map(_make, plans, targets)
         return
@@ -113,8 +113,11 @@ def _claim(folder: Path, wanted: Manifest) -> None:
         return
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise OptionError("exists and is not empty", remedy="name a new folder", file=folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    path.write_text(wanted.to_json(), encoding="utf-8")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ResultError(f"cannot be made ({error.strerror})", remedy="choose another place", file=folder) from None
+    write(path, wanted.to_json())
 
 
 def _load(path: Path) -> dict[str, Any]:
@@ -129,7 +132,10 @@ def _load(path: Path) -> dict[str, Any]:
 
 def _make(plan: Plan, target: Path) -> Path:
     if not target.exists():
-        partial = target.with_name(f".{target.name}.partial")
-        shutil.rmtree(partial, ignore_errors=True)
-        plan.make().write(partial).rename(target)
+        case = plan.make()
+        try:
+            write_folder(target, case.write)
+        except ResultError:
+            if not target.is_dir():  # else another process has made the same case meanwhile
+                raise
     return target

@@ -1,4 +1,4 @@
-"""The methods under trial: armgap's own diagnosis, and the peers. One interface: a sealed case in, an answer out."""
+"""The methods under trial: armgap's own diagnosis, and the baselines. One interface: a sealed case in, an answer out."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import armgap
 from armgap import _native
-from armgap.trial.answers import Answer, Limit, Named, Reach, Size
+from armgap.trial.answers import AbsentEffect, Answer, NamedCause, PredictionErrors, Size
 
 if TYPE_CHECKING:
     from armgap.diagnosis import Cause, Diagnosis
@@ -60,9 +60,9 @@ class Method:
 
 def methods() -> dict[str, Method]:
     """All methods by name, armgap first."""
-    from armgap.trial.peers import PEERS
+    from armgap.trial.baselines import BASELINES
 
-    return {m.name: m for m in (ARMGAP, *PEERS)}
+    return {m.name: m for m in (ARMGAP, *BASELINES)}
 
 
 def answer_with_armgap(case: SealedCase) -> Answer:
@@ -82,18 +82,18 @@ def from_diagnosis(result: Diagnosis, names: Sequence[str]) -> Answer:
         method="armgap",
         verdict=result.verdict,
         causes=tuple(_named(c) for c in result.causes) if result.verdict == "effect" else (),
-        limits=tuple(Limit(r.effect, r.joint, r.bound.parameter, r.bound.value) for r in absent if r.bound),
-        reach=Reach(gap.horizon_s, gap.before, gap.refit, gap.after, gap.floor),
+        limits=tuple(AbsentEffect(r.effect, r.joint, r.bound.parameter, r.bound.value) for r in absent if r.bound),
+        reach=PredictionErrors(gap.horizon_s, gap.before, gap.refit, gap.after, gap.floor),
         theta=tuple(final[name].value for name in names),
         place=result.where[0].joint if result.where else None,
         remark=_first_ranks(result),
     )
 
 
-def _named(cause: Cause) -> Named:
+def _named(cause: Cause) -> NamedCause:
     sizes = {key: Size(x.value, x.sigma) for key, x in cause.parameters.items()}
     alike = tuple((e.effect, e.joint) for e in cause.equivalents)
-    return Named(cause.effect, cause.joint, cause.probability, sizes, alike)
+    return NamedCause(cause.effect, cause.joint, cause.probability, sizes, alike)
 
 
 def _first_ranks(result: Diagnosis) -> str:

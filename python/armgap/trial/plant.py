@@ -40,7 +40,7 @@ IMPEDANCE = 0.9999
 
 
 @dataclass
-class Point:
+class JointState:
     """What a law sees of one joint: half a step ahead, SI."""
 
     t: float
@@ -51,8 +51,8 @@ class Point:
     others: list[tuple[float, float]]
 
 
-TorqueLaw = Callable[[Point], float]
-FrictionLaw = Callable[[Point, float], float]
+TorqueLaw = Callable[[JointState], float]
+FrictionLaw = Callable[[JointState, float], float]
 
 
 @dataclass
@@ -80,7 +80,7 @@ class Flexure:
 
 
 @dataclass
-class Build:
+class PlantConfig:
     """Everything the engine is given: the nominal arm and what effects change in it.
 
     Attributes
@@ -95,7 +95,7 @@ class Build:
         Torque ``-k (q - q0) - cubic (q - q0)^3``.
     drag : dict of joint to (quadratic, cubic)
         Torque ``-quadratic dq |dq| - cubic dq^3``.
-    edges : dict of joint to list of float
+    discontinuities : dict of joint to list of float
         Positions at which a torque law jumps; a step across one is cut like a step with a reversal.
     coupling : (rotor inertia, gear), optional
         Rotor of joint 2 on link 1, kinetic energy ``inertia (dq1 + gear dq2)^2 / 2``.
@@ -114,7 +114,7 @@ class Build:
     torque_laws: dict[int, list[TorqueLaw]] = field(default_factory=dict)
     friction_laws: dict[int, list[FrictionLaw]] = field(default_factory=dict)
     drag: dict[int, tuple[float, float]] = field(default_factory=dict)
-    edges: dict[int, list[float]] = field(default_factory=dict)
+    discontinuities: dict[int, list[float]] = field(default_factory=dict)
 
 
 class Plant:
@@ -122,28 +122,28 @@ class Plant:
 
     Parameters
     ----------
-    build : Build
+    config : PlantConfig
         The arm and what is different about it.
     """
 
-    def __init__(self, build: Build) -> None:
+    def __init__(self, config: PlantConfig) -> None:
         from armgap.trial.model import compile_model
 
         self._mj = mujoco()
-        self._build = build
-        self.n = build.arm.n_joints
-        self.steps_per_sample = math.ceil(build.arm.sample_period / TIME_STEP - 1e-9)
-        self.dt = build.arm.sample_period / self.steps_per_sample
-        self.model: Any = compile_model(build, self.dt)
+        self._config = config
+        self.n = config.arm.n_joints
+        self.steps_per_sample = math.ceil(config.arm.sample_period / TIME_STEP - 1e-9)
+        self.dt = config.arm.sample_period / self.steps_per_sample
+        self.model: Any = compile_model(config, self.dt)
         self.data: Any = self._mj.MjData(self.model)
         self.dof = [self.model.joint(f"joint{j}").dofadr[0] for j in range(self.n)]
         self.motor = [self._motor_dof(j) for j in range(self.n)]
-        self._coulomb = list(build.arm.coulomb)
+        self._coulomb = list(config.arm.coulomb)
         self._slope = [0.0] * self.n
-        self.lawful = bool(build.torque_laws or build.friction_laws)
+        self.state_dependent = bool(config.torque_laws or config.friction_laws)
 
     def _motor_dof(self, joint: int) -> int:
-        name = f"rotor{joint}" if joint in self._build.rotors else f"joint{joint}"
+        name = f"rotor{joint}" if joint in self._config.rotors else f"joint{joint}"
         return int(self.model.joint(name).dofadr[0])
 
     @property
@@ -204,22 +204,22 @@ class Plant:
 
     def _drive(self, tau: list[float], dt: float) -> None:
         self.data.qfrc_applied[:] = 0.0
-        points = self._points(tau, dt) if self.lawful else None
+        points = self._points(tau, dt) if self.state_dependent else None
         for j in range(self.n):
             self.data.qfrc_applied[self.motor[j]] += tau[j]
             if points:
                 self._apply_laws(j, points[j])
 
-    def _apply_laws(self, joint: int, point: Point) -> None:
-        for law in self._build.torque_laws.get(joint, ()):
+    def _apply_laws(self, joint: int, point: JointState) -> None:
+        for law in self._config.torque_laws.get(joint, ()):
             self.data.qfrc_applied[self.dof[joint]] += law(point)
-        if joint in self._build.friction_laws:
+        if joint in self._config.friction_laws:
             level = self._coulomb[joint]
-            for extra in self._build.friction_laws[joint]:
+            for extra in self._config.friction_laws[joint]:
                 level += extra(point, level)
             self.model.dof_frictionloss[self.dof[joint]] = max(level, 0.0)
 
-    def _points(self, tau: list[float], dt: float) -> list[Point]:
+    def _points(self, tau: list[float], dt: float) -> list[JointState]:
         q, dq = self.position(), self.velocity()
         ahead = [v + 0.5 * dt * a for v, a in zip(dq, self._slope, strict=True)]
         # A joint that stands, or would turn round within half a step, is taken as it is.
@@ -228,7 +228,8 @@ class Plant:
         states = list(zip(half, ahead, strict=True))
         load = self.data.qfrc_bias
         return [
-            Point(self.time + 0.5 * dt, *states[j], tau[j], float(load[self.dof[j]]), states) for j in range(self.n)
+            JointState(self.time + 0.5 * dt, *states[j], tau[j], float(load[self.dof[j]]), states)
+            for j in range(self.n)
         ]
 
     def _snapshot(self) -> tuple[Any, Any, float]:
@@ -247,7 +248,7 @@ class Plant:
         return False
 
     def _crossed(self, before: tuple[Any, Any, float]) -> bool:
-        for j, positions in self._build.edges.items():
+        for j, positions in self._config.discontinuities.items():
             old, new = float(before[0][self.dof[j]]), float(self.data.qpos[self.dof[j]])
             if any((old < x) != (new < x) for x in positions):
                 return True

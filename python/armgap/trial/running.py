@@ -13,16 +13,17 @@ from concurrent.futures import TimeoutError as TookTooLong
 from contextlib import contextmanager
 from pathlib import Path
 
-from armgap.errors import ArmgapError
+from armgap.errors import ArmgapError, ResultError
+from armgap.output import write
 from armgap.trial.answers import Answer
 from armgap.trial.engine import worker_pool
 from armgap.trial.key import sealed_hash
+from armgap.trial.layout import ANSWERS
 from armgap.trial.methods import Method, methods
 from armgap.trial.sealed import SealedCase, case_folders
 
 __all__ = ["ANSWERS", "LIMIT_S", "answer_cases", "answer_file", "open_cases"]
 
-ANSWERS = "answers"
 #: Longest time for one case, s.
 LIMIT_S = 300.0
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS")
@@ -87,7 +88,7 @@ def _result(result: Callable[[], Answer], case: Path, method: Method, limit_s: f
 
 
 def _answer(case: str, name: str) -> Answer:
-    """One case in a process of its own; complaints of armgap and failures of a peer become answers."""
+    """One case in a process of its own; complaints of armgap and failures of a baseline become answers."""
     method = methods()[name]
     start = time.process_time()
     try:
@@ -122,7 +123,10 @@ def _answered(case: Path, method: Method) -> bool:
 
 
 def _write(path: Path, answer: Answer) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.partial")
-    temporary.write_text(answer.to_json(), encoding="utf-8")
-    temporary.replace(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ResultError(
+            f"cannot be made ({error.strerror})", remedy="choose another place", file=path.parent
+        ) from None
+    write(path, answer.to_json())

@@ -8,6 +8,7 @@ from pathlib import Path
 from armgap.arm import Arm
 from armgap.errors import OptionError
 from armgap.log import Log
+from armgap.trial.layout import ARM_FILE, case_folders_in
 
 __all__ = ["SealedCase", "case_folders"]
 
@@ -41,7 +42,7 @@ class SealedCase:
             A file is missing or cannot be used.
         """
         target = Path(folder)
-        arm = Arm.read(target / "arm.toml")
+        arm = Arm.read(target / ARM_FILE)
         training, holdout = (_logs(target, part, arm) for part in ("train", "holdout"))
         return cls(target.name, arm, training, holdout)
 
@@ -54,7 +55,7 @@ def case_folders(folder: str | Path) -> list[Path]:
     OptionError
         There are none.
     """
-    found = sorted(path.parent for path in Path(folder).glob("*/arm.toml"))
+    found = case_folders_in(Path(folder))
     if not found:
         raise OptionError("holds no cases", remedy="make some with armgap trial make -o DIR", file=folder)
     return found

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from armgap.output import write_folder
 from armgap.trial.arms import MODELS
-from armgap.trial.case import Case, NoMotionError, Wish, make_case, possible
+from armgap.trial.case import Case, EffectRequest, NoMotionError, make_case, possible
+from armgap.trial.layout import case_name
 
 #: Families of cases and their usual shares.
 FAMILIES = {"single": 0.65, "null": 0.08, "parameters": 0.07, "pair": 0.12, "outside": 0.08}
@@ -46,7 +48,7 @@ class Plan:
     seed: tuple[int, ...]
     family: str
     model: str
-    effects: tuple[Wish, ...]
+    effects: tuple[EffectRequest, ...]
     nominal: str
     duration: float = 10.0
 
@@ -131,7 +133,8 @@ def make_trial(
         The case folders.
     """
     plans = [replace(p, duration=duration) for p in plan_trial(seed, n_cases, families)]
-    targets = [Path(folder) / f"case-{i:04d}" for i in range(n_cases)]
+    targets = [Path(folder) / case_name(i) for i in range(n_cases)]
+    Path(folder).mkdir(parents=True, exist_ok=True)
     if workers == 1:
         return [_make(p, t) for p, t in zip(plans, targets, strict=True)]
     with ProcessPoolExecutor(workers) as pool:
@@ -139,7 +142,7 @@ def make_trial(
 
 
 def _make(plan: Plan, target: Path) -> Path:
-    return plan.make().write(target)
+    return write_folder(target, plan.make().write)
 
 
 def _deal(shares: Mapping[str, float], n: int) -> list[str]:
@@ -151,27 +154,27 @@ def _deal(shares: Mapping[str, float], n: int) -> list[str]:
     return names + rest[: n - len(names)]
 
 
-def _endless(rng: np.random.Generator, model: str, families: tuple[str, ...]) -> Iterator[Wish]:
+def _endless(rng: np.random.Generator, model: str, families: tuple[str, ...]) -> Iterator[EffectRequest]:
     """Every effect and joint of a machine in random order, again and again."""
     arm = MODELS[model]
-    wishes = possible(arm.kind, arm.n_joints, families)
+    requests = possible(arm.kind, arm.n_joints, families)
     while True:
-        for i in rng.permutation(len(wishes)):
-            yield wishes[int(i)]
+        for i in rng.permutation(len(requests)):
+            yield requests[int(i)]
 
 
 def _plan(
     rng: np.random.Generator,
     seed: tuple[int, int],
     family: str,
-    singles: dict[str, Iterator[Wish]],
-    others: dict[str, Iterator[Wish]],
+    singles: dict[str, Iterator[EffectRequest]],
+    others: dict[str, Iterator[EffectRequest]],
 ) -> Plan:
     model = str(rng.choice(list(MACHINES), p=list(MACHINES.values())))
     nominal = {"null": "exact", "parameters": "off"}.get(family) or str(rng.choice(["exact", "off"]))
     if family == "pair" and model in ("pendulum", "axis"):
         model = "direct-drive"
-    effects: tuple[Wish, ...] = ()
+    effects: tuple[EffectRequest, ...] = ()
     if family == "single":
         effects = (next(singles[model]),)
     elif family == "outside":
@@ -181,9 +184,9 @@ def _plan(
     return Plan(seed, family, model, effects, nominal)
 
 
-def _pair(wishes: Iterator[Wish]) -> tuple[Wish, Wish]:
-    first = next(wishes)
-    second = next(w for w in wishes if w[0] != first[0] and not _alike(first, w))
+def _pair(requests: Iterator[EffectRequest]) -> tuple[EffectRequest, EffectRequest]:
+    first = next(requests)
+    second = next(w for w in requests if w[0] != first[0] and not _alike(first, w))
     return first, second
 
 
@@ -195,5 +198,5 @@ LOOK_ALIKES = (
 )
 
 
-def _alike(a: Wish, b: Wish) -> bool:
+def _alike(a: EffectRequest, b: EffectRequest) -> bool:
     return any({a[0], b[0]} == pair for pair in LOOK_ALIKES)

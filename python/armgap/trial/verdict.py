@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armgap.trial.key import Hidden, Key
+from armgap.trial.key import HiddenEffect, Key
 
 if TYPE_CHECKING:
     from armgap.diagnosis import Diagnosis
@@ -76,5 +76,5 @@ def describe(names: list[Name]) -> str:
     return " and ".join(f"{n} (joint {j})" if j is not None else n for n, j in names)
 
 
-def _distinct(effects: tuple[Hidden, ...]) -> list[Name]:
+def _distinct(effects: tuple[HiddenEffect, ...]) -> list[Name]:
     return list(dict.fromkeys((e.effect, e.joint) for e in effects))

@@ -18,7 +18,7 @@ import numpy as np
 
 from armgap.trial.armfile import spread
 from armgap.trial.arms import TrialArm
-from armgap.trial.rig import Array, Trace
+from armgap.trial.simulated_arm import Array, Trace
 from armgap.trial.windows import Mechanism, Window, cut, misses, refit
 
 __all__ = ["MULTIPLE", "SIGMAS", "Visibility", "visibility"]
@@ -66,7 +66,7 @@ def visibility(arm: TrialArm, plain: dict[str, Trace], logs: dict[str, Trace], e
     plain, logs : dict of str to Trace
         The logs without and with the effect.
     everywhere : bool, default True
-        Whether the effect acts in all logs. Then training and holdout must both show it, and the fainter counts; of a
+        Whether the effect acts in all logs. Then training and holdout must both show it, and the smaller counts; of a
         push only the training logs, in which it is.
     """
     m = Mechanism(arm.kind, arm.gravity, arm.length)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armgap import _native
 
 Array = NDArray[np.float64]
-Placed = tuple[str, int | None, dict[str, float]]
+NativeEffect = tuple[str, int | None, dict[str, float]]
 
 #: Length of a window, s.
 WINDOW = 0.2
@@ -73,7 +73,7 @@ def _window(t: Array, q: Array, tau: Array, s: int, rows: int, margin: int) -> W
     return Window(fix(t[part]), fix(tau[part]), fix(cubic[0]), fix(cubic[1]), q[s + 1 : s + rows + 1])
 
 
-def misses(m: Mechanism, theta: Array, windows: Sequence[Window], effects: Sequence[Placed] = ()) -> Array:
+def misses(m: Mechanism, theta: Array, windows: Sequence[Window], effects: Sequence[NativeEffect] = ()) -> Array:
     """Measured minus predicted positions, shape (n_windows, n, n_joints).
 
     Raises
@@ -84,7 +84,7 @@ def misses(m: Mechanism, theta: Array, windows: Sequence[Window], effects: Seque
     return np.array([w.q - _predict(m, theta, w, effects) for w in windows])
 
 
-def _predict(m: Mechanism, theta: Array, w: Window, effects: Sequence[Placed]) -> Array:
+def _predict(m: Mechanism, theta: Array, w: Window, effects: Sequence[NativeEffect]) -> Array:
     arm = (m.kind, m.gravity, list(m.link_length), theta.tolist())
     for tolerance in TOLERANCES:
         try:
@@ -100,7 +100,7 @@ def refit(
     sigma: Array,
     windows: Sequence[Window],
     noise: Array,
-    effects: Sequence[Placed] = (),
+    effects: Sequence[NativeEffect] = (),
 ) -> Array:
     """Estimate the arm's parameters by Gauss-Newton, from `theta` and with `sigma` around it as prior.
 
@@ -142,7 +142,7 @@ def _cost(
     sigma: Array,
     windows: Sequence[Window],
     noise: Array,
-    effects: Sequence[Placed],
+    effects: Sequence[NativeEffect],
 ) -> float:
     try:
         error = misses(m, theta, windows, effects) / noise
@@ -158,7 +158,7 @@ def _newton(
     sigma: Array,
     windows: Sequence[Window],
     noise: Array,
-    effects: Sequence[Placed],
+    effects: Sequence[NativeEffect],
 ) -> Array:
     now = misses(m, theta, windows, effects)
     columns = []

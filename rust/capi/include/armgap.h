@@ -340,7 +340,8 @@ armgap_status armgap_update(armgap_estimator *estimator,
                             size_t joints);
 
 /*
- The same for a sample `h` seconds after the last one, which keeps its resolution however long the controller runs.
+ Takes one sample `h` seconds after the last one; `h` keeps its resolution however long the controller runs. Arguments as for
+ `armgap_update`.
  */
 armgap_status armgap_update_after(armgap_estimator *estimator,
                                   double h,
@@ -391,7 +392,8 @@ armgap_status armgap_update_f32(armgap_estimator_f32 *estimator,
                                 size_t joints);
 
 /*
- The same for a sample `h` seconds after the last one, which keeps its resolution however long the controller runs.
+ Takes one sample `h` seconds after the last one; `h` keeps its resolution however long the controller runs. Arguments as for
+ `armgap_update_f32`.
  */
 armgap_status armgap_update_after_f32(armgap_estimator_f32 *estimator,
                                       float h,

@@ -59,6 +59,7 @@ fn stretch<'a>(log: &LogData<'a>, range: std::ops::Range<usize>) -> LogData<'a> 
         name: format!("{whole} ({} to {} s)", millis(t[0]), millis(t[t.len() - 1])),
         t,
         q: &log.q[rows.clone()],
+        moment: log.moment.map(|moment| &moment[rows.clone()]),
         tau: &log.tau[rows],
         tables: log.tables.iter().map(|table| &table[range.clone()]).collect(),
     }
@@ -92,6 +93,7 @@ mod tests {
             t: &t,
             q: &values,
             tau: &values,
+            moment: None,
             tables: vec![&values[..2000]],
         };
         let (training, holdout) = ([log("a")], [log("b (last part) (0 to 9.995 s)")]);

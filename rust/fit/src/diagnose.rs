@@ -27,6 +27,8 @@ pub struct LogData<'a> {
     pub q: &'a [f64],
     /// Torques, one row per sample, held until the next.
     pub tau: &'a [f64],
+    /// First moment of every torque about the middle of its interval, where it is the mean of several, N m s^2 (N s^2).
+    pub moment: Option<&'a [f64]>,
     /// Torque per unit of size of each custom effect, sample by sample.
     pub tables: Vec<&'a [f64]>,
 }
@@ -144,6 +146,7 @@ pub(crate) fn validate(
             .iter()
             .chain(log.q)
             .chain(log.tau)
+            .chain(log.moment.into_iter().flatten())
             .chain(log.tables.iter().copied().flatten())
             .all(|x| x.is_finite());
         let fits = log.tables.len() == options.custom_effects.len()
@@ -276,7 +279,7 @@ impl Request<'_> {
         });
         let track = |log: &LogData<'_>| {
             let tables = log.tables.iter().map(|table| table.to_vec()).collect();
-            Track::new(&log.name, log.t, log.q, log.tau, steps).with_tables(tables)
+            Track::new(&log.name, log.t, log.q, log.tau, steps).with_moments(log.moment).with_tables(tables)
         };
         let tracks = logs.iter().map(track).collect();
         let data = Dataset::new(tracks, self.options.horizon);

@@ -63,8 +63,7 @@ impl WithArm for RegressionRows<'_> {
                 second: row(self.tau, k - 1),
                 middle: row(self.q, k - 1),
             };
-            let (psi, y) =
-                model.update::<Portable, A, P>(&arm, Variant::Exact, &between(k), &interval);
+            let (psi, y) = model.update::<Portable, A, P>(&arm, Variant::Exact, &between(k), &interval);
             rows.psi.extend(psi.iter().flatten());
             rows.y.extend(y);
         }

@@ -84,6 +84,18 @@ impl<const N: usize> Track<N> {
         track
     }
 
+    /// Replaces held torques by straight lines of the same mean and these first moments about the middle of each interval.
+    pub fn with_moments(mut self, moments: Option<&[f64]>) -> Self {
+        let Some(moments) = moments else { return self };
+        for (k, row) in moments.chunks_exact(N).enumerate() {
+            let Some(h) = self.t.get(k + 1).map(|next| next - self.t[k]) else { break };
+            for (segment, moment) in self.held[k].iter_mut().zip(row) {
+                *segment = InputSegment::with_moment(segment.mean(), *moment, h);
+            }
+        }
+        self
+    }
+
     /// Adds the torques of the custom effects to the log.
     pub fn with_tables(mut self, tables: Vec<Vec<f64>>) -> Self {
         self.tables = tables;

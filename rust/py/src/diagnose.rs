@@ -9,13 +9,14 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Name, times, positions, torques, and the torques of the custom effects.
+/// Name, times, positions, torques, the torques of the custom effects, and first moments of torques that are means.
 type PyLog<'py> = (
     String,
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
     Vec<PyReadonlyArray1<'py, f64>>,
+    Option<PyReadonlyArray2<'py, f64>>,
 );
 
 /// A log's own copy of its numbers, for a thread that may outlive the caller.
@@ -25,6 +26,7 @@ struct Owned {
     q: Vec<f64>,
     tau: Vec<f64>,
     tables: Vec<Vec<f64>>,
+    moment: Option<Vec<f64>>,
 }
 
 /// The arm's parameters estimated again without any effect: `theta`, `sigma`, and per joint the RMS errors `before` and `refit` and
@@ -92,7 +94,7 @@ pub fn diagnose(
 }
 
 fn copy(log: &PyLog<'_>, n: usize) -> PyResult<Owned> {
-    let (name, t, q, tau, tables) = log;
+    let (name, t, q, tau, tables, moment) = log;
     let t = vector(t, "t")?;
     Ok(Owned {
         name: name.clone(),
@@ -100,6 +102,10 @@ fn copy(log: &PyLog<'_>, n: usize) -> PyResult<Owned> {
         q: matrix(q, "q", t.len(), n)?.to_vec(),
         tau: matrix(tau, "tau", t.len(), n)?.to_vec(),
         tables: tables.iter().map(|x| Ok(vector(x, "effects")?.to_vec())).collect::<PyResult<_>>()?,
+        moment: moment
+            .as_ref()
+            .map(|x| Ok::<_, PyErr>(matrix(x, "moment", t.len(), n)?.to_vec()))
+            .transpose()?,
     })
 }
 
@@ -109,6 +115,7 @@ fn views<'a>(logs: &'a [Owned]) -> Vec<LogData<'a>> {
         t: &log.t,
         q: &log.q,
         tau: &log.tau,
+        moment: log.moment.as_deref(),
         tables: log.tables.iter().map(Vec::as_slice).collect(),
     };
     logs.iter().map(view).collect()

@@ -9,6 +9,7 @@ from armgap.errors import LogReadError
 from armgap.log.formats import hdf5, matlab, mcap, npz, parquet, rosbag, text
 from armgap.log.formats.format import Format
 from armgap.log.recording import Recording, Source
+from armgap.reading import printable
 
 __all__ = ["FORMATS", "Format", "record"]
 
@@ -38,7 +39,7 @@ def record(path: str | Path) -> tuple[Recording, str, Path]:
     if str(path) == "-":
         source, name = Source(path, sys.stdin.buffer.read()), "stdin"
     else:
-        source, name = Source(path), path.stem
+        source, name = Source(path), printable(path.stem)
     return _format(source).read(source), name, path
 
 

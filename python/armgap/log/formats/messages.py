@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from armgap.errors import ColumnError, LogReadError
 from armgap.log.findings import Finding, counted
 from armgap.log.recording import Recording, Stream, Suggestion
-from armgap.progress import tell
+from armgap.progress import report_progress
 
 __all__ = ["KINDS", "Message", "record"]
 
@@ -135,7 +135,7 @@ def record(messages: Iterable[Message], path: Path, seen: Mapping[str, str], cou
     empty: dict[str, int] = {}
     for number, message in enumerate(messages, start=1):
         if count and number % _LOOK == 0:
-            tell(f"reading {path.name}", min(number / count, 1.0))
+            report_progress(f"reading {path.name}", min(number / count, 1.0))
         try:
             rows = KINDS[message.kind](message)
         except (ValueError, TypeError, AttributeError, OverflowError) as error:

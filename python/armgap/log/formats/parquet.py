@@ -13,6 +13,7 @@ from armgap.errors import ArmgapError, LogReadError
 from armgap.log.formats import parquet_structure
 from armgap.log.formats.format import Format, first_line
 from armgap.log.recording import Recording, Source, Stream
+from armgap.reading import is_text
 
 __all__ = ["FORMAT"]
 
@@ -35,7 +36,10 @@ def read(source: Source) -> Recording:
 
 
 def _scan(source: Source) -> pl.LazyFrame:
-    return pl.scan_parquet(source.path if source.data is None else source.data, glob=False)
+    data = source.data
+    if data is None and not is_text(source.path):
+        data = source.path.read_bytes()  # polars takes names that are text only
+    return pl.scan_parquet(source.path if data is None else data, glob=False)
 
 
 def _ends(source: Source) -> None:

@@ -22,7 +22,7 @@ from armgap.log.findings import Finding
 from armgap.log.formats.format import Format, first_line
 from armgap.log.recording import Recording, Source, Stream
 from armgap.log.spellings import unit_of
-from armgap.progress import tell
+from armgap.progress import report_progress
 
 __all__ = ["FORMAT"]
 
@@ -101,7 +101,7 @@ def read(source: Source) -> Recording:
     dialect, rows, said = _dialect(first, lines.comment, rows, source.path)
     table = _Table(findings=findings + said)
     while block := list(islice(rows, _BLOCK)):
-        tell(f"reading {source.path.name}", lines.read / max(source.size, lines.read, 1))
+        report_progress(f"reading {source.path.name}", lines.read / max(source.size, lines.read, 1))
         _add(table, block, dialect, lines, source.path)
     if not table.rows:
         raise LogReadError("holds a header and no samples", remedy="give a log with samples", file=source.path)

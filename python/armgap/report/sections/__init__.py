@@ -6,21 +6,27 @@ from collections.abc import Callable
 
 from armgap.report.page import Section
 from armgap.report.sections.about import data_quality, method
-from armgap.report.sections.causes import evidence, look_alikes, ranking
+from armgap.report.sections.advice import what_next
+from armgap.report.sections.causes import candidates, evidence, look_alikes, ranking
+from armgap.report.sections.checks import checks, input_checks
 from armgap.report.sections.gap import first_picture, gap_map
+from armgap.report.sections.input import conventions
+from armgap.report.sections.model_labels import Data
 from armgap.report.sections.motion import free_run, horizons, predictions
 from armgap.report.sections.parameters import parameters
 from armgap.report.sections.silent import not_shown, ruled_out
-from armgap.report.sections.steps import Data
 
-__all__ = ["SECTIONS"]
+__all__ = ["SECTIONS", "input_checks"]
 
 SECTIONS: tuple[Callable[[Data], Section | None], ...] = (
     first_picture,
+    conventions,
+    checks,
     evidence,
     predictions,
     gap_map,
     ranking,
+    candidates,
     look_alikes,
     parameters,
     not_shown,
@@ -29,5 +35,6 @@ SECTIONS: tuple[Callable[[Data], Section | None], ...] = (
     free_run,
     data_quality,
     method,
+    what_next,
 )
 """Every section, in the order of the page; one that has nothing to say returns None."""

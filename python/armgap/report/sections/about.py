@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 
 from armgap.report.page import Section, Table
-from armgap.report.sections.steps import Data, length_unit
+from armgap.report.sections.model_labels import Data, length_unit
 from armgap.report.words import error_text, figure
 
 __all__ = ["data_quality", "method"]

@@ -7,10 +7,10 @@ from typing import Any
 
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
-from armgap.report.sections.steps import Data, length_unit, load_text
+from armgap.report.sections.model_labels import Data, length_unit, load_text
 from armgap.report.words import error_text, figure, joint_text, named, percent, sizes, symbol_text, title
 
-__all__ = ["evidence", "look_alikes", "ranking"]
+__all__ = ["candidates", "evidence", "look_alikes", "ranking"]
 
 _WORST_SHARE = -9.99
 #: Share explained from which on it is called all.
@@ -26,7 +26,7 @@ def evidence(data: Data) -> Section | None:
         return None
     what = load_text(data)
     text = (
-        f"Dots: the {what} that the model without this cause lacks, on held-out motion. Rings: its mean over a range, with the 95 % interval. "
+        f"Dots: the residual {what} of the model without this cause, on held-out motion. Rings: its mean over a range, with the 95 % interval. "
         "Line: what the fitted law adds in the same samples. A law that is right runs through the rings. Samples at rest are left out, "
         f"where dry friction hides every other {what}."
     )
@@ -113,6 +113,20 @@ def _course(data: Data) -> list[str]:
                 f"Step {len(lines) + 1}: {named(before['added'])} was added, and the error fell from {errors[0]} to {errors[1]} m{unit}."
             )
     return lines
+
+
+def candidates(data: Data) -> Section | None:
+    """Causes that were accepted but are not fit for the headline, and why."""
+    found = data.get("candidates") or []
+    if not found:
+        return None
+    rows = [
+        (named(c), f"{c['probability']:.2f}", sizes(c["parameters"]), percent(c["closed"]), c.get("why") or "")
+        for c in found
+    ]
+    text = "These were fitted like causes, but do not stand on their own. Take them as hints of what to look at, not as findings."
+    header = ("candidate", "probability", "size", "share of the gap removed", "why it is no named cause")
+    return Section("Candidates not fit for the headline", points=[text], tables=[Table(header, rows)])
 
 
 def look_alikes(data: Data) -> Section | None:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from armgap.report import charts
-from armgap.report.page import Bar, Cell, Drawing, Heat, Section, Table, Tile
-from armgap.report.sections.steps import Data, length_unit, load_text, steps, torque_unit
-from armgap.report.words import error_text, figure, percent, variable_text
+from armgap.report.page import Bar, Cell, Drawing, HeatMap, Section, Table, Tile
+from armgap.report.sections.model_labels import Data, length_unit, load_text, model_labels, torque_unit
+from armgap.report.words import error_text, figure, percent, unit_text, variable_text
 
 __all__ = ["first_picture", "gap_map"]
 
@@ -17,6 +17,8 @@ __all__ = ["first_picture", "gap_map"]
 SMALL = 0.01
 #: Where there is no gap, the map shows noise, and is this many times paler.
 PALE = 5.0
+#: A limit of a range counts as zero below this share of the largest limit of its row.
+NOTHING = 1e-4
 
 
 def first_picture(data: Data) -> Section:
@@ -24,20 +26,20 @@ def first_picture(data: Data) -> Section:
     gap = data["gap"]
     unit = length_unit(data)
     joints = [f"joint {j + 1}" for j in range(len(gap["before"]))]
-    series = [(label, [1e3 * v for v in gap[key]], colour) for label, key, colour in steps(data)]
+    series = [(label, [1e3 * v for v in gap[key]], colour) for label, key, colour in model_labels(data)]
     series.append(("sensor noise alone", [1e3 * v for v in gap["floor"]], charts.FLOOR))
     caption = f"How far: RMS prediction error over {gap['horizon_s']:g} s [m{unit}, log scale]"
-    chart = charts.bars("", "", joints, series, log=True, height=280)
+    chart = charts.bars("", f"m{unit}, log scale", joints, series, log=True, height=300)
     key = "before" if data["verdict"] == "parameters" else "refit"
     name = {"before": "arm file's model", "refit": "re-estimated model"}[key]
-    what = f"Where: {load_text(data)} missing in the {name} [RMS, {torque_unit(data)}], by range of each variable, low to high"
+    what = f"Where: {load_text(data)} missing in the {name} [RMS, {torque_unit(data)}]; below the tiles, the limits of each range"
     return Section("", figures=[Drawing(caption, chart, _bars(data))], heats=_heats(data, [(what, key)]))
 
 
 def _bars(data: Data) -> Table:
     """The first chart as a table with bars of text, longest for the largest error."""
     gap = data["gap"]
-    shown = [*((label, key) for label, key, _ in steps(data)), ("sensor noise alone", "floor")]
+    shown = [*((label, key) for label, key, _ in model_labels(data)), ("sensor noise alone", "floor")]
     top = max((v for _, key in shown for v in gap[key]), default=0.0) or 1.0
     rows: list[tuple[Cell, ...]] = [
         (f"joint {j + 1}", label, Bar(gap[key][j] / top, error_text(1e3 * gap[key][j]), charts.BEFORE))
@@ -47,8 +49,8 @@ def _bars(data: Data) -> Table:
     return Table(("joint", "model", f"RMS error over {gap['horizon_s']:g} s [m{length_unit(data)}]"), rows)
 
 
-def _heats(data: Data, wanted: Sequence[tuple[str, str]]) -> list[Heat]:
-    """Maps of the lacking torque, all on one scale: a row per joint and variable, a tile per range, low values first."""
+def _heats(data: Data, wanted: Sequence[tuple[str, str]]) -> list[HeatMap]:
+    """Maps of the residual torque, all on one scale: a row per joint and variable, a tile per range, low values first."""
     regimes = data.get("regimes") or []
     if not regimes:
         return []
@@ -57,7 +59,7 @@ def _heats(data: Data, wanted: Sequence[tuple[str, str]]) -> list[Heat]:
     top = max(v * weight[r["joint"]][0] for r in regimes for _, key in wanted for v in r[key]) or 1.0
     top *= PALE if data["verdict"] == "none" else 1.0
     return [
-        Heat(
+        HeatMap(
             caption,
             [
                 (_row(r), [_tile(data, r, i, v, v * weight[r["joint"]][0] / top) for i, v in enumerate(r[key])])
@@ -82,16 +84,26 @@ def _weights(data: Data) -> dict[int, tuple[float, float]]:
 
 
 def _row(regime: Data) -> str:
-    return f"joint {regime['joint']}: {variable_text(regime['variable'])}"
+    """Joint, variable and unit of a row."""
+    unit = unit_text(regime["unit"]).replace(" ", "\N{NO-BREAK SPACE}")
+    return f"joint {regime['joint']}: {variable_text(regime['variable'])}" + (f" [{unit}]" if unit else "")
 
 
 def _tile(data: Data, regime: Data, i: int, value: float, depth: float) -> Tile:
     span = _groups(regime)[i]
-    text = ("no ", "yes ")[min(i, 1)] if regime["variable"].startswith("reversal") else ""
+    reversal = regime["variable"].startswith("reversal")
+    text = ("no ", "yes ")[min(i, 1)] if reversal else ""
+    low, high = ("", "") if reversal else (_limit(regime, k) for k in (i, i + 1))
     if not regime["count"][i]:
-        return Tile("", 0.0, f"{span}: no samples")
+        return Tile("", 0.0, f"{span}: no samples", low=low, high=high)
     tip = f"{span}: {figure(value)} {torque_unit(data)}, {regime['count'][i]} samples"
-    return Tile(f"{text}{value:.{2 if value >= SMALL else 1}g}", depth, tip, _stands_out(data, regime, i))
+    return Tile(f"{text}{value:.{2 if value >= SMALL else 1}g}", depth, tip, _stands_out(data, regime, i), low, high)
+
+
+def _limit(regime: Data, k: int) -> str:
+    """A limit of a range; what is next to nothing beside the largest is none."""
+    edge, largest = regime["edges"][k], max(abs(e) for e in regime["edges"])
+    return figure(edge if abs(edge) > NOTHING * largest else 0.0, 2)
 
 
 def _stands_out(data: Data, regime: Data, i: int) -> bool:
@@ -106,16 +118,18 @@ def _stands_out(data: Data, regime: Data, i: int) -> bool:
 
 
 def gap_map(data: Data) -> Section | None:
-    """The gap by joint and regime, before and after, on one scale; the same in figures."""
+    """The gap by joint and regime, before and after, on one scale, and as a table of figures."""
     if not data.get("regimes"):
         return None
     what = load_text(data)
     text = (
-        f"The {what} that each model lacks: the curvature of the prediction error within each window, times the inertia. All maps share "
-        f"one scale, on which each joint's {what} counts against what is typical of that joint. Columns are ranges of the variable, low on the "
-        "left; the table below has them in figures. A right cause empties the map where it acts."
+        f"The residual {what} of each model: the curvature of the prediction error within each window, times the inertia. All maps share "
+        f"one scale, on which each joint's {what} counts against what is typical of that joint. The columns of a row are ranges of its variable "
+        "that hold equally many samples; their limits stand below them. A right cause empties the map where it acts."
     )
-    wanted = [(f"{label[:1].upper()}{label[1:]} [RMS, {torque_unit(data)}]", key) for label, key, _ in steps(data)]
+    wanted = [
+        (f"{label[:1].upper()}{label[1:]} [RMS, {torque_unit(data)}]", key) for label, key, _ in model_labels(data)
+    ]
     tables = [_table(data)]
     if data.get("energy"):
         tables.append(_energy(data))
@@ -125,7 +139,7 @@ def gap_map(data: Data) -> Section | None:
 def _energy(data: Data) -> Table:
     """What the missing torque does with energy, per joint and model."""
     does = {"takes": "takes energy", "gives": "gives energy", "both": "takes and gives back"}
-    labels = {key: label for label, key, _ in steps(data)}
+    labels = {key: label for label, key, _ in model_labels(data)}
     rows = [
         [
             f"joint {e['joint']}",
@@ -162,9 +176,9 @@ def _groups(regime: Data) -> list[str]:
 
 
 def _table(data: Data) -> Table:
-    names = [label for label, _, _ in steps(data)]
+    names = [label for label, _, _ in model_labels(data)]
     rows = [
-        (f"joint {r['joint']}", span, str(r["count"][i]), *(figure(r[k][i]) for _, k, _ in steps(data)))
+        (f"joint {r['joint']}", span, str(r["count"][i]), *(figure(r[k][i]) for _, k, _ in model_labels(data)))
         for r in data["regimes"]
         for i, span in enumerate(_groups(r))
     ]

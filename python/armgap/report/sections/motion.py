@@ -8,7 +8,7 @@ import numpy as np
 
 from armgap.report import charts
 from armgap.report.page import Drawing, Section, Table
-from armgap.report.sections.steps import Data, length_unit, steps
+from armgap.report.sections.model_labels import Data, length_unit, model_labels
 from armgap.report.words import each_joint, figure
 
 __all__ = ["free_run", "horizons", "predictions"]
@@ -40,15 +40,17 @@ def predictions(data: Data) -> Section | None:
 
 def _position(data: Data, s: Data) -> Any:
     curves = [("measured", s["measured"], charts.MEASURED)]
-    curves += [(label, s[key], colour) for label, key, colour in steps(data)]
+    curves += [(label, s[key], colour) for label, key, colour in model_labels(data)]
     return charts.lines("", "time [s]", "", s["t"], curves, breaks=s["window_start"])
 
 
 def _error(data: Data, s: Data) -> Any:
-    measured, *predicted = (np.asarray(s[key], dtype=float) for key in ("measured", *(k for _, k, _ in steps(data))))
+    measured, *predicted = (
+        np.asarray(s[key], dtype=float) for key in ("measured", *(k for _, k, _ in model_labels(data)))
+    )
     curves = [
         (label, 1e3 * (measured - values), colour)
-        for (label, _, colour), values in zip(steps(data), predicted, strict=True)
+        for (label, _, colour), values in zip(model_labels(data), predicted, strict=True)
     ]
     return charts.lines("", "time [s]", "", s["t"], curves, breaks=s["window_start"])
 
@@ -59,11 +61,11 @@ def horizons(data: Data) -> Section | None:
     every = sorted([gap, *gap.get("horizons", [])], key=lambda h: float(h["horizon_s"]))
     if len(every) < 2:
         return None
-    header = ("horizon [s]", _ARROW.join(label for label, _, _ in steps(data)), "measurement alone")
+    header = ("horizon [s]", _ARROW.join(label for label, _, _ in model_labels(data)), "measurement alone")
     rows = [
         (
             figure(h["horizon_s"]),
-            each_joint(*(h[key] for _, key, _ in steps(data)), unit=unit),
+            each_joint(*(h[key] for _, key, _ in model_labels(data)), unit=unit),
             each_joint(h["floor"], unit=unit),
         )
         for h in every

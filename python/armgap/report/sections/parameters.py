@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from armgap.report import charts
-from armgap.report.page import Cell, Section, Table, Track
-from armgap.report.sections.steps import Data
+from armgap.report.page import Cell, IntervalLine, Section, Table
+from armgap.report.sections.model_labels import Data
 from armgap.report.words import figure, named, parameter_text, unit_text, value
 
 __all__ = ["parameters"]
@@ -52,7 +52,7 @@ def _moved(entries: list[Any], *, causes: bool) -> Cell:
     if causes:
         dots.append((min(max(away[1] / REACH, -1.0), 1.0), charts.AFTER))
         words += f", with causes {figure(away[1], 2)}"
-    return Track(dots, MIDDLE / REACH, words)
+    return IntervalLine(dots, MIDDLE / REACH, words)
 
 
 def _plausibility(data: Data) -> list[Table]:

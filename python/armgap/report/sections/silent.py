@@ -6,7 +6,7 @@ import functools
 
 from armgap import _native
 from armgap.report.page import Section, Table
-from armgap.report.sections.steps import Data
+from armgap.report.sections.model_labels import Data
 from armgap.report.words import figure, joint_text, named, title, unit_text
 
 __all__ = ["excited_by", "not_shown", "ruled_out"]

@@ -2,7 +2,7 @@
 
 from armgap.trial.commands.all import all_of_it
 from armgap.trial.commands.make import make
-from armgap.trial.commands.run import peers, run
+from armgap.trial.commands.run import baselines, former_name, run
 from armgap.trial.commands.score import score
 
-__all__ = ["all_of_it", "make", "peers", "run", "score"]
+__all__ = ["all_of_it", "baselines", "former_name", "make", "run", "score"]

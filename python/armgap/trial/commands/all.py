@@ -6,7 +6,9 @@ from pathlib import Path
 
 import click
 
-from armgap.cli.common import check_outputs, json_option, quiet_option
+from armgap.cli.common import json_option, quiet_option
+from armgap.cli.files import Command
+from armgap.output import is_stdout
 from armgap.trial.commands.common import cases_option, duration_option, output_option, seed_option, workers_option
 from armgap.trial.commands.run import limit_option
 from armgap.trial.commands.score import md_option
@@ -14,14 +16,17 @@ from armgap.trial.commands.score import md_option
 __all__ = ["all_of_it"]
 
 
-@click.command("all")
+@click.command("all", cls=Command)
 @cases_option
 @seed_option
 @output_option
 @duration_option
 @workers_option
 @limit_option
-@click.option("--peers/--no-peers", "with_peers", default=True, show_default=True, help="Let other methods answer too.")
+@click.option("--baselines/--no-baselines", default=True, show_default=True, help="Let other methods answer too.")
+@click.option(
+    "--peers/--no-peers", "former_name", default=None, hidden=True
+)  # former name of --baselines; goes with 0.3.0
 @json_option
 @md_option
 @quiet_option
@@ -32,22 +37,22 @@ def all_of_it(
     duration: float,
     workers: int,
     limit_s: float,
-    with_peers: bool,
+    baselines: bool,
+    former_name: bool | None,
     json_file: str | None,
     md_file: str | None,
     quiet: bool,
 ) -> None:
-    """Make cases, diagnose them, let peers name causes too, open the keys and score. Goes on where it stopped."""
+    """Make cases, diagnose them, let the baselines name causes too, open the keys and score. Goes on where it stopped."""
     from armgap.trial.commands.make import make_them
     from armgap.trial.commands.run import answer_all
     from armgap.trial.commands.score import score_all
     from armgap.trial.methods import methods
 
-    check_outputs(json_file, md_file)
-    names = list(methods()) if with_peers else ["armgap"]
+    names = list(methods()) if (baselines if former_name is None else former_name) else ["armgap"]
     for name in names:
         methods()[name].check()  # what is not installed is missed now, not after the cases are made
-    silent = quiet or "-" in (json_file, md_file)
+    silent = quiet or is_stdout(json_file, md_file)
     make_them(folder, cases, seed, duration, workers, silent)
     answer_all(folder, names, workers, limit_s, False, silent)
     score_all(folder, json_file, md_file, silent)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import TypeVar
 
 import click
+
+from armgap.cli.files import InputFolder, OutputFolder
+from armgap.cli.numbers import Number, Seed
+from armgap.trial.layout import MOST_CASES, belongs
 
 __all__ = [
     "cases_option",
@@ -20,29 +23,30 @@ __all__ = [
 ]
 
 Item = TypeVar("Item")
+MOST_WORKERS = 1024
 
-folder_argument = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path, exists=True, file_okay=False))
+folder_argument = click.argument("folder", metavar="DIR", type=InputFolder(belongs, exists=True))
 output_option = click.option(
     "-o",
     "--output",
     "folder",
     required=True,
     metavar="DIR",
-    type=click.Path(path_type=Path),
+    type=OutputFolder(belongs),
     help="Folder of the trial.",
 )
 cases_option = click.option(
-    "-n", "--cases", default=200, show_default=True, type=click.IntRange(min=1), help="Number of cases."
+    "-n", "--cases", default=200, show_default=True, type=click.IntRange(1, MOST_CASES), help="Number of cases."
 )
-seed_option = click.option("--seed", type=click.IntRange(min=0), help="Seed of the cases; a fresh one by default.")
+seed_option = click.option("--seed", type=Seed(), help="Seed of the cases; a fresh one by default.")
 duration_option = click.option(
-    "--duration", default=10.0, show_default=True, type=click.FloatRange(1.0, 600.0), help="Length of each log [s]."
+    "--duration", default=10.0, show_default=True, type=Number(1.0, 600.0), help="Length of each log [s]."
 )
 workers_option = click.option(
     "--workers",
     default=os.cpu_count() or 1,
     show_default="one per processor",
-    type=click.IntRange(min=1),
+    type=click.IntRange(1, MOST_WORKERS),
     help="Processes, of one thread each.",
 )
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from armgap.cli.common import console, quiet_option
+from armgap.cli.files import Command
 from armgap.trial.commands.common import (
     cases_option,
     duration_option,
@@ -19,7 +20,7 @@ from armgap.trial.commands.common import (
 __all__ = ["make", "make_them"]
 
 
-@click.command("make")
+@click.command("make", cls=Command)
 @cases_option
 @seed_option
 @output_option

@@ -1,4 +1,4 @@
-"""``armgap trial run`` and ``armgap trial peers``."""
+"""``armgap trial run`` and ``armgap trial baselines``."""
 
 from __future__ import annotations
 
@@ -8,22 +8,26 @@ from pathlib import Path
 import click
 
 from armgap.cli.common import console, quiet_option
+from armgap.cli.files import Command, Words
+from armgap.cli.numbers import Number
 from armgap.trial.commands.common import folder_argument, progress, workers_option
 
-__all__ = ["answer_all", "limit_option", "peers", "run"]
+__all__ = ["answer_all", "baselines", "former_name", "limit_option", "run"]
 
+LONGEST_S = 1e6
+"""Of one case: eleven days; a system's clocks do not wait for ever."""
 limit_option = click.option(
     "--limit",
     "limit_s",
     default=300.0,
     show_default=True,
-    type=click.FloatRange(min=1.0),
+    type=Number(1.0, LONGEST_S),
     help="Longest time for one case [s].",
 )
 again_option = click.option("--again", is_flag=True, help="Answer anew what is answered already.")
 
 
-@click.command("run")
+@click.command("run", cls=Command)
 @folder_argument
 @workers_option
 @limit_option
@@ -34,15 +38,21 @@ def run(folder: Path, workers: int, limit_s: float, again: bool, quiet: bool) ->
     answer_all(folder, ["armgap"], workers, limit_s, again, quiet)
 
 
-@click.command("peers")
+@click.command("baselines", cls=Command)
 @folder_argument
-@click.option("--only", multiple=True, metavar="NAME", help="Only this method; may be repeated. All peers by default.")
+@click.option(
+    "--only",
+    multiple=True,
+    type=Words(),
+    metavar="NAME",
+    help="Only this method; may be repeated. All baselines by default.",
+)
 @workers_option
 @limit_option
 @again_option
 @quiet_option
-def peers(folder: Path, only: tuple[str, ...], workers: int, limit_s: float, again: bool, quiet: bool) -> None:
-    """Let other methods name the causes in DIR, keys closed. Goes on where it stopped."""
+def baselines(folder: Path, only: tuple[str, ...], workers: int, limit_s: float, again: bool, quiet: bool) -> None:
+    """Let other methods, the baselines, name the causes in DIR, keys closed. Goes on where it stopped."""
     from armgap.errors import OptionError
     from armgap.trial.methods import methods
 
@@ -51,6 +61,12 @@ def peers(folder: Path, only: tuple[str, ...], workers: int, limit_s: float, aga
     if unknown:
         raise OptionError(f"--only: no method `{unknown[0]}`", remedy=f"take one of {', '.join(known)}")
     answer_all(folder, list(only) or known, workers, limit_s, again, quiet)
+
+
+#: Former name of the command; goes with 0.3.0.
+former_name = Command(
+    "peers", callback=baselines.callback, params=baselines.params, help=baselines.help, hidden=True, deprecated=True
+)
 
 
 def answer_all(folder: Path, names: Sequence[str], workers: int, limit_s: float, again: bool, quiet: bool) -> None:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armgap.cli.common import check_outputs, console, json_option, quiet_option, write
+from armgap.cli.common import console, json_option, quiet_option
+from armgap.cli.files import Command, OutputFile
+from armgap.output import is_stdout, write
 from armgap.trial.commands.common import folder_argument
 
 if TYPE_CHECKING:
@@ -19,18 +21,21 @@ if TYPE_CHECKING:
 __all__ = ["md_option", "score", "score_all"]
 
 md_option = click.option(
-    "--md", "md_file", metavar="OUT.md", help="Write the tables as Markdown; - is standard output."
+    "--md",
+    "md_file",
+    type=OutputFile(),
+    metavar="OUT.md",
+    help="Write the tables as Markdown; - is standard output.",
 )
 
 
-@click.command("score")
+@click.command("score", cls=Command)
 @folder_argument
 @json_option
 @md_option
 @quiet_option
 def score(folder: Path, json_file: str | None, md_file: str | None, quiet: bool) -> None:
-    """Open the keys of DIR and score armgap and every peer that has answered all cases."""
-    check_outputs(json_file, md_file)
+    """Open the keys of DIR and score armgap and every baseline that has answered all cases."""
     score_all(folder, json_file, md_file, quiet)
 
 
@@ -52,7 +57,7 @@ def score_all(folder: Path, json_file: str | None, md_file: str | None, quiet: b
         write(json_file, json.dumps(data, indent=1))
     if md_file is not None:
         write(md_file, page(found, manifest, seal_of_all(cases)))
-    if not quiet and "-" not in (json_file, md_file):
+    if not (quiet or is_stdout(json_file, md_file)):
         console().print(_table(found))
         for note in partly:
             console().print(note, highlight=False)

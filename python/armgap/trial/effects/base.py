@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armgap.trial.arms import TrialArm
-from armgap.trial.rig import Array, Rig, Trace
+from armgap.trial.simulated_arm import Array, SimulatedArm, Trace
 
 Parameters = dict[str, float]
 #: Logs have a travel in common if it is at least this share of the smallest range of any of them.
@@ -20,7 +20,7 @@ class NoTravelError(ValueError):
 
 
 @dataclass(frozen=True)
-class Use:
+class JointUsage:
     """How one joint is used by a case's motions: the quantities sizes are stated against.
 
     Attributes
@@ -62,11 +62,11 @@ class Use:
         return self.high - self.low
 
 
-def usage(traces: list[Trace], joint: int) -> Use:
+def usage(traces: list[Trace], joint: int) -> JointUsage:
     """Summarise how a joint (from 0) is used, over all logs of a case."""
     tau = np.concatenate([x.tau[:, joint] for x in traces])
     dq = np.concatenate([x.dq_true[:, joint] for x in traces])
-    return Use(
+    return JointUsage(
         torque=float(np.sqrt(np.mean(tau**2))),
         peak=min(float(np.max(np.abs(x.tau[:, joint]))) for x in traces),
         slew=float(np.quantile(np.concatenate([_rate(x, joint) for x in traces]), 0.98)),
@@ -91,7 +91,7 @@ class Draw:
     size: float
     arm: TrialArm
     joint: int
-    use: Use
+    use: JointUsage
 
     def between(self, low: float, high: float) -> float:
         """Geometric interpolation by ``size``."""
@@ -144,7 +144,7 @@ class TrialEffect:
     draw : callable
         Parameters for a :class:`Draw`.
     apply : callable
-        Puts it into a rig, on a joint (from 0), for the log it is given.
+        Puts it into a simulated arm, on a joint (from 0), for the log it is given.
     """
 
     name: str
@@ -152,7 +152,7 @@ class TrialEffect:
     family: str
     kinds: tuple[str, ...]
     draw: Callable[[Draw], Parameters]
-    apply: Callable[[Rig, int, Parameters], None]
+    apply: Callable[[SimulatedArm, int, Parameters], None]
 
 
 ROTARY = ("pendulum", "two-link")
@@ -160,7 +160,7 @@ ANY = ("axis", "pendulum", "two-link")
 TWO_LINK = ("two-link",)
 REGISTRY: dict[str, TrialEffect] = {}
 
-Apply = Callable[[Rig, int, Parameters], None]
+Apply = Callable[[SimulatedArm, int, Parameters], None]
 
 
 def effect(
@@ -171,7 +171,7 @@ def effect(
     family: str = "library",
     kinds: tuple[str, ...] = ANY,
 ) -> Callable[[Apply], Apply]:
-    """Register the decorated function as what puts effect ``name`` into a rig."""
+    """Register the decorated function as what puts effect ``name`` into a simulated arm."""
 
     def register(apply: Apply) -> Apply:
         REGISTRY[name] = TrialEffect(name, per_joint, family, kinds, draw, apply)

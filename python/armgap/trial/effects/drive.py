@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 
-from armgap.trial.chain import DeadZone, Delay, Gain, Lag, MagneticHysteresis, Saturation, SlewLimit
+from armgap.trial.actuator import DeadZone, Delay, Gain, Lag, MagneticHysteresis, Saturation, SlewLimit
 from armgap.trial.effects.base import Draw, Parameters, effect
 from armgap.trial.effects.friction import torque_law
 from armgap.trial.plant import TIME_STEP, Rotor
-from armgap.trial.rig import Rig
+from armgap.trial.simulated_arm import SimulatedArm
 
 SPAN = 2.0 * math.pi
 
 
 @effect("torque_offset", lambda d: {"offset": d.sign() * d.use.torque * d.between(0.01, 0.15)})
-def torque_offset(rig: Rig, joint: int, p: Parameters) -> None:
+def torque_offset(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """A constant torque."""
-    torque_law(rig, joint, lambda x: p["offset"])
+    torque_law(sim, joint, lambda x: p["offset"])
 
 
 def _draw_gain(d: Draw) -> Parameters:
@@ -24,15 +24,15 @@ def _draw_gain(d: Draw) -> Parameters:
 
 
 @effect("torque_gain", _draw_gain)
-def torque_gain(rig: Rig, joint: int, p: Parameters) -> None:
+def torque_gain(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """``gain`` times the command."""
-    rig.actuators[joint].add(Gain(p["gain"]))
+    sim.actuators[joint].add(Gain(p["gain"]))
 
 
 @effect("actuator_lag", lambda d: {"time_constant": d.between(0.001, 0.02)})
-def actuator_lag(rig: Rig, joint: int, p: Parameters) -> None:
+def actuator_lag(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """First-order lag of the torque."""
-    rig.actuators[joint].add(Lag(p["time_constant"]))
+    sim.actuators[joint].add(Lag(p["time_constant"]))
 
 
 def _draw_delay(d: Draw) -> Parameters:
@@ -42,21 +42,21 @@ def _draw_delay(d: Draw) -> Parameters:
 
 
 @effect("actuator_delay", _draw_delay)
-def actuator_delay(rig: Rig, joint: int, p: Parameters) -> None:
+def actuator_delay(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Pure delay of the torque, a whole number of internal steps."""
-    rig.actuators[joint].add(Delay(p["delay"]))
+    sim.actuators[joint].add(Delay(p["delay"]))
 
 
 @effect("torque_saturation", lambda d: {"level": d.use.peak * (1.0 - d.between(0.06, 0.5))})
-def torque_saturation(rig: Rig, joint: int, p: Parameters) -> None:
+def torque_saturation(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Torque clipped at ``level``, below the peaks of every log."""
-    rig.actuators[joint].add(Saturation(p["level"]))
+    sim.actuators[joint].add(Saturation(p["level"]))
 
 
 @effect("torque_dead_zone", lambda d: {"level": d.use.torque * d.between(0.02, 0.3)})
-def torque_dead_zone(rig: Rig, joint: int, p: Parameters) -> None:
+def torque_dead_zone(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """No torque below ``level``, the excess over it above."""
-    rig.actuators[joint].add(DeadZone(p["level"]))
+    sim.actuators[joint].add(DeadZone(p["level"]))
 
 
 def _draw_ripple(d: Draw) -> Parameters:
@@ -70,9 +70,9 @@ def _draw_ripple(d: Draw) -> Parameters:
 
 
 @effect("torque_ripple", _draw_ripple)
-def torque_ripple(rig: Rig, joint: int, p: Parameters) -> None:
+def torque_ripple(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Torque ``amplitude sin(n q + phase)``, cogging."""
-    torque_law(rig, joint, lambda x: p["amplitude"] * math.sin(p["n"] * x.q + p["phase"]))
+    torque_law(sim, joint, lambda x: p["amplitude"] * math.sin(p["n"] * x.q + p["phase"]))
 
 
 def _draw_elasticity(d: Draw) -> Parameters:
@@ -87,12 +87,12 @@ def _draw_elasticity(d: Draw) -> Parameters:
 
 
 @effect("joint_elasticity", _draw_elasticity)
-def joint_elasticity(rig: Rig, joint: int, p: Parameters) -> None:
+def joint_elasticity(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """A rotor, additional to the nominal arm, that drives the joint through a spring and damper.
 
     The encoder and the friction are on the joint's side of the spring.
     """
-    rig.build.rotors[joint] = Rotor(p["rotor_inertia"], p["stiffness"], p["damping"])
+    sim.config.rotors[joint] = Rotor(p["rotor_inertia"], p["stiffness"], p["damping"])
 
 
 #: Share of the joint's inertia that sits before the play.
@@ -100,13 +100,13 @@ BACKLASH_ROTOR = 0.12
 
 
 @effect("backlash", lambda d: {"gap": d.between(2e-3, 4e-2)}, kinds=("pendulum", "two-link"))
-def backlash(rig: Rig, joint: int, p: Parameters) -> None:
+def backlash(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Play of width ``gap`` between motor and joint, both ends together; the encoder is on the joint's side.
 
     The motor's inertia is a share of the last link's, so that without play the arm is the nominal one.
     """
-    inertia = BACKLASH_ROTOR * rig.build.arm.inertia[joint]
-    rig.build.rotors[joint] = Rotor(inertia, gap=p["gap"], part_of_link=True)
+    inertia = BACKLASH_ROTOR * sim.config.arm.inertia[joint]
+    sim.config.rotors[joint] = Rotor(inertia, gap=p["gap"], part_of_link=True)
 
 
 @effect(
@@ -114,9 +114,9 @@ def backlash(rig: Rig, joint: int, p: Parameters) -> None:
     lambda d: {"rate": d.use.slew * d.between(0.7, 0.15)},
     family="outside",
 )
-def slew_limit(rig: Rig, joint: int, p: Parameters) -> None:
+def slew_limit(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Torque that changes by no more than ``rate`` per second."""
-    rig.actuators[joint].add(SlewLimit(p["rate"]))
+    sim.actuators[joint].add(SlewLimit(p["rate"]))
 
 
 @effect(
@@ -124,9 +124,9 @@ def slew_limit(rig: Rig, joint: int, p: Parameters) -> None:
     lambda d: {"width": d.use.torque * d.between(0.1, 0.6), "share": d.uniform(0.4, 0.8)},
     family="outside",
 )
-def motor_hysteresis(rig: Rig, joint: int, p: Parameters) -> None:
+def motor_hysteresis(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Part of the torque follows the command through a play, as the flux in magnetically hard iron."""
-    rig.actuators[joint].add(MagneticHysteresis(p["width"], p["share"]))
+    sim.actuators[joint].add(MagneticHysteresis(p["width"], p["share"]))
 
 
 @effect(
@@ -134,9 +134,9 @@ def motor_hysteresis(rig: Rig, joint: int, p: Parameters) -> None:
     lambda d: {"amplitude": d.between(0.08, 0.5), "n": float(round(4 * SPAN / d.use.travel))},
     family="outside",
 )
-def torque_constant_variation(rig: Rig, joint: int, p: Parameters) -> None:
+def torque_constant_variation(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Torque constant that varies with the rotor's position: ``tau (1 + amplitude sin(n q))``."""
-    torque_law(rig, joint, lambda x: x.tau * p["amplitude"] * math.sin(p["n"] * x.q))
+    torque_law(sim, joint, lambda x: x.tau * p["amplitude"] * math.sin(p["n"] * x.q))
 
 
 @effect(
@@ -147,6 +147,6 @@ def torque_constant_variation(rig: Rig, joint: int, p: Parameters) -> None:
     },
     family="outside",
 )
-def speed_ripple(rig: Rig, joint: int, p: Parameters) -> None:
+def speed_ripple(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Torque ripple that grows with speed: ``amplitude dq sin(n q)``, from an uneven gear."""
-    torque_law(rig, joint, lambda x: p["amplitude"] * x.dq * math.sin(p["n"] * x.q))
+    torque_law(sim, joint, lambda x: p["amplitude"] * x.dq * math.sin(p["n"] * x.q))

@@ -5,27 +5,27 @@ from __future__ import annotations
 import math
 
 from armgap.trial.effects.base import ANY, TWO_LINK, Draw, Parameters, effect
-from armgap.trial.plant import FrictionLaw, Point, TorqueLaw
-from armgap.trial.rig import Rig
+from armgap.trial.plant import FrictionLaw, JointState, TorqueLaw
+from armgap.trial.simulated_arm import SimulatedArm
 
 
-def torque_law(rig: Rig, joint: int, law: TorqueLaw) -> None:
+def torque_law(sim: SimulatedArm, joint: int, law: TorqueLaw) -> None:
     """Add a torque on a joint."""
-    rig.build.torque_laws.setdefault(joint, []).append(law)
+    sim.config.torque_laws.setdefault(joint, []).append(law)
 
 
-def friction_law(rig: Rig, joint: int, law: FrictionLaw) -> None:
+def friction_law(sim: SimulatedArm, joint: int, law: FrictionLaw) -> None:
     """Add to a joint's Coulomb level."""
-    rig.build.friction_laws.setdefault(joint, []).append(law)
+    sim.config.friction_laws.setdefault(joint, []).append(law)
 
 
 @effect("coulomb_asymmetry", lambda d: {"delta": d.sign() * d.coulomb * d.between(0.05, 0.5)})
-def coulomb_asymmetry(rig: Rig, joint: int, p: Parameters) -> None:
+def coulomb_asymmetry(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Levels ``fc + delta`` forward and ``fc - delta`` backward.
 
     At rest friction takes any value between the two, so this is symmetric friction moved by ``-delta``, always.
     """
-    torque_law(rig, joint, lambda x: -p["delta"])
+    torque_law(sim, joint, lambda x: -p["delta"])
 
 
 def _draw_stribeck(d: Draw) -> Parameters:
@@ -36,9 +36,9 @@ def _draw_stribeck(d: Draw) -> Parameters:
 
 
 @effect("stribeck", _draw_stribeck)
-def stribeck(rig: Rig, joint: int, p: Parameters) -> None:
+def stribeck(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """``amplitude exp(-(dq / velocity)^2)`` on the Coulomb level."""
-    friction_law(rig, joint, lambda x, level: p["amplitude"] * math.exp(-((x.dq / p["velocity"]) ** 2)))
+    friction_law(sim, joint, lambda x, level: p["amplitude"] * math.exp(-((x.dq / p["velocity"]) ** 2)))
 
 
 def _draw_quadratic(d: Draw) -> Parameters:
@@ -47,16 +47,16 @@ def _draw_quadratic(d: Draw) -> Parameters:
 
 
 @effect("quadratic_drag", _draw_quadratic)
-def quadratic_drag(rig: Rig, joint: int, p: Parameters) -> None:
+def quadratic_drag(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """``c dq |dq|``, MuJoCo's quadratic damping."""
-    quadratic, cubic = rig.build.drag.get(joint, (0.0, 0.0))
-    rig.build.drag[joint] = (quadratic + p["c"], cubic)
+    quadratic, cubic = sim.config.drag.get(joint, (0.0, 0.0))
+    sim.config.drag[joint] = (quadratic + p["c"], cubic)
 
 
 @effect("load_dependent_friction", lambda d: {"mu": d.between(0.05, 0.4)}, kinds=("pendulum", "two-link"))
-def load_dependent_friction(rig: Rig, joint: int, p: Parameters) -> None:
+def load_dependent_friction(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """``mu |C dq + g|`` on the Coulomb level: the load that gravity and the other link put on the joint."""
-    friction_law(rig, joint, lambda x, level: p["mu"] * abs(x.load))
+    friction_law(sim, joint, lambda x, level: p["mu"] * abs(x.load))
 
 
 def _draw_position(d: Draw) -> Parameters:
@@ -65,9 +65,9 @@ def _draw_position(d: Draw) -> Parameters:
 
 
 @effect("position_dependent_friction", _draw_position, kinds=("pendulum", "two-link"))
-def position_dependent_friction(rig: Rig, joint: int, p: Parameters) -> None:
+def position_dependent_friction(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """``a cos q + b sin q`` on the Coulomb level."""
-    friction_law(rig, joint, lambda x, level: p["a"] * math.cos(x.q) + p["b"] * math.sin(x.q))
+    friction_law(sim, joint, lambda x, level: p["a"] * math.cos(x.q) + p["b"] * math.sin(x.q))
 
 
 def _draw_warmup(d: Draw) -> Parameters:
@@ -78,15 +78,15 @@ def _draw_warmup(d: Draw) -> Parameters:
 
 
 @effect("friction_warmup", _draw_warmup)
-def friction_warmup(rig: Rig, joint: int, p: Parameters) -> None:
+def friction_warmup(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Viscous and Coulomb friction times ``1 + amplitude exp(-t / time_constant)``, from the start of each log."""
-    viscous = rig.build.arm.viscous[joint]
+    viscous = sim.config.arm.viscous[joint]
 
     def excess(t: float) -> float:
         return p["amplitude"] * math.exp(-t / p["time_constant"])
 
-    friction_law(rig, joint, lambda x, level: level * excess(x.t))
-    torque_law(rig, joint, lambda x: -viscous * x.dq * excess(x.t))
+    friction_law(sim, joint, lambda x, level: level * excess(x.t))
+    torque_law(sim, joint, lambda x: -viscous * x.dq * excess(x.t))
 
 
 def _draw_presliding(d: Draw) -> Parameters:
@@ -95,9 +95,9 @@ def _draw_presliding(d: Draw) -> Parameters:
 
 
 @effect("presliding", _draw_presliding)
-def presliding(rig: Rig, joint: int, p: Parameters) -> None:
+def presliding(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Dahl friction beside the Coulomb friction: ``dz/dt = stiffness dq (1 - sgn(dq) z / amplitude)``."""
-    torque_law(rig, joint, Dahl(p["amplitude"], p["stiffness"]))
+    torque_law(sim, joint, Dahl(p["amplitude"], p["stiffness"]))
 
 
 class Dahl:
@@ -110,7 +110,7 @@ class Dahl:
         self._amplitude, self._length = amplitude, amplitude / stiffness
         self._now = self._before = (-math.inf, 0.0, 0.0)  # t, q, z
 
-    def __call__(self, x: Point) -> float:
+    def __call__(self, x: JointState) -> float:
         """Torque on the joint."""
         start = self._before if x.t <= self._now[0] else self._now
         _, q, z = start
@@ -126,15 +126,15 @@ def _draw_asymmetric(d: Draw) -> Parameters:
 
 
 @effect("viscous_asymmetry", _draw_asymmetric, family="further")
-def viscous_asymmetry(rig: Rig, joint: int, p: Parameters) -> None:
+def viscous_asymmetry(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Viscous coefficient ``b + delta`` forward and ``b - delta`` backward."""
-    torque_law(rig, joint, lambda x: -p["delta"] * abs(x.dq))
+    torque_law(sim, joint, lambda x: -p["delta"] * abs(x.dq))
 
 
 @effect("gear_efficiency", lambda d: {"loss": d.between(0.03, 0.3)}, family="further", kinds=ANY)
-def gear_efficiency(rig: Rig, joint: int, p: Parameters) -> None:
+def gear_efficiency(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Share ``loss`` of the motor's torque is lost while it drives (``tau dq > 0``), none while it is driven."""
-    torque_law(rig, joint, lambda x: -p["loss"] * x.tau if x.tau * x.dq > 0 else 0.0)
+    torque_law(sim, joint, lambda x: -p["loss"] * x.tau if x.tau * x.dq > 0 else 0.0)
 
 
 @effect(
@@ -143,7 +143,7 @@ def gear_efficiency(rig: Rig, joint: int, p: Parameters) -> None:
     family="further",
     kinds=TWO_LINK,
 )
-def cross_friction(rig: Rig, joint: int, p: Parameters) -> None:
+def cross_friction(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """``level sgn(dq)`` of the other joint's velocity, as in wrists that share a gear."""
     other = 1 - joint
-    torque_law(rig, joint, lambda x: -p["level"] * math.tanh(x.others[other][1] / 0.01))
+    torque_law(sim, joint, lambda x: -p["level"] * math.tanh(x.others[other][1] / 0.01))

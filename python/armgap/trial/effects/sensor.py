@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 from armgap.trial.effects.base import ROTARY, Draw, Parameters, effect
-from armgap.trial.rig import Rig
+from armgap.trial.simulated_arm import SimulatedArm
 
 
 @effect("encoder_offset", lambda d: {"offset": d.sign() * d.between(0.01, 0.15)}, kinds=ROTARY)
-def encoder_offset(rig: Rig, joint: int, p: Parameters) -> None:
+def encoder_offset(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Measured ``q + offset``."""
-    rig.encoders[joint].offset += p["offset"]
+    sim.encoders[joint].offset += p["offset"]
 
 
 def _draw_eccentricity(d: Draw) -> Parameters:
@@ -20,7 +20,7 @@ def _draw_eccentricity(d: Draw) -> Parameters:
 
 
 @effect("encoder_eccentricity", _draw_eccentricity, kinds=ROTARY)
-def encoder_eccentricity(rig: Rig, joint: int, p: Parameters) -> None:
+def encoder_eccentricity(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Measured ``q + a sin q + b cos q``."""
-    rig.encoders[joint].a += p["a"]
-    rig.encoders[joint].b += p["b"]
+    sim.encoders[joint].a += p["a"]
+    sim.encoders[joint].b += p["b"]

@@ -6,8 +6,8 @@ import math
 
 from armgap.trial.effects.base import ROTARY, TWO_LINK, Draw, Parameters, effect
 from armgap.trial.effects.friction import torque_law
-from armgap.trial.plant import TIME_STEP, Flexure, Point
-from armgap.trial.rig import Rig
+from armgap.trial.plant import TIME_STEP, Flexure, JointState
+from armgap.trial.simulated_arm import SimulatedArm
 
 
 def _draw_payload(d: Draw) -> Parameters:
@@ -18,15 +18,15 @@ def _draw_payload(d: Draw) -> Parameters:
 
 
 @effect("payload", _draw_payload, per_joint=False, kinds=ROTARY)
-def payload(rig: Rig, joint: int, p: Parameters) -> None:
+def payload(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """A point mass on the last link."""
-    rig.build.payload = (p["mass"], p["distance"])
+    sim.config.payload = (p["mass"], p["distance"])
 
 
 @effect("base_tilt", lambda d: {"angle": d.sign() * d.between(0.01, 0.15)}, per_joint=False, kinds=ROTARY)
-def base_tilt(rig: Rig, joint: int, p: Parameters) -> None:
+def base_tilt(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Base turned in the plane of motion: gravity sees ``q1 + angle``."""
-    rig.build.tilt += p["angle"]
+    sim.config.tilt += p["angle"]
 
 
 def _draw_spring(d: Draw) -> Parameters:
@@ -35,9 +35,9 @@ def _draw_spring(d: Draw) -> Parameters:
 
 
 @effect("joint_spring", _draw_spring)
-def joint_spring(rig: Rig, joint: int, p: Parameters) -> None:
+def joint_spring(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """``k (q - q0)``, MuJoCo's joint stiffness."""
-    rig.build.spring[joint] = (p["k"], p["q0"], 0.0)
+    sim.config.spring[joint] = (p["k"], p["q0"], 0.0)
 
 
 def _draw_armature(d: Draw) -> Parameters:
@@ -47,9 +47,9 @@ def _draw_armature(d: Draw) -> Parameters:
 
 
 @effect("rotor_inertia", _draw_armature)
-def rotor_inertia(rig: Rig, joint: int, p: Parameters) -> None:
+def rotor_inertia(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Inertia on the joint's own acceleration, MuJoCo's armature."""
-    rig.build.armature[joint] = p["inertia"]
+    sim.config.armature[joint] = p["inertia"]
 
 
 def _draw_contact(d: Draw) -> Parameters:
@@ -62,17 +62,17 @@ def _draw_contact(d: Draw) -> Parameters:
 
 
 @effect("contact", _draw_contact)
-def contact(rig: Rig, joint: int, p: Parameters) -> None:
+def contact(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Spring and damper beyond ``position``, on the side away from zero; it pushes and never pulls."""
     side = math.copysign(1.0, p["position"])
 
-    def push(x: Point) -> float:
+    def push(x: JointState) -> float:
         depth = side * (x.q - p["position"])
         force = p["stiffness"] * depth + p["damping"] * side * x.dq
         return -side * max(force, 0.0) if depth > 0 else 0.0
 
-    torque_law(rig, joint, push)
-    rig.build.edges.setdefault(joint, []).append(p["position"])
+    torque_law(sim, joint, push)
+    sim.config.discontinuities.setdefault(joint, []).append(p["position"])
 
 
 def _draw_pulse(d: Draw) -> Parameters:
@@ -86,10 +86,10 @@ def _draw_pulse(d: Draw) -> Parameters:
 
 
 @effect("external_pulse", _draw_pulse)
-def external_pulse(rig: Rig, joint: int, p: Parameters) -> None:
+def external_pulse(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """A constant torque of the given impulse for ``duration`` around ``time``."""
     half, torque = 0.5 * p["duration"], p["impulse"] / p["duration"]
-    torque_law(rig, joint, lambda x: torque if abs(x.t - p["time"]) < half else 0.0)
+    torque_law(sim, joint, lambda x: torque if abs(x.t - p["time"]) < half else 0.0)
 
 
 def _draw_hardening(d: Draw) -> Parameters:
@@ -98,9 +98,9 @@ def _draw_hardening(d: Draw) -> Parameters:
 
 
 @effect("hardening_spring", _draw_hardening, family="further")
-def hardening_spring(rig: Rig, joint: int, p: Parameters) -> None:
+def hardening_spring(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """``k (q - q0) + cubic (q - q0)^3``, MuJoCo's polynomial stiffness."""
-    rig.build.spring[joint] = (p["k"], p["q0"], p["cubic"])
+    sim.config.spring[joint] = (p["k"], p["q0"], p["cubic"])
 
 
 def _draw_coupling(d: Draw) -> Parameters:
@@ -109,9 +109,9 @@ def _draw_coupling(d: Draw) -> Parameters:
 
 
 @effect("rotor_coupling", _draw_coupling, per_joint=False, family="further", kinds=TWO_LINK)
-def rotor_coupling(rig: Rig, joint: int, p: Parameters) -> None:
+def rotor_coupling(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Geared rotor of joint 2 on link 1: ``inertia (dq1 + gear dq2)^2 / 2``, MuJoCo's tendon armature."""
-    rig.build.coupling = (p["inertia"], p["gear"])
+    sim.config.coupling = (p["inertia"], p["gear"])
 
 
 @effect(
@@ -119,10 +119,10 @@ def rotor_coupling(rig: Rig, joint: int, p: Parameters) -> None:
     lambda d: {"c3": (d.coulomb + d.arm.viscous[d.joint] * d.use.speed) * d.between(0.2, 1.5) / d.use.speed**3},
     family="further",
 )
-def cubic_drag(rig: Rig, joint: int, p: Parameters) -> None:
+def cubic_drag(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """``c3 dq^3``, MuJoCo's cubic damping."""
-    quadratic, cubic = rig.build.drag.get(joint, (0.0, 0.0))
-    rig.build.drag[joint] = (quadratic, cubic + p["c3"])
+    quadratic, cubic = sim.config.drag.get(joint, (0.0, 0.0))
+    sim.config.drag[joint] = (quadratic, cubic + p["c3"])
 
 
 def _draw_flexure(d: Draw) -> Parameters:
@@ -133,6 +133,6 @@ def _draw_flexure(d: Draw) -> Parameters:
 
 
 @effect("link_flexibility", _draw_flexure, per_joint=False, family="outside")
-def link_flexibility(rig: Rig, joint: int, p: Parameters) -> None:
+def link_flexibility(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     """Outer part of the last link on a spring and damper: one more mode."""
-    rig.build.flexure = Flexure(p["stiffness"], p["damping"])
+    sim.config.flexure = Flexure(p["stiffness"], p["damping"])

@@ -1,12 +1,5 @@
-"""Other ways to name a cause, answering the same sealed cases; one file each, one line in :data:`PEERS`."""
+"""Former name of `armgap.trial.baselines`; goes with 0.3.0."""
 
-from __future__ import annotations
+from armgap._renamed import old_names
 
-from armgap.trial.methods import Method
-from armgap.trial.peers.constant import CONSTANT
-from armgap.trial.peers.correlation import CORRELATION
-from armgap.trial.peers.frols import FROLS
-from armgap.trial.peers.stepwise import STEPWISE
-from armgap.trial.peers.sysid import SYSID
-
-PEERS: tuple[Method, ...] = (SYSID, STEPWISE, CORRELATION, FROLS, CONSTANT)
+__getattr__ = old_names(__name__)

@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any
 
 from armgap.simulation import effects
-from armgap.trial.answers import Answer, Name, Named
+from armgap.trial.answers import Answer, Name, NamedCause
 from armgap.trial.key import Key
 from armgap.trial.verdict import describe, equivalent
 
@@ -38,7 +38,7 @@ class CaseScore:
     visible : float
         How far the least visible hidden effect stands above what the measurement leaves; see
         `armgap.trial.visibility`.
-    named : tuple of Named
+    named : tuple of NamedCause
         What was named, first cause first.
     matches : tuple of bool
         Which of them are hidden, or equivalents of a hidden one.
@@ -60,7 +60,7 @@ class CaseScore:
     style: str
     hidden: tuple[Name, ...]
     visible: float
-    named: tuple[Named, ...]
+    named: tuple[NamedCause, ...]
     matches: tuple[bool, ...]
     right: bool
     exact: bool
@@ -151,5 +151,5 @@ def _right(group: str, matches: tuple[bool, ...]) -> bool:
     return not matches
 
 
-def _listed(first: Named, match: bool, hidden: Sequence[Name]) -> bool:
+def _listed(first: NamedCause, match: bool, hidden: Sequence[Name]) -> bool:
     return match or any(equivalent(alike, h) for alike in first.look_alikes for h in hidden)

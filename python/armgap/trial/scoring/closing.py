@@ -21,7 +21,7 @@ from armgap.trial.answers import Answer
 from armgap.trial.key import Key
 from armgap.trial.methods import HORIZON
 from armgap.trial.sealed import SealedCase
-from armgap.trial.windows import Array, Mechanism, Placed, Window, cut, misses
+from armgap.trial.windows import Array, Mechanism, NativeEffect, Window, cut, misses
 
 __all__ = ["HISTORY", "Closing", "closing", "model_error"]
 
@@ -73,7 +73,7 @@ def closing(folder: Path, answer: Answer, key: Key) -> Closing | None:
     return Closing(folder.name, *(tuple(float(x) for x in r) for r in rms))
 
 
-def model_error(arm: Arm, theta: Array, windows: Sequence[Window], placed: Sequence[Placed]) -> Array:
+def model_error(arm: Arm, theta: Array, windows: Sequence[Window], placed: Sequence[NativeEffect]) -> Array:
     """RMS error per joint of a model on windows, starts read through the encoders that it has."""
     lengths = () if arm.link_length is None else tuple(arm.link_length.tolist())
     error = misses(Mechanism(arm.kind, arm.gravity, lengths), theta, [_read(w, placed) for w in windows], placed)
@@ -81,12 +81,12 @@ def model_error(arm: Arm, theta: Array, windows: Sequence[Window], placed: Seque
     return rms
 
 
-def _simulable(placed: Sequence[Placed]) -> bool:
+def _simulable(placed: Sequence[NativeEffect]) -> bool:
     known = {e["name"] for e in effects()}
     return all(name in known and name not in HISTORY for name, _, _ in placed)
 
 
-def _read(w: Window, placed: Sequence[Placed]) -> Window:
+def _read(w: Window, placed: Sequence[NativeEffect]) -> Window:
     """The window with its start as the joint has it, where the encoder shows something else."""
     q, dq = w.q0.copy(), w.dq0.copy()
     for name, joint, p in placed:

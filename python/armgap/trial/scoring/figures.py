@@ -114,8 +114,8 @@ class Figures:
     @property
     def coverage(self) -> Share:
         """95 % intervals of sizes that hold the truth."""
-        told = [s.covered for s in self.sizes if s.covered is not None]
-        return Share(sum(told), len(told))
+        stated = [s.covered for s in self.sizes if s.covered is not None]
+        return Share(sum(stated), len(stated))
 
     @property
     def bounds_hold(self) -> Share:
@@ -145,7 +145,7 @@ class Figures:
         for c in self.cases:
             if c.located is not None:
                 groups.setdefault(c.group, []).append(c.located)
-        return {g: Share(sum(told), len(told)) for g, told in groups.items()}
+        return {g: Share(sum(stated), len(stated)) for g, stated in groups.items()}
 
     @property
     def seconds(self) -> tuple[float, float]:

@@ -97,11 +97,11 @@ def _partial(all_figures: Sequence[Figures]) -> str:
         if can is None:
             continue
         asked = {c.case for c in f.visible if all(effect in can for effect, _ in c.hidden)}
-        own, ours = (share([c for c in x.visible if c.case in asked]) for x in (f, all_figures[0]))
+        theirs, ours = (share([c for c in x.visible if c.case in asked]) for x in (f, all_figures[0]))
         title = methods()[f.method].title
         lines.append(
             f"\n\n{title} has parameters for {len(can)} of the effects only. In the cases that hide nothing else it is right in "
-            f"{_plain(own)}, armgap in {_plain(ours)}."
+            f"{_plain(theirs)}, armgap in {_plain(ours)}."
         )
     return "".join(lines)
 
@@ -126,10 +126,10 @@ def _groups(all_figures: Sequence[Figures]) -> str:
     unexplained = sum(c.verdict == "unexplained" for c in outside)
     believed = sum(any(n.probability > 0.5 for n in c.named) for c in outside)
     places = all_figures[0].located
-    told = [f"{_plain(places[g])} ({g})" for g in GROUPS if g in places]
+    stated = [f"{_plain(places[g])} ({g})" for g in GROUPS if g in places]
     located = (
-        f"On arms with two joints the one said to bear most of the gap is the hidden effect's in {', '.join(told)}. "
-        if told
+        f"On arms with two joints the one said to bear most of the gap is the hidden effect's in {', '.join(stated)}. "
+        if stated
         else ""
     )
     pairs = [c for c in all_figures[0].cases if c.group == "two effects"]
@@ -159,7 +159,7 @@ def _bands(all_figures: Sequence[Figures]) -> str:
     rows = [(name, *(_plain(s.get(name)) for s in shares)) for name in shares[0]]
     return (
         "## By how far the effect stands out\n\nError of predictions over 0.2 s with the re-estimated arm, where it is largest, "
-        "as a multiple of what it is without the effect; of a pair, the fainter.\n\n"
+        "as a multiple of what it is without the effect; of a pair, the smaller.\n\n"
         + table(("stands out by", *_titles(all_figures)), rows)
     )
 
@@ -191,7 +191,7 @@ def _calibration(first: Figures) -> str:
 
 
 def _sizes(first: Figures) -> str:
-    told = (
+    stated = (
         []
         if first.size_error is None
         else [("median error of sizes, of causes rightly named", f"{first.size_error:.2%}")]
@@ -216,7 +216,7 @@ def _sizes(first: Figures) -> str:
         )
     rows = [
         *closed,
-        *told,
+        *stated,
         ("95 % intervals of sizes that hold the hidden size", _percent(first.coverage)),
         ("hidden effects called absent whose 95 % bound holds", _plain(first.bounds_hold)),
         ("look-alikes listed beside the first cause, mean", f"{first.alike:.1f}"),

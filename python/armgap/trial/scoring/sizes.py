@@ -1,12 +1,12 @@
-"""How well sizes are told: error of a named cause's size, intervals that hold the truth, bounds of what is called absent."""
+"""How well sizes are stated: error of a named cause's size, intervals that hold the truth, bounds of what is called absent."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-from armgap.trial.answers import Answer, Limit, Named
-from armgap.trial.key import Hidden, Key
+from armgap.trial.answers import AbsentEffect, Answer, NamedCause
+from armgap.trial.key import HiddenEffect, Key
 from armgap.trial.verdict import equivalent
 
 __all__ = ["BoundScore", "SizeScore", "bound_scores", "size_scores"]
@@ -106,25 +106,25 @@ def bound_scores(answer: Answer, key: Key) -> list[BoundScore]:
     return found
 
 
-def _size(cause: Named, hidden: Hidden) -> SizeScore:
+def _size(cause: NamedCause, hidden: HiddenEffect) -> SizeScore:
     if cause.effect in VECTOR:
         return _vector(cause, hidden, VECTOR[cause.effect])
     key = MAIN[cause.effect]
     truth = _truth(hidden, key)
-    told, sigma = cause.sizes[key].value - NEUTRAL.get(cause.effect, 0.0), cause.sizes[key].sigma
+    stated, sigma = cause.sizes[key].value - NEUTRAL.get(cause.effect, 0.0), cause.sizes[key].sigma
     if key == "amplitude" and cause.effect == "torque_ripple":
-        told, truth = abs(told), abs(truth)  # the sign is in the phase
-    return SizeScore(cause.effect, abs(told - truth) / abs(truth), _covers(told - truth, sigma))
+        stated, truth = abs(stated), abs(truth)  # the sign is in the phase
+    return SizeScore(cause.effect, abs(stated - truth) / abs(truth), _covers(stated - truth, sigma))
 
 
-def _truth(hidden: Hidden, key: str) -> float:
+def _truth(hidden: HiddenEffect, key: str) -> float:
     """Hidden size in the library's terms, from its neutral value."""
     if hidden.effect == "rotor_coupling":  # the library states what the rotor adds off the diagonal
         return hidden.parameters["inertia"] * hidden.parameters["gear"]
     return hidden.parameters[key] - NEUTRAL.get(hidden.effect, 0.0)
 
 
-def _vector(cause: Named, hidden: Hidden, keys: tuple[str, ...]) -> SizeScore:
+def _vector(cause: NamedCause, hidden: HiddenEffect, keys: tuple[str, ...]) -> SizeScore:
     apart = [cause.sizes[k].value - hidden.parameters[k] for k in keys]
     covers = [_covers(d, cause.sizes[k].sigma) for d, k in zip(apart, keys, strict=True)]
     covered = None if None in covers else all(c is True for c in covers)
@@ -136,5 +136,5 @@ def _covers(difference: float, sigma: float | None) -> bool | None:
     return None if sigma is None or sigma <= 0 else abs(difference) <= Z_95 * sigma
 
 
-def _bound(limit: Limit, hidden: Hidden) -> BoundScore:
+def _bound(limit: AbsentEffect, hidden: HiddenEffect) -> BoundScore:
     return BoundScore(hidden.effect, hidden.joint, limit.value, _truth(hidden, limit.parameter))

@@ -1,0 +1,93 @@
+"""Holdout logs that hold rows of the training logs: their contents are compared, whatever the files are called.
+
+A row is the same if all its positions and torques are. Rows that occur more than once in a log (a joint at rest) say nothing. What is
+left has to agree in time too: the same distance between the clocks for many rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.check.check import Check
+from armgap.check.outcome import ranges
+from armgap.log import Log
+
+__all__ = ["copied_holdout"]
+
+# Rows at the same distance in time that make a copy; two runs of one experiment do not agree to the last digit so often.
+_FEWEST = 40
+# Distances in time are told apart by this part of a period.
+_APART = 0.5
+# A hole of so many rows in a copied range is filled: rows that occur twice.
+_HOLE = 50
+
+
+def copied_holdout(training: Sequence[Log], holdout: Sequence[Log]) -> list[Check]:
+    """Say which holdout logs hold rows of training logs.
+
+    Parameters
+    ----------
+    training, holdout : sequence of Log
+        Logs that are learnt from, and judged on.
+
+    Returns
+    -------
+    list of Check
+        One for each pair that shares rows, with the rows of the holdout log.
+    """
+    known = [_rows(log) for log in training]
+    checks = []
+    for held in holdout:
+        its_rows = _rows(held)
+        for log, theirs in zip(training, known, strict=True):
+            rows = _common(log, theirs, held, its_rows)
+            if len(rows):
+                said = (
+                    f"{100 * len(rows) / len(held):.0f} % of its rows are rows of {log.name}, which is learnt from: "
+                    "its figures flatter"
+                )
+                remedy = ("hold out a log of another run",)
+                checks.append(Check("copied_holdout", "warning", said, remedy, None, held.name, ranges(rows)))
+    return checks
+
+
+def _rows(log: Log) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:
+    """Return a number for each row's contents, sorted, and the row, of contents that occur once."""
+    keys = np.zeros(len(log), dtype=np.uint64)
+    for column in (*log.q.T, *log.tau.T):
+        # Multiply and shift (a mixing step of SplitMix64): equal rows give equal numbers, others hardly ever.
+        keys ^= (np.ascontiguousarray(column) + 0.0).view(np.uint64)
+        keys *= np.uint64(0xBF58476D1CE4E5B9)
+        keys ^= keys >> np.uint64(31)
+    numbers, first, counts = np.unique(keys, return_index=True, return_counts=True)
+    return numbers[counts == 1], first[counts == 1]
+
+
+def _common(
+    log: Log,
+    theirs: tuple[NDArray[np.uint64], NDArray[np.intp]],
+    held: Log,
+    its_rows: tuple[NDArray[np.uint64], NDArray[np.intp]],
+) -> NDArray[np.intp]:
+    """Return the rows of the holdout log that stand in the training log at one distance in time."""
+    _, here, there = np.intersect1d(its_rows[0], theirs[0], assume_unique=True, return_indices=True)
+    if len(here) < _FEWEST:
+        return np.arange(0)
+    mine, its = its_rows[1][here], theirs[1][there]
+    apart = np.round((held.t[mine] - log.t[its]) / (_APART * held.sample_period))
+    distances, counts = np.unique(apart, return_counts=True)
+    best = distances[np.argmax(counts)]
+    same = np.abs(apart - best) <= 1
+    if np.count_nonzero(same) < _FEWEST:
+        return np.arange(0)
+    return _filled(np.sort(mine[same]))
+
+
+def _filled(rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return rows with small holes closed."""
+    ends = np.flatnonzero(np.diff(rows) > _HOLE)
+    parts = zip(rows[np.r_[0, ends + 1]], rows[np.r_[ends, len(rows) - 1]], strict=True)
+    return np.concatenate([np.arange(a, b + 1) for a, b in parts])

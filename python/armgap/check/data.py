@@ -1,0 +1,72 @@
+"""The checks that need the columns of one log only, in the order in which defects hide each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm import Arm
+from armgap.check import filtered, quantized, repeated, spike, stamps, wrapped
+from armgap.check.check import Check
+from armgap.check.copied import copied_holdout
+from armgap.check.outcome import Outcome
+from armgap.log import Log
+
+__all__ = ["LOG_CHECKS", "copied_holdout", "data_checks"]
+
+LOG_CHECKS: tuple[Callable[[Log, Arm | None], Outcome], ...] = (
+    wrapped.look,
+    spike.look,
+    repeated.look,
+    stamps.look,
+    filtered.look,
+    quantized.look,
+)
+
+_REMEDY = "leave out --no-repair"
+
+
+def data_checks(log: Log, arm: Arm | None, *, repair: bool) -> tuple[Log, list[Check]]:
+    """Look for defects that a log shows by itself, and repair those that can be repaired without guessing.
+
+    Parameters
+    ----------
+    log : Log
+        Log as it was read.
+    arm : Arm, optional
+        Arm it belongs to; the step of its encoders is used, and whether its joints turn.
+    repair : bool
+        Whether to repair. Without it, what could be repaired is a warning.
+
+    Returns
+    -------
+    log : Log
+        The repaired log, or the log itself.
+    checks : list of Check
+        What was noticed; rows are those of the log as it was given.
+    """
+    current, rows = log, None
+    said: list[Check] = []
+    for look in LOG_CHECKS:
+        outcome = look(current, arm)
+        said += [_worded(check, outcome, rows, repair=repair) for check in outcome.checks]
+        if outcome.repaired is None:
+            continue
+        current = outcome.repaired
+        if outcome.kept is not None:
+            rows = outcome.kept if rows is None else rows[outcome.kept]
+    return (current if repair else log), said
+
+
+def _worded(check: Check, outcome: Outcome, rows: NDArray[np.intp] | None, *, repair: bool) -> Check:
+    """Return a check with rows of the original log, and with what was done or could be."""
+    if rows is not None:
+        check = replace(check, rows=tuple((int(rows[a]), int(rows[b])) for a, b in check.rows))
+    if check.severity != "repaired":
+        return check
+    if repair:
+        return replace(check, message=f"{check.message}; {outcome.deed}")
+    return replace(check, severity="warning", remedies=(_REMEDY,))

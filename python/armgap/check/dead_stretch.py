@@ -1,0 +1,98 @@
+"""`dead_stretch`: torques zero or constant for a stretch in which the arm moves as if it were driven."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm import Arm
+from armgap.check.check import Check
+from armgap.check.equation_error import EquationError, Rows, bounds
+from armgap.log import Log
+
+__all__ = ["find"]
+
+# A torque that stays the same for so long [s] is a stretch.
+_SHORTEST_S = 0.4
+# The filters have forgotten what was before after this time [s], six of their time constants.
+_FORGOTTEN_S = 0.2
+# The equation of motion leaves so many times more there (mean square) than elsewhere, and this share of the joint's torque.
+_WORSE = 25.0
+_SHARE = 0.1
+# Rows that a judgement needs, inside and outside.
+_FEWEST = 30
+
+
+def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
+    """Return the stretches of each log whose torque was not recorded."""
+    checks = []
+    for log in logs:
+        runs = [(j, first, last) for j in range(log.n_joints) for first, last in _constant(log, j)]
+        if runs:
+            checks += _judged(log, arm, runs)
+    return checks
+
+
+def _constant(log: Log, j: int) -> list[tuple[int, int]]:
+    """Return ranges of samples over which a joint's torque does not change although it does elsewhere."""
+    tau = log.tau[:, j]
+    if np.all(tau == tau[0]):
+        return []
+    edges = np.flatnonzero(np.diff(tau) != 0) + 1
+    first, last = np.concatenate([[0], edges]), np.concatenate([edges, [len(tau)]]) - 1
+    long = log.t[last] - log.t[first] >= _SHORTEST_S
+    return list(zip(first[long].tolist(), last[long].tolist(), strict=True))
+
+
+def _judged(log: Log, arm: Arm, runs: Sequence[tuple[int, int, int]]) -> list[Check]:
+    rows = Rows.of(log, arm)
+    dead = np.zeros((len(rows.y), log.n_joints), dtype=bool)
+    alive = np.ones(len(rows.y), dtype=bool)
+    when = log.t[rows.samples]
+    for j, first, last in runs:
+        # The filters forget what was before, or what was missing, within this time.
+        settled = log.t[first] + _FORGOTTEN_S
+        dead[(when >= settled) & (when <= log.t[last]), j] = True
+        alive &= (when < log.t[first]) | (when > log.t[last] + _FORGOTTEN_S)
+    if alive.sum() < _FEWEST:
+        return []
+    outside = Rows(rows.psi[alive], rows.y[alive], rows.samples[alive])
+    base = EquationError([outside], arm)
+    residual = rows.y - rows.psi @ base.fit(*bounds(arm)).theta
+    checks = []
+    for j, first, last in runs:
+        inside = dead[:, j] & (rows.samples >= first) & (rows.samples <= last)
+        if inside.sum() < _FEWEST:
+            continue
+        within = float(np.mean(residual[inside, j] ** 2))
+        if within > _WORSE * float(np.mean(residual[alive, j] ** 2)) and within > _SHARE * float(base.scale[j]):
+            checks.append(_check(log, j, first, last, within, residual[alive, j]))
+    return _merged(checks)
+
+
+def _check(log: Log, j: int, first: int, last: int, within: float, outside: NDArray[np.float64]) -> Check:
+    begins, ends = float(log.t[first]), float(log.t[last])
+    message = (
+        f"`tau{j + 1}` stays at {log.tau[first, j]:.4g} from {begins:.4g} to {ends:.4g} s while the joint moves as if driven: the "
+        f"torque that is missing there is {np.sqrt(within):.3g} (RMS), elsewhere {np.sqrt(float(np.mean(outside**2))):.2g}"
+    )
+    remedy = f"--skip {log.recording}:{begins:.4g}-{ends:.4g}"
+    return Check(
+        "dead_stretch",
+        "error",
+        message,
+        (remedy,),
+        j + 1,
+        log.recording,
+        ((first + log.first_row, last + log.first_row),),
+    )
+
+
+def _merged(checks: list[Check]) -> list[Check]:
+    """Return one check per stretch, of the whole arm where all joints' torques are missing."""
+    by_rows: dict[tuple[tuple[int, int], ...], list[Check]] = {}
+    for check in checks:
+        by_rows.setdefault(check.rows, []).append(check)
+    return [group[0] for group in by_rows.values()]

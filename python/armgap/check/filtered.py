@@ -1,0 +1,171 @@
+"""Positions that are smoother than their encoder: low-passed, interpolated from a slower rate, or fitted.
+
+A raw encoder adds white noise, its step over the square root of 12 while the joint moves: differences of every order, each in its own
+norm, give the same deviation once motion has faded. A low-pass leaves less of it, and less by higher orders; interpolation leaves
+none between its knots. Numbers that are exact to their last digit never were an encoder's; a simulation of dry friction still has
+the kinks of its reversals, which a low-pass would have taken away.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm import Arm
+from armgap.check.check import Check
+from armgap.check.numbers import ORDERS, blocks, from_neighbours, grid_step, noise_by_order, rounding, travel_per_row
+from armgap.check.outcome import NOTHING, Outcome
+from armgap.log import Log
+
+__all__ = ["look"]
+
+Array = NDArray[np.float64]
+
+# Noise below this part of the encoder's is not the encoder's.
+_OF_ENCODER = 0.5
+# By differences of order 6 noise appears larger than by order 12 by this factor if it falls towards high frequencies.
+_COLOURED = 1.3
+# Counts per row from which rounding is white.
+_WHITE_COUNTS = 1.0
+# A joint moves where it gets on by more than this part of its usual fast pace, per row.
+_MOVES = 0.05
+# Positions that are held in this share of the rows in motion are another defect.
+_HELD = 0.1
+# Rows in motion that have to speak, and reversals that an exact log has to pass smoothly.
+_FEWEST, _REVERSALS = 200, 4
+# Numbers are exact within so many roundings, fourth differences within so many times more.
+_EXACT, _FOURTH = 20.0, 8.0
+# Rows whose neighbours are a period away within this part: differences mean something there.
+_EVEN = 0.2
+# Interpolation leaves this share of the fourth differences exact, and others this much larger than what is exact. Rounding to a grid
+# makes up to so many steps of it more often than none.
+_PIECEWISE, _KNOTS, _FEW_COUNTS = 0.05, 1e3, 5
+# Those others are of any size: what one in ten exceeds is so many times what one in twenty stays below. Steps of a grid make it 4.
+_ANY_SIZE, _FEWEST_KNOTS = 20.0, 20
+# Torques that explain this share of the high frequencies, with an inertia above zero, speak for motion. A controller's torques follow
+# the encoder's noise, and so does what a low-pass leaves of it, by half or so.
+_EXPLAINED = 0.9
+_HALF = 6
+_DOUBLE = float(np.finfo(np.float64).eps)
+
+
+def look(log: Log, arm: Arm | None) -> Outcome:
+    """Say which joints' positions have less noise at high frequencies than any encoder."""
+    steps = None if arm is None else arm.encoder_step
+    found = []
+    for j in range(log.n_joints):
+        step = None if steps is None else float(steps[j])
+        dry = arm is None or float(arm.theta[len(arm.theta) - arm.n_joints + j]) > 0
+        why = _why(log, j, step, dry)
+        if why:
+            remedy = ("log positions as the encoder gives them",)
+            found.append(Check("filtered_positions", "warning", f"q{j + 1} {why}", remedy, j + 1, log.name))
+    return Outcome(tuple(found)) if found else NOTHING
+
+
+def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
+    """Return what speaks against a raw encoder; empty if nothing does."""
+    rows = blocks(len(log))
+    pieces = [np.ascontiguousarray(log.q[r, j]) for r in rows]
+    paces = [travel_per_row(q, _HALF) for q in pieces]
+    usual = float(np.quantile(np.concatenate(paces), 0.9))
+    grid = grid_step(np.concatenate(pieces))
+    slowest = max(_MOVES * usual, _WHITE_COUNTS * max(step or 0.0, grid or 0.0))
+    moving = [p > slowest for p in paces]
+    count = sum(int(np.count_nonzero(m)) for m in moving)
+    if count < _FEWEST or _stale(pieces, moving) > _HELD * count:
+        return ""
+    even = [m & _even(log.t[r], log.sample_period) for r, m in zip(rows, moving, strict=True)]
+    spaced = sum(int(np.count_nonzero(m)) for m in even) >= _FEWEST
+    least = _over_times(log, j, rows, moving)
+    if spaced:
+        squares, middle = noise_by_order(pieces, even)
+        exact = _EXACT * max(rounding(q) for q in pieces)
+        if why := _unmeasured(pieces, even, exact, grid or 0.0):
+            return why
+        if middle[-1] <= exact:
+            smooth = (
+                dry and squares[-1] <= _EXACT * _DOUBLE * _largest(pieces) and _reversals(pieces, even) >= _REVERSALS
+            )
+            return "is smooth to its last digit, reversals included: filtered, fitted or computed" if smooth else ""
+        least = min(least, float(squares.min()))
+    driven = _driven(log, j, rows, even) if spaced else False
+    if step is not None and least < _OF_ENCODER * step / np.sqrt(12) and not driven:
+        return (
+            f"has noise of {least:.2g} at high frequencies where the encoder's step of {step:.3g} makes {step / np.sqrt(12):.2g}: "
+            "filtered, interpolated, or of a finer encoder than the arm file's"
+        )
+    if grid is not None and least < _OF_ENCODER * grid / np.sqrt(12) and not driven:
+        return f"has noise of {least:.2g} at high frequencies, less than its own steps of {grid:.3g} make: filtered"
+    if spaced and grid is None and not driven:
+        falls = min(float(of[ORDERS.index(6)] / of[-1]) for of in (squares, middle))
+        if falls > _COLOURED:
+            return f"has noise that falls towards high frequencies (by a factor of {falls:.2g}), as no encoder's does: filtered"
+    return ""
+
+
+def _even(t: Array, period: float) -> NDArray[np.bool_]:
+    """Return the rows whose neighbours, on either side, lie a period apart."""
+    off = np.append(0, np.cumsum(np.abs(np.diff(t) / period - 1) > _EVEN))
+    rows = np.arange(len(t))
+    return np.asarray(off[np.minimum(rows + _HALF, len(t) - 1)] == off[np.maximum(rows - _HALF, 0)])
+
+
+def _unmeasured(pieces: list[Array], moving: list[NDArray[np.bool_]], exact: float, grid: float) -> str:
+    share = _between_knots(pieces, moving, max(_FOURTH * exact, 0.01 * grid), grid)
+    if share <= _PIECEWISE:
+        return ""
+    return f"lies exactly on straight lines or cubics between knots in {100 * share:.0f} % of the rows: interpolated"
+
+
+def _stale(pieces: list[Array], moving: list[NDArray[np.bool_]]) -> int:
+    """Return how many rows in motion repeat the position before."""
+    return sum(int(np.count_nonzero((q[1:] == q[:-1]) & m[1:])) for q, m in zip(pieces, moving, strict=True))
+
+
+def _largest(pieces: list[Array]) -> float:
+    return max(float(np.max(np.abs(q))) for q in pieces)
+
+
+def _between_knots(pieces: list[Array], moving: list[NDArray[np.bool_]], exact: float, grid: float) -> float:
+    """Return the share of rows whose fourth differences are exactly zero; none if all are alike, or steps of the grid."""
+    bends = np.concatenate([np.abs(np.diff(q, n=4)[m[2:-2]]) for q, m in zip(pieces, moving, strict=True)])
+    zero = bends <= exact
+    others = bends[~zero]
+    if len(others) < _FEWEST_KNOTS:
+        return 0.0
+    small, large = np.quantile(others, (0.05, 0.9))
+    if large < max(_KNOTS * exact, _ANY_SIZE * small):
+        return 0.0
+    if np.count_nonzero(others < (_FEW_COUNTS + 0.5) * grid) > 0.5 * np.count_nonzero(zero):
+        return 0.0
+    return float(np.mean(zero))
+
+
+def _over_times(log: Log, j: int, rows: list[slice], moving: list[NDArray[np.bool_]]) -> float:
+    """Return the noise left by cubics over the stamps, which uneven times do not hide."""
+    left = np.concatenate(
+        [from_neighbours(log.t[r], log.q[r, j : j + 1])[m[2:-2], 0] for r, m in zip(rows, moving, strict=True)]
+    )
+    return float(np.sqrt(np.mean(left**2)))
+
+
+def _reversals(pieces: list[Array], moving: list[NDArray[np.bool_]]) -> int:
+    signs = [np.sign(np.diff(q)[m[:-1]]) for q, m in zip(pieces, moving, strict=True)]
+    return sum(int(np.count_nonzero(s[1:] != s[:-1])) for s in signs)
+
+
+def _driven(log: Log, j: int, rows: list[slice], moving: list[NDArray[np.bool_]]) -> bool:
+    """Whether torques explain the high frequencies: held torques accelerate, so sixth differences follow fourth ones of torque."""
+    y = np.concatenate([np.diff(log.q[r, j], n=6)[m[3:-3]] for r, m in zip(rows, moving, strict=True)])
+    columns = []
+    for r, m in zip(rows, moving, strict=True):
+        pushed = log.tau[r][:-1] + log.tau[r][1:]
+        columns.append(np.diff(pushed, n=4, axis=0)[: len(m) - 6][m[3:-3]])
+    x = np.concatenate(columns)
+    total = float(y @ y)
+    if total == 0 or not np.any(x):
+        return False
+    inverse_inertia = np.linalg.lstsq(x, y, rcond=None)[0]
+    left = y - x @ inverse_inertia
+    return bool(inverse_inertia[j] > 0) and float(left @ left) < (1 - _EXPLAINED) * total

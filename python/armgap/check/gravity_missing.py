@@ -1,0 +1,21 @@
+"""`gravity_missing`: torques hold no weight: they were logged after gravity compensation, or the arm moves in a horizontal plane."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from armgap.arm import Arm
+from armgap.check.corrections import Corrections
+from armgap.check.reading import Reading, reading
+
+__all__ = ["readings"]
+
+
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
+    """Yield the arm without its weights, where it has any."""
+    if arm.theta[arm.gravity_parameters].any():
+        yield reading(
+            "gravity_missing",
+            "the torques carry no weight: logged after gravity compensation, or moved in a horizontal plane",
+            Corrections(gravity="compensated"),
+        )

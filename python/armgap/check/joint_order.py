@@ -1,0 +1,20 @@
+"""`joint_order`: columns of two joints are exchanged: positions, torques, or both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+from armgap.arm import Arm
+from armgap.check.corrections import Corrections
+from armgap.check.reading import Reading, reading
+
+__all__ = ["readings"]
+
+
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
+    """Yield every pair of joints with positions, torques or both exchanged."""
+    for i, j in combinations(range(1, arm.n_joints + 1), 2):
+        q, tau = (f"q{i}", f"q{j}"), (f"tau{i}", f"tau{j}")
+        for swap, what in (((q,), "positions"), ((tau,), "torques"), ((q, tau), "positions and torques")):
+            yield reading("joint_order", f"the {what} of joints {i} and {j} are exchanged", Corrections(swap=swap))

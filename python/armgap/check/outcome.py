@@ -1,0 +1,111 @@
+"""What a check of one log's columns comes to, and rows left out of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.check.check import Check
+from armgap.log import Log
+
+__all__ = ["NOTHING", "Outcome", "ranges", "seconds", "with_rows"]
+
+# More ranges of rows than that say nothing more.
+_LISTED = 200
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a check found in a log.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+        What it says; severity ``"repaired"`` where `repaired` holds the remedy.
+    repaired : Log, optional
+        The log without the defect.
+    kept : ndarray, optional
+        Rows of the log that are left in `repaired`; None if all are.
+    deed : str
+        What was done, in words.
+    """
+
+    checks: tuple[Check, ...] = ()
+    repaired: Log | None = None
+    kept: NDArray[np.intp] | None = None
+    deed: str = ""
+
+
+NOTHING = Outcome()
+
+
+def ranges(rows: NDArray[np.intp] | Sequence[int]) -> tuple[tuple[int, int], ...]:
+    """Return sorted rows as ranges ``(first, last)``, the first 200 of more.
+
+    Examples
+    --------
+    >>> ranges([3, 4, 5, 9])
+    ((3, 5), (9, 9))
+    """
+    rows = np.asarray(rows, dtype=np.intp)
+    if not len(rows):
+        return ()
+    ends = np.flatnonzero(np.diff(rows) > 1)
+    first, last = rows[np.r_[0, ends + 1]], rows[np.r_[ends, len(rows) - 1]]
+    return tuple((int(a), int(b)) for a, b in zip(first[:_LISTED], last[:_LISTED], strict=True))
+
+
+def seconds(time: float) -> str:
+    """Return a time in words."""
+    return f"{time:.4g} s"
+
+
+def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None = None) -> Log:
+    """Return some rows of a log, each with the mean torque from its time to that of the next one.
+
+    The torque's impulse over every interval and its first moment are what they were, so that an arm gains the same momentum and goes the
+    same way.
+
+    Parameters
+    ----------
+    log : Log
+        Log, of n samples.
+    kept : ndarray
+        Rows to keep, increasing.
+    valid : ndarray, shape (n_samples, n_joints), optional
+        Torques that count; a row without any valid one takes the torque before it.
+    """
+    held = np.append(np.diff(log.t), log.sample_period)[:, None]
+    weight = np.broadcast_to(held, log.tau.shape) if valid is None else held * valid
+    first = int(kept[0])
+    starts = kept - first
+    impulse = np.add.reduceat(np.where(weight > 0, log.tau, 0.0)[first:] * weight[first:], starts)
+    duration = np.add.reduceat(weight[first:], starts)
+    empty = duration <= 0
+    tau = impulse / np.where(empty, 1.0, duration)
+    alone = np.diff(np.append(kept, len(log))) == 1
+    tau[alone] = log.tau[kept[alone]]  # no rounding where nothing was left out
+    for row, j in np.argwhere(empty):
+        tau[row, j] = tau[row - 1, j] if row else 0.0
+    dq = None if log.dq is None else log.dq[kept]
+    return replace(log, t=log.t[kept], q=log.q[kept], tau=tau, dq=dq, moment=_moment(log, kept, tau, valid))
+
+
+def _moment(
+    log: Log, kept: NDArray[np.intp], mean: NDArray[np.float64], valid: NDArray[np.bool_] | None
+) -> NDArray[np.float64]:
+    """Return the first moment of the torque about the middle of every interval between kept rows; zero where a torque does not count."""
+    first, counts = int(kept[0]), np.diff(np.append(kept, len(log)))
+    ends = np.append(log.t[1:], log.t[-1] + log.sample_period)
+    middle = np.repeat(0.5 * (log.t[kept] + np.append(log.t[kept[1:]], ends[-1])), counts)
+    held, centre = (ends - log.t)[first:], 0.5 * (ends + log.t)[first:]
+    apart = (log.tau[first:] - np.repeat(mean, counts, axis=0)) * (held * (centre - middle))[:, None]
+    moment = np.add.reduceat(apart, kept - first)
+    if log.moment is not None:
+        moment += np.add.reduceat(log.moment[first:], kept - first)
+    if valid is not None:
+        moment[~np.logical_and.reduceat(valid[first:], kept - first)] = 0.0
+    return moment

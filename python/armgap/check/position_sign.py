@@ -1,0 +1,32 @@
+"""`position_sign`: positions of one joint, or everything of it, count the other way.
+
+For a single joint this is `torque_sign`: no log tells the two apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from armgap.arm import Arm
+from armgap.check.corrections import Corrections
+from armgap.check.reading import Reading, reading
+
+__all__ = ["readings"]
+
+
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
+    """Yield, for arms of several joints, each joint's positions, and its positions with its torques."""
+    if arm.n_joints == 1:
+        return
+    joints = range(1, arm.n_joints + 1)
+    every = [f"{kind}{j}" for kind in ("q", "tau") for j in joints]
+    for j in joints:
+        for flip, what in (
+            ((f"q{j}",), f"positions of joint {j} counted the other way"),
+            ((f"q{j}", f"tau{j}"), f"positions and torques of joint {j} counted the other way"),
+        ):
+            if arm.n_joints == 2 and len(flip) == 2 and j == 1:
+                # Both joints' signs together are no defect, so joint 1 wholly turned over is joint 2 wholly turned over.
+                continue
+            rest = tuple(column for column in every if column not in flip)
+            yield reading("position_sign", what, Corrections(flip=flip), Corrections(flip=rest), joint=j)

@@ -1,0 +1,38 @@
+"""`position_zero`: a joint counts from 90 or 180 degrees off the model's zero.
+
+For joint 1 half a turn is the same as gravity's sign, or a ceiling mount; a quarter turn is the same as a wall mount.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from armgap.arm import Arm
+from armgap.check.corrections import Corrections
+from armgap.check.reading import Reading, reading
+
+__all__ = ["OFFSETS", "readings"]
+
+#: Zeros that people count from, beside the model's own [degrees].
+OFFSETS = (180, 90, -90)
+
+
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
+    """Yield every joint that turns with its zero at each of `OFFSETS`."""
+    if not arm.rotary:
+        return
+    for j in range(1, arm.n_joints + 1):
+        for degrees in OFFSETS:
+            corrections = Corrections(zero={f"q{j}": math.radians(degrees)})
+            what = f"`q{j}` counts from {degrees} degrees of the model's joint {j}"
+            if j == 1 and degrees == 180:
+                if arm.expects_weight:
+                    upright = Corrections(gravity="reversed")
+                    yield reading(
+                        "position_zero", f"{what} (or the arm hangs from a ceiling)", corrections, upright, joint=j
+                    )
+            elif j == 1:
+                yield reading("position_zero", f"{what} (or the arm is mounted on a wall)", corrections, joint=j)
+            else:
+                yield reading("position_zero", what, corrections, joint=j)

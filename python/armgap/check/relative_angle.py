@@ -1,0 +1,27 @@
+"""`relative_angle`: a joint's angle is measured from the world where the model counts it from the link before, or the reverse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from armgap.arm import Arm
+from armgap.check.corrections import Corrections
+from armgap.check.reading import Reading, reading
+
+__all__ = ["readings"]
+
+
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
+    """Yield both directions for every joint after the first of an arm that turns."""
+    if not arm.rotary:
+        return
+    for j in range(2, arm.n_joints + 1):
+        column = f"q{j}"
+        absolute, relative = Corrections(absolute=(column,)), Corrections(relative=(column,))
+        yield reading("relative_angle", f"`{column}` counts from the world, not from link {j - 1}", absolute, joint=j)
+        yield reading(
+            "relative_angle",
+            f"`{column}` counts from link {j - 1} where the arm file means the world",
+            relative,
+            joint=j,
+        )

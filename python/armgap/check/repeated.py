@@ -1,0 +1,155 @@
+"""Positions held over several rows while the joint moves: only rows with a fresh position stay.
+
+A position that is held is followed by a step that makes up for the rows it was held over. A joint that stops does not do that, and
+one that moves by a few encoder counts per row or less repeats its position by nature.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm import Arm
+from armgap.check.check import Check
+from armgap.check.numbers import blocks, grid_step, travel_per_row
+from armgap.check.outcome import NOTHING, Outcome, ranges, with_rows
+from armgap.log import Log
+
+__all__ = ["look"]
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# A joint that moves so many counts per row does not repeat a position by itself.
+_FAST_COUNTS = 8.0
+# Where positions are held at all, a row that repeats is a held one if the joint moves by so many counts per row.
+_SLOW_COUNTS = 2.0
+# After a hold the position steps by what the motion asks over the rows of the hold, within these factors.
+_MAKES_UP = (0.5, 2.0)
+# Share of the rows in motion that are held, and rows of that kind, before anything is said.
+_SHARE, _FEWEST = 0.1, 20
+# Motion is judged over so many rows to either side at least, and twice the usual hold.
+_AROUND, _LONGEST = 8, 64
+# Joints have one pattern if their held rows agree to this share.
+_AGREE = 0.9
+# A pattern is regular if this share of the holds is.
+_REGULAR = 0.95
+
+
+@dataclass(frozen=True)
+class _Held:
+    """One joint: rows that repeat the one before, that lie in fast motion, in any; share of rows held, length of a hold."""
+
+    again: Flags
+    fast: Flags
+    moves: Flags
+    share: float
+    length: float
+
+
+def look(log: Log, arm: Arm | None) -> Outcome:
+    """Find joints whose positions are held; repair if they are held together, or the others do not move."""
+    joints = [_held(np.ascontiguousarray(log.q[:, j])) for j in range(log.n_joints)]
+    held = [j for j, h in enumerate(joints) if h.share >= _SHARE]
+    if not held:
+        return NOTHING
+    together = all(_agree(joints[held[0]], other) for other in joints)
+    severity = "repaired" if together else "warning"
+    kept = _fresh(log, [joints[j] for j in held]) if together else np.arange(len(log))
+    gone = np.setdiff1d(np.arange(len(log)), kept, assume_unique=True)
+    checks = tuple(_said(log, j, joints[j], gone, severity) for j in held)
+    if not together:
+        return Outcome(checks)
+    deed = f"the {len(kept)} rows with fresh positions are kept, each with the mean torque until the next"
+    return Outcome(checks, with_rows(log, kept), kept, deed)
+
+
+def _said(log: Log, j: int, held: _Held, gone: NDArray[np.intp], severity: str) -> Check:
+    apart = "" if severity == "repaired" else ", the joints each in their own rows"
+    said = (
+        f"q{j + 1} repeats its last value in {100 * held.share:.0f} % of the rows in which the joint moves, "
+        f"held over {held.length:.2g} rows as a rule{apart}"
+    )
+    remedy = () if severity == "repaired" else ("log every joint's position when it is read",)
+    return Check(
+        "repeated_positions", "repaired" if severity == "repaired" else "warning", said, remedy, j + 1, log.name,
+        ranges(gone),
+    )  # fmt: skip
+
+
+def _held(q: Array) -> _Held:
+    again = np.append(False, q[1:] == q[:-1])
+    pieces = [q[rows] for rows in blocks(len(q))]
+    step = grid_step(np.concatenate(pieces)) or 0.0
+    held = moving = 0
+    lengths: list[Array] = []
+    for piece in pieces:
+        count, rows, run = _holds(piece, step)
+        held, moving = held + count, moving + rows
+        lengths.append(run)
+    runs = np.concatenate(lengths)
+    length = float(np.median(runs)) if len(runs) else 1.0
+    pace = travel_per_row(q, _reach(length))
+    share = held / max(moving, 1) if held >= _FEWEST else 0.0
+    return _Held(again, pace > _FAST_COUNTS * step, pace > _SLOW_COUNTS * step, share, length)
+
+
+def _reach(length: float) -> int:
+    return int(max(_AROUND, 2 * length))
+
+
+def _holds(q: Array, step: float) -> tuple[int, int, Array]:
+    """Return the rows held, the rows in fast motion, and the length of each hold."""
+    starts = np.append(0, np.flatnonzero(q[1:] != q[:-1]) + 1)
+    if len(starts) < 4:
+        return 0, 0, np.empty(0)
+    length = np.diff(starts).astype(np.float64)[1:-1]  # of holds that are whole and have a step on either side
+    steps = q[starts[1:]] - q[starts[:-1]]
+    into, out = steps[:-2], steps[1:-1]
+    first = starts[1:-2]
+    reach = _reach(min(float(np.median(length[length > 1])) if np.any(length > 1) else 1.0, _LONGEST))
+    pace = travel_per_row(q, reach)[first]
+    fast = (pace > _FAST_COUNTS * step) & (length <= _LONGEST)
+    asked = length * pace
+    makes_up = (into * out > 0) & (np.abs(out) > _MAKES_UP[0] * asked) & (np.abs(out) < _MAKES_UP[1] * asked)
+    held = fast & makes_up & (length > 1)
+    return int(np.sum(length[held] - 1)), int(np.sum(length[fast])), length[held]
+
+
+def _agree(held: _Held, other: _Held) -> bool:
+    """Whether two joints hold their positions in the same rows, as far as both move."""
+    both = held.fast & other.fast
+    if np.count_nonzero(both) < _FEWEST:
+        return True
+    # The rarer of the two: a joint that stops now and then repeats its position by itself there.
+    one, two = np.count_nonzero(held.again & both), np.count_nonzero(other.again & both)
+    rarer = min(one, two) if other.share >= _SHARE else one
+    return bool(np.count_nonzero(held.again & other.again & both) >= _AGREE * rarer)
+
+
+def _fresh(log: Log, held: list[_Held]) -> NDArray[np.intp]:
+    """Return the rows with fresh positions: at a regular beat throughout, otherwise wherever no moving joint is held."""
+    rows = np.arange(len(log))
+    beat = _beat(held)
+    if beat is not None:
+        period, phase = beat
+        return np.flatnonzero((rows % period == phase) | (rows == 0))
+    stale = np.zeros(len(log), dtype=bool)
+    for h in held:
+        stale |= h.again & h.moves
+    return np.flatnonzero(~stale)
+
+
+def _beat(held: list[_Held]) -> tuple[int, int] | None:
+    """Return period and phase of a regular hold, None if it has none."""
+    fresh = np.unique(np.concatenate([np.flatnonzero(~h.again & h.fast) for h in held]))
+    if len(fresh) < _FEWEST:
+        return None
+    period = int(np.median(np.diff(fresh)))
+    if period < 2:
+        return None
+    counts = np.bincount(fresh % period, minlength=period)
+    phase = int(np.argmax(counts))
+    return (period, phase) if counts[phase] >= _REGULAR * len(fresh) else None

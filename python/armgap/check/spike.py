@@ -1,0 +1,137 @@
+"""Single rows that no motion explains: a position that returns at once, a torque of absurd size that nothing answers.
+
+A position is a spike if for one to three rows it lies off the straight line between the rows around it by several times what the
+joint moves per row next to it: even a joint that is struck, and reverses within a row, does not get that far. A torque is one if
+it is far beyond the largest torques of the log for one to three rows, and no joint gets faster than otherwise by it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm import Arm
+from armgap.check.check import Check
+from armgap.check.outcome import NOTHING, Outcome, ranges, seconds, with_rows
+from armgap.log import Log
+
+__all__ = ["look"]
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+# Longest run of wild rows; the longest that leaves windows whole.
+_LONGEST = 3
+# Off the line by so many times what the joint moves per row around it. A blow reverses a joint within a row: up to 2.
+_TIMES_MOTION = 3.0
+# And by so many times the change of speed per row that is exceeded in 5 % of the rows.
+_TIMES_USUAL = 20.0
+# At the ends of a log only one side speaks.
+_TIMES_AT_END = 10.0
+# More rows than this share are no single rows.
+_MOST = 0.005
+# A torque beyond the largest 0.5 % by this factor is looked at; by the second one it is absurd whatever the arm does.
+_TORQUE_FACTOR, _TORQUE_ABSURD = 30.0, 1e3
+# Torques that are zero but for so few rows have no usual size.
+_TORQUE_ACTIVE = 0.05
+# Rows over which a speed is taken on either side of a torque.
+_SPEED_ROWS = 5
+# Scales are taken from so many rows.
+_ENOUGH = 200_000
+
+
+def look(log: Log, arm: Arm | None) -> Outcome:
+    """Leave out rows that no motion explains; the torque before them is held over them."""
+    if len(log) < 4 * _LONGEST + 4:
+        return NOTHING
+    found = []
+    wild = np.zeros(len(log), dtype=bool)
+    valid = np.ones(log.tau.shape, dtype=bool)
+    for j in range(log.n_joints):
+        q, tau = np.ascontiguousarray(log.q[:, j]), np.ascontiguousarray(log.tau[:, j])
+        for name, values, rows in ((f"q{j + 1}", q, _positions(q)), (f"tau{j + 1}", tau, _torques(log.t, q, tau))):
+            if not len(rows) or len(rows) > max(_LONGEST, _MOST * len(log)):
+                continue
+            wild[rows] = True
+            valid[rows, j] &= name[0] == "q"
+            found.append(_said(log, name, values, rows, j))
+    if not found:
+        return NOTHING
+    kept = np.flatnonzero(~wild)
+    deed = "left out, with the mean torque of what was left out held"
+    return Outcome(tuple(found), with_rows(log, kept, valid), kept, deed)
+
+
+def _said(log: Log, name: str, values: Array, rows: Rows, j: int) -> Check:
+    row = int(rows[np.argmax(np.abs(values[rows]))])
+    beside = values[row + 1 if row + 1 not in rows and row + 1 < len(log) else max(int(rows[0]) - 1, 0)]
+    many = "" if len(rows) == 1 else f" ({len(rows)} rows in all)"
+    said = f"{name} is {values[row]:.6g} at {seconds(log.t[row])} beside {beside:.4g}, which no motion explains{many}"
+    return Check("spike", "repaired", said, (), j + 1, log.name, ranges(rows))
+
+
+def _positions(q: Array) -> Rows:
+    steps = np.diff(q)
+    bends = np.abs(np.diff(steps))
+    thin = bends[:: max(1, len(bends) // _ENOUGH)]
+    floor = _TIMES_USUAL * float(np.quantile(thin, 0.95)) + 1e-9 * float(np.median(np.abs(q)))
+    steps = np.abs(steps)
+    wild: list[Rows] = [_at_start(q, floor), len(q) - 1 - _at_start(q[::-1], floor)]
+    # Into a spike the path bends by about its size: at row k - 1, which is bend k - 2.
+    first = np.flatnonzero(bends > floor / 4) + 2
+    for m in range(1, _LONGEST + 1):
+        k = first[(first >= 3) & (first < len(q) - m - 2)]
+        if not len(k):
+            continue
+        through = np.abs(q[k + m] - q[k - 1]) / (m + 1)
+        around = np.max([steps[k - 2], steps[k - 3], steps[k + m], steps[k + m + 1], through], axis=0)
+        off = np.min(np.abs([q[k + i] - _line(q, k, m, i) for i in range(m)]), axis=0)
+        k = k[off > 0.5 * (m + 1) * _TIMES_MOTION * around + floor]
+        wild += [k + i for i in range(m)]
+    return np.unique(np.concatenate(wild))
+
+
+def _line(q: Array, k: Rows, m: int, i: int) -> Array:
+    part = (i + 1) / (m + 1)
+    return np.asarray((1 - part) * q[k - 1] + part * q[k + m])
+
+
+def _at_start(q: Array, floor: float) -> Rows:
+    """Return the first row, or the first few, if they lie far off where the rows after them come from."""
+    for m in range(_LONGEST, 0, -1):
+        around = float(np.max(np.abs(np.diff(q[m : m + 4]))))
+        pace = q[m + 1] - q[m]
+        off = np.abs(q[:m] - (q[m] - pace * np.arange(m, 0, -1)))
+        if np.min(off) > m * _TIMES_AT_END * around + 2 * floor:
+            return np.arange(m)
+    return np.arange(0)
+
+
+def _torques(t: Array, q: Array, tau: Array) -> Rows:
+    size = np.abs(tau)
+    thin = size[:: max(1, len(size) // _ENOUGH)]
+    usual = float(np.quantile(thin, 0.995))
+    if usual == 0 or float(np.mean(thin > 0)) < _TORQUE_ACTIVE:
+        return np.arange(0)
+    wild: list[int] = []
+    for first, last in ranges(np.flatnonzero(size > _TORQUE_FACTOR * usual)):
+        if last - first >= _LONGEST:
+            continue
+        absurd = float(size[first : last + 1].min()) > _TORQUE_ABSURD * usual
+        if absurd or not _answered(t, q, first, last):
+            wild += range(first, last + 1)
+    return np.array(wild, dtype=np.intp)
+
+
+def _answered(t: Array, q: Array, first: int, last: int) -> bool:
+    """Whether the joint's speed changes over the rows by more than it ever does in as many."""
+    w = _SPEED_ROWS
+    if first < w or last + 1 + w >= len(q):
+        return False
+    thin = slice(0, min(len(q), _ENOUGH))
+    speed = (q[thin][w:] - q[thin][:-w]) / (t[thin][w:] - t[thin][:-w])
+    apart = w + 1 + last - first
+    usual = float(np.quantile(np.abs(speed[apart:] - speed[:-apart]), 0.99))
+    before = (q[first] - q[first - w]) / (t[first] - t[first - w])
+    after = (q[last + 1 + w] - q[last + 1]) / (t[last + 1 + w] - t[last + 1])
+    return bool(abs(after - before) > 1.5 * usual)

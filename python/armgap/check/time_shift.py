@@ -1,0 +1,128 @@
+"""`time_shift`: torque and position columns shifted against each other.
+
+Torques that come too late in the file would act before they are commanded, which nothing in an arm does: they are shifted back. Torques
+that come too early look like a delay of the drive, which is an effect (`actuator_delay`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm import Arm
+from armgap.check.check import Check
+from armgap.check.contradiction import Refit
+from armgap.check.corrections import Corrections
+from armgap.check.equation_error import EquationError, Rows, bounds
+from armgap.log import Log
+
+__all__ = ["acausal", "causal", "confirmed"]
+
+# Shifts that are tried [samples].
+_LARGEST = 8
+# Cut-off of the filters [rad/s]: a shift shows in the motion itself; what a controller makes of encoder noise would hide it.
+_CUTOFF = 10.0
+# A shift counts from this part of a sample on. On simulated logs with hidden effects the estimate is -0.25 to 0.85 samples off, and
+# earlier (a negative shift) is the side that no drive's lag is on.
+_COUNTS = 0.6
+# So many of the halves of all logs have to agree, each by half as much.
+_AGREEING = 0.75
+# Predictions with the shift may miss by no more than this part of what they miss without; a neighbour has to be better by this much.
+_AS_GOOD = 1.02
+_CLEARLY = 0.9
+# A share of torque that nothing tells from none.
+_EXACT = 1e-7
+# A half needs so many rows.
+_FEWEST = 200
+# Delays of all joints are one shift of the file if they differ by less than this part of a sample, or by this many of their deviations.
+_EQUAL = 0.5
+_EQUAL_SIGMAS = 3.0
+
+
+def acausal(logs: Sequence[Log], arm: Arm) -> int:
+    """Return by how many samples the torques of all logs come late in the file; 0 if they do not."""
+    curves = [_curve(half, arm) for log in logs for half in _halves(Rows.of(log, arm, _CUTOFF))]
+    if not curves:
+        return 0
+    late = -_minimum(np.sum(curves, axis=0))
+    agreeing = np.mean([-_minimum(curve) > 0.5 * _COUNTS for curve in curves])
+    if not _COUNTS <= late < _LARGEST or agreeing < _AGREEING:
+        return 0
+    return max(1, round(late))
+
+
+def _halves(rows: Rows) -> list[Rows]:
+    """Return the rows in two halves, for estimates that are independent of each other."""
+    middle = len(rows.y) // 2
+    parts = [slice(0, middle), slice(middle, None)]
+    halves = [Rows(rows.psi[part], rows.y[part], rows.samples[part]) for part in parts]
+    return [half for half in halves if len(half.y) >= _FEWEST]
+
+
+def _curve(rows: Rows, arm: Arm) -> NDArray[np.float64]:
+    """Return the log-likelihood's cost of every shift, joints weighted by what they leave unexplained."""
+    low, high = bounds(arm)
+    count = len(rows.y)
+    inner = slice(_LARGEST, count - _LARGEST)
+    base = EquationError([Rows(rows.psi[inner], rows.y[inner], rows.samples[inner])], arm)
+    shifted = [rows.y[_LARGEST - s : count - _LARGEST - s] for s in range(-_LARGEST, _LARGEST + 1)]
+    return np.array([count * float(np.sum(np.log(base.fit(low, high, [y]).share + _EXACT))) for y in shifted])
+
+
+def _minimum(costs: NDArray[np.float64]) -> float:
+    """Return the shift where a parabola through the least cost and its neighbours is least [samples]."""
+    i = int(np.argmin(costs))
+    if i in (0, len(costs) - 1):
+        return float(i - _LARGEST)
+    a, b, c = costs[i - 1 : i + 2]
+    return float(i - _LARGEST + 0.5 * (a - c) / (a - 2 * b + c))
+
+
+def confirmed(
+    samples: int, training: Sequence[Log], holdout: Sequence[Log], arm: Arm, horizon: float
+) -> Corrections | None:
+    """Return the shift unless predictions speak against it; of its neighbours the one that they clearly prefer."""
+    period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
+    as_is = Refit.of(arm, training, holdout, horizon)
+
+    def error(k: int) -> float:
+        corrections = Corrections(shift={"tau": -k * period})
+        read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
+        return Refit.of(arm, read[0], read[1], horizon).against(as_is)
+
+    errors = {k: error(k) for k in (samples - 1, samples, samples + 1) if k}
+    best = min(errors, key=lambda k: errors[k])
+    best = best if errors[best] < _CLEARLY * errors[samples] else samples
+    if errors[best] > _AS_GOOD:
+        return None
+    return Corrections(shift={"tau": float(f"{-best * period:.6g}")})
+
+
+def causal(causes: Sequence[Mapping[str, Any]], n_joints: int, period: float) -> Check | None:
+    """Return the warning that named delays, equal on all joints, may be torques that stand too early in the file.
+
+    Parameters
+    ----------
+    causes : sequence of mapping
+        The causes of a diagnosis.
+    n_joints : int
+        Number of joints.
+    period : float
+        Sample period [s].
+    """
+    delays = {cause["joint"]: cause["parameters"]["delay"] for cause in causes if cause["effect"] == "actuator_delay"}
+    if len(delays) < n_joints:
+        return None
+    values = [delay["value"] for delay in delays.values()]
+    sigmas = [delay["sigma"] for delay in delays.values()]
+    if max(values) - min(values) > max(_EQUAL * period, _EQUAL_SIGMAS * float(np.hypot.reduce(sigmas))):
+        return None
+    shift = float(np.mean(values))
+    message = (
+        f"all joints answer {1e3 * shift:.3g} ms late: a delay of the drives, or torques that stand that much too early in the file; "
+        "no log of motion tells the two apart"
+    )
+    return Check("time_shift", "warning", message, (f"--shift tau={shift:.4g}",))

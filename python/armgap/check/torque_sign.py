@@ -1,0 +1,32 @@
+"""`torque_sign`: torques count the other way.
+
+All torques turned over are the same as all positions turned over: the equation of motion is odd in ``(q, tau)`` together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from armgap.arm import Arm
+from armgap.check.corrections import Corrections
+from armgap.check.reading import Reading, reading
+
+__all__ = ["readings"]
+
+
+def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
+    """Yield one reading per joint, and one of all joints."""
+    joints = range(1, arm.n_joints + 1)
+    every_tau, every_q = tuple(f"tau{j}" for j in joints), tuple(f"q{j}" for j in joints)
+    every = reading(
+        "torque_sign", "all torques counted the other way", Corrections(flip=every_tau), Corrections(flip=every_q),
+        joint=1 if arm.n_joints == 1 else None,
+    )  # fmt: skip
+    yield every
+    if arm.n_joints > 1:
+        for j in joints:
+            others = tuple(c for c in every_tau if c != f"tau{j}")
+            yield reading(
+                "torque_sign", f"torques of joint {j} counted the other way", Corrections(flip=(f"tau{j}",)),
+                Corrections(flip=(*every_q, *others)), joint=j,
+            )  # fmt: skip

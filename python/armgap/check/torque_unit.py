@@ -1,0 +1,122 @@
+"""`torque_unit`: a torque column in another unit: a motor's current, a percentage, the motor's side of a gear.
+
+One factor per column makes the torques that the arm file expects. A factor on all torques alike is the same as all parameters scaled, so
+there only another order of magnitude is a unit; anything closer is left to the re-estimated parameters and said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm import Arm
+from armgap.check.check import Check, Severity
+from armgap.check.corrections import Corrections
+from armgap.check.equation_error import EquationError, bounds
+
+__all__ = ["Factors", "find", "refined", "said"]
+
+# A factor within these bounds is a gain of the drive (an effect), or wrong parameters.
+_GAIN = 2.0
+# A factor that all columns share: within these bounds an arm file may be that far off.
+_SCALED = 4.0
+# Factors beyond this are no unit that a repair should guess at.
+_LARGEST = 2e3
+# Columns share a factor if it differs by less than this.
+_ALIKE = 1.5
+# Parameters may differ from the arm file by this factor while a column's factor is estimated.
+_TRUST = 2.0
+_ROUNDS = 4
+# The factor has to lower the mean log share of unexplained torque by this much, and to leave no more than this share of a joint's torque.
+_GAIN_IN_COST = 0.5
+_LEFT = 0.3
+
+
+@dataclass(frozen=True)
+class Factors:
+    """Factors on torque columns, what they leave unexplained, and what is to be said about them."""
+
+    corrections: Corrections
+    closeness: float
+    checks: tuple[Check, ...]
+
+
+def find(base: EquationError, arm: Arm) -> Factors | None:
+    """Return the factors that belong on torque columns of the logs (`base`), or None."""
+    low, high = bounds(arm, _TRUST)
+    factors = _factors(base, low, high)
+    odd = [j for j, c in enumerate(factors) if not _within(c, _GAIN)]
+    if not odd or np.any(factors <= 0):
+        return None
+    applied = np.where(np.isin(np.arange(len(factors)), odd), factors, 1.0)
+    shared = len(odd) == len(factors) and float(factors.max() / factors.min()) < _ALIKE
+    if shared:
+        applied = np.full(len(factors), math.exp(float(np.mean(np.log(factors)))))
+    fit = base.with_factors(low, high, applied)
+    needed = 0.0 if shared and _within(applied[0], _SCALED) else _GAIN_IN_COST
+    if base.with_factors(low, high, np.ones_like(applied)).cost - fit.cost < needed or float(fit.share.max()) > _LEFT:
+        return None
+    corrections, checks = _said(applied, odd, shared)
+    return Factors(corrections, fit.closeness, tuple(checks))
+
+
+def _within(factor: float, bound: float) -> bool:
+    return bool(1 / bound <= factor <= bound)
+
+
+def _factors(base: EquationError, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the factor of every torque column: the form of the torques by parameters in the trust of the file, their size by the file."""
+    factors = base.expected()
+    for _ in range(_ROUNDS):
+        if np.any(factors <= 0):
+            break
+        theta = base.with_factors(low, high, factors).theta
+        factors = factors * base.size_of(theta)
+    return factors
+
+
+def _said(factors: NDArray[np.float64], odd: Sequence[int], shared: bool) -> tuple[Corrections, list[Check]]:
+    listed = {f"tau{j + 1}": float(f"{factors[j]:.4g}") for j in odd}
+    corrections = Corrections(factor={"tau": next(iter(listed.values()))} if shared and len(odd) > 1 else listed)
+    largest = max(max(c, 1 / c) for c in listed.values())
+    severity: Severity = "repaired"
+    if shared and largest < _SCALED:
+        severity = "warning"
+    elif largest > _LARGEST:
+        severity = "error"
+    return corrections, said(corrections.factor, severity, shared=shared)
+
+
+def said(factors: Mapping[str, float], severity: Severity = "repaired", *, shared: bool = False) -> list[Check]:
+    """Return one check per column; a factor that all columns share is also one of all parameters."""
+    checks = []
+    for column, c in factors.items():
+        remedies = [f"--factor {column}={c:.4g}"]
+        if shared:
+            remedies.append(f"all values of theta and friction in the arm file divided by {c:.4g}")
+        message = f"`{column}` times {c:.4g} is the torque that the arm file expects: a current, a percentage, or the motor's side of a gear?"
+        if severity == "warning" and shared:
+            message += " Or the arm file's values are off by that much: they are trusted no further than that"
+        joint = int(column[3:]) if column != "tau" else None
+        checks.append(Check("torque_unit", severity, message, tuple(remedies), joint))
+    return checks
+
+
+def refined(factors: Mapping[str, float], causes: Sequence[Mapping[str, Any]], n_joints: int) -> dict[str, float]:
+    """Return repaired factors with the gains that a diagnosis named; empty where it named none.
+
+    A column of unknown unit has no gain of its own: what the fit finds there is what the factor was off by. A gain of another joint is the
+    inverse on this one, as the size of all parameters is only trusted to a few percent.
+    """
+    gains = {c["joint"]: c["parameters"]["gain"]["value"] for c in causes if c["effect"] == "torque_gain"}
+    by_joint = {j: factors.get(f"tau{j}", factors.get("tau")) for j in range(1, n_joints + 1)}
+    repaired = {j: c for j, c in by_joint.items() if c is not None}
+    if not gains or not repaired:
+        return {}
+    elsewhere = math.prod(gain for j, gain in gains.items() if j not in repaired)
+    return {f"tau{j}": float(f"{c * gains.get(j, 1.0) / elsewhere:.4g}") for j, c in repaired.items()}

@@ -1,0 +1,34 @@
+"""Positions that jump by a whole turn where an encoder of one turn starts again: taken out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from armgap.arm import Arm
+from armgap.check.check import Check
+from armgap.check.outcome import NOTHING, Outcome, ranges, seconds
+from armgap.log import Log
+from armgap.log.turns import turn_jumps, unwrapped
+
+__all__ = ["look"]
+
+
+def look(log: Log, arm: Arm | None) -> Outcome:
+    """Compare the path with and without the turn at every jump; joints that slide have no turns."""
+    if arm is not None and not arm.rotary:
+        return NOTHING
+    found = []
+    q = log.q.copy()
+    for j in range(log.n_joints):
+        at = np.flatnonzero(turn_jumps(log.q[:, j])) + 1
+        if not len(at):
+            continue
+        q[:, j] = unwrapped(log.q[:, j])
+        times = "once" if len(at) == 1 else f"{len(at)} times"
+        said = (
+            f"q{j + 1} jumps by a whole turn {times}, first at {seconds(log.t[at[0]])}, and goes on smoothly without it"
+        )
+        found.append(Check("wrapped_positions", "repaired", said, (), j + 1, log.name, ranges(at)))
+    return Outcome(tuple(found), replace(log, q=q), None, "the turns were taken out") if found else NOTHING

@@ -1,0 +1,33 @@
+"""Numbers on the command line."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import click
+
+from armgap.options import LARGEST_SEED
+
+__all__ = ["Number", "Seed"]
+
+
+class Number(click.FloatRange):
+    """A finite number in a range; what is no number is in every range that only compares."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number", param, ctx)
+        return number
+
+
+class Seed(click.IntRange):
+    """A seed of a random generator."""
+
+    def __init__(self) -> None:
+        super().__init__(0, LARGEST_SEED)
+
+    def _describe_range(self) -> str:
+        return "x>=0"

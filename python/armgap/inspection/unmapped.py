@@ -1,0 +1,218 @@
+"""A file whose columns nobody has named yet: what each column holds, and a mapping that its name and trend suggest.
+
+What is proposed is for the user to confirm: nothing is read by it.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from armgap.errors import ArmgapError, UnitError
+from armgap.log import Log
+from armgap.log.formats import record
+from armgap.log.recording import Recording
+
+if TYPE_CHECKING:
+    from armgap.arm import Arm
+
+__all__ = ["Column", "Columns", "columns_of"]
+
+#: Words of a name, in the order in which quantities are looked for: "pos_vel" is a velocity, "target_position" no measurement.
+_WORDS: dict[str, re.Pattern[str]] = {
+    "skip": re.compile(
+        r"(target|desired|des|ref|reference|setpoint|goal|temp|temperature|voltage|error|err|status|acc|acceleration)"
+    ),
+    "dq": re.compile(r"(dq[0-9]*|qd[0-9]*|qdot[0-9]*|vel|velocity|speed|omega|rate)"),
+    "tau": re.compile(r"(tau[0-9]*|torque|effort|trq|cmd|command|force|u[0-9]*|current)"),
+    "q": re.compile(r"(q[0-9]*|pos|position|angle|ang|theta[0-9]*|phi[0-9]*|enc|encoder|joint[0-9]*)"),
+}
+_TIME = re.compile(r"(t|time|stamp|timestamp|sec|secs|seconds|clock|ms|us|ns|nanosec)")
+_JOINT = ("q", "tau", "dq")
+#: What stands where no column suggests itself.
+_PLACEHOLDER = "NAME"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a file.
+
+    Attributes
+    ----------
+    name, dtype : str
+        As in the file.
+    unit : str or None
+        Unit that the file states.
+    rows, missing : int
+        Rows, and rows without a finite number.
+    low, high : float or None
+        Range of its numbers; None where it holds none.
+    trend : str
+        ``"rising"`` (as times do), ``"constant"``, ``"varies"``, or ``"text"``.
+    """
+
+    name: str
+    dtype: str
+    unit: str | None
+    rows: int
+    missing: int
+    low: float | None
+    high: float | None
+    trend: str
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The columns of a file that nobody has mapped, and a mapping to confirm.
+
+    Attributes
+    ----------
+    log : str
+        Name of the file without its ending.
+    columns : tuple of Column
+        Every column of the file.
+    proposed : dict
+        Column by standard name; ``"NAME"`` where none suggests itself.
+    units : dict
+        Units by group that this mapping would need, such as ``{"q": "deg"}``.
+    """
+
+    log: str
+    columns: tuple[Column, ...]
+    proposed: dict[str, str]
+    units: dict[str, str]
+
+    @property
+    def options(self) -> str:
+        """The mapping as options of the command line."""
+        words = f"--columns {shlex.quote(_pairs(self.proposed))}"
+        return f"{words} --units {_pairs(self.units)}" if self.units else words
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object, schema ``armgap.columns/1``."""
+        return {
+            "schema": "armgap.columns/1",
+            "log": self.log,
+            "columns": [asdict(c) for c in self.columns],
+            "proposed": self.proposed,
+            "units": self.units,
+            "options": self.options,
+        }
+
+
+def columns_of(path: str | Path, arm: Arm | None = None) -> Columns:
+    """List the columns of a file, and propose a mapping by their names and their trend.
+
+    Parameters
+    ----------
+    path : path-like
+        Log of any format.
+    arm : Arm, optional
+        Arm the log belongs to; says how many joints there are.
+
+    Raises
+    ------
+    LogReadError
+        If the file cannot be read.
+    """
+    recording, name, _ = record(path)
+    listed = tuple(_column(recording, column) for column in recording.columns)
+    proposed = _proposed(listed, None if arm is None else arm.n_joints)
+    return Columns(name, listed, proposed, _units(path, proposed, arm))
+
+
+def _column(recording: Recording, name: str) -> Column:
+    stream = recording.stream_of(name)
+    series = stream.fetch(name)
+    unit = stream.units.get(name)
+    if series.dtype.is_temporal():
+        series = series.to_physical()
+    if not series.dtype.is_numeric():
+        numbers = series.cast(pl.Float64, strict=False) if series.dtype == pl.String else None
+        if numbers is None or numbers.null_count() == len(numbers):
+            return Column(name, str(stream.fetch(name).dtype), unit, len(series), len(series), None, None, "text")
+        series = numbers
+    values = series.cast(pl.Float64).to_numpy()
+    fine = values[np.isfinite(values)]
+    low, high = (float(fine.min()), float(fine.max())) if len(fine) else (None, None)
+    missing = len(values) - len(fine)
+    return Column(name, str(stream.fetch(name).dtype), unit, len(values), missing, low, high, _course(fine))
+
+
+def _course(values: NDArray[np.float64]) -> str:
+    if len(values) < 2:
+        return "constant"
+    steps = np.diff(values)
+    if not steps.any():
+        return "constant"
+    return "rising" if bool(np.all(steps >= 0)) and float(np.mean(steps > 0)) > 0.5 else "varies"
+
+
+def _proposed(columns: tuple[Column, ...], n_joints: int | None) -> dict[str, str]:
+    """Standard names in their order, each with the column that suggests itself."""
+    usable = [c for c in columns if c.low is not None]
+    kinds = {c.name: _kind(c) for c in usable}
+    rising = [c.name for c in usable if c.trend == "rising"]
+    time = next((name for name in rising if kinds[name] == "t"), rising[0] if rising else _PLACEHOLDER)
+    groups = {kind: _numbered([c.name for c in usable if kinds[c.name] == kind and c.name != time]) for kind in _JOINT}
+    n = n_joints or max(len(groups["q"]), len(groups["tau"]), 1)
+    named = {"t": time}
+    for kind in ("q", "tau"):
+        named |= {f"{kind}{j + 1}": (groups[kind] + [_PLACEHOLDER] * n)[j] for j in range(n)}
+    if len(groups["dq"]) == n:
+        named |= {f"dq{j + 1}": name for j, name in enumerate(groups["dq"])}
+    return named
+
+
+def _numbered(names: list[str]) -> list[str]:
+    """Names in the order of the first number in each, where each has one; else as in the file."""
+    numbers = [re.search(r"[0-9]+", name) for name in names]
+    return sorted(names, key=lambda name: int(re.findall(r"[0-9]+", name)[0])) if all(numbers) else names
+
+
+def _kind(column: Column) -> str | None:
+    """What a column seems to be: by the words of its name; a rising column with a name of time is time."""
+    words = [w for w in re.split(r"[^a-z0-9]+", _spread(column.name)) if w]
+    if column.trend == "rising" and any(_TIME.fullmatch(w) for w in words):
+        return "t"
+    for kind, pattern in _WORDS.items():
+        if any(pattern.fullmatch(w) for w in words):
+            return None if kind == "skip" else kind
+    return None
+
+
+def _spread(name: str) -> str:
+    """A name in small letters whose words are apart: ``shoulderPos1`` is ``shoulder pos1``, and ``pos1`` is ``pos 1``."""
+    apart = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name).lower()
+    return re.sub(r"(?<=[a-z]{2})(?=[0-9])", " ", apart)
+
+
+def _units(path: str | Path, proposed: dict[str, str], arm: Arm | None) -> dict[str, str]:
+    """Units that reading by a mapping would ask for, one after the other."""
+    units: dict[str, str] = {}
+    if _PLACEHOLDER in proposed.values() or str(path) == "-":
+        return units
+    for _ in range(3):  # times, positions, velocities or torques
+        try:
+            Log.read(path, columns=proposed, units=units, arm=arm)
+        except UnitError as error:
+            asked = re.search(r"--units (\w+)=([\w/]+)", error.remedy)
+            if asked is None or asked[1] in units:
+                return units
+            units[asked[1]] = asked[2]
+        except ArmgapError:
+            return units
+        else:
+            return units
+    return units
+
+
+def _pairs(mapping: dict[str, str]) -> str:
+    return ",".join(f"{key}={name}" for key, name in mapping.items())

@@ -1,0 +1,45 @@
+"""The words that results and options consist of, as types: what a type checker accepts is what the program knows."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+__all__ = [
+    "CAUSE_STATUSES",
+    "FILTERS",
+    "GAP_OUTCOMES",
+    "SCHEMES",
+    "STATUSES",
+    "VELOCITIES",
+    "VERDICTS",
+    "CauseStatus",
+    "Filters",
+    "GapOutcome",
+    "Scheme",
+    "Status",
+    "VelocityMethod",
+    "Verdict",
+]
+
+Scheme = Literal["filtered-dynamic", "supplied-energy", "filtered-power"]
+Filters = Literal["exact", "paper"]
+VelocityMethod = Literal["backward", "central", "local-cubic", "sensor", "midpoint"]
+Verdict = Literal["none", "parameters", "effect", "unexplained", "input"]
+Status = Literal["absent", "not excited", "undecided"]
+CauseStatus = Literal["gone", "unseen", "undecided", "new", "smaller", "larger", "unchanged", "renamed"]
+GapOutcome = Literal["smaller", "larger", "unchanged", "none"]
+
+SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
+"""The regression models, in the order of Reyes and Kelly (1997)."""
+FILTERS: tuple[Filters, ...] = get_args(Filters)
+"""Consistent filters, and the paper's as printed."""
+VELOCITIES: tuple[VelocityMethod, ...] = get_args(VelocityMethod)
+"""Ways to get velocities."""
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+"""Verdicts of a diagnosis."""
+STATUSES: tuple[Status, ...] = get_args(Status)
+"""What a candidate can be that is no cause."""
+CAUSE_STATUSES: tuple[CauseStatus, ...] = get_args(CauseStatus)
+"""What can become of a cause between two diagnoses."""
+GAP_OUTCOMES: tuple[GapOutcome, ...] = get_args(GapOutcome)
+"""What can become of the gap between two diagnoses."""

@@ -1,0 +1,60 @@
+"""What a result was made from: hashes of the inputs, options, and the version."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armgap import _native
+from armgap.arm import Arm
+from armgap.log import Log
+
+__all__ = ["provenance"]
+
+
+def provenance(arm: Arm, logs: Mapping[str, Sequence[Log]], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return version, options, and the SHA-256 of every input.
+
+    Parameters
+    ----------
+    arm : Arm
+        The nominal model; the hash is that of its file, or of its text as an arm file.
+    logs : mapping of str to sequence of Log
+        Logs as they were read, by what they are used for. The hash is that of the file, or of the columns of a log that came from
+        no regular file.
+    options : mapping
+        What was asked for.
+
+    Returns
+    -------
+    dict
+        ``version``, ``options``, ``arm`` and ``logs``; an input has ``file`` (null without one) and ``sha256``.
+    """
+    return {
+        "version": _native.__version__,
+        "options": dict(options),
+        "arm": _input(arm.path, arm.to_toml().encode()),
+        "logs": [
+            {"name": log.name, "set": use, **_input(log.path, _columns(log))}
+            for use, group in logs.items()
+            for log in group
+        ],
+    }
+
+
+def _input(path: Path | None, content: bytes) -> dict[str, Any]:
+    if path is not None and path.is_file():
+        with path.open("rb") as file:
+            return {"file": str(path), "sha256": hashlib.file_digest(file, "sha256").hexdigest()}
+    return {"file": None if path is None else str(path), "sha256": hashlib.sha256(content).hexdigest()}
+
+
+def _columns(log: Log) -> bytes:
+    if log.path is not None and log.path.is_file():
+        return b""
+    arrays = [log.t, log.q, log.tau] + ([] if log.dq is None else [log.dq])
+    return b"".join(np.ascontiguousarray(x).tobytes() for x in arrays)

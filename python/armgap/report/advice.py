@@ -1,0 +1,105 @@
+"""What to do next: a few lines that follow from the verdict and from what the diagnosis holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from armgap import _native
+from armgap.report.words import doubtful, named, percent, title
+
+__all__ = ["next_steps"]
+
+Data = dict[str, Any]
+
+#: Effects that the logs do not excite and that are listed here; all of them have a section of their own.
+LISTED = 3
+#: Share of the gap above the floor that may stay before it is worth a line: less is what other motions alone vary it by.
+REMAINDER = 0.2
+_EXPORT = "`armgap export DIAGNOSIS.json --arm ARM.toml -o corrected.toml` (`.xml` for MuJoCo, `.urdf` for URDF)"
+_AGAIN = "After a repair, diagnose a log of the same motion and compare: `armgap compare DIAGNOSIS.json REPAIRED.json`."
+_LOG_MORE = (
+    "Log more: the measured torque (motor current times torque constant), mapped to the tau columns in place of the command, tells "
+    "whether the gap lies in the drive; note the times of any contact or load."
+)
+_OWN = "If you suspect a law, write it as a custom effect and give it to `armgap.diagnose(..., effects=[...])`."
+
+
+def next_steps(data: Data) -> list[str]:
+    """Return what to do next, most urgent first.
+
+    Parameters
+    ----------
+    data : dict
+        JSON object of a diagnosis.
+    """
+    return [*_impossible(data), *_BY_VERDICT.get(data["verdict"], _none)(data)]
+
+
+def _input(data: Data) -> list[str]:
+    remedies = [_remedy(c) for c in data.get("checks") or [] if c["severity"] == "error"]
+    steps = [f"Apply the remedy and diagnose again: {text}." for text in dict.fromkeys(filter(None, remedies))]
+    return [
+        *(steps or ["Correct the input and diagnose again."]),
+        "Effects are not judged until the input agrees with the arm file.",
+    ]
+
+
+def _remedy(check: Data) -> str:
+    several = check.get("remedies") or list(filter(None, [check.get("remedy")]))
+    text = " or ".join(f"`{r}`" for r in several)
+    return f"{text} (no log tells these apart; choose by looking at the arm)" if len(several) > 1 else text
+
+
+def _none(data: Data) -> list[str]:
+    return ["Nothing is left to shrink on this motion: keep the arm file.", *_excite(data)]
+
+
+def _parameters(data: Data) -> list[str]:
+    return [f"Take over the re-estimated values: {_EXPORT}.", *_excite(data)]
+
+
+def _effect(data: Data) -> list[str]:
+    steps = [_alike(c) for c in data["causes"] if c.get("equivalents")]
+    steps.append(f"Export the corrected model: {_EXPORT}.")
+    steps.append(_AGAIN)
+    left = 1.0 - float(data["gap"]["closed"])
+    if doubtful(data) or left > REMAINDER:
+        steps.append(f"{percent(left)} of the gap above the floor stays. {_LOG_MORE}")
+    return steps
+
+
+def _alike(cause: Data) -> str:
+    others = " or ".join(dict.fromkeys(named(e) for e in cause["equivalents"]))
+    return f"These logs do not tell {named(cause)}, from {others}: look at the arm before you repair it; the section on look-alikes says why."
+
+
+def _unexplained(data: Data) -> list[str]:
+    places = data.get("where") or []
+    steps = [f"Look at joint {places[0]['joint']} first: that is where the torque is lacking."] if places else []
+    return [*steps, _LOG_MORE, _OWN, *_excite(data)]
+
+
+def _excite(data: Data) -> list[str]:
+    """Which motion to record so that what these logs cannot show is shown or ruled out."""
+    silent = dict.fromkeys(r["effect"] for r in data.get("ruled_out") or [] if r["status"] == "not excited")
+    if not silent:
+        return []
+    needs = {entry["name"]: str(entry["excited_by"]) for entry in _native.effects()}
+    shown = [f"{title(name)} needs {needs[name]}" for name in silent if name in needs][:LISTED]
+    more = f"; and {len(silent) - len(shown)} more effects" if len(silent) > len(shown) else ""
+    return [f"To rule out what these logs do not excite, record other motion: {'; '.join(shown)}{more}."]
+
+
+def _impossible(data: Data) -> list[str]:
+    broken = [c["check"] for c in data.get("plausibility") or [] if not c["holds"]]
+    return [f"First find out why this does not hold: {'; '.join(broken)}. No arm has such values."] if broken else []
+
+
+_BY_VERDICT: dict[str, Callable[[Data], list[str]]] = {
+    "none": _none,
+    "parameters": _parameters,
+    "effect": _effect,
+    "unexplained": _unexplained,
+    "input": _input,
+}

@@ -1,0 +1,112 @@
+"""Which zero, which angles and which signs a kind of arm has; in words, and as a section with the logs' columns and units."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from armgap.report.page import Section, Table
+from armgap.report.sketch import panel
+
+__all__ = ["TITLE", "WORDS", "brief", "section"]
+
+Data = dict[str, Any]
+
+TITLE = "Conventions, columns and units"
+_TORQUE = (
+    "Positive torque turns its joint towards greater q. It is the torque at the joint, behind the gear, commanded at t and held until "
+    "the next row."
+)
+_SENSE = "The positive direction is the one in which q grows. Either sense of rotation is fine"
+
+WORDS: dict[str, tuple[str, ...]] = {
+    "axis": (
+        "q1 = 0 may be anywhere on the rail. The positive direction is the one in which q1 grows.",
+        "Positive force pushes towards greater q1. It is commanded at t and held until the next row.",
+        "theta2 is the weight along the axis: positive where gravity pulls towards smaller q1 (uphill is positive), 0 on a horizontal axis.",
+    ),
+    "pendulum": (
+        "q1 = 0: the link hangs straight down.",
+        f"{_SENSE}, as long as the torque counts the same way.",
+        _TORQUE,
+        "Gravity pulls the link back to q1 = 0: holding it at 0 < q1 < pi takes the positive torque m g l sin(q1).",
+    ),
+    "two-link": (
+        "q1 = 0: link 1 hangs straight down.",
+        "q2 is the angle of link 2 relative to link 1, not to the world. q2 = 0: the arm is straight.",
+        f"{_SENSE}, as long as both joints and both torques count the same way.",
+        _TORQUE,
+        "Gravity pulls the arm back to q1 = q2 = 0: holding it takes theta4 sin(q1) + theta5 sin(q1 + q2) at joint 1 and "
+        "theta5 sin(q1 + q2) at joint 2.",
+    ),
+}
+"""Kind of arm to its conventions, one sentence or two each."""
+
+_BRIEF = {
+    "axis": "positive force pushes towards greater q1.",
+    "pendulum": "q1 = 0 hangs straight down; positive torque turns the joint towards greater q1.",
+    "two-link": "q = 0 hangs straight down; q2 is relative to link 1; positive torque turns its joint towards greater q.",
+}
+_QUANTITIES = {
+    "t": "time",
+    "t_tau": "time of the torques",
+    "q": "position of joint {}",
+    "tau": "torque of joint {}",
+    "dq": "velocity of joint {}",
+}
+_FORCE = {"tau": "force of joint {}"}
+_KEY = re.compile(r"(t_tau|t|q|tau|dq)([0-9]*)")
+_SHOWN = {"Nm": "N m", "mNm": "mN m"}
+
+
+def brief(kind: str) -> str:
+    """The conventions of a kind of arm in one line; nothing for a kind that is not known."""
+    return _BRIEF.get(kind, "")
+
+
+def section(kind: str, logs: list[Data] | None = None, si: Data | None = None) -> Section | None:
+    """Return the section of an arm's conventions.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of arm.
+    logs : list of dict, optional
+        ``input.logs`` of a diagnosis: columns and units of each log.
+    si : dict, optional
+        ``input.units`` of a diagnosis: SI unit of each group of columns.
+    """
+    if kind not in WORDS:
+        return None
+    tables = _tables(kind, logs or [], si or {})
+    title = TITLE if tables else "Conventions"
+    return Section(title, sketch=panel(kind), points=WORDS[kind], tables=tables, name="conventions")
+
+
+def _tables(kind: str, logs: list[Data], si: Data) -> list[Table]:
+    """One table for all logs that name their columns alike and have the same units."""
+    groups: dict[str, tuple[Data, list[str]]] = {}
+    for log in logs:
+        names = groups.setdefault(repr((log["columns"], log["units"])), (log, []))[1]
+        names += [log["name"]] if log["name"] not in names else []
+    return [
+        Table(("column", "what it is", f"in {', '.join(names)}", "unit there", "used as"), _rows(kind, log, si))
+        for log, names in groups.values()
+        if log["columns"]
+    ]
+
+
+def _rows(kind: str, log: Data, si: Data) -> list[tuple[str, ...]]:
+    return [_row(kind, key, name, log["units"].get(key, ""), si) for key, name in log["columns"].items()]
+
+
+def _row(kind: str, key: str, name: str, unit: str, si: Data) -> tuple[str, ...]:
+    from armgap.log.units import FACTORS
+
+    match = _KEY.fullmatch(key)
+    group, joint = match.groups() if match else (key, "")
+    words = _QUANTITIES | (_FORCE if kind == "axis" else {})
+    used = str(si.get("t" if group == "t_tau" else group, ""))
+    factor = FACTORS.get("t" if group == "t_tau" else group, {}).get(unit, 1.0)
+    converted = used if factor == 1.0 else f"{used}, times {factor:.4g}"
+    return key, words.get(group, "").format(joint), name, _SHOWN.get(unit, unit), converted

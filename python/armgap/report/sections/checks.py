@@ -1,0 +1,60 @@
+"""What was noticed about the input: contradictions between log and arm file, repairs, warnings."""
+
+from __future__ import annotations
+
+from armgap.report.page import Section, Table
+from armgap.report.sections.model_labels import Data
+from armgap.report.words import joint_text
+
+__all__ = ["checks", "input_checks"]
+
+TITLE = "Checks of the input"
+#: Row ranges that are listed; of more, the number is said.
+LISTED = 3
+#: Severity to its word, gravest first.
+_SEVERITY = {"error": "contradiction", "repaired": "repaired", "warning": "warning"}
+
+
+def checks(data: Data) -> Section | None:
+    """What was noticed, unless it stands before the answers already."""
+    return None if data["verdict"] == "input" else input_checks(data)
+
+
+def input_checks(data: Data) -> Section | None:
+    """What was noticed, errors first."""
+    found = data.get("checks") or []
+    if not found:
+        return None
+    order = list(_SEVERITY)
+    ordered = sorted(found, key=lambda c: order.index(c["severity"]) if c["severity"] in order else len(order))
+    rows = [
+        (
+            _SEVERITY.get(c["severity"], c["severity"]),
+            c["check"].replace("_", " "),
+            _place(c),
+            f"{c['message'].rstrip('.')}.",
+            _remedies(c),
+        )
+        for c in ordered
+    ]
+    header = ("", "check", "where", "what the log shows", "remedy")
+    return Section(TITLE, tables=[Table(header, rows)], name="checks")
+
+
+def _place(check: Data) -> str:
+    """Joint, log and rows, counted from 1 as in every message."""
+    joint = "" if check.get("joint") is None else joint_text(check["joint"])
+    return ", ".join(filter(None, (joint, check.get("log"), _rows(check.get("rows") or []))))
+
+
+def _rows(ranges: list[list[int]]) -> str:
+    shown = [str(a + 1) if a == b else f"{a + 1} to {b + 1}" for a, b in ranges[:LISTED]]
+    more = f" and {len(ranges) - LISTED} more ranges" if len(ranges) > LISTED else ""
+    one = len(ranges) == 1 and ranges[0][0] == ranges[0][1]
+    return f"row{'' if one else 's'} {', '.join(shown)}{more}" if shown else ""
+
+
+def _remedies(check: Data) -> str:
+    """Options and lines as code; several where no log tells them apart."""
+    several = check.get("remedies") or list(filter(None, [check.get("remedy")]))
+    return " or ".join(f"`{r}`" for r in several)

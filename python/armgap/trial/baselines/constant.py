@@ -1,0 +1,20 @@
+"""A constant guess: the answer of someone who has not looked at the log."""
+
+from __future__ import annotations
+
+from armgap.trial.answers import Answer, NamedCause
+from armgap.trial.methods import Method
+from armgap.trial.sealed import SealedCase
+
+__all__ = ["CONSTANT"]
+
+#: Stribeck friction of the first joint, the effect most often named in the literature on friction; one of 24 effects.
+GUESS = NamedCause("stribeck", 1, probability=1.0 / 24.0)
+
+
+def answer(case: SealedCase) -> Answer:
+    """Name the same cause whatever the logs."""
+    return Answer("constant", "effect", (GUESS,))
+
+
+CONSTANT = Method("constant", "constant guess", "always names Stribeck friction of joint 1", answer)

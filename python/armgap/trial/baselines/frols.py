@@ -1,0 +1,113 @@
+"""FROLS of SysIdentPy: forward orthogonal least squares over the same signatures, model order by BIC.
+
+The arm's own columns are projected out of the torques and of all signatures, so that what FROLS chooses from is what the
+re-estimated arm leaves. Terms enter as inputs of a NFIR model of degree one without lag. The probability of a named
+effect is the share of the residual's power that its terms remove (the sum of their error reduction ratios).
+
+References
+----------
+Chen, Billings and Luo (1989), Int. J. Control 50, 1873-1896. Lacerda et al. (2020), J. Open Source Software 5(54), 2384.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import warnings
+from typing import Any
+
+import numpy as np
+
+from armgap.trial.answers import Answer, NamedCause
+from armgap.trial.baselines.regression import Array, regression_data
+from armgap.trial.baselines.signatures import Signature, signatures
+from armgap.trial.engine import TrialEngineMissingError
+from armgap.trial.methods import Method
+from armgap.trial.sealed import SealedCase
+
+__all__ = ["FROLS"]
+
+#: Terms that BIC chooses among, causes named at most, and the least share of power of a named cause.
+TERMS, MAX_CAUSES, MIN_SHARE = 8, 4, 0.05
+
+
+def answer(case: SealedCase) -> Answer:
+    """Name the effects of the terms that FROLS keeps, most power first."""
+    made = regression_data(case)
+    q, _ = np.linalg.qr(made.base)
+    found = signatures(case.arm, made, made.motions[0])
+    columns = np.hstack([s.columns for s in found])
+    owner = [s for s in found for _ in range(s.columns.shape[1])]
+    left, candidates = made.tau - q @ (q.T @ made.tau), columns - q @ (q.T @ columns)
+    power = np.linalg.norm(candidates, axis=0)
+    kept = np.flatnonzero(power > 1e-6 * np.linalg.norm(columns, axis=0))
+    chosen, shares = _select(candidates[:, kept] / power[kept], left / np.std(left))
+    return _named([owner[int(kept[i])] for i in chosen], shares)
+
+
+def _named(terms: list[Signature], shares: list[float]) -> Answer:
+    total: dict[tuple[str, int | None], float] = {}
+    for s, share in zip(terms, shares, strict=True):
+        key = (s.effect, s.joint)
+        total[key] = total.get(key, 0.0) + share
+    best = sorted(((share, key) for key, share in total.items() if share >= MIN_SHARE), key=lambda x: -x[0])[
+        :MAX_CAUSES
+    ]
+    causes = tuple(NamedCause(effect, joint, min(max(share, 0.0), 1.0)) for share, (effect, joint) in best)
+    return Answer("frols", "effect" if causes else "none", causes)
+
+
+def _select(candidates: Array, target: Array) -> tuple[list[int], list[float]]:
+    """Columns chosen, and their error reduction ratios."""
+    library = _library()
+    model = library.FROLS(
+        order_selection=True,
+        info_criteria="bic",
+        n_info_values=min(TERMS, candidates.shape[1]),
+        n_terms=None,
+        xlag=[[1]] * candidates.shape[1],
+        ylag=1,
+        model_type="NFIR",
+        basis_function=library.Polynomial(degree=1),
+        estimator=library.LeastSquares(),
+    )
+    # A term of lag one at row k is the candidate's row k - 1: shift the candidates by one row.
+    shifted = np.vstack([candidates[1:], candidates[-1:]])
+    with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
+        warnings.simplefilter("ignore")
+        model.fit(X=shifted, y=target.reshape(-1, 1))
+    # Column 0 of the model's matrix is the constant.
+    terms = [(int(i) - 1, float(r)) for i, r in zip(model.pivv, model.err, strict=False) if int(i) > 0]
+    return [i for i, _ in terms], [r for _, r in terms]
+
+
+def _library() -> Any:
+    try:
+        return _Library()
+    except ImportError as error:
+        raise TrialEngineMissingError("sysidentpy", "the baseline frols", "trial-baselines") from error
+
+
+class _Library:
+    """What is used of SysIdentPy."""
+
+    def __init__(self) -> None:
+        selection = importlib.import_module("sysidentpy.model_structure_selection")
+        self.FROLS: Any = selection.FROLS
+        self.Polynomial: Any = importlib.import_module("sysidentpy.basis_function").Polynomial
+        self.LeastSquares: Any = importlib.import_module("sysidentpy.parameter_estimation").LeastSquares
+
+
+def _check() -> None:
+    _library()
+
+
+FROLS = Method(
+    "frols",
+    "SysIdentPy FROLS",
+    f"sysidentpy.FROLS over the same signatures with the arm's columns projected out, up to {TERMS} terms by BIC; effects whose terms "
+    f"remove at least {MIN_SHARE:.0%} of the residual's power, that share as probability",
+    answer,
+    check=_check,
+)

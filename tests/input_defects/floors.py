@@ -1,0 +1,75 @@
+"""Claimed floors against true ones, and verdicts against what remains."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .judging import Record
+from .tables import percent, table
+
+#: A claimed floor may be this much below or above the true one.
+BAND = (0.7, 1.4)
+#: What remains is of consequence beyond so many true floors and this share of the RMS displacement over the horizon.
+FLOORS, SHARE = 4.0, 0.001
+#: What of the gap remains according to a verdict that calls for no effect.
+REMAINS = {"none": "before", "parameters": "after"}
+
+
+def floor_section(records: list[Record]) -> str:
+    """The section of the page."""
+    answered = [r for r in records if "failed" not in r and "gap" in r]
+    plain, without_worst = (ratios(answered, key) for key in ("floor", "floor_cut"))
+    lines = [_line("all joints", plain, without_worst)]
+    for model in dict.fromkeys(r["model"] for r in answered):
+        of = [r for r in answered if r["model"] == model]
+        lines.append(_line(model, ratios(of, "floor"), ratios(of, "floor_cut")))
+    head = ["joints of", "joints", "0.7 to 1.4", "5 %", "median", "95 %", "0.7 to 1.4, worst starts cut"]
+    parts = [TEXT, table(head, lines), _contradictions(answered, len(records))]
+    return "## Floor and verdict\n\n" + "\n\n".join(parts)
+
+
+TEXT = """\
+The true floor is what the true arm, run from the measured starts, misses the measured positions by (`true_floor.py`); half of the
+cases have white noise of 0.5 to 10 counts beside the rounding. Claimed over true floor, joint by joint; in the last column windows
+of the true floor count up to ten times the typical one."""
+
+
+def ratios(records: list[Record], key: str) -> np.ndarray:
+    """Claimed over true floor of every joint."""
+    pairs = [(c, t) for r in records for c, t in zip(r["gap"]["floor"], r["true"][key], strict=True)]
+    return np.array([c / t for c, t in pairs])
+
+
+def _line(name: str, plain: np.ndarray, without_worst: np.ndarray) -> list[str]:
+    spread = [f"{x:.2f}" for x in np.quantile(plain, [0.05, 0.5, 0.95])] if len(plain) else ["-"] * 3
+    return [name, str(len(plain)), _inside(plain), *spread, _inside(without_worst)]
+
+
+def _inside(ratio: np.ndarray) -> str:
+    return percent(int(np.sum((ratio >= BAND[0]) & (ratio <= BAND[1]))), len(ratio))
+
+
+def contradicts(record: Record) -> list[str]:
+    """Joints on which more remains than the verdict says."""
+    if record["verdict"] not in REMAINS:
+        return []
+    left, true = record["gap"][REMAINS[record["verdict"]]], record["true"]
+    return [
+        f"joint {j + 1}: {gap:.3g} over a floor of {floor:.3g}, {100 * gap / travel:.2f} % of the displacement"
+        for j, (gap, floor, travel) in enumerate(zip(left, true["floor"], true["travel"], strict=True))
+        if gap > FLOORS * floor and gap > SHARE * travel
+    ]
+
+
+def _contradictions(records: list[Record], asked: int) -> str:
+    found = [(r, said) for r in records if (said := contradicts(r))]
+    text = f"Verdicts `none` or `parameters` beside a gap of more than {FLOORS:g} floors and {100 * SHARE:g} % of the RMS displacement\n"
+    text += f"over the horizon: {len(found)} of {len(records)} answers ({asked - len(records)} cases without one)."
+    if not found:
+        return text
+    lines = [[r["case"], r["verdict"], "; ".join(said), _hidden(r)] for r, said in found]
+    return text + "\n\n" + table(["case", "verdict", "what remains", "hidden"], lines)
+
+
+def _hidden(record: Record) -> str:
+    return ", ".join(f"{effect}:{joint or ''}" for effect, joint in record["hidden"]) or "nothing"

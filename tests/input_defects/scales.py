@@ -1,0 +1,78 @@
+"""Defects of unit and meaning: torques as currents or shares, positions in degrees or turns, a position in a torque's place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from .case import Array, Inputs, NotApplicableError, Table, Truth
+from .defect import ANY, AXIS, ROTARY, TWO_LINK, Defect
+from .expected import Expected
+
+Result = tuple[Inputs, Expected]
+
+#: Torque constant of a small motor [N m/A], and a harmonic drive's ratio.
+CURRENT, GEAR = 0.08, 50.0
+#: A factor within these is a gain of the drive rather than another unit, with a margin on both sides.
+GAINS = (0.4, 2.5)
+#: Time by which a servo's joint follows its commanded position [s].
+FOLLOWS = (0.02, 0.08)
+
+
+def scales() -> Iterator[Defect]:
+    """All of them."""
+    gain, tau = ("torque_gain",), ("tau",)
+    for name, factor in (("current", CURRENT), ("gear 50", GEAR)):
+        yield Defect(f"torque_unit:{name}", partial(scaled, factor=factor), ANY, tau, gain)
+        yield Defect(f"torque_unit:{name}, tau2 only", partial(scaled, factor=factor, only=2), TWO_LINK, tau, gain)
+    yield Defect("torque_unit:current, tau1 only", partial(scaled, factor=CURRENT, only=1), TWO_LINK, tau, gain)
+    yield Defect("torque_unit:percentage", percentage, ANY, tau, gain)
+    yield Defect("torque_is_position:all", commanded, ANY, tau)
+    yield Defect("torque_is_position:tau1", partial(commanded, only=1), TWO_LINK, tau)
+    yield Defect("torque_is_position:degrees", partial(commanded, unit=180 / math.pi), ROTARY, tau)
+    for unit, per_si, kinds in (("deg", 180 / math.pi, ROTARY), ("turns", 0.5 / math.pi, ROTARY), ("mm", 1e3, AXIS)):
+        yield Defect(f"position_unit:{unit}", partial(counted_in, unit=unit, per_si=per_si), kinds, ("q",))
+
+
+def scaled(inputs: Inputs, truth: Truth, _: np.random.Generator, *, factor: float, only: int = 0) -> Result:
+    """Torques that have to be multiplied by one factor, in every column or in one."""
+    factors = np.array([factor if only in (0, j + 1) else 1.0 for j in range(truth.n_joints)])
+    return _divided(inputs, factors)
+
+
+def percentage(inputs: Inputs, truth: Truth, _: np.random.Generator) -> Result:
+    """Torques in percent of the limit."""
+    factors = truth.limit / 100
+    if np.any((factors > GAINS[0]) & (factors < GAINS[1])):
+        raise NotApplicableError("a percentage of this limit is about a newton metre")
+    return _divided(inputs, factors)
+
+
+def _divided(inputs: Inputs, factors: Array) -> Result:
+    entries = [f"tau{j + 1}={x:.6g}" for j, x in enumerate(factors) if x != 1.0]
+    expected = Expected(("torque_unit",), ("repaired",), ("--factor " + ",".join(entries),))
+    return inputs.each(lambda x: x.changed(tau=x.tau / factors)), expected
+
+
+def commanded(inputs: Inputs, truth: Truth, rng: np.random.Generator, *, only: int = 0, unit: float = 1.0) -> Result:
+    """A servo's commanded position in the torque's column: the joint follows it as a first-order lag does."""
+    lag = rng.uniform(*FOLLOWS)
+    joints = [j for j in range(truth.n_joints) if only in (0, j + 1)]
+
+    def change(x: Table) -> Table:
+        tau = x.tau.copy()
+        tau[:, joints] = unit * (x.q_true + lag * x.dq_true)[:, joints]
+        return x.changed(tau=tau)
+
+    remedy = "--map " + ",".join(f"tau{j + 1}" for j in joints)
+    return inputs.each(change), Expected(("torque_is_position",), ("error",), (remedy,))
+
+
+def counted_in(inputs: Inputs, truth: Truth, _: np.random.Generator, *, unit: str, per_si: float) -> Result:
+    """Positions in another unit. Degrees and millimetres may be refused or converted when a log is read."""
+    severities = ("error",) if unit == "turns" else ("error", "repaired")
+    expected = Expected(("position_unit",), severities, (f"--units q={unit}",))
+    return inputs.each(lambda x: x.changed(q=x.q * per_si)), expected

@@ -1,0 +1,290 @@
+"""Contradictions between logs and arm file: each defect put into a log is said, with its remedy; a sound log is left alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armgap import Arm, Log, diagnose, simulate
+from armgap.check import CORRECTIONS, NAMES, Check, Corrections, examine, time_shift, torque_unit
+from armgap.check.contradiction import READINGS
+from armgap.check.equation_error import EquationError, Rows, bounds
+from armgap.errors import ColumnError, OptionError
+from swings import off, sines, swing
+
+
+@pytest.fixture(scope="module")
+def swings(pendulum: Arm) -> list[Log]:
+    return [swing(off(pendulum), seed) for seed in (1, 2)]
+
+
+@pytest.fixture(scope="module")
+def two_links(arm: Arm) -> list[Log]:
+    t = np.arange(2400) * arm.sample_period
+    return [simulate(off(arm), t, sines(t, seed), noise=2e-5, seed=seed, name=f"run {seed}") for seed in (3, 4)]
+
+
+def read_as(logs: list[Log], **given: object) -> list[Log]:
+    corrections = Corrections.parse(**given)
+    return [corrections.on_log(log) for log in logs]
+
+
+def checked(logs: list[Log], arm: Arm, **options: bool) -> tuple[Check, ...]:
+    return examine(logs[:1], logs[1:], arm, **options).checks
+
+
+def test_sound_logs_are_left_alone(swings: list[Log], pendulum: Arm, two_links: list[Log], arm: Arm) -> None:
+    assert checked(swings, pendulum) == ()
+    assert checked(two_links, arm) == ()
+
+
+@pytest.mark.parametrize(
+    ("defect", "name", "remedies"),
+    [
+        ({"flip": "tau1"}, "torque_sign", {"--flip tau1", "--flip q1"}),
+        ({"zero": "q1=180deg"}, "position_zero", {"--zero q1=180deg", "--gravity reversed"}),
+        ({"zero": "q1=-90deg"}, "position_zero", {"--zero q1=90deg"}),
+        ({"zero": "q1=90deg"}, "position_zero", {"--zero q1=-90deg"}),
+    ],
+)
+def test_defects_of_a_pendulum(
+    swings: list[Log], pendulum: Arm, defect: dict[str, str], name: str, remedies: set[str]
+) -> None:
+    [check] = checked(read_as(swings, **defect), pendulum)
+    assert (check.check, check.severity) == (name, "error")
+    assert remedies == set(check.remedies)
+
+
+@pytest.mark.parametrize(
+    ("defect", "name", "remedy"),
+    [
+        ({"flip": "tau1"}, "torque_sign", "--flip tau1"),
+        ({"flip": "tau2"}, "torque_sign", "--flip tau2"),
+        ({"flip": "tau1,tau2"}, "torque_sign", "--flip tau1,tau2"),
+        ({"flip": "q1"}, "position_sign", "--flip q1"),
+        ({"flip": "q2"}, "position_sign", "--flip q2"),
+        ({"swap": ["q1,q2"]}, "joint_order", "--swap q1,q2"),
+        ({"swap": ["tau1,tau2"]}, "joint_order", "--swap tau1,tau2"),
+        ({"relative": "q2"}, "relative_angle", "--absolute q2"),
+        ({"zero": "q2=90deg"}, "position_zero", "--zero q2=-90deg"),
+    ],
+)
+def test_defects_of_a_two_link_arm(
+    two_links: list[Log], arm: Arm, defect: dict[str, object], name: str, remedy: str
+) -> None:
+    [check] = checked(read_as(two_links, **defect), arm)
+    assert (check.check, check.severity) == (name, "error")
+    assert remedy in check.remedies
+
+
+def test_the_remedy_is_applied(swings: list[Log], pendulum: Arm) -> None:
+    found = examine(*([log] for log in read_as(swings, flip="tau1")), pendulum)
+    assert found.contradictory
+    np.testing.assert_array_equal(found.training[0].tau, swings[0].tau)
+
+
+def test_gravity_of_the_arm_file(swings: list[Log], pendulum: Arm) -> None:
+    turned = replace(pendulum, theta=pendulum.theta * [1, -1, 1, 1])
+    [check] = checked(swings, turned)
+    assert check.check == "gravity_sign"
+    assert "--gravity reversed" in check.remedies
+
+
+def test_gravity_compensated_torques(swings: list[Log], pendulum: Arm) -> None:
+    weight = off(pendulum).theta[1]
+    compensated = [replace(log, tau=log.tau - weight * np.sin(log.q)) for log in swings]
+    [check] = checked(compensated, pendulum)
+    assert (check.check, check.severity) == ("gravity_missing", "error")
+
+
+@pytest.mark.parametrize("factor", [12.5, 0.02])
+def test_a_factor_on_a_torque_column(two_links: list[Log], arm: Arm, factor: float) -> None:
+    [check] = checked(read_as(two_links, factor={"tau2": factor}), arm)
+    assert (check.check, check.severity, check.joint) == ("torque_unit", "repaired", 2)
+    found = float(check.remedy.removeprefix("--factor tau2="))
+    assert found * factor == pytest.approx(1.0, abs=0.15)
+
+
+def test_parameters_that_are_all_three_times_off_are_left_to_the_fit(swings: list[Log], pendulum: Arm) -> None:
+    scaled = replace(pendulum, theta=3 * pendulum.theta, sigma=3 * pendulum.sigma)
+    assert [c.severity for c in checked(swings, scaled)] == ["warning"]
+
+
+def test_a_commanded_position_in_the_torque_column(pendulum: Arm) -> None:
+    t = np.arange(2000) * pendulum.sample_period
+    logs = []
+    for seed in (1, 2):
+        draw = np.random.default_rng(seed)
+        speed, phase = 2 * np.pi * draw.uniform(0.2, 1.5, 4), draw.uniform(0, 6, 4)
+        reference = 0.3 * np.sin(np.outer(t, speed) + phase).sum(axis=1)
+        late = 0.3 * np.sin(np.outer(t - 0.02, speed) + phase).sum(axis=1)
+        logs.append(Log(f"servo {seed}", t, late[:, None] + draw.normal(0, 2e-4, (len(t), 1)), reference[:, None]))
+    [check] = checked(logs, pendulum)
+    assert (check.check, check.severity) == ("torque_is_position", "error")
+
+
+@pytest.mark.parametrize("samples", [1, 3])
+def test_torques_that_come_late_in_the_file(two_links: list[Log], arm: Arm, samples: int) -> None:
+    late = [replace(log, tau=np.vstack([log.tau[:samples], log.tau[:-samples]])) for log in two_links]
+    [check] = checked(late, arm)
+    assert (check.check, check.severity) == ("time_shift", "repaired")
+    assert float(check.remedy.removeprefix("--shift tau=")) == pytest.approx(-samples * arm.sample_period)
+    assert [c.severity for c in checked(late, arm, repair=False)] == ["warning"]
+
+
+def test_a_stretch_without_torque(two_links: list[Log], arm: Arm) -> None:
+    def without(log: Log) -> Log:
+        tau = log.tau.copy()
+        tau[400:1000] = 0.0
+        return replace(log, tau=tau)
+
+    found = checked([without(two_links[0]), two_links[1]], arm)
+    assert {c.check for c in found} == {"dead_stretch"}
+    assert found[0].rows == ((400, 999),)
+    assert found[0].log == "run 3"
+
+
+def test_a_free_swing_is_no_dead_stretch(pendulum: Arm) -> None:
+    t = np.arange(2000) * pendulum.sample_period
+    tau = np.where(t < 4, 0.5 * np.sin(3 * t) + 0.2 * np.sin(7 * t), 0.0)
+    logs = [simulate(off(pendulum), t, s * tau, noise=2e-4, seed=k, name=f"run {k}") for k, s in enumerate((1.0, -0.8))]
+    assert checked(logs, pendulum) == ()
+
+
+def test_the_verdict_of_contradictory_input(swings: list[Log], pendulum: Arm) -> None:
+    train, holdout = read_as(swings, flip="tau1")
+    result = diagnose(train, pendulum, holdout=holdout)
+    assert result.verdict == "input"
+    assert result.causes == ()
+    assert result.checks[0].check == "torque_sign"
+    # The figures are those with the remedy applied.
+    assert max(result.gap.refit) < 5e-3
+
+
+def test_corrections_are_options_and_lines_of_the_arm_file(pendulum: Arm, tmp_path: object) -> None:
+    given = Corrections.parse(
+        flip=["tau1"],
+        zero={"q1": "180deg"},
+        factor={"tau": 2},
+        shift={"tau": "-0.005s"},
+        skip=["run:0-1.5"],
+        unit="deg",
+    )
+    text = replace(pendulum, corrections=given).to_toml()
+    path = tmp_path / "arm.toml"  # type: ignore[operator]
+    path.write_text(text)
+    assert Arm.read(path).corrections == given
+
+
+def test_every_correction_undoes_its_defect(two_links: list[Log]) -> None:
+    [log, _] = two_links
+    for there, back in (
+        ({"flip": "q1,tau2"}, {"flip": "q1,tau2"}),
+        ({"zero": "q1=90deg"}, {"zero": "q1=-90deg"}),
+        ({"swap": ["q1,q2"]}, {"swap": ["q1,q2"]}),
+        ({"absolute": "q2"}, {"relative": "q2"}),
+        ({"factor": "tau1=4"}, {"factor": "tau1=0.25"}),
+    ):
+        [again] = read_as(read_as([log], **there), **back)
+        np.testing.assert_allclose(again.q, log.q, atol=1e-12)
+        np.testing.assert_allclose(again.tau, log.tau, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"flip": "speed1"},
+        {"zero": "q1"},
+        {"zero": "q1=left"},
+        {"swap": ["q1,tau1"]},
+        {"factor": "tau1=0"},
+        {"shift": "tau=soon"},
+        {"skip": "2-1"},
+        {"gravity": "up"},
+        {"unit": "gon"},
+        {"mirror": "q1"},
+    ],
+)
+def test_corrections_that_are_none(given: dict[str, object]) -> None:
+    with pytest.raises(OptionError):
+        Corrections.parse(**given)
+
+
+def test_a_column_that_is_not_there(swings: list[Log]) -> None:
+    with pytest.raises(ColumnError, match="q2"):
+        Corrections.parse(flip="q2").on_log(swings[0])
+
+
+def test_bounded_least_squares_is_the_least(two_links: list[Log], arm: Arm) -> None:
+    """No random parameters within the bounds explain the torques better."""
+    flipped = read_as(two_links, flip="tau1")
+    base = EquationError([Rows.of(log, arm) for log in flipped], arm)
+    low, high = bounds(arm)
+    fit = base.fit(low, high)
+    assert np.all(fit.theta >= low - 1e-9)
+    assert np.all(fit.theta <= high + 1e-9)
+    draw = np.random.default_rng(0)
+    ceiling = np.where(np.isfinite(high), high, 3 * arm.theta)
+
+    def cost(theta: np.ndarray) -> float:
+        squares = sum(np.sum((r.y - r.psi @ theta) ** 2, axis=0) for r in base.rows)
+        return float(np.sum(squares / base.count / base.scale))
+
+    least = cost(fit.theta)
+    assert least == pytest.approx(float(fit.share.sum()), rel=1e-6)
+    for _ in range(200):
+        near = np.clip(fit.theta * draw.normal(1, 0.05, len(low)), low, ceiling)
+        assert cost(near) >= least - 1e-9
+        assert cost(draw.uniform(low, ceiling)) >= least - 1e-9
+
+
+def test_every_check_is_offered_somewhere(arm: Arm, pendulum: Arm) -> None:
+    """Every name has a module that says it, and every reading is of a known check with a remedy of its own."""
+    from pathlib import Path
+
+    import armgap.check
+
+    sources = "".join(p.read_text() for p in Path(armgap.check.__file__).parent.glob("*.py") if p.name != "check.py")
+    assert [name for name in NAMES if f'"{name}"' not in sources] == []
+
+    def turned(a: Arm) -> Arm:
+        return replace(a, theta=-a.theta)
+
+    offered = [r for a in (arm, pendulum, turned(pendulum)) for readings in READINGS for r in readings(a, 1.0)]
+    assert all(r.check in NAMES and r.remedies and r.corrections for r in offered)
+    assert set(CORRECTIONS) >= {
+        "flip",
+        "zero",
+        "swap",
+        "absolute",
+        "relative",
+        "factor",
+        "shift",
+        "skip",
+        "gravity",
+        "unit",
+    }
+
+
+def test_a_gain_beside_a_repaired_column_is_what_its_factor_was_off_by() -> None:
+    def gain(joint: int, value: float) -> dict[str, object]:
+        return {"effect": "torque_gain", "joint": joint, "parameters": {"gain": {"value": value}}}
+
+    assert torque_unit.refined({"tau2": 10.0}, [gain(2, 0.9)], 2) == {"tau2": 9.0}
+    assert torque_unit.refined({"tau2": 10.0}, [gain(1, 0.8)], 2) == {"tau2": 12.5}
+    assert torque_unit.refined({"tau": 10.0}, [gain(1, 1.1)], 2) == {"tau1": 11.0, "tau2": 10.0}
+    assert torque_unit.refined({}, [gain(1, 1.1)], 2) == {}
+    assert torque_unit.refined({"tau2": 10.0}, [{"effect": "stribeck", "joint": 2, "parameters": {}}], 2) == {}
+
+
+def test_equal_delays_of_all_joints_may_be_a_shift_of_the_file() -> None:
+    def delay(joint: int, value: float) -> dict[str, object]:
+        return {"effect": "actuator_delay", "joint": joint, "parameters": {"delay": {"value": value, "sigma": 1e-5}}}
+
+    check = time_shift.causal([delay(1, 0.005), delay(2, 0.005)], 2, 0.002)
+    assert check is not None
+    assert (check.severity, check.remedy) == ("warning", "--shift tau=0.005")
+    assert time_shift.causal([delay(1, 0.005), delay(2, 0.009)], 2, 0.002) is None
+    assert time_shift.causal([delay(1, 0.005)], 2, 0.002) is None
