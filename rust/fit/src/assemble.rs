@@ -91,7 +91,10 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         ruled_out: absent
             .into_iter()
             .filter(|r| {
-                !disturbances.iter().any(|e| r.effect == "external_pulse" && r.joint == e.push.joint_number())
+                let unnamed = headline.disturbance_candidates.iter().map(|u| &u.found);
+                let found =
+                    |e: &Disturbance| r.effect == "external_pulse" && r.joint == e.push.joint_number();
+                !disturbances.iter().chain(unnamed).any(found)
             })
             .collect(),
         parameters: Parameters {
@@ -361,7 +364,11 @@ fn notes<const N: usize, const P: usize>(
     } else if named && remains {
         notes.push("a gap remains that no further effect in the library explains".to_owned());
     }
-    notes.extend(sanity.iter().map(|s| s.message.clone()));
+    for found in sanity {
+        if !notes.contains(&found.message) {
+            notes.push(found.message.clone());
+        }
+    }
     notes.extend(narrowed(description));
     notes
 }
@@ -376,9 +383,5 @@ fn narrowed(description: &ArmDescription) -> Option<String> {
         .map(|(parameter, _)| parameter.name)
         .collect();
     let names = wide.join(", ");
-    (!wide.is_empty()).then(|| {
-        format!(
-            "sigma of {names} is wider than ten times the value, which is taken instead: no log could tell"
-        )
-    })
+    (!wide.is_empty()).then(|| format!("sigma of {names}: more than ten times the value, so that much is used; a wider one lets the logs say no more"))
 }

@@ -26,15 +26,16 @@ const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
 /// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
 const FREE_RUN_LIMIT: f64 = 100.0;
 
-/// A window's variance from its measured initial state counts up to this many times the typical one.
-const WORST_START: f64 = 10.0;
+/// A window's mean square error from its measured initial state counts up to this many times the typical variance: twenty times in
+/// the error itself, as far as initial states are ever corrected.
+const WORST_START: f64 = 400.0;
 
 /// Predictions on the holdout from measured initial states, and their squared errors.
 pub struct Errors<const N: usize> {
     before: Vec<f64>,
     refit: Vec<f64>,
     after: Vec<f64>,
-    /// Mean variance that measured initial states and the measurement itself put into the errors, per joint.
+    /// Mean square that measured initial states and the measurement itself put into the errors, per joint.
     floor: [f64; N],
 }
 
@@ -94,8 +95,8 @@ impl<const N: usize> Errors<N> {
     }
 }
 
-/// Variance of a perfect model's errors: noise of the sample itself, and of the measured initial state carried along the window, around what the
-/// model predicts.
+/// Mean square of a perfect model's errors: noise of the sample itself, and the error of the measured initial state carried along the
+/// window, around what the model predicts.
 fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     data: &Dataset<N>,
@@ -105,24 +106,25 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let offsets = data.zero_offsets();
     let columns =
         crate::weighting::initial_state_sensitivities(data, &context.arm, model, &offsets, predicted);
-    let carried = |window: &Window<N>| -> [f64; N] {
+    let carried = |window: &Window<N>, errors: &[[f64; 2]; N]| -> [f64; N] {
         let mut sum = [0.0; N];
         for row in window.range().step_by(N) {
             for (j, total) in sum.iter_mut().enumerate() {
                 for (k, [vq, cov, vdq]) in window.initial_state.covariance.iter().enumerate() {
-                    let (a, b) = (columns[k][row + j], columns[N + k][row + j]);
+                    let [a, b] = [0, 1].map(|i| columns[i * N + k][row + j] * errors[k][i].sqrt());
                     *total += a * a * vq + 2.0 * a * b * cov + b * b * vdq;
                 }
             }
         }
         sum.map(|x| x / window.rows() as f64)
     };
-    let windows: Vec<[f64; N]> = data.windows.iter().map(carried).collect();
+    let by_noise: Vec<[f64; N]> = data.windows.iter().map(|w| carried(w, &[[1.0; 2]; N])).collect();
+    let in_all: Vec<[f64; N]> =
+        data.windows.iter().map(|w| carried(w, &w.initial_state.mean_square)).collect();
     std::array::from_fn(|j| {
         // A window whose initial state decides whether a joint sticks has no meaningful derivative; it counts as a bad one, not as infinite.
-        let typical = crate::track::median(windows.iter().map(|w| w[j]).collect());
-        let mean =
-            windows.iter().map(|w| w[j].min(WORST_START * typical)).sum::<f64>() / windows.len() as f64;
+        let typical = crate::track::median(by_noise.iter().map(|w| w[j]).collect());
+        let mean = in_all.iter().map(|w| w[j].min(WORST_START * typical)).sum::<f64>() / in_all.len() as f64;
         context.noise[j].powi(2) + mean
     })
 }

@@ -32,15 +32,25 @@ const CHI_SQUARED_MEDIAN: f64 = 0.454_936;
 /// Smallest noise, rad or m, that a weight is ever derived from.
 const LEAST: f64 = 1e-9;
 
-/// Standard deviation of the measurement `q` at the times `t`, at least that of uniform rounding to `step` (zero where none is known).
-pub fn noise_level(t: &[f64], q: &[f64], step: f64) -> f64 {
+/// Noise of a position measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Standard deviation, rad or m.
+    pub sigma: f64,
+    /// Whether neighbouring samples show clearly more than that, as positions do that are held.
+    pub is_held: bool,
+}
+
+/// Noise of the measurement `q` at the times `t`, at least that of uniform rounding to `step` (zero where none is known).
+pub fn noise(t: &[f64], q: &[f64], step: f64) -> Noise {
     let adjacent = scatter(t, q, 1).unwrap_or(0.0);
     let (fresh_t, fresh_q) = fresh(t, q);
     let strided = STRIDES[1..].iter().filter_map(|stride| scatter(t, q, *stride));
     let held = (fresh_t.len() > FRESH).then(|| scatter(&fresh_t, &fresh_q, 1)).flatten();
     let least = strided.chain(held).fold(adjacent, f64::min);
     let white = if least < CLEARLY * adjacent { least } else { adjacent };
-    white.max(step / 12.0_f64.sqrt()).max(LEAST)
+    let sigma = white.max(step / 12.0_f64.sqrt()).max(LEAST);
+    Noise { sigma, is_held: sigma < CLEARLY * adjacent }
 }
 
 /// The samples at which the value changes.
@@ -77,6 +87,10 @@ mod tests {
     use crate::random::Random;
 
     const NOISE: f64 = 2e-4;
+
+    fn noise_level(t: &[f64], q: &[f64], step: f64) -> f64 {
+        noise(t, q, step).sigma
+    }
     const PERIOD: f64 = 4e-3;
 
     /// Roughly normal, of mean 0 and variance 1: twelve uniform numbers.
@@ -139,6 +153,7 @@ mod tests {
         for rows in [2, 3, 5] {
             let held: Vec<f64> = (0..q.len()).map(|k| q[k / rows * rows]).collect();
             assert_near(noise_level(&t, &held, 0.0), NOISE, &format!("held over {rows} rows"));
+            assert!(noise(&t, &held, 0.0).is_held && !noise(&t, &q, 0.0).is_held);
         }
         let mut random = Random(3);
         let mut irregular = q.clone();

@@ -12,11 +12,12 @@ const KNOWN: f64 = 2.0;
 /// A nominal value smaller than this part of the estimated one stands for none, and so does its sign.
 const COMPARABLE: f64 = 0.2;
 
-/// A parameter that ends within this part of its standard deviation of where it began has not moved.
-const MOVED: f64 = 1e-2;
+/// Logs that leave more than this part of a parameter's prior deviation hardly say anything about it: less than the arm file does.
+const UNSEEN: f64 = 0.71;
 
-/// Logs that leave more than this part of a parameter's prior deviation say nothing about it.
-const UNSEEN: f64 = 0.9;
+/// What is said of values that stayed where they were.
+const STUCK: &str = "beside so large a gap the logs say less about the parameters than the arm file does, and their values stayed near \
+     it; check signs, zeros and units first";
 
 /// Largest standard deviation, in the value's own size (or that of the largest parameter of its unit): what lies a value ten times as
 /// large away then costs one square, as good as nothing beside any log, and steps of finite differences, which go by it, stay on the arm.
@@ -73,7 +74,7 @@ impl Estimate {
     }
 
     fn is_unmoved(&self) -> bool {
-        self.distance() < MOVED && self.sigma > UNSEEN * self.prior
+        self.distance() < FAR && self.sigma > UNSEEN * self.prior
     }
 }
 
@@ -100,14 +101,7 @@ pub fn sanity(kind: ArmKind, estimates: &[Estimate], remains: bool) -> Vec<Sanit
         } else if estimate.distance() > FAR {
             (Kind::Sigma, far(parameter, estimate))
         } else if stuck {
-            (
-                Kind::Unmoved,
-                format!(
-                    "{} stayed at {}, and a gap is left: near it, predictions do not depend on it",
-                    parameter.name,
-                    with_unit(estimate.nominal, parameter)
-                ),
-            )
+            (Kind::Unmoved, STUCK.to_owned())
         } else {
             return None;
         };
@@ -197,7 +191,7 @@ mod tests {
 
     #[test]
     fn a_fit_that_did_not_move_is_said_beside_a_gap() {
-        let still = |x: f64| Estimate { nominal: x, prior: 0.1 * x, value: x, sigma: 0.1 * x };
+        let still = |x: f64| Estimate { nominal: x, prior: 0.1 * x, value: 1.1 * x, sigma: 0.08 * x };
         let all: Vec<Estimate> = [5e5, 6e6, 0.02, 0.1].into_iter().map(still).collect();
         let kinds: Vec<Kind> = sanity(PENDULUM, &all, true).into_iter().map(|s| s.kind).collect();
         assert_eq!(kinds, [Kind::Unmoved; 4]);

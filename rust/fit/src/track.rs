@@ -2,7 +2,7 @@
 
 use crate::latent_states::MeasuredState;
 use crate::model::EffectInstance;
-use crate::noise::noise_level;
+use crate::noise::noise;
 use crate::smooth::{Local, local_cubic};
 use armgap_core::effect::InputSegment;
 use nalgebra::SVector;
@@ -13,6 +13,11 @@ const HALF_WIDTHS: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 27];
 
 /// Half width of the confidence intervals that successive widths must share, in standard deviations.
 const CONFIDENCE: f64 = 2.0;
+
+/// Mean square errors of a measured state, in units of its variance, are kept within these: one estimate from one window is no better
+/// known, and beyond the larger the positions are not what the arm did.
+const LEAST_ERROR: f64 = 0.25;
+const LARGEST_ERROR: f64 = 10.0;
 
 /// A log of `N` joints.
 #[derive(Debug, Clone)]
@@ -27,6 +32,8 @@ pub struct Track<const N: usize> {
     pub held: Vec<[InputSegment<f64>; N]>,
     /// Standard deviation of the position measurement, per joint.
     pub noise: [f64; N],
+    /// Whether its samples are held over several rows, per joint.
+    pub is_held: [bool; N],
     /// Smallest step of the position measurement, per joint; zero where none is seen.
     pub step: [f64; N],
     /// Known external disturbances.
@@ -46,6 +53,8 @@ pub struct InitialState<const N: usize> {
     pub dq: SVector<f64, N>,
     /// Per joint: variance of position, covariance, variance of velocity.
     pub covariance: [[f64; 3]; N],
+    /// Per joint: mean square error of position and of velocity, bias of the local cubic included, in units of their variance.
+    pub mean_square: [[f64; 2]; N],
 }
 
 impl<const N: usize> Track<N> {
@@ -60,6 +69,7 @@ impl<const N: usize> Track<N> {
             q: rows(q).into_iter().map(SVector::from).collect(),
             held: rows(tau).into_iter().map(|row| row.map(InputSegment::held)).collect(),
             noise: [0.0; N],
+            is_held: [false; N],
             step: [0.0; N],
             pushes: Vec::new(),
             tables: Vec::new(),
@@ -68,7 +78,8 @@ impl<const N: usize> Track<N> {
         for j in 0..N {
             let column = track.column(j);
             track.step[j] = steps.map_or_else(|| smallest_step(&column), |s| s[j]);
-            track.noise[j] = noise_level(&track.t, &column, track.step[j]);
+            let found = noise(&track.t, &column, track.step[j]);
+            (track.noise[j], track.is_held[j]) = (found.sigma, found.is_held);
         }
         track
     }
@@ -128,9 +139,15 @@ impl<const N: usize> Track<N> {
 
     /// The measured state at a sample, from a local cubic in each joint.
     pub fn initial_state(&self, at: usize) -> InitialState<N> {
-        let mut start = InitialState { q: self.q[at], dq: SVector::zeros(), covariance: [[0.0; 3]; N] };
+        let mut start = InitialState {
+            q: self.q[at],
+            dq: SVector::zeros(),
+            covariance: [[0.0; 3]; N],
+            mean_square: [[1.0; 2]; N],
+        };
         for j in 0..N {
-            let local = self.local(j, at);
+            let (local, wider) = self.nested(j, at);
+            start.mean_square[j] = self.mean_square(j, at, &local, &wider);
             let variance = self.noise[j] * self.noise[j];
             (start.q[j], start.dq[j]) = (local.q, local.dq);
             start.covariance[j] = local.covariance.map(|c| c * variance);
@@ -159,6 +176,11 @@ impl<const N: usize> Track<N> {
     /// widest that passes may still err by several of its standard deviations, as its neighbours cannot tell; the one before
     /// errs by a third of that and has the larger deviation, so it is the one that keeps what its covariance promises.
     pub fn local(&self, j: usize, at: usize) -> Local {
+        self.nested(j, at).0
+    }
+
+    /// That local cubic, and the widest that passes.
+    fn nested(&self, j: usize, at: usize) -> (Local, Local) {
         let fit = |half: usize| local_cubic(&self.t, |k| self.q[k][j], at, half);
         let mut widest = fit(HALF_WIDTHS[0]);
         let mut before = widest;
@@ -172,7 +194,23 @@ impl<const N: usize> Track<N> {
             }
             (before, widest) = (widest, local);
         }
-        before
+        (before, widest)
+    }
+
+    /// Mean square error of a local cubic's position and velocity in units of their variance: what it leaves of its samples is more than
+    /// noise where no cubic passes through the motion, and so is its distance from the sample itself, and from a wider cubic.
+    ///
+    /// Where positions are held, what a cubic leaves says nothing about the motion.
+    fn mean_square(&self, j: usize, at: usize, local: &Local, wider: &Local) -> [f64; 2] {
+        if self.is_held[j] {
+            return [1.0; 2];
+        }
+        let noise = self.noise[j].powi(2);
+        let [vq, _, vdq] = local.covariance;
+        let misfit = local.misfit / noise;
+        let position = ((self.q[at][j] - local.q).powi(2) / noise - (1.0 - vq)) / vq;
+        let velocity = ((local.dq - wider.dq).powi(2) / noise - (vdq - wider.covariance[2])) / vdq;
+        [position, velocity].map(|bias| (misfit + bias).clamp(LEAST_ERROR, LARGEST_ERROR))
     }
 }
 
