@@ -108,7 +108,7 @@ mod tests {
         (t, measured)
     }
 
-    fn rounded(q: &[f64], step: f64) -> Vec<f64> {
+    fn on_grid(q: &[f64], step: f64) -> Vec<f64> {
         q.iter().map(|q| (q / step).round() * step).collect()
     }
 
@@ -140,7 +140,7 @@ mod tests {
         for hertz in [0.0, 0.02, 0.3, 1.0] {
             let (t, q) = log(hertz, 0.0);
             assert_near(
-                noise_level(&t, &rounded(&q, step), step),
+                noise_level(&t, &on_grid(&q, step), step),
                 step / 12.0_f64.sqrt(),
                 &format!("{hertz}"),
             );
