@@ -125,11 +125,11 @@ fn far(parameter: &Parameter, estimate: &Estimate) -> String {
 }
 
 fn with_unit(value: f64, parameter: &Parameter) -> String {
-    format!("{} {}", on_grid(value), parameter.unit)
+    format!("{} {}", significant(value), parameter.unit)
 }
 
 /// Four digits, with an exponent where they stand far from the point.
-fn on_grid(value: f64) -> String {
+fn significant(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) {
         return format!("{value:.3e}");
@@ -210,7 +210,7 @@ mod tests {
 
     #[test]
     fn numbers_have_four_digits() {
-        let texts = [0.0, 0.6, -10.912, 123.456, 4321.9, 2e7, 5e-5].map(on_grid);
+        let texts = [0.0, 0.6, -10.912, 123.456, 4321.9, 2e7, 5e-5].map(significant);
         assert_eq!(texts, ["0", "0.6000", "-10.91", "123.5", "4322", "2.000e7", "5.000e-5"]);
     }
 }
