@@ -149,7 +149,7 @@ def _run(plant: Plant, rig: SimulatedArm, tau: Array) -> Array:
     """Positions after each of the rows of held commands."""
     q = np.empty((len(tau), plant.n))
     for k, command in enumerate(tau.tolist()):
-        if not plant.lawful and all(a.constant for a in rig.actuators):
+        if not plant.state_dependent and all(a.constant for a in rig.actuators):
             plant.hold([a(u, plant.dt) for a, u in zip(rig.actuators, command, strict=True)])
         else:
             for _ in range(plant.steps_per_sample):
