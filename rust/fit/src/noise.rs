@@ -128,7 +128,9 @@ mod tests {
     fn uneven_times_are_no_noise() {
         let (mut t, _) = log(0.0, 0.0);
         let mut random = Random(2);
-        t.iter_mut().for_each(|t| *t += 0.3 * PERIOD * random.below(1000) as f64 / 1000.0);
+        for t in &mut t {
+            *t += 0.3 * PERIOD * random.below(1000) as f64 / 1000.0;
+        }
         let mut measured = |t: &f64| (6.0 * t).sin() + NOISE * normal(&mut random);
         let q: Vec<f64> = t.iter().map(&mut measured).collect();
         assert_near(noise_level(&t, &q, 0.0), NOISE, "uneven times");
