@@ -25,8 +25,6 @@ _FEWEST_ROWS = 100
 # Columns do not belong together if this share of a joint's torque stays unexplained. Effects of the library leave less than a tenth on
 # simulated logs, and less than a quarter on logs of a real arm.
 _UNRELATED = 0.5
-# A joint is driven if its torque has this part of the mean square of the largest term of its equation of motion.
-_DRIVEN = 0.05
 
 
 @dataclass(frozen=True)
@@ -104,14 +102,13 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
         return _applied(replace(now, arm=_doubted(now.arm, factors)), applied, said)
     found = confirm(stands, suspects, now.training, now.holdout, now.arm, horizon)
     if found is None:
-        return _applied(now, Corrections(), _strangers(stands, base, now, horizon))
+        return _applied(now, Corrections(), _strangers(stands, now, horizon))
     return _applied(now, found.reading.corrections, [_said(found, now.arm, horizon)])
 
 
-def _strangers(stands: Fit, base: EquationError, now: Examined, horizon: float) -> list[Check]:
+def _strangers(stands: Fit, now: Examined, horizon: float) -> list[Check]:
     """Say that torques and positions do not belong together, where no parameters with the arm file's signs explain half of a torque."""
-    driven = base.square > _DRIVEN * base.scale
-    share = np.where(driven, base.of_torques(stands).share, stands.share)
+    share = stands.share
     worst = int(np.argmax(share))
     if share[worst] < _UNRELATED or _predicted(Corrections(), now, horizon).relative < EXPLAINS:
         return []
