@@ -149,10 +149,10 @@ def test_no_holdout_is_said_and_cut_from_the_logs(clean):
 
 
 def test_no_training_sample_is_judged_on(pendulum):
-    from armgap.diagnosis import _split
+    from armgap.prepared_input import split
 
     whole = swing(pendulum, 1)
-    (first,), (last,) = _split([whole])
+    (first,), (last,) = split([whole])
     assert len(first) + len(last) == len(whole)
     np.testing.assert_array_equal(np.concatenate([first.q, last.q]), whole.q)
     assert last.duration == pytest.approx(0.4 * whole.duration, rel=0.01)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -15,19 +15,16 @@ import numpy as np
 from armgap import _native, options
 from armgap._renamed import old_names
 from armgap.arm import Arm
-from armgap.check import Check, Corrections, copied_holdout, data_checks, examine, torque_unit
+from armgap.check import Check, Corrections, torque_unit
 from armgap.check.time_shift import causal
 from armgap.custom_effect import CustomEffect, TorqueTables, check_effects
-from armgap.errors import LogShapeError, OptionError
 from armgap.evidence import laws, plausibility
 from armgap.literals import Status, Verdict
-from armgap.log import Log, gather
+from armgap.log import Log
 from armgap.log.findings import remarks
-from armgap.log.stretches import choose
 from armgap.log.units import si
+from armgap.prepared_input import PreparedInput, prepare, refused
 from armgap.progress import ProgressCallback, report_progress, use_callback
-from armgap.provenance import provenance
-from armgap.reading import printable
 from armgap.report.notebook import NotebookDisplay
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Location", "RuledOut", "Sanity", "Value", "diagnose"]
@@ -39,7 +36,6 @@ if not TYPE_CHECKING:
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
 #: What a stretch of a log is called after the log's own name.
 _STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
-_HELD_OUT = 0.4
 MOST_BYTES = 2**28
 """Size of a diagnosis' file; the largest hold some MB."""
 MOST_CAUSES = 1000
@@ -383,81 +379,11 @@ def diagnose(
     check_effects(effects)
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
     with use_callback(progress):
-        read = {"training": _gathered(logs, arm), "holdout": [] if holdout is None else _gathered(holdout, arm)}
-        asked = settings | {"repair": repair, "corrections": (corrections or Corrections()).to_dict()}
-        given = _given(read["training"], read["holdout"], arm, corrections or Corrections(), repair=repair)
-        given = replace(given, provenance=provenance(arm, read, asked))
-        return _diagnose(_examined(given, settings["horizon"], repair=repair), settings, effects)
+        given = prepare(logs, holdout, arm, corrections or Corrections(), settings, repair=repair)
+        return _diagnose(given, settings, effects)
 
 
-@dataclass(frozen=True)
-class _Input:
-    """Logs and arm, and what is to be said about them."""
-
-    training: list[Log]
-    holdout: list[Log]
-    arm: Arm
-    notes: tuple[str, ...]
-    checks: tuple[Check, ...]
-    factors: Mapping[str, float] = field(default_factory=dict)
-    provenance: Mapping[str, Any] = field(default_factory=dict)
-
-    def with_factors(self, factors: Mapping[str, float]) -> _Input:
-        """Return the input with other factors on its torque columns than those that it was repaired with."""
-        by_column = {
-            f"tau{j + 1}": self.factors.get(f"tau{j + 1}", self.factors.get("tau", 1.0))
-            for j in range(self.arm.n_joints)
-        }
-        ratio = Corrections(factor={column: c / by_column[column] for column, c in factors.items()})
-        checks = [c for c in self.checks if c.check != "torque_unit"]
-        return replace(
-            self,
-            training=[replace(ratio.on_log(log), findings=log.findings) for log in self.training],
-            holdout=[replace(ratio.on_log(log), findings=log.findings) for log in self.holdout],
-            checks=(*torque_unit.said(factors), *checks),
-            factors=factors,
-        )
-
-
-def _given(logs: Sequence[Log], holdout: Sequence[Log], arm: Arm, corrections: Corrections, *, repair: bool) -> _Input:
-    """Correct and repair the logs, each by itself, and split them where nothing is held out."""
-    training, checks = _repaired(logs, arm, corrections, repair=repair)
-    arm = corrections.on_arm(arm)
-    if not holdout:
-        training, held = _split(_tell_apart(training, [])[0])
-        note = f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out"
-        return _Input(training, held, arm, (note,), tuple(checks))
-    held, more = _repaired(holdout, arm, corrections, repair=repair)
-    checks += [*more, *copied_holdout(training, held)]
-    return _Input(*_tell_apart(training, held), arm, (), tuple(checks))
-
-
-def _examined(given: _Input, horizon: float, *, repair: bool) -> _Input:
-    """Choose stretches of long logs, and compare logs and arm file with and without each defect."""
-    training, held = (choose(group, horizon=horizon) for group in (given.training, given.holdout))
-    for log in (*training, *held):
-        if log.duration < horizon:
-            raise LogShapeError(
-                f"lasts {log.duration:.3g} s, less than the horizon of {horizon:g} s",
-                remedy="give a longer log or a shorter --horizon",
-                file=log.path or log.name,
-            )
-    try:
-        found = examine(training, held, given.arm, horizon=horizon, repair=repair)
-    except ValueError as error:
-        raise _refused(str(error), training, held) from None
-    checks = (*found.checks, *given.checks)
-    return replace(
-        given,
-        training=found.training,
-        holdout=found.holdout,
-        arm=found.arm,
-        checks=checks,
-        factors=found.corrections.factor,
-    )
-
-
-def _diagnose(given: _Input, settings: dict[str, Any], effects: Sequence[CustomEffect]) -> Diagnosis:
+def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[CustomEffect]) -> Diagnosis:
     """Hand over to the core, and add what is known on this side."""
     training, held, arm = given.training, given.holdout, given.arm
     contradictory = any(check.severity == "error" for check in given.checks)
@@ -468,10 +394,14 @@ def _diagnose(given: _Input, settings: dict[str, Any], effects: Sequence[CustomE
     settings = settings | {"own": [e.joint - 1 for e in effects]}
     try:
         text = _native.diagnose(
-            arm.to_native(), _columns(training, tables), _columns(held, tables), settings, report_progress
+            arm.to_native(),
+            [log.to_native(tables.by_log[log.name]) for log in training],
+            [log.to_native(tables.by_log[log.name]) for log in held],
+            settings,
+            report_progress,
         )
     except ValueError as error:
-        raise _refused(str(error), training, held) from None
+        raise refused(str(error), training, held) from None
     data = tables.named(json.loads(text))
     if factors := torque_unit.refined(given.factors, data["causes"], arm.n_joints):
         return _diagnose(replace(given.with_factors(factors), factors={}), settings, effects)
@@ -535,67 +465,3 @@ def _contradicted(data: dict[str, Any]) -> dict[str, Any]:
     """Return the result of logs and arm file that contradict each other: figures with the remedy applied, no causes."""
     gap = data["gap"] | {"after": data["gap"]["refit"]}
     return data | {"verdict": "input", "causes": [], "candidates": [], "gap": gap}
-
-
-def _repaired(
-    logs: Sequence[Log], arm: Arm, corrections: Corrections, *, repair: bool
-) -> tuple[list[Log], list[Check]]:
-    examined = [data_checks(corrections.on_log(log), arm, repair=repair) for log in logs]
-    return [log for log, _ in examined], [check.of(check.log or log.name) for log, found in examined for check in found]
-
-
-def _gathered(logs: LogLike | Sequence[LogLike], arm: Arm) -> list[Log]:
-    read = gather(logs, arm)
-    if not read:
-        raise OptionError("no log was given", remedy="give at least one")
-    for log in read:
-        if log.n_joints != arm.n_joints:
-            raise LogShapeError(
-                f"has {log.n_joints} joints, the arm has {arm.n_joints}",
-                remedy="use the arm file that belongs to this log",
-                file=log.path or log.name,
-            )
-    return read
-
-
-def _refused(message: str, training: list[Log], held: list[Log]) -> LogShapeError:
-    """Name the logs that the core could not work with."""
-    problem, _, remedy = message.partition("; ")
-    logs = held if "holdout" in problem else training
-    files = ", ".join(dict.fromkeys(str(log.path or log.name) for log in logs))
-    return LogShapeError(problem, remedy=remedy or "see the log and the options", file=files)
-
-
-def _tell_apart(training: list[Log], held: list[Log]) -> tuple[list[Log], list[Log]]:
-    """Give logs of the same name their folder's name, then a number."""
-    logs = [*training, *held]
-    for rename in (_with_folder, _with_number):
-        names = [log.name for log in logs]
-        logs = [rename(log, i) if names.count(log.name) > 1 else log for i, log in enumerate(logs, start=1)]
-    return logs[: len(training)], logs[len(training) :]
-
-
-def _with_folder(log: Log, _: int) -> Log:
-    return log if log.path is None else replace(log, name=f"{printable(log.path.resolve().parent.name)}/{log.name}")
-
-
-def _with_number(log: Log, number: int) -> Log:
-    return replace(log, name=f"{log.name} ({number})")
-
-
-def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
-    training, held = [], []
-    for log in logs:
-        cut = int(np.searchsorted(log.t, log.t[0] + (1 - _HELD_OUT) * log.duration))
-        training.append(log.part(0, cut, f"{log.name} (first part)"))
-        held.append(log.part(cut, len(log), f"{log.name} (last part)"))
-    return training, held
-
-
-def _columns(logs: list[Log], tables: TorqueTables) -> list[tuple[str, Any, Any, Any, list[Any], Any]]:
-    fix = np.ascontiguousarray
-    moments = [None if log.moment is None else fix(log.moment) for log in logs]
-    return [
-        (log.name, fix(log.t), fix(log.q), fix(log.tau), tables.by_log[log.name], moment)
-        for log, moment in zip(logs, moments, strict=True)
-    ]

@@ -77,7 +77,9 @@ class Refit:
     @classmethod
     def of(cls, arm: Arm, training: Sequence[Log], holdout: Sequence[Log], horizon: float) -> Refit:
         """Fit the parameters of the arm in the trust that it states."""
-        found = _native.refit(arm.to_native(), _columns(training), _columns(holdout), horizon)
+        found = _native.refit(
+            arm.to_native(), [log.to_native() for log in training], [log.to_native() for log in holdout], horizon
+        )
         theta, sigma, error, motion = (np.asarray(found[key]) for key in ("theta", "sigma", "refit", "motion"))
         return cls(theta, sigma, error, motion)
 
@@ -192,11 +194,3 @@ def confirm(
     alike = tuple(s.reading for part, s, _ in tried[1:] if part <= _ALIKE * ratio)
     shares = (float(stands.share.max()), float(best.fit.share.max()))
     return Found(best.reading, alike, shares, (as_is.error, refit.error))
-
-
-def _columns(logs: Sequence[Log]) -> list[tuple[str, Array, Array, Array, list[Array], Array | None]]:
-    fix = np.ascontiguousarray
-    moments = [None if log.moment is None else fix(log.moment) for log in logs]
-    return [
-        (log.name, fix(log.t), fix(log.q), fix(log.tau), [], moment) for log, moment in zip(logs, moments, strict=True)
-    ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -270,6 +270,12 @@ class Log:
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
         """Return the log with other findings."""
         return replace(self, findings=findings)
+
+    def to_native(self, tables: Sequence[NDArray[np.float64]] = ()) -> tuple[Any, ...]:
+        """Return the log as the compiled core takes it, with a table of torques per custom effect."""
+        fix = np.ascontiguousarray
+        moment = None if self.moment is None else fix(self.moment)
+        return (self.name, fix(self.t), fix(self.q), fix(self.tau), list(tables), moment)
 
     def to_polars(self) -> pl.DataFrame:
         """Return the log as a table with the columns ``t, q1 …, tau1 …`` and, where there are any, ``dq1 …``."""
