@@ -25,7 +25,7 @@ $(VENV)/.tools: pyproject.toml | tools
 	@touch $@
 
 $(VENV)/.built: $(VENV)/.tools pyproject.toml $(RUST_SOURCES)
-	@echo "building armgap (about a minute the first time)"
+	@echo "building armgap (some minutes the first time)"
 	@PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --release --extras trial,formats,ros,dev,docs
 	@touch $@
 
