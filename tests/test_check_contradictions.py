@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armgap import Arm, Log, diagnose, simulate
-from armgap.check import CORRECTIONS, NAMES, Check, Corrections, examine, time_shift, torque_unit
+from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, time_shift, torque_unit
 from armgap.check.contradiction import READINGS
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.errors import ColumnError, OptionError
@@ -144,6 +144,18 @@ def test_a_stretch_without_torque(two_links: list[Log], arm: Arm) -> None:
     assert {c.check for c in found} == {"dead_stretch"}
     assert found[0].rows == ((400, 999),)
     assert found[0].log == "run 3"
+
+
+@pytest.mark.parametrize("first", [300, 8600])
+def test_a_stretch_without_torque_anywhere_in_a_long_log(pendulum: Arm, first: int) -> None:
+    t = np.arange(9600) * 1e-3
+    tau = 0.5 * np.sin(3 * t) + 0.2 * np.sin(7 * t)
+    log = simulate(off(pendulum), t, tau, noise=1e-5, seed=1, name="long")
+    assert dead_stretch.find([log], pendulum) == []
+    tau = log.tau.copy()
+    tau[first : first + 600] = 0.0
+    [check] = dead_stretch.find([replace(log, tau=tau)], pendulum)
+    assert check.rows == ((first, first + 599),)
 
 
 def test_a_free_swing_is_no_dead_stretch(pendulum: Arm) -> None:

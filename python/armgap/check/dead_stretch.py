@@ -30,8 +30,8 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
     checks = []
     for log in logs:
         runs = [(j, first, last) for j in range(log.n_joints) for first, last in _constant(log, j)]
-        if runs:
-            checks += _judged(log, arm, runs)
+        for stretch in dict.fromkeys((first, last) for _, first, last in runs):
+            checks += _judged(log, arm, runs, stretch)
     return checks
 
 
@@ -46,8 +46,8 @@ def _constant(log: Log, j: int) -> list[tuple[int, int]]:
     return list(zip(first[long].tolist(), last[long].tolist(), strict=True))
 
 
-def _judged(log: Log, arm: Arm, runs: Sequence[tuple[int, int, int]]) -> list[Check]:
-    rows = Rows.of(log, arm)
+def _judged(log: Log, arm: Arm, runs: Sequence[tuple[int, int, int]], stretch: tuple[int, int]) -> list[Check]:
+    rows = Rows.of(log, arm, around=stretch)
     dead = np.zeros((len(rows.y), log.n_joints), dtype=bool)
     alive = np.ones(len(rows.y), dtype=bool)
     when = log.t[rows.samples]
@@ -62,7 +62,8 @@ def _judged(log: Log, arm: Arm, runs: Sequence[tuple[int, int, int]]) -> list[Ch
     base = EquationError([outside], arm)
     residual = rows.y - rows.psi @ base.fit(*bounds(arm)).theta
     checks = []
-    for j, first, last in runs:
+    for j in (j for j, *run in runs if tuple(run) == stretch):
+        first, last = stretch
         inside = dead[:, j] & (rows.samples >= first) & (rows.samples <= last)
         if inside.sum() < _FEWEST:
             continue

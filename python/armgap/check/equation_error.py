@@ -33,6 +33,8 @@ _HOLE = 3.0
 _TRUST_FACTOR = 5.0
 # Samples of one log that are used: 16 s at 4 ms; more tells nothing new about a sign.
 _LARGEST_LOG = 4000
+# Length of log on either side of a stretch that the stretch is compared with [s]: a few periods of the slowest motions that tell anything.
+_BESIDE_S = 8.0
 # Share of a joint's torque below which a residual counts as explained: what unmodelled effects leave of healthy logs of real arms.
 _EXPLAINED = 0.02
 # Share of a joint's torque that nothing tells from none.
@@ -63,10 +65,15 @@ class Rows:
     samples: NDArray[np.intp]
 
     @classmethod
-    def of(cls, log: Log, arm: Arm, cutoff: float = CUTOFF) -> Rows:
-        """Return the rows of a log, of a stretch from its middle if it is long; `cutoff` is that of the filters [rad/s]."""
-        first = max(0, (len(log) - _LARGEST_LOG) // 2)
-        part = slice(first, first + _LARGEST_LOG)
+    def of(cls, log: Log, arm: Arm, cutoff: float = CUTOFF, around: tuple[int, int] | None = None) -> Rows:
+        """Return the rows of a log; of a long one those of a stretch from its middle, or of the samples `around` and some seconds beside them.
+
+        `cutoff` is that of the filters [rad/s].
+        """
+        begin, end = around or ((len(log) - _LARGEST_LOG) // 2, (len(log) + _LARGEST_LOG) // 2)
+        beside = max(round(_BESIDE_S / float(np.median(np.diff(log.t)))), end - begin) if around else 0
+        first = max(0, begin - beside)
+        part = slice(first, end + beside + 1)
         t, q, tau = (np.ascontiguousarray(x[part]) for x in (log.t, log.q, log.tau))
         steps = np.diff(t)
         period = float(np.median(steps))
