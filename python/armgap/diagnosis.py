@@ -84,6 +84,8 @@ class Gap:
         RMS errors at other prediction horizons, as far as the logs are long enough.
     motion : tuple of float
         RMS displacement over the horizon [rad or m].
+    unexplained : float
+        Share of the gap above the floor with parameters re-estimated that the named causes leave, from 0 to 1.
     """
 
     horizon_s: float
@@ -97,6 +99,7 @@ class Gap:
     free_run_after: tuple[float, ...]
     horizons: tuple[GapAtHorizon, ...] = ()
     motion: tuple[float, ...] = ()
+    unexplained: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -246,6 +249,7 @@ class Diagnosis(NotebookDisplay):
                 tuple(gap["free_run"]["after"]),
                 tuple(_at_horizon(h) for h in gap.get("horizons", ())),
                 tuple(gap.get("motion", ())),
+                gap.get("unexplained", 0.0),
             ),
             where=tuple(_location(p) for p in data["where"]),
             causes=tuple(_cause(c) for c in data["causes"]),

@@ -59,9 +59,6 @@ pub const CLEAR: f64 = 2.75;
 const MATTERS_IF_FAINT: f64 = 0.7;
 const CERTAIN_IF_FAINT: f64 = 5.0;
 
-/// Probability left to a cause when all of the gap stays unexplained.
-pub const REMAINDER_DOUBT: f64 = 0.2;
-
 /// How fast an unexplained remainder reduces the probability of the causes: effects that are in no library were seen to be imitated by
 /// two or three that are, for up to eight tenths of the gap.
 pub const REMAINDER_POWER: i32 = 6;

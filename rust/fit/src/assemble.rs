@@ -53,7 +53,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     };
     let rotary = description.kind.rotary();
     let figures = || {
-        let (errors, free) = (Errors::new(context, &compared), FreeRuns::new(context, &compared));
+        let (errors, free) = (Errors::new(context, &compared, options.seed), FreeRuns::new(context, &compared));
         (gap(context, &compared, &errors, &free, description, options), errors.series(context), free.series())
     };
     let residual = || {
@@ -202,6 +202,7 @@ fn cause(cause: &crate::belief::Cause, joints: usize, rotary: bool) -> Cause {
             .into_iter()
             .map(|e| EquivalentSummary { effect: e.effect, joint: e.joint, why: e.why })
             .collect(),
+        evidence: Some(cause.evidence),
         log: None,
     }
 }
@@ -222,6 +223,7 @@ fn push<A, const N: usize, const P: usize>(
         parameters: effect_values(&disturbance.push, &disturbance.sigma, rotary),
         closed: disturbance.share.clamp(0.0, 1.0),
         equivalents: Vec::new(),
+        evidence: None,
         log: Some(sample.data.tracks[disturbance.track].name.clone()),
     }
 }

@@ -1,10 +1,11 @@
 //! Selection probability of a cause.
 
 use crate::acceptance::{
-    ABOVE_FLOOR, ALIKE_TRUST, Ground, REMAINDER_DOUBT, REMAINDER_POWER, RESAMPLES, UNEXPLAINED, restores,
+    ABOVE_FLOOR, ALIKE_TRUST, Ground, REMAINDER_POWER, RESAMPLES, UNEXPLAINED, restores,
 };
 use crate::attribute::{Candidate, SearchNode};
 use crate::equivalent;
+use crate::evidence::Evidence;
 use crate::model::EffectInstance;
 use crate::random::Random;
 
@@ -23,6 +24,10 @@ pub struct Cause {
     pub relevance: f64,
     /// Effects that this log does not tell from it.
     pub look_alikes: Vec<EffectInstance>,
+    /// What it rests on.
+    pub evidence: Evidence,
+    /// Why it was accepted.
+    pub ground: Ground,
 }
 
 impl<const N: usize, const P: usize> SearchNode<N, P> {
@@ -51,16 +56,19 @@ pub fn name<const N: usize, const P: usize>(
     let look_alikes: Vec<EffectInstance> =
         others.map(|(_, c)| c).filter(alike).filter_map(|c| c.effect).take(3).collect();
     let effect = best.effect.unwrap_or_else(|| unreachable!("only effects are named"));
+    let probability = match ground {
+        Ground::Motion => probability(node, choice, seed),
+        Ground::Trust => trust_probability(node, choice),
+    };
     Cause {
         effect,
         sigma: Vec::new(),
-        probability: match ground {
-            Ground::Motion => probability(node, choice, seed),
-            Ground::Trust => trust_probability(node, choice),
-        },
+        probability,
         share: node.share(best).clamp(0.0, 1.0),
         relevance: node.relevance(best),
         look_alikes,
+        evidence: Evidence { selected: probability, ..Evidence::default() },
+        ground,
     }
 }
 
@@ -154,21 +162,6 @@ fn left_of<const N: usize, const P: usize>(earlier: &SearchNode<N, P>, last: &Se
     let cut = last.excess() / earlier.excess();
     let left = if last.is_open() { as_it_is.max(cut) } else { as_it_is.min(cut) };
     left.min(1.0)
-}
-
-/// Lowers the probabilities where a gap of consequence remains that no candidate explains: what leaves it may also be what the named
-/// causes stand in for. A further cause is measured by the gap that was left when it was taken up: a small one may be no more than what the
-/// form of the first gets wrong.
-pub fn temper<const N: usize, const P: usize>(nodes: &[SearchNode<N, P>], causes: &mut [Cause]) {
-    let Some(last) = nodes.last() else { return };
-    let of_all = belief_beside(left_over(nodes), REMAINDER_DOUBT);
-    for cause in causes {
-        let without =
-            |s: &&SearchNode<N, P>| !s.settled.hypothesis.effects.iter().any(|e| e.same_place(&cause.effect));
-        let further = nodes.iter().take_while(without).skip(1).last().filter(|_| last.excess() > ABOVE_FLOOR);
-        let of_its_own = further.map_or(1.0, |before| belief_beside(left_of(before, last), REMAINDER_DOUBT));
-        cause.probability *= of_all.min(of_its_own);
-    }
 }
 
 /// What a probability is multiplied by beside a part `left` of the gap that nothing explains: one for none, `least` for all of it.

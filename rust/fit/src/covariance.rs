@@ -135,19 +135,14 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// About normal: the sum of twelve uniform numbers.
-    fn normal(random: &mut Random) -> f64 {
-        (0..12).map(|_| random.below(1 << 30) as f64 / (1u64 << 30) as f64).sum::<f64>() - 6.0
-    }
-
     /// Two values fitted to noise, whose columns have these sizes in each window: the values and their covariance.
     fn fitted(sizes: &[[f64; 2]], random: &mut Random) -> ([f64; 2], ParameterCovariance) {
         let mut rows: Vec<Vec<[f64; 3]>> = sizes
             .iter()
             .map(|size| {
-                let loud = 1.0 + 0.5 * normal(random).abs();
+                let loud = 1.0 + 0.5 * random.normal().abs();
                 (0..20)
-                    .map(|_| [size[0] * normal(random), size[1] * normal(random), loud * normal(random)])
+                    .map(|_| [size[0] * random.normal(), size[1] * random.normal(), loud * random.normal()])
                     .collect()
             })
             .collect();

@@ -7,9 +7,11 @@
 
 use crate::attribute::SearchNode;
 use crate::belief::left_over;
+use crate::context::DiagnosisContext;
 use crate::diagnose::LogData;
 use crate::model_search::Attribution;
 use crate::window::cut;
+use armgap_core::arm::Arm;
 
 /// Stretches per log, if it is long enough.
 const STRETCHES: usize = 6;
@@ -22,6 +24,20 @@ const LEFT: f64 = 0.1;
 
 /// It counts beside a remainder too if that stands this much less above the floor than the remainder it was made for.
 const MUCH_LESS: f64 = 0.1;
+
+/// Predictions miss by this factor more on the holdout, in the mean square, where it shows what the training logs do not.
+const MORE: f64 = 2.0;
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// Whether a search ended with predictions that miss by much more on the holdout than on the training logs: only then can stretches
+    /// of both tell more than the logs as they are.
+    pub(crate) fn holdout_shows_more(&self, attribution: &Attribution<N, P>) -> bool {
+        let Some(last) = attribution.nodes.last() else { return false };
+        let per_row = |costs: &[f64], rows: usize| costs.iter().sum::<f64>() / rows as f64;
+        let holdout = self.judge(&last.weights.holdout).raw_costs(&last.base.fit.hypothesis);
+        per_row(&holdout, self.holdout.data.rows) > MORE * per_row(&last.base.fit.costs, self.training.data.rows)
+    }
+}
 
 /// Training and holdout stretches; none where a log is too short for two.
 pub fn crosswise<'a>(

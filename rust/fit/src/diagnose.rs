@@ -185,7 +185,7 @@ impl WithArm for Request<'_> {
         let mut context = self.context::<A, N, P>(arm.clone(), theta, self.training, self.holdout)?;
         let Options { max_causes, seed, .. } = *self.options;
         let mut conclusion = context.conclude(context.attribute(max_causes, seed, None), max_causes, seed);
-        let instead = self.crosswise(arm, theta, &conclusion)?;
+        let instead = self.crosswise(arm, theta, &context, &conclusion)?;
         let is_crosswise = instead.is_some();
         if let Some(instead) = instead {
             (context, conclusion) = instead;
@@ -209,11 +209,12 @@ impl Request<'_> {
         &self,
         arm: A,
         theta: [f64; P],
+        plain: &DiagnosisContext<A, N, P>,
         first: &Conclusion<N, P>,
     ) -> Result<Option<(DiagnosisContext<A, N, P>, Conclusion<N, P>)>, DiagnoseError> {
         let Options { max_causes, seed, horizon, .. } = *self.options;
         let pushed = first.disturbances.iter().any(|e| e.probability > NAMED);
-        if !first.attribution.is_unexplained() && !pushed {
+        if !(first.attribution.is_unexplained() || pushed) || !plain.holdout_shows_more(first.without_disturbances()) {
             return Ok(None);
         }
         let Some([training, holdout]) = crosswise(self.training, self.holdout, horizon) else {

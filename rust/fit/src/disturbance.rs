@@ -206,11 +206,6 @@ mod tests {
     const STEP: f64 = 2.5e-3;
     const NOISE: f64 = 1e-6;
 
-    /// Roughly normal, of mean 0 and variance 1: twelve uniform numbers.
-    fn normal(random: &mut Random) -> f64 {
-        (0..12).map(|_| random.below(1 << 20) as f64 / f64::from(1 << 20)).sum::<f64>() - 6.0
-    }
-
     /// Windows of a coupled arm that torques of these intensities moved away from what was predicted.
     fn misses(windows: usize, intensity: [f64; 2], seed: u64) -> PredictionErrors<2> {
         let mut random = Random(seed);
@@ -218,11 +213,11 @@ mod tests {
         let mut one = || {
             let (mut e, mut de) = (Vector::<2>::zeros(), Vector::<2>::new(1e-3, -1e-3));
             let mut row = || {
-                let torque = Vector::from_fn(|j, _| (intensity[j] / STEP).sqrt() * normal(&mut random));
+                let torque = Vector::from_fn(|j, _| (intensity[j] / STEP).sqrt() * random.normal());
                 let kick = mobility * torque;
                 e += de * STEP + kick * (STEP * STEP / 2.0);
                 de += kick * STEP;
-                PredictionError { error: e.map(|x| x + NOISE * normal(&mut random)), step: STEP, mobility }
+                PredictionError { error: e.map(|x| x + NOISE * random.normal()), step: STEP, mobility }
             };
             let rows: Vec<_> = (0..100).map(|_| row()).collect();
             let start = KalmanFilter {

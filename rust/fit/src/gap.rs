@@ -7,6 +7,8 @@ use crate::diagnose::Options;
 use crate::model::Hypothesis;
 use crate::random::Random;
 use crate::report::{AtHorizon, FreeRun, FreeRunSeries, Gap, Series};
+use crate::track::InitialState;
+use crate::weighting::Weighting;
 use crate::window::{Dataset, InitialStateOffset, Window};
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
@@ -26,9 +28,17 @@ const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
 /// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
 const FREE_RUN_LIMIT: f64 = 100.0;
 
-/// A window's mean square error from its measured initial state counts up to this many times the typical variance: twenty times in
-/// the error itself, as far as initial states are ever corrected.
-const WORST_START: f64 = 400.0;
+/// Pairs of displaced initial states from which a perfect model's errors are estimated: the mean square of one window is then known to
+/// 40 %, that of forty windows to 6 %.
+const DISPLACED: usize = 3;
+
+/// Mean square of a window whose measured initial state erred by ten of its standard deviations, as at a reversal, in units of that of a
+/// typical draw.
+const WORST_START: f64 = 100.0;
+
+/// A window is consistent with its noise and its measured initial state up to this cost per sample and joint: the noise is known to 3 %, and
+/// of some hundred values the mean square scatters by 15 %.
+const CONSISTENT: f64 = 1.5;
 
 /// Predictions on the holdout from measured initial states, and their squared errors.
 pub struct Errors<const N: usize> {
@@ -44,6 +54,7 @@ impl<const N: usize> Errors<N> {
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         context: &DiagnosisContext<A, N, P>,
         compared: &Compared<P>,
+        seed: u64,
     ) -> Self {
         let data = &context.holdout.data;
         let offsets = data.zero_offsets();
@@ -52,7 +63,7 @@ impl<const N: usize> Errors<N> {
         Self {
             before: bare.predict(&context.arm, &compared.before, &offsets),
             refit: bare.predict(&context.arm, &compared.refit, &offsets),
-            floor: floor(context, data, &compared.after, &after),
+            floor: floor(context, data, &compared.after, &after, seed),
             after,
         }
     }
@@ -96,37 +107,89 @@ impl<const N: usize> Errors<N> {
 }
 
 /// Mean square of a perfect model's errors: noise of the sample itself, and the error of the measured initial state carried along the
-/// window, around what the model predicts.
+/// window.
+///
+/// What the model misses by in a window is a perfect model's error where noise and a displaced initial state explain it. Elsewhere that
+/// error is what displacements drawn from the measured state's covariance make, and no more than what the model misses by; beside windows
+/// of which most are explained it may be that of a start that erred by more than its covariance says.
 fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     data: &Dataset<N>,
     model: &Hypothesis<P>,
     predicted: &[f64],
+    seed: u64,
 ) -> [f64; N] {
-    let offsets = data.zero_offsets();
-    let columns =
-        crate::weighting::initial_state_sensitivities(data, &context.arm, model, &offsets, predicted);
-    let carried = |window: &Window<N>, errors: &[[f64; 2]; N]| -> [f64; N] {
-        let mut sum = [0.0; N];
-        for row in window.range().step_by(N) {
-            for (j, total) in sum.iter_mut().enumerate() {
-                for (k, [vq, cov, vdq]) in window.initial_state.covariance.iter().enumerate() {
-                    let [a, b] = [0, 1].map(|i| columns[i * N + k][row + j] * errors[k][i].sqrt());
-                    *total += a * a * vq + 2.0 * a * b * cov + b * b * vdq;
+    let measured = data.measured();
+    let missed = window_squares(data, &measured, predicted);
+    let carried = carried(context, data, model, predicted, seed);
+    let weighting =
+        Weighting::new(data, &context.arm, model, context.noise, data.zero_offsets(), predicted);
+    let costs = weighting.costs(data, &weighting.residual(&measured, predicted));
+    let consistent: Vec<bool> =
+        data.windows.iter().zip(&costs).map(|(w, cost)| *cost < CONSISTENT * (w.rows() * N) as f64).collect();
+    let explained = 2 * consistent.iter().filter(|c| **c).count() > consistent.len();
+    let worst = if explained { WORST_START } else { 1.0 };
+    let mut sum = [0.0; N];
+    for (index, consistent) in consistent.into_iter().enumerate() {
+        for (j, total) in sum.iter_mut().enumerate() {
+            let most = context.noise[j].powi(2) + worst * carried[index][j];
+            *total += if consistent { missed[index][j] } else { missed[index][j].min(most) };
+        }
+    }
+    sum.map(|x| x / data.windows.len() as f64)
+}
+
+/// Mean square, window by window, of what displaced initial states change in the predictions.
+fn carried<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    data: &Dataset<N>,
+    model: &Hypothesis<P>,
+    predicted: &[f64],
+    seed: u64,
+) -> Vec<[f64; N]> {
+    let mut random = Random(seed);
+    let mut sum = vec![[0.0; N]; data.windows.len()];
+    for _ in 0..DISPLACED {
+        let drawn: Vec<InitialStateOffset<N>> =
+            data.windows.iter().map(|w| displaced(&w.initial_state, &mut random)).collect();
+        for offsets in [drawn.iter().map(InitialStateOffset::opposite).collect(), drawn] {
+            let there = data.predict(&context.arm, model, &offsets);
+            for (total, square) in sum.iter_mut().zip(window_squares(data, predicted, &there)) {
+                for j in 0..N {
+                    total[j] += square[j] / (2 * DISPLACED) as f64;
                 }
+            }
+        }
+    }
+    sum
+}
+
+/// An error of a measured initial state, drawn from its covariance and its bias.
+fn displaced<const N: usize>(state: &InitialState<N>, random: &mut Random) -> InitialStateOffset<N> {
+    let mut offset = InitialStateOffset::none();
+    for j in 0..N {
+        let [vq, cov, vdq] = state.covariance[j];
+        let [bias_q, bias_dq] = state.mean_square[j];
+        let (a, b) = (random.normal(), random.normal());
+        let given_q = (vdq - cov * cov / vq).max(0.0).sqrt();
+        offset.q[j] = (bias_q * vq).sqrt() * a;
+        offset.dq[j] = bias_dq.sqrt() * (cov / vq.sqrt() * a + given_q * b);
+    }
+    offset
+}
+
+/// Mean square difference of each joint, window by window.
+fn window_squares<const N: usize>(data: &Dataset<N>, one: &[f64], other: &[f64]) -> Vec<[f64; N]> {
+    let of = |window: &Window<N>| -> [f64; N] {
+        let mut sum = [0.0; N];
+        for (a, b) in one[window.range()].chunks_exact(N).zip(other[window.range()].chunks_exact(N)) {
+            for (total, (a, b)) in sum.iter_mut().zip(a.iter().zip(b)) {
+                *total += (a - b).powi(2);
             }
         }
         sum.map(|x| x / window.rows() as f64)
     };
-    let by_noise: Vec<[f64; N]> = data.windows.iter().map(|w| carried(w, &[[1.0; 2]; N])).collect();
-    let in_all: Vec<[f64; N]> =
-        data.windows.iter().map(|w| carried(w, &w.initial_state.mean_square)).collect();
-    std::array::from_fn(|j| {
-        // A window whose initial state decides whether a joint sticks has no meaningful derivative; it counts as a bad one, not as infinite.
-        let typical = crate::track::median(by_noise.iter().map(|w| w[j]).collect());
-        let mean = in_all.iter().map(|w| w[j].min(WORST_START * typical)).sum::<f64>() / in_all.len() as f64;
-        context.noise[j].powi(2) + mean
-    })
+    data.windows.iter().map(of).collect()
 }
 
 /// RMS difference of each joint.
@@ -151,14 +214,16 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let floor: Vec<f64> = errors.floor.iter().map(|v| v.sqrt()).collect();
     let before = rms::<N>(measured, &errors.before);
     let after = rms::<N>(measured, &errors.after);
+    let refit = rms::<N>(measured, &errors.refit);
     Gap {
         horizon_s: options.horizon,
         unit: if description.kind.rotary() { "rad" } else { "m" },
         closed: closed(&before, &after, &floor),
         closed_ci: closed_interval(context, errors, &floor, options.seed),
-        refit: rms::<N>(measured, &errors.refit),
+        unexplained: (1.0 - closed(&refit, &after, &floor)).clamp(0.0, 1.0),
+        refit,
         motion: rms::<N>(measured, &context.holdout.still()),
-        horizons: HORIZONS.par_iter().filter_map(|h| at_horizon(context, compared, *h)).collect(),
+        horizons: HORIZONS.par_iter().filter_map(|h| at_horizon(context, compared, *h, options.seed)).collect(),
         free_run: FreeRun {
             before: rms::<N>(&free.measured, &free.before),
             after: rms::<N>(&free.measured, &free.after),
@@ -174,6 +239,7 @@ fn at_horizon<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     compared: &Compared<P>,
     horizon: f64,
+    seed: u64,
 ) -> Option<AtHorizon> {
     let data = Dataset::new(context.holdout.data.tracks.clone(), horizon);
     if data.windows.len() < 2 * data.tracks.len() {
@@ -187,7 +253,7 @@ fn at_horizon<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         horizon_s: horizon,
         before: missed(&bare.predict(&context.arm, &compared.before, &offsets)),
         refit: missed(&bare.predict(&context.arm, &compared.refit, &offsets)),
-        floor: floor(context, &data, &compared.after, &after).map(f64::sqrt).to_vec(),
+        floor: floor(context, &data, &compared.after, &after, seed).map(f64::sqrt).to_vec(),
         after: missed(&after),
     })
 }

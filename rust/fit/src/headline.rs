@@ -114,6 +114,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// none is left, the search without them counts.
     pub fn headline(&mut self, conclusion: Conclusion<N, P>, most: usize) -> Headline<N, P> {
         let Conclusion { mut attribution, alone, mut disturbances } = conclusion;
+        self.weigh(&mut attribution);
         let (mut causes, mut candidates) = sorted_causes(&attribution.causes, most);
         disturbances.sort_by(|a, b| b.clarity().total_cmp(&a.clarity()));
         let (disturbances, disturbance_candidates) =
@@ -121,6 +122,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let mut changed = !disturbance_candidates.is_empty();
         if let Some(alone) = alone.filter(|_| changed && disturbances.is_empty()) {
             attribution = alone;
+            self.set_pushes(&[]);
+            self.weigh(&mut attribution);
             (causes, candidates) = sorted_causes(&attribution.causes, most);
             changed = false;
         }

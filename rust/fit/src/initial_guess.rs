@@ -68,6 +68,19 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (initial_guesses, screened)
     }
 
+    /// Part of the training windows' cost above the floor that any one candidate removes to first order.
+    pub(crate) fn largest_gain(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> f64 {
+        let problem = self.problem(&weights.training);
+        let mut all = self.open_candidates(&fit.hypothesis);
+        all.extend(self.ripple_guesses(&all, weights, fit));
+        all.extend(self.contact_guesses(&all, &fit.hypothesis));
+        self.progress.begin(Phase::Screen, all.len());
+        let gains = screen(&problem, &fit.hypothesis, &all).into_iter().map(|test| test.gain);
+        let cost: f64 = problem.window_costs(&fit.hypothesis).iter().sum();
+        let rows = self.training.data.rows as f64 / self.holdout.data.rows as f64;
+        gains.fold(0.0, f64::max) / (cost - rows * self.floor(weights)).max(1e-9 * cost)
+    }
+
     /// Candidates not yet in the model.
     pub fn open_candidates(&self, model: &Hypothesis<P>) -> Vec<EffectInstance> {
         let taken = |c: &EffectInstance| model.effects.iter().any(|e| e.same_place(c));

@@ -21,6 +21,7 @@ mod disturbance;
 mod duel;
 pub mod energy;
 pub mod equivalent;
+pub mod evidence;
 mod friction_regularisation;
 mod gap;
 mod headline;

@@ -4,7 +4,7 @@
 
 use crate::acceptance::{CERTAIN, CLEAR, FAINTEST, RELEVANT, TRUST_GAIN, UNEXPLAINED, choose, min_relevance};
 use crate::attribute::{Candidate, SearchNode};
-use crate::belief::{Cause, name, temper};
+use crate::belief::{Cause, name};
 use crate::context::{DiagnosisContext, SplitWeighting};
 use crate::model::{EffectInstance, Hypothesis};
 use crate::solve::{Effort, Fit};
@@ -111,7 +111,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.apply_dispersion_factor(&mut model, &node.weights);
         nodes.push(node);
         refresh(&model, &mut causes);
-        temper(&nodes, &mut causes);
         Attribution { refit, model, causes, nodes }
     }
 

@@ -93,18 +93,13 @@ mod tests {
     }
     const PERIOD: f64 = 4e-3;
 
-    /// Roughly normal, of mean 0 and variance 1: twelve uniform numbers.
-    fn normal(random: &mut Random) -> f64 {
-        (0..12).map(|_| random.below(1 << 20) as f64 / f64::from(1 << 20)).sum::<f64>() - 6.0
-    }
-
     /// Ten seconds of a motion of 1.2 rad at up to `hertz`, measured with this noise.
     fn log(hertz: f64, noise: f64) -> (Vec<f64>, Vec<f64>) {
         let mut random = Random(1);
         let t: Vec<f64> = (0..2500).map(|k| f64::from(k) * PERIOD).collect();
         let turn = std::f64::consts::TAU * hertz;
         let q = |t: &f64| 0.8 * (turn * t).sin() + 0.4 * (0.37 * turn * t).cos();
-        let measured = t.iter().map(|t| q(t) + noise * normal(&mut random)).collect();
+        let measured = t.iter().map(|t| q(t) + noise * random.normal()).collect();
         (t, measured)
     }
 
@@ -131,7 +126,7 @@ mod tests {
         for t in &mut t {
             *t += 0.3 * PERIOD * random.below(1000) as f64 / 1000.0;
         }
-        let mut measured = |t: &f64| (6.0 * t).sin() + NOISE * normal(&mut random);
+        let mut measured = |t: &f64| (6.0 * t).sin() + NOISE * random.normal();
         let q: Vec<f64> = t.iter().map(&mut measured).collect();
         assert_near(noise_level(&t, &q, 0.0), NOISE, "uneven times");
     }

@@ -16,4 +16,10 @@ impl Random {
     pub fn below(&mut self, n: usize) -> usize {
         (self.next() % n.max(1) as u64) as usize
     }
+
+    /// Roughly normal, of mean 0 and variance 1: twelve uniform numbers.
+    pub fn normal(&mut self) -> f64 {
+        const PARTS: usize = 1 << 20;
+        (0..12).map(|_| self.below(PARTS) as f64 / PARTS as f64).sum::<f64>() - 6.0
+    }
 }

@@ -11,6 +11,7 @@ use crate::attribute::{Candidate, SearchNode};
 use crate::belief::{Cause, name, probability_over};
 use crate::context::DiagnosisContext;
 use crate::equivalent;
+use crate::evidence::Evidence;
 use crate::model::{EffectInstance, Hypothesis};
 use crate::model_search::{ModelSearch, added};
 use crate::solve::Effort;
@@ -145,7 +146,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let named = name(&node, choice, Ground::Motion, seed);
         let replaced = search.causes.iter().find(|c| c.effect.same_place(&rival.instead_of));
         let as_sure = replaced.map_or(named.probability, |c| c.probability);
-        causes.push(Cause { probability: rival.better.unwrap_or(as_sure), ..named });
+        let selected = rival.better.unwrap_or(as_sure);
+        causes.push(Cause { probability: selected, evidence: Evidence { selected, ..named.evidence }, ..named });
         let next = node.candidates[choice].fit.clone();
         let mut other = ModelSearch {
             causes,

@@ -94,6 +94,8 @@ pub struct Gap {
     pub closed: f64,
     /// 95 % interval of it.
     pub closed_ci: [f64; 2],
+    /// Share of the gap above the floor with parameters re-estimated that the named causes leave.
+    pub unexplained: f64,
     /// RMS errors at other prediction horizons.
     pub horizons: Vec<AtHorizon>,
     /// Over the whole holdout from its first sample.
@@ -141,6 +143,9 @@ pub struct Cause {
     pub closed: f64,
     /// What this log does not tell from it.
     pub equivalents: Vec<EquivalentSummary>,
+    /// What it rests on; none for external disturbances.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<crate::evidence::Evidence>,
     /// The log that an external disturbance belongs to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,

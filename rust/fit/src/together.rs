@@ -15,6 +15,9 @@ use armgap_core::arm::Arm;
 /// Part of the gap above the floor that two effects must explain to be accepted together.
 const NEARLY_ALL: f64 = 0.85;
 
+/// Part of what a second effect has to explain that it must explain to first order to be looked for.
+const FORESEEN: f64 = 0.3;
+
 /// Candidates that are taken on trust.
 const TRIED: usize = 3;
 
@@ -67,7 +70,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         min_relevance: f64,
         seed: u64,
     ) -> Option<Both<N, P>> {
-        let node = self.node(&first.fit.hypothesis, alone.weights.training.scale, min_relevance);
+        let (fit, weights) = self.settle(&first.fit.hypothesis, alone.weights.training.scale);
+        // The part of what `first` leaves that a second has to take off it.
+        let needed = 1.0 - (1.0 - NEARLY_ALL) / (1.0 - alone.share(first)).max(1e-9);
+        if self.largest_gain(&fit, &weights) < FORESEEN * needed {
+            return None;
+        }
+        let node = self.node_around((fit, weights), min_relevance);
         let (choice, ground) = choose(&node, true, min_relevance)?;
         let pair = &node.candidates[choice];
         let none = &alone.settled.hypothesis;

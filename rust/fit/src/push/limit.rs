@@ -4,8 +4,10 @@
 //! One level that explains what all of them explain needs fewer values than they do.
 
 use super::Disturbance;
+use crate::acceptance::Ground;
 use crate::belief::Cause;
 use crate::context::{DiagnosisContext, SplitWeighting};
+use crate::evidence::Evidence;
 use crate::minimum::minimum;
 use crate::model::{EffectInstance, Hypothesis};
 use crate::model_search::Attribution;
@@ -99,7 +101,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let sigma = vec![by_level.sigma(best)?];
         let probability = disturbances.iter().map(|e| e.probability).fold(0.0, f64::max);
         let effect = by_level.limited_to(best)?;
-        Some(Cause { effect, sigma, probability, share, relevance: 0.0, look_alikes: Vec::new() })
+        Some(Cause { effect, sigma, probability, share, relevance: 0.0, look_alikes: Vec::new(), evidence: Evidence { selected: probability, ..Evidence::default() }, ground: Ground::Motion })
     }
 }
 

@@ -79,6 +79,11 @@ pub struct Conclusion<const N: usize, const P: usize> {
 }
 
 impl<const N: usize, const P: usize> Conclusion<N, P> {
+    /// The attribution of the logs as they are.
+    pub fn without_disturbances(&self) -> &Attribution<N, P> {
+        self.alone.as_ref().unwrap_or(&self.attribution)
+    }
+
     fn without(attribution: Attribution<N, P>) -> Self {
         Self { attribution, alone: None, disturbances: Vec::new() }
     }

@@ -1,0 +1,158 @@
+//! What a cause rests on in the final model, and the probability that it is in the arm.
+//!
+//! A real arm always lacks something that has no name, so what stays unexplained is no evidence against a cause by itself. What counts is
+//! how the cause's own part compares with it: an effect that is not there takes up a part of the rest, and another part under another motion.
+//! So the probability follows from three figures: how often the cause is chosen when the windows are drawn again, by how much predictions
+//! of the holdout miss more without it, and whether the holdout asks for the same size as the training logs.
+
+use crate::acceptance::{ABOVE_FLOOR, Ground, UNEXPLAINED};
+use crate::attribute::SearchNode;
+use crate::context::DiagnosisContext;
+use crate::model::EffectInstance;
+use crate::model_search::Attribution;
+use crate::solve::{Effort, Fit, neutral};
+use armgap_core::arm::Arm;
+use armgap_core::effect::Trial;
+use serde::Serialize;
+
+/// Increase of the holdout's cost without a cause, relative to what is left with it, at which it is as likely there as not; from trials with
+/// clutter and with effects outside the library.
+const EVEN: f64 = 1.2;
+
+/// How fast the odds rise with that increase.
+const STEEPNESS: f64 = 2.0;
+
+/// Scatter of a size between logs, relative to it, that other missing effects make beside its standard deviation.
+const SAME: f64 = 0.15;
+
+/// Mean and scatter of the size that another log asks for, relative to the first, where the effect is not there.
+const OTHER: [f64; 2] = [0.7, 0.8];
+
+/// What a cause rests on.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Evidence {
+    /// How often it has the lowest cost of all candidates when the windows are drawn again, at the node where it was added.
+    pub selected: f64,
+    /// By how much the cost of the holdout rises without it, everything else fitted again, relative to the cost above the floor with it.
+    pub gain: f64,
+    /// Size that the holdout asks for, relative to that of the training logs; none where a size has no direction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_ratio: Option<f64>,
+    /// Standard deviation of that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_ratio_sigma: Option<f64>,
+}
+
+impl Evidence {
+    /// Probability that the effect is in the arm.
+    pub fn probability(&self) -> f64 {
+        let odds = (self.gain.max(0.0) / EVEN).powf(STEEPNESS) * self.agreement();
+        if odds.is_finite() { self.selected * odds / (1.0 + odds) } else { self.selected }
+    }
+
+    /// How much more likely the two sizes are for an effect that is there than for one that is not.
+    fn agreement(&self) -> f64 {
+        let (Some(ratio), Some(sigma)) = (self.size_ratio, self.size_ratio_sigma) else { return 1.0 };
+        let density = |mean: f64, scatter: f64| {
+            let scatter = scatter.hypot(sigma);
+            (-0.5 * ((ratio - mean) / scatter).powi(2)).exp() / scatter
+        };
+        let likelihood_ratio = density(1.0, SAME) / density(OTHER[0], OTHER[1]);
+        if likelihood_ratio.is_finite() { likelihood_ratio } else { 1.0 }
+    }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// Gives the causes of an attribution their evidence and probability.
+    pub(crate) fn weigh(&self, attribution: &mut Attribution<N, P>) {
+        let Some(last) = attribution.nodes.last() else { return };
+        if attribution.causes.is_empty() {
+            return;
+        }
+        let model = &attribution.model;
+        let on_holdout = self.judge(&last.weights.holdout).solve(&model.hypothesis, Effort::FULL);
+        let cost = |fit: &Fit<P>| self.judged_on_holdout(&last.weights, fit).0.iter().sum::<f64>();
+        let full = cost(model);
+        let rest = if is_more_than_noise(last) { (full - last.floor).max(0.0) } else { 0.0 };
+        for cause in &mut attribution.causes {
+            let Some(place) = model.hypothesis.effects.iter().position(|e| e.same_place(&cause.effect)) else {
+                continue;
+            };
+            let mut without = model.hypothesis.clone();
+            without.effects.remove(place);
+            let without = self.problem(&last.weights.training).solve(&without, Effort::FULL);
+            cause.evidence.gain = (cost(&without) - full) / rest;
+            if let Some((ratio, sigma)) = size_ratio(place, model, &on_holdout) {
+                (cause.evidence.size_ratio, cause.evidence.size_ratio_sigma) = (Some(ratio), Some(sigma));
+            }
+            if cause.ground == Ground::Motion {
+                cause.probability = cause.evidence.probability();
+            }
+        }
+    }
+}
+
+/// Whether a search ended beside a cost that is more than noise.
+fn is_more_than_noise<const N: usize, const P: usize>(last: &SearchNode<N, P>) -> bool {
+    last.excess() > if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED }
+}
+
+/// Size of an effect in one fit relative to another, along the first, and its standard deviation; none for an effect whose first
+/// parameter is no amplitude.
+fn size_ratio<const P: usize>(place: usize, of: &Fit<P>, other: &Fit<P>) -> Option<(f64, f64)> {
+    let effects = &of.hypothesis.effects;
+    let (one, two) = (&effects[place], &other.hypothesis.effects[place]);
+    if matches!(one.law.spec().trial, Trial::Whole | Trial::Disturbance) {
+        return None;
+    }
+    let first = P + effects[..place].iter().map(EffectInstance::len).sum::<usize>();
+    let off = neutral(one);
+    let (mut along, mut square, mut variance) = (0.0, 0.0, 0.0);
+    for i in 0..one.amplitudes() {
+        let (a, b) = (one.p[i] - off.p[i], two.p[i] - off.p[i]);
+        along += a * b;
+        square += a * a;
+        variance += a * a * (of.sigma(first + i).powi(2) + other.sigma(first + i).powi(2));
+    }
+    let (ratio, sigma) = (along / square, variance.sqrt() / square);
+    (ratio.is_finite() && sigma.is_finite()).then_some((ratio, sigma))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn evidence(gain: f64, ratio: Option<f64>) -> Evidence {
+        Evidence { selected: 1.0, gain, size_ratio: ratio, size_ratio_sigma: ratio.map(|_| 0.05) }
+    }
+
+    #[test]
+    fn a_cause_without_a_rest_beside_it_is_as_sure_as_its_choice() {
+        let choice = Evidence { selected: 0.97, ..evidence(f64::INFINITY, None) };
+        assert_eq!(choice.probability(), 0.97);
+    }
+
+    #[test]
+    fn a_cause_that_explains_more_than_what_is_left_is_likely() {
+        assert!((evidence(EVEN, None).probability() - 0.5).abs() < 1e-12);
+        assert!(evidence(4.0, None).probability() > 0.9);
+        assert!(evidence(0.2, None).probability() < 0.05);
+        assert_eq!(evidence(-1.0, None).probability(), 0.0);
+    }
+
+    #[test]
+    fn sizes_that_agree_speak_for_a_cause_and_others_against_it() {
+        let [same, near, far, turned] =
+            [1.0, 0.85, 1.8, -0.5].map(|ratio| evidence(1.0, Some(ratio)).probability());
+        let silent = evidence(1.0, None).probability();
+        assert!(same > near && near > silent && silent > far && far > turned);
+    }
+
+    #[test]
+    fn a_size_that_is_hardly_known_says_little() {
+        let known = evidence(1.0, Some(1.6));
+        let unknown = Evidence { size_ratio_sigma: Some(2.0), ..known };
+        let silent = evidence(1.0, None).probability();
+        assert!((unknown.probability() - silent).abs() < 0.1 && known.probability() < 0.5 * silent);
+    }
+}

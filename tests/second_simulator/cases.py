@@ -1,0 +1,433 @@
+"""Cases: an arm, its motions, what is hidden in it, and the files of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from .dynamics import STEP, simulate, table
+
+Array = np.ndarray
+TURN = 2.0 * math.pi
+#: Mass [kg], length, centre [m], inertia [kg m^2] of both links; viscous, Coulomb friction; largest torque; encoder counts.
+DESIGNS = {
+    "large": ((14.0, 5.0), (0.42, 0.33), (0.17, 0.12), (0.45, 0.09), (1.6, 0.25), (4.5, 1.1), (150.0, 30.0), 262144),
+    "small": ((0.7, 0.6), (0.22, 0.28), (0.16, 0.21), (0.010, 0.008), (0.02, 0.012), (0.12, 0.09), (9.0, 6.0), 65536),
+}
+PERIODS = (0.001, 0.002, 0.0025, 0.004)
+#: Trust that the arm file states: relative sigma of inertial values and of friction.
+TRUST = (0.05, 0.20)
+JOINT_EFFECTS = (
+    "torque_offset", "torque_gain", "actuator_lag", "actuator_delay", "torque_saturation", "torque_dead_zone", "torque_ripple",
+    "coulomb_asymmetry", "viscous_asymmetry", "stribeck", "quadratic_drag", "load_dependent_friction", "position_dependent_friction",
+    "friction_warmup", "joint_spring", "rotor_inertia", "gear_efficiency", "encoder_offset", "encoder_eccentricity", "contact",
+)  # fmt: skip
+HIDDEN_STATES = ("joint_elasticity", "backlash")
+ARM_EFFECTS = ("base_tilt", "payload")
+OUTSIDE = ("cross_position", "drift", "product", "random_torque")
+#: What clutter is made of: small everywhere.
+SMALL = (
+    "torque_offset", "torque_gain", "torque_ripple", "coulomb_asymmetry", "viscous_asymmetry", "stribeck", "quadratic_drag",
+    "load_dependent_friction", "position_dependent_friction", "friction_warmup", "joint_spring", "rotor_inertia", "gear_efficiency",
+)  # fmt: skip
+#: What no motion, or hardly any, tells from each other is not put beside each other.
+ALIKE = (
+    {"torque_offset", "coulomb_asymmetry", "encoder_offset", "base_tilt"},
+    {"torque_gain", "gear_efficiency"},
+    {"viscous_asymmetry", "coulomb_asymmetry"},
+    {"joint_spring", "position_dependent_friction", "encoder_offset"},
+    {"rotor_inertia", "payload", "joint_elasticity", "backlash"},
+)
+FAMILIES = ("single", "clutter", "clutter-only", "hidden-state", "null", "parameters", "outside")
+
+
+@dataclass
+class Machine:
+    """One arm, whole."""
+
+    design: str
+    arm: Array
+    joints: list[dict[str, float]]
+    limit: Array
+    step: Array
+    period: float
+    tilt: float = 0.0
+    payload: tuple[float, float] = (0.0, 1.0)
+    sides: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    offset: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    eccentricity: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0), (0.0, 0.0)])
+    random_torque: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.1), (0.0, 0.1)])
+    noise: Array = field(default_factory=lambda: np.zeros(2))
+    rotor: list[float] = field(default_factory=lambda: [0.0, 0.0])
+
+    @property
+    def theta(self) -> Array:
+        """Base parameters of Reyes and Kelly (1997), section 5, and friction; a rotor rides in its link's inertia."""
+        m1, m2, l1, c1, c2, i1, i2, g = self.arm
+        third = m2 * c2**2 + i2 + self.rotor[1]
+        first = m1 * c1**2 + m2 * l1**2 + i1 + third + self.rotor[0]
+        friction = [self.joints[j][name] for name in ("viscous", "coulomb") for j in range(2)]
+        return np.array([first, l1 * m2 * c2, third, g * (c1 * m1 + m2 * l1), g * m2 * c2, *friction])
+
+    @property
+    def inertia(self) -> Array:
+        """Diagonal of the inertia matrix of the stretched arm."""
+        return np.array([self.theta[0] + 2.0 * self.theta[1], self.theta[2]])
+
+
+def draw_machine(rng: np.random.Generator) -> Machine:
+    """An arm around one of the designs."""
+    design = str(rng.choice(list(DESIGNS)))
+    mass, length, com, inertia, viscous, coulomb, limit, counts = DESIGNS[design]
+
+    def spread(values: tuple[float, float], width: float = 0.2) -> list[float]:
+        return [float(v * rng.uniform(1 - width, 1 + width)) for v in values]
+
+    (m1, m2), (l1, _), (c1, c2), (i1, i2) = spread(mass), spread(length), spread(com), spread(inertia)
+    fv, fc = spread(viscous, 0.4), spread(coulomb, 0.4)
+    width = float(np.exp(rng.uniform(math.log(1e-3), math.log(8e-3))))
+    joints = [{"viscous": v, "coulomb": c, "width": width} for v, c in zip(fv, fc, strict=True)]
+    step = np.full(2, TURN / counts)
+    arm = np.array([m1, m2, l1, c1, c2, i1, i2, 9.81])
+    return Machine(design, arm, joints, np.array(limit), step, float(rng.choice(PERIODS)))
+
+
+def draw_reference(rng: np.random.Generator, machine: Machine, duration: float) -> Array:
+    """A multisine that a PD controller follows; feed-forward of the weight, or none."""
+    n = round(duration / machine.period)
+    t = machine.period * np.arange(n)
+    out = np.zeros((n, 2, 6))
+    fade = 0.5 * (1 - np.cos(np.pi * np.minimum(t / 0.8, 1.0)))
+    bandwidth = rng.uniform(8.0, 16.0)
+    for j in range(2):
+        k = int(rng.integers(3, 7))
+        f = np.exp(rng.uniform(math.log(0.15), math.log(1.6), k))
+        size = rng.uniform(0.3, 1.0, k) / np.sqrt(f)
+        size *= rng.uniform(0.5, 1.1) / np.sqrt(np.sum(size**2) / 2)
+        phase = rng.uniform(0, TURN, k)
+        wave = size[:, None] * np.sin(TURN * f[:, None] * t + phase[:, None])
+        q = fade * (rng.uniform(-0.4, 0.4) + wave.sum(0)) * 0.8
+        out[:, j, 0] = q
+        out[:, j, 1] = np.gradient(q, machine.period)
+        out[:, j, 3] = machine.inertia[j] * bandwidth**2
+        out[:, j, 4] = 1.4 * machine.inertia[j] * bandwidth
+        out[:, j, 5] = machine.limit[j]
+    if rng.uniform() < 0.5:
+        theta = machine.theta
+        out[:, 1, 2] = theta[4] * np.sin(out[:, 0, 0] + out[:, 1, 0])
+        out[:, 0, 2] = theta[3] * np.sin(out[:, 0, 0]) + out[:, 1, 2]
+    return out
+
+
+@dataclass(frozen=True)
+class Run:
+    """One log and its truth."""
+
+    t: Array
+    q: Array
+    tau: Array
+    true_q: Array
+    true_dq: Array
+
+
+def run(machine: Machine, reference: Array, seed: int, zero: Array, pushes: Array | None = None) -> Run:
+    """Simulate one log; the same seed makes the same noise."""
+    rng = np.random.default_rng(seed)
+    n = len(reference)
+    disturbance = np.zeros((n, 4))
+    for j, (sd, time) in enumerate(machine.random_torque):
+        decay = math.exp(-machine.period / time)
+        kicks = rng.standard_normal(n) * sd * math.sqrt(1 - decay**2)
+        level = sd * rng.standard_normal()
+        for k in range(n):
+            level = decay * level + kicks[k]
+            disturbance[k, j] = level
+        disturbance[:, 2 + j] = machine.noise[j] * rng.standard_normal(n)
+    encoder = np.array(
+        [[s, z + o, *e, d] for s, z, o, e, d in zip(
+            machine.sides, zero, machine.offset, machine.eccentricity, machine.step, strict=True)]
+    )  # fmt: skip
+    steps = max(1, round(machine.period / STEP))
+    q, tau, true_q, true_dq = simulate(
+        machine.arm, machine.tilt, np.array(machine.payload), table(machine.joints), encoder, reference, machine.period,
+        steps, disturbance, np.zeros((0, 4)) if pushes is None else pushes,
+    )  # fmt: skip
+    return Run(machine.period * np.arange(n), q, tau, true_q, true_dq)
+
+
+@dataclass(frozen=True)
+class Use:
+    """How a joint is used: RMS torque and largest, RMS acceleration, speed, range of positions; sizes are stated against these."""
+
+    torque: float
+    peak: float
+    acceleration: float
+    speed: float
+    low: float
+    high: float
+    slew: float
+
+
+def use_of(runs: list[Run], j: int) -> Use:
+    """Use of one joint in all logs."""
+    tau = np.concatenate([r.tau[:, j] for r in runs])
+    dq = [r.true_dq[:, j] for r in runs]
+    ddq = np.concatenate([np.gradient(d, r.t[1]) for d, r in zip(dq, runs, strict=True)])
+    q = np.concatenate([r.true_q[:, j] for r in runs])
+    return Use(
+        float(np.sqrt(np.mean(tau**2))), min(float(np.max(np.abs(r.tau[:, j]))) for r in runs),
+        float(np.sqrt(np.mean(ddq**2))), float(np.sqrt(np.mean(np.concatenate(dq) ** 2))),
+        float(np.quantile(q, 0.02)), float(np.quantile(q, 0.98)),
+        float(np.sqrt(np.mean(np.concatenate([np.gradient(r.tau[:, j], r.t[1]) for r in runs]) ** 2))),
+    )  # fmt: skip
+
+
+def hide(machine: Machine, name: str, j: int, share: float, use: Use, rng: np.random.Generator) -> dict[str, float]:
+    """Put an effect into a machine that makes about `share` of the joint's RMS torque; return its values."""
+    p, torque = machine.joints[j], share * use.torque
+    sign = float(rng.choice([-1.0, 1.0]))
+    load = abs(machine.theta[3 + j]) * 0.5
+    values: dict[str, float] = {}
+    match name:
+        case "torque_offset":
+            values = {"offset": sign * torque}
+        case "torque_gain":
+            values = {"gain": 1.0 + sign * share}
+        case "actuator_lag" | "actuator_delay":
+            late = min(torque / use.slew, 0.03)
+            values = {
+                "lag" if name == "actuator_lag" else "late": p.get("lag" if name == "actuator_lag" else "late", 0.0)
+                + late
+            }
+        case "torque_saturation":
+            values = {"saturation": use.peak * (1.0 - 1.2 * share)}
+        case "torque_dead_zone":
+            values = {"dead_zone": torque}
+        case "torque_ripple":
+            n = round(rng.uniform(2.0, 7.0) * TURN / (use.high - use.low))
+            values = {
+                "ripple": 1.4 * torque,
+                "ripple_n": float(n),
+                "ripple_phase": float(rng.uniform(-math.pi, math.pi)),
+            }
+        case "coulomb_asymmetry":
+            values = {"asymmetry": sign * torque}
+        case "viscous_asymmetry":
+            values = {"viscous_asymmetry": sign * torque / use.speed}
+        case "stribeck":
+            values = {"stribeck": 2.5 * torque, "stribeck_velocity": use.speed * float(rng.uniform(0.05, 0.3))}
+        case "quadratic_drag":
+            values = {"quadratic": 0.7 * torque / use.speed**2}
+        case "load_dependent_friction":
+            values = {"load": torque / load}
+        case "position_dependent_friction":
+            phase = rng.uniform(0, TURN)
+            values = {"cos_friction": torque * math.cos(phase), "sin_friction": torque * math.sin(phase)}
+        case "friction_warmup":
+            values = {"warm": torque / p["coulomb"], "warm_time": float(rng.uniform(2.0, 6.0))}
+        case "joint_spring":
+            values = {"spring": 2.5 * torque / (use.high - use.low), "spring_q0": float(rng.uniform(use.low, use.high))}
+        case "rotor_inertia":
+            values = {"armature": torque / use.acceleration}
+        case "gear_efficiency":
+            values = {"efficiency_loss": 1.4 * share}
+        case "contact":
+            at = use.high - share * (use.high - use.low) if sign > 0 else use.low + share * (use.high - use.low)
+            if at * sign < 0.05:
+                at = sign * 0.05
+            k = 20.0 * use.torque / (use.high - use.low)
+            values = {"stop": at, "stop_stiffness": k, "stop_damping": 0.2 * math.sqrt(k * machine.inertia[j])}
+        case "encoder_offset":
+            machine.offset[j] += sign * torque / (2.0 * load)
+            return {"offset": machine.offset[j]}
+        case "encoder_eccentricity":
+            phase = rng.uniform(0, TURN)
+            size = torque / (2.0 * load)
+            machine.eccentricity[j] = (size * math.cos(phase), size * math.sin(phase))
+            return {"cos": machine.eccentricity[j][0], "sin": machine.eccentricity[j][1]}
+        case "base_tilt":
+            machine.tilt = sign * torque / (2.0 * load)
+            return {"angle": machine.tilt}
+        case "payload":
+            distance = float(rng.uniform(0.7, 1.2) * machine.arm[4] * 1.5)
+            mass = share * 2.0 * machine.arm[1] * machine.arm[4] / distance
+            machine.payload = (mass, distance)
+            return {"mass": mass, "distance": distance}
+        case "cross_position":
+            values = {"cross_position": 2.0 * torque}
+        case "drift":
+            values = {"drift": sign * torque / 5.0}
+        case "product":
+            values = {"product": sign * torque / (use.speed * 0.5 * (use.high - use.low))}
+        case "random_torque":
+            machine.random_torque[j] = (torque, float(np.exp(rng.uniform(math.log(0.02), math.log(0.5)))))
+            return {"sd": torque, "time": machine.random_torque[j][1]}
+        case _:
+            raise ValueError(name)
+    p.update(values)
+    return values
+
+
+def hide_transmission(
+    machine: Machine, name: str, j: int, size: float, use: Use, rng: np.random.Generator
+) -> dict[str, float]:
+    """Put a shaft or play between motor and link; sides of encoder and friction are drawn, the same on both joints."""
+    p = machine.joints[j]
+    rotor = (
+        machine.inertia[j] * float(np.exp(rng.uniform(math.log(0.05), math.log(0.25))))
+        if j
+        else 0.15 * machine.inertia[0]
+    )
+    link = machine.inertia[j]
+    machine.rotor[j] = rotor
+    side = float(rng.uniform() < 0.6)
+    machine.sides[j] = side
+    p["friction_at_motor"] = float(rng.uniform() < 0.6) if rng.uniform() < 0.3 else side
+    p["rotor"] = rotor
+    if name == "joint_elasticity":
+        hertz = 25.0 * (6.0 / 25.0) ** size
+        p["shaft"] = link * rotor / (link + rotor) * (TURN * hertz) ** 2
+        p["shaft_damping"] = 2 * 0.05 * math.sqrt(p["shaft"] * link * rotor / (link + rotor))
+    else:
+        p["play"] = 0.002 * (0.03 / 0.002) ** size
+        p["shaft"] = rotor * 1500.0**2
+        p["shaft_damping"] = 2 * 0.3 * rotor * 1500.0
+    return {k: p[k] for k in ("rotor", "shaft", "play", "friction_at_motor") if k in p} | {"encoder_at_motor": side}
+
+
+def requests(families: tuple[str, ...]) -> list[tuple[str, int | None]]:
+    """All effects and joints."""
+    return [(name, j) for name in families for j in ((1, 2) if name not in ARM_EFFECTS else (None,))]
+
+
+def _beside(rng: np.random.Generator, main: str | None) -> list[tuple[str, int | None]]:
+    taken = {name for group in ALIKE if main in group for name in group} | {main}
+    offered = [w for w in requests(SMALL) if w[0] not in taken]
+    chosen: list[tuple[str, int | None]] = []
+    count = int(rng.integers(3, 6))
+    for i in rng.permutation(len(offered)):
+        name, j = offered[int(i)]
+        near = {n for group in ALIKE if name in group for n in group} | {name}
+        if len(chosen) < count and not any(n in near and k == j for n, k in chosen):
+            chosen.append((name, j))
+    return chosen
+
+
+def make(seed: tuple[int, int], family: str, folder: Path, duration: float = 10.0) -> dict[str, Any]:
+    """Make one case on disk; returns its key."""
+    for attempt in range(20):
+        key = _make(np.random.default_rng([*seed, attempt]), family, folder, duration)
+        if key is not None:
+            key["seed"] = list(seed)
+            (folder / "key.json").write_text(json.dumps(key, indent=1))
+            return key
+    raise RuntimeError(f"no motion for {seed}")
+
+
+def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) -> dict[str, Any] | None:
+    machine = draw_machine(rng)
+    cluttered = family.startswith("clutter")
+    names = ["train-1", "train-2", "holdout-1"] if cluttered else ["train-1", "holdout-1"]
+    references = [draw_reference(rng, machine, duration) for _ in names]
+    seeds = [int(s) for s in rng.integers(0, 2**31, len(names))]
+    nothing = np.zeros(2)
+    plain = [run(machine, r, s, nothing) for r, s in zip(references, seeds, strict=True)]
+    if not all(_sane(r) for r in plain):
+        return None
+    uses = [use_of(plain, j) for j in range(2)]
+    nominal_theta, zeros = machine.theta, [nothing for _ in names]
+    small: list[dict[str, Any]] = []
+    main = _draw_main(rng, family)
+    if cluttered:
+        for name, joint in _beside(rng, main[0] if main else None):
+            j = (joint or 1) - 1
+            share = float(np.exp(rng.uniform(math.log(0.006), math.log(0.03))))
+            small.append(
+                {
+                    "effect": name,
+                    "joint": joint,
+                    "parameters": hide(machine, name, j, share, uses[j], rng),
+                    "share": share,
+                }
+            )
+        zeros = [rng.normal(0.0, 0.002, 2) for _ in names]
+        machine.random_torque = [
+            (float(rng.uniform(0.002, 0.01)) * u.torque, float(rng.uniform(0.05, 0.5))) for u in uses
+        ]
+        if main is None or main[0] not in ("actuator_lag", "actuator_delay"):
+            loop = float(rng.uniform(0.002, 0.005))
+            for p in machine.joints:
+                p["lag"] = loop
+        for p in machine.joints:
+            p["late"] = float(rng.uniform(0.0, 1.0)) * machine.period
+    without = [run(machine, r, s, z) for r, s, z in zip(references, seeds, zeros, strict=True)]
+    effects: list[dict[str, Any]] = []
+    if main is not None:
+        name, joint = main
+        j = (joint or 1) - 1
+        if name in HIDDEN_STATES:
+            values = hide_transmission(machine, name, j, float(rng.uniform()), uses[j], rng)
+            nominal_theta = machine.theta
+        else:
+            values = hide(machine, name, j, float(np.exp(rng.uniform(math.log(0.04), math.log(0.3)))), uses[j], rng)
+        effects.append({"effect": name, "joint": joint, "parameters": values})
+    runs = [run(machine, r, s, z) for r, s, z in zip(references, seeds, zeros, strict=True)]
+    if not all(_sane(r) for r in [*runs, *without]):
+        return None
+    exact = family == "null" or (family != "parameters" and rng.uniform() < 0.5)
+    trust = np.repeat(TRUST, [5, 4])
+    stated = nominal_theta * (1.0 + (0.0 if exact else 1.0) * trust * np.clip(rng.standard_normal(9), -2.5, 2.5))
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "arm.toml").write_text(_arm_file(machine, stated, trust * np.abs(stated)))
+    _write(folder, names, runs)
+    key = {"family": family, "design": machine.design, "effects": effects, "clutter": small, "exact": exact}
+    if cluttered and main is not None:
+        (folder / "without").mkdir(exist_ok=True)
+        _write(folder / "without", names, without)
+    return key
+
+
+def _draw_main(rng: np.random.Generator, family: str) -> tuple[str, int | None] | None:
+    offered = {
+        "single": requests(JOINT_EFFECTS) + requests(ARM_EFFECTS),
+        "clutter": requests(JOINT_EFFECTS) + requests(ARM_EFFECTS),
+        "hidden-state": requests(HIDDEN_STATES),
+        "outside": requests(OUTSIDE),
+    }.get(family)
+    return None if offered is None else offered[int(rng.integers(len(offered)))]
+
+
+def _sane(r: Run) -> bool:
+    return (
+        bool(np.all(np.isfinite(r.true_q)))
+        and bool(np.max(np.abs(r.true_q)) < 4.0)
+        and bool(np.max(np.abs(r.true_dq)) < 25.0)
+    )
+
+
+def _write(folder: Path, names: list[str], runs: list[Run]) -> None:
+    for name, r in zip(names, runs, strict=True):
+        columns = {"t": r.t} | {f"{kind}{j + 1}": x[:, j] for kind, x in (("q", r.q), ("tau", r.tau)) for j in range(2)}
+        pl.DataFrame(columns).write_parquet(folder / f"{name}.parquet")
+
+
+def _arm_file(machine: Machine, theta: Array, sigma: Array) -> str:
+    def listed(values: Array) -> str:
+        return "[" + ", ".join(repr(float(v)) for v in values) + "]"
+
+    lines = [
+        'name = "second simulator"', 'kind = "two-link"', "gravity = 9.81", f"sample_period = {machine.period!r}",
+        "[inertial]", f"theta = {listed(theta[:5])}", f"sigma = {listed(sigma[:5])}",
+        "[friction]", f"viscous = {listed(theta[5:7])}", f"coulomb = {listed(theta[7:])}",
+        f"sigma_viscous = {listed(sigma[5:7])}", f"sigma_coulomb = {listed(sigma[7:])}",
+        "[encoder]", f"counts_per_rev = {[round(TURN / s) for s in machine.step]}",
+        "[actuator]", f"torque_limit = {listed(machine.limit)}",
+        "[geometry]", f"link_length = [{float(machine.arm[2])!r}, {float(1.5 * machine.arm[4])!r}]", "",
+    ]  # fmt: skip
+    return "\n".join(lines)

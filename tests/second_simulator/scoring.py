@@ -1,0 +1,106 @@
+"""What the answers come to: right first causes, false names, claimed against right."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+
+from armgap.trial.verdict import equivalent
+
+Record = dict[str, Any]
+#: Edges of the table of claimed against right.
+EDGES = (0.0, 0.5, 0.75, 0.9, 1.001)
+#: An effect that makes less of the mean square miss is not asked for by name.
+HALF = 0.5
+
+
+def is_true(record: Record, cause: Record, main_only: bool = False) -> bool:
+    """Whether a cause, or one of its listed equivalents, is in the arm."""
+    hidden = [(h["effect"], h["joint"]) for h in record["effects"] + ([] if main_only else record["clutter"])]
+    if not main_only and record["family"].startswith("clutter"):
+        # Current loops and the commands that come late are in every cluttered arm.
+        hidden += [(effect, j) for effect in ("actuator_lag", "actuator_delay") for j in (1, 2)]
+    names = [(cause["effect"], cause["joint"])] + [(e["effect"], e["joint"]) for e in cause["equivalents"]]
+    return any(equivalent(n, h) for n in names for h in hidden)
+
+
+def report(records: list[Record], cases: bool) -> str:
+    """Tables as text."""
+    failed = [r for r in records if "failed" in r]
+    records = [r for r in records if "failed" not in r]
+    lines = [f"{len(records)} answers, {len(failed)} failed", ""]
+    lines.append(
+        "family | asked | first right | among causes | as candidate only | no cause | wrong name >= 0.5 | seconds (median, max)"
+    )
+    for family in dict.fromkeys(r["family"] for r in records):
+        of = [r for r in records if r["family"] == family]
+        groups = {"": of}
+        if any(r["share"] is not None for r in of):
+            groups = {
+                f" (share >= {HALF:g})": [r for r in of if (r["share"] or 0) >= HALF],
+                " (less)": [r for r in of if (r["share"] or 0) < HALF],
+            }
+        for label, group in groups.items():
+            if group:
+                lines.append(_line(family + label, group))
+    lines += ["", "claimed against right: all names of causes and candidates, by family group", ""]
+    for label, chosen in {
+        "inside the library": lambda r: r["family"] != "outside",
+        "clutter": lambda r: r["family"].startswith("clutter"),
+        "outside": lambda r: r["family"] == "outside",
+        "all": lambda r: True,
+    }.items():
+        pairs = [
+            (c["probability"], is_true(r, c))
+            for r in records
+            if chosen(r)
+            for c in r["causes"] + r["candidates"]
+            if c["effect"] != "external_pulse"
+        ]
+        lines.append(f"{label}: " + "; ".join(_bin(pairs, low, high) for low, high in itertools.pairwise(EDGES)))
+    if cases:
+        lines += [""] + [_case(r) for r in records if not _right(r)]
+        lines += [f"{r['case']}: {r['failed']}" for r in failed]
+    return "\n".join(lines)
+
+
+def _right(r: Record) -> bool:
+    if not r["effects"] or r["family"] == "outside":
+        return not any(not is_true(r, c) and c["probability"] >= 0.5 for c in r["causes"])
+    return bool(r["causes"]) and is_true(r, r["causes"][0], True)
+
+
+def _line(label: str, of: list[Record]) -> str:
+    first = sum(bool(r["causes"]) and is_true(r, r["causes"][0], True) for r in of)
+    among = sum(any(is_true(r, c, True) for c in r["causes"]) for r in of)
+    candidate = sum(
+        not any(is_true(r, c, True) for c in r["causes"]) and any(is_true(r, c, True) for c in r["candidates"])
+        for r in of
+    )
+    silent = sum(not r["causes"] for r in of)
+    wrong = sum(any(not is_true(r, c) and c["probability"] >= 0.5 for c in r["causes"]) for r in of)
+    seconds = [r["seconds"] for r in of]
+    return f"{label} | {len(of)} | {first} | {among} | {candidate} | {silent} | {wrong} | {np.median(seconds):.1f}, {max(seconds):.0f}"
+
+
+def _bin(pairs: list[tuple[float, bool]], low: float, high: float) -> str:
+    inside = [(p, right) for p, right in pairs if low <= p < high]
+    if not inside:
+        return f"[{low:g}, {high:.2g}) -"
+    claimed, right = np.mean([p for p, _ in inside]), np.mean([r for _, r in inside])
+    return f"[{low:g}, {high:.2g}) {len(inside)}: claimed {claimed:.2f}, right {right:.2f}"
+
+
+def _case(r: Record) -> str:
+    def names(causes: list[Record]) -> str:
+        return ", ".join(
+            f"{c['effect']}:{c['joint'] or ''} {c['probability']:.2f}{'' if is_true(r, c) else '!'}" for c in causes
+        )
+
+    hidden = ", ".join(f"{h['effect']}:{h['joint'] or ''}" for h in r["effects"]) or "nothing"
+    share = "" if r["share"] is None else f" share {r['share']:.2f}"
+    after = "/".join(f"{a / f:.0f}" for a, f in zip(r["gap"]["after"], r["gap"]["floor"], strict=True))
+    found = f"{r['verdict']} [{names(r['causes'])}] ({names(r['candidates'])})"
+    return f"{r['case']}: {hidden}{share} -> {found}, {after} floors, {r['seconds']:.0f} s"

@@ -1,0 +1,101 @@
+"""armgap's dynamics and effects against a simulator that shares no code with them: the same torques make the same motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from armgap import Arm, simulate
+from armgap.simulation import Effect
+
+pytest.importorskip("numba")
+
+from second_simulator.cases import Machine, draw_machine, draw_reference, run
+
+#: Both integrators and their steps [rad]; encoders are taken out.
+SAME = 2e-7
+
+#: Laws that the two state otherwise, and the share of their doing by which motions may differ: an asymmetry that is rounded with the rest of
+#: friction or is not, a load with or without Coriolis torques, a loss that jumps where a step does not end.
+OTHERWISE = {"coulomb_asymmetry": 0.03, "load_dependent_friction": 0.1, "gear_efficiency": 0.03}
+
+#: Effect and its values in armgap; the same in the second simulator.
+EFFECTS = [
+    (("coulomb_asymmetry", 1, {"delta": 0.4}), {"asymmetry": 0.4}),
+    (("torque_offset", 2, {"offset": 0.2}), {"offset": 0.2}),
+    (("stribeck", 2, {"amplitude": 0.3, "velocity": 0.5}), {"stribeck": 0.3, "stribeck_velocity": 0.5}),
+    (("quadratic_drag", 1, {"c": 0.3}), {"quadratic": 0.3}),
+    (("cubic_drag", 2, {"c3": 0.05}), {"cubic": 0.05}),
+    (("load_dependent_friction", 1, {"mu": 0.05}), {"load": 0.05}),
+    (("position_dependent_friction", 2, {"a": 0.2, "b": -0.1}), {"cos_friction": 0.2, "sin_friction": -0.1}),
+    (("viscous_asymmetry", 1, {"delta": 0.2}), {"viscous_asymmetry": 0.2}),
+    (("gear_efficiency", 2, {"loss": 0.1}), {"efficiency_loss": 0.1}),
+    (("torque_gain", 1, {"gain": 0.9}), {"gain": 0.9}),
+    (("torque_saturation", 1, {"level": 12.0}), {"saturation": 12.0}),
+    (("torque_dead_zone", 2, {"level": 0.2}), {"dead_zone": 0.2}),
+    (("torque_ripple", 1, {"amplitude": 0.8, "n": 11.0, "phase": 0.4}), {"ripple": 0.8, "ripple_n": 11.0, "ripple_phase": 0.4}),
+    (("joint_spring", 2, {"k": 0.9, "q0": 0.2}), {"spring": 0.9, "spring_q0": 0.2}),
+    (("rotor_inertia", 2, {"inertia": 0.05}), {"armature": 0.05}),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    rng = np.random.default_rng(8)
+    machine = next(m for m in iter(lambda: draw_machine(rng), None) if m.design == "large")
+    machine.period = 0.002
+    machine.step[:] = 1e-12
+    for p in machine.joints:
+        p["width"] = 0.02
+    return machine
+
+
+def arm_of(machine: Machine) -> Arm:
+    theta = machine.theta
+    return Arm(
+        "second",
+        "two-link",
+        9.81,
+        machine.period,
+        theta,
+        0.1 * np.abs(theta),
+        link_length=np.array([machine.arm[2], 0.3]),
+    )
+
+
+def compared(machine: Machine, effects: list[Effect]) -> float:
+    """Largest difference of a position over a second [rad]; the first samples decide where both start."""
+    made = run(machine, draw_reference(np.random.default_rng(3), machine, 1.0), 0, np.zeros(2))
+    log = simulate(
+        arm_of(machine),
+        made.t,
+        made.tau,
+        q0=made.true_q[0],
+        effects=effects,
+        encoder=False,
+        smoothing=0.02,
+        tolerance=1e-8,
+    )
+    return float(np.max(np.abs(log.q - made.true_q)))
+
+
+def test_the_arm_itself(machine: Machine) -> None:
+    assert compared(machine, []) < SAME
+
+
+@pytest.mark.parametrize(("here", "there"), EFFECTS, ids=[here[0] for here, _ in EFFECTS])
+def test_an_effect(machine: Machine, here: tuple[str, int, dict[str, float]], there: dict[str, float]) -> None:
+    name, joint, values = here
+    with_it = Machine(**{**vars(machine), "joints": [dict(p) for p in machine.joints]})
+    with_it.joints[joint - 1].update(there)
+    doing = compared(with_it, [])
+    assert doing > 1e3 * SAME, "the effect does nothing here"
+    assert compared(with_it, [Effect(name, joint, values)]) < max(SAME, OTHERWISE.get(name, 0.0) * doing)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("payload", {"mass": 0.8, "distance": 0.25}), ("base_tilt", {"angle": 0.1})]
+)
+def test_an_effect_of_the_whole_arm(machine: Machine, name: str, value: dict[str, float]) -> None:
+    given = {"payload": (0.8, 0.25)} if name == "payload" else {"tilt": 0.1}
+    assert compared(Machine(**{**vars(machine), **given}), [Effect(name, None, value)]) < SAME
