@@ -53,7 +53,8 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     };
     let rotary = description.kind.rotary();
     let figures = || {
-        let (errors, free) = (Errors::new(context, &compared, options.seed), FreeRuns::new(context, &compared));
+        let (errors, free) =
+            (Errors::new(context, &compared, options.seed), FreeRuns::new(context, &compared));
         (gap(context, &compared, &errors, &free, description, options), errors.series(context), free.series())
     };
     let residual = || {

@@ -35,7 +35,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let Some(last) = attribution.nodes.last() else { return false };
         let per_row = |costs: &[f64], rows: usize| costs.iter().sum::<f64>() / rows as f64;
         let holdout = self.judge(&last.weights.holdout).raw_costs(&last.base.fit.hypothesis);
-        per_row(&holdout, self.holdout.data.rows) > MORE * per_row(&last.base.fit.costs, self.training.data.rows)
+        per_row(&holdout, self.holdout.data.rows)
+            > MORE * per_row(&last.base.fit.costs, self.training.data.rows)
     }
 }
 

@@ -214,7 +214,9 @@ impl Request<'_> {
     ) -> Result<Option<(DiagnosisContext<A, N, P>, Conclusion<N, P>)>, DiagnoseError> {
         let Options { max_causes, seed, horizon, .. } = *self.options;
         let pushed = first.disturbances.iter().any(|e| e.probability > NAMED);
-        if !(first.attribution.is_unexplained() || pushed) || !plain.holdout_shows_more(first.without_disturbances()) {
+        if !(first.attribution.is_unexplained() || pushed)
+            || !plain.holdout_shows_more(first.without_disturbances())
+        {
             return Ok(None);
         }
         let Some([training, holdout]) = crosswise(self.training, self.holdout, horizon) else {

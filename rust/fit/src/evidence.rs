@@ -15,13 +15,6 @@ use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
 use serde::Serialize;
 
-/// Increase of the holdout's cost without a cause, relative to what is left with it, at which it is as likely there as not; from trials with
-/// clutter and with effects outside the library.
-const EVEN: f64 = 1.2;
-
-/// How fast the odds rise with that increase.
-const STEEPNESS: f64 = 2.0;
-
 /// Scatter of a size between logs, relative to it, that other missing effects make beside its standard deviation.
 const SAME: f64 = 0.15;
 
@@ -44,9 +37,9 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// Probability that the effect is in the arm.
+    /// Probability that the effect is in the arm. A cause that takes off as much as what stays is as likely there as not, unless sizes say more.
     pub fn probability(&self) -> f64 {
-        let odds = (self.gain.max(0.0) / EVEN).powf(STEEPNESS) * self.agreement();
+        let odds = self.gain.max(0.0) * self.agreement();
         if odds.is_finite() { self.selected * odds / (1.0 + odds) } else { self.selected }
     }
 
@@ -75,7 +68,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let full = cost(model);
         let rest = if is_more_than_noise(last) { (full - last.floor).max(0.0) } else { 0.0 };
         for cause in &mut attribution.causes {
-            let Some(place) = model.hypothesis.effects.iter().position(|e| e.same_place(&cause.effect)) else {
+            let Some(place) = model.hypothesis.effects.iter().position(|e| e.same_place(&cause.effect))
+            else {
                 continue;
             };
             let mut without = model.hypothesis.clone();
@@ -134,9 +128,9 @@ mod tests {
 
     #[test]
     fn a_cause_that_explains_more_than_what_is_left_is_likely() {
-        assert!((evidence(EVEN, None).probability() - 0.5).abs() < 1e-12);
-        assert!(evidence(4.0, None).probability() > 0.9);
-        assert!(evidence(0.2, None).probability() < 0.05);
+        assert!((evidence(1.0, None).probability() - 0.5).abs() < 1e-12);
+        assert!(evidence(9.0, None).probability() > 0.89);
+        assert!(evidence(0.1, None).probability() < 0.1);
         assert_eq!(evidence(-1.0, None).probability(), 0.0);
     }
 

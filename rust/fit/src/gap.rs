@@ -122,8 +122,7 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let measured = data.measured();
     let missed = window_squares(data, &measured, predicted);
     let carried = carried(context, data, model, predicted, seed);
-    let weighting =
-        Weighting::new(data, &context.arm, model, context.noise, data.zero_offsets(), predicted);
+    let weighting = Weighting::new(data, &context.arm, model, context.noise, data.zero_offsets(), predicted);
     let costs = weighting.costs(data, &weighting.residual(&measured, predicted));
     let consistent: Vec<bool> =
         data.windows.iter().zip(&costs).map(|(w, cost)| *cost < CONSISTENT * (w.rows() * N) as f64).collect();
@@ -223,7 +222,10 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         unexplained: (1.0 - closed(&refit, &after, &floor)).clamp(0.0, 1.0),
         refit,
         motion: rms::<N>(measured, &context.holdout.still()),
-        horizons: HORIZONS.par_iter().filter_map(|h| at_horizon(context, compared, *h, options.seed)).collect(),
+        horizons: HORIZONS
+            .par_iter()
+            .filter_map(|h| at_horizon(context, compared, *h, options.seed))
+            .collect(),
         free_run: FreeRun {
             before: rms::<N>(&free.measured, &free.before),
             after: rms::<N>(&free.measured, &free.after),

@@ -147,7 +147,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let replaced = search.causes.iter().find(|c| c.effect.same_place(&rival.instead_of));
         let as_sure = replaced.map_or(named.probability, |c| c.probability);
         let selected = rival.better.unwrap_or(as_sure);
-        causes.push(Cause { probability: selected, evidence: Evidence { selected, ..named.evidence }, ..named });
+        causes.push(Cause {
+            probability: selected,
+            evidence: Evidence { selected, ..named.evidence },
+            ..named
+        });
         let next = node.candidates[choice].fit.clone();
         let mut other = ModelSearch {
             causes,

@@ -101,7 +101,16 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let sigma = vec![by_level.sigma(best)?];
         let probability = disturbances.iter().map(|e| e.probability).fold(0.0, f64::max);
         let effect = by_level.limited_to(best)?;
-        Some(Cause { effect, sigma, probability, share, relevance: 0.0, look_alikes: Vec::new(), evidence: Evidence { selected: probability, ..Evidence::default() }, ground: Ground::Motion })
+        Some(Cause {
+            effect,
+            sigma,
+            probability,
+            share,
+            relevance: 0.0,
+            look_alikes: Vec::new(),
+            evidence: Evidence { selected: probability, ..Evidence::default() },
+            ground: Ground::Motion,
+        })
     }
 }
 
