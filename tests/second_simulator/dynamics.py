@@ -130,7 +130,8 @@ def simulate(arm, tilt, payload, P, encoder, reference, period, steps, disturban
     """Run from rest at the first reference.
 
     Parameters: `encoder` rows ``[side (1: motor), zero, cos, sin, step]``; `disturbances` of shape (samples, 4): torques, and noise of the
-    encoders; `reference` of shape (samples, 2, 6): position, velocity, feed-forward torque, gains, largest command; `pushes` rows ``[joint, time, width, impulse]``.
+    encoders; `reference` of shape (samples, 2, 6): position, velocity, feed-forward torque, gains, largest command; `pushes` rows
+    ``[joint, time, width, impulse]``.
     Returns measured positions, commands, and true link positions and velocities at the samples.
     """
     samples = reference.shape[0]
