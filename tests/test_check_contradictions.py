@@ -12,6 +12,7 @@ from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, e
 from armgap.check.contradiction import READINGS
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.errors import ColumnError, OptionError
+from armgap.simulation import Effect
 from swings import off, sines, swing
 
 
@@ -156,6 +157,17 @@ def test_a_stretch_without_torque_anywhere_in_a_long_log(pendulum: Arm, first: i
     tau[first : first + 600] = 0.0
     [check] = dead_stretch.find([replace(log, tau=tau)], pendulum)
     assert check.rows == ((first, first + 599),)
+
+
+def test_a_clipped_command_is_no_dead_stretch(pendulum: Arm) -> None:
+    t = np.arange(4000) * 1e-3
+    log = simulate(off(pendulum), t, 0.9 * np.sin(3 * t), noise=1e-5, seed=1, name="clipped")
+    assert dead_stretch.find([replace(log, tau=np.clip(log.tau, -0.3, 0.3))], pendulum) == []
+
+
+def test_a_strong_spring_is_no_other_arm(pendulum: Arm) -> None:
+    spring = Effect("hardening_spring", 1, {"k": 3.0, "q0": 0.05, "cubic": 30.0})
+    assert checked([swing(off(pendulum), seed, spring) for seed in (1, 2)], pendulum) == ()
 
 
 def test_a_free_swing_is_no_dead_stretch(pendulum: Arm) -> None:

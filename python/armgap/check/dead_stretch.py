@@ -36,13 +36,17 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
 
 
 def _constant(log: Log, j: int) -> list[tuple[int, int]]:
-    """Return ranges of samples over which a joint's torque does not change although it does elsewhere."""
+    """Return ranges of samples over which a joint's torque does not change although it does elsewhere.
+
+    At the column's largest and smallest value a command is clipped, not missing.
+    """
     tau = log.tau[:, j]
+    clipped = (tau != 0) & ((tau == tau.min()) | (tau == tau.max()))
     if np.all(tau == tau[0]):
         return []
     edges = np.flatnonzero(np.diff(tau) != 0) + 1
     first, last = np.concatenate([[0], edges]), np.concatenate([edges, [len(tau)]]) - 1
-    long = log.t[last] - log.t[first] >= _SHORTEST_S
+    long = (log.t[last] - log.t[first] >= _SHORTEST_S) & ~clipped[first]
     return list(zip(first[long].tolist(), last[long].tolist(), strict=True))
 
 
