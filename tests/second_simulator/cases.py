@@ -44,7 +44,7 @@ ALIKE = (
     {"joint_spring", "position_dependent_friction", "encoder_offset"},
     {"rotor_inertia", "payload", "joint_elasticity", "backlash"},
 )
-FAMILIES = ("single", "clutter", "clutter-only", "hidden-state", "null", "parameters", "outside")
+FAMILIES = ("single", "pair", "clutter", "clutter-only", "hidden-state", "null", "parameters", "outside")
 
 
 @dataclass
@@ -343,9 +343,9 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
     uses = [use_of(plain, j) for j in range(2)]
     nominal_theta, zeros = machine.theta, [nothing for _ in names]
     small: list[dict[str, Any]] = []
-    main = _draw_main(rng, family)
+    mains = _draw_mains(rng, family)
     if cluttered:
-        for name, joint in _beside(rng, main[0] if main else None):
+        for name, joint in _beside(rng, mains[0][0] if mains else None):
             j = (joint or 1) - 1
             share = float(np.exp(rng.uniform(math.log(0.006), math.log(0.03))))
             small.append(
@@ -360,7 +360,7 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
         machine.random_torque = [
             (float(rng.uniform(0.002, 0.01)) * u.torque, float(rng.uniform(0.05, 0.5))) for u in uses
         ]
-        if main is None or main[0] not in ("actuator_lag", "actuator_delay"):
+        if not any(name in ("actuator_lag", "actuator_delay") for name, _ in mains):
             loop = float(rng.uniform(0.002, 0.005))
             for p in machine.joints:
                 p["lag"] = loop
@@ -368,14 +368,14 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
             p["late"] = float(rng.uniform(0.0, 1.0)) * machine.period
     without = [run(machine, r, s, z) for r, s, z in zip(references, seeds, zeros, strict=True)]
     effects: list[dict[str, Any]] = []
-    if main is not None:
-        name, joint = main
+    for name, joint in mains:
         j = (joint or 1) - 1
         if name in HIDDEN_STATES:
             values = hide_transmission(machine, name, j, float(rng.uniform()), uses[j], rng)
             nominal_theta = machine.theta
         else:
-            values = hide(machine, name, j, float(np.exp(rng.uniform(math.log(0.04), math.log(0.3)))), uses[j], rng)
+            share = float(np.exp(rng.uniform(math.log(0.04), math.log(0.3))))
+            values = hide(machine, name, j, share, uses[j], rng)
         effects.append({"effect": name, "joint": joint, "parameters": values})
     runs = [run(machine, r, s, z) for r, s, z in zip(references, seeds, zeros, strict=True)]
     if not all(_sane(r) for r in [*runs, *without]):
@@ -387,20 +387,30 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
     (folder / "arm.toml").write_text(_arm_file(machine, stated, trust * np.abs(stated)))
     _write(folder, names, runs)
     key = {"family": family, "design": machine.design, "effects": effects, "clutter": small, "exact": exact}
-    if cluttered and main is not None:
+    if cluttered and mains:
         (folder / "without").mkdir(exist_ok=True)
         _write(folder / "without", names, without)
     return key
 
 
-def _draw_main(rng: np.random.Generator, family: str) -> tuple[str, int | None] | None:
+def _draw_mains(rng: np.random.Generator, family: str) -> list[tuple[str, int | None]]:
+    """What a case hides: two effects that motion tells apart in a pair, one or none otherwise."""
+    known = requests(JOINT_EFFECTS) + requests(ARM_EFFECTS)
     offered = {
-        "single": requests(JOINT_EFFECTS) + requests(ARM_EFFECTS),
-        "clutter": requests(JOINT_EFFECTS) + requests(ARM_EFFECTS),
+        "single": known,
+        "pair": known,
+        "clutter": known,
         "hidden-state": requests(HIDDEN_STATES),
         "outside": requests(OUTSIDE),
-    }.get(family)
-    return None if offered is None else offered[int(rng.integers(len(offered)))]
+    }.get(family, [])
+    if not offered:
+        return []
+    first = offered[int(rng.integers(len(offered)))]
+    if family != "pair":
+        return [first]
+    alike = {name for group in ALIKE if first[0] in group for name in group} | {first[0]}
+    others = [request for request in offered if request[0] not in alike]
+    return [first, others[int(rng.integers(len(others)))]]
 
 
 def _sane(r: Run) -> bool:

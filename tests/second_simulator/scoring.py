@@ -32,7 +32,7 @@ def report(records: list[Record], cases: bool) -> str:
     records = [r for r in records if "failed" not in r]
     lines = [f"{len(records)} answers, {len(failed)} failed", ""]
     lines.append(
-        "family | asked | first right | among causes | as candidate only | no cause | wrong name >= 0.5 | seconds (median, max)"
+        "family | asked | first right | among causes | all hidden named | as candidate only | no cause | wrong name >= 0.5 | seconds (median, max)"
     )
     for family in dict.fromkeys(r["family"] for r in records):
         of = [r for r in records if r["family"] == family]
@@ -75,6 +75,9 @@ def _right(r: Record) -> bool:
 def _line(label: str, of: list[Record]) -> str:
     first = sum(bool(r["causes"]) and is_true(r, r["causes"][0], True) for r in of)
     among = sum(any(is_true(r, c, True) for c in r["causes"]) for r in of)
+    whole = sum(
+        all(any(is_true({**r, "effects": [h]}, c, True) for c in r["causes"]) for h in r["effects"]) for r in of
+    )
     candidate = sum(
         not any(is_true(r, c, True) for c in r["causes"]) and any(is_true(r, c, True) for c in r["candidates"])
         for r in of
@@ -82,7 +85,7 @@ def _line(label: str, of: list[Record]) -> str:
     silent = sum(not r["causes"] for r in of)
     wrong = sum(any(not is_true(r, c) and c["probability"] >= 0.5 for c in r["causes"]) for r in of)
     seconds = [r["seconds"] for r in of]
-    return f"{label} | {len(of)} | {first} | {among} | {candidate} | {silent} | {wrong} | {np.median(seconds):.1f}, {max(seconds):.0f}"
+    return f"{label} | {len(of)} | {first} | {among} | {whole} | {candidate} | {silent} | {wrong} | {np.median(seconds):.1f}, {max(seconds):.0f}"
 
 
 def _bin(pairs: list[tuple[float, bool]], low: float, high: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ from armgap.log import Log
 
 __all__ = ["find"]
 
+Run = tuple[int, int, int]
+"""A joint from 0, and the first and last sample of a stretch in which its torque does not change."""
 # A torque that stays the same for so long [s] is a stretch.
 _SHORTEST_S = 0.4
 # The filters have forgotten what was before after this time [s], six of their time constants.
@@ -21,6 +23,8 @@ _FORGOTTEN_S = 0.2
 # The equation of motion leaves so many times more there (mean square) than elsewhere, and this share of the joint's torque.
 _WORSE = 25.0
 _SHARE = 0.1
+# Stretches that begin within this time [s] are judged by the same rows beside them.
+_TOGETHER_S = 16.0
 # Rows that a judgement needs, inside and outside.
 _FEWEST = 30
 
@@ -30,9 +34,21 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
     checks = []
     for log in logs:
         runs = [(j, first, last) for j in range(log.n_joints) for first, last in _constant(log, j)]
-        for stretch in dict.fromkeys((first, last) for _, first, last in runs):
-            checks += _judged(log, arm, runs, stretch)
+        for near in _neighbours(log, runs):
+            checks += _judged(log, arm, runs, near)
     return checks
+
+
+def _neighbours(log: Log, runs: list[Run]) -> Iterator[list[Run]]:
+    """Yield runs that are judged together, because they begin within some seconds."""
+    group: list[Run] = []
+    for run in sorted(runs, key=lambda run: run[1]):
+        if group and log.t[run[1]] - log.t[group[0][1]] > _TOGETHER_S:
+            yield group
+            group = []
+        group.append(run)
+    if group:
+        yield group
 
 
 def _constant(log: Log, j: int) -> list[tuple[int, int]]:
@@ -41,17 +57,18 @@ def _constant(log: Log, j: int) -> list[tuple[int, int]]:
     At the column's largest and smallest value a command is clipped, not missing.
     """
     tau = log.tau[:, j]
-    clipped = (tau != 0) & ((tau == tau.min()) | (tau == tau.max()))
     if np.all(tau == tau[0]):
         return []
+    clipped = (tau != 0) & ((tau == tau.min()) | (tau == tau.max()))
     edges = np.flatnonzero(np.diff(tau) != 0) + 1
     first, last = np.concatenate([[0], edges]), np.concatenate([edges, [len(tau)]]) - 1
     long = (log.t[last] - log.t[first] >= _SHORTEST_S) & ~clipped[first]
     return list(zip(first[long].tolist(), last[long].tolist(), strict=True))
 
 
-def _judged(log: Log, arm: Arm, runs: Sequence[tuple[int, int, int]], stretch: tuple[int, int]) -> list[Check]:
-    rows = Rows.of(log, arm, around=stretch)
+def _judged(log: Log, arm: Arm, runs: list[Run], near: list[Run]) -> list[Check]:
+    """Judge the runs `near` each other by what the equation of motion leaves beside them, outside of all `runs`."""
+    rows = Rows.of(log, arm, around=(near[0][1], max(last for _, _, last in near)))
     dead = np.zeros((len(rows.y), log.n_joints), dtype=bool)
     alive = np.ones(len(rows.y), dtype=bool)
     when = log.t[rows.samples]
@@ -66,8 +83,7 @@ def _judged(log: Log, arm: Arm, runs: Sequence[tuple[int, int, int]], stretch: t
     base = EquationError([outside], arm)
     residual = rows.y - rows.psi @ base.fit(*bounds(arm)).theta
     checks = []
-    for j in (j for j, *run in runs if tuple(run) == stretch):
-        first, last = stretch
+    for j, first, last in near:
         inside = dead[:, j] & (rows.samples >= first) & (rows.samples <= last)
         if inside.sum() < _FEWEST:
             continue

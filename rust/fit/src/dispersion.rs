@@ -19,13 +19,13 @@ const OWN: f64 = 0.5;
 const MOST: f64 = 1e3;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Multiplies the deviations of a fit by its dispersion factor against a fit of the same model to the holdout.
-    pub fn apply_dispersion_factor(&self, fit: &mut Fit<P>, weights: &SplitWeighting<N>) {
+    /// Multiplies the deviations of a fit by its dispersion factor against a fit of the same model to the holdout, and returns that one.
+    pub fn apply_dispersion_factor(&self, fit: &mut Fit<P>, weights: &SplitWeighting<N>) -> Fit<P> {
         let other = self.judge(&weights.holdout).solve(&fit.hypothesis, Effort::FULL);
         let squares = self.squared_differences(fit, &other);
         let known: Vec<f64> = squares.iter().flatten().copied().collect();
         if known.is_empty() {
-            return;
+            return other;
         }
         let shared = known.iter().sum::<f64>() / known.len() as f64;
         let factor: Vec<f64> = squares
@@ -42,6 +42,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         for ((i, j), value) in indices(factor.len()).zip(fit.covariance.matrix.iter_mut()) {
             *value *= scale[i] * scale[j];
         }
+        other
     }
 
     /// Squared difference of every determined value in units of its variance.

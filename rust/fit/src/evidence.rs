@@ -26,8 +26,9 @@ const OTHER: [f64; 2] = [0.7, 0.8];
 pub struct Evidence {
     /// How often it has the lowest cost of all candidates when the windows are drawn again, at the node where it was added.
     pub selected: f64,
-    /// By how much the cost of the holdout rises without it, everything else fitted again, relative to the cost above the floor with it.
-    pub gain: f64,
+    /// By how much the cost of the holdout rises without it, everything else fitted again, relative to the cost above the floor with it; none
+    /// where no more than noise stays.
+    pub gain: Option<f64>,
     /// Size that the holdout asks for, relative to that of the training logs; none where a size has no direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio: Option<f64>,
@@ -39,8 +40,9 @@ pub struct Evidence {
 impl Evidence {
     /// Probability that the effect is in the arm. A cause that takes off as much as what stays is as likely there as not, unless sizes say more.
     pub fn probability(&self) -> f64 {
-        let odds = self.gain.max(0.0) * self.agreement();
-        if odds.is_finite() { self.selected * odds / (1.0 + odds) } else { self.selected }
+        let Some(gain) = self.gain else { return self.selected };
+        let odds = gain.max(0.0) * self.agreement();
+        self.selected * odds / (1.0 + odds)
     }
 
     /// How much more likely the two sizes are for an effect that is there than for one that is not.
@@ -62,21 +64,22 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if attribution.causes.is_empty() {
             return;
         }
-        let model = &attribution.model;
-        let on_holdout = self.judge(&last.weights.holdout).solve(&model.hypothesis, Effort::FULL);
+        let (model, on_holdout) = (&attribution.model, &attribution.on_holdout);
         let cost = |fit: &Fit<P>| self.judged_on_holdout(&last.weights, fit).0.iter().sum::<f64>();
         let full = cost(model);
-        let rest = if is_more_than_noise(last) { (full - last.floor).max(0.0) } else { 0.0 };
+        let rest = is_more_than_noise(last).then_some(full - last.floor).filter(|rest| *rest > 0.0);
         for cause in &mut attribution.causes {
             let Some(place) = model.hypothesis.effects.iter().position(|e| e.same_place(&cause.effect))
             else {
                 continue;
             };
-            let mut without = model.hypothesis.clone();
-            without.effects.remove(place);
-            let without = self.problem(&last.weights.training).solve(&without, Effort::FULL);
-            cause.evidence.gain = (cost(&without) - full) / rest;
-            if let Some((ratio, sigma)) = size_ratio(place, model, &on_holdout) {
+            cause.evidence.gain = rest.map(|rest| {
+                let mut without = model.hypothesis.clone();
+                without.effects.remove(place);
+                let without = self.problem(&last.weights.training).solve(&without, Effort::FULL);
+                (cost(&without) - full) / rest
+            });
+            if let Some((ratio, sigma)) = size_ratio(place, model, on_holdout) {
                 (cause.evidence.size_ratio, cause.evidence.size_ratio_sigma) = (Some(ratio), Some(sigma));
             }
             if cause.ground == Ground::Motion {
@@ -117,12 +120,12 @@ mod tests {
     use super::*;
 
     fn evidence(gain: f64, ratio: Option<f64>) -> Evidence {
-        Evidence { selected: 1.0, gain, size_ratio: ratio, size_ratio_sigma: ratio.map(|_| 0.05) }
+        Evidence { selected: 1.0, gain: Some(gain), size_ratio: ratio, size_ratio_sigma: ratio.map(|_| 0.05) }
     }
 
     #[test]
     fn a_cause_without_a_rest_beside_it_is_as_sure_as_its_choice() {
-        let choice = Evidence { selected: 0.97, ..evidence(f64::INFINITY, None) };
+        let choice = Evidence { selected: 0.97, gain: None, ..evidence(0.0, Some(-3.0)) };
         assert_eq!(choice.probability(), 0.97);
     }
 

@@ -28,9 +28,9 @@ const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
 /// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
 const FREE_RUN_LIMIT: f64 = 100.0;
 
-/// Pairs of displaced initial states from which a perfect model's errors are estimated: the mean square of one window is then known to
-/// 40 %, that of forty windows to 6 %.
-const DISPLACED: usize = 3;
+/// Displaced initial states from which a perfect model's errors are estimated: the mean square of one window is then known to some 40 %, that
+/// of forty windows to 6 %.
+const DISPLACED: usize = 6;
 
 /// Mean square of a window whose measured initial state erred by ten of its standard deviations, as at a reversal, in units of that of a
 /// typical draw.
@@ -149,14 +149,12 @@ fn carried<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let mut random = Random(seed);
     let mut sum = vec![[0.0; N]; data.windows.len()];
     for _ in 0..DISPLACED {
-        let drawn: Vec<InitialStateOffset<N>> =
+        let offsets: Vec<InitialStateOffset<N>> =
             data.windows.iter().map(|w| displaced(&w.initial_state, &mut random)).collect();
-        for offsets in [drawn.iter().map(InitialStateOffset::opposite).collect(), drawn] {
-            let there = data.predict(&context.arm, model, &offsets);
-            for (total, square) in sum.iter_mut().zip(window_squares(data, predicted, &there)) {
-                for j in 0..N {
-                    total[j] += square[j] / (2 * DISPLACED) as f64;
-                }
+        let there = data.predict(&context.arm, model, &offsets);
+        for (total, square) in sum.iter_mut().zip(window_squares(data, predicted, &there)) {
+            for j in 0..N {
+                total[j] += square[j] / DISPLACED as f64;
             }
         }
     }

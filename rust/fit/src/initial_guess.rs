@@ -42,11 +42,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if !gap && is_plausible::<P>(fit.prior_cost) {
             return (Vec::new(), Vec::new());
         }
-        let mut all = self.open_candidates(&fit.hypothesis);
-        all.extend(self.ripple_guesses(&all, weights, fit));
-        all.extend(self.contact_guesses(&all, &fit.hypothesis));
-        self.progress.begin(Phase::Screen, all.len());
-        let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
+        let (all, screened) = self.screened(fit, weights);
         let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
         let trace = if size < CONSEQUENCE { TRACE_IN_SMALL } else { TRACE };
         let least = if gap { trace * training } else { f64::INFINITY };
@@ -70,15 +66,21 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
     /// Part of the training windows' cost above the floor that any one candidate removes to first order.
     pub(crate) fn largest_gain(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> f64 {
-        let problem = self.problem(&weights.training);
+        let (_, screened) = self.screened(fit, weights);
+        let gains = screened.into_iter().map(|test| test.gain);
+        let cost: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
+        let rows = self.training.data.rows as f64 / self.holdout.data.rows as f64;
+        gains.fold(0.0, f64::max) / (cost - rows * self.floor(weights)).max(1e-9 * cost)
+    }
+
+    /// All candidates at their initial guesses, the open ones first, and their score tests.
+    fn screened(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> (Vec<EffectInstance>, Vec<ScoreTest>) {
         let mut all = self.open_candidates(&fit.hypothesis);
         all.extend(self.ripple_guesses(&all, weights, fit));
         all.extend(self.contact_guesses(&all, &fit.hypothesis));
         self.progress.begin(Phase::Screen, all.len());
-        let gains = screen(&problem, &fit.hypothesis, &all).into_iter().map(|test| test.gain);
-        let cost: f64 = problem.window_costs(&fit.hypothesis).iter().sum();
-        let rows = self.training.data.rows as f64 / self.holdout.data.rows as f64;
-        gains.fold(0.0, f64::max) / (cost - rows * self.floor(weights)).max(1e-9 * cost)
+        let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
+        (all, screened)
     }
 
     /// Candidates not yet in the model.

@@ -17,6 +17,8 @@ pub struct Attribution<const N: usize, const P: usize> {
     pub refit: Fit<P>,
     /// The final model.
     pub model: Fit<P>,
+    /// The same model fitted to the holdout.
+    pub on_holdout: Fit<P>,
     /// Accepted causes, strongest first.
     pub causes: Vec<Cause>,
     /// Every search node, the last one being the one at which nothing was accepted.
@@ -108,10 +110,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let ModelSearch { mut causes, mut nodes, node, .. } = search;
         let mut model = node.settled.clone();
         self.prune(&mut model, &mut causes, &node);
-        self.apply_dispersion_factor(&mut model, &node.weights);
+        let on_holdout = self.apply_dispersion_factor(&mut model, &node.weights);
         nodes.push(node);
         refresh(&model, &mut causes);
-        Attribution { refit, model, causes, nodes }
+        Attribution { refit, model, on_holdout, causes, nodes }
     }
 
     /// Adds one cause after another, or two at once, until no candidate is accepted.

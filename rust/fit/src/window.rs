@@ -231,11 +231,6 @@ impl<const N: usize> InitialStateOffset<N> {
     pub fn none() -> Self {
         Self { q: SVector::zeros(), dq: SVector::zeros() }
     }
-
-    /// The same to the other side.
-    pub fn opposite(&self) -> Self {
-        Self { q: -self.q, dq: -self.dq }
-    }
 }
 
 /// A position this part of a window's travel beyond it is one that a prediction may reach.
