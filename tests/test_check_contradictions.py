@@ -9,7 +9,7 @@ import pytest
 
 from armgap import Arm, Log, diagnose, simulate
 from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, time_shift, torque_unit
-from armgap.check.contradiction import READINGS
+from armgap.check.contradiction import READINGS, Refit
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.errors import ColumnError, OptionError
 from armgap.simulation import Effect
@@ -145,6 +145,19 @@ def test_a_stretch_without_torque(two_links: list[Log], arm: Arm) -> None:
     assert {c.check for c in found} == {"dead_stretch"}
     assert found[0].rows == ((400, 999),)
     assert found[0].log == "run 3"
+
+
+def test_a_joint_that_moves_only_as_it_is_read_otherwise_is_predicted_no_better() -> None:
+    def refit(error: list[float], motion: list[float]) -> Refit:
+        return Refit(np.ones(4), np.ones(4), np.array(error), np.array(motion))
+
+    # Joint 2 stands still relative to link 1, and moves with it when it is taken to count from the world.
+    still, moving = refit([0.010, 0.001], [0.14, 0.0005]), refit([0.010, 0.008], [0.14, 0.14])
+    assert moving.relative < 0.2 * still.relative
+    assert moving.against(still) > 1.0
+    # Degrees make of the same motion one that is 57 times as large.
+    degrees = refit([0.57, 0.57], [8.0, 8.0])
+    assert refit([0.01, 0.01], [0.14, 0.14]).against(degrees, rescaled=True) == pytest.approx(1.0, rel=0.01)
 
 
 @pytest.mark.parametrize("first", [300, 8600])

@@ -90,9 +90,17 @@ class Refit:
         b = arm.n_inertial
         return bool(np.all(self.theta[:b] >= (low - slack)[:b]) and np.all(self.theta[:b] <= (high + slack)[:b]))
 
-    def against(self, other: Refit) -> float:
-        """Return this error as a part of another one, each relative to its own motion."""
-        return self.relative / other.relative
+    def against(self, other: Refit, *, rescaled: bool = False) -> float:
+        """Return this error as a part of another one, the geometric mean over the joints.
+
+        Of positions in other units each error is taken relative to its own motion. Of other readings it is not: a joint that hardly moves as it
+        stands may move with another reading, which makes no prediction better.
+        """
+        if rescaled:
+            return self.relative / other.relative
+        least = np.maximum(_NEGLIGIBLE * np.maximum(self.motion, other.motion), np.finfo(float).tiny)
+        errors = np.maximum(self.error, least) / np.maximum(other.error, least)
+        return float(np.exp(np.mean(np.log(errors))))
 
     @property
     def relative(self) -> float:
@@ -186,7 +194,7 @@ def confirm(
         read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
         refit = Refit.of(corrections.on_arm(arm), read[0], read[1], horizon)
         if refit.possible(corrections.on_arm(arm)) and refit.relative < EXPLAINS:
-            tried.append((refit.against(as_is), suspect, refit))
+            tried.append((refit.against(as_is, rescaled=bool(corrections.unit)), suspect, refit))
     tried.sort(key=lambda entry: entry[0])
     if not tried or tried[0][0] > limit:
         return None

@@ -161,7 +161,8 @@ def _prefers(
     if not rivals:
         return True
     with_factors = _predicted(factors.corrections, now, horizon)
-    return all(with_factors.against(_predicted(s.reading.corrections, now, horizon)) <= 1.0 for s in rivals[:2])
+    readings = [s.reading.corrections for s in rivals[:2]]
+    return all(with_factors.against(_predicted(r, now, horizon), rescaled=bool(r.unit)) <= 1.0 for r in readings)
 
 
 def _predicted(corrections: Corrections, now: Examined, horizon: float) -> Refit:
