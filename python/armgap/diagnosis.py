@@ -417,6 +417,7 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = [*given.notes, *data["notes"]]
     checks = [*given.checks, *_ambiguous_delay(data, training, arm)]
+    _ambiguous_lag(data, given.checks)
     data["checks"] = [check.to_dict() for check in checks]
     known, corrected_logs = tables.applied(data, (*training, *held))
     count = len(training)
@@ -463,6 +464,16 @@ def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> lis
                 {"effect": "time_shift", "joint": None, "why": "torques early in the file by as much"}
             )
     return [check]
+
+
+def _ambiguous_lag(data: dict[str, Any], checks: Sequence[Check]) -> None:
+    """List a low-pass of the positions among the equivalents of what delays a joint's torque; as long as nobody knows, each has half."""
+    joints = {check.joint for check in checks if check.check == "filtered_positions"}
+    for cause in data["causes"]:
+        if cause["joint"] in joints and cause["effect"] in ("actuator_lag", "actuator_delay"):
+            cause["probability"] *= 0.5
+            why = f"q{cause['joint']} is smoother than its encoder: a low-pass before logging delays positions as much"
+            cause["equivalents"].append({"effect": "filtered_positions", "joint": cause["joint"], "why": why})
 
 
 def _contradicted(data: dict[str, Any]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import os
 import sys
@@ -49,7 +50,7 @@ def main(words: list[str] | None = None) -> None:
     except ValueError as error:
         sys.exit(f"--defects: {error}")
     os.environ.update(dict.fromkeys(THREADS, "1"))
-    cases = _plans(options, models)
+    cases = dict(itertools.islice(_plans(options, models).items(), options.first))
     made = _made(cases, options.cache, options.jobs)
     done = set() if options.again else _done(options)
     tasks = [t for t in _tasks(options, made, names) if t not in done]
@@ -68,6 +69,7 @@ def _options() -> argparse.ArgumentParser:
     parser.add_argument("--mode", choices=MODES, default="defects")
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--cases", type=int, required=True, metavar="N")
+    parser.add_argument("--first", type=int, metavar="K", help="only the first of the N cases; all by default")
     parser.add_argument(
         "--models", help="machines, with commas; all by default (the trial's own shares in other modes)"
     )

@@ -45,7 +45,8 @@ SAME = 1e-9
 
 
 def true_floor(case: Kept, noise: Array, rng: np.random.Generator) -> dict[str, list[float]]:
-    """Return ``floor`` and ``floor_cut`` (bad starts cut), RMS per joint, and ``travel``: RMS displacement over a window.
+    """Return ``floor`` (of the log as it was measured), ``floor_drawn`` and ``floor_cut`` (of all draws, without and with bad starts cut),
+    RMS per joint, and ``travel``: RMS displacement over a window.
 
     Parameters
     ----------
@@ -64,9 +65,11 @@ def true_floor(case: Kept, noise: Array, rng: np.random.Generator) -> dict[str, 
         squares += list(_missed(case, name, windows, draws, deviation))
         travels += [table.q_true[last] - table.q_true[first] for first, last in windows]
     per_window = np.array(squares)
+    own = per_window[:: 1 + REPEATS]
     typical = np.median(per_window, axis=0)
     return {
-        "floor": np.sqrt(np.mean(per_window, axis=0)).tolist(),
+        "floor": np.sqrt(np.mean(own, axis=0)).tolist(),
+        "floor_drawn": np.sqrt(np.mean(per_window, axis=0)).tolist(),
         "floor_cut": np.sqrt(np.mean(np.minimum(per_window, WORST * typical), axis=0)).tolist(),
         "travel": np.sqrt(np.mean(np.array(travels) ** 2, axis=0)).tolist(),
     }

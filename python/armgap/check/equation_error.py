@@ -176,9 +176,13 @@ class EquationError:
         return (self.moment @ self.arm.theta) / np.maximum(self.square, 1e-30)
 
     def size_of(self, theta: Array) -> Array:
-        """Return per joint the factor that makes the arm file's torques of those of `theta`, by least squares."""
+        """Return per joint the factor that makes the arm file's torques of those of `theta`, by least squares, friction left aside.
+
+        An arm file knows inertias and weights far better than friction.
+        """
+        of_file, theta = (np.where(np.arange(len(x)) < self.arm.n_inertial, x, 0.0) for x in (self.arm.theta, theta))
         squares = np.einsum("i,jil,l->j", theta, self.gram, theta)
-        size: Array = np.einsum("i,jil,l->j", self.arm.theta, self.gram, theta) / np.maximum(squares, 1e-30)
+        size: Array = np.einsum("i,jil,l->j", of_file, self.gram, theta) / np.maximum(squares, 1e-30)
         return size
 
     def __len__(self) -> int:

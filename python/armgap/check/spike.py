@@ -3,6 +3,8 @@
 A position is a spike if for one to three rows it lies off the straight line between the rows around it by several times what the
 joint moves per row next to it: even a joint that is struck, and reverses within a row, does not get that far. A torque is one if
 it is far beyond the largest torques of the log for one to three rows, and no joint gets faster than otherwise by it.
+
+A position that is left out is missed by nobody. Without a torque nobody knows what drove the arm, so there the log is broken in two.
 """
 
 from __future__ import annotations
@@ -34,14 +36,18 @@ _MOST = 0.005
 _TORQUE_FACTOR, _TORQUE_ABSURD = 30.0, 1e3
 # Torques that are zero but for so few rows have no usual size.
 _TORQUE_ACTIVE = 0.05
+# A log of fewer rows than this is not broken in two.
+_FEWEST_LEFT = 16
 # Rows over which a speed is taken on either side of a torque.
 _SPEED_ROWS = 5
+# Predictions end where samples are missing for 10 periods and a quarter of the usual horizon; so much is left out around a torque [s; periods].
+_BREAK, _BREAK_PERIODS = 0.07, 12
 # Scales are taken from so many rows.
 _ENOUGH = 200_000
 
 
 def look(log: Log, arm: Arm | None) -> Outcome:
-    """Leave out rows that no motion explains; the torque before them is held over them."""
+    """Leave out rows that no motion explains, and those beside a torque that is not known."""
     if len(log) < 4 * _LONGEST + 4:
         return NOTHING
     found = []
@@ -57,8 +63,14 @@ def look(log: Log, arm: Arm | None) -> Outcome:
             found.append(_said(log, name, values, rows, j))
     if not found:
         return NOTHING
+    unknown = np.flatnonzero(~valid.all(axis=1))
+    beside = max(_BREAK, _BREAK_PERIODS * log.sample_period)
+    for row in unknown:
+        wild |= np.abs(log.t - log.t[row]) < 0.5 * beside
     kept = np.flatnonzero(~wild)
-    deed = "left out, with the mean torque of what was left out held"
+    if len(kept) < _FEWEST_LEFT:
+        return NOTHING
+    deed = f"left out, and {seconds(beside)} around a torque that nobody knows" if len(unknown) else "left out"
     return Outcome(tuple(found), with_rows(log, kept, valid), kept, deed)
 
 

@@ -186,7 +186,7 @@ def _said(found: Found, arm: Arm, horizon: float) -> Check:
 
 def _shift(now: Examined, horizon: float, repair: bool) -> Examined:
     samples = time_shift.acausal([*now.training, *now.holdout], now.arm)
-    if not samples:
+    if samples is None:
         return now
     corrections = time_shift.confirmed(samples, now.training, now.holdout, now.arm, horizon)
     if corrections is None:

@@ -6,7 +6,9 @@ that come too early look like a delay of the drive, which is an effect (`actuato
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -30,8 +32,10 @@ _CUTOFF = 10.0
 _COUNTS = 0.6
 # So many of the halves of all logs have to agree, each by half as much.
 _AGREEING = 0.75
-# Predictions with the shift may miss by no more than this part of what they miss without; a neighbour has to be better by this much.
+# Predictions with the shift may miss by no more than this part of what they miss without.
 _AS_GOOD = 1.02
+# A shift by one more sample has to lower the misses to this part. On 24 development cases torques late by one sample gave 0.01 to 0.72, but for
+# four where an unmodelled effect hides it (0.99 to 1.07); logs in order gave 0.96 and more.
 _CLEARLY = 0.9
 # A share of torque that nothing tells from none.
 _EXACT = 1e-7
@@ -42,14 +46,14 @@ _EQUAL = 0.5
 _EQUAL_SIGMAS = 3.0
 
 
-def acausal(logs: Sequence[Log], arm: Arm) -> int:
-    """Return by how many samples the torques of all logs come late in the file; 0 if they do not."""
+def acausal(logs: Sequence[Log], arm: Arm) -> int | None:
+    """Return by how many samples the torques of all logs come late in the file; 0 if only a part of them says so, None if nothing does."""
     curves = [_curve(half, arm) for log in logs for half in _halves(Rows.of(log, arm, _CUTOFF))]
-    if not curves:
-        return 0
+    says = [-_minimum(curve) > 0.5 * _COUNTS for curve in curves]
+    if not any(says):
+        return None
     late = -_minimum(np.sum(curves, axis=0))
-    agreeing = np.mean([-_minimum(curve) > 0.5 * _COUNTS for curve in curves])
-    if not _COUNTS <= late < _LARGEST or agreeing < _AGREEING:
+    if not _COUNTS <= late < _LARGEST or np.mean(says) < _AGREEING:
         return 0
     return max(1, round(late))
 
@@ -84,19 +88,26 @@ def _minimum(costs: NDArray[np.float64]) -> float:
 def confirmed(
     samples: int, training: Sequence[Log], holdout: Sequence[Log], arm: Arm, horizon: float
 ) -> Corrections | None:
-    """Return the shift unless predictions speak against it; of its neighbours the one that they clearly prefer."""
+    """Return the shift that predictions prefer, or none; `samples` is what the equation of motion says.
+
+    From there the shift moves on, a sample at a time, for as long as predictions clearly gain. Beside a large unmodelled effect they hardly
+    change with a shift, so they need not gain where the equation of motion has found one: only not lose.
+    """
     period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
     as_is = Refit.of(arm, training, holdout, horizon)
 
+    @cache
     def error(k: int) -> float:
+        if not 0 < k <= _LARGEST:
+            return 1.0 if k == 0 else math.inf
         corrections = Corrections(shift={"tau": -k * period})
         read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
         return Refit.of(arm, read[0], read[1], horizon).against(as_is)
 
-    errors = {k: error(k) for k in (samples - 1, samples, samples + 1) if k}
-    best = min(errors, key=lambda k: errors[k])
-    best = best if errors[best] < _CLEARLY * errors[samples] else samples
-    if errors[best] > _AS_GOOD:
+    best = samples
+    while error(k := min((best - 1, best + 1), key=error)) < _CLEARLY * error(best):
+        best = k
+    if best == 0 or error(best) > _AS_GOOD:
         return None
     return Corrections(shift={"tau": float(f"{-best * period:.6g}")})
 

@@ -5,6 +5,7 @@ use crate::assemble::Compared;
 use crate::context::DiagnosisContext;
 use crate::diagnose::Options;
 use crate::model::Hypothesis;
+use crate::products::squares;
 use crate::random::Random;
 use crate::report::{AtHorizon, FreeRun, FreeRunSeries, Gap, Series};
 use crate::track::InitialState;
@@ -39,6 +40,10 @@ const WORST_START: f64 = 100.0;
 /// A window is consistent with its noise and its measured initial state up to this cost per sample and joint: the noise is known to 3 %, and
 /// of some hundred values the mean square scatters by 15 %.
 const CONSISTENT: f64 = 1.5;
+
+/// A displaced initial state explains a window if it leaves less than this part of the squared errors. Of the errors of a constant torque that
+/// the model lacks it leaves 1/36; where starts erred at kinks of the motion it left 1e-6 to 2e-4.
+const DISPLACED_SHARE: f64 = 0.003;
 
 /// Predictions on the holdout from measured initial states, and their squared errors.
 pub struct Errors<const N: usize> {
@@ -109,7 +114,8 @@ impl<const N: usize> Errors<N> {
 /// Mean square of a perfect model's errors: noise of the sample itself, and the error of the measured initial state carried along the
 /// window.
 ///
-/// What the model misses by in a window is a perfect model's error where noise and a displaced initial state explain it. Elsewhere that
+/// What the model misses by in a window is a perfect model's error where noise and a displaced initial state explain it, by the covariance of
+/// the measured one or, at a kink of the motion, by so much of the errors that no torque would leave as little. Elsewhere that
 /// error is what displacements drawn from the measured state's covariance make, and no more than what the model misses by; beside windows
 /// of which most are explained it may be that of a start that erred by more than its covariance says.
 fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
@@ -123,9 +129,18 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let missed = window_squares(data, &measured, predicted);
     let carried = carried(context, data, model, predicted, seed);
     let weighting = Weighting::new(data, &context.arm, model, context.noise, data.zero_offsets(), predicted);
-    let costs = weighting.costs(data, &weighting.residual(&measured, predicted));
-    let consistent: Vec<bool> =
-        data.windows.iter().zip(&costs).map(|(w, cost)| *cost < CONSISTENT * (w.rows() * N) as f64).collect();
+    let residual = weighting.residual(&measured, predicted);
+    let costs = weighting.costs(data, &residual);
+    let left = weighting.beside_free_states(data, &residual);
+    let consistent: Vec<bool> = data
+        .windows
+        .iter()
+        .zip(costs.iter().zip(&left))
+        .map(|(w, (cost, left))| {
+            let missed = squares(&[&residual[w.range()]])[0];
+            *cost < CONSISTENT * (w.rows() * N) as f64 || *left < DISPLACED_SHARE * missed
+        })
+        .collect();
     let explained = 2 * consistent.iter().filter(|c| **c).count() > consistent.len();
     let worst = if explained { WORST_START } else { 1.0 };
     let mut sum = [0.0; N];

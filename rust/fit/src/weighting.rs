@@ -238,6 +238,18 @@ impl<const N: usize> Weighting<N> {
         windows.map(|(window, projection)| projection.cost(&residual[window.range()])).collect()
     }
 
+    /// Squared residual of every window that is left once its initial state is fitted without regard to the measured one.
+    pub fn beside_free_states(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
+        let windows = data.windows.iter().zip(&self.projections);
+        windows
+            .map(|(window, projection)| {
+                let r = DVector::from_column_slice(&residual[window.range()]);
+                let basis = projection.samples.clone().qr().q();
+                (r.norm_squared() - basis.tr_mul(&r).norm_squared()).max(0.0)
+            })
+            .collect()
+    }
+
     /// The residual that is left once the initial states are fitted, whitened, in the order of the flat vector.
     pub fn remainder(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
         let mut left = residual.to_vec();
