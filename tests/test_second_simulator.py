@@ -64,19 +64,32 @@ def arm_of(machine: Machine) -> Arm:
 
 
 def compared(machine: Machine, effects: list[Effect]) -> float:
-    """Largest difference of a position over a second [rad]; the first samples decide where both start."""
+    """Largest difference of what encoders show over a second [rad]."""
+    return float(np.max(np.abs(difference(machine, effects, arm_of(machine), 0.02))))
+
+
+def difference(machine: Machine, effects: list[Effect], arm: Arm, smoothing: float) -> np.ndarray:
+    """What encoders show over a second in both simulators; the first samples decide where both start."""
     made = run(machine, draw_reference(np.random.default_rng(3), machine, 1.0), 0, np.zeros(2))
     log = simulate(
-        arm_of(machine),
+        arm,
         made.t,
         made.tau,
         q0=made.true_q[0],
         effects=effects,
         encoder=False,
-        smoothing=0.02,
-        tolerance=1e-8,
+        smoothing=smoothing,
+        tolerance=1e-8 if smoothing else 1e-6,
     )
-    return float(np.max(np.abs(log.q - made.true_q)))
+    return log.q - made.q
+
+
+def with_transmission(machine: Machine, joint: int, encoder: int, width: float = 0.02, **values: float) -> Machine:
+    """The machine with a rotor, a shaft or play on one joint."""
+    joints = [{**p, "width": width} for p in machine.joints]
+    joints[joint - 1].update(values)
+    sides = [float(encoder) if j == joint else 0.0 for j in (1, 2)]
+    return Machine(**{**vars(machine), "joints": joints, "sides": sides})
 
 
 def test_the_arm_itself(machine: Machine) -> None:
@@ -100,3 +113,35 @@ def test_an_effect_of_the_whole_arm(machine: Machine, name: str, value: dict[str
     with_it = Machine(**{**vars(machine), **({"payload": (0.8, 0.25)} if name == "payload" else {"tilt": 0.1})})
     assert compared(with_it, []) > 1e3 * SAME
     assert compared(with_it, [Effect(name, None, value)]) < SAME
+
+
+@pytest.mark.parametrize("joint", [1, 2])
+@pytest.mark.parametrize("encoder", [0, 1])
+@pytest.mark.parametrize("friction", [0, 1])
+def test_a_shaft_with_encoder_and_friction_on_either_side(
+    machine: Machine, joint: int, encoder: int, friction: int
+) -> None:
+    rotor, stiffness, damping = 0.03, 190.0, 1.5
+    values = {"rotor": rotor, "shaft": stiffness, "shaft_damping": damping, "friction_at_motor": float(friction)}
+    with_it = with_transmission(machine, joint, encoder, **values)
+    shaft = {"stiffness": stiffness, "damping": damping, "rotor_inertia": rotor, "rotor_rides": float(joint == 2)}
+    sides = {"encoder_at_motor": float(encoder), "friction_at_motor": float(friction)}
+    assert compared(with_it, []) > 1e3 * SAME
+    assert compared(with_it, [Effect("joint_elasticity", joint, {**shaft, **sides})]) < SAME
+
+
+@pytest.mark.parametrize("encoder", [0, 1])
+@pytest.mark.parametrize("friction", [0, 1])
+def test_play_with_encoder_and_friction_on_either_side(machine: Machine, encoder: int, friction: int) -> None:
+    """Rigid flanks and dry friction here, stiff flanks and friction of a small width there: motions agree to a part of what play does."""
+    joint, gap, width = 1, 0.02, 2e-3
+    rotor = 0.15 * float(machine.inertia[joint - 1])
+    flanks = {"shaft": rotor * 1500.0**2, "shaft_damping": 0.6 * rotor * 1500.0}
+    values = {"rotor": rotor, "play": gap, "friction_at_motor": float(friction), **flanks}
+    with_it = with_transmission(machine, joint, encoder, width, **values)
+    nominal = Machine(**{**vars(machine), "rotor": [rotor, 0.0]})
+    share = {"gap": gap, "rotor_share": rotor / float(nominal.inertia[0]), "riding": 1.0}
+    sides = {"encoder_at_motor": float(encoder), "friction_at_motor": float(friction)}
+    effect = Effect("backlash", joint, {**share, **sides})
+    doing, left = (float(np.std(difference(with_it, e, arm_of(nominal), 0.0)[:, 0])) for e in ([], [effect]))
+    assert left < 0.2 * doing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
+from armgap.literals import Side
 
 if TYPE_CHECKING:
     from armgap.check.corrections import Corrections
@@ -41,6 +43,11 @@ class Arm:
         Link lengths [m].
     link_mass : ndarray, shape (n_joints,), optional
         Link masses [kg]; motion does not tell them, an export to a simulator wants them.
+    encoder_side, friction_side : tuple of {"motor", "link", "unknown"}, optional
+        Per joint, the side of the transmission that the encoder measures and that friction acts on. Where it is unknown, an elastic or
+        slack transmission is tried with both.
+    gear_ratio : ndarray, shape (n_joints,), optional
+        Turns of the motor per turn of the joint.
     columns : dict of str to str
         Names that the arm's logs use for ``t``, ``q1``, ``tau1`` and so on.
     sealed : str, optional
@@ -64,6 +71,9 @@ class Arm:
     sealed: str | None = None
     path: Path | None = None
     link_mass: NDArray[np.float64] | None = None
+    encoder_side: tuple[Side, ...] | None = None
+    friction_side: tuple[Side, ...] | None = None
+    gear_ratio: NDArray[np.float64] | None = None
     corrections: Corrections | None = None
 
     @classmethod
@@ -159,6 +169,9 @@ class Arm:
             "counts_per_rev": as_list(self.counts_per_rev),
             "torque_limit": as_list(self.torque_limit),
             "link_length": as_list(self.link_length),
+            "encoder_at_motor": _at_motor(self.encoder_side),
+            "friction_at_motor": _at_motor(self.friction_side),
+            "gear_ratio": as_list(self.gear_ratio),
         }
 
     def to_toml(self) -> str:
@@ -182,6 +195,9 @@ class Arm:
         ]
         for table, key, value in (
             ("encoder", "counts_per_rev", self.counts_per_rev),
+            ("encoder", "side", self.encoder_side),
+            ("transmission", "friction_side", self.friction_side),
+            ("transmission", "gear_ratio", self.gear_ratio),
             ("actuator", "torque_limit", self.torque_limit),
             ("geometry", "link_length", self.link_length),
             ("geometry", "link_mass", self.link_mass),
@@ -203,8 +219,13 @@ def _quoted(text: str) -> str:
     return f'"{escaped}"'
 
 
-def _listed(values: NDArray[np.float64]) -> str:
-    return "[" + ", ".join(repr(float(v)) for v in values) + "]"
+def _listed(values: Iterable[Any]) -> str:
+    return "[" + ", ".join(_quoted(v) if isinstance(v, str) else repr(float(v)) for v in values) + "]"
+
+
+def _at_motor(sides: tuple[Side, ...] | None) -> list[bool | None] | None:
+    """Return per joint whether something sits at the motor, None where that is unknown."""
+    return None if sides is None else [None if side == "unknown" else side == "motor" for side in sides]
 
 
 def kinds() -> dict[str, dict[str, Any]]:

@@ -7,7 +7,7 @@ import math
 import re
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from armgap import _native
 from armgap.arm import kinds
 from armgap.errors import ArmFileError, OptionError
+from armgap.literals import Side
 from armgap.reading import printable, read_bounded
 
 if TYPE_CHECKING:
@@ -26,7 +27,8 @@ _TABLES: dict[str, tuple[str, ...]] = {
     "inertial": ("theta", "sigma"),
     "links": ("mass", "length", "com", "inertia", "sigma"),
     "friction": ("viscous", "coulomb", "sigma_viscous", "sigma_coulomb"),
-    "encoder": ("counts_per_rev",),
+    "encoder": ("counts_per_rev", "side"),
+    "transmission": ("friction_side", "gear_ratio"),
     "actuator": ("torque_limit",),
     "geometry": ("link_length", "link_mass"),
     "columns": (),
@@ -105,6 +107,9 @@ class ArmFile:
             torque_limit=self._optional("actuator.torque_limit", n),
             link_length=self._lengths(n),
             link_mass=self._masses(n),
+            encoder_side=self._sides("encoder.side", n),
+            friction_side=self._sides("transmission.friction_side", n),
+            gear_ratio=self._optional("transmission.gear_ratio", n),
             columns=columns,
             corrections=self._corrections(),
             sealed=self._sealed(),
@@ -198,6 +203,16 @@ class ArmFile:
     def _optional(self, key: str, n: int) -> NDArray[np.float64] | None:
         table = self.data.get(key.split(".")[0], {})
         return self._vector(table, key, n, above=0.0) if key.split(".")[1] in table else None
+
+    def _sides(self, key: str, n: int) -> tuple[Side, ...] | None:
+        table, name = key.split(".")
+        value = self.data.get(table, {}).get(name)
+        if value is None:
+            return None
+        if not isinstance(value, list) or len(value) != n or any(side not in get_args(Side) for side in value):
+            words = ", ".join(f'"{side}"' for side in get_args(Side))
+            raise self._error(key, f"needs a list of {n} of {words}, found {value!r}", "one entry per joint")
+        return tuple(value)
 
     def _lengths(self, n: int) -> NDArray[np.float64] | None:
         if "links" in self.data and "geometry" not in self.data:

@@ -126,7 +126,11 @@ class Equivalent:
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause, or a candidate, which says `why` it is not named; a push belongs to one log."""
+    """A named cause, or a candidate, which says `why` it is not named; a push belongs to one log.
+
+    An elastic or slack transmission has `sides`: ``encoder`` and ``friction`` at the ``"motor"`` or the ``"link"``, and whether its ``rotor``
+    ``"rides"`` on the joints before or is ``"geared"``.
+    """
 
     effect: str
     title: str
@@ -137,6 +141,7 @@ class Cause:
     equivalents: tuple[Equivalent, ...]
     log: str | None = None
     why: str | None = None
+    sides: dict[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -312,6 +317,7 @@ def _cause(data: dict[str, Any]) -> Cause:
         tuple(_take(Equivalent, e) for e in data["equivalents"]),
         data.get("log"),
         data.get("why"),
+        data.get("sides"),
     )
 
 

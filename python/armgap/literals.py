@@ -16,6 +16,7 @@ __all__ = [
     "Filters",
     "GapOutcome",
     "Scheme",
+    "Side",
     "Status",
     "VelocityMethod",
     "Verdict",
@@ -26,6 +27,7 @@ Filters = Literal["exact", "paper"]
 VelocityMethod = Literal["backward", "central", "local-cubic", "sensor", "midpoint"]
 Verdict = Literal["none", "parameters", "effect", "unexplained", "input"]
 Status = Literal["absent", "not excited", "undecided"]
+Side = Literal["motor", "link", "unknown"]
 CauseStatus = Literal["gone", "unseen", "undecided", "new", "smaller", "larger", "unchanged", "renamed"]
 GapOutcome = Literal["smaller", "larger", "unchanged", "none"]
 

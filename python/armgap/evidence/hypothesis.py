@@ -41,6 +41,14 @@ class EffectInstance(NamedTuple):
         return self.effect, joint, self.parameters
 
 
+def at_motor(sides: dict[str, str] | None) -> dict[str, float]:
+    """Return where encoder and friction sit, and how the rotor moves (`sides` of a cause), as the compiled simulator takes it."""
+    if sides is None:
+        return {}
+    found = {f"{what}_at_motor": float(sides[what] == "motor") for what in ("encoder", "friction")}
+    return {**found, "rotor_rides": float(sides["rotor"] == "rides")}
+
+
 @dataclass(frozen=True)
 class Hypothesis:
     """A model of an arm.
@@ -68,7 +76,10 @@ class Hypothesis:
         found = data["parameters"]["with_causes"]
         effects = tuple(
             EffectInstance(
-                c["effect"], c["joint"], {name: p["value"] for name, p in c["parameters"].items()}, c.get("log")
+                c["effect"],
+                c["joint"],
+                {**{name: p["value"] for name, p in c["parameters"].items()}, **at_motor(c.get("sides"))},
+                c.get("log"),
             )
             for c in data.get("causes") or []
         )

@@ -212,6 +212,9 @@ def parameter_text(kind: str, name: str) -> str:
 def named(effect: Data) -> str:
     """An effect with its place, and its log if it belongs to one."""
     place = f"{title(effect['effect'])}, {joint_text(effect['joint'])}"
+    if sides := effect.get("sides"):
+        encoder, friction = sides["encoder"], sides["friction"]
+        place += f" ({f'encoder and friction at the {encoder}' if encoder == friction else f'encoder at the {encoder}, friction at the {friction}'})"
     return f"{place}, in {effect['log']}" if effect.get("log") else place
 
 

@@ -6,7 +6,7 @@
 
 use crate::linear::solve_positive_definite;
 use crate::real::Real;
-use crate::transmission::{LatentState, Transmission};
+use crate::transmission::{LatentState, Sides, Transmission};
 use nalgebra::SVector;
 
 /// An inertia matrix, by rows.
@@ -16,14 +16,16 @@ type InertiaMatrix<T, const N: usize> = [[T; N]; N];
 #[derive(Debug, Clone, Copy)]
 pub struct Drivetrain<T, const N: usize> {
     of: [Option<Transmission<T>>; N],
+    sides: [Sides; N],
     any: bool,
     has_backlash: bool,
+    brakes_motors: bool,
 }
 
 impl<T: Real, const N: usize> Drivetrain<T, N> {
     /// All joints rigid.
     pub(crate) fn none() -> Self {
-        Self { of: [None; N], any: false, has_backlash: false }
+        Self { of: [None; N], sides: [Sides::LINK; N], any: false, has_backlash: false, brakes_motors: false }
     }
 
     /// Puts a transmission on joint `j`, if there is such a joint, and takes the rotor's inertia out of the link's if it is a part of that.
@@ -40,6 +42,64 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
             add_rotor_inertia(inertia, -transmission.inertia, &transmission.rotor_jacobian(j));
         }
         Some(())
+    }
+
+    /// Says where encoder and friction of joint `j` sit, if there is such a joint; without a transmission it makes no difference.
+    pub(crate) fn set_sides(&mut self, j: usize, sides: Sides) -> Option<()> {
+        *self.sides.get_mut(j)? = sides;
+        self.brakes_motors |= sides.friction_at_motor;
+        if let Some(transmission) = self.of.get_mut(j)?.as_mut().filter(|t| t.backlash <= T::zero()) {
+            transmission.coupling_ratio = if sides.rotor_rides { T::one() } else { T::zero() };
+        }
+        Some(())
+    }
+
+    /// Where encoder and friction of joint `j` sit.
+    #[inline]
+    pub fn sides(&self, j: usize) -> Sides {
+        if self.get(j).is_some() { self.sides[j] } else { Sides::LINK }
+    }
+
+    /// Whether the encoder of any joint measures the position of its motor.
+    pub fn measures_motors(&self) -> bool {
+        (0..N).any(|j| self.sides(j).encoder_at_motor)
+    }
+
+    /// Whether friction of any joint acts on its motor.
+    #[inline]
+    pub fn brakes_motors(&self) -> bool {
+        self.brakes_motors
+    }
+
+    /// Whether friction of joint `j` acts on a motor that moves against its link; behind closed backlash both move as one.
+    #[inline]
+    pub fn brakes_motor(&self, j: usize, latent: &LatentState<T, N>) -> bool {
+        self.brakes_motors && self.sides(j).friction_at_motor && latent.side[j] == T::zero()
+    }
+
+    /// Velocity on which the friction of joint `j` acts, given the joints'.
+    #[inline]
+    pub fn friction_velocity(&self, j: usize, dq: T, latent: &LatentState<T, N>) -> T {
+        if self.brakes_motor(j, latent) { dq + latent.deflection_rate[j] } else { dq }
+    }
+
+    /// Torque that joint `j`'s transmission passes on while backlash is open or there is none.
+    #[inline]
+    pub(crate) fn transmitted(&self, j: usize, latent: &LatentState<T, N>) -> T {
+        match self.get(j) {
+            Some(transmission) if transmission.backlash <= T::zero() => {
+                transmission.transmitted(latent.deflection[j], latent.deflection_rate[j])
+            }
+            _ => T::zero(),
+        }
+    }
+
+    /// Positions that the encoders measure when the joints are at `q`.
+    #[inline]
+    pub fn shown(&self, q: &SVector<T, N>, latent: &LatentState<T, N>) -> SVector<T, N> {
+        SVector::from_fn(
+            |j, _| if self.sides(j).encoder_at_motor { q[j] + latent.deflection[j] } else { q[j] },
+        )
     }
 
     /// Whether any joint has a transmission.

@@ -69,6 +69,25 @@ impl<T: Real> Transmission<T> {
     }
 }
 
+/// Where encoder and friction of a joint sit, on the link's side of its transmission or on the motor's, and how its rotor moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Sides {
+    /// The encoder measures the motor's position.
+    pub encoder_at_motor: bool,
+    /// Friction acts on the motor.
+    pub friction_at_motor: bool,
+    /// The rotor turns as fast as its joint and rides on the joints before; behind a high gear ratio it hardly notices them. Of elastic
+    /// transmissions; the coupling ratio of backlash is a parameter.
+    pub rotor_rides: bool,
+}
+
+impl Sides {
+    /// Encoder and friction on the link's side of a high gear ratio.
+    pub const LINK: Self = Self { encoder_at_motor: false, friction_at_motor: false, rotor_rides: false };
+    /// Encoder and friction on the motor's side of a high gear ratio.
+    pub const MOTOR: Self = Self { encoder_at_motor: true, friction_at_motor: true, rotor_rides: false };
+}
+
 /// Latent states of the joints, which no encoder measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LatentState<T, const N: usize> {

@@ -1,6 +1,7 @@
 //! From an arm's description at run time to one of the arms known at compile time.
 
 use armgap_core::arm::{Arm, ArmKind, Axis, Pendulum, TwoLink};
+use armgap_core::transmission::Sides;
 
 /// An arm as an arm file describes it; lists have one entry per parameter or joint.
 #[derive(Debug, Clone)]
@@ -19,7 +20,16 @@ pub struct ArmDescription {
     pub torque_limit: Option<Vec<f64>>,
     /// Link lengths, m.
     pub link_length: Option<Vec<f64>>,
+    /// Per joint, whether the encoder measures the motor's position; none where that is unknown.
+    pub encoder_at_motor: Option<Vec<Option<bool>>>,
+    /// Per joint, whether friction acts on the motor; none where that is unknown.
+    pub friction_at_motor: Option<Vec<Option<bool>>>,
+    /// Turns of the motor per turn of the joint.
+    pub gear_ratio: Option<Vec<f64>>,
 }
+
+/// A rotor behind a smaller gear ratio than this rides on the joints before it.
+const RIDES: f64 = 2.0;
 
 /// Something to be done with an arm whose size is known at compile time.
 pub trait WithArm {
@@ -39,6 +49,27 @@ impl ArmDescription {
     pub fn steps(&self) -> Option<Vec<f64>> {
         let whole = if self.kind.rotary() { std::f64::consts::TAU } else { 1.0 };
         self.counts_per_rev.as_ref().map(|counts| counts.iter().map(|count| whole / count).collect())
+    }
+
+    /// Sides of joint `j` that encoder and friction may be on, both on one side first.
+    pub fn sides(&self, j: usize) -> Vec<Sides> {
+        let known =
+            |list: &Option<Vec<Option<bool>>>| list.as_ref().and_then(|l| l.get(j).copied().flatten());
+        let (encoder, friction) = (known(&self.encoder_at_motor), known(&self.friction_at_motor));
+        let rides = self.gear_ratio.as_ref().and_then(|ratios| ratios.get(j)).map(|ratio| *ratio < RIDES);
+        let mixed = |encoder_at_motor| Sides {
+            encoder_at_motor,
+            friction_at_motor: !encoder_at_motor,
+            rotor_rides: false,
+        };
+        let all = [false, true].into_iter().flat_map(|rotor_rides| {
+            [Sides::LINK, Sides::MOTOR, mixed(true), mixed(false)].map(|s| Sides { rotor_rides, ..s })
+        });
+        // On the first joint there is nothing to ride on.
+        all.filter(|s| if j == 0 { !s.rotor_rides } else { rides.is_none_or(|r| r == s.rotor_rides) })
+            .filter(|s| encoder.is_none_or(|e| e == s.encoder_at_motor))
+            .filter(|s| friction.is_none_or(|f| f == s.friction_at_motor))
+            .collect()
     }
 
     /// Runs `work` with the arm of this kind; `None` if the number of parameters does not fit the kind.

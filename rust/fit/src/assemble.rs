@@ -15,7 +15,7 @@ use crate::model_search::Attribution;
 use crate::push::Disturbance;
 use crate::report::{
     self, ArmSummary, Cause, Diagnosis, EquivalentSummary, LogSummary, Named, Noise, OptionSummary,
-    Parameters, Ranked, StageSummary, Value,
+    Parameters, Ranked, SidesSummary, StageSummary, Value,
 };
 use crate::ruled_out::ruled_out;
 use crate::sanity::{Estimate, Sanity, bounded_sigma, sanity};
@@ -204,6 +204,7 @@ fn cause(cause: &crate::belief::Cause, joints: usize, rotary: bool) -> Cause {
             .map(|e| EquivalentSummary { effect: e.effect, joint: e.joint, why: e.why })
             .collect(),
         evidence: Some(cause.evidence),
+        sides: cause.effect.law.has_transmission().then(|| SidesSummary::of(cause.effect.sides)),
         log: None,
     }
 }
@@ -225,6 +226,7 @@ fn push<A, const N: usize, const P: usize>(
         closed: disturbance.share.clamp(0.0, 1.0),
         equivalents: Vec::new(),
         evidence: None,
+        sides: None,
         log: Some(sample.data.tracks[disturbance.track].name.clone()),
     }
 }

@@ -8,8 +8,12 @@ use crate::scale::Scales;
 use crate::screen::ScoreTest;
 use crate::solve::{Effort, Fit};
 use armgap_core::arm::Arm;
-use armgap_core::effect::{MAX_PARAMETERS, Trial, catalogue, find};
+use armgap_core::effect::{MAX_PARAMETERS, Quantity, Trial, catalogue, find};
+use armgap_core::transmission::Sides;
 use rayon::prelude::*;
+
+/// Other sides of encoder and friction from which the best transmission is fitted again.
+const OTHER_SIDES: usize = 2;
 
 /// Candidates that are fitted again under the weights of the best.
 const FINALISTS: usize = 4;
@@ -301,6 +305,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let mut initial_guesses = finalists(&candidates, hopeless);
             initial_guesses.extend(candidates.first().and_then(|best| simpler(current, best)));
             initial_guesses.extend(candidates.first().and_then(|best| richer(current, best, &self.scales)));
+            if last {
+                initial_guesses
+                    .extend(candidates.first().into_iter().flat_map(|c| self.other_sides(c, weights)));
+            }
             let effort = if last { Effort::FULL } else { Effort::ROUGH };
             let base = || self.candidate(weights, current, current.effects.len(), effort, &[]);
             let (fitted, base) =
@@ -315,6 +323,33 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let weights = heavier.as_ref().unwrap_or(given);
         let base = self.candidate(weights, current, current.effects.len(), Effort::FULL, &[]);
         FinalRound { base, candidates, weights: heavier }
+    }
+
+    /// The model with a candidate whose effect is a transmission, with encoder and friction on other sides that they may be on: those that explain
+    /// the training windows best as it stands.
+    fn other_sides(&self, candidate: &Candidate<P>, weights: &SplitWeighting<N>) -> Vec<Hypothesis<P>> {
+        let Some(effect) = candidate.effect.filter(|effect| effect.law.has_transmission()) else {
+            return Vec::new();
+        };
+        let model = &candidate.fit.hypothesis;
+        let Some(index) = model.effects.iter().position(|e| e.same_place(&effect)) else {
+            return Vec::new();
+        };
+        let elastic = !effect.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Ratio);
+        let others: Vec<Sides> = self.sides[effect.joint]
+            .iter()
+            .copied()
+            .filter(|sides| *sides != effect.sides && (elastic || !sides.rotor_rides))
+            .collect();
+        let problem = self.problem(&weights.training);
+        let with = |sides: Sides| {
+            let mut other = model.clone();
+            other.effects[index].sides = sides;
+            (problem.window_costs(&other).iter().sum::<f64>(), other)
+        };
+        let mut found: Vec<(f64, Hypothesis<P>)> = others.into_par_iter().map(with).collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.into_iter().take(OTHER_SIDES).map(|(_, model)| model).collect()
     }
 
     /// Cost of predicting that every joint stays at the initial position of its window.
@@ -380,7 +415,7 @@ fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> O
     }
     let taken = model.effects.iter().any(|e| e.law.spec().name == law.spec().name && e.joint == effect.joint);
     let theta = candidate.fit.hypothesis.theta;
-    (!taken).then(|| Hypothesis { theta, ..model.with(EffectInstance { law, joint: effect.joint, p }) })
+    (!taken).then(|| Hypothesis { theta, ..model.with(EffectInstance::new(law, effect.joint, p)) })
 }
 
 /// The model with the law of which a candidate's effect is the simplest case, with a small value of the parameter that the simple one does not have.
@@ -402,5 +437,5 @@ fn richer<const N: usize, const P: usize>(
     }
     let taken = model.effects.iter().any(|e| e.law.spec().name == law.spec().name && e.joint == effect.joint);
     let theta = candidate.fit.hypothesis.theta;
-    (!taken).then(|| Hypothesis { theta, ..model.with(EffectInstance { law, joint: effect.joint, p }) })
+    (!taken).then(|| Hypothesis { theta, ..model.with(EffectInstance::new(law, effect.joint, p)) })
 }

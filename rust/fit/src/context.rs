@@ -7,6 +7,7 @@ use crate::solve::{Effort, Fit, FitProblem, Prior};
 use crate::weighting::Weighting;
 use crate::window::{Dataset, InitialStateOffset, Window};
 use armgap_core::arm::Arm;
+use armgap_core::transmission::Sides;
 
 /// Rounds of re-weighting at most.
 const MAX_ROUNDS: usize = 5;
@@ -28,6 +29,8 @@ pub struct DiagnosisContext<A, const N: usize, const P: usize> {
     pub holdout: WindowSet<N>,
     /// Standard deviation of the position measurement.
     pub noise: [f64; N],
+    /// Sides that encoder and friction of every joint may be on, both on one side first.
+    pub sides: [Vec<Sides>; N],
     /// Custom effects at their initial guess.
     pub custom_effects: Vec<EffectInstance>,
     /// Progress report and cancellation.

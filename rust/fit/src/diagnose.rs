@@ -256,7 +256,8 @@ impl Request<'_> {
         });
         let progress = ProgressReporter::new(Observer::clone(self.observer));
         let custom_effects = self.custom_effects(&scales);
-        Ok(DiagnosisContext { arm, prior, scales, training, holdout, noise, custom_effects, progress })
+        let sides = std::array::from_fn(|j| self.arm.sides(j));
+        Ok(DiagnosisContext { arm, prior, scales, training, holdout, noise, sides, custom_effects, progress })
     }
 
     /// The custom effects at their initial guesses.
@@ -265,7 +266,7 @@ impl Request<'_> {
             let law = custom_effect::law(index);
             let (parameter, start) = (&law.spec().parameters[0], law.spec().initial_guesses[0][0]);
             let size = start * scales.size(parameter.quantity, *joint);
-            EffectInstance { law, joint: *joint, p: [size, 0.0, 0.0] }
+            EffectInstance::new(law, *joint, [size, 0.0, 0.0])
         };
         self.options.custom_effects.iter().enumerate().map(placed).collect()
     }

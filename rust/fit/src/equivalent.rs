@@ -82,7 +82,7 @@ mod tests {
     use armgap_core::effect::find;
 
     fn placed(name: &str, joint: usize) -> EffectInstance {
-        EffectInstance { law: find::<f64>(name).expect("in the catalogue"), joint, p: [0.0; 3] }
+        EffectInstance::new(find::<f64>(name).expect("in the catalogue"), joint, [0.0; 3])
     }
 
     #[test]

@@ -178,7 +178,7 @@ mod tests {
     use armgap_core::effect::find;
 
     fn effect(name: &str, p: [f64; 3]) -> EffectInstance {
-        EffectInstance { law: find::<f64>(name).unwrap(), joint: 0, p }
+        EffectInstance::new(find::<f64>(name).unwrap(), 0, p)
     }
 
     #[test]

@@ -86,7 +86,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// Candidates not yet in the model.
     pub fn open_candidates(&self, model: &Hypothesis<P>) -> Vec<EffectInstance> {
         let taken = |c: &EffectInstance| model.effects.iter().any(|e| e.same_place(c));
-        let known = effect_instances(&self.scales).into_iter();
+        let known = effect_instances(&self.scales, &self.sides, model.effects.is_empty()).into_iter();
         known.chain(self.custom_effects.iter().copied()).filter(|c| !taken(c)).collect()
     }
 

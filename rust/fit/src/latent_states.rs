@@ -6,8 +6,9 @@
 use crate::track::Track;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{InputSegment, interval};
-use armgap_core::plant::Plant;
-use armgap_core::transmission::{LatentState, Transmission};
+use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::plant::{Mode, Plant};
+use armgap_core::transmission::{LatentState, Sides, Transmission};
 use nalgebra::SVector;
 
 /// Measured state at one sample.
@@ -21,6 +22,9 @@ pub struct MeasuredState<const N: usize> {
 
 /// Natural frequency of the motor times the step length, at most.
 const STEP: f64 = 1.0;
+
+/// The same for an arm whose measured states are put in place at every sample, so that the steps only have to be stable.
+const STABLE: f64 = 1.5;
 
 /// Steps per sample at most.
 const MAX_STEPS: usize = 8;
@@ -36,6 +40,9 @@ pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     last: usize,
 ) -> Vec<LatentState<f64, N>> {
     let path = track.path();
+    if (0..N).any(|j| plant.drivetrain().sides(j) != Sides::LINK) {
+        return beside_measured(track, plant, torque, last);
+    }
     let mut now = LatentState::none(path[0].q);
     let mut all = Vec::with_capacity(last + 1);
     for k in 0..=last {
@@ -57,6 +64,64 @@ pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
                 (now.deflection[j], now.deflection_rate[j]) = (at - ends[1].0, rate - ends[1].1);
             }
         }
+    }
+    all
+}
+
+/// Latent states of an arm of which some encoders measure motors, or friction brakes them: the whole arm is simulated from sample to sample, and
+/// what encoders measure is put in its place at each.
+fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    track: &Track<N>,
+    plant: &Plant<f64, A, N, P>,
+    torque: &[[InputSegment<f64>; N]],
+    last: usize,
+) -> Vec<LatentState<f64, N>> {
+    let path = track.path();
+    let drivetrain = plant.drivetrain();
+    let rate = plant.fastest(&path[0].q);
+    let mut now = State::new(path[0].q, path[0].dq);
+    let mut all = Vec::with_capacity(last + 1);
+    for k in 0..=last {
+        if k > 0 {
+            let h = track.t[k] - track.t[k - 1];
+            let count = ((h * rate / STABLE).ceil() as usize).clamp(1, MAX_STEPS);
+            advance(plant, &mut now, &Interval { t: track.t[k - 1], h, torque: &torque[k - 1] }, count);
+        }
+        if !now.is_finite() || now.latent.deflection.amax() > LIMIT {
+            now = State::new(path[k].q, path[k].dq);
+        }
+        for j in 0..N {
+            let (at, rate) = (path[k].q[j], path[k].dq[j]);
+            let Some(transmission) = drivetrain.get(j) else {
+                (now.q[j], now.dq[j]) = (at, rate);
+                continue;
+            };
+            if drivetrain.sides(j).encoder_at_motor {
+                (now.latent.deflection[j], now.latent.deflection_rate[j]) = (at - now.q[j], rate - now.dq[j]);
+            } else {
+                now.latent.deflection[j] += now.q[j] - at;
+                now.latent.deflection_rate[j] += now.dq[j] - rate;
+                (now.q[j], now.dq[j]) = (at, rate);
+            }
+            if transmission.backlash > 0.0 {
+                let beyond = now.latent.deflection[j].abs() >= transmission.half_backlash();
+                if beyond || now.latent.side[j] != 0.0 {
+                    let side = if beyond { now.latent.deflection[j].signum() } else { now.latent.side[j] };
+                    now.latent.side[j] = side;
+                    now.latent.deflection[j] = side * transmission.half_backlash();
+                    now.latent.deflection_rate[j] = 0.0;
+                }
+                if drivetrain.sides(j).encoder_at_motor {
+                    now.q[j] = at - now.latent.deflection[j];
+                    now.dq[j] = rate - now.latent.deflection_rate[j];
+                }
+            }
+        }
+        now.modes =
+            std::array::from_fn(|j| Mode::of(drivetrain.friction_velocity(j, now.dq[j], &now.latent)));
+        now.latent.memory = plant.memory(&now.q, &now.latent);
+        now.latent.anchor = now.q;
+        all.push(now.latent);
     }
     all
 }

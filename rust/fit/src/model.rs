@@ -5,6 +5,7 @@ use armgap_core::arm::Arm;
 use armgap_core::effect::{Active, Effect, InputSegment, MAX_PARAMETERS, Quantity, Scope, Trial};
 use armgap_core::integrate::State;
 use armgap_core::plant::Plant;
+use armgap_core::transmission::Sides;
 use nalgebra::SVector;
 
 /// An effect on a joint, with values for its parameters.
@@ -16,6 +17,8 @@ pub struct EffectInstance {
     pub joint: usize,
     /// Parameter values, SI.
     pub p: [f64; MAX_PARAMETERS],
+    /// Where encoder and friction sit; of effects with a transmission.
+    pub sides: Sides,
 }
 
 impl std::fmt::Debug for EffectInstance {
@@ -25,6 +28,16 @@ impl std::fmt::Debug for EffectInstance {
 }
 
 impl EffectInstance {
+    /// An effect with encoder and friction on the link's side.
+    pub fn new(law: &'static dyn Effect<f64>, joint: usize, p: [f64; MAX_PARAMETERS]) -> Self {
+        Self { law, joint, p, sides: Sides::LINK }
+    }
+
+    /// The same effect with encoder and friction elsewhere.
+    pub fn with_sides(self, sides: Sides) -> Self {
+        Self { sides, ..self }
+    }
+
     /// Number of parameters in use.
     pub fn len(&self) -> usize {
         self.law.spec().parameters.len()
@@ -114,9 +127,10 @@ impl<const P: usize> Hypothesis<P> {
     /// The simulator of this hypothesis; `None` if it names more effects than a plant carries.
     pub fn plant<A: Arm<f64, N, P>, const N: usize>(&self, arm: &A) -> Option<Plant<f64, A, N, P>> {
         let plant = Plant::new(arm.clone(), self.theta).with_smoothing(self.smoothing);
-        self.effects
-            .iter()
-            .try_fold(plant, |plant, e| plant.with_effect(Active { law: e.law, joint: e.joint, p: e.p }))
+        self.effects.iter().try_fold(plant, |plant, e| {
+            let plant = plant.with_effect(Active { law: e.law, joint: e.joint, p: e.p })?;
+            if e.sides == Sides::LINK { Some(plant) } else { plant.with_sides(e.joint, e.sides) }
+        })
     }
 
     /// Rewrites the held commands of a log into the torque that reaches the joints; `pushes` are added last, `tables` are those of the

@@ -92,6 +92,9 @@ mod tests {
             counts_per_rev: None,
             torque_limit: None,
             link_length: None,
+            encoder_at_motor: None,
+            friction_at_motor: None,
+            gear_ratio: None,
         };
         let work = RegressionRows { cutoff: 30.0, t: &t, q: &q, tau: &tau };
         let rows = arm.dispatch(work).expect("an axis has four parameters");

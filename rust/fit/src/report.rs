@@ -4,6 +4,7 @@ use crate::energy::Energy;
 use crate::locate::{Location, Regime};
 use crate::sanity::Sanity;
 use crate::verdict::Verdict;
+use armgap_core::transmission::Sides;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -146,9 +147,32 @@ pub struct Cause {
     /// What it rests on; none for external disturbances.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub evidence: Option<crate::evidence::Evidence>,
+    /// Where encoder and friction sit; of effects with a transmission.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sides: Option<SidesSummary>,
     /// The log that an external disturbance belongs to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,
+}
+
+/// Sides of a transmission: `motor` or `link`.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct SidesSummary {
+    /// Side that the encoder measures.
+    pub encoder: &'static str,
+    /// Side that friction acts on.
+    pub friction: &'static str,
+    /// How the rotor of an elastic transmission moves with the joints before its own: `rides`, or `geared` where it hardly does.
+    pub rotor: &'static str,
+}
+
+impl SidesSummary {
+    /// In words.
+    pub fn of(sides: Sides) -> Self {
+        let word = |at_motor| if at_motor { "motor" } else { "link" };
+        let rotor = if sides.rotor_rides { "rides" } else { "geared" };
+        Self { encoder: word(sides.encoder_at_motor), friction: word(sides.friction_at_motor), rotor }
+    }
 }
 
 /// A cause that is not named.

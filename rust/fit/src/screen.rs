@@ -8,11 +8,16 @@ use crate::scale::Scales;
 use crate::solve::{FitProblem, neutral, scaled_inverse};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Trial, catalogue};
+use armgap_core::transmission::Sides;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Size of the trial displacement of a candidate's first parameter, relative to its initial guess.
 const TRIAL: f64 = 1e-3;
+
+/// With encoder or friction at the motor the state behind a window takes as long to find as the window itself: beside other effects one of so
+/// many initial guesses is tried.
+const MOTOR_GUESSES: usize = 3;
 
 /// Score test of a candidate at one initial guess.
 #[derive(Debug, Clone)]
@@ -37,15 +42,20 @@ pub struct ScoreTest {
     pub distinct: f64,
 }
 
-/// Every effect on every joint it can act on, at each of its initial guesses.
-pub fn effect_instances<const N: usize>(scales: &Scales<N>) -> Vec<EffectInstance> {
+/// Every effect on every joint it can act on, at each of its initial guesses; a transmission with encoder and friction both on the link's side and
+/// both on the motor's, where they may be.
+pub fn effect_instances<const N: usize>(
+    scales: &Scales<N>,
+    sides: &[Vec<Sides>; N],
+    all_guesses: bool,
+) -> Vec<EffectInstance> {
     let mut all = Vec::new();
     for law in catalogue::<f64>().iter().filter(|law| law.spec().least_joints <= N) {
         let spec = law.spec();
         let joints = if spec.scope == Scope::Joint { N } else { 1 };
         for joint in 0..joints {
-            for initial_guess in spec.initial_guesses {
-                let mut effect = EffectInstance { law: *law, joint, p: *initial_guess };
+            for (guess, initial_guess) in spec.initial_guesses.iter().enumerate() {
+                let mut effect = EffectInstance::new(*law, joint, *initial_guess);
                 let mut reached = true;
                 for (value, parameter) in effect.p.iter_mut().zip(spec.parameters) {
                     match scales.initial_guess(parameter.quantity, joint, *value) {
@@ -53,13 +63,29 @@ pub fn effect_instances<const N: usize>(scales: &Scales<N>) -> Vec<EffectInstanc
                         None => reached = false,
                     }
                 }
-                if reached {
+                if !reached {
+                    continue;
+                }
+                if !law.has_transmission() {
                     all.push(effect);
+                    continue;
+                }
+                for sides in whole(&sides[joint]) {
+                    if all_guesses || *sides == Sides::LINK || guess % MOTOR_GUESSES == MOTOR_GUESSES / 2 {
+                        all.push(effect.with_sides(*sides));
+                    }
                 }
             }
         }
     }
     all
+}
+
+/// Of the sides that encoder and friction may be on, those with both on one side and a geared rotor; all where there are none.
+fn whole(sides: &[Sides]) -> Vec<&Sides> {
+    let both = |s: &&Sides| s.encoder_at_motor == s.friction_at_motor && !s.rotor_rides;
+    let found: Vec<&Sides> = sides.iter().filter(both).collect();
+    if found.is_empty() { sides.iter().collect() } else { found }
 }
 
 /// Scores all candidates around a fitted hypothesis.

@@ -131,8 +131,13 @@ impl Simulation<'_> {
             if !state.is_finite() {
                 return Err(SimulationError::Diverged(k));
             }
-            q.extend((0..N).map(|j| hypothesis.measured(j, state.q[j])));
-            dq.extend(state.dq.iter());
+            let shown = plant.drivetrain().shown(&state.q, &state.latent);
+            q.extend((0..N).map(|j| hypothesis.measured(j, shown[j])));
+            let rates = |j: usize| {
+                let moves = plant.drivetrain().sides(j).encoder_at_motor;
+                state.dq[j] + if moves { state.latent.deflection_rate[j] } else { 0.0 }
+            };
+            dq.extend((0..N).map(rates));
             let step = Interval { t: self.t[k], h: interval(self.t, k), torque: &torque[k] };
             advance(&plant, &mut state, &step, substeps);
         }

@@ -9,8 +9,8 @@ use crate::track::{InitialState, Track};
 use armgap_core::arm::Arm;
 use armgap_core::cpu::Level;
 use armgap_core::effect::InputSegment;
-use armgap_core::integrate::{Interval, advance};
-use armgap_core::plant::Plant;
+use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::plant::{Mode, Plant};
 use armgap_core::rollout::{BatchRollout, Run, WIDTH};
 use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
@@ -158,7 +158,7 @@ impl<const N: usize> Dataset<N> {
             let mut state = hypothesis
                 .initial_state(window.initial_state.q + shift.q, window.initial_state.dq + shift.dq);
             if let Some(states) = &latent[window.track] {
-                state.latent = LatentState { anchor: state.q, ..states[window.first] };
+                enter(&plant, &mut state, &states[window.first]);
             }
             let (t, torque) = (&track.t[window.first..=window.last], &torque[window.first..window.last]);
             let runs =
@@ -239,6 +239,22 @@ const NEAR_EDGE: f64 = 0.3;
 /// Runs that share the lanes of one vector unit: enough that few lanes are idle at the end.
 const GROUP: usize = 4 * WIDTH;
 
+/// Gives a state at the positions that encoders show its latent states: a link behind the encoder of its motor lies by the deflection off it.
+fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    plant: &Plant<f64, A, N, P>,
+    state: &mut State<f64, N>,
+    latent: &LatentState<f64, N>,
+) {
+    for j in (0..N).filter(|j| plant.drivetrain().sides(*j).encoder_at_motor) {
+        state.q[j] -= latent.deflection[j];
+        state.dq[j] -= latent.deflection_rate[j];
+    }
+    state.latent = LatentState { anchor: state.q, ..*latent };
+    state.modes = std::array::from_fn(|j| {
+        Mode::of(plant.drivetrain().friction_velocity(j, state.dq[j], &state.latent))
+    });
+}
+
 /// Simulates one run by the scalar integrator, in as many steps per sample as its plant needs.
 fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
     let most = match (run.plant.jumps(), run.plant.drivetrain().any()) {
@@ -246,6 +262,7 @@ fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'
         (false, true) => MAX_SUBSTEPS_DRIVEN,
         (false, false) => MAX_SUBSTEPS,
     };
+    let measures_motors = run.plant.drivetrain().measures_motors();
     let state = &mut run.state;
     for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
         let h = run.t[k + 1] - run.t[k];
@@ -258,7 +275,11 @@ fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'
         if !state.is_finite() || state.q.amax() > DIVERGED {
             break;
         }
-        row.copy_from_slice(state.q.as_slice());
+        if measures_motors {
+            row.copy_from_slice(run.plant.drivetrain().shown(&state.q, &state.latent).as_slice());
+        } else {
+            row.copy_from_slice(state.q.as_slice());
+        }
     }
 }
 

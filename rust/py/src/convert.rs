@@ -2,6 +2,7 @@
 
 use armgap_core::arm::{ArmKind, LinkParameters, TwoLink};
 use armgap_core::effect::{Scope, catalogue, find};
+use armgap_core::transmission::Sides;
 use armgap_fit::arm::ArmDescription;
 use armgap_fit::model::EffectInstance;
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
@@ -9,6 +10,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::BTreeMap;
+
+/// Values of an effect with a transmission that say where encoder and friction sit: 1 at the motor, 0 at the link.
+const ENCODER_SIDE: &str = "encoder_at_motor";
+const FRICTION_SIDE: &str = "friction_at_motor";
+const ROTOR: &str = "rotor_rides";
 
 /// The kinds of arm, as a list of dicts.
 #[pyfunction]
@@ -130,6 +136,12 @@ pub fn effect_instances(
                     return Err(PyValueError::new_err(format!("`{name}` needs a joint from 1 to {last}")));
                 }
             };
+            let mut values = values;
+            let mut at_motor =
+                |name: &str| law.has_transmission() && values.remove(name).is_some_and(|x| x != 0.0);
+            let (encoder_at_motor, friction_at_motor, rotor_rides) =
+                (at_motor(ENCODER_SIDE), at_motor(FRICTION_SIDE), at_motor(ROTOR));
+            let sides = Sides { encoder_at_motor, friction_at_motor, rotor_rides };
             let mut p = [0.0; 3];
             for (slot, parameter) in p.iter_mut().zip(spec.parameters) {
                 let value = *values.get(parameter.name).ok_or_else(|| {
@@ -147,7 +159,7 @@ pub fn effect_instances(
             {
                 return Err(PyValueError::new_err(format!("`{name}` has no parameter `{extra}`")));
             }
-            Ok(EffectInstance { law, joint, p })
+            Ok(EffectInstance::new(law, joint, p).with_sides(sides))
         })
         .collect()
 }
@@ -199,6 +211,9 @@ pub fn description(arm: &Bound<'_, PyDict>) -> PyResult<ArmDescription> {
         counts_per_rev: get(arm, "counts_per_rev")?,
         torque_limit: get(arm, "torque_limit")?,
         link_length: get(arm, "link_length")?,
+        encoder_at_motor: get(arm, "encoder_at_motor")?,
+        friction_at_motor: get(arm, "friction_at_motor")?,
+        gear_ratio: get(arm, "gear_ratio")?,
     };
     let (p, n) = (description.kind.parameters().len(), description.kind.joints());
     let lists = [

@@ -45,6 +45,9 @@ pub fn simulate<'py>(
         counts_per_rev: None,
         torque_limit: None,
         link_length,
+        encoder_at_motor: None,
+        friction_at_motor: None,
+        gear_ratio: None,
     };
     let rows = t.len();
     let (t, tau, q0, dq0) = (t.to_vec(), tau.to_vec(), q0.to_vec(), dq0.to_vec());
@@ -87,8 +90,18 @@ pub fn inertia<'py>(
     let q = matrix(&q, "q", rows, n)?;
     let effects = effect_instances(kind, effects)?;
     let sigma = vec![1.0; theta.len()];
-    let arm =
-        ArmDescription { kind, gravity, theta, sigma, counts_per_rev: None, torque_limit: None, link_length };
+    let arm = ArmDescription {
+        kind,
+        gravity,
+        theta,
+        sigma,
+        counts_per_rev: None,
+        torque_limit: None,
+        link_length,
+        encoder_at_motor: None,
+        friction_at_motor: None,
+        gear_ratio: None,
+    };
     let found = arm.dispatch(InertiaMatrices { q, effects: &effects }).flatten().ok_or_else(|| {
         PyValueError::new_err("`theta` has the wrong length for this arm, or there are too many effects")
     })?;

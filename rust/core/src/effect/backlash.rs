@@ -49,6 +49,10 @@ impl<T: Real> Effect<T> for Backlash {
         &SPEC
     }
 
+    fn has_transmission(&self) -> bool {
+        true
+    }
+
     fn transmission(&self, p: &[T; MAX_PARAMETERS], inertia: T) -> Option<Transmission<T>> {
         let rotor = p[1] * inertia;
         let rate = lit::<T>(FLANK_RATE);

@@ -4,7 +4,10 @@
 //! rotor_inertia d2(q + deflection)/dt2 = tau - stiffness deflection - damping d(deflection)/dt
 //! ```
 //!
-//! The rotor comes in addition to the rigid arm; encoder and friction are on the link's side. A shaft of infinite stiffness is a
+//! Damping counts up to the critical one of the rotor on its shaft, `2 sqrt(stiffness rotor_inertia)`.
+//!
+//! The rotor comes in addition to the rigid arm; encoder and friction are on the link's side or on the motor's
+//! ([`crate::transmission::Sides`]). A shaft of infinite stiffness is a
 //! rigid joint whose rotor is part of the arm's own inertia.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, NEVER, Quantity, Scope, Spec, Trial};
@@ -49,12 +52,17 @@ impl<T: Real> Effect<T> for JointElasticity {
         &SPEC
     }
 
+    fn has_transmission(&self) -> bool {
+        true
+    }
+
     fn transmission(&self, p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Transmission<T>> {
         let rigid = p[0] >= lit(NEVER);
         (!rigid).then_some(Transmission {
             inertia: p[2],
             stiffness: p[0],
-            damping: p[1],
+            // Beyond critical damping there is no resonance left, and nothing that a shaft does.
+            damping: p[1].min((p[0] * p[2]).max(T::zero()).sqrt() * lit(2.0)),
             backlash: T::zero(),
             part_of_link: false,
             coupling_ratio: T::zero(),

@@ -395,6 +395,11 @@ pub trait Effect<T: Real>: Sync {
         memory
     }
 
+    /// Whether it puts a transmission between motor and link.
+    fn has_transmission(&self) -> bool {
+        false
+    }
+
     /// Transmission of a joint whose own inertia at `q = 0` is `inertia`; none for a rigid joint.
     fn transmission(&self, _p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Transmission<T>> {
         None

@@ -11,7 +11,7 @@ use crate::real::Real;
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A, N, P> {
     /// Opens every backlash whose flank would have to pull; returns whether any was opened.
     pub(super) fn open(&self, x: T, state: &mut State<T, N>, motion: &Accelerations<T, N>) -> bool {
-        let tau = self.interval.torque_at(x);
+        let tau = self.interval.torque_at(x) - motion.motor_friction;
         let mut opened = false;
         for j in 0..N {
             let flank_tension = self.plant.drivetrain().flank_tension(j, tau[j], &motion.ddq, &state.latent);
@@ -41,7 +41,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
             return (depth > T::zero()).then_some(ModeEvent { joint: j, s, change: Change::Impact });
         }
         let flank_tension = |x: T, at: &State<T, N>, motion: &Accelerations<T, N>| {
-            drivetrain.flank_tension(j, self.interval.torque_at(x)[j], &motion.ddq, &at.latent)
+            let tau = self.interval.torque_at(x)[j] - motion.motor_friction[j];
+            drivetrain.flank_tension(j, tau, &motion.ddq, &at.latent)
         };
         let (before, after) = (flank_tension(x, state, k1)?, flank_tension(x + dt, trial, end)?);
         let s = if before < T::zero() { before / (before - after) } else { T::zero() };

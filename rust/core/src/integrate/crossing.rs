@@ -32,8 +32,10 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
     ) -> Option<ModeEvent<T>> {
         let &TrialStep { state, x, dt, k1 } = trial_step;
         let exact = self.plant.smoothing() == T::zero();
-        let reverses =
-            |j: usize| exact && self.plant.is_dry(j) && trial.dq[j] * state.modes[j].direction() < T::zero();
+        let velocity = |j: usize, at: &State<T, N>| self.plant.friction_velocity(j, &at.dq, &at.latent);
+        let reverses = |j: usize| {
+            exact && self.plant.is_dry(j) && velocity(j, trial) * state.modes[j].direction() < T::zero()
+        };
         let sticks = |j: usize| exact && state.modes[j] == Mode::Stuck;
         let has_backlash = self.plant.drivetrain().has_backlash();
         let edge = |j: usize| self.plant.edge_between(j, state.q[j], trial.q[j]);
@@ -44,7 +46,9 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         let mut first: Option<ModeEvent<T>> = None;
         for j in 0..N {
             let event = if reverses(j) {
-                let s = hermite_root(state.dq[j], k1.ddq[j] * dt, trial.dq[j], end.ddq[j] * dt);
+                let before = self.plant.friction_acceleration(j, k1, &state.latent);
+                let after = self.plant.friction_acceleration(j, &end, &trial.latent);
+                let s = hermite_root(velocity(j, state), before * dt, velocity(j, trial), after * dt);
                 Some(ModeEvent { joint: j, s, change: Change::Standstill })
             } else if sticks(j) {
                 self.release(j, trial_step, trial, &end)
@@ -101,7 +105,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
             }
             Change::Open { flank_tension } if flank_tension[0] < T::zero() => {
                 let violation = |x: T, there: &State<T, N>, motion: &Accelerations<T, N>| {
-                    let tau = self.interval.torque_at(x)[event.joint];
+                    let tau = self.interval.torque_at(x)[event.joint] - motion.motor_friction[event.joint];
                     self.plant
                         .drivetrain()
                         .flank_tension(event.joint, tau, &motion.ddq, &there.latent)
@@ -127,7 +131,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
             return state;
         }
         match event.change {
-            Change::Standstill => (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck),
+            Change::Standstill => self.stop(j, &mut state),
             Change::Release { mode, .. } => state.modes[j] = mode,
             Change::Open { .. } => state.latent.side[j] = T::zero(),
             Change::Impact => return self.after_impact(j, state),
@@ -137,6 +141,16 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
             }
         }
         state
+    }
+
+    /// Holds joint `j`, or the motor that its friction acts on.
+    pub(super) fn stop(&self, j: usize, state: &mut State<T, N>) {
+        if self.plant.drivetrain().brakes_motor(j, &state.latent) {
+            state.latent.deflection_rate[j] = -state.dq[j];
+        } else {
+            state.dq[j] = T::zero();
+        }
+        state.modes[j] = Mode::Stuck;
     }
 
     /// Integrates to where a velocity vanishes: Newton's method, its last correction so small that a straight line is exact.
@@ -149,7 +163,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
             let joints = JointState { q: reached.q.into(), dq: reached.dq.into() };
             let ddq = [&k1.ddq.into(), &slope.ddq.into()];
             let zero = VelocityZero { joints: &joints, j: event.joint, length: s * dt, ddq };
-            let correction = zero.correction();
+            let correction = if self.plant.drivetrain().any() {
+                -self.plant.friction_velocity(event.joint, &reached.dq, &reached.latent)
+                    / self.plant.friction_acceleration(event.joint, &slope, &reached.latent)
+            } else {
+                zero.correction()
+            };
             let next = s + correction / dt;
             if !(next > T::zero() && next <= T::one()) {
                 break;

@@ -254,8 +254,9 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
     fn hold_reversed(&self, state: &mut State<T, N>) {
         let exact = self.plant.smoothing() == T::zero();
         for j in (0..N).filter(|j| exact && self.plant.is_dry(*j)) {
-            if state.dq[j] * state.modes[j].direction() < T::zero() {
-                (state.dq[j], state.modes[j]) = (T::zero(), Mode::Stuck);
+            let velocity = self.plant.friction_velocity(j, &state.dq, &state.latent);
+            if velocity * state.modes[j].direction() < T::zero() {
+                self.stop(j, state);
             }
         }
     }
@@ -288,7 +289,11 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
         state: &State<T, N>,
         motion: &Accelerations<T, N>,
     ) -> (T, T) {
-        let tau = self.plant.drivetrain().torque_at_joints(&self.interval.torque_at(x), &state.latent);
+        let torque = self.interval.torque_at(x);
+        let mut tau = self.plant.drivetrain().torque_at_joints(&torque, &state.latent);
+        if self.plant.drivetrain().brakes_motor(j, &state.latent) {
+            tau[j] = torque[j];
+        }
         self.plant.stiction_violation(j, self.interval.t + x, state.q[j], tau[j], motion.friction_at_rest[j])
     }
 
@@ -303,17 +308,21 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
     ) -> Option<(usize, Mode)> {
         let (mut found, mut worst) = (None, T::zero());
         for j in 0..N {
-            if state.dq[j] != T::zero() {
+            let velocity = self.plant.friction_velocity(j, &state.dq, &state.latent);
+            if velocity != T::zero() {
                 let contradicts = self.plant.is_dry(j) || state.modes[j] == Mode::Stuck;
-                if contradicts && state.modes[j] != Mode::of(state.dq[j]) {
-                    return Some((j, Mode::of(state.dq[j])));
+                if contradicts && state.modes[j] != Mode::of(velocity) {
+                    return Some((j, Mode::of(velocity)));
                 }
             } else if state.modes[j] == Mode::Stuck {
                 let (stiction_violation, direction) = self.stiction_violation(j, x, state, motion);
                 if stiction_violation > worst && !tried[j] {
                     (found, worst) = (Some((j, Mode::of(direction))), stiction_violation);
                 }
-            } else if self.plant.is_dry(j) && motion.ddq[j] * state.modes[j].direction() < T::zero() {
+            } else if self.plant.is_dry(j)
+                && self.plant.friction_acceleration(j, motion, &state.latent) * state.modes[j].direction()
+                    < T::zero()
+            {
                 return Some((j, Mode::Stuck));
             }
         }

@@ -14,7 +14,7 @@ use crate::effect::{Active, Hooks};
 use crate::kinematics::{JointState, KinematicState, RigidArm};
 use crate::linear::solve_positive_definite;
 use crate::real::Real;
-use crate::transmission::LatentState;
+use crate::transmission::{LatentState, Sides};
 use nalgebra::SVector;
 
 /// Most effects one plant can carry.
@@ -64,6 +64,8 @@ pub struct Accelerations<T, const N: usize> {
     pub friction_at_rest: SVector<T, N>,
     /// Acceleration of the transmissions' deflections; zero for rigid joints.
     pub deflection_acceleration: SVector<T, N>,
+    /// Friction torque of joints whose friction sits at the motor; zero for others.
+    pub motor_friction: SVector<T, N>,
 }
 
 /// An arm with parameter values, effects and a friction model.
@@ -130,6 +132,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
                 *value += *change;
             }
         }
+        Some(self)
+    }
+
+    /// Says where encoder and friction of joint `j` sit; `None` for a joint that the arm does not have.
+    pub fn with_sides(mut self, j: usize, sides: Sides) -> Option<Self> {
+        self.drivetrain.set_sides(j, sides)?;
         Some(self)
     }
 
@@ -241,10 +249,88 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         }
         let mut closed = *kinematics;
         self.drivetrain.add_closed_rotors(&mut closed.equation_terms.inertia, latent);
-        let motion = self.undriven(t, &closed, &self.drivetrain.torque_at_joints(tau, latent), modes, latent);
-        Accelerations {
-            deflection_acceleration: self.drivetrain.deflection_accelerations(tau, &motion.ddq, latent),
-            ..motion
+        if !self.drivetrain.brakes_motors() {
+            let reaching = self.drivetrain.torque_at_joints(tau, latent);
+            let mut motion = self.undriven(t, &closed, &reaching, modes, latent);
+            motion.deflection_acceleration =
+                self.drivetrain.deflection_accelerations(tau, &motion.ddq, latent);
+            return motion;
+        }
+        let braked = self.motor_friction(t, kinematics, tau, modes, latent);
+        let tau = tau - braked;
+        let mut motion =
+            self.undriven(t, &closed, &self.drivetrain.torque_at_joints(&tau, latent), modes, latent);
+        motion.deflection_acceleration = self.drivetrain.deflection_accelerations(&tau, &motion.ddq, latent);
+        let stuck = self.stuck(modes);
+        for j in 0..N {
+            if !self.drivetrain.sides(j).friction_at_motor {
+                continue;
+            }
+            if self.drivetrain.brakes_motor(j, latent) {
+                motion.motor_friction[j] = braked[j];
+                if stuck[j] {
+                    motion.friction_at_rest[j] = braked[j];
+                    motion.deflection_acceleration[j] = -motion.ddq[j];
+                }
+            } else if stuck[j] {
+                motion.motor_friction[j] = motion.friction_at_rest[j];
+            } else {
+                let dq = kinematics.joints.dq[j];
+                let x =
+                    self.point(j, t, kinematics.joints.q[j], dq, tau[j], kinematics.equation_terms.bias[j]);
+                motion.motor_friction[j] = self.rigid.viscous[j] * dq + self.dry_friction(j, &x, modes[j]);
+            }
+        }
+        motion
+    }
+
+    /// Friction torques on motors that move against their links; a motor that sticks needs what it would pass on otherwise.
+    #[inline]
+    fn motor_friction(
+        &self,
+        t: T,
+        kinematics: &KinematicState<T, N>,
+        tau: &SVector<T, N>,
+        modes: &[Mode; N],
+        latent: &LatentState<T, N>,
+    ) -> SVector<T, N> {
+        let mut braked = SVector::zeros();
+        let stuck = self.stuck(modes);
+        for j in 0..N {
+            if !self.drivetrain.brakes_motor(j, latent) {
+                continue;
+            }
+            if stuck[j] {
+                braked[j] = tau[j] - self.drivetrain.transmitted(j, latent);
+                continue;
+            }
+            let JointState { q, dq } = &kinematics.joints;
+            let velocity = dq[j] + latent.deflection_rate[j];
+            let at = q[j] + latent.deflection[j];
+            let x = self.point(j, t, at, velocity, tau[j], kinematics.equation_terms.bias[j]);
+            braked[j] = self.rigid.viscous[j] * velocity + self.dry_friction(j, &x, modes[j]);
+        }
+        braked
+    }
+
+    /// Velocity on which the friction of joint `j` acts.
+    #[inline]
+    pub(crate) fn friction_velocity(&self, j: usize, dq: &SVector<T, N>, latent: &LatentState<T, N>) -> T {
+        self.drivetrain.friction_velocity(j, dq[j], latent)
+    }
+
+    /// Acceleration on which the friction of joint `j` acts.
+    #[inline]
+    pub(crate) fn friction_acceleration(
+        &self,
+        j: usize,
+        motion: &Accelerations<T, N>,
+        latent: &LatentState<T, N>,
+    ) -> T {
+        if self.drivetrain.brakes_motor(j, latent) {
+            motion.ddq[j] + motion.deflection_acceleration[j]
+        } else {
+            motion.ddq[j]
         }
     }
 
@@ -266,8 +352,18 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         let memory =
             if self.has_hysteresis { self.memory(&SVector::from(*q), latent) } else { latent.memory };
         let mut rhs = SVector::<T, N>::zeros();
+        let mut held = *modes;
         for j in 0..N {
             let hooks = self.hooks[j];
+            if self.drivetrain.brakes_motor(j, latent) {
+                let mut x = self.point(j, t, q[j], dq[j], tau[j], bias[j]);
+                x.other = self.sliding((j + 1) % N, dq, modes);
+                x.memory = memory[j];
+                rhs[j] = tau[j] - bias[j] + self.force(j, &x);
+                // Nothing holds the link.
+                held[j] = Mode::Forward;
+                continue;
+            }
             if !(hooks.force || hooks.coulomb) {
                 let dry = self.rigid.coulomb[j].max(T::zero()) * self.sliding(j, dq, modes);
                 rhs[j] = tau[j] - bias[j] - self.rigid.viscous[j] * dq[j] - dry;
@@ -281,7 +377,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             rhs[j] = tau[j] - bias[j] - self.rigid.viscous[j] * dq[j] - self.dry_friction(j, &x, modes[j])
                 + self.force(j, &x);
         }
-        self.solve(inertia, &rhs, modes)
+        self.solve(inertia, &rhs, &held)
     }
 
     /// Residual torque by inverse dynamics: the torque that a measured motion needs beyond `tau`, with rigid transmissions and friction
@@ -338,7 +434,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
                 }
             }
         }
-        Accelerations { ddq, friction_at_rest, deflection_acceleration: SVector::zeros() }
+        let zero = SVector::zeros();
+        Accelerations { ddq, friction_at_rest, deflection_acceleration: zero, motor_friction: zero }
     }
 
     /// Which joints are held; none with smoothed friction.

@@ -60,7 +60,11 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             let free = Self::free_inertia(j, &inertia);
             if self.smoothing > T::zero() {
                 let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
-                fastest = fastest.max(self.level(j, &x, T::one()) / (self.smoothing * free));
+                let braked = match self.drivetrain.get(j) {
+                    Some(transmission) if self.drivetrain.sides(j).friction_at_motor => transmission.inertia,
+                    _ => free,
+                };
+                fastest = fastest.max(self.level(j, &x, T::one()) / (self.smoothing * braked));
             }
             if let Some(transmission) = self.drivetrain.get(j).filter(|d| d.backlash <= T::zero()) {
                 fastest = fastest.max(transmission.rate(free));

@@ -41,7 +41,7 @@ struct ByLevel<'a, A, const N: usize, const P: usize> {
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> ByLevel<'_, A, N, P> {
     fn limited_to(&self, level: f64) -> Option<EffectInstance> {
-        find::<f64>(LAW).map(|law| EffectInstance { law, joint: self.joint, p: [level, 0.0, 0.0] })
+        find::<f64>(LAW).map(|law| EffectInstance::new(law, self.joint, [level, 0.0, 0.0]))
     }
 
     fn cost_of(&self, level: f64) -> f64 {

@@ -238,7 +238,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Some(Disturbance {
             holdout: set == 1,
             track,
-            push: EffectInstance { law, joint: bell.joint, p: [impulse, bell.time, duration] },
+            push: EffectInstance::new(law, bell.joint, [impulse, bell.time, duration]),
             sigma: [sigma * impulse.abs(), sigma * bell.width, sigma * duration],
             share: 0.0,
             probability: 1.0 - 0.5 * (rest / bell.z).powi(2).min(1.0),

@@ -95,11 +95,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let gains: Vec<(f64, EffectInstance)> = tried
             .into_par_iter()
             .filter_map(|(joint, duration, time)| {
-                let push = EffectInstance {
-                    law,
-                    joint,
-                    p: [SLIGHT * self.scales.size(Quantity::Impulse, joint), time, duration],
-                };
+                let impulse = SLIGHT * self.scales.size(Quantity::Impulse, joint);
+                let push = EffectInstance::new(law, joint, [impulse, time, duration]);
                 self.first_order(&sample, &weighting, &residual, &known, push, state)
             })
             .collect();

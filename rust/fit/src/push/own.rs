@@ -49,6 +49,7 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> Own<'a, A, N, P> {
             training: WindowSet::new(data.clone()),
             holdout: WindowSet::new(data),
             noise: self.whole.noise,
+            sides: self.whole.sides.clone(),
             custom_effects: self.whole.custom_effects.clone(),
             progress: self.whole.progress.aside(),
         };
