@@ -85,6 +85,26 @@ def test_written_and_read_again(arm, tmp_path):
     )
 
 
+def test_sides_and_gear_ratios(tmp_path):
+    path, again = tmp_path / "arm.toml", tmp_path / "again.toml"
+    encoder = "[encoder]\ncounts_per_rev = [1024000, 655360]\n"
+    assert encoder in TABLE_ONE
+    text = TABLE_ONE.replace(encoder, encoder + 'side = ["motor", "unknown"]\n')
+    path.write_text(text + '[transmission]\nfriction_side = ["link", "motor"]\ngear_ratio = [1.0, 50.0]\n')
+    arm = Arm.read(path)
+    assert (arm.encoder_side, arm.friction_side) == (("motor", "unknown"), ("link", "motor"))
+    native = arm.to_native()
+    assert (native["encoder_at_motor"], native["friction_at_motor"]) == ([True, None], [False, True])
+    again.write_text(arm.to_toml())
+    second = Arm.read(again)
+    assert (second.encoder_side, second.friction_side) == (arm.encoder_side, arm.friction_side)
+    assert second.gear_ratio.tolist() == [1.0, 50.0]
+    for wrong in ('["motor"]', '["motor", "shaft"]', '"motor"'):
+        path.write_text(text + f"[transmission]\nfriction_side = {wrong}\n")
+        with pytest.raises(ArmFileError, match=r"transmission.friction_side.*needs a list of 2 of"):
+            Arm.read(path)
+
+
 def test_names_with_quotes_columns_and_seal_survive(tmp_path):
     text = TABLE_ONE.replace("Reyes-Kelly direct-drive arm", 'a \\"b\\" \\\\ c')
     text += f'[columns]\nq1 = "shoulder \\"raw\\""\n[sealed]\nsha256 = "{"ab" * 32}"\n'

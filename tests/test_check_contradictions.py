@@ -11,6 +11,7 @@ from armgap import Arm, Log, diagnose, simulate
 from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, time_shift, torque_unit
 from armgap.check.contradiction import READINGS, Refit
 from armgap.check.equation_error import EquationError, Rows, bounds
+from armgap.diagnosis import _ambiguous_lag
 from armgap.errors import ColumnError, OptionError
 from armgap.simulation import Effect
 from swings import off, sines, swing
@@ -133,6 +134,41 @@ def test_torques_that_come_late_in_the_file(two_links: list[Log], arm: Arm, samp
     assert (check.check, check.severity) == ("time_shift", "repaired")
     assert float(check.remedy.removeprefix("--shift tau=")) == pytest.approx(-samples * arm.sample_period)
     assert [c.severity for c in checked(late, arm, repair=False)] == ["warning"]
+
+
+def test_halves_that_do_not_agree_leave_a_late_torque_to_predictions(two_links: list[Log], arm: Arm) -> None:
+    training, holdout = two_links[:1], two_links[1:]
+    assert time_shift.confirmed(0, training, holdout, arm, 0.25) is None
+    late = [replace(log, tau=np.vstack([log.tau[:2], log.tau[:-2]])) for log in two_links]
+    found = time_shift.confirmed(0, late[:1], late[1:], arm, 0.25)
+    assert found is not None
+    assert found.shift["tau"] == pytest.approx(-2 * arm.sample_period)
+
+
+def test_a_factor_is_told_from_inertias_and_weights(two_links: list[Log], arm: Arm) -> None:
+    friction = np.arange(len(arm.theta)) >= arm.n_inertial
+    wrong = replace(arm, theta=np.where(friction, 0.2, 1.0) * arm.theta, sigma=np.where(friction, 5.0, 1.0) * arm.sigma)
+    amperes = [replace(log, tau=log.tau / 12.0) for log in two_links]
+    factors = [
+        float(c.remedy.removeprefix("--factor tau=").split()[0])
+        for c in checked(amperes, wrong)
+        if c.check == "torque_unit"
+    ]
+    assert factors
+    assert all(abs(factor / 12.0 - 1) < 0.1 for factor in factors)
+
+
+def test_a_lag_beside_a_low_pass_may_be_the_low_pass() -> None:
+    def lag(joint: int) -> dict[str, object]:
+        return {"effect": "actuator_lag", "joint": joint, "probability": 0.98, "equivalents": []}
+
+    filtered = Check("filtered_positions", "warning", "", ("log positions as the encoder gives them",), 1, "run")
+    data = {"causes": [lag(1), lag(2)]}
+    _ambiguous_lag(data, [filtered])
+    first, second = data["causes"]
+    assert (first["probability"], second["probability"]) == (0.49, 0.98)
+    assert [e["effect"] for e in first["equivalents"]] == ["filtered_positions"]
+    assert not second["equivalents"]
 
 
 def test_a_stretch_without_torque(two_links: list[Log], arm: Arm) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,6 +29,24 @@ def run(seed: int, *effects: Effect, name: str = "log") -> Log:
     draw = np.random.default_rng(seed).uniform(size=(3, 6))
     tau = ((0.1 + 0.3 * draw[0]) * np.sin(np.outer(t, 1.0 + 20.0 * draw[1]) + 6 * draw[2])).sum(axis=1)
     return simulate(TRUE, t, tau, effects=list(effects), noise=NOISE, seed=seed, tolerance=TOLERANCE, name=name)
+
+
+@pytest.mark.parametrize("name", ["joint_elasticity", "backlash"])
+def test_encoder_and_friction_at_the_motor(name: str) -> None:
+    at_motor = Effect(name, 1, {**CASES[name], "encoder_at_motor": 1.0, "friction_at_motor": 1.0})
+    found = diagnose(run(1, at_motor), ARM, holdout=run(2, at_motor))
+    cause = found.causes[0]
+    assert (cause.effect, cause.joint) == (name, 1)
+    assert cause.sides == {"encoder": "motor", "friction": "motor", "rotor": "geared"}
+    size = next(iter(CASES[name]))
+    assert cause.parameters[size].value == pytest.approx(CASES[name][size], rel=0.2)
+
+
+def test_only_the_sides_of_the_arm_file_are_tried() -> None:
+    effect = Effect("joint_elasticity", 1, CASES["joint_elasticity"])
+    known = replace(ARM, encoder_side=("link",), friction_side=("link",))
+    cause = diagnose(run(1, effect), known, holdout=run(2, effect)).causes[0]
+    assert cause.sides == {"encoder": "link", "friction": "link", "rotor": "geared"}
 
 
 @pytest.mark.parametrize("name", CASES)

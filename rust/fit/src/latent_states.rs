@@ -26,6 +26,10 @@ const STEP: f64 = 1.0;
 /// The same for an arm whose measured states are put in place at every sample, so that the steps only have to be stable.
 const STABLE: f64 = 1.5;
 
+/// Time in which a link behind the encoder of its motor is drawn to where the motor's torque balance has it, s: long beside a sample, as
+/// accelerations are noisy, short beside the ringing of a shaft with little damping, which would carry an error along the log.
+const MEMORY: f64 = 0.25;
+
 /// Steps per sample at most.
 const MAX_STEPS: usize = 8;
 
@@ -82,6 +86,7 @@ fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let mut now = State::new(path[0].q, path[0].dq);
     let mut all = Vec::with_capacity(last + 1);
     for k in 0..=last {
+        let before = now.latent.deflection;
         if k > 0 {
             let h = track.t[k] - track.t[k - 1];
             let count = ((h * rate / STABLE).ceil() as usize).clamp(1, MAX_STEPS);
@@ -98,6 +103,17 @@ fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             };
             if drivetrain.sides(j).encoder_at_motor {
                 (now.latent.deflection[j], now.latent.deflection_rate[j]) = (at - now.q[j], rate - now.dq[j]);
+                if k > 0 && transmission.backlash <= 0.0 {
+                    let sample = Motor { path: [&path[k - 1], &path[k]], h: track.t[k] - track.t[k - 1], j };
+                    let predicted = 0.5 * (before[j] + now.latent.deflection[j]);
+                    if let Some(balance) =
+                        sample.deflection(plant, &torque[k - 1][j], now.latent.deflection_rate[j])
+                    {
+                        let share = (sample.h / MEMORY).min(0.5);
+                        now.latent.deflection[j] += share * (balance - predicted);
+                        now.q[j] = at - now.latent.deflection[j];
+                    }
+                }
             } else {
                 now.latent.deflection[j] += now.q[j] - at;
                 now.latent.deflection_rate[j] += now.dq[j] - rate;
@@ -124,6 +140,39 @@ fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         all.push(now.latent);
     }
     all
+}
+
+/// One measured motor over one sample interval.
+struct Motor<'a, const N: usize> {
+    path: [&'a MeasuredState<N>; 2],
+    h: f64,
+    j: usize,
+}
+
+impl<const N: usize> Motor<'_, N> {
+    /// Deflection of the shaft that the motor's acceleration asks for, at this rate; none where the motor may stick.
+    fn deflection<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        plant: &Plant<f64, A, N, P>,
+        torque: &InputSegment<f64>,
+        rate: f64,
+    ) -> Option<f64> {
+        let Self { path: [from, to], h, j } = *self;
+        let transmission = plant.drivetrain().get(j)?;
+        let speed = 0.5 * (from.dq[j] + to.dq[j]);
+        let mut braked = 0.0;
+        if plant.drivetrain().sides(j).friction_at_motor {
+            if from.dq[j] * to.dq[j] <= 0.0 {
+                return None;
+            }
+            let rigid = plant.rigid();
+            braked = rigid.viscous[j] * speed + rigid.coulomb[j].max(0.0) * speed.signum();
+        }
+        let carried: f64 = (0..j).map(|i| to.dq[i] - from.dq[i]).sum();
+        let gained = to.dq[j] - from.dq[j] + transmission.coupling_ratio * carried;
+        let passed = torque.at(0.5) - braked - transmission.inertia * gained / h;
+        Some((passed - transmission.damping * rate) / transmission.stiffness)
+    }
 }
 
 /// These latent states with rigid flanks: a rotor behind a flank is put onto it.
