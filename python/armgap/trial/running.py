@@ -6,11 +6,9 @@ the case (its seal) and to the software (its version), and is no failure. Keys s
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import TimeoutError as TookTooLong
-from contextlib import contextmanager
 from pathlib import Path
 
 from armgap.errors import ArmgapError, ResultError
@@ -21,12 +19,12 @@ from armgap.trial.key import sealed_hash
 from armgap.trial.layout import ANSWERS
 from armgap.trial.methods import Method, methods
 from armgap.trial.sealed import SealedCase, case_folders
+from armgap.workers import one_thread
 
 __all__ = ["ANSWERS", "LIMIT_S", "answer_cases", "answer_file", "open_cases"]
 
 #: Longest time for one case, s.
 LIMIT_S = 300.0
-THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS")
 
 
 def answer_file(case: Path, method: str) -> Path:
@@ -62,7 +60,7 @@ def answer_cases(
     """
     if not cases:
         return
-    with _one_thread(), worker_pool(min(workers, len(cases))) as pool:
+    with one_thread(), worker_pool(min(workers, len(cases))) as pool:
         futures = [pool.schedule(_answer, args=[str(c), method.name], timeout=limit_s) for c in cases]
         try:
             for case, future in zip(cases, futures, strict=True):
@@ -98,20 +96,6 @@ def _answer(case: str, name: str) -> Answer:
     except (ArmgapError, ArithmeticError, ValueError, RuntimeError, LookupError) as error:
         answer = Answer(name, "none", error=f"{type(error).__name__}: {error}")
     return answer.stamped(sealed_hash(case), method.version(), time.process_time() - start)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Let processes started meanwhile use one thread each; libraries read this when they are loaded."""
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            os.environ.pop(name, None)
-            if value is not None:
-                os.environ[name] = value
 
 
 def _answered(case: Path, method: Method) -> bool:

@@ -1,0 +1,67 @@
+"""``armgap fleet``."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+from armgap.cli.common import console, quiet_option
+from armgap.cli.files import Command, InputFile, OutputFolder, Words
+from armgap.cli.progress import working
+from armgap.fleet.engines import ENGINES
+from armgap.fleet.folder import LIMIT_S, belongs
+from armgap.progress import report_progress
+
+__all__ = ["command"]
+
+
+@click.command("fleet", cls=Command)
+@click.argument("manifest", type=InputFile(), metavar="MANIFEST")
+@click.option("-o", "--output", "folder", type=OutputFolder(belongs), required=True, metavar="FOLDER", help="Where to.")
+@click.option(
+    "--engine", type=click.Choice(list(ENGINES)), default="local", show_default=True, help="Where to compute."
+)
+@click.option("--address", type=Words(), metavar="HOST:PORT", help="A Ray cluster that runs already.")
+@click.option(
+    "--workers", type=click.IntRange(min=1), default=os.cpu_count() or 1, show_default="all cores", help="Processes."
+)
+@click.option("--horizon", type=click.FloatRange(min=0, min_open=True), help="Prediction horizon [s].")
+@click.option(
+    "--limit",
+    "limit_s",
+    type=click.FloatRange(min=0, min_open=True),
+    default=LIMIT_S,
+    show_default=True,
+    help="Longest time for one entry [s].",
+)
+@click.option("--again", is_flag=True, help="Diagnose also what stands in the folder.")
+@quiet_option
+def command(manifest: str, folder: Path, engine: str, horizon: float | None, quiet: bool, **options: Any) -> None:
+    """Diagnose every entry of a manifest: who has what, what drifts, which robot is the odd one.
+
+    The MANIFEST is CSV, Parquet or TOML with the columns robot, arm, logs, holdout, time; several logs are separated by ;.
+    A run that was interrupted goes on where it stopped.
+    """
+    from armgap.fleet import read_manifest, run_fleet
+
+    def progress(done: int, total: int) -> None:
+        report_progress(f"{done} of {total} entries", done / max(total, 1))
+
+    entries = read_manifest(manifest)
+    settings = {} if horizon is None else {"horizon": horizon}
+    with working("reading the manifest", quiet=quiet):
+        fleet = run_fleet(entries, folder, settings, engine=engine, progress=progress, **options)
+    if quiet:
+        return
+    say = console()
+    stood = len(entries) - fleet.answered
+    say.print(
+        f"{len(entries)} entries: {fleet.answered} diagnosed now, {stood} stood there, {fleet.failed.height} without a diagnosis",
+        highlight=False,
+    )
+    for row in fleet.failed.to_dicts():
+        say.print(f"{row['robot']} {row['time'] or ''}: {row['error']}", highlight=False, markup=False)
+    say.print(f"tables and page: {fleet.folder}", highlight=False, markup=False)

@@ -1,0 +1,173 @@
+"""The folder of a fleet: one diagnosis per entry, the tables and the page. What stands in it is not computed again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from armgap.errors import OptionError, ResultError
+from armgap.fleet.engines import ENGINES
+from armgap.fleet.manifest import Entry
+from armgap.fleet.tables import PARAMETERS, SUMMARY, failed_row, parameter_rows, summary_rows
+from armgap.fleet.work import Outcome, content_key
+from armgap.output import write
+
+__all__ = ["LIMIT_S", "Fleet", "belongs", "run_fleet"]
+
+LIMIT_S = 600.0
+"""Longest time for one entry [s]."""
+_DIAGNOSES = "diagnoses"
+_SUMMARY, _PARAMETERS, _PAGE = "summary.parquet", "parameters.parquet", "index.html"
+
+
+def belongs(path: Path) -> bool:
+    """Whether an entry of the folder is one that a fleet writes."""
+    return path.name in (_DIAGNOSES, _SUMMARY, _PARAMETERS, _PAGE)
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """What a manifest came to.
+
+    Attributes
+    ----------
+    folder : Path
+        Where everything lies.
+    summary, parameters : polars.DataFrame
+        The tables, see docs/formats.md.
+    answered : int
+        Entries diagnosed by this run; the others stood in the folder.
+    """
+
+    folder: Path
+    summary: pl.DataFrame
+    parameters: pl.DataFrame
+    answered: int
+
+    @property
+    def failed(self) -> pl.DataFrame:
+        """Entries without a diagnosis, and why."""
+        return self.summary.filter(pl.col("error").is_not_null())
+
+
+def run_fleet(
+    entries: Sequence[Entry],
+    folder: str | Path,
+    settings: Mapping[str, Any] | None = None,
+    *,
+    engine: str = "local",
+    workers: int = 1,
+    limit_s: float = LIMIT_S,
+    address: str | None = None,
+    again: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Fleet:
+    """Diagnose every entry that the folder does not hold yet, and write tables and page.
+
+    Parameters
+    ----------
+    entries : sequence of Entry
+        See `read_manifest`.
+    folder : path-like
+        Made if it is not there. Results belong to the content of logs and arm file, the settings and the version; entries whose process
+        died or took too long are tried again by the next run.
+    settings : mapping, optional
+        Keyword arguments of `armgap.diagnose`, such as ``horizon``.
+    engine : str, default "local"
+        ``"local"``: processes of this machine; ``"ray"``: a Ray cluster.
+    workers : int, default 1
+        Processes.
+    limit_s : float, default 600
+        Longest time for one entry on this machine [s].
+    address : str, optional
+        Of a Ray cluster that runs already.
+    again : bool, default False
+        Diagnose also what stands in the folder.
+    progress : callable, optional
+        Is told how many entries are done, and of how many.
+
+    Raises
+    ------
+    OptionError
+        If the engine is not known, or a number is impossible.
+    ResultError
+        If the folder cannot be written to.
+    """
+    if engine not in ENGINES:
+        raise OptionError(f"`{engine}` is no engine", remedy=f"known: {', '.join(ENGINES)}")
+    if workers < 1 or limit_s <= 0:
+        raise OptionError("workers and the time limit must be above zero", remedy="give 1 or more")
+    folder = Path(folder)
+    place = folder / _DIAGNOSES
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ResultError(f"cannot be made ({error.strerror or error})", remedy="choose another", file=place) from None
+    settings = dict(settings or {})
+    keys = {entry: content_key(entry, settings) for entry in entries}
+    lost: dict[str, Outcome] = {}
+    open_entries = {key: entry for entry, key in keys.items() if again or not _stands(place, key)}
+    say = progress or (lambda done, total: None)
+    say(0, len(open_entries))
+    if open_entries:
+        run = ENGINES[engine](
+            list(open_entries.values()),
+            settings,
+            workers=min(workers, len(open_entries)),
+            limit_s=limit_s,
+            address=address,
+        )
+        for count, (entry, outcome) in enumerate(run, start=1):
+            if "lost" in outcome:
+                lost[keys[entry]] = outcome
+            else:
+                _keep(place, keys[entry], outcome)
+            say(count, len(open_entries))
+    return _written(folder, keys, lost, len(open_entries))
+
+
+def _file(place: Path, key: str, *, failed: bool = False) -> Path:
+    return place / f"{key}.{'error.json' if failed else 'json'}"
+
+
+def _stands(place: Path, key: str) -> bool:
+    return _file(place, key).is_file() or _file(place, key, failed=True).is_file()
+
+
+def _keep(place: Path, key: str, outcome: Outcome) -> None:
+    if "diagnosis" in outcome:
+        write(_file(place, key), outcome["diagnosis"])
+        _file(place, key, failed=True).unlink(missing_ok=True)
+    else:
+        write(_file(place, key, failed=True), json.dumps({k: outcome[k] for k in ("error", "seconds")}))
+        _file(place, key).unlink(missing_ok=True)
+
+
+def _written(folder: Path, keys: Mapping[Entry, str], lost: Mapping[str, Outcome], answered: int) -> Fleet:
+    """Make tables and page of what stands in the folder, one diagnosis in memory at a time."""
+    from armgap.fleet.page import fleet_document
+    from armgap.report.output import render_report
+
+    summary: list[dict[str, Any]] = []
+    parameters: list[dict[str, Any]] = []
+    for entry, key in keys.items():
+        if key in lost:
+            summary.append(failed_row(entry, lost[key]["lost"], lost[key]["seconds"]))
+        elif (file := _file(folder / _DIAGNOSES, key)).is_file():
+            diagnosis = json.loads(file.read_text(encoding="utf-8"))
+            summary += summary_rows(entry, diagnosis)
+            parameters += parameter_rows(entry, diagnosis)
+        else:
+            failed = json.loads(_file(folder / _DIAGNOSES, key, failed=True).read_text(encoding="utf-8"))
+            summary.append(failed_row(entry, failed["error"], failed["seconds"]))
+    tables = pl.DataFrame(summary, schema=SUMMARY), pl.DataFrame(parameters, schema=PARAMETERS)
+    for name, table in zip((_SUMMARY, _PARAMETERS), tables, strict=True):
+        write(folder / name, table.write_parquet)
+    fleet = Fleet(folder, *tables, answered)
+    write(folder / _PAGE, render_report(fleet_document(fleet), {}, _PAGE))
+    return fleet

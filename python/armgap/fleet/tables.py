@@ -1,0 +1,72 @@
+"""Rows of the tables: one per named cause, and one per parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import polars as pl
+
+from armgap.fleet.manifest import Entry
+
+__all__ = ["PARAMETERS", "SUMMARY", "failed_row", "parameter_rows", "summary_rows"]
+
+Row = dict[str, Any]
+SUMMARY: dict[str, type[pl.DataType]] = {
+    "robot": pl.String,
+    "time": pl.String,
+    "verdict": pl.String,
+    "effect": pl.String,
+    "joint": pl.Int64,
+    "probability": pl.Float64,
+    "closed": pl.Float64,
+    "unexplained": pl.Float64,
+    "seconds": pl.Float64,
+    "error": pl.String,
+}
+"""Columns of ``summary.parquet``: one row per named cause; without one, or where the entry failed, one row with an empty effect."""
+PARAMETERS: dict[str, type[pl.DataType]] = {
+    "robot": pl.String,
+    "time": pl.String,
+    "of": pl.String,
+    "name": pl.String,
+    "value": pl.Float64,
+    "sigma": pl.Float64,
+    "unit": pl.String,
+}
+"""Columns of ``parameters.parquet``; `of` is ``arm`` or ``effect:joint``."""
+
+
+def summary_rows(entry: Entry, diagnosis: dict[str, Any]) -> list[Row]:
+    """Return the rows of an entry's diagnosis."""
+    gap = diagnosis["gap"]
+    of_entry = {
+        **_empty(entry),
+        "verdict": diagnosis["verdict"],
+        "closed": gap["closed"],
+        "unexplained": gap["unexplained"],
+        "seconds": diagnosis["seconds"],
+    }
+    named = [{"effect": c["effect"], "joint": c["joint"], "probability": c["probability"]} for c in diagnosis["causes"]]
+    return [{**of_entry, **cause} for cause in named] or [of_entry]
+
+
+def failed_row(entry: Entry, error: str, seconds: float | None) -> Row:
+    """Return the row of an entry without a diagnosis."""
+    return {**_empty(entry), "seconds": seconds, "error": error}
+
+
+def _empty(entry: Entry) -> Row:
+    return {**dict.fromkeys(SUMMARY), "robot": entry.robot, "time": entry.time or None}
+
+
+def parameter_rows(entry: Entry, diagnosis: dict[str, Any]) -> Iterator[Row]:
+    """Yield the re-estimated parameters of the arm, and those of its named causes."""
+    place = {"robot": entry.robot, "time": entry.time or None}
+    arm = diagnosis["parameters"]["with_causes"]
+    found = [("arm", name, value) for name, value in arm.items()]
+    for cause in diagnosis["causes"]:
+        of = f"{cause['effect']}:{cause['joint'] or ''}"
+        found += [(of, name, value) for name, value in cause["parameters"].items()]
+    for of, name, value in found:
+        yield {**place, "of": of, "name": name, **{key: value.get(key) for key in ("value", "sigma", "unit")}}

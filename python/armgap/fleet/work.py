@@ -1,0 +1,77 @@
+"""One entry diagnosed in a process of its own; what goes wrong with it is a sentence, not the end of the fleet."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from armgap import __version__
+from armgap.errors import ArmgapError
+from armgap.fleet.manifest import Entry, is_url
+
+__all__ = ["Outcome", "answer", "content_key"]
+
+Outcome = dict[str, Any]
+"""``diagnosis``, the JSON text, or ``error``, one line; and ``seconds``."""
+_READERS: dict[str, Callable[[str], pl.DataFrame]] = {".parquet": pl.read_parquet, ".csv": pl.read_csv}
+
+
+def content_key(entry: Entry, settings: Mapping[str, Any]) -> str:
+    """Return what a result belongs to: the content of the files, the settings and the version; of a URL its text.
+
+    A file that cannot be read counts by its name, so that the entry is tried again once it is there.
+    """
+    mark = hashlib.sha256(json.dumps([__version__, dict(settings), len(entry.logs)], sort_keys=True).encode())
+    for place in entry.files:
+        mark.update(_digest(place))
+    return mark.hexdigest()[:24]
+
+
+def _digest(place: str) -> bytes:
+    if is_url(place):
+        return hashlib.sha256(place.encode()).digest()
+    try:
+        with open(place, "rb") as file:
+            return hashlib.file_digest(file, "sha256").digest()
+    except OSError:
+        return hashlib.sha256(f"missing {place}".encode()).digest()
+
+
+def answer(entry: Entry, settings: Mapping[str, Any]) -> Outcome:
+    """Diagnose an entry.
+
+    Parameters
+    ----------
+    entry : Entry
+        Arm and logs.
+    settings : mapping
+        Keyword arguments of `armgap.diagnose`.
+    """
+    import armgap
+
+    start = time.perf_counter()
+    try:
+        logs, holdout = ([_source(place) for place in places] for places in (entry.logs, entry.holdout))
+        found = armgap.diagnose(logs, Path(entry.arm), holdout=holdout or None, **settings)
+        outcome: Outcome = {"diagnosis": found.to_json()}
+    except ArmgapError as error:
+        outcome = {"error": str(error)}
+    except Exception as error:  # one entry must not end the others; what it was stands in its row
+        outcome = {"error": f"{type(error).__name__}: {' '.join(str(error).split())}"}
+    return {**outcome, "seconds": time.perf_counter() - start}
+
+
+def _source(place: str) -> Any:
+    """A path as it is; of a URL the table that polars reads there."""
+    if not is_url(place):
+        return Path(place)
+    suffix = Path(place.partition("?")[0]).suffix.lower()
+    if suffix not in _READERS:
+        raise ArmgapError(f"`{place}` is no log that is read from a URL", remedy=f"use {' or '.join(_READERS)}")
+    return _READERS[suffix](place)

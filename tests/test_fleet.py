@@ -1,0 +1,225 @@
+"""Fleets: manifests, entries that fail, restarts, tables, what drifts and which robot is the odd one."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from armgap import Arm
+from armgap.errors import OptionError
+from armgap.fleet import Entry, Fleet, read_manifest, run_fleet
+from armgap.fleet.drift import drifts, odd_ones
+from armgap.fleet.manifest import ManifestError
+from armgap.fleet.page import fleet_document, moving, odd
+from armgap.fleet.tables import PARAMETERS, SUMMARY
+from swings import off, swing
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory, pendulum: Arm) -> Path:
+    """A manifest of four visits of two robots and two broken entries, with its files."""
+    folder = tmp_path_factory.mktemp("fleet")
+    (folder / "arm.toml").write_text(pendulum.to_toml(), encoding="utf-8")
+    for seed in (1, 2, 3, 4):
+        swing(off(pendulum), seed).write(folder / f"run-{seed}.parquet")
+    (folder / "broken.csv").write_text("nothing\n", encoding="utf-8")
+    rows = [
+        ("north", "run-1.parquet", "run-2.parquet", "2026-01-01"),
+        ("north", "run-3.parquet", "", "2026-01-02"),
+        ("south", "run-2.parquet;run-3.parquet", "run-1.parquet", "2026-01-01"),
+        ("south", "run-4.parquet", "", "2026-01-02"),
+        ("west", "broken.csv", "", "2026-01-01"),
+        ("west", "run-9.parquet", "", ""),
+    ]
+    lines = ["robot,arm,logs,holdout,time", *(f"{r},arm.toml,{logs},{held},{t}" for r, logs, held, t in rows)]
+    (folder / "manifest.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def fleet(place: Path) -> Fleet:
+    return run_fleet(read_manifest(place / "manifest.csv"), place / "out", workers=2)
+
+
+def test_every_entry_has_its_rows(fleet: Fleet, place: Path) -> None:
+    assert fleet.answered == 6
+    assert dict(fleet.summary.schema) == SUMMARY
+    assert dict(fleet.parameters.schema) == PARAMETERS
+    assert set(fleet.summary["robot"]) == {"north", "south", "west"}
+    assert fleet.failed["robot"].to_list() == ["west", "west"]
+    assert all("\n" not in error for error in fleet.failed["error"])
+    assert "run-9.parquet" in fleet.failed["error"][1]
+    good = fleet.summary.filter(pl.col("error").is_null())
+    assert good["verdict"].null_count() == 0
+    assert fleet.parameters.filter(pl.col("of") == "arm").group_by(["robot", "time"]).len()["len"].to_list() == [4] * 4
+    for name, table in (("summary", fleet.summary), ("parameters", fleet.parameters)):
+        assert pl.read_parquet(place / "out" / f"{name}.parquet").equals(table)
+    assert "West" in (place / "out" / "index.html").read_text(encoding="utf-8").title()
+    diagnoses = [p for p in (place / "out" / "diagnoses").iterdir() if not p.name.endswith(".error.json")]
+    assert len(diagnoses) == 4
+    assert all(json.loads(p.read_text(encoding="utf-8"))["schema"].startswith("armgap") for p in diagnoses)
+
+
+def test_a_second_run_computes_nothing_and_says_the_same(fleet: Fleet, place: Path) -> None:
+    entries = read_manifest(place / "manifest.csv")
+    again = run_fleet(entries, place / "out", workers=2)
+    assert again.answered == 0
+    assert again.summary.equals(fleet.summary)
+    # By content: another order and other names of the same files are the same diagnoses, other settings are not.
+    (place / "copy.parquet").write_bytes((place / "run-3.parquet").read_bytes())
+    moved = [Entry("north", entries[1].arm, (str(place / "copy.parquet"),), (), "", 1)]
+    assert run_fleet(moved, place / "out").answered == 0
+    assert run_fleet(moved, place / "out", {"horizon": 0.2}).answered == 1
+
+
+def test_a_failed_entry_is_tried_again_once_its_file_is_there(fleet: Fleet, place: Path) -> None:
+    entries = read_manifest(place / "manifest.csv")[5:]
+    (place / "run-9.parquet").write_bytes((place / "run-4.parquet").read_bytes())
+    mended = run_fleet(entries, place / "out")
+    assert mended.failed.height == 0
+    (place / "run-9.parquet").unlink()
+
+
+def test_an_entry_that_takes_too_long_is_lost_and_tried_again(place: Path) -> None:
+    entries = read_manifest(place / "manifest.csv")[:1]
+    lost = run_fleet(entries, place / "slow", limit_s=0.01)
+    assert "took longer" in lost.failed["error"][0]
+    assert run_fleet(entries, place / "slow").failed.height == 0
+
+
+def test_a_run_that_was_killed_goes_on(place: Path) -> None:
+    words = [
+        sys.executable,
+        "-c",
+        "from armgap.cli import main; main()",
+        "fleet",
+        str(place / "manifest.csv"),
+        "-o",
+        str(place / "killed"),
+        "--workers",
+        "1",
+    ]
+    running = subprocess.Popen(words, start_new_session=True, stdout=subprocess.DEVNULL)
+    diagnoses = place / "killed" / "diagnoses"
+    for _ in range(100):
+        if diagnoses.is_dir() and any(diagnoses.glob("*.json")):
+            break
+        time.sleep(0.1)
+    os.killpg(running.pid, signal.SIGKILL)
+    running.wait()
+    stood = len(list(diagnoses.glob("*.json")))
+    assert stood > 0
+    after = run_fleet(read_manifest(place / "manifest.csv"), place / "killed", workers=2)
+    assert after.answered == 6 - stood
+
+
+def test_the_command(fleet: Fleet, place: Path, run: Callable[..., tuple[int, str, str]]) -> None:
+    status, out, _ = run("fleet", str(place / "manifest.csv"), "-o", str(place / "out"))
+    assert status == 0
+    assert "6 entries" in out
+    assert "broken.csv" in out
+    status, _, err = run(
+        "fleet", str(place / "manifest.csv"), "-o", str(place / "out"), "--address", "here:1", "--again"
+    )
+    assert (status, "--engine ray" in err) == (2, True)
+
+
+def test_forms_of_a_manifest(place: Path) -> None:
+    csv = read_manifest(place / "manifest.csv")
+    pl.read_csv(place / "manifest.csv").write_parquet(place / "manifest.parquet")
+    assert read_manifest(place / "manifest.parquet") == csv
+    tables = [
+        f'[[entry]]\nrobot = "{e.robot}"\narm = "arm.toml"\nlogs = {json.dumps([Path(p).name for p in e.logs])}\n'
+        f'holdout = {json.dumps([Path(p).name for p in e.holdout])}\ntime = "{e.time}"\n'
+        for e in csv
+    ]
+    (place / "manifest.toml").write_text("\n".join(tables), encoding="utf-8")
+    assert read_manifest(place / "manifest.toml") == csv
+    assert csv[2].logs == (str(place / "run-2.parquet"), str(place / "run-3.parquet"))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("robot,arm\na,b\n", "`logs`.*is missing"),
+        ("robot,arm,logs\n", "holds no entry"),
+        ("robot,arm,logs\na,,c\n", "`arm`.*row 1.*is empty"),
+        ("robot,arm,logs,time\na,b,c,noon\n", "`time`.*row 1.*`noon` is no time"),
+        ("robot,arm,logs,colour\na,b,c,red\n", "`colour`.*is no column"),
+    ],
+)
+def test_manifests_that_are_none(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "m.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(ManifestError, match=said):
+        read_manifest(tmp_path / "m.csv")
+
+
+def test_what_is_no_manifest(tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match=r"\.csv, \.parquet, \.toml"):
+        read_manifest(tmp_path / "m.xls")
+    with pytest.raises(ManifestError, match="cannot be read"):
+        read_manifest(tmp_path / "m.csv")
+
+
+def fleet_of(rng: np.random.Generator, robot: int | None, robots: int = 20, visits: int = 30) -> np.ndarray:
+    """Friction of a fleet with a scatter of 10 %; that of one robot rises by 3 % per visit from visit 10."""
+    values = np.exp(0.1 * rng.standard_normal((robots, visits)) + 0.1 * rng.standard_normal(visits))
+    if robot is not None:
+        values[robot, 10:] *= 1.03 ** np.arange(1, visits - 9)
+    return values
+
+
+def test_friction_that_rises_is_found_and_nothing_else() -> None:
+    rng = np.random.default_rng(2)
+    found, false = 0, 0
+    for _ in range(50):
+        robot = int(rng.integers(20))
+        named = [d.robot for d in drifts(fleet_of(rng, robot))]
+        found += robot in named
+        false += any(r != robot for r in named) or bool(drifts(fleet_of(rng, None)))
+    assert found >= 45
+    assert false <= 2
+
+
+def test_a_drift_says_since_when_and_how_fast() -> None:
+    [drift] = drifts(fleet_of(np.random.default_rng(5), 7))
+    assert drift.robot == 7
+    assert abs(drift.onset - 10) <= 4
+    assert drift.rate == pytest.approx(0.03, rel=0.4)
+
+
+def test_a_robot_far_from_the_others_is_odd() -> None:
+    values = fleet_of(np.random.default_rng(3), None)
+    assert odd_ones(values) == []
+    values[4] *= 2.0
+    [(robot, apart)] = odd_ones(values)
+    assert robot == 4
+    assert apart > 5
+    assert odd_ones(values[:3]) == []
+
+
+def test_the_page_says_what_moves() -> None:
+    values = fleet_of(np.random.default_rng(5), 7)
+    values[3] *= 3.0
+    rows = [
+        (f"robot {i}", f"2026-01-{k + 1:02d}T00:00:00", "arm", "coulomb1", float(v), 0.05, "N m")
+        for i, row in enumerate(values)
+        for k, v in enumerate(row)
+    ]
+    parameters = pl.DataFrame(rows, schema=PARAMETERS, orient="row")
+    assert [(robot, name) for robot, _, name, _, _ in moving(parameters)] == [("robot 7", "coulomb1")]
+    assert next(odd(parameters))[:3] == ("robot 3", "arm", "coulomb1")
+    row = ("robot 7", None, "none", None, None, None, 0.0, 0.0, 0.1, None)
+    document = fleet_document(Fleet(Path(), pl.DataFrame([row], schema=SUMMARY, orient="row"), parameters, 0))
+    assert "robot 7" in document.answers[0].headline
+    assert "robot 3" in document.answers[1].headline
