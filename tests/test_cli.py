@@ -24,6 +24,7 @@ IMPORT_LIMIT_S = 0.6
 PROMISED = {
     "bench",
     "export",
+    "fleet",
     "compare",
     "replay",
     "inspect",

@@ -107,7 +107,7 @@ def _as_they_come(
     while running:
         done = first(list(running))
         entry = running.pop(done)
-        running |= {submit(following): following for following in islice(waiting, 1)}
+        running |= {submit(next_entry): next_entry for next_entry in islice(waiting, 1)}
         yield entry, result(done)
 
 

@@ -22,15 +22,16 @@ __all__ = ["fleet_document", "moving", "odd"]
 # Charts and rows that are shown; the tables hold all of them.
 _CHARTS, _ROWS = 6, 40
 _EMPTY = "-"
+_MIDNIGHT = "T00:00:00"
 
 
 def fleet_document(fleet: Fleet) -> Document:
     """Return the page of a fleet."""
     robots = fleet.summary["robot"].n_unique()
-    entries = fleet.summary.unique(["robot", "time", "error", "seconds"]).height
     moves, strangers = list(moving(fleet.parameters)), list(odd(fleet.parameters))
-    failed = fleet.failed.height
-    lead = f"{entries} diagnoses of {robots} robots; {failed} entries without a diagnosis."
+    failed, done = fleet.failed.height, fleet.summary.filter(pl.col("error").is_null())
+    diagnoses = done.unique(["robot", "time", "seconds"]).height
+    lead = f"{diagnoses} diagnoses of {robots} robots; entries without one: {failed}."
     answers = [
         SummaryAnswer("What drifts?", *_listed([_moved(m) for m in moves], "nothing", "parameters that grow or fall steadily")),
         SummaryAnswer("Which robot is the odd one?", *_listed([_stranger(s) for s in strangers], "none", "values far from the other robots'")),
@@ -77,8 +78,11 @@ def _visits(table: pl.DataFrame) -> tuple[list[str], list[list[str]], np.ndarray
 
 def _moved(move: Move) -> str:
     robot, of, name, visits, drift = move
-    since = visits[drift.onset] or f"visit {drift.onset + 1}"
-    return f"{robot}: {_named(of, name)} by {100 * drift.rate:+.1f} % per visit since {since}"
+    return f"{robot}: {_named(of, name)} by {100 * drift.rate:+.1f} % per visit since {_since(visits, drift)}"
+
+
+def _since(visits: list[str], drift: Drift) -> str:
+    return visits[drift.onset].removesuffix(_MIDNIGHT) or f"visit {drift.onset + 1}"
 
 
 def _stranger(found: tuple[str, str, str, float]) -> str:
@@ -151,7 +155,7 @@ def _moving(parameters: pl.DataFrame, moves: list[Move]) -> Section:
         (
             robot,
             _named(of, name),
-            visits[d.onset] or f"visit {d.onset + 1}",
+            _since(visits, d),
             f"{100 * d.rate:+.1f} %",
             f"{d.evidence:.1f}",
         )
@@ -187,8 +191,8 @@ def _odd(strangers: list[tuple[str, str, str, float]]) -> Section:
 def _failures(failed: pl.DataFrame) -> Section | None:
     if not failed.height:
         return None
-    rows: list[tuple[str, ...]] = [(r["robot"], r["time"] or _EMPTY, r["error"]) for r in failed.to_dicts()]
+    rows: list[tuple[str, ...]] = [(r["robot"], (r["time"] or _EMPTY).removesuffix(_MIDNIGHT), r["error"]) for r in failed.to_dicts()]
     tables = [Table(("robot", "time", "why"), rows[:_ROWS])]
     if rows[_ROWS:]:
         tables.append(Table(("robot", "time", "why"), rows[_ROWS:], fold=f"{len(rows) - _ROWS} more"))
-    return Section("Entries without a diagnosis", text=[f"{failed.height} entries."], tables=tables)
+    return Section("Entries without a diagnosis", tables=tables)

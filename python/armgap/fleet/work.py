@@ -37,7 +37,7 @@ def _digest(place: str) -> bytes:
     if is_url(place):
         return hashlib.sha256(place.encode()).digest()
     try:
-        with open(place, "rb") as file:
+        with Path(place).open("rb") as file:
             return hashlib.file_digest(file, "sha256").digest()
     except OSError:
         return hashlib.sha256(f"missing {place}".encode()).digest()
