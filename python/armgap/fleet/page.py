@@ -191,7 +191,9 @@ def _odd(strangers: list[tuple[str, str, str, float]]) -> Section:
 def _failures(failed: pl.DataFrame) -> Section | None:
     if not failed.height:
         return None
-    rows: list[tuple[str, ...]] = [(r["robot"], (r["time"] or _EMPTY).removesuffix(_MIDNIGHT), r["error"]) for r in failed.to_dicts()]
+    rows: list[tuple[str, ...]] = [
+        (r["robot"], (r["time"] or _EMPTY).removesuffix(_MIDNIGHT), r["error"]) for r in failed.to_dicts()
+    ]
     tables = [Table(("robot", "time", "why"), rows[:_ROWS])]
     if rows[_ROWS:]:
         tables.append(Table(("robot", "time", "why"), rows[_ROWS:], fold=f"{len(rows) - _ROWS} more"))

@@ -41,8 +41,9 @@ const WORST_START: f64 = 100.0;
 /// of some hundred values the mean square scatters by 15 %.
 const CONSISTENT: f64 = 1.5;
 
-/// A displaced initial state explains a window if it leaves less than this part of the squared errors. Of the errors of a constant torque that
-/// the model lacks it leaves 1/36; where starts erred at kinks of the motion it left 1e-6 to 2e-4.
+/// Beside a start that erred by more than its covariance says, a window is explained where noise is all that a displaced one leaves, and that is less
+/// than this part of the squared errors. Of the errors of a constant torque that the model lacks it leaves 1/36; where starts erred at kinks of
+/// the motion it left 1e-6 to 2e-4.
 const DISPLACED_SHARE: f64 = 0.003;
 
 /// Predictions on the holdout from measured initial states, and their squared errors.
@@ -137,8 +138,9 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         .iter()
         .zip(costs.iter().zip(&left))
         .map(|(w, (cost, left))| {
+            let noise = CONSISTENT * (w.rows() * N) as f64;
             let missed = squares(&[&residual[w.range()]])[0];
-            *cost < CONSISTENT * (w.rows() * N) as f64 || *left < DISPLACED_SHARE * missed
+            *cost < noise || (*left < noise && *left < DISPLACED_SHARE * missed)
         })
         .collect();
     let explained = 2 * consistent.iter().filter(|c| **c).count() > consistent.len();
