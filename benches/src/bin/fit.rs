@@ -47,6 +47,9 @@ fn fitted(log: &Log) -> Option<Estimate> {
         counts_per_rev: None,
         torque_limit: None,
         link_length: Some(vec![0.45, 0.45]),
+        encoder_at_motor: None,
+        friction_at_motor: None,
+        gear_ratio: None,
     };
     let work = OutputError { t: &log.t, q: &log.q, tau: &log.tau, horizon: HORIZON, steps: Some(&log.steps) };
     arm.dispatch(work).flatten()
