@@ -46,7 +46,8 @@ def held(log: Log, rows: int) -> Log:
 
 @pytest.mark.parametrize("rows", [2, 3, 5])
 def test_held_positions_do_not_pass_for_noise(pendulum: Arm, rows: int) -> None:
-    data = as_they_stand(pendulum, held(swing(off(pendulum), 1), rows), held(swing(off(pendulum), 2), rows))
+    logs = [held(swing(off(pendulum), seed), rows) for seed in (1, 2)]
+    data = as_they_stand(pendulum, *logs, max_causes=0)
     [floor], [after] = data["gap"]["floor"], data["gap"]["after"]
     assert data["noise"]["position_sigma"][0] < 1.4 * 2e-4
     assert after > SEVERAL * floor

@@ -93,14 +93,14 @@ def confirmed(
 
     From there the shift moves on, a sample at a time, for as long as predictions clearly gain. Beside a large unmodelled effect they hardly
     change with a shift, so they need not gain where the equation of motion has found several samples: only not lose. A single sample may be the
-    doing of an effect, so there predictions decide.
+    doing of an effect, so there predictions decide, and only where they are clearly worse on either side.
     """
     period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
     as_is = Refit.of(arm, training, holdout, horizon)
 
     @cache
     def error(k: int) -> float:
-        if not 0 < k <= _LARGEST:
+        if k == 0 or abs(k) > _LARGEST:
             return 1.0 if k == 0 else math.inf
         corrections = Corrections(shift={"tau": -k * period})
         read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
@@ -109,7 +109,9 @@ def confirmed(
     best = samples if samples > 1 else 0
     while error(k := min((best - 1, best + 1), key=error)) < (_CLEARLY if best else _AT_FIRST) * error(best):
         best = k
-    if best == 0 or error(best) > _AS_GOOD:
+    if best <= 0 or error(best) > _AS_GOOD:
+        return None
+    if samples <= 1 and error(best) > _CLEARLY * error(best + 1):
         return None
     return Corrections(shift={"tau": float(f"{-best * period:.6g}")})
 
