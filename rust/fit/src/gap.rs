@@ -41,9 +41,9 @@ const WORST_START: f64 = 100.0;
 /// of some hundred values the mean square scatters by 15 %.
 const CONSISTENT: f64 = 1.5;
 
-/// Beside a start that erred by more than its covariance says, a window is explained where noise is all that a displaced one leaves, as it is in most
-/// windows, and that is less than this part of the squared errors. Of the errors of a constant torque that the model lacks it leaves 1/36; where
-/// starts erred at kinks of the motion it left 1e-6 to 2e-4.
+/// Beside a start that erred by more than its covariance says, a window is explained where noise is all that a displaced one leaves, and that is less
+/// than this part of the squared errors. Of the errors of a constant torque that the model lacks it leaves 1/36; where starts erred at kinks of
+/// the motion it left 1e-6 to 2e-4.
 const DISPLACED_SHARE: f64 = 0.003;
 
 /// Predictions on the holdout from measured initial states, and their squared errors.
@@ -133,21 +133,18 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let residual = weighting.residual(&measured, predicted);
     let costs = weighting.costs(data, &residual);
     let left = weighting.beside_free_states(data, &residual);
-    let noise = |w: &Window<N>| CONSISTENT * (w.rows() * N) as f64;
-    let most = |holds: &[bool]| 2 * holds.iter().filter(|h| **h).count() > holds.len();
-    // Where starts alone are wrong, noise is all that they leave in most windows.
-    let free: Vec<bool> = data.windows.iter().zip(&left).map(|(w, left)| *left < noise(w)).collect();
-    let only_starts = most(&free);
     let consistent: Vec<bool> = data
         .windows
         .iter()
-        .enumerate()
-        .map(|(i, w)| {
-            let displaced = left[i] < DISPLACED_SHARE * squares(&[&residual[w.range()]])[0];
-            costs[i] < noise(w) || (only_starts && free[i] && displaced)
+        .zip(costs.iter().zip(&left))
+        .map(|(w, (cost, left))| {
+            let noise = CONSISTENT * (w.rows() * N) as f64;
+            let missed = squares(&[&residual[w.range()]])[0];
+            *cost < noise || (*left < noise && *left < DISPLACED_SHARE * missed)
         })
         .collect();
-    let worst = if most(&consistent) { WORST_START } else { 1.0 };
+    let explained = 2 * consistent.iter().filter(|c| **c).count() > consistent.len();
+    let worst = if explained { WORST_START } else { 1.0 };
     let mut sum = [0.0; N];
     for (index, consistent) in consistent.into_iter().enumerate() {
         for (j, total) in sum.iter_mut().enumerate() {
