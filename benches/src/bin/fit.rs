@@ -39,18 +39,7 @@ fn log() -> Log {
 
 fn fitted(log: &Log) -> Option<Estimate> {
     let first: Vec<f64> = THETA.iter().zip(FIRST).map(|(x, f)| x * f).collect();
-    let arm = ArmDescription {
-        kind: ArmKind::TwoLink,
-        gravity: 9.81,
-        sigma: vec![1.0; first.len()],
-        theta: first,
-        counts_per_rev: None,
-        torque_limit: None,
-        link_length: Some(vec![0.45, 0.45]),
-        encoder_at_motor: None,
-        friction_at_motor: None,
-        gear_ratio: None,
-    };
+    let arm = ArmDescription::plain(ArmKind::TwoLink, 9.81, first, Some(vec![0.45, 0.45]));
     let work = OutputError { t: &log.t, q: &log.q, tau: &log.tau, horizon: HORIZON, steps: Some(&log.steps) };
     arm.dispatch(work).flatten()
 }

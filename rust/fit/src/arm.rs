@@ -45,6 +45,22 @@ pub trait WithArm {
 }
 
 impl ArmDescription {
+    /// An arm of which no more is known than its parameters, each trusted to one unit.
+    pub fn plain(kind: ArmKind, gravity: f64, theta: Vec<f64>, link_length: Option<Vec<f64>>) -> Self {
+        Self {
+            kind,
+            gravity,
+            sigma: vec![1.0; theta.len()],
+            theta,
+            counts_per_rev: None,
+            torque_limit: None,
+            link_length,
+            encoder_at_motor: None,
+            friction_at_motor: None,
+            gear_ratio: None,
+        }
+    }
+
     /// Smallest steps of the position measurement, where encoders are known.
     pub fn steps(&self) -> Option<Vec<f64>> {
         let whole = if self.kind.rotary() { std::f64::consts::TAU } else { 1.0 };

@@ -39,19 +39,7 @@ pub fn identify<'py>(
     let (q, tau) = (matrix(&q, "q", t.len(), n)?, matrix(&tau, "tau", t.len(), n)?);
     let dq = dq.as_ref().map(|dq| matrix(dq, "dq", t.len(), n)).transpose()?;
     let variant = if paper { Variant::Paper } else { Variant::Exact };
-    let sigma = vec![1.0; theta.len()];
-    let arm = ArmDescription {
-        kind,
-        gravity,
-        theta,
-        sigma,
-        counts_per_rev: None,
-        torque_limit: None,
-        link_length,
-        encoder_at_motor: None,
-        friction_at_motor: None,
-        gear_ratio: None,
-    };
+    let arm = ArmDescription::plain(kind, gravity, theta, link_length);
     let work = Identification { scheme, variant, cutoff, forgetting, p0, theta0: &theta0, t, q, tau, dq };
     let history = py
         .detach(|| arm.dispatch(work))

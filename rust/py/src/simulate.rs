@@ -37,18 +37,7 @@ pub fn simulate<'py>(
         return Err(PyValueError::new_err(format!("`q0` and `dq0` need {n} values")));
     }
     let effects = effect_instances(kind, effects)?;
-    let arm = ArmDescription {
-        kind,
-        gravity,
-        sigma: vec![1.0; theta.len()],
-        theta,
-        counts_per_rev: None,
-        torque_limit: None,
-        link_length,
-        encoder_at_motor: None,
-        friction_at_motor: None,
-        gear_ratio: None,
-    };
+    let arm = ArmDescription::plain(kind, gravity, theta, link_length);
     let rows = t.len();
     let (t, tau, q0, dq0) = (t.to_vec(), tau.to_vec(), q0.to_vec(), dq0.to_vec());
     let ended = with_progress(py, progress.as_ref(), move |observer| {
@@ -89,19 +78,7 @@ pub fn inertia<'py>(
     let (n, rows) = (kind.joints(), numpy::PyUntypedArrayMethods::shape(&*q)[0]);
     let q = matrix(&q, "q", rows, n)?;
     let effects = effect_instances(kind, effects)?;
-    let sigma = vec![1.0; theta.len()];
-    let arm = ArmDescription {
-        kind,
-        gravity,
-        theta,
-        sigma,
-        counts_per_rev: None,
-        torque_limit: None,
-        link_length,
-        encoder_at_motor: None,
-        friction_at_motor: None,
-        gear_ratio: None,
-    };
+    let arm = ArmDescription::plain(kind, gravity, theta, link_length);
     let found = arm.dispatch(InertiaMatrices { q, effects: &effects }).flatten().ok_or_else(|| {
         PyValueError::new_err("`theta` has the wrong length for this arm, or there are too many effects")
     })?;
