@@ -109,6 +109,41 @@ def test_a_factor_on_a_torque_column(two_links: list[Log], arm: Arm, factor: flo
     assert found * factor == pytest.approx(1.0, abs=0.15)
 
 
+def carried(arm: Arm, *hidden: Effect, scale: float = 1.0) -> list[Log]:
+    """Logs of an arm with strong effects."""
+    t = np.arange(2400) * arm.sample_period
+    torques = [scale * sines(t, seed) for seed in (3, 4)]
+    return [
+        simulate(off(arm), t, tau, effects=list(hidden), noise=2e-5, seed=seed, name=f"run {seed}")
+        for seed, tau in enumerate(torques)
+    ]
+
+
+def test_a_drive_that_saturates_far_below_its_command_has_no_other_unit(arm: Arm) -> None:
+    logs = carried(arm, Effect("torque_saturation", 2, {"level": 0.6}), scale=3.0)
+    base = EquationError([Rows.of(log, arm) for log in logs], arm)
+    assert (
+        not 0.5
+        < base.size_of(base.with_factors(*bounds(arm, 2.0), base.expected()).theta)[1] * base.expected()[1]
+        < 2.0
+    )
+    assert not any(c.check == "torque_unit" for c in checked(logs, arm))
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        (Effect("joint_spring", 1, {"k": 300.0, "q0": 0.2}), Effect("joint_spring", 2, {"k": 80.0, "q0": 0.2})),
+        (Effect("hardening_spring", 2, {"k": 10.0, "q0": 0.1, "cubic": 400.0}),),
+    ],
+)
+def test_strong_springs_are_no_other_reading_of_the_columns(arm: Arm, hidden: tuple[Effect, ...]) -> None:
+    logs = carried(arm, *hidden)
+    low, high = bounds(arm)
+    assert EquationError([Rows.of(log, arm) for log in logs], arm).fit(low, high).share.max() > 0.3, "not strong"
+    assert checked(logs, arm) == ()
+
+
 def test_parameters_that_are_all_three_times_off_are_left_to_the_fit(swings: list[Log], pendulum: Arm) -> None:
     scaled = replace(pendulum, theta=3 * pendulum.theta, sigma=3 * pendulum.sigma)
     assert [c.severity for c in checked(swings, scaled)] == ["warning"]

@@ -74,6 +74,8 @@ PLACE: dict[str, Check] = {
     "share": share,
     "regime": text,
     "detail": text,
+}
+RANGE: dict[str, Check] = {
     "range": lambda x: text(x["variable"]) and number(x["from"]) and number(x["to"]) and x["from"] < x["to"],
 }
 CAUSE: dict[str, Check] = {
@@ -98,7 +100,7 @@ def test_json_follows_the_schema(result):
     assert data["verdict"] in ("none", "parameters", "effect", "unexplained")
     follows(data["gap"], GAP)
     for place in data["where"]:
-        follows(place, PLACE)
+        follows(place, PLACE if place["regime"] == "everywhere" else {**PLACE, **RANGE})
     for cause in data["causes"]:
         follows(cause, CAUSE)
     for candidate in data["ruled_out"]:

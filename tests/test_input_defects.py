@@ -21,7 +21,7 @@ from input_defects.expected import Expected, Option, listed, remedies
 from input_defects.floors import contradicts
 from input_defects.judging import judged, wrong_effects
 from input_defects.making import keep, read
-from input_defects.true_floor import cut, measured_again, measured_start, true_floor
+from input_defects.true_floor import driven_by_torque, measured_again, measured_start, rows_of, true_floor
 
 PERIOD = 0.001
 THETA = {
@@ -309,9 +309,22 @@ def test_measured_starts_are_exact_on_a_cubic():
         np.testing.assert_allclose(rate, [2 - 6 * t[row] + 12 * t[row] ** 2, 0.0], atol=1e-6)
 
 
-def test_windows_follow_each_other():
-    windows = cut(PERIOD * np.arange(1001))
-    assert windows == [(0, 250), (250, 500), (500, 750), (750, 1000)]
+def test_rows_of_windows_follow_from_the_times_of_their_first_samples():
+    t = 3.0 + PERIOD * np.arange(1001)
+    assert rows_of(t, [PERIOD, 251 * PERIOD, 491 * PERIOD]) == [(0, 250), (250, 490), (490, 1000)]
+
+
+def test_starts_beside_a_jerky_torque_are_exact():
+    """Beside a cubic, the motion is that of a mass under a torque which jumps in every sample."""
+    t, rng = PERIOD * np.arange(400), np.random.default_rng(1)
+    tau = rng.standard_normal((400, 1))
+    speed = np.concatenate([[0.0], np.cumsum(PERIOD * tau[:-1, 0] / 0.5)])
+    q = np.concatenate([[0.0], np.cumsum(PERIOD * (speed[:-1] + 0.5 * PERIOD * tau[:-1, 0] / 0.5))]) + t**3
+    noise = np.array([1e-9])
+    driven = driven_by_torque({"inertial": {"theta": [0.5]}}, t, q[:, None], tau, noise)
+    for row in (0, 5, 200, 399):
+        start, rate = measured_start(t, q[:, None], row, noise, driven)
+        np.testing.assert_allclose([start[0], rate[0]], [q[row], speed[row] + 3 * t[row] ** 2], atol=1e-7)
 
 
 def test_the_true_floor_is_above_rounding_and_grows_with_the_noise(tmp_path):
@@ -323,7 +336,9 @@ def test_the_true_floor_is_above_rounding_and_grows_with_the_noise(tmp_path):
     for counts in (0.0, 4.0):
         rng = np.random.default_rng(1)
         noisy = measured_again(case, counts * step, rng)
-        floors.append(true_floor(noisy, counts * step, rng)["floor_cut"][0])
+        starts = {name: t.t[1::100] - t.t[0] for name, t in case.inputs.holdout.items()}
+        sigma = np.hypot(counts * step, step / math.sqrt(12))
+        floors.append(true_floor(noisy, counts * step, rng, starts, sigma)["floor_cut"][0])
         assert floors[-1] > math.hypot(counts * step[0], step[0] / math.sqrt(12))
     assert floors[1] > 2 * floors[0]
 

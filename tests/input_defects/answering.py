@@ -85,7 +85,10 @@ def answer_floor(folder: str, defect: str, seed: int) -> Record:
     noise = counts * case.truth.step
     case = measured_again(case, noise, rng)
     record = {**about(case), "version": build(), "defect": defect, "noise_counts": counts, **diagnosed(case.inputs)}
-    return {**record, "true": true_floor(case, noise, rng)}
+    if "cut" not in record:
+        return record
+    cut = record.pop("cut")
+    return {**record, "true": true_floor(case, noise, rng, cut["windows"], np.array(cut["sigma"]))}
 
 
 def about(case: Kept) -> Record:
@@ -137,4 +140,8 @@ def _kept(found: dict[str, Any]) -> Record:
         "gap": {key: found["gap"][key] for key in ("before", "refit", "after", "floor", "closed")},
         "notes": found["notes"],
         "findings": found["log_findings"],
+        "cut": {
+            "windows": {s["log"]: [s["t"][i] for i in s["window_start"]] for s in found["series"] if s["joint"] == 1},
+            "sigma": found["noise"]["position_sigma"],
+        },
     }

@@ -9,16 +9,18 @@ torque. What that run and the measurement differ by is the floor, without any mo
 The same is done for further draws of the noise: rounding with the encoder's counts elsewhere, `REPEATS` times.
 
 The start is measured by a local cubic as wide as the motion allows (intersection of confidence intervals, Goldenshluger and
-Nemirovski 1997); it is written here once more, after the description in docs/method.md and rust/fit/src/track.rs.
+Nemirovski 1997), of the positions without what the torque makes of them; that is written here once more, after the description in
+docs/method.md and rust/fit/src/track.rs. Where the windows begin, and how noisy it takes the positions to be, the diagnosis says.
 """
 
 from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,8 +33,6 @@ from armgap.trial.simulated_arm import SimulatedArm
 from .case import Array
 from .making import Kept
 
-#: Length of a window [s], the default of `armgap.diagnose`.
-HORIZON = 0.25
 #: Half widths of the local cubic [samples], and half width of the confidence intervals [standard deviations].
 HALF_WIDTHS = (3, 4, 6, 8, 11, 15, 20, 27)
 CONFIDENCE = 2.0
@@ -44,7 +44,9 @@ WORST = 10.0
 SAME = 1e-9
 
 
-def true_floor(case: Kept, noise: Array, rng: np.random.Generator) -> dict[str, list[float]]:
+def true_floor(
+    case: Kept, noise: Array, rng: np.random.Generator, starts: Mapping[str, Sequence[float]], deviation: Array
+) -> dict[str, list[float]]:
     """Return ``floor`` (of the log as it was measured), ``floor_drawn`` and ``floor_cut`` (of all draws, without and with bad starts cut),
     RMS per joint, and ``travel``: RMS displacement over a window.
 
@@ -56,13 +58,18 @@ def true_floor(case: Kept, noise: Array, rng: np.random.Generator) -> dict[str, 
         Standard deviation of white noise before rounding [rad or m].
     rng : numpy.random.Generator
         Of the further draws.
+    starts : mapping of str to sequence of float
+        Times of the first predicted samples of all windows of every holdout log, as the diagnosis cut it [s since its start].
+    deviation : ndarray, shape (n_joints,)
+        Standard deviation of a position as the diagnosis took it [rad or m]; it decides how wide the local cubics are.
     """
     squares, travels = [], []
-    deviation = np.sqrt(noise**2 + case.truth.step**2 / 12)
     for name, table in case.inputs.holdout.items():
-        windows, shown = cut(table.t), shown_by(_encoders(case, name), table.q_true)
+        driven = driven_by_torque(case.inputs.arm, table.t, table.q, table.tau, deviation)
+        windows = rows_of(table.t, starts[name])
+        shown = shown_by(_encoders(case, name), table.q_true)
         draws = [table.q, *(_measure(shown, noise, case.truth.step, rng, True) for _ in range(REPEATS))]
-        squares += list(_missed(case, name, windows, draws, deviation))
+        squares += list(_missed(case, name, windows, draws, driven, deviation))
         travels += [table.q_true[last] - table.q_true[first] for first, last in windows]
     per_window = np.array(squares)
     own = per_window[:: 1 + REPEATS]
@@ -115,7 +122,7 @@ def arm_of(case: Kept) -> TrialArm:
 
 
 def _missed(
-    case: Kept, name: str, windows: list[tuple[int, int]], draws: list[Array], deviation: Array
+    case: Kept, name: str, windows: list[tuple[int, int]], draws: list[Array], driven: Array, deviation: Array
 ) -> Iterator[Array]:
     """Mean square error of every window and draw, shape (n_joints,)."""
     table, encoders = case.inputs.holdout[name], _encoders(case, name)
@@ -129,7 +136,7 @@ def _missed(
             raise RuntimeError(f"{case.name}: the true motion is not made again")
         shown, rate = shown_by(encoders, true_q), rate_shown_by(encoders, true_q, table.dq_true[first])
         for q in draws:
-            start_q, start_dq = measured_start(table.t, q, first, deviation)
+            start_q, start_dq = measured_start(table.t, q, first, deviation, driven)
             run = _displaced(plant, rig, start_q - shown, start_dq - rate, table.tau[first:last])
             yield np.mean((q[first + 1 : last + 1] - shown_by(encoders, run)) ** 2, axis=0)
 
@@ -161,41 +168,95 @@ def _run(plant: Plant, rig: SimulatedArm, tau: Array) -> Array:
     return q
 
 
-def cut(t: Array, horizon: float = HORIZON) -> list[tuple[int, int]]:
-    """First and last rows of windows of about `horizon` seconds of an evenly sampled log."""
-    duration = float(t[-1] - t[0])
-    count = min(int(duration / horizon + 0.2), (len(t) - 1) // 4)
-    edges = np.searchsorted(t, t[0] + duration * np.arange(count + 1) / count - 1e-9)
-    edges = np.minimum(edges, len(t) - 1)
-    return [(int(a), int(b)) for a, b in itertools.pairwise(edges) if b > a]
+def rows_of(t: Array, starts: Sequence[float]) -> list[tuple[int, int]]:
+    """First and last rows of consecutive windows of a log whose first predicted samples have these times since its start."""
+    first = np.searchsorted(t - t[0], np.array(starts) - 1e-6) - 1
+    return list(itertools.pairwise([*map(int, first), len(t) - 1]))
 
 
-def measured_start(t: Array, q: Array, row: int, deviation: Array) -> tuple[Array, Array]:
+def _column(t: Array, q: Array, driven: Array, deviation: float, step: int = 1) -> list[_Cubic]:
+    return [_widest(t, q, driven, row, deviation) for row in range(0, len(t), step)]
+
+
+def driven_by_torque(arm: Mapping[str, Any], t: Array, q: Array, tau: Array, deviation: Array) -> Array:
+    """Accelerations that the torque gives the arm of an arm file, zero for joints whose positions are no smoother without their effect.
+
+    Returns
+    -------
+    ndarray, shape (n_samples, n_joints)
+    """
+    driven = np.linalg.solve(_inertia(arm, q), tau[:, :, None])[:, :, 0]
+    for j, noise in enumerate(deviation):
+        rough = [
+            np.mean([np.log(c.deviation) for c in _column(t, q[:, j], a, noise, step=7)])
+            for a in (np.zeros(len(t)), np.asarray(driven[:, j], dtype=float))
+        ]
+        if rough[1] >= rough[0]:
+            driven[:, j] = 0.0
+    return np.asarray(driven)
+
+
+def _inertia(arm: Mapping[str, Any], q: Array) -> Array:
+    """Inertia matrices (n_samples, n_joints, n_joints) of an arm file (Siciliano et al. 2009, eq. 7.82 for two links)."""
+    theta = arm["inertial"]["theta"]
+    if q.shape[1] == 1:
+        return np.full((len(q), 1, 1), theta[0])
+    coupled = theta[2] + theta[1] * np.cos(q[:, 1])
+    return np.array(
+        [[theta[0] + 2 * theta[1] * np.cos(q[:, 1]), coupled], [coupled, np.full(len(q), theta[2])]]
+    ).transpose(2, 0, 1)
+
+
+def measured_start(t: Array, q: Array, row: int, deviation: Array, driven: Array | None = None) -> tuple[Array, Array]:
     """Position and velocity of each joint at a row, from positions around it."""
-    found = [_local(t, column, row, float(s)) for column, s in zip(q.T, deviation, strict=True)]
-    return np.array([x for x, _ in found]), np.array([v for _, v in found])
+    driven = np.zeros_like(q) if driven is None else driven
+    found = [_widest(t, *joint[:2], row, float(joint[2])) for joint in zip(q.T, driven.T, deviation, strict=True)]
+    return np.array([c.position for c in found]), np.array([c.velocity for c in found])
 
 
-def _local(t: Array, q: Array, row: int, deviation: float) -> tuple[float, float]:
-    before = widest = _cubic(t, q, row, HALF_WIDTHS[0])
+def _widest(t: Array, q: Array, driven: Array, row: int, deviation: float) -> _Cubic:
+    """The cubic before the widest whose velocity agrees with those of all narrower ones."""
+    first = max(0, min(row - HALF_WIDTHS[-1], len(t) - 2 * HALF_WIDTHS[-1] - 1))
+    near = slice(first, first + 2 * HALF_WIDTHS[-1] + 1)
+    t, q, at = t[near] - t[row], q[near].copy(), row - first
+    if np.any(driven):
+        h, a = np.diff(t), driven[near][: len(t) - 1]
+        speed = np.concatenate([[0.0], np.cumsum(h * a)])
+        distance = np.concatenate([[0.0], np.cumsum(h * (speed[:-1] + 0.5 * h * a))])
+        q -= distance - distance[at] - speed[at] * t
+    before = widest = _cubic(t, q, at, HALF_WIDTHS[0])
     low, high = -np.inf, np.inf
     for half in (h for h in HALF_WIDTHS if 2 * h < len(t)):
-        local = _cubic(t, q, row, half)
-        radius = CONFIDENCE * deviation * local[2]
-        low, high = max(low, local[1] - radius), min(high, local[1] + radius)
+        local = _cubic(t, q, at, half)
+        radius = CONFIDENCE * deviation * local.deviation
+        low, high = max(low, local.velocity - radius), min(high, local.velocity + radius)
         if low > high:
             break
         before, widest = widest, local
-    return before[0], before[1]
+    return before
 
 
-def _cubic(t: Array, q: Array, row: int, half: int) -> tuple[float, float, float]:
+class _Cubic(NamedTuple):
     """Position, velocity, and the velocity's deviation for noise of one, from a cubic through the samples around a row."""
+
+    position: float
+    velocity: float
+    deviation: float
+    half: int
+
+
+def _cubic(t: Array, q: Array, row: int, half: int) -> _Cubic:
     count = min(2 * half + 1, len(t))
     first = min(max(row - half, 0), len(t) - count)
-    x = t[first : first + count] - t[row]
-    scale = float(x[-1] - x[0]) / 2
-    powers = np.vander(x / scale, 4, increasing=True)
-    inverse = np.linalg.inv(powers.T @ powers)
+    inverse, scale, powers = _powers(tuple(np.round(t[first : first + count] - t[row], 9).tolist()))
     c = inverse @ (powers.T @ (q[first : first + count] - q[row]))
-    return float(q[row] + c[0]), float(c[1] / scale), float(np.sqrt(inverse[1, 1]) / scale)
+    return _Cubic(float(q[row] + c[0]), float(c[1] / scale), float(np.sqrt(inverse[1, 1]) / scale), half)
+
+
+@lru_cache(maxsize=1000)
+def _powers(x: tuple[float, ...]) -> tuple[Array, float, Array]:
+    """Inverse of the normal matrix, scale and powers of a cubic at these times."""
+    scale = (x[-1] - x[0]) / 2
+    powers: Array = np.vander(np.array(x) / scale, 4, increasing=True)
+    inverse = np.asarray(np.linalg.inv(powers.T @ powers), dtype=float)
+    return inverse, scale, powers

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armgap.arm import Arm
 from armgap.check import dead_stretch, time_shift, torque_is_position, torque_unit
@@ -18,16 +19,21 @@ from armgap.progress import report_progress
 
 __all__ = ["Examined", "examine"]
 
-# Readings whose mean log share of unexplained torque differs by less are told apart by predictions.
+Array = NDArray[np.float64]
+
+# Readings whose mean log share of unexplained torque differs by less are told apart by predictions. One that explains less by this much than springs
+# and contacts do is none: weight that is read the wrong way is as good as a spring in many logs, so the other way round nothing is said.
 _CLOSE = 1.0
 # Rows of the equation of motion that a comparison needs.
 _FEWEST_ROWS = 100
 # Columns do not belong together if this share of a joint's torque stays unexplained. Effects of the library leave less than a tenth on
 # simulated logs, and less than a quarter on logs of a real arm.
 _UNRELATED = 0.5
-# Turns of a fit beside springs. A spring that takes most of a torque is found in the first; after five no share changed by more than 0.02 on nine
-# development cases (columns of another arm 0.5 to 1.1, a spring 0.7 before and 0.09 after).
+# Turns of a fit beside elastic torques. One that takes most of a torque is found in the first; after five no share changed by more than 0.02 on
+# nine development cases (columns of another arm 0.5 to 1.1, a spring 0.7 before and 0.09 after).
 _TURNS = 5
+# Positions are taken together in so many classes where a torque may be any function of them that does not fall.
+_CLASSES = 50
 
 
 @dataclass(frozen=True)
@@ -98,25 +104,26 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
     if len(base) < _FEWEST_ROWS:
         return now
     stands, suspects = screen(base, logs, now.arm)
-    factors = torque_unit.find(base, now.arm)
+    factors = torque_unit.find(base, logs, now.arm)
     if factors is not None and _prefers(factors, suspects, base, now, horizon):
         applied = factors.corrections if repair and factors.checks[0].severity == "repaired" else Corrections()
         said = [c if c.severity != "repaired" or repair else replace(c, severity="warning") for c in factors.checks]
         return _applied(replace(now, arm=_doubted(now.arm, factors)), applied, said)
+    elastic = _beside_elasticity(base, logs, now.arm) if suspects or stands.share.max() >= _UNRELATED else stands
+    suspects = [s for s in suspects if s.fit.cost < elastic.cost + _CLOSE]
     found = confirm(stands, suspects, now.training, now.holdout, now.arm, horizon)
     if found is None:
-        return _applied(now, Corrections(), _strangers(stands, base, now, horizon))
+        return _applied(now, Corrections(), _strangers(elastic, now, horizon))
     return _applied(now, found.reading.corrections, [_said(found, now.arm, horizon)])
 
 
-def _strangers(stands: Fit, base: EquationError, now: Examined, horizon: float) -> list[Check]:
+def _strangers(elastic: Fit, now: Examined, horizon: float) -> list[Check]:
     """Say that torques and positions do not belong together.
 
-    So it is where no parameters with the arm file's signs explain half of a torque, not even beside springs, which can take most of it.
+    So it is where no parameters with the arm file's signs explain half of a torque, not even beside springs and contacts, which can take most of it
+    (`elastic`).
     """
-    if stands.share.max() < _UNRELATED:
-        return []
-    share = _beside_springs(base, [*now.training, *now.holdout], now.arm).share
+    share = elastic.share
     worst = int(np.argmax(share))
     if share[worst] < _UNRELATED or _predicted(Corrections(), now, horizon).relative < EXPLAINS:
         return []
@@ -129,20 +136,38 @@ def _strangers(stands: Fit, base: EquationError, now: Examined, horizon: float) 
     return [Check("joint_order", "error", message, (f"--columns {columns}",), worst + 1)]
 
 
-def _beside_springs(base: EquationError, logs: Sequence[Log], arm: Arm) -> Fit:
-    """Fit the arm by turns with an offset and a hardening spring on every joint."""
+def _beside_elasticity(base: EquationError, logs: Sequence[Log], arm: Arm) -> Fit:
+    """Fit the arm by turns with a torque on every joint that does not fall with its position: an offset, springs, contacts."""
     q = np.concatenate([log.q[rows.samples] for log, rows in zip(logs, base.rows, strict=True)])
-    q = q / np.maximum(np.abs(q).max(axis=0), np.finfo(float).tiny)
     ends = np.cumsum([len(rows.y) for rows in base.rows])[:-1]
     torques = [rows.y for rows in base.rows]
     for _ in range(_TURNS):
         theta = base.fit(*bounds(arm), torques).theta
         left = np.concatenate([rows.y - rows.psi @ theta for rows in base.rows])
-        for j in range(arm.n_joints):
-            shapes = np.stack([np.ones(len(q)), q[:, j], q[:, j] ** 3], axis=1)
-            left[:, j] = shapes @ np.linalg.lstsq(shapes, left[:, j], rcond=None)[0]
-        torques = [rows.y - spring for rows, spring in zip(base.rows, np.split(left, ends), strict=True)]
+        elastic = np.stack([_rising(x, y) for x, y in zip(q.T, left.T, strict=True)], axis=1)
+        torques = [rows.y - part for rows, part in zip(base.rows, np.split(elastic, ends), strict=True)]
     return base.fit(*bounds(arm), torques)
+
+
+def _rising(x: Array, y: Array) -> Array:
+    """Return the function of `x` that never falls and is closest to `y`: isotonic regression by pooling adjacent violators (Barlow et al. 1972)."""
+    edges = np.linspace(x.min(), x.max(), _CLASSES + 1)[1:-1]
+    place = np.searchsorted(edges, x)
+    weight = np.bincount(place, minlength=_CLASSES).astype(float)
+    taken = weight > 0
+    middle = np.bincount(place, x, minlength=_CLASSES)[taken] / weight[taken]
+    pools: list[tuple[float, float, int]] = []
+    for mean, count in zip(
+        np.bincount(place, y, minlength=_CLASSES)[taken] / weight[taken], weight[taken], strict=True
+    ):
+        pool = (float(mean), float(count), 1)
+        while pools and pools[-1][0] > pool[0]:
+            before = pools.pop()
+            total = before[1] + pool[1]
+            pool = ((before[0] * before[1] + pool[0] * pool[1]) / total, total, before[2] + pool[2])
+        pools.append(pool)
+    rising = np.repeat([p[0] for p in pools], [p[2] for p in pools])
+    return np.asarray(np.interp(x, middle, rising))
 
 
 def _doubted(arm: Arm, factors: torque_unit.Factors) -> Arm:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from armgap.arm import Arm
 from armgap.check.check import Check, Severity
 from armgap.check.corrections import Corrections
-from armgap.check.equation_error import EquationError, bounds
+from armgap.check.equation_error import EquationError, Fit, Rows, bounds
+from armgap.log import Log
 
 __all__ = ["Factors", "find", "refined", "said"]
 
@@ -35,6 +36,8 @@ _ROUNDS = 4
 # The factor has to lower the mean log share of unexplained torque by this much, and to leave no more than this share of a joint's torque.
 _GAIN_IN_COST = 0.5
 _LEFT = 0.3
+# Quantiles of a torque's size that a drive's limit may be at: a limit between two of them still explains what no factor does.
+_LEVELS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,8 @@ class Factors:
     checks: tuple[Check, ...]
 
 
-def find(base: EquationError, arm: Arm) -> Factors | None:
-    """Return the factors that belong on torque columns of the logs (`base`), or None."""
+def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
+    """Return the factors that belong on torque columns of the logs (`base`), or None; a drive that saturates is no factor."""
     low, high = bounds(arm, _TRUST)
     factors = _factors(base, low, high)
     odd = [j for j, c in enumerate(factors) if not _within(c, _GAIN)]
@@ -61,8 +64,29 @@ def find(base: EquationError, arm: Arm) -> Factors | None:
     needed = 0.0 if shared and _within(applied[0], _SCALED) else _GAIN_IN_COST
     if base.with_factors(low, high, np.ones_like(applied)).cost - fit.cost < needed or float(fit.share.max()) > _LEFT:
         return None
+    if min(_limited(logs, arm, j).closeness for j in odd) < fit.closeness:
+        return None
     corrections, checks = _said(applied, odd, shared)
     return Factors(corrections, fit.closeness, tuple(checks))
+
+
+def _limited(logs: Sequence[Log], arm: Arm, joint: int) -> Fit:
+    """Return the best fit to torques of which those of a joint are limited: far below what was commanded that looks like a small factor."""
+    size = np.concatenate([np.abs(log.tau[:, joint]) for log in logs])
+    return min(
+        (_with_limit(logs, arm, joint, level) for level in np.quantile(size, _LEVELS)),
+        key=lambda fit: fit.closeness,
+    )
+
+
+def _with_limit(logs: Sequence[Log], arm: Arm, joint: int, level: float) -> Fit:
+    rows = []
+    for log in logs:
+        tau = log.tau.copy()
+        tau[:, joint] = np.clip(tau[:, joint], -level, level)
+        rows.append(Rows.of(replace(log, tau=tau), arm))
+    limited = EquationError(rows, arm)
+    return limited.of_torques(limited.fit(*bounds(arm, _TRUST)))
 
 
 def _within(factor: float, bound: float) -> bool:

@@ -8,9 +8,9 @@
 use crate::attribute::SearchNode;
 use crate::belief::left_over;
 use crate::context::DiagnosisContext;
+use crate::cut::cut;
 use crate::diagnose::LogData;
 use crate::model_search::Attribution;
-use crate::window::cut;
 use armgap_core::arm::Arm;
 
 /// Stretches per log, if it is long enough.

@@ -244,8 +244,8 @@ impl Request<'_> {
         training: &[LogData<'_>],
         holdout: &[LogData<'_>],
     ) -> Result<DiagnosisContext<A, N, P>, DiagnoseError> {
-        let training = self.sample::<N>("training", training)?;
-        let holdout = self.sample::<N>("holdout", holdout)?;
+        let training = self.sample("training", training, &arm, &theta)?;
+        let holdout = self.sample("holdout", holdout, &arm, &theta)?;
         let length = self.arm.link_length.as_ref().and_then(|l| l.last().copied());
         let scales = Scales::new(&arm, &theta, &training.data.tracks, self.arm.gravity, length);
         let bounded = bounded_sigma(self.arm.kind, &theta, &self.arm.sigma);
@@ -271,10 +271,12 @@ impl Request<'_> {
         self.options.custom_effects.iter().enumerate().map(placed).collect()
     }
 
-    fn sample<const N: usize>(
+    fn sample<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         set: &'static str,
         logs: &[LogData<'_>],
+        arm: &A,
+        theta: &[f64; P],
     ) -> Result<WindowSet<N>, DiagnoseError> {
         let steps = self.arm.counts_per_rev.as_ref().map(|counts| {
             std::array::from_fn(|j| {
@@ -283,7 +285,10 @@ impl Request<'_> {
         });
         let track = |log: &LogData<'_>| {
             let tables = log.tables.iter().map(|table| table.to_vec()).collect();
-            Track::new(&log.name, log.t, log.q, log.tau, steps).with_moments(log.moment).with_tables(tables)
+            Track::new(&log.name, log.t, log.q, log.tau, steps)
+                .with_moments(log.moment)
+                .with_tables(tables)
+                .smoothed_beside_torque(arm, theta)
         };
         let tracks = logs.iter().map(track).collect();
         let data = Dataset::new(tracks, self.options.horizon);

@@ -33,18 +33,17 @@ const FREE_RUN_LIMIT: f64 = 100.0;
 /// of forty windows to 6 %.
 const DISPLACED: usize = 6;
 
-/// Mean square of a window whose measured initial state erred by ten of its standard deviations, as at a reversal, in units of that of a
-/// typical draw.
-const WORST_START: f64 = 100.0;
-
 /// A window is consistent with its noise and its measured initial state up to this cost per sample and joint: the noise is known to 3 %, and
 /// of some hundred values the mean square scatters by 15 %.
 const CONSISTENT: f64 = 1.5;
 
-/// Beside a start that erred by more than its covariance says, a window is explained where noise is all that a displaced one leaves, and that is less
-/// than this part of the squared errors. Of the errors of a constant torque that the model lacks it leaves 1/36; where starts erred at kinks of
-/// the motion it left 1e-6 to 2e-4.
-const DISPLACED_SHARE: f64 = 0.003;
+/// A torque that the model lacks leaves 1/36 of the squared errors it makes once the initial state is fitted, if it is constant over the window, and
+/// more if it is not. What is left beyond noise, with two standard deviations of it, times this may be a quarter of the squared errors at most in a
+/// window that a displaced initial state explains.
+const TORQUE_SHARE: f64 = 4.0 * 36.0;
+
+/// Fewest explained windows that say by how much initial states err beyond their covariance.
+const FEWEST_EXPLAINED: usize = 5;
 
 /// Predictions on the holdout from measured initial states, and their squared errors.
 pub struct Errors<const N: usize> {
@@ -115,10 +114,10 @@ impl<const N: usize> Errors<N> {
 /// Mean square of a perfect model's errors: noise of the sample itself, and the error of the measured initial state carried along the
 /// window.
 ///
-/// What the model misses by in a window is a perfect model's error where noise and a displaced initial state explain it, by the covariance of
-/// the measured one or, at a kink of the motion, by so much of the errors that no torque would leave as little. Elsewhere that
-/// error is what displacements drawn from the measured state's covariance make, and no more than what the model misses by; beside windows
-/// of which most are explained it may be that of a start that erred by more than its covariance says.
+/// What the model misses by in a window is a perfect model's error where noise and a displaced initial state explain it: one within the
+/// covariance of the measured state, or one that leaves so little of the errors that no torque could have made them. Elsewhere that
+/// error is what displacements drawn from the measured state's covariance make, times what the errors of explained windows are of theirs, and
+/// no more than what the model misses by.
 fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     data: &Dataset<N>,
@@ -133,26 +132,30 @@ fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let residual = weighting.residual(&measured, predicted);
     let costs = weighting.costs(data, &residual);
     let left = weighting.beside_free_states(data, &residual);
-    let consistent: Vec<bool> = data
+    let explained: Vec<bool> = data
         .windows
         .iter()
         .zip(costs.iter().zip(&left))
         .map(|(w, (cost, left))| {
-            let noise = CONSISTENT * (w.rows() * N) as f64;
+            let samples = (w.rows() * N) as f64;
+            let beyond_noise = left - samples + 2.0 * (2.0 * samples).sqrt();
             let missed = squares(&[&residual[w.range()]])[0];
-            *cost < noise || (*left < noise && *left < DISPLACED_SHARE * missed)
+            *cost < CONSISTENT * samples
+                || (*left < CONSISTENT * samples && TORQUE_SHARE * beyond_noise < missed)
         })
         .collect();
-    let explained = 2 * consistent.iter().filter(|c| **c).count() > consistent.len();
-    let worst = if explained { WORST_START } else { 1.0 };
-    let mut sum = [0.0; N];
-    for (index, consistent) in consistent.into_iter().enumerate() {
-        for (j, total) in sum.iter_mut().enumerate() {
-            let most = context.noise[j].powi(2) + worst * carried[index][j];
-            *total += if consistent { missed[index][j] } else { missed[index][j].min(most) };
-        }
-    }
-    sum.map(|x| x / data.windows.len() as f64)
+    let carried = |index: usize, j: usize| context.noise[j].powi(2) + carried[index][j];
+    let enough = explained.iter().filter(|e| **e).count() >= FEWEST_EXPLAINED;
+    std::array::from_fn(|j| {
+        let of_explained = |square: &dyn Fn(usize) -> f64| -> f64 {
+            (0..explained.len()).filter(|&i| explained[i]).map(square).sum()
+        };
+        let ratio = of_explained(&|i| missed[i][j]) / of_explained(&|i| carried(i, j));
+        let beyond = if enough { ratio.max(1.0) } else { 1.0 };
+        let square =
+            |i: usize| if explained[i] { missed[i][j] } else { missed[i][j].min(beyond * carried(i, j)) };
+        (0..explained.len()).map(square).sum::<f64>() / explained.len() as f64
+    })
 }
 
 /// Mean square, window by window, of what displaced initial states change in the predictions.

@@ -15,6 +15,7 @@ pub mod context;
 pub mod covariance;
 mod crosswise;
 pub mod custom_effect;
+mod cut;
 pub mod diagnose;
 mod dispersion;
 mod disturbance;

@@ -4,8 +4,10 @@ use crate::latent_states::MeasuredState;
 use crate::model::EffectInstance;
 use crate::noise::noise;
 use crate::smooth::{Local, local_cubic};
+use armgap_core::arm::Arm;
 use armgap_core::effect::InputSegment;
 use nalgebra::SVector;
+use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// Half widths, in samples, that a local cubic may have.
@@ -18,6 +20,12 @@ const CONFIDENCE: f64 = 2.0;
 /// known, and beyond the larger the positions are not what the arm did.
 const LEAST_ERROR: f64 = 0.25;
 const LARGEST_ERROR: f64 = 10.0;
+
+/// Samples that the widest local cubic rests on.
+const WIDEST: usize = 2 * HALF_WIDTHS[HALF_WIDTHS.len() - 1] + 1;
+
+/// One sample in so many says whether positions are smoother without what the torque makes of them.
+const ASKED: usize = 7;
 
 /// A log of `N` joints.
 #[derive(Debug, Clone)]
@@ -40,8 +48,24 @@ pub struct Track<const N: usize> {
     pub pushes: Vec<EffectInstance>,
     /// Torque per unit of size of each custom effect, sample by sample.
     pub tables: Vec<Vec<f64>>,
+    /// Acceleration that the torque gives each joint from a sample to the next, `M(q)^-1 tau`; none for a joint whose measured motion is no
+    /// smoother without it.
+    driven: [Option<Vec<f64>>; N],
     /// Smoothed motion, once it is asked for.
     path: OnceLock<Vec<MeasuredState<N>>>,
+    /// Local cubics, once they are asked for.
+    smoothed: OnceLock<Vec<[Smoothed; N]>>,
+}
+
+/// A local cubic as wide as the motion around its sample allows.
+#[derive(Debug, Clone, Copy)]
+pub struct Smoothed {
+    /// The cubic.
+    pub local: Local,
+    /// The widest that is consistent with it.
+    pub wider: Local,
+    /// Samples on either side that it rests on.
+    pub half_width: usize,
 }
 
 /// A measured initial state: position and velocity of each joint with their covariance.
@@ -73,7 +97,9 @@ impl<const N: usize> Track<N> {
             step: [0.0; N],
             pushes: Vec::new(),
             tables: Vec::new(),
+            driven: std::array::from_fn(|_| None),
             path: OnceLock::new(),
+            smoothed: OnceLock::new(),
         };
         for j in 0..N {
             let column = track.column(j);
@@ -102,10 +128,72 @@ impl<const N: usize> Track<N> {
         self
     }
 
+    /// Lets local cubics describe what is left of the measured motion without what the torque makes of it.
+    ///
+    /// A torque that jumps from sample to sample, as that of a controller with a noisy velocity does, leaves no cubic through more than a
+    /// few samples. How far it moves the arm within some samples follows from the inertia `M(q)` alone; the rest, friction, gravity and what
+    /// the model lacks, is as smooth as its causes. Where the arm is not so driven (a wrong sign or unit, a motor behind a spring) the motion is no
+    /// smoother without it, and is taken as measured.
+    pub fn smoothed_beside_torque<A: Arm<f64, N, P>, const P: usize>(
+        mut self,
+        arm: &A,
+        theta: &[f64; P],
+    ) -> Self {
+        let accelerations: Vec<SVector<f64, N>> = self
+            .q
+            .iter()
+            .zip(&self.held)
+            .map(|(q, held)| {
+                let tau = SVector::from_fn(|j, _| held[j].mean());
+                arm.inertia(theta, q).cholesky().map_or_else(SVector::zeros, |inertia| inertia.solve(&tau))
+            })
+            .collect();
+        for j in (0..N).filter(|j| !self.is_held[*j]) {
+            let column: Vec<f64> = accelerations.iter().map(|a| a[j]).collect();
+            let is_finite = column.iter().all(|a| a.is_finite());
+            if is_finite && self.roughness(j, Some(&column)) < self.roughness(j, None) {
+                self.driven[j] = Some(column);
+            }
+        }
+        self
+    }
+
+    /// Mean logarithm of the variance of the velocities of a joint: low where cubics are wide.
+    fn roughness(&self, j: usize, driven: Option<&[f64]>) -> f64 {
+        (0..self.len()).step_by(ASKED).map(|k| self.widest(j, k, driven).local.covariance[2].ln()).sum()
+    }
+
+    /// Positions of joint `j` for cubics around a sample, from the returned one on: without the distance that these accelerations make from
+    /// there.
+    fn positions_near(&self, j: usize, at: usize, driven: Option<&[f64]>) -> (usize, [f64; WIDEST]) {
+        let first = at.saturating_sub(WIDEST / 2).min(self.len().saturating_sub(WIDEST));
+        let mut positions = [0.0; WIDEST];
+        for (place, q) in positions.iter_mut().zip(&self.q[first..]) {
+            *place = q[j];
+        }
+        let Some(driven) = driven else { return (first, positions) };
+        let (mut distance, mut speed) = (0.0, 0.0);
+        for k in at + 1..(first + WIDEST).min(self.len()) {
+            let (h, a) = (self.t[k] - self.t[k - 1], driven[k - 1]);
+            distance += h * (speed + 0.5 * h * a);
+            speed += h * a;
+            positions[k - first] -= distance;
+        }
+        (distance, speed) = (0.0, 0.0);
+        for k in (first..at).rev() {
+            let (h, a) = (self.t[k + 1] - self.t[k], driven[k]);
+            distance -= h * (speed - 0.5 * h * a);
+            speed -= h * a;
+            positions[k - first] -= distance;
+        }
+        (first, positions)
+    }
+
     /// One track of pieces that follow each other in time.
     pub fn joined(pieces: &[&Self]) -> Option<Self> {
         let (first, rest) = pieces.split_first()?;
-        let mut whole = Self { path: OnceLock::new(), pushes: Vec::new(), ..(*first).clone() };
+        let mut whole =
+            Self { path: OnceLock::new(), smoothed: OnceLock::new(), pushes: Vec::new(), ..(*first).clone() };
         for piece in rest {
             whole.t.extend(&piece.t);
             whole.q.extend(&piece.q);
@@ -146,8 +234,9 @@ impl<const N: usize> Track<N> {
             mean_square: [[1.0; 2]; N],
         };
         for j in 0..N {
-            let (local, wider) = self.nested(j, at);
-            start.mean_square[j] = self.mean_square(j, at, &local, &wider);
+            let smoothed = self.nested(j, at);
+            let local = smoothed.local;
+            start.mean_square[j] = self.mean_square(j, at, &smoothed);
             let variance = self.noise[j] * self.noise[j];
             (start.q[j], start.dq[j]) = (local.q, local.dq);
             start.covariance[j] = local.covariance.map(|c| c * variance);
@@ -158,15 +247,18 @@ impl<const N: usize> Track<N> {
     /// Smoothed motion at every sample.
     pub fn path(&self) -> &[MeasuredState<N>] {
         self.path.get_or_init(|| {
-            let moving = |k: usize| {
-                let locals: [Local; N] = std::array::from_fn(|j| self.local(j, k));
-                MeasuredState {
-                    q: SVector::from_fn(|j, _| locals[j].q),
-                    dq: SVector::from_fn(|j, _| locals[j].dq),
-                }
+            let moving = |smoothed: &[Smoothed; N]| MeasuredState {
+                q: SVector::from_fn(|j, _| smoothed[j].local.q),
+                dq: SVector::from_fn(|j, _| smoothed[j].local.dq),
             };
-            (0..self.len()).map(moving).collect()
+            self.smoothed().iter().map(moving).collect()
         })
+    }
+
+    /// The local cubics of all joints at every sample.
+    pub fn smoothed(&self) -> &[[Smoothed; N]] {
+        let at = |k: usize| std::array::from_fn(|j| self.nested(j, k));
+        self.smoothed.get_or_init(|| (0..self.len()).into_par_iter().map(at).collect())
     }
 
     /// The local cubic of joint `j` around a sample, as wide as the motion there allows.
@@ -176,41 +268,48 @@ impl<const N: usize> Track<N> {
     /// widest that passes may still err by several of its standard deviations, as its neighbours cannot tell; the one before
     /// errs by a third of that and has the larger deviation, so it is the one that keeps what its covariance promises.
     pub fn local(&self, j: usize, at: usize) -> Local {
-        self.nested(j, at).0
+        self.nested(j, at).local
     }
 
     /// That local cubic, and the widest that passes.
-    fn nested(&self, j: usize, at: usize) -> (Local, Local) {
-        let fit = |half: usize| local_cubic(&self.t, |k| self.q[k][j], at, half);
+    fn nested(&self, j: usize, at: usize) -> Smoothed {
+        self.widest(j, at, self.driven[j].as_deref())
+    }
+
+    /// The widest local cubic but one that is consistent with all narrower ones.
+    fn widest(&self, j: usize, at: usize, driven: Option<&[f64]>) -> Smoothed {
+        let (first, positions) = self.positions_near(j, at, driven);
+        let fit = |half: usize| (local_cubic(&self.t, |k| positions[k - first], at, half), half);
         let mut widest = fit(HALF_WIDTHS[0]);
         let mut before = widest;
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         for half in HALF_WIDTHS.into_iter().filter(|half| 2 * half < self.len()) {
-            let local = fit(half);
+            let (local, half) = fit(half);
             let radius = CONFIDENCE * self.noise[j] * local.covariance[2].sqrt();
             (low, high) = (low.max(local.dq - radius), high.min(local.dq + radius));
             if low > high {
                 break;
             }
-            (before, widest) = (widest, local);
+            (before, widest) = (widest, (local, half));
         }
-        (before, widest)
+        Smoothed { local: before.0, wider: widest.0, half_width: before.1 }
     }
 
     /// Mean square error of a local cubic's position and velocity in units of their variance: what it leaves of its samples is more than
     /// noise where no cubic passes through the motion, and so is its distance from the sample itself, and from a wider cubic.
     ///
     /// Where positions are held, what a cubic leaves says nothing about the motion.
-    fn mean_square(&self, j: usize, at: usize, local: &Local, wider: &Local) -> [f64; 2] {
+    fn mean_square(&self, j: usize, at: usize, smoothed: &Smoothed) -> [f64; 2] {
         if self.is_held[j] {
             return [1.0; 2];
         }
+        let Smoothed { local, wider, .. } = smoothed;
         let noise = self.noise[j].powi(2);
         let [vq, _, vdq] = local.covariance;
         let misfit = local.misfit / noise;
-        let position = ((self.q[at][j] - local.q).powi(2) / noise - (1.0 - vq)) / vq;
-        let velocity = ((local.dq - wider.dq).powi(2) / noise - (vdq - wider.covariance[2])) / vdq;
-        [position, velocity].map(|bias| (misfit + bias).clamp(LEAST_ERROR, LARGEST_ERROR))
+        let position = misfit + ((self.q[at][j] - local.q).powi(2) / noise - (1.0 - vq)) / vq;
+        let wide = ((local.dq - wider.dq).powi(2) / noise - (vdq - wider.covariance[2])) / vdq;
+        [position, misfit + wide].map(|error| error.clamp(LEAST_ERROR, LARGEST_ERROR))
     }
 }
 
@@ -233,4 +332,57 @@ fn smallest_step(q: &[f64]) -> f64 {
     let step = steps[steps.len() / 200];
     let on_grid = steps.iter().filter(|d| ((*d / step).round() * step - *d).abs() < 0.05 * step).count();
     if on_grid * 10 > steps.len() * 9 { step } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use armgap_core::arm::Pendulum;
+
+    const INERTIA: f64 = 0.5;
+    const STEP: f64 = 1e-7;
+
+    /// A pendulum's inertia under a torque that is new in every sample, and a slow motion beside it; positions, torques and true velocities.
+    fn jerky(sign: f64) -> (Track<1>, Vec<f64>) {
+        let (h, mut random) = (0.0025, Random(1));
+        let (mut q, mut dq) = (0.0, 0.0);
+        let (mut t, mut positions, mut torques, mut rates) = (vec![], vec![], vec![], vec![]);
+        for k in 0..800 {
+            let now = h * f64::from(k);
+            let tau = 3.0 * random.normal();
+            t.push(now);
+            positions.push(((q + now.powi(2)) / STEP).round() * STEP);
+            rates.push(dq + 2.0 * now);
+            torques.push(sign * tau);
+            q += h * (dq + 0.5 * h * tau / INERTIA);
+            dq += h * tau / INERTIA;
+        }
+        (Track::new("", &t, &positions, &torques, Some([STEP])), rates)
+    }
+
+    fn worst(track: &Track<1>, rates: &[f64]) -> f64 {
+        (10..790).map(|k| (track.initial_state(k).dq[0] - rates[k]).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_torque_s_part_of_a_jerky_motion_is_known() {
+        let (track, rates) = jerky(1.0);
+        let theta = [INERTIA, 0.0, 0.0, 0.0];
+        let arm = Pendulum { gravity: 9.81 };
+        let plain = worst(&track, &rates);
+        let beside = worst(&track.smoothed_beside_torque(&arm, &theta), &rates);
+        assert!(beside < 0.05 * plain, "{beside} beside {plain}");
+    }
+
+    #[test]
+    fn a_torque_of_the_wrong_sign_is_left_aside() {
+        let (track, rates) = jerky(-1.0);
+        let plain = worst(&track, &rates);
+        let beside = worst(
+            &track.smoothed_beside_torque(&Pendulum { gravity: 9.81 }, &[INERTIA, 0.0, 0.0, 0.0]),
+            &rates,
+        );
+        assert!((beside - plain).abs() < 1e-12, "{beside} beside {plain}");
+    }
 }

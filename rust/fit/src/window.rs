@@ -3,6 +3,7 @@
 //! Every window starts from its measured initial state and runs under the logged torque; the predicted positions of all windows lie in one
 //! flat vector, row by row and joint by joint.
 
+use crate::cut::cut_at_smooth_motion;
 use crate::latent_states::latent_states;
 use crate::model::Hypothesis;
 use crate::track::{InitialState, Track};
@@ -94,12 +95,12 @@ impl<const N: usize> Dataset<N> {
         self
     }
 
-    /// Cuts every track into windows of `horizon` seconds; a gap in the samples ends a window.
+    /// Cuts every track into windows of about `horizon` seconds, where its state is measured best; a gap in the samples ends a window.
     pub fn new(tracks: Vec<Track<N>>, horizon: f64) -> Self {
         let mut windows = Vec::new();
         let mut rows = 0;
         for (index, track) in tracks.iter().enumerate() {
-            for (first, last) in cut(&track.t, horizon) {
+            for (first, last) in cut_at_smooth_motion(track, horizon) {
                 windows.push(Window {
                     track: index,
                     first,
@@ -286,27 +287,4 @@ fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'
 /// Steps per sample that keep Runge-Kutta stable against smoothed friction of this rate times the sample period.
 fn substeps(stiffness: f64) -> usize {
     ((stiffness / 1.5).ceil() as usize).max(1)
-}
-
-/// Index pairs `(first, last)` of consecutive windows of about `horizon` seconds, of equal length within a stretch without gaps.
-pub fn cut(t: &[f64], horizon: f64) -> Vec<(usize, usize)> {
-    let period = crate::track::median(t.windows(2).map(|w| w[1] - w[0]).collect());
-    let largest = (10.0 * period).max(0.25 * horizon);
-    let mut found = Vec::new();
-    let mut begin = 0;
-    for k in 1..=t.len() {
-        if k < t.len() && t[k] - t[k - 1] <= largest {
-            continue;
-        }
-        let stretch = &t[begin..k];
-        let duration = stretch[stretch.len() - 1] - stretch[0];
-        let count = ((duration / horizon + 0.2).floor() as usize).min((stretch.len() - 1) / 4);
-        let edge = |i: usize| {
-            let time = stretch[0] + duration * i as f64 / count as f64;
-            begin + stretch.partition_point(|&x| x < time - 1e-9).min(stretch.len() - 1)
-        };
-        found.extend((0..count).map(|i| (edge(i), edge(i + 1))).filter(|(a, b)| b > a));
-        begin = k;
-    }
-    found
 }
