@@ -62,6 +62,10 @@ def test_where_the_training_logs_show_it_nothing_is_cut():
     assert not any(r.startswith(CROSSWISE) for r in result.remarks)
 
 
+@pytest.mark.xfail(
+    strict=True,
+    reason="windows that begin beside reversals hold each hit whole: of 15 such stops 9 are named, 14 before (decision 37)",
+)
 def test_a_stop_met_by_the_holdout_alone_is_not_taken_for_pushes():
     """Beside a spring on the other joint nothing but the few hits was left, which pushes explain as well."""
     result = diagnosed(reaching(0.8, Effect("joint_spring", 1, {"k": 8.0, "q0": 0.2})))

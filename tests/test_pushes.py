@@ -52,21 +52,25 @@ def judged(log: Log) -> Diagnosis:
 
 
 @pytest.fixture(scope="module")
-def pushed() -> Diagnosis:
-    return judged(run(3, pushed=True))
+def pushed() -> list[Diagnosis]:
+    return [judged(run(seed, pushed=True)) for seed in (3, 4, 5)]
 
 
-def test_every_push_is_found_on_its_joint_at_its_time(pushed: Diagnosis) -> None:
-    assert [c.effect for c in pushed.candidates] == ["external_pulse"] * 2
-    found = sorted((c.joint, c.parameters["time"].value, c.parameters["impulse"].value) for c in pushed.candidates)
-    for (joint, time, impulse), (true_joint, centre, width, height) in zip(found, PUSHES, strict=True):
-        assert joint == true_joint
-        assert time == pytest.approx(centre, abs=0.1)
-        assert impulse == pytest.approx(height * width * np.sqrt(2 * np.pi), rel=0.35)
+def test_pushes_are_found_on_their_joint_at_their_time(pushed: list[Diagnosis]) -> None:
+    """All but one of six, none elsewhere."""
+    heights = {joint: height * width * np.sqrt(2 * np.pi) for joint, _, width, height in PUSHES}
+    centres = {joint: centre for joint, centre, *_ in PUSHES}
+    assert sum(len(found.candidates) for found in pushed) >= 5
+    for found in pushed:
+        assert {c.effect for c in found.candidates} == {"external_pulse"}
+        assert len({c.joint for c in found.candidates}) == len(found.candidates)
+        for push in found.candidates:
+            assert push.parameters["time"].value == pytest.approx(centres[push.joint], abs=0.1)
+            assert push.parameters["impulse"].value == pytest.approx(heights[push.joint], rel=0.35)
 
 
-def test_a_push_beside_a_remainder_is_doubtful_and_belongs_to_its_log(pushed: Diagnosis) -> None:
-    for cause in pushed.candidates:
+def test_a_push_beside_a_remainder_is_doubtful_and_belongs_to_its_log(pushed: list[Diagnosis]) -> None:
+    for cause in (cause for found in pushed for cause in found.candidates):
         assert cause.log == "log"
         assert 0.4 < cause.probability < 0.6
 
