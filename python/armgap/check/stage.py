@@ -121,11 +121,14 @@ def _strangers(elastic: Fit, now: Examined, horizon: float) -> list[Check]:
     """Say that torques and positions do not belong together.
 
     So it is where no parameters with the arm file's signs explain half of a torque, not even beside springs and contacts, which can take most of it
-    (`elastic`).
+    (`elastic`), or behind a drive that saturates far below its command.
     """
     share = elastic.share
     worst = int(np.argmax(share))
-    if share[worst] < _UNRELATED or _predicted(Corrections(), now, horizon).relative < EXPLAINS:
+    logs = [*now.training, *now.holdout]
+    if share[worst] < _UNRELATED or torque_unit.limited(logs, now.arm, worst).share.max() < _UNRELATED:
+        return []
+    if _predicted(Corrections(), now, horizon).relative < EXPLAINS:
         return []
     columns = ",".join(f"{kind}{j}=NAME" for kind in ("q", "tau") for j in range(1, now.arm.n_joints + 1))
     message = (

@@ -20,7 +20,7 @@ from armgap.check.corrections import Corrections
 from armgap.check.equation_error import EquationError, Fit, Rows, bounds
 from armgap.log import Log
 
-__all__ = ["Factors", "find", "refined", "said"]
+__all__ = ["Factors", "find", "limited", "refined", "said"]
 
 # A factor within these bounds is a gain of the drive (an effect), or wrong parameters.
 _GAIN = 2.0
@@ -64,13 +64,13 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     needed = 0.0 if shared and _within(applied[0], _SCALED) else _GAIN_IN_COST
     if base.with_factors(low, high, np.ones_like(applied)).cost - fit.cost < needed or float(fit.share.max()) > _LEFT:
         return None
-    if min(_limited(logs, arm, j).closeness for j in odd) < fit.closeness:
+    if min(limited(logs, arm, j).closeness for j in odd) < fit.closeness:
         return None
     corrections, checks = _said(applied, odd, shared)
     return Factors(corrections, fit.closeness, tuple(checks))
 
 
-def _limited(logs: Sequence[Log], arm: Arm, joint: int) -> Fit:
+def limited(logs: Sequence[Log], arm: Arm, joint: int) -> Fit:
     """Return the best fit to torques of which those of a joint are limited: far below what was commanded that looks like a small factor."""
     size = np.concatenate([np.abs(log.tau[:, joint]) for log in logs])
     return min(
