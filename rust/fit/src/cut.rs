@@ -10,7 +10,7 @@ use crate::track::{Smoothed, Track, median};
 const REACH: f64 = 0.2;
 
 /// Squared error of a velocity that is measured at a reversal, in units of the variance of a typical one: errors of some ten standard deviations
-/// were seen. Edges are the same for 30 and 300 wherever an edge within reach has no reversal in its local cubic.
+/// were seen. It only has to outweigh what variances differ by within reach; other values were not tried.
 const REVERSAL: f64 = 100.0;
 
 /// Index pairs `(first, last)` of consecutive windows of about `horizon` seconds, each edge at the sample within reach whose velocity is known

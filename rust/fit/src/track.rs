@@ -192,8 +192,21 @@ impl<const N: usize> Track<N> {
     /// One track of pieces that follow each other in time.
     pub fn joined(pieces: &[&Self]) -> Option<Self> {
         let (first, rest) = pieces.split_first()?;
-        let mut whole =
-            Self { path: OnceLock::new(), smoothed: OnceLock::new(), pushes: Vec::new(), ..(*first).clone() };
+        // A joint is taken beside its torque only where all pieces are.
+        let driven = std::array::from_fn(|j| {
+            pieces
+                .iter()
+                .map(|piece| piece.driven[j].clone())
+                .collect::<Option<Vec<_>>>()
+                .map(|all| all.concat())
+        });
+        let mut whole = Self {
+            path: OnceLock::new(),
+            smoothed: OnceLock::new(),
+            pushes: Vec::new(),
+            driven,
+            ..(*first).clone()
+        };
         for piece in rest {
             whole.t.extend(&piece.t);
             whole.q.extend(&piece.q);
@@ -384,5 +397,18 @@ mod tests {
             &rates,
         );
         assert!((beside - plain).abs() < 1e-12, "{beside} beside {plain}");
+    }
+
+    #[test]
+    fn pieces_are_joined_with_what_their_torques_make() {
+        let arm = Pendulum { gravity: 9.81 };
+        let beside = || jerky(1.0).0.smoothed_beside_torque(&arm, &[INERTIA, 0.0, 0.0, 0.0]);
+        let mut later = beside();
+        later.t.iter_mut().for_each(|t| *t += 2.0);
+        let whole = Track::joined(&[&beside(), &later]).unwrap();
+        assert_eq!(whole.driven[0].as_ref().map(Vec::len), Some(whole.len()));
+        assert!(whole.initial_state(whole.len() - 1).dq[0].is_finite());
+        let mixed = Track::joined(&[&beside(), &jerky(1.0).0]).unwrap();
+        assert!(mixed.driven[0].is_none());
     }
 }
