@@ -324,7 +324,7 @@ fn arm_summary(description: &ArmDescription) -> ArmSummary {
     ArmSummary {
         kind: kind.name(),
         n_joints: kind.joints(),
-        parameter_names: kind.parameters().iter().map(|p| p.name).collect(),
+        parameter_names: kind.parameters().iter().map(|p| p.name.to_owned()).collect(),
         parameter_units: kind.parameters().iter().map(|p| p.unit).collect(),
         joint_unit: vec![if kind.rotary() { "rad" } else { "m" }; kind.joints()],
     }

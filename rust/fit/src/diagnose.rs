@@ -103,7 +103,7 @@ impl std::fmt::Display for DiagnoseError {
 impl std::error::Error for DiagnoseError {}
 
 /// Windows without which nothing can be said.
-const FEWEST_WINDOWS: usize = 4;
+pub(crate) const FEWEST_WINDOWS: usize = 4;
 
 /// Note of a diagnosis by interleaved cross-validation.
 const CROSSWISE: &str = "effects fitted to the training logs did not explain the holdout: every log was cut into stretches that were learnt \

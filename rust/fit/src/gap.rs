@@ -15,16 +15,16 @@ use armgap_core::arm::Arm;
 use rayon::prelude::*;
 
 /// Points of a drawn curve at most.
-const DRAWN: usize = 2500;
+pub(crate) const DRAWN: usize = 2500;
 
 /// Holdout logs that are drawn.
-const DRAWN_LOGS: usize = 3;
+pub(crate) const DRAWN_LOGS: usize = 3;
 
 /// Resamples of the holdout windows for the interval of the closed share.
 const RESAMPLES: usize = 500;
 
 /// Further prediction horizons, s.
-const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
+pub(crate) const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
 
 /// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
 const FREE_RUN_LIMIT: f64 = 100.0;
@@ -279,7 +279,7 @@ fn at_horizon<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 }
 
 /// Share of the gap above the floor that is closed, over all joints.
-fn closed(before: &[f64], after: &[f64], floor: &[f64]) -> f64 {
+pub(crate) fn closed(before: &[f64], after: &[f64], floor: &[f64]) -> f64 {
     let above =
         |x: &[f64]| x.iter().zip(floor).map(|(x, f)| ((x - f) / before_scale(before)).max(0.0)).sum::<f64>();
     let (b, a) = (above(before), above(after));
@@ -325,7 +325,7 @@ fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 }
 
 /// The holdout as one window per log.
-fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
+pub(crate) fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
     let (mut windows, mut rows) = (Vec::new(), 0);
     for (index, track) in data.tracks.iter().enumerate() {
         let last = track.len() - 1;
@@ -342,7 +342,7 @@ fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
 }
 
 /// Predictions kept within reach of the measurement, so that a diverged run stays a number.
-fn limited(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
+pub(crate) fn limited(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
     let within = |p: &f64, m: &f64| m + (p - m).clamp(-FREE_RUN_LIMIT, FREE_RUN_LIMIT);
     predicted.iter().zip(measured).map(|(p, m)| within(p, m)).collect()
 }

@@ -50,6 +50,7 @@ mod ruled_out;
 mod sanity;
 pub mod scale;
 pub mod screen;
+pub mod serial;
 pub mod simulate;
 pub mod smooth;
 pub mod solve;

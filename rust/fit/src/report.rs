@@ -79,7 +79,7 @@ pub struct Diagnosis {
 pub struct Gap {
     /// Prediction horizon, s.
     pub horizon_s: f64,
-    /// Unit of the position errors per joint.
+    /// Unit of the position errors; of an arm with joints of both kinds that of its first joint (see `arm.joint_unit`).
     pub unit: &'static str,
     /// Arm file as it is.
     pub before: Vec<f64>,
@@ -245,7 +245,7 @@ pub struct ArmSummary {
     /// Joints.
     pub n_joints: usize,
     /// Parameter names in the order of `theta`.
-    pub parameter_names: Vec<&'static str>,
+    pub parameter_names: Vec<String>,
     /// Their units.
     pub parameter_units: Vec<&'static str>,
     /// Unit of each joint's position.

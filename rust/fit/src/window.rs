@@ -139,6 +139,33 @@ impl<const N: usize> Dataset<N> {
         hypothesis: &Hypothesis<P>,
         offsets: &[InitialStateOffset<N>],
     ) -> Vec<f64> {
+        self.predict_by(arm, hypothesis, offsets, |batched| {
+            let level = Level::widest();
+            batched
+                .par_chunks_mut(GROUP)
+                .for_each(|group| BatchRollout { runs: group, limit: DIVERGED }.run_all(level));
+        })
+    }
+
+    /// The same, run by run: for arms whose equation is too long to be worth the lanes of a vector unit.
+    pub fn predict_singly<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+    ) -> Vec<f64> {
+        self.predict_by(arm, hypothesis, &self.zero_offsets(), |runs| {
+            runs.par_iter_mut().for_each(run_scalar);
+        })
+    }
+
+    /// Predictions of which `rollout` simulates the runs that need no latent state and come near no edge.
+    fn predict_by<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+        offsets: &[InitialStateOffset<N>],
+        rollout: impl Fn(&mut [Run<'_, f64, A, N, P>]),
+    ) -> Vec<f64> {
         let mut predicted = vec![DIVERGED; self.rows * N];
         let Some(plant) = hypothesis.plant(arm) else {
             return predicted;
@@ -170,10 +197,7 @@ impl<const N: usize> Dataset<N> {
                 };
             runs.push(Run { plant: &plant, t, torque, state, positions });
         }
-        let level = Level::widest();
-        batched
-            .par_chunks_mut(GROUP)
-            .for_each(|group| BatchRollout { runs: group, limit: DIVERGED }.run_all(level));
+        rollout(&mut batched);
         scalar.par_chunks_mut(WIDTH).for_each(|group| group.iter_mut().for_each(run_scalar));
         if hypothesis.distorts() {
             for row in predicted.chunks_exact_mut(N) {

@@ -1,0 +1,44 @@
+//! What decides in the diagnosis of a serial arm: every constant with its unit, its reason, and what other values did.
+
+/// Robust test statistic (squared, sandwich over blocks) that a term needs on the training logs: five standard deviations, which one of
+/// 300 candidates exceeds by chance once in 6,000 searches.
+pub const SIGNIFICANT: f64 = 25.0;
+
+/// Decrease of the training cost, per parameter, that pays for it: twice the logarithm of some hundred candidates.
+pub const PRICE: f64 = 12.0;
+
+/// Standard deviations by which the cost of the holdout's blocks has to fall on average.
+pub const HOLDOUT_DEVIATIONS: f64 = 2.0;
+
+/// Share of what one joint's holdout rows leave that a term has to take.
+pub const MATTERS: f64 = 0.1;
+
+/// Torque of a term, RMS, beside the torque of the joint it acts on most: below it makes no difference to anyone.
+pub const CONSEQUENCE: f64 = 0.005;
+
+/// Decrease of the squared distance from the arm file's values, per parameter, from which a term that only restores these is believed.
+pub const RESTORES: f64 = 9.0;
+
+/// Two models whose costs differ by less than this part of what the term explains, or by less than `ALIKE_COST`, are alike.
+pub const ALIKE: f64 = 0.05;
+
+/// See [`ALIKE`]; in units of the cost, two standard deviations squared.
+pub const ALIKE_COST: f64 = 4.0;
+
+/// Candidates that are fitted after all were tested to first order.
+pub const FINALISTS: usize = 14;
+
+/// Iterations of a fit at most, and the relative decrease of the cost that ends it.
+pub const ITERATIONS: usize = 10;
+
+/// See [`ITERATIONS`].
+pub const ENOUGH: f64 = 1e-4;
+
+/// Resamples of the blocks behind a probability.
+pub const RESAMPLES: usize = 400;
+
+/// Part of the joints that move on which a law has to be found to be one cause of the whole arm.
+pub const ARM_WIDE: f64 = 0.5;
+
+/// Probability below which a cause is only a candidate.
+pub const NAMED: f64 = 0.3;

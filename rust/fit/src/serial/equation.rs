@@ -1,0 +1,360 @@
+//! The weak equation of motion of an arm along its logs, and the torque of any term along the same motion.
+
+use super::intervals::{Intervals, Middle, TestFunction};
+use super::rows::{JointRows, Rows, Signal};
+use super::predict::turned;
+use super::term::{Term, TermKind, of_load};
+use crate::model::EffectInstance;
+use crate::track::Track;
+use armgap_core::arm::Arm;
+use armgap_core::chain::Chain;
+use armgap_core::effect::{InputSegment, JointPoint};
+use armgap_core::kinematics::{JointState, RigidArm};
+use nalgebra::SVector;
+use rayon::prelude::*;
+
+/// Length of a block, s, over which what the model lacks may be correlated.
+const BLOCK_S: f64 = 1.0;
+
+/// A row of which the joint is at rest for more than this share is no datum.
+const MOSTLY_AT_REST: f64 = 0.1;
+
+/// Displacement of the base's tilt for its derivative, rad; the torque is smooth in it.
+const TILT_STEP: f64 = 1e-4;
+
+/// An arm along logs.
+pub struct Equation<const N: usize, const P: usize> {
+    /// The arm.
+    pub arm: Chain<f64, N>,
+    /// Rows.
+    pub rows: Rows,
+    logs: Vec<Intervals<N>>,
+    times: Vec<Vec<f64>>,
+    held: Vec<Vec<[InputSegment<f64>; N]>>,
+    functions: Vec<TestFunction>,
+    /// Test functions of each joint's rows.
+    kept: Vec<Vec<usize>>,
+}
+
+/// Torques per interval of every log on the joints that a term acts on.
+type Torques<const N: usize> = [Option<Vec<Vec<f64>>>; N];
+
+impl<const N: usize, const P: usize> Equation<N, P> {
+    /// The equation along these logs; `theta` are nominal values.
+    pub fn new(arm: Chain<f64, N>, theta: &[f64; P], tracks: &[Track<N>]) -> Self {
+        let logs: Vec<Intervals<N>> = tracks.iter().map(Intervals::new).collect();
+        let functions: Vec<TestFunction> =
+            logs.iter().enumerate().flat_map(|(i, log)| log.test_functions(i)).collect();
+        let mut equation = Self {
+            arm,
+            rows: Rows { joints: Vec::new(), parameters: P, blocks: 0 },
+            logs,
+            times: tracks.iter().map(|t| t.t.clone()).collect(),
+            held: tracks.iter().map(|t| t.held.clone()).collect(),
+            functions,
+            kept: Vec::new(),
+        };
+        equation.kept = (0..N).map(|j| equation.moving(j)).collect();
+        equation.rows = equation.all_rows(theta);
+        equation
+    }
+
+    /// Test functions during which joint `j` moves.
+    fn moving(&self, j: usize) -> Vec<usize> {
+        let still = |phi: &TestFunction| -> f64 {
+            let middles = &self.logs[phi.log].middles;
+            phi.reach().filter(|k| middles[*k].rest[j]).map(|k| phi.weight(&middles[k])).sum()
+        };
+        (0..self.functions.len()).filter(|i| still(&self.functions[*i]) <= MOSTLY_AT_REST).collect()
+    }
+
+    fn all_rows(&self, theta: &[f64; P]) -> Rows {
+        let mut first_block = vec![0];
+        for log in &self.logs {
+            let duration = log.middles.last().map_or(0.0, |m| m.t + 0.5 * m.h);
+            first_block.push(first_block[first_block.len() - 1] + (duration / BLOCK_S) as usize + 1);
+        }
+        // Along every interval: momentum, and what is left of the torque, per unit of every parameter.
+        let terms: Vec<Vec<[Vec<f64>; 2]>> = self
+            .logs
+            .iter()
+            .map(|log| log.middles.par_iter().map(|m| self.regressors(m)).collect())
+            .collect();
+        let inertia: Vec<[[f64; N]; N]> = self
+            .functions
+            .par_iter()
+            .map(|phi| {
+                let m = &self.logs[phi.log].middles[(phi.first + phi.last) / 2];
+                let inertia = self.arm.inertia(theta, &SVector::from(m.q));
+                std::array::from_fn(|j| std::array::from_fn(|k| inertia[(j, k)]))
+            })
+            .collect();
+        let joint = |j: usize| {
+            let row = |i: &usize| {
+                let phi = &self.functions[*i];
+                let log = &self.logs[phi.log];
+                let mut psi = vec![0.0; P];
+                let mut y = 0.0;
+                for k in phi.reach() {
+                    let m = &log.middles[k];
+                    let (weight, rise) = (phi.weight(m), phi.rise(m));
+                    y += weight * m.tau[j];
+                    let [momentum, rest] = &terms[phi.log][k];
+                    for (i, psi) in psi.iter_mut().enumerate() {
+                        *psi += weight * rest[j * P + i] - rise * momentum[j * P + i];
+                    }
+                }
+                (y, psi, first_block[phi.log] + (phi.centre / BLOCK_S) as usize, self.floor(phi, &inertia[*i][j]))
+            };
+            let found: Vec<_> = self.kept[j].par_iter().map(row).collect();
+            let mut rows = JointRows { y: vec![], psi: vec![], block: vec![], floor: vec![] };
+            for (y, psi, block, floor) in found {
+                rows.y.push(y);
+                rows.psi.extend(psi);
+                rows.block.push(block);
+                rows.floor.push(floor);
+            }
+            rows
+        };
+        let joints = (0..N).map(joint).collect();
+        Rows { joints, parameters: P, blocks: first_block[self.logs.len()] }
+    }
+
+    /// Momentum and the rest of the torque in the middle of an interval, by joint and parameter.
+    fn regressors(&self, m: &Middle<N>) -> [Vec<f64>; 2] {
+        let q = SVector::from(m.q);
+        let momentum = self.arm.momentum_regressor(&q, &SVector::from(m.mean_dq));
+        let dq = SVector::from(m.dq);
+        let rest: nalgebra::SMatrix<f64, N, P> =
+            self.arm.potential_regressor(&q, &dq) + self.arm.friction_regressor(&dq);
+        [momentum, rest].map(|x| (0..N).flat_map(|j| (0..P).map(move |i| (j, i))).map(|at| x[at]).collect())
+    }
+
+    /// Standard deviation that noisy positions put into a row, through the momentum.
+    fn floor(&self, phi: &TestFunction, inertia: &[f64; N]) -> f64 {
+        let log = &self.logs[phi.log];
+        let mut before = 0.0;
+        let mut square = 0.0;
+        for k in phi.reach() {
+            let slope = phi.rise(&log.middles[k]) / log.middles[k].h;
+            square += (slope - before).powi(2);
+            before = slope;
+        }
+        square += before * before;
+        let variance: f64 = (0..N).map(|k| (inertia[k] * log.noise[k]).powi(2)).sum();
+        (variance * square).sqrt()
+    }
+
+    /// The torque of a term that the arm needs on top of its own, row by row: what it would take from the left-hand side.
+    pub fn signal(&self, term: &Term, theta: &[f64; P]) -> Signal {
+        match term.kind {
+            TermKind::Law(_) => match term.effect() {
+                Some(effect) if effect.law.spec().hooks.measured => self.displaced(&effect, theta),
+                Some(effect) => self.of_law(&effect, theta),
+                None => vec![None; N],
+            },
+            TermKind::Payload => self.of_link(N - 1, &of_load(&term.p)),
+            TermKind::NominalLink(link) => self.of_link(link, &std::array::from_fn(|i| term.p[i])),
+            TermKind::BaseTilt => self.of_tilt(&term.p, theta),
+        }
+    }
+
+    /// A change of one link's ten numbers.
+    fn of_link(&self, link: usize, change: &[f64; 10]) -> Signal {
+        let joint = |(j, rows): (usize, &JointRows)| {
+            (j <= link).then(|| {
+                let along = |psi: &[f64]| psi[10 * link..][..10].iter().zip(change).map(|(a, b)| a * b).sum();
+                rows.psi.chunks_exact(P).map(along).collect()
+            })
+        };
+        self.rows.joints.iter().enumerate().map(joint).collect()
+    }
+
+    /// Averages of torques per interval over the test functions of each joint's rows.
+    fn weak(&self, torques: &Torques<N>) -> Signal {
+        let joint = |j: usize| {
+            torques[j].as_ref().map(|torque| {
+                let row = |i: &usize| {
+                    let phi = &self.functions[*i];
+                    let middles = &self.logs[phi.log].middles;
+                    phi.reach().map(|k| phi.weight(&middles[k]) * torque[phi.log][k]).sum()
+                };
+                self.kept[j].iter().map(row).collect()
+            })
+        };
+        (0..N).map(joint).collect()
+    }
+
+    /// A law on one joint: a torque, a part of dry friction, an inertia, or a change of the command.
+    fn of_law(&self, effect: &EffectInstance, theta: &[f64; P]) -> Signal {
+        let (spec, j) = (effect.law.spec(), effect.joint);
+        let mut torques: Torques<N> = std::array::from_fn(|_| None);
+        if spec.hooks.command {
+            let of = |i: usize| {
+                let mut column: Vec<InputSegment<f64>> = self.held[i].iter().map(|row| row[j]).collect();
+                effect.law.command(&effect.p, &self.times[i], &mut column);
+                let middles = &self.logs[i].middles;
+                (0..middles.len()).map(|k| middles[k].tau[j] - column[k].mean()).collect()
+            };
+            torques[j] = Some((0..self.logs.len()).map(of).collect());
+            return self.weak(&torques);
+        }
+        if spec.hooks.force || spec.hooks.coulomb {
+            torques[j] = Some(self.logs.iter().map(|log| self.along(log, effect, theta)).collect());
+            return self.weak(&torques);
+        }
+        let inertia = effect.law.inertia(&effect.p);
+        if inertia == 0.0 {
+            return vec![None; N];
+        }
+        let mut signal = vec![None; N];
+        let row = |i: &usize| {
+            let phi = &self.functions[*i];
+            let middles = &self.logs[phi.log].middles;
+            phi.reach().map(|k| -phi.rise(&middles[k]) * inertia * middles[k].mean_dq[j]).sum()
+        };
+        signal[j] = Some(self.kept[j].iter().map(row).collect());
+        signal
+    }
+
+    /// Torque of a law along a log, interval by interval.
+    fn along(&self, log: &Intervals<N>, effect: &EffectInstance, theta: &[f64; P]) -> Vec<f64> {
+        let (spec, j) = (effect.law.spec(), effect.joint);
+        let viscous = self.arm.viscous(theta)[j];
+        let coulomb = self.arm.coulomb(theta)[j];
+        let rigid = RigidArm {
+            arm: self.arm,
+            theta: *theta,
+            viscous: [0.0; N],
+            coulomb: [0.0; N],
+            constant_inertia: self.arm.constant_inertia(theta),
+            tilt: 0.0,
+        };
+        let needs_load = spec.name == "load_dependent_friction" || spec.name == "gear_efficiency";
+        let (mut memory, mut before) = (0.0, None);
+        let torque = |m: &Middle<N>| {
+            let load = if needs_load {
+                rigid.equation_terms(&JointState { q: m.q, dq: m.dq }).bias[j]
+            } else {
+                0.0
+            };
+            if spec.hooks.memory {
+                let travelled = before.map_or(0.0, |q: f64| m.q[j] - q);
+                memory = effect.law.hysteresis_after(&effect.p, memory, travelled);
+                before = Some(m.q[j]);
+            }
+            let x = JointPoint {
+                t: m.t,
+                q: m.q[j],
+                dq: m.dq[j],
+                tau: m.tau[j],
+                load,
+                friction: viscous * m.dq[j].abs() + coulomb,
+                other: sign(m.dq[(j + 1) % N]),
+                memory,
+            };
+            let direction = sign(x.dq);
+            let level = if spec.hooks.coulomb { effect.law.coulomb(&effect.p, &x, direction) } else { 0.0 };
+            let force = if spec.hooks.force { effect.law.force(&effect.p, &x) } else { 0.0 };
+            level * direction - force
+        };
+        log.middles.iter().map(torque).collect()
+    }
+
+    /// Measured positions that are not the joints': difference of the arm's own torque along both.
+    fn displaced(&self, effect: &EffectInstance, theta: &[f64; P]) -> Signal {
+        let j = effect.joint;
+        let theta = SVector::from(*theta);
+        let actual = |reading: f64| {
+            let mut q = reading;
+            for _ in 0..4 {
+                q += reading - effect.law.measured(&effect.p, q);
+            }
+            q
+        };
+        let differences: Vec<Vec<[SVector<f64, N>; 2]>> = self
+            .logs
+            .iter()
+            .map(|log| {
+                log.middles
+                    .par_iter()
+                    .map(|m| {
+                        let mut there = *m;
+                        let step = 0.5 * m.h * m.mean_dq[j];
+                        let (from, to) = (actual(m.q[j] - step), actual(m.q[j] + step));
+                        there.q[j] = 0.5 * (from + to);
+                        there.mean_dq[j] = (to - from) / m.h;
+                        if m.mean_dq[j] != 0.0 {
+                            there.dq[j] = m.dq[j] * there.mean_dq[j] / m.mean_dq[j];
+                        }
+                        let at = |m: &Middle<N>| {
+                            let (q, dq) = (SVector::from(m.q), SVector::from(m.dq));
+                            let momentum: nalgebra::SMatrix<f64, N, P> =
+                                self.arm.momentum_regressor(&q, &SVector::from(m.mean_dq));
+                            let rest: nalgebra::SMatrix<f64, N, P> =
+                                self.arm.potential_regressor(&q, &dq) + self.arm.friction_regressor(&dq);
+                            [momentum * theta, rest * theta]
+                        };
+                        let ([pa, ra], [pb, rb]) = (at(&there), at(m));
+                        [pa - pb, ra - rb]
+                    })
+                    .collect()
+            })
+            .collect();
+        let joint = |joint: usize| {
+            let row = |i: &usize| {
+                let phi = &self.functions[*i];
+                let log = &self.logs[phi.log];
+                let part = |k: usize| {
+                    let ([momentum, rest], m) = (&differences[phi.log][k], &log.middles[k]);
+                    phi.weight(m) * rest[joint] - phi.rise(m) * momentum[joint]
+                };
+                phi.reach().map(part).sum()
+            };
+            Some(self.kept[joint].iter().map(row).collect())
+        };
+        (0..N).map(joint).collect()
+    }
+
+    /// Gravity from another direction: to first order in the tilt.
+    fn of_tilt(&self, p: &[f64], theta: &[f64; P]) -> Signal {
+        let theta = SVector::from(*theta);
+        let size = p[0].abs().max(p[1].abs());
+        if size == 0.0 {
+            return vec![None; N];
+        }
+        let by = |scale: f64| turned(&self.arm, [p[0] * scale, p[1] * scale]);
+        let scale = TILT_STEP / size;
+        let (ahead, behind) = (by(scale), by(-scale));
+        let zero = SVector::zeros();
+        let torques: Vec<Vec<SVector<f64, N>>> = self
+            .logs
+            .iter()
+            .map(|log| {
+                let at = |m: &Middle<N>| {
+                    let q = SVector::from(m.q);
+                    let of = |arm: &Chain<f64, N>| -> SVector<f64, N> {
+                        let y: nalgebra::SMatrix<f64, N, P> = arm.potential_regressor(&q, &zero);
+                        y * theta
+                    };
+                    (of(&ahead) - of(&behind)) / (2.0 * scale)
+                };
+                log.middles.par_iter().map(at).collect()
+            })
+            .collect();
+        let by_joint: Torques<N> = std::array::from_fn(|j| {
+            Some(torques.iter().map(|log| log.iter().map(|tau| tau[j]).collect()).collect())
+        });
+        self.weak(&by_joint)
+    }
+}
+
+fn sign(x: f64) -> f64 {
+    if x > 0.0 {
+        1.0
+    } else if x < 0.0 {
+        -1.0
+    } else {
+        0.0
+    }
+}

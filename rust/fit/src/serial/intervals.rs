@@ -1,0 +1,197 @@
+//! A log as its sample intervals: the state in the middle of each, the torque held over it, and the test functions it is weighed by.
+//!
+//! The equation of motion is used in its weak form. With a smooth test function `phi` of compact support,
+//!
+//! ```text
+//! - int phi' M(q) dq dt + int phi (g - dK/dq + f) dt = int phi tau dt
+//! ```
+//!
+//! needs no acceleration: it is the filtered dynamic regression of Reyes and Kelly (1997) with a symmetric filter of finite length in place of
+//! the first-order one. Velocities in the momentum are differences of positions over the interval, whose mean they are exactly; friction and
+//! whatever depends on the sign of a velocity take it from local cubics.
+
+use crate::track::Track;
+use std::f64::consts::PI;
+
+/// Half width of a test function, s: its transfer function falls to one half at 0.5 / `HALF_WIDTH_S`, here 10 Hz. Friction torques of a
+/// reversal are smeared over it; the noise of positions enters with its inverse square.
+pub const HALF_WIDTH_S: f64 = 0.05;
+
+/// Least half width in sample periods.
+const FEWEST_PERIODS: f64 = 5.0;
+
+/// Distance between test functions, in half widths.
+const SPACING: f64 = 0.5;
+
+/// A joint is at rest where its velocity is below so many of its standard deviations; dry friction then is a bound and no datum.
+const AT_REST: f64 = 3.0;
+
+/// The time between two samples in so many periods ends a stretch.
+const GAP: f64 = 3.5;
+
+/// State and torque in the middle of a sample interval.
+#[derive(Debug, Clone, Copy)]
+pub struct Middle<const N: usize> {
+    /// Time since the start of the log, s.
+    pub t: f64,
+    /// Length of the interval, s.
+    pub h: f64,
+    /// Positions.
+    pub q: [f64; N],
+    /// Velocities from local cubics.
+    pub dq: [f64; N],
+    /// Mean velocities: differences of positions.
+    pub mean_dq: [f64; N],
+    /// Mean torques.
+    pub tau: [f64; N],
+    /// Whether each joint is at rest.
+    pub rest: [bool; N],
+}
+
+/// A log's intervals.
+#[derive(Debug, Clone)]
+pub struct Intervals<const N: usize> {
+    /// Interval by interval.
+    pub middles: Vec<Middle<N>>,
+    /// Standard deviation of the position measurement per joint.
+    pub noise: [f64; N],
+}
+
+impl<const N: usize> Intervals<N> {
+    /// The intervals of a log.
+    pub fn new(track: &Track<N>) -> Self {
+        let smoothed = track.smoothed();
+        let begin = track.t.first().copied().unwrap_or(0.0);
+        let middle = |k: usize| -> Middle<N> {
+            let h = track.t[k + 1] - track.t[k];
+            let (a, b) = (&smoothed[k], &smoothed[k + 1]);
+            let of = |value: &dyn Fn(usize) -> f64| std::array::from_fn(value);
+            Middle {
+                t: 0.5 * (track.t[k] + track.t[k + 1]) - begin,
+                h,
+                q: of(&|j| 0.5 * (track.q[k][j] + track.q[k + 1][j])),
+                dq: of(&|j| 0.5 * (a[j].local.dq + b[j].local.dq)),
+                mean_dq: of(&|j| (track.q[k + 1][j] - track.q[k][j]) / h),
+                tau: of(&|j| track.held[k][j].mean()),
+                rest: std::array::from_fn(|j| {
+                    let speed = 0.5 * (a[j].local.dq + b[j].local.dq);
+                    speed.abs() <= AT_REST * track.noise[j] * a[j].local.covariance[2].sqrt()
+                }),
+            }
+        };
+        Self { middles: (0..track.len().saturating_sub(1)).map(middle).collect(), noise: track.noise }
+    }
+
+    /// Test functions over this log.
+    pub fn test_functions(&self, log: usize) -> Vec<TestFunction> {
+        let period = crate::track::median(self.middles.iter().map(|m| m.h).collect());
+        let half = HALF_WIDTH_S.max(FEWEST_PERIODS * period);
+        let mut found = Vec::new();
+        let mut first = 0;
+        for k in 0..=self.middles.len() {
+            if k < self.middles.len() && self.middles[k].h <= GAP * period {
+                continue;
+            }
+            found.extend(self.over(log, first..k, half));
+            first = k + 1;
+        }
+        found
+    }
+
+    fn over(&self, log: usize, stretch: std::ops::Range<usize>, half: f64) -> Vec<TestFunction> {
+        let Some((a, b)) = self.middles.get(stretch.clone()).and_then(|m| Some((m.first()?, m.last()?))) else {
+            return Vec::new();
+        };
+        let (begin, end) = (a.t - 0.5 * a.h, b.t + 0.5 * b.h);
+        let count = ((end - begin - 2.0 * half) / (SPACING * half)).floor();
+        let at = |i: usize| {
+            let centre = begin + half * (1.0 + SPACING * i as f64);
+            let inside = &self.middles[stretch.clone()];
+            let first = stretch.start + inside.partition_point(|m| m.t + 0.5 * m.h <= centre - half);
+            let last = stretch.start + inside.partition_point(|m| m.t - 0.5 * m.h < centre + half);
+            TestFunction { log, first, last, centre, half }
+        };
+        if count < 0.0 { Vec::new() } else { (0..=count as usize).map(at).collect() }
+    }
+}
+
+/// A raised cosine of unit area.
+#[derive(Debug, Clone, Copy)]
+pub struct TestFunction {
+    /// Index of the log.
+    pub log: usize,
+    /// First interval that it reaches.
+    pub first: usize,
+    /// One behind the last.
+    pub last: usize,
+    /// Time of its maximum since the start of the log, s.
+    pub centre: f64,
+    half: f64,
+}
+
+impl TestFunction {
+    /// Integral of the test function over an interval.
+    pub fn weight<const N: usize>(&self, m: &Middle<N>) -> f64 {
+        let area = |t: f64| {
+            let x = ((t - self.centre) / self.half).clamp(-1.0, 1.0);
+            0.5 * (x + (PI * x).sin() / PI)
+        };
+        area(m.t + 0.5 * m.h) - area(m.t - 0.5 * m.h)
+    }
+
+    /// Mean derivative of the test function over an interval times its length.
+    pub fn rise<const N: usize>(&self, m: &Middle<N>) -> f64 {
+        self.value(m.t + 0.5 * m.h) - self.value(m.t - 0.5 * m.h)
+    }
+
+    fn value(&self, t: f64) -> f64 {
+        let x = ((t - self.centre) / self.half).clamp(-1.0, 1.0);
+        0.5 * (1.0 + (PI * x).cos()) / self.half
+    }
+
+    /// Intervals it reaches.
+    pub fn reach(&self) -> std::ops::Range<usize> {
+        self.first..self.last
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn falling(count: usize, h: f64) -> Track<1> {
+        let t: Vec<f64> = (0..count).map(|k| h * k as f64 + 1e-4 * (k as f64).sin()).collect();
+        let q: Vec<f64> = t.iter().map(|t| 0.5 * 3.0 * t * t).collect();
+        Track::new("", &t, &q, &vec![1.0; count], Some([1e-9]))
+    }
+
+    #[test]
+    fn test_functions_have_unit_area_and_no_net_rise() {
+        let log = Intervals::new(&falling(400, 0.0025));
+        let functions = log.test_functions(0);
+        assert!(functions.len() > 30);
+        for phi in functions {
+            let area: f64 = phi.reach().map(|k| phi.weight(&log.middles[k])).sum();
+            let rise: f64 = phi.reach().map(|k| phi.rise(&log.middles[k])).sum();
+            assert!((area - 1.0).abs() < 1e-12 && rise.abs() < 1e-9, "{area} {rise}");
+        }
+    }
+
+    #[test]
+    fn the_weak_form_of_an_acceleration_is_the_acceleration() {
+        let log = Intervals::new(&falling(400, 0.0025));
+        for phi in log.test_functions(0) {
+            let weak: f64 =
+                phi.reach().map(|k| -phi.rise(&log.middles[k]) * log.middles[k].mean_dq[0]).sum();
+            assert!((weak - 3.0).abs() < 1e-3, "{weak}");
+        }
+    }
+
+    #[test]
+    fn nothing_reaches_across_a_gap() {
+        let mut track = falling(400, 0.0025);
+        track.t.iter_mut().skip(200).for_each(|t| *t += 0.1);
+        let log = Intervals::new(&track);
+        assert!(log.test_functions(0).iter().all(|phi| !phi.reach().contains(&199)));
+    }
+}

@@ -1,0 +1,197 @@
+//! Diagnosis of serial arms of one to seven joints.
+//!
+//! A serial arm has dozens of parameters and hundreds of candidate effects, and its torques are mostly those of a controller or of measured
+//! currents: not an input that is independent of what the model lacks. So terms are sought in the equation of motion along the measured
+//! path, in its weak form, where all parameters and most terms are linear and no rollout is needed; predictions over short windows only say
+//! how far the gap shrinks. The way of the data is `intervals` (log) -> `equation` (rows, torques of terms) -> `rows` (regression) ->
+//! `search` (which terms) -> `predict` (gap) -> `result`.
+
+mod constants;
+mod equation;
+mod intervals;
+mod predict;
+mod result;
+mod rows;
+mod search;
+mod term;
+
+use crate::diagnose::{DiagnoseError, FEWEST_WINDOWS, LogData, Options};
+use crate::progress::{Observer, ProgressReporter, guarded};
+use crate::report::Diagnosis;
+use crate::scale::Scales;
+use crate::screen::effect_instances;
+use crate::track::Track;
+use crate::window::Dataset;
+use armgap_core::chain::{Chain, ChainJoint, JointKind, PARAMETERS_PER_JOINT};
+use armgap_core::effect::{Scope, Trial};
+use equation::Equation;
+use rows::{Prior, Rows, Signal};
+use search::{Motion, Search};
+use std::time::Instant;
+use term::{Term, TermKind};
+
+/// A serial arm as an arm file describes it.
+#[derive(Debug, Clone)]
+pub struct SerialArm {
+    /// Joints from the base, at most seven.
+    pub joints: Vec<ChainJoint<f64>>,
+    /// Acceleration of gravity in the base frame, m/s^2.
+    pub gravity: [f64; 3],
+    /// Thirteen parameters per joint: ten of each link, then rotor inertias, viscous and Coulomb coefficients.
+    pub theta: Vec<f64>,
+    /// Standard deviations of them; zero for a value that is not estimated.
+    pub sigma: Vec<f64>,
+    /// Smallest step of each position measurement.
+    pub steps: Option<Vec<f64>>,
+}
+
+impl SerialArm {
+    /// Whether each joint turns.
+    pub fn rotary(&self) -> Vec<bool> {
+        self.joints.iter().map(|j| j.kind == JointKind::Revolute).collect()
+    }
+}
+
+/// What was asked for.
+struct Request<'a> {
+    arm: &'a SerialArm,
+    training: &'a [LogData<'a>],
+    holdout: &'a [LogData<'a>],
+    options: &'a Options,
+    observer: &'a Observer,
+}
+
+/// Diagnoses the gap between a serial arm and its logs; `observer` gets the progress and may cancel.
+///
+/// # Errors
+///
+/// Logs or options that cannot be worked with.
+pub fn diagnose(
+    arm: &SerialArm,
+    training: &[LogData<'_>],
+    holdout: &[LogData<'_>],
+    options: &Options,
+    observer: &Observer,
+) -> Result<Diagnosis, DiagnoseError> {
+    crate::diagnose::validate_logs(arm.joints.len(), training, holdout, options)?;
+    let request = Request { arm, training, holdout, options, observer };
+    guarded(|| by_size(&request)).ok_or(DiagnoseError::Stopped)?
+}
+
+/// The diagnosis with its number of joints known at compile time.
+fn by_size(request: &Request<'_>) -> Result<Diagnosis, DiagnoseError> {
+    match request.arm.joints.len() {
+        1 => request.run::<1, 13>(),
+        2 => request.run::<2, 26>(),
+        3 => request.run::<3, 39>(),
+        4 => request.run::<4, 52>(),
+        5 => request.run::<5, 65>(),
+        6 => request.run::<6, 78>(),
+        7 => request.run::<7, 91>(),
+        _ => Err(DiagnoseError::Joints(request.arm.joints.len())),
+    }
+}
+
+impl<const N: usize, const P: usize> Motion for Equation<N, P> {
+    fn rows(&self) -> &Rows {
+        &self.rows
+    }
+
+    fn signal(&self, term: &Term, theta: &[f64]) -> Signal {
+        let theta = std::array::from_fn(|i| theta[i]);
+        Equation::signal(self, term, &theta)
+    }
+}
+
+/// Logs, equation and windows of one set.
+pub(crate) struct Set<const N: usize, const P: usize> {
+    pub(crate) equation: Equation<N, P>,
+    pub(crate) data: Dataset<N>,
+}
+
+impl Request<'_> {
+    fn run<const N: usize, const P: usize>(&self) -> Result<Diagnosis, DiagnoseError> {
+        let started = Instant::now();
+        let sizes = |found: usize| DiagnoseError::Sizes { found, needed: P };
+        let joints: [ChainJoint<f64>; N] =
+            self.arm.joints.clone().try_into().map_err(|_| DiagnoseError::Joints(self.arm.joints.len()))?;
+        let theta: [f64; P] = self.arm.theta.clone().try_into().map_err(|_| sizes(self.arm.theta.len()))?;
+        if self.arm.sigma.len() != P || P != PARAMETERS_PER_JOINT * N {
+            return Err(sizes(self.arm.sigma.len()));
+        }
+        let arm = Chain::new(joints, self.arm.gravity);
+        let progress = ProgressReporter::new(Observer::clone(self.observer));
+        let training = self.set::<N, P>("training", self.training, &arm, &theta)?;
+        let holdout = self.set::<N, P>("holdout", self.holdout, &arm, &theta)?;
+        let prior = Prior {
+            theta: theta.to_vec(),
+            sigma: self.arm.sigma.clone(),
+            positive: (0..P).map(|i| i >= 10 * N).collect(),
+        };
+        let search = Search {
+            training: &training.equation,
+            holdout: &holdout.equation,
+            prior: &prior,
+            candidates: candidates(&arm, &theta, &training.data.tracks),
+            rotary: self.arm.rotary(),
+            progress: &progress,
+        };
+        let found = search.run(self.options.max_causes, self.options.seed);
+        let mut diagnosis = result::assemble(self.arm, &arm, &training, &holdout, &found, self.options, &progress);
+        diagnosis.seconds = started.elapsed().as_secs_f64();
+        Ok(diagnosis)
+    }
+
+    fn set<const N: usize, const P: usize>(
+        &self,
+        set: &'static str,
+        logs: &[LogData<'_>],
+        arm: &Chain<f64, N>,
+        theta: &[f64; P],
+    ) -> Result<Set<N, P>, DiagnoseError> {
+        let steps = self.arm.steps.as_ref().map(|steps| std::array::from_fn(|j| steps[j]));
+        let track =
+            |log: &LogData<'_>| Track::new(&log.name, log.t, log.q, log.tau, steps).with_moments(log.moment);
+        let tracks: Vec<Track<N>> = logs.iter().map(track).collect();
+        let equation = Equation::new(*arm, theta, &tracks);
+        let data = Dataset::new(tracks, self.options.horizon);
+        if data.windows.len() < FEWEST_WINDOWS {
+            return Err(DiagnoseError::TooShort { set, windows: data.windows.len(), needed: FEWEST_WINDOWS });
+        }
+        Ok(Set { equation, data })
+    }
+}
+
+/// Every term at each of its initial guesses, grouped by place. Effects with latent states between motor and link, and those stated for the
+/// plane, are not among them.
+fn candidates<const N: usize, const P: usize>(
+    arm: &Chain<f64, N>,
+    theta: &[f64; P],
+    tracks: &[Track<N>],
+) -> Vec<Vec<Term>> {
+    let gravity = arm.gravity_vector().iter().map(|g| g * g).sum::<f64>().sqrt();
+    let scales = Scales::new(arm, theta, tracks, gravity, None);
+    let sides = std::array::from_fn(|_| Vec::new());
+    let mut groups: Vec<Vec<Term>> = Vec::new();
+    for effect in effect_instances(&scales, &sides, true) {
+        let spec = effect.law.spec();
+        if spec.scope == Scope::Arm || spec.trial == Trial::Disturbance || effect.law.has_transmission() {
+            continue;
+        }
+        // A rotor inertia that the arm file has is one of the arm's parameters.
+        if spec.name == "rotor_inertia" && theta[10 * N + effect.joint] > 0.0 {
+            continue;
+        }
+        let term = Term::of_law(effect);
+        match groups.iter_mut().find(|group| group[0].same_place(&term)) {
+            Some(group) => group.push(term),
+            None => groups.push(vec![term]),
+        }
+    }
+    groups.push(vec![Term::neutral(TermKind::Payload)]);
+    if gravity > 0.0 {
+        groups.push(vec![Term::neutral(TermKind::BaseTilt)]);
+    }
+    groups.extend((0..N).map(|link| vec![Term::neutral(TermKind::NominalLink(link))]));
+    groups
+}

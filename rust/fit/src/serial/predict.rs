@@ -1,0 +1,75 @@
+//! Predictions of a serial arm with terms, over short windows and over whole logs.
+
+use super::term::{Term, TermKind, of_load};
+use crate::model::Hypothesis;
+use crate::window::{Dataset, Window};
+use armgap_core::chain::Chain;
+
+/// An arm with parameters and terms, as the integrator takes it.
+pub struct Model<const N: usize, const P: usize> {
+    arm: Chain<f64, N>,
+    hypothesis: Hypothesis<P>,
+}
+
+impl<const N: usize, const P: usize> Model<N, P> {
+    /// The arm with these parameters and terms.
+    pub fn new(arm: &Chain<f64, N>, theta: [f64; P], terms: &[Term]) -> Self {
+        let mut model = Self { arm: *arm, hypothesis: Hypothesis::rigid(theta) };
+        for term in terms {
+            match term.kind {
+                TermKind::Law(_) => model.hypothesis.effects.extend(term.effect()),
+                TermKind::Payload => model.add(N - 1, &of_load(&term.p)),
+                TermKind::NominalLink(link) => model.add(link, &std::array::from_fn(|i| term.p[i])),
+                TermKind::BaseTilt => model.arm = turned(&model.arm, [term.p[0], term.p[1]]),
+            }
+        }
+        model
+    }
+
+    fn add(&mut self, link: usize, change: &[f64; 10]) {
+        for (value, by) in self.hypothesis.theta[10 * link..].iter_mut().zip(change) {
+            *value += by;
+        }
+    }
+
+    /// Predicted positions of all windows.
+    pub fn predict(&self, data: &Dataset<N>) -> Vec<f64> {
+        data.predict_singly(&self.arm, &self.hypothesis)
+    }
+}
+
+/// The arm with its base turned by this rotation vector about the horizontal axes of its frame: gravity turns the other way.
+pub fn turned<const N: usize>(arm: &Chain<f64, N>, by: [f64; 2]) -> Chain<f64, N> {
+    let g = *arm.gravity_vector();
+    let angle = by[0].hypot(by[1]);
+    if angle == 0.0 {
+        return *arm;
+    }
+    let axis = [-by[0] / angle, -by[1] / angle, 0.0];
+    let cross = [
+        axis[1] * g[2] - axis[2] * g[1],
+        axis[2] * g[0] - axis[0] * g[2],
+        axis[0] * g[1] - axis[1] * g[0],
+    ];
+    let along: f64 = axis.iter().zip(&g).map(|(a, b)| a * b).sum();
+    let (sine, cosine) = angle.sin_cos();
+    arm.with_gravity(std::array::from_fn(|i| {
+        g[i] * cosine + cross[i] * sine + axis[i] * along * (1.0 - cosine)
+    }))
+}
+
+/// Mean square, per joint, of the errors of a perfect model: noise of the sample itself, and the error of the measured initial state carried
+/// along the window.
+pub fn floor<const N: usize>(data: &Dataset<N>, noise: &[f64; N]) -> [f64; N] {
+    let square = |w: &Window<N>, j: usize| -> f64 {
+        let track = &data.tracks[w.track];
+        let [vq, c, vdq] = w.initial_state.covariance[j];
+        let [mq, mdq] = w.initial_state.mean_square[j];
+        let at = |k: usize| {
+            let t = track.t[k] - track.t[w.first];
+            noise[j].powi(2) + vq * mq + 2.0 * t * c * (mq * mdq).sqrt() + t * t * vdq * mdq
+        };
+        (w.first + 1..=w.last).map(at).sum()
+    };
+    std::array::from_fn(|j| data.windows.iter().map(|w| square(w, j)).sum::<f64>() / data.rows.max(1) as f64)
+}

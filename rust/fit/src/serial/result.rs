@@ -1,0 +1,449 @@
+//! From the end of a search to the diagnosis as data.
+
+use super::constants::{CONSEQUENCE, NAMED, SIGNIFICANT};
+use super::predict::{Model, floor};
+use super::search::{Fitted, Found, Tested};
+use super::term::{Term, TermKind};
+use super::{SerialArm, Set};
+use crate::diagnose::Options;
+use crate::gap::{DRAWN, DRAWN_LOGS, HORIZONS, closed, limited, rms, whole};
+use crate::locate::Location;
+use crate::progress::{Phase, ProgressReporter};
+use crate::random::Random;
+use crate::report::{
+    ArmSummary, AtHorizon, Bound, Candidate, Cause, Diagnosis, EquivalentSummary, FreeRun, FreeRunSeries, Gap,
+    LogSummary, Named, Noise, OptionSummary, Parameters, RuledOut, Series, Value,
+};
+use crate::verdict::Evidence;
+use crate::window::Dataset;
+use armgap_core::chain::{Chain, parameter};
+use armgap_core::effect::{Scope, catalogue};
+
+/// Quantile of the normal distribution for bounds at 95 %.
+const NORMAL_95: f64 = 1.645;
+
+/// An effect that is known no better than to this part of the joint's torque has not been excited.
+const NOT_EXCITED: f64 = 0.2;
+
+/// Resamples of the holdout's windows for the interval of the closed share.
+const RESAMPLES: usize = 500;
+
+const LOOK_ALIKE: &str = "explains the torque along these logs as well";
+
+/// The three models a report compares, and their predictions on the holdout.
+struct Compared<const N: usize, const P: usize> {
+    models: [Model<N, P>; 3],
+    predicted: [Vec<f64>; 3],
+    measured: Vec<f64>,
+    floor: Vec<f64>,
+}
+
+/// The diagnosis as data.
+pub(crate) fn assemble<const N: usize, const P: usize>(
+    description: &SerialArm,
+    arm: &Chain<f64, N>,
+    training: &Set<N, P>,
+    holdout: &Set<N, P>,
+    found: &Found,
+    options: &Options,
+    progress: &ProgressReporter,
+) -> Diagnosis {
+    progress.begin(Phase::Result, 6);
+    let rotary = description.rotary();
+    let causes: Vec<Cause> = found.named.iter().map(|n| cause(n, &rotary)).collect();
+    let (named, unnamed): (Vec<Cause>, Vec<Cause>) = causes.into_iter().partition(|c| c.probability >= NAMED);
+    let why = |c: Cause| Candidate {
+        why: format!("its probability is {:.2}; from {NAMED} on a cause is named", c.probability),
+        cause: c,
+    };
+    let fitted = |set: &Fitted| std::array::from_fn(|i| set.estimate.theta[i]);
+    let nominal = std::array::from_fn(|i| description.theta[i]);
+    let kept: Vec<Term> =
+        found.named.iter().filter(|n| n.probability >= NAMED).map(|n| n.term.clone()).collect();
+    let reported = if kept.len() == found.named.len() { &found.model } else { &found.refit };
+    let terms: &[Term] = if std::ptr::eq(reported, &found.model) { &found.model.terms } else { &[] };
+    let models =
+        [Model::new(arm, nominal, &[]), Model::new(arm, fitted(&found.refit), &[]), Model::new(arm, fitted(reported), terms)];
+    let noise: [f64; N] =
+        std::array::from_fn(|j| crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect()));
+    let data = &holdout.data;
+    let predicted = [0, 1, 2].map(|i| {
+        progress.unit();
+        models[i].predict(data)
+    });
+    let compared = Compared {
+        predicted,
+        measured: data.measured(),
+        floor: floor(data, &noise).iter().map(|v| v.sqrt()).collect(),
+        models,
+    };
+    let gap = gap(&compared, data, &rotary, options);
+    let evidence = Evidence {
+        named: !named.is_empty(),
+        open: false,
+        before: &gap.before,
+        refit: &gap.refit,
+        after: &gap.after,
+        floor: &gap.floor,
+        motion: &gap.motion,
+    };
+    let verdict = evidence.verdict();
+    let parameters = |theta: &[f64], sigma: &[f64]| values(description, theta, sigma);
+    let (free_run_series, free_run) = free_runs(&compared, data);
+    let mut gap = gap;
+    gap.free_run = free_run;
+    Diagnosis {
+        schema: "armgap.diagnosis/1",
+        verdict,
+        places: places(found, holdout),
+        energy: Vec::new(),
+        causes: named,
+        candidates: unnamed.into_iter().map(why).collect(),
+        ruled_out: ruled_out(found, &rotary),
+        parameters: Parameters {
+            nominal: parameters(&description.theta, &description.sigma),
+            refit: parameters(&found.refit.estimate.theta, &found.sigma[0]),
+            with_causes: parameters(&reported.estimate.theta, &found.sigma[1]),
+        },
+        sanity: Vec::new(),
+        arm: summary(description),
+        training: logs(&training.data),
+        holdout: logs(data),
+        ranking: Vec::new(),
+        stages: Vec::new(),
+        regimes: Vec::new(),
+        series: series(&compared, data),
+        free_run_series,
+        noise: Noise {
+            position_sigma: noise.to_vec(),
+            encoder_step: training.data.tracks.first().map_or_else(Vec::new, |t| t.step.to_vec()),
+        },
+        options: OptionSummary {
+            horizon_s: options.horizon,
+            max_causes: options.max_causes,
+            seed: options.seed,
+            friction_smoothing: 0.0,
+        },
+        version: env!("CARGO_PKG_VERSION"),
+        seconds: 0.0,
+        notes: notes(found, training, holdout, &rotary),
+        gap,
+    }
+}
+
+fn rotary_of(term: &Term, rotary: &[bool]) -> bool {
+    term.joint().is_none_or(|j| rotary[j - 1])
+}
+
+fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
+    let parameters = term.parameters(rotary_of(term, rotary));
+    let value = |(i, p): (usize, &super::term::TermParameter)| {
+        let sigma = sigma.get(i).copied().filter(|s| s.is_finite()).unwrap_or(0.0);
+        (p.name.to_owned(), Value { value: term.p[i], sigma, unit: p.unit })
+    };
+    parameters.iter().enumerate().map(value).collect()
+}
+
+fn cause(named: &super::search::Named, rotary: &[bool]) -> Cause {
+    let term = &named.term;
+    let alike = |t: &Term| EquivalentSummary { effect: t.name(), joint: t.joint(), why: LOOK_ALIKE.to_owned() };
+    Cause {
+        effect: term.name(),
+        title: term.title(),
+        joint: term.joint(),
+        probability: named.probability,
+        parameters: named_values(term, &named.sigma, rotary),
+        closed: named.evidence.share.clamp(0.0, 1.0),
+        equivalents: named.alike.iter().map(alike).collect(),
+        evidence: None,
+        sides: None,
+        log: None,
+    }
+}
+
+/// Share of each joint in the torque that the re-estimated arm leaves unexplained, in units of the joint's own torque.
+fn places<const N: usize, const P: usize>(found: &Found, holdout: &Set<N, P>) -> Vec<Location> {
+    let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+    let rows = &holdout.equation.rows.joints;
+    let none = vec![None; N];
+    let residual = holdout.equation.rows.residual(&found.refit.estimate.theta, &none);
+    let left: Vec<f64> = (0..N)
+        .map(|j| ((square(&residual[j]) - square(&rows[j].floor)) / square(&rows[j].y).max(f64::MIN_POSITIVE)).max(0.0))
+        .collect();
+    let total: f64 = left.iter().sum();
+    let mut places: Vec<Location> = (0..N)
+        .filter(|j| total > 0.0 && left[*j] > 0.0)
+        .map(|j| Location {
+            joint: j + 1,
+            share: left[j] / total,
+            regime: "everywhere".to_owned(),
+            detail: format!("{:.1} % of the joint's torque unexplained", 100.0 * left[j].sqrt()),
+            range: None,
+        })
+        .collect();
+    places.sort_by(|a, b| b.share.total_cmp(&a.share));
+    places
+}
+
+fn gap<const N: usize, const P: usize>(
+    compared: &Compared<N, P>,
+    data: &Dataset<N>,
+    rotary: &[bool],
+    options: &Options,
+) -> Gap {
+    let still: Vec<f64> =
+        data.windows.iter().flat_map(|w| w.initial_state.q.as_slice().repeat(w.rows())).collect();
+    let missed = |i: usize| rms::<N>(&compared.measured, &limited(&compared.measured, &compared.predicted[i]));
+    let [before, refit, after] = [0, 1, 2].map(missed);
+    let floor = compared.floor.clone();
+    Gap {
+        horizon_s: options.horizon,
+        unit: if rotary.first() == Some(&true) { "rad" } else { "m" },
+        closed: closed(&before, &after, &floor),
+        closed_ci: closed_interval(compared, data, options.seed),
+        unexplained: (1.0 - closed(&refit, &after, &floor)).clamp(0.0, 1.0),
+        motion: rms::<N>(&compared.measured, &still),
+        horizons: HORIZONS.iter().filter_map(|h| at_horizon(compared, data, *h)).collect(),
+        free_run: FreeRun { before: Vec::new(), after: Vec::new() },
+        before,
+        refit,
+        after,
+        floor,
+    }
+}
+
+fn at_horizon<const N: usize, const P: usize>(
+    compared: &Compared<N, P>,
+    data: &Dataset<N>,
+    horizon: f64,
+) -> Option<AtHorizon> {
+    let data = Dataset::new(data.tracks.clone(), horizon);
+    if data.windows.len() < 2 * data.tracks.len() {
+        return None;
+    }
+    let measured = data.measured();
+    let missed = |i: usize| rms::<N>(&measured, &limited(&measured, &compared.models[i].predict(&data)));
+    let noise = data.tracks.first().map_or([0.0; N], |t| t.noise);
+    Some(AtHorizon {
+        horizon_s: horizon,
+        before: missed(0),
+        refit: missed(1),
+        after: missed(2),
+        floor: floor(&data, &noise).iter().map(|v| v.sqrt()).collect(),
+    })
+}
+
+/// 95 % interval of the closed share from resampled holdout windows.
+fn closed_interval<const N: usize, const P: usize>(
+    compared: &Compared<N, P>,
+    data: &Dataset<N>,
+    seed: u64,
+) -> [f64; 2] {
+    let table = |predicted: &[f64]| -> Vec<[f64; N]> {
+        let predicted = limited(&compared.measured, predicted);
+        let of = |w: &crate::window::Window<N>| {
+            let (a, b) = (&compared.measured[w.range()], &predicted[w.range()]);
+            std::array::from_fn(|j| {
+                a.iter().zip(b).skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
+            })
+        };
+        data.windows.iter().map(of).collect()
+    };
+    let (before, after) = (table(&compared.predicted[0]), table(&compared.predicted[2]));
+    let mut random = Random(seed);
+    let mut shares: Vec<f64> = (0..RESAMPLES)
+        .map(|_| {
+            let draw: Vec<usize> = data.windows.iter().map(|_| random.below(data.windows.len())).collect();
+            let rows: usize = draw.iter().map(|w| data.windows[*w].rows()).sum();
+            let pooled = |table: &[[f64; N]]| -> Vec<f64> {
+                (0..N)
+                    .map(|j| (draw.iter().map(|&w| table[w][j]).sum::<f64>() / rows.max(1) as f64).sqrt())
+                    .collect()
+            };
+            closed(&pooled(&before), &pooled(&after), &compared.floor)
+        })
+        .collect();
+    shares.sort_by(f64::total_cmp);
+    [shares[RESAMPLES / 40], shares[RESAMPLES - 1 - RESAMPLES / 40]]
+}
+
+fn series<const N: usize, const P: usize>(compared: &Compared<N, P>, data: &Dataset<N>) -> Vec<Series> {
+    let mut all = Vec::new();
+    for (index, track) in data.tracks.iter().enumerate().take(DRAWN_LOGS) {
+        let stride = track.len().div_ceil(DRAWN);
+        let windows: Vec<_> = data.windows.iter().filter(|w| w.track == index).collect();
+        for j in 0..N {
+            let mut start = Vec::new();
+            let mut places = Vec::new();
+            for w in &windows {
+                start.push(places.len());
+                places.extend((0..w.rows()).step_by(stride).map(|i| (w.first + 1 + i, (w.offset + i) * N + j)));
+            }
+            let pick = |x: &[f64]| places.iter().map(|(_, at)| x[*at]).collect();
+            all.push(Series {
+                log: track.name.clone(),
+                joint: j + 1,
+                t: places.iter().map(|(k, _)| track.t[*k]).collect(),
+                measured: pick(&compared.measured),
+                before: pick(&compared.predicted[0]),
+                refit: pick(&compared.predicted[1]),
+                after: pick(&compared.predicted[2]),
+                window_start: start,
+            });
+        }
+    }
+    all
+}
+
+fn free_runs<const N: usize, const P: usize>(
+    compared: &Compared<N, P>,
+    data: &Dataset<N>,
+) -> (Vec<FreeRunSeries>, FreeRun) {
+    let data = whole(data);
+    let measured = data.measured();
+    let [before, after] = [0, 2].map(|i| limited(&measured, &compared.models[i].predict(&data)));
+    let mut all = Vec::new();
+    for window in data.windows.iter().take(DRAWN_LOGS) {
+        let track = &data.tracks[window.track];
+        let rows: Vec<usize> = (0..window.rows()).step_by(window.rows().div_ceil(DRAWN)).collect();
+        for j in 0..N {
+            let pick = |x: &[f64]| rows.iter().map(|i| x[(window.offset + i) * N + j]).collect();
+            all.push(FreeRunSeries {
+                log: track.name.clone(),
+                joint: j + 1,
+                t: rows.iter().map(|i| track.t[i + 1]).collect(),
+                measured: pick(&measured),
+                before: pick(&before),
+                after: pick(&after),
+            });
+        }
+    }
+    (all, FreeRun { before: rms::<N>(&measured, &before), after: rms::<N>(&measured, &after) })
+}
+
+/// Status of every place that is not in the model.
+fn ruled_out(found: &Found, rotary: &[bool]) -> Vec<RuledOut> {
+    let named = |t: &Tested| found.named.iter().any(|n| n.term.same_place(&t.term));
+    let mut all: Vec<RuledOut> =
+        found.tested.iter().filter(|t| !named(t)).map(|t| status(found, t, rotary)).collect();
+    let untested = catalogue::<f64>().iter().map(|law| (law, law.spec())).filter(|(law, spec)| {
+        law.has_transmission() || (spec.scope == Scope::Joint && spec.name == "external_pulse")
+    });
+    for (_, spec) in untested {
+        all.extend((0..rotary.len()).map(|j| RuledOut {
+            effect: spec.name,
+            joint: Some(j + 1),
+            status: "undecided",
+            bound: None,
+            why: Some("not tested on serial arms".to_owned()),
+        }));
+    }
+    all
+}
+
+fn status(found: &Found, tested: &Tested, rotary: &[bool]) -> RuledOut {
+    let term = &tested.term;
+    let (effect, joint) = (term.name(), term.joint());
+    let entry = |status, bound, why| RuledOut { effect, joint, status, bound, why };
+    let alike = found.named.iter().find(|n| n.alike.iter().any(|a| a.same_place(term)));
+    if let Some(cause) = alike {
+        let place = cause.term.joint().map_or_else(String::new, |j| format!(" of joint {j}"));
+        let why = format!("looks like {}{place} in these logs", cause.term.name());
+        return entry("undecided", None, Some(why));
+    }
+    let [size, sigma] = tested.size;
+    let known = sigma * tested.consequence;
+    if !known.is_finite() || known > NOT_EXCITED || tested.consequence == 0.0 {
+        return entry("not excited", None, Some("these logs do not pin its size down".to_owned()));
+    }
+    let statistic = (size / sigma.max(f64::MIN_POSITIVE)).powi(2);
+    let largest = size.abs() + NORMAL_95 * sigma;
+    if statistic > SIGNIFICANT && largest * tested.consequence > 10.0 * CONSEQUENCE {
+        let why = "explains a part of what remains, and too little of it to be named".to_owned();
+        return entry("undecided", None, Some(why));
+    }
+    let parameters = term.parameters(rotary_of(term, rotary));
+    let bound = (term.amplitudes() > 0 && !matches!(term.kind, TermKind::NominalLink(_)))
+        .then(|| {
+            let p = parameters.first()?;
+            let value = (largest * (term.p[0] - p.neutral)).abs();
+            value.is_finite().then_some(Bound { parameter: p.name, value, unit: p.unit, level: 0.95 })
+        })
+        .flatten();
+    entry("absent", bound, None)
+}
+
+fn values(description: &SerialArm, theta: &[f64], sigma: &[f64]) -> Named<Value> {
+    let kinds: Vec<_> = description.joints.iter().map(|j| j.kind).collect();
+    let one = |i: usize| {
+        let p = parameter(&kinds, i)?;
+        Some((p.to_string(), Value { value: theta[i], sigma: sigma[i], unit: p.unit }))
+    };
+    (0..theta.len()).filter_map(one).collect()
+}
+
+fn summary(description: &SerialArm) -> ArmSummary {
+    let kinds: Vec<_> = description.joints.iter().map(|j| j.kind).collect();
+    let parameters: Vec<_> = (0..description.theta.len()).filter_map(|i| parameter(&kinds, i)).collect();
+    ArmSummary {
+        kind: "serial",
+        n_joints: kinds.len(),
+        parameter_names: parameters.iter().map(ToString::to_string).collect(),
+        parameter_units: parameters.iter().map(|p| p.unit).collect(),
+        joint_unit: description.rotary().iter().map(|turns| if *turns { "rad" } else { "m" }).collect(),
+    }
+}
+
+fn logs<const N: usize>(data: &Dataset<N>) -> Vec<LogSummary> {
+    let of = |(i, track): (usize, &crate::track::Track<N>)| LogSummary {
+        name: track.name.clone(),
+        samples: track.len(),
+        duration_s: track.t[track.len() - 1] - track.t[0],
+        windows: data.windows.iter().filter(|w| w.track == i).count(),
+    };
+    data.tracks.iter().enumerate().map(of).collect()
+}
+
+/// Remarks: what share of each joint's torque stays unexplained, and which joints hardly move.
+fn notes<const N: usize, const P: usize>(
+    found: &Found,
+    training: &Set<N, P>,
+    holdout: &Set<N, P>,
+    rotary: &[bool],
+) -> Vec<String> {
+    let mut notes = Vec::new();
+    let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+    let rows = &holdout.equation.rows;
+    let shares = |set: &Fitted| -> Vec<String> {
+        let residual: Vec<Vec<f64>> = {
+            let signals: Vec<_> = set
+                .terms
+                .iter()
+                .map(|t| holdout.equation.signal(t, &std::array::from_fn(|i| set.estimate.theta[i])))
+                .collect();
+            let beside = if signals.is_empty() { vec![None; N] } else { super::rows::sum(rows, &signals) };
+            rows.residual(&set.estimate.theta, &beside)
+        };
+        (0..N)
+            .map(|j| match square(&rows.joints[j].y) {
+                y if y > 0.0 => format!("{:.1}", 100.0 * (square(&residual[j]) / y).sqrt()),
+                _ => "-".to_owned(),
+            })
+            .collect()
+    };
+    notes.push(format!(
+        "share of each joint's torque that stays unexplained on the holdout (RMS, %): {} with parameters re-estimated",
+        shares(&found.refit).join(", ")
+    ));
+    if !found.model.terms.is_empty() {
+        notes.push(format!("the same with all terms found: {}", shares(&found.model).join(", ")));
+    }
+    let still: Vec<String> = (0..rotary.len())
+        .filter(|j| training.equation.rows.joints[*j].y.is_empty())
+        .map(|j| (j + 1).to_string())
+        .collect();
+    if !still.is_empty() {
+        notes.push(format!("joint {} does not move in the training logs: nothing is said about it", still.join(", ")));
+    }
+    notes
+}

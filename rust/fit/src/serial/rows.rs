@@ -1,0 +1,352 @@
+//! Rows of the weak equation of motion, joint by joint, and their regression on the arm's parameters beside further torques.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Residuals correlated over this many rows at most count as one.
+const LONGEST_CORRELATION: usize = 40;
+
+/// Rounds in which weights follow from residuals.
+const WEIGHT_ROUNDS: usize = 4;
+
+/// Rows of one joint: `y = psi theta + torques beside`.
+#[derive(Debug, Clone)]
+pub struct JointRows {
+    /// Torque, one value per row.
+    pub y: Vec<f64>,
+    /// Regressor, row by row.
+    pub psi: Vec<f64>,
+    /// Block, of a second or so, that each row belongs to.
+    pub block: Vec<usize>,
+    /// Standard deviation that the noise of positions puts into each row.
+    pub floor: Vec<f64>,
+}
+
+/// Rows of all joints.
+#[derive(Debug, Clone)]
+pub struct Rows {
+    /// By joint.
+    pub joints: Vec<JointRows>,
+    /// Number of parameters.
+    pub parameters: usize,
+    /// Number of blocks.
+    pub blocks: usize,
+}
+
+/// A torque beside the arm's own, by joint and row; none on joints it does not act on.
+pub type Signal = Vec<Option<Vec<f64>>>;
+
+/// Prior of the parameters: values, standard deviations, and which may not be negative.
+#[derive(Debug, Clone)]
+pub struct Prior {
+    /// Values.
+    pub theta: Vec<f64>,
+    /// Standard deviations; zero for a value that is not estimated.
+    pub sigma: Vec<f64>,
+    /// Whether each is a coefficient that may not be negative.
+    pub positive: Vec<bool>,
+}
+
+impl Prior {
+    /// Squared distance in standard deviations.
+    pub fn cost(&self, theta: &[f64]) -> f64 {
+        let off = |i: usize| if self.sigma[i] > 0.0 { ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2) } else { 0.0 };
+        (0..theta.len()).map(off).sum()
+    }
+}
+
+/// Sum of signals.
+pub fn sum(rows: &Rows, signals: &[Signal]) -> Signal {
+    let of = |j: usize| {
+        let mut total: Option<Vec<f64>> = None;
+        for part in signals.iter().filter_map(|s| s[j].as_ref()) {
+            match &mut total {
+                Some(total) => total.iter_mut().zip(part).for_each(|(a, b)| *a += b),
+                None => total = Some(part.clone()),
+            }
+        }
+        total
+    };
+    (0..rows.joints.len()).map(of).collect()
+}
+
+impl JointRows {
+    /// What parameters and a torque beside leave of the rows.
+    fn residual(&self, theta: &[f64], beside: Option<&Vec<f64>>) -> Vec<f64> {
+        let p = theta.len();
+        let row = |i: usize| {
+            let own: f64 = self.psi[i * p..(i + 1) * p].iter().zip(theta).map(|(a, b)| a * b).sum();
+            self.y[i] - own - beside.map_or(0.0, |s| s[i])
+        };
+        (0..self.y.len()).map(row).collect()
+    }
+}
+
+impl Rows {
+    /// Residuals by joint.
+    pub fn residual(&self, theta: &[f64], beside: &Signal) -> Vec<Vec<f64>> {
+        self.joints.iter().zip(beside).map(|(rows, s)| rows.residual(theta, s.as_ref())).collect()
+    }
+
+    /// Weight of each joint's rows from its residuals: one over their variance, times the number of rows that count as one because they are
+    /// correlated. A joint without rows weighs nothing.
+    pub fn weights(&self, residual: &[Vec<f64>]) -> Vec<f64> {
+        let of = |(rows, r): (&JointRows, &Vec<f64>)| {
+            let n = r.len() as f64;
+            let variance = r.iter().map(|r| r * r).sum::<f64>() / n.max(1.0);
+            let noise = rows.floor.iter().map(|f| f * f).sum::<f64>() / n.max(1.0);
+            let weight = 1.0 / (variance.max(noise) * correlation_length(r));
+            if weight.is_finite() { weight } else { 0.0 }
+        };
+        self.joints.iter().zip(residual).map(of).collect()
+    }
+
+    /// Weighted squared residuals by joint and block.
+    pub fn costs(&self, weights: &[f64], residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let of = |j: usize| {
+            let mut cost = vec![0.0; self.blocks];
+            for (r, block) in residual[j].iter().zip(&self.joints[j].block) {
+                cost[*block] += weights[j] * r * r;
+            }
+            cost
+        };
+        (0..self.joints.len()).map(of).collect()
+    }
+}
+
+/// Rows that count as one: one plus twice the sum of their residuals' correlations up to the first that is not positive.
+fn correlation_length(r: &[f64]) -> f64 {
+    let total: f64 = r.iter().map(|r| r * r).sum();
+    let mut length = 1.0;
+    for lag in 1..LONGEST_CORRELATION.min(r.len()) {
+        let part: f64 = r.iter().zip(&r[lag..]).map(|(a, b)| a * b).sum();
+        if part <= 0.0 || total <= 0.0 {
+            break;
+        }
+        length += 2.0 * part / total;
+    }
+    length
+}
+
+/// Regression of rows on the arm's parameters, with their prior.
+pub struct Regression<'a> {
+    /// Rows.
+    pub rows: &'a Rows,
+    /// Prior.
+    pub prior: &'a Prior,
+    /// Weight of each joint's rows.
+    pub weights: Vec<f64>,
+    /// Normal matrix of the data alone.
+    normal: DMatrix<f64>,
+}
+
+/// Parameters that fit best beside a given torque.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// Parameters.
+    pub theta: Vec<f64>,
+    /// Residuals by joint.
+    pub residual: Vec<Vec<f64>>,
+    /// Weighted squared residuals and squared distance from the prior.
+    pub cost: f64,
+    /// Of it, the distance from the prior.
+    pub prior_cost: f64,
+}
+
+impl<'a> Regression<'a> {
+    /// With these weights.
+    pub fn new(rows: &'a Rows, prior: &'a Prior, weights: Vec<f64>) -> Self {
+        let p = rows.parameters;
+        let mut normal = DMatrix::zeros(p, p);
+        for (joint, weight) in rows.joints.iter().zip(&weights) {
+            let psi = DMatrix::from_row_slice(joint.y.len(), p, &joint.psi);
+            normal += *weight * psi.tr_mul(&psi);
+        }
+        Self { rows, prior, weights, normal }
+    }
+
+    /// With weights that follow from the residuals beside a torque.
+    pub fn reweighted(rows: &'a Rows, prior: &'a Prior, beside: &Signal) -> Self {
+        let scale = |rows: &JointRows| {
+            let square = rows.y.iter().map(|y| y * y).sum::<f64>() / rows.y.len().max(1) as f64;
+            if square > 0.0 { 1.0 / (0.01 * square) } else { 0.0 }
+        };
+        let mut regression = Self::new(rows, prior, rows.joints.iter().map(scale).collect());
+        for _ in 0..WEIGHT_ROUNDS {
+            let found = regression.estimate(beside);
+            regression = Self::new(rows, prior, rows.weights(&found.residual));
+        }
+        regression
+    }
+
+    /// `Psi' W s` for a signal.
+    fn along(&self, signal: &Signal) -> DVector<f64> {
+        let p = self.rows.parameters;
+        let mut total = DVector::zeros(p);
+        for (j, s) in signal.iter().enumerate() {
+            let Some(s) = s else { continue };
+            for (row, s) in self.rows.joints[j].psi.chunks_exact(p).zip(s) {
+                let scaled = self.weights[j] * s;
+                total.iter_mut().zip(row).for_each(|(t, psi)| *t += scaled * psi);
+            }
+        }
+        total
+    }
+
+    /// Weighted product of two signals.
+    fn product(&self, a: &Signal, b: &Signal) -> f64 {
+        let of = |j: usize| match (&a[j], &b[j]) {
+            (Some(a), Some(b)) => self.weights[j] * a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>(),
+            _ => 0.0,
+        };
+        (0..a.len()).map(of).sum()
+    }
+
+    /// Normal matrix with the prior's precision; values that are not estimated, or held, are pinned.
+    fn system(&self, held: &[bool]) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
+        let mut system = self.normal.clone();
+        let p = self.rows.parameters;
+        for i in 0..p {
+            if held[i] {
+                system.row_mut(i).fill(0.0);
+                system.column_mut(i).fill(0.0);
+                system[(i, i)] = 1.0;
+            } else {
+                system[(i, i)] += self.prior.sigma[i].powi(-2);
+            }
+        }
+        system.cholesky()
+    }
+
+    /// Values that are not estimated.
+    fn fixed(&self) -> Vec<bool> {
+        self.prior.sigma.iter().map(|s| *s <= 0.0).collect()
+    }
+
+    /// Best parameters beside a torque; coefficients that would be negative are held at zero.
+    pub fn estimate(&self, beside: &Signal) -> Estimate {
+        let p = self.rows.parameters;
+        let torque: Signal = self
+            .rows
+            .joints
+            .iter()
+            .zip(beside)
+            .map(|(rows, s)| {
+                Some(match s {
+                    Some(s) => rows.y.iter().zip(s).map(|(y, s)| y - s).collect(),
+                    None => rows.y.clone(),
+                })
+            })
+            .collect();
+        let right = self.along(&torque);
+        let mut held = self.fixed();
+        let mut value = self.prior.theta.clone();
+        for _ in 0..=p {
+            let mut b = right.clone();
+            for i in 0..p {
+                if held[i] {
+                    continue;
+                }
+                b[i] += self.prior.theta[i] * self.prior.sigma[i].powi(-2);
+                for k in (0..p).filter(|k| held[*k]) {
+                    b[i] -= self.normal[(i, k)] * value[k];
+                }
+            }
+            for i in (0..p).filter(|i| held[*i]) {
+                b[i] = value[i];
+            }
+            let Some(system) = self.system(&held) else { break };
+            let found = system.solve(&b);
+            value = found.iter().copied().collect();
+            let negative: Vec<usize> =
+                (0..p).filter(|i| !held[*i] && self.prior.positive[*i] && value[*i] < 0.0).collect();
+            if negative.is_empty() {
+                break;
+            }
+            for i in negative {
+                (held[i], value[i]) = (true, 0.0);
+            }
+        }
+        let residual = self.rows.residual(&value, beside);
+        let prior_cost = self.prior.cost(&value);
+        let data: f64 = residual
+            .iter()
+            .zip(&self.weights)
+            .map(|(r, w)| w * r.iter().map(|r| r * r).sum::<f64>())
+            .sum();
+        Estimate { theta: value, residual, cost: data + prior_cost, prior_cost }
+    }
+
+    /// To first order, what further torques with free sizes explain of a residual beside the parameters.
+    pub fn score(&self, at: &Estimate, columns: &[Signal]) -> Option<Score> {
+        let k = columns.len();
+        let system = self.system(&self.fixed())?;
+        let along: Vec<DVector<f64>> = columns.iter().map(|c| self.along(c)).collect();
+        let solved: Vec<DVector<f64>> = along.iter().map(|b| system.solve(b)).collect();
+        let residual: Signal = at.residual.iter().cloned().map(Some).collect();
+        let slope = DVector::from_fn(k, |i, _| self.product(&columns[i], &residual));
+        let own = DMatrix::from_fn(k, k, |i, j| self.product(&columns[i], &columns[j]));
+        let information = DMatrix::from_fn(k, k, |i, j| own[(i, j)] - along[i].dot(&solved[j]));
+        let inverse = crate::solve::scaled_inverse(&information)?;
+        let size = &inverse * &slope;
+        let gain = slope.dot(&size);
+        Some(Score {
+            size: size.iter().copied().collect(),
+            gain,
+            distinct: (0..k).map(|i| information[(i, i)] / own[(i, i)].max(f64::MIN_POSITIVE)).fold(1.0, f64::min),
+            inverse,
+            solved,
+        })
+    }
+
+    /// Covariance of the sizes from the scatter of their scores over blocks, at an estimate that includes them (sandwich).
+    pub fn sandwich(&self, at: &Estimate, columns: &[Signal], score: &Score) -> DMatrix<f64> {
+        let (k, p) = (columns.len(), self.rows.parameters);
+        let mut blocks = vec![DVector::<f64>::zeros(k); self.rows.blocks];
+        for (j, rows) in self.rows.joints.iter().enumerate() {
+            for (row, r) in at.residual[j].iter().enumerate() {
+                let psi = &rows.psi[row * p..(row + 1) * p];
+                let weighted = self.weights[j] * r;
+                let total = &mut blocks[rows.block[row]];
+                for i in 0..k {
+                    let own = columns[i][j].as_ref().map_or(0.0, |c| c[row]);
+                    let imitated: f64 = psi.iter().zip(score.solved[i].iter()).map(|(a, b)| a * b).sum();
+                    total[i] += weighted * (own - imitated);
+                }
+            }
+        }
+        let used = blocks.iter().filter(|b| b.iter().any(|x| *x != 0.0)).count() as f64;
+        let mut scatter = DMatrix::<f64>::zeros(k, k);
+        for block in &blocks {
+            scatter += block * block.transpose();
+        }
+        let small_sample = used / (used - 1.0).max(1.0);
+        &score.inverse * scatter * &score.inverse * small_sample
+    }
+
+    /// Standard deviations of the parameters from the curvature of the cost.
+    pub fn sigma(&self) -> Vec<f64> {
+        let fixed = self.fixed();
+        let inverse = self.system(&fixed).map(|s| s.inverse());
+        (0..self.rows.parameters)
+            .map(|i| match &inverse {
+                Some(inverse) if !fixed[i] => inverse[(i, i)].max(0.0).sqrt(),
+                _ => self.prior.sigma[i],
+            })
+            .collect()
+    }
+}
+
+/// A first-order test of further torques.
+#[derive(Debug, Clone)]
+pub struct Score {
+    /// Their sizes.
+    pub size: Vec<f64>,
+    /// Decrease of the cost.
+    pub gain: f64,
+    /// Least share of a torque that the parameters cannot imitate.
+    pub distinct: f64,
+    /// Inverse of the information on the sizes.
+    inverse: DMatrix<f64>,
+    /// Parameters that imitate each torque.
+    solved: Vec<DVector<f64>>,
+}

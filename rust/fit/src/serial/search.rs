@@ -1,0 +1,640 @@
+//! Which terms a serial arm's model lacks: added one after another, swapped for rivals, dropped when idle.
+
+use super::constants::{
+    ALIKE, ALIKE_COST, ARM_WIDE, CONSEQUENCE, ENOUGH, FINALISTS, HOLDOUT_DEVIATIONS, ITERATIONS, MATTERS, PRICE,
+    RESAMPLES, RESTORES, SIGNIFICANT,
+};
+use super::rows::{Estimate, Prior, Regression, Rows, Signal, sum};
+use super::term::{Term, TermKind};
+use crate::progress::{Phase, ProgressReporter};
+use crate::random::Random;
+use armgap_core::effect::Trial;
+use rayon::prelude::*;
+
+/// Relative step of numerical derivatives of a term's torque.
+const STEP: f64 = 1e-3;
+
+/// A first-order test is not trusted farther than so many initial guesses.
+const FARTHEST: f64 = 50.0;
+
+/// Rows of an arm along some logs, and the torques of terms along them.
+pub trait Motion: Sync {
+    /// The rows.
+    fn rows(&self) -> &Rows;
+    /// Torque of a term, given the arm's parameters.
+    fn signal(&self, term: &Term, theta: &[f64]) -> Signal;
+}
+
+/// What a search works with.
+pub struct Search<'a> {
+    /// Logs that terms are fitted to.
+    pub training: &'a dyn Motion,
+    /// Logs that they are judged on.
+    pub holdout: &'a dyn Motion,
+    /// Prior of the arm's parameters.
+    pub prior: &'a Prior,
+    /// Every term at its initial guesses, grouped by place.
+    pub candidates: Vec<Vec<Term>>,
+    /// Whether each joint turns.
+    pub rotary: Vec<bool>,
+    /// Progress report and cancellation.
+    pub progress: &'a ProgressReporter,
+}
+
+/// A model with terms, fitted to the training logs and judged on the holdout.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// Its terms.
+    pub terms: Vec<Term>,
+    /// Parameters and what they leave of the training logs.
+    pub estimate: Estimate,
+    /// Weighted squared residuals by joint and block: training, holdout.
+    pub costs: [Vec<Vec<f64>>; 2],
+}
+
+impl Fitted {
+    fn holdout_cost(&self) -> f64 {
+        self.costs[1].iter().flatten().sum()
+    }
+
+    /// What ranks models: cost of training logs, prior and holdout, and the price of its parameters.
+    fn total(&self) -> f64 {
+        let parameters: usize = self.terms.iter().map(|t| t.p.len()).sum();
+        self.estimate.cost + self.holdout_cost() + 2.0 * parameters as f64
+    }
+}
+
+/// What speaks for a term: the model with it against the model without.
+#[derive(Debug, Clone, Copy)]
+pub struct Evidence {
+    /// Number of its parameters.
+    pub parameters: usize,
+    /// Decrease of the training cost, prior included.
+    pub gain: f64,
+    /// Of it, decrease of the distance from the prior.
+    pub relief: f64,
+    /// Squared robust test statistic.
+    pub statistic: f64,
+    /// Decrease of the holdout's cost.
+    pub holdout_gain: f64,
+    /// Its mean over blocks in standard deviations.
+    pub deviations: f64,
+    /// Largest share of one joint's holdout cost that it takes.
+    pub share: f64,
+    /// Largest RMS torque beside that of the joint.
+    pub consequence: f64,
+}
+
+impl Evidence {
+    /// Whether the logs ask for the term by what it explains.
+    pub fn explains(&self) -> bool {
+        self.statistic > SIGNIFICANT
+            && self.gain > PRICE * self.parameters as f64
+            && self.deviations > HOLDOUT_DEVIATIONS
+            && self.share > MATTERS
+            && self.consequence > CONSEQUENCE
+    }
+
+    /// Whether it brings the arm's parameters back to where the arm file has them, and the holdout does not speak against it.
+    pub fn restores(&self) -> bool {
+        self.relief > RESTORES * self.parameters.min(4) as f64
+            && self.gain > PRICE + 2.0 * self.parameters as f64
+            && self.deviations > -HOLDOUT_DEVIATIONS
+            && self.consequence > CONSEQUENCE
+    }
+
+    /// Whether the term is accepted.
+    pub fn is_accepted(&self) -> bool {
+        self.explains() || self.restores()
+    }
+}
+
+/// A term of the final model with what it rests on.
+#[derive(Debug, Clone)]
+pub struct Named {
+    /// The term.
+    pub term: Term,
+    /// Standard deviations of its parameters.
+    pub sigma: Vec<f64>,
+    /// What speaks for it.
+    pub evidence: Evidence,
+    /// Probability that it, or one of its look-alikes, is in the arm.
+    pub probability: f64,
+    /// Terms that explain the same.
+    pub alike: Vec<Term>,
+}
+
+/// Tests of a place that is not in the final model.
+#[derive(Debug, Clone)]
+pub struct Tested {
+    /// The term at its best guess.
+    pub term: Term,
+    /// Decrease of the cost, to first order.
+    pub gain: f64,
+    /// Least share of its torque that the parameters cannot imitate.
+    pub distinct: f64,
+    /// Size and its robust standard deviation, relative to the term as given.
+    pub size: [f64; 2],
+    /// RMS of its torque beside that of the joint's, per unit of size.
+    pub consequence: f64,
+}
+
+/// The end of a search.
+pub struct Found {
+    /// The arm's own parameters, without terms.
+    pub refit: Fitted,
+    /// The model with all terms.
+    pub model: Fitted,
+    /// Its terms, strongest first.
+    pub named: Vec<Named>,
+    /// All other places, tested beside the final model.
+    pub tested: Vec<Tested>,
+    /// Standard deviations of the arm's parameters: re-estimated, and with the terms.
+    pub sigma: [Vec<f64>; 2],
+    /// Noise that measured positions put into the holdout's cost, by joint.
+    pub floor: Vec<f64>,
+}
+
+impl Search<'_> {
+    /// Runs the search for `most` decisions at most.
+    pub fn run(&self, most: usize, seed: u64) -> Found {
+        self.progress.begin(Phase::Refit, 1);
+        let none = vec![None; self.rotary.len()];
+        let mut regression = Regression::reweighted(self.training.rows(), self.prior, &none);
+        let mut model = self.fit(&regression, Vec::new(), &self.prior.theta);
+        let refit = model.clone();
+        let sigma = regression.sigma();
+        for _ in 0..most {
+            let Some(added) = self.best_addition(&regression, &model) else { break };
+            let mut terms = model.terms.clone();
+            terms.extend(added);
+            let beside = self.beside(self.training, &terms, &model.estimate.theta);
+            regression = Regression::reweighted(self.training.rows(), self.prior, &beside);
+            model = self.without_idle(&regression, self.fit(&regression, terms, &model.estimate.theta));
+            model = self.swapped(&regression, model);
+        }
+        self.concluded(&regression, refit, model, sigma, seed)
+    }
+
+    /// Torques of all terms together.
+    fn beside(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Signal {
+        if terms.is_empty() {
+            return vec![None; self.rotary.len()];
+        }
+        let signals: Vec<Signal> = terms.iter().map(|t| motion.signal(t, theta)).collect();
+        sum(motion.rows(), &signals)
+    }
+
+    /// Fits the arm's parameters and those of all terms to the training logs (variable projection, Golub and Pereyra 1973), and judges them on
+    /// the holdout.
+    pub fn fit(&self, regression: &Regression, terms: Vec<Term>, theta: &[f64]) -> Fitted {
+        self.progress.check();
+        let mut terms = terms;
+        let mut estimate = regression.estimate(&self.beside(self.training, &terms, theta));
+        for _ in 0..ITERATIONS {
+            if terms.is_empty() {
+                break;
+            }
+            let theta = estimate.theta.clone();
+            let columns = self.derivatives(&terms, &theta);
+            let Some(score) = regression.score(&estimate, &columns) else { break };
+            let mut better = None;
+            for part in [1.0, 0.5, 0.2, 0.05] {
+                let moved = self.moved(&terms, &score.size, part);
+                let there = regression.estimate(&self.beside(self.training, &moved, &theta));
+                if there.cost < estimate.cost {
+                    better = Some((moved, there));
+                    break;
+                }
+            }
+            let Some((moved, there)) = better else { break };
+            let fell = estimate.cost - there.cost;
+            let is_enough = fell < ENOUGH * estimate.cost;
+            (terms, estimate) = (moved, there);
+            if is_enough {
+                break;
+            }
+        }
+        let beside = self.beside(self.holdout, &terms, &estimate.theta);
+        let held = self.holdout.rows().residual(&estimate.theta, &beside);
+        let costs = [
+            regression.rows.costs(&regression.weights, &estimate.residual),
+            self.holdout.rows().costs(&regression.weights, &held),
+        ];
+        Fitted { terms, estimate, costs }
+    }
+
+    fn rotary_of(&self, term: &Term) -> bool {
+        term.joint().is_none_or(|j| self.rotary[j - 1])
+    }
+
+    /// Terms moved by part of a step, within their bounds.
+    fn moved(&self, terms: &[Term], step: &[f64], part: f64) -> Vec<Term> {
+        let mut rest = step.iter();
+        terms
+            .iter()
+            .map(|term| {
+                let bounds = term.parameters(self.rotary_of(term));
+                let p = term
+                    .p
+                    .iter()
+                    .zip(&bounds)
+                    .map(|(p, b)| {
+                        let by = part * rest.next().copied().unwrap_or(0.0);
+                        // A shape or a threshold changes by no more than a factor of two in one step.
+                        let by = if *p == 0.0 || b.neutral == 0.0 && p.abs() < by.abs() && term.amplitudes() > 0 {
+                            by
+                        } else if term.amplitudes() == 0 && p.abs() > 0.0 {
+                            by.clamp(-0.5 * p.abs(), p.abs())
+                        } else {
+                            by
+                        };
+                        (p + by).clamp(b.bounds[0], b.bounds[1])
+                    })
+                    .collect();
+                term.with(p)
+            })
+            .collect()
+    }
+
+    /// Derivatives of the terms' torques by all their parameters.
+    fn derivatives(&self, terms: &[Term], theta: &[f64]) -> Vec<Signal> {
+        let places: Vec<(usize, usize)> =
+            terms.iter().enumerate().flat_map(|(i, t)| (0..t.p.len()).map(move |k| (i, k))).collect();
+        places
+            .par_iter()
+            .map(|&(i, k)| {
+                let term = &terms[i];
+                let step = STEP * if term.p[k] == 0.0 { 1.0 } else { term.p[k].abs() };
+                let at = |sign: f64| {
+                    let mut p = term.p.clone();
+                    p[k] += sign * step;
+                    self.training.signal(&term.with(p), theta)
+                };
+                difference(&at(1.0), &at(-1.0), 2.0 * step)
+            })
+            .collect()
+    }
+
+    /// Tests a term to first order; returns it with the suggested values.
+    fn test(&self, regression: &Regression, at: &Estimate, term: &Term) -> Option<(Term, f64)> {
+        let theta = &at.theta;
+        let bounds = term.parameters(self.rotary_of(term));
+        let within = |p: &[f64]| p.iter().zip(&bounds).all(|(p, b)| *p >= b.bounds[0] && *p <= b.bounds[1]);
+        if let TermKind::Payload = term.kind {
+            let last = self.rotary.len() - 1;
+            let columns: Vec<Signal> = (0..4).map(|i| self.unit(&Term::neutral(TermKind::NominalLink(last)), i, theta)).collect();
+            let score = regression.score(at, &columns)?;
+            let mass = score.size[0];
+            if mass <= 0.0 {
+                return None;
+            }
+            let p = vec![mass, score.size[1] / mass, score.size[2] / mass, score.size[3] / mass];
+            return Some((term.with(p), score.gain));
+        }
+        let count = term.amplitudes();
+        if count > 0 {
+            let columns: Vec<Signal> = (0..count).map(|i| self.unit(term, i, theta)).collect();
+            let score = regression.score(at, &columns)?;
+            let mut p = term.p.clone();
+            for i in 0..count {
+                p[i] = bounds[i].neutral + score.size[i];
+            }
+            return within(&p).then(|| (term.with(p), score.gain));
+        }
+        let TermKind::Law(effect) = term.kind else { return None };
+        let column = self.training.signal(term, theta);
+        let score = regression.score(at, std::slice::from_ref(&column))?;
+        let size = score.size[0];
+        let information = score.gain / (size * size).max(f64::MIN_POSITIVE);
+        let (p, size) = match effect.law.spec().trial {
+            // A threshold has no small version of itself.
+            Trial::Whole => (term.p.clone(), 1.0),
+            Trial::Ray => {
+                let share = size.clamp(0.0, FARTHEST);
+                (term.p.iter().map(|p| p * share).collect(), share)
+            }
+            _ => {
+                let neutral = bounds[0].neutral;
+                let mut p = term.p.clone();
+                p[0] = (neutral + size.clamp(-FARTHEST, FARTHEST) * (p[0] - neutral))
+                    .clamp(bounds[0].bounds[0], bounds[0].bounds[1]);
+                let share = (p[0] - neutral) / (term.p[0] - neutral);
+                (p, share)
+            }
+        };
+        let gain = (2.0 * score.size[0] - size) * size * information;
+        (gain > 0.0 && within(&p)).then(|| (term.with(p), gain))
+    }
+
+    /// Torque per unit of one amplitude, the others switched off.
+    fn unit(&self, term: &Term, amplitude: usize, theta: &[f64]) -> Signal {
+        let neutral = term.parameters(self.rotary_of(term));
+        let mut p = term.p.clone();
+        for (i, value) in p.iter_mut().enumerate().take(term.amplitudes()) {
+            *value = neutral[i].neutral + if i == amplitude { 1.0 } else { 0.0 };
+        }
+        self.training.signal(&term.with(p), theta)
+    }
+
+    /// Best initial guess of every place that is not in the model, best first.
+    fn screened(&self, regression: &Regression, model: &Fitted) -> Vec<(Term, f64)> {
+        let open: Vec<&Vec<Term>> = self
+            .candidates
+            .iter()
+            .filter(|group| !model.terms.iter().any(|t| group.first().is_some_and(|g| g.same_place(t))))
+            .collect();
+        self.progress.begin(Phase::Screen, open.len());
+        let mut found: Vec<(Term, f64)> = open
+            .par_iter()
+            .filter_map(|group| {
+                self.progress.unit();
+                let tests = group.iter().filter_map(|term| self.test(regression, &model.estimate, term));
+                tests.max_by(|a, b| a.1.total_cmp(&b.1))
+            })
+            .filter(|(_, gain)| gain.is_finite())
+            .collect();
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        found
+    }
+
+    /// Models with one more term each, fitted: the finalists of the screening.
+    fn finalists(&self, regression: &Regression, model: &Fitted, screened: &[(Term, f64)]) -> Vec<Fitted> {
+        let worth = |(term, gain): &&(Term, f64)| *gain > PRICE + 2.0 * term.p.len() as f64;
+        let wanted: Vec<&(Term, f64)> = screened.iter().filter(worth).take(FINALISTS).collect();
+        self.progress.begin(Phase::Candidates, wanted.len());
+        wanted
+            .par_iter()
+            .map(|(term, _)| {
+                self.progress.unit();
+                let mut terms = model.terms.clone();
+                terms.push(term.clone());
+                self.fit(regression, terms, &model.estimate.theta)
+            })
+            .collect()
+    }
+
+    /// The terms of the best decision; none where no candidate is accepted.
+    fn best_addition(&self, regression: &Regression, model: &Fitted) -> Option<Vec<Term>> {
+        let screened = self.screened(regression, model);
+        let fitted = self.finalists(regression, model, &screened);
+        let last = model.terms.len();
+        let accepted: Vec<&Fitted> = fitted
+            .iter()
+            .filter(|with| self.evidence(regression, model, with, last).is_accepted())
+            .collect();
+        let best = accepted.iter().min_by(|a, b| a.total().total_cmp(&b.total()))?;
+        let term = &best.terms[last];
+        Some(self.everywhere(regression, model, &screened, term).unwrap_or_else(|| vec![term.clone()]))
+    }
+
+    /// The same law on every joint where it is accepted, if these are enough to be one cause of the whole arm.
+    fn everywhere(
+        &self,
+        regression: &Regression,
+        model: &Fitted,
+        screened: &[(Term, f64)],
+        best: &Term,
+    ) -> Option<Vec<Term>> {
+        if !best.is_of_a_joint() {
+            return None;
+        }
+        let last = model.terms.len();
+        let moving = self.training.rows().joints.iter().filter(|r| !r.y.is_empty()).count();
+        let alike: Vec<&Term> =
+            screened.iter().map(|(t, _)| t).filter(|t| t.name() == best.name() && !t.same_place(best)).collect();
+        let mut all: Vec<Term> = alike
+            .par_iter()
+            .filter_map(|term| {
+                let mut terms = model.terms.clone();
+                terms.push((*term).clone());
+                let with = self.fit(regression, terms, &model.estimate.theta);
+                let accepted = self.evidence(regression, model, &with, last).is_accepted();
+                accepted.then(|| with.terms[last].clone())
+            })
+            .collect();
+        all.push(best.clone());
+        let enough = (ARM_WIDE * moving as f64).max(2.0);
+        (all.len() as f64 >= enough).then_some(all)
+    }
+
+    /// What speaks for term `index` of `with` beside the model `without` it.
+    fn evidence(&self, regression: &Regression, without: &Fitted, with: &Fitted, index: usize) -> Evidence {
+        let term = &with.terms[index];
+        let signal = self.training.signal(term, &with.estimate.theta);
+        let column = std::slice::from_ref(&signal);
+        let statistic = regression.score(&with.estimate, column).map_or(0.0, |score| {
+            1.0 / regression.sandwich(&with.estimate, column, &score)[(0, 0)].max(f64::MIN_POSITIVE)
+        });
+        let joints = self.rotary.len();
+        let blocks = without.costs[1].first().map_or(0, Vec::len);
+        let fell: Vec<f64> = (0..blocks)
+            .map(|b| (0..joints).map(|j| without.costs[1][j][b] - with.costs[1][j][b]).sum())
+            .collect();
+        let used = fell.iter().filter(|d| **d != 0.0).count().max(1) as f64;
+        let total: f64 = fell.iter().sum();
+        let mean = total / used;
+        let variance = fell.iter().filter(|d| **d != 0.0).map(|d| (d - mean).powi(2)).sum::<f64>() / used;
+        let share = (0..joints)
+            .map(|j| {
+                let before: f64 = without.costs[1][j].iter().sum();
+                let after: f64 = with.costs[1][j].iter().sum();
+                if before > 0.0 { (before - after) / before } else { 0.0 }
+            })
+            .fold(0.0, f64::max);
+        Evidence {
+            parameters: term.p.len(),
+            gain: without.estimate.cost - with.estimate.cost,
+            relief: without.estimate.prior_cost - with.estimate.prior_cost,
+            statistic,
+            holdout_gain: total,
+            deviations: mean * used.sqrt() / variance.sqrt().max(f64::MIN_POSITIVE),
+            share,
+            consequence: consequence(self.training.rows(), &signal),
+        }
+    }
+
+    /// The model without term `index`, fitted.
+    fn without(&self, regression: &Regression, model: &Fitted, index: usize) -> Fitted {
+        let mut terms = model.terms.clone();
+        terms.remove(index);
+        self.fit(regression, terms, &model.estimate.theta)
+    }
+
+    /// Drops terms that are not accepted beside the others.
+    fn without_idle(&self, regression: &Regression, model: Fitted) -> Fitted {
+        let mut model = model;
+        let mut index = 0;
+        while index + 1 < model.terms.len() {
+            let without = self.without(regression, &model, index);
+            if self.evidence(regression, &without, &model, index).is_accepted() {
+                index += 1;
+            } else {
+                model = without;
+            }
+        }
+        model
+    }
+
+    /// Puts a rival in the place of a term where the others beside it leave less.
+    fn swapped(&self, regression: &Regression, model: Fitted) -> Fitted {
+        let mut model = model;
+        for index in 0..model.terms.len() {
+            if model.terms.len() < 2 {
+                break;
+            }
+            let without = self.without(regression, &model, index);
+            let screened = self.screened(regression, &without);
+            let last = without.terms.len();
+            let rival = self
+                .finalists(regression, &without, &screened)
+                .into_iter()
+                .filter(|with| self.evidence(regression, &without, with, last).is_accepted())
+                .min_by(|a, b| a.total().total_cmp(&b.total()));
+            if let Some(rival) = rival
+                && rival.total() < model.total() - ALIKE_COST
+                && !rival.terms[last].same_place(&model.terms[index])
+            {
+                model = rival;
+            }
+        }
+        model
+    }
+
+    /// Probabilities, look-alikes, and tests of what is not in the model.
+    fn concluded(
+        &self,
+        regression: &Regression,
+        refit: Fitted,
+        model: Fitted,
+        refit_sigma: Vec<f64>,
+        seed: u64,
+    ) -> Found {
+        let floor = self.floor(regression);
+        let mut named: Vec<Named> =
+            (0..model.terms.len()).map(|i| self.named(regression, &model, i, &floor, seed)).collect();
+        named.sort_by(|a, b| (b.evidence.gain + b.evidence.holdout_gain).total_cmp(&(a.evidence.gain + a.evidence.holdout_gain)));
+        let tested = self.tested(regression, &model);
+        // Re-estimated costs are comparable only under the same weights.
+        let refit = if model.terms.is_empty() { refit } else { self.fit(regression, Vec::new(), &refit.estimate.theta) };
+        Found { refit, named, tested, sigma: [refit_sigma, regression.sigma()], floor, model }
+    }
+
+    /// Cost that noisy positions alone put into the holdout's rows, by joint.
+    fn floor(&self, regression: &Regression) -> Vec<f64> {
+        let of = |(rows, w): (&super::rows::JointRows, &f64)| w * rows.floor.iter().map(|f| f * f).sum::<f64>();
+        self.holdout.rows().joints.iter().zip(&regression.weights).map(of).collect()
+    }
+
+    fn named(&self, regression: &Regression, model: &Fitted, index: usize, floor: &[f64], seed: u64) -> Named {
+        let term = model.terms[index].clone();
+        let without = self.without(regression, model, index);
+        let evidence = self.evidence(regression, &without, model, index);
+        let mut rivals = self.finalists(regression, &without, &self.screened(regression, &without));
+        let last = without.terms.len();
+        rivals.retain(|r| !r.terms[last].same_place(&term));
+        let explained = without.total() - model.total();
+        let alike = |rival: &Fitted| rival.total() - model.total() < (ALIKE * explained).max(ALIKE_COST);
+        let (same, others): (Vec<Fitted>, Vec<Fitted>) = rivals.into_iter().partition(alike);
+        let mut against: Vec<&Fitted> = others.iter().collect();
+        against.push(&without);
+        let wins = stability(model, &against, seed);
+        let trust = trust(&without, model, &evidence, floor);
+        let columns = self.derivatives(std::slice::from_ref(&term), &model.estimate.theta);
+        let sigma = regression.score(&model.estimate, &columns).map_or_else(
+            || vec![f64::INFINITY; term.p.len()],
+            |score| {
+                let covariance = regression.sandwich(&model.estimate, &columns, &score);
+                (0..term.p.len()).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect()
+            },
+        );
+        let alike = same.into_iter().map(|r| r.terms[last].clone()).collect();
+        Named { term, sigma, evidence, probability: wins * trust, alike }
+    }
+
+    /// Tests of every place that is not in the model, beside it.
+    fn tested(&self, regression: &Regression, model: &Fitted) -> Vec<Tested> {
+        let screened = self.screened(regression, model);
+        let open = self.candidates.iter().filter_map(|group| group.first());
+        open.filter(|term| !model.terms.iter().any(|t| t.same_place(term)))
+            .map(|first| {
+                let found = screened.iter().find(|(t, _)| t.same_place(first));
+                let (term, gain) = found.map_or((first.clone(), 0.0), |(t, gain)| (t.clone(), *gain));
+                let signal = self.training.signal(&term, &model.estimate.theta);
+                let column = std::slice::from_ref(&signal);
+                let score = regression.score(&model.estimate, column);
+                let (size, distinct) = score.map_or(([0.0, f64::INFINITY], 0.0), |score| {
+                    let sigma = regression.sandwich(&model.estimate, column, &score)[(0, 0)].max(0.0).sqrt();
+                    ([score.size[0], sigma], score.distinct)
+                });
+                let consequence = consequence(self.training.rows(), &signal);
+                Tested { term, gain, distinct, size, consequence }
+            })
+            .collect()
+    }
+}
+
+/// Difference of two signals over a step.
+fn difference(a: &Signal, b: &Signal, step: f64) -> Signal {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| match (a, b) {
+            (Some(a), Some(b)) => Some(a.iter().zip(b).map(|(a, b)| (a - b) / step).collect()),
+            (Some(a), None) => Some(a.iter().map(|a| a / step).collect()),
+            (None, Some(b)) => Some(b.iter().map(|b| -b / step).collect()),
+            (None, None) => None,
+        })
+        .collect()
+}
+
+/// Largest RMS torque of a signal beside that of the joint it acts on.
+fn consequence(rows: &Rows, signal: &Signal) -> f64 {
+    let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+    let of = |(rows, s): (&super::rows::JointRows, &Option<Vec<f64>>)| match s {
+        Some(s) if !s.is_empty() => (square(s) / square(&rows.y).max(f64::MIN_POSITIVE)).sqrt(),
+        _ => 0.0,
+    };
+    rows.joints.iter().zip(signal).map(of).fold(0.0, f64::max)
+}
+
+/// Share of resamples of the blocks, of training and holdout, in which a model costs less than every rival.
+fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64) -> f64 {
+    let by_block = |fitted: &Fitted| -> Vec<f64> {
+        fitted.costs.iter().flat_map(|set| {
+            let blocks = set.first().map_or(0, Vec::len);
+            (0..blocks).map(move |b| set.iter().map(|joint| joint[b]).sum::<f64>()).collect::<Vec<f64>>()
+        }).collect()
+    };
+    let price = |fitted: &Fitted| {
+        fitted.estimate.prior_cost + 2.0 * fitted.terms.iter().map(|t| t.p.len()).sum::<usize>() as f64
+    };
+    let own = by_block(model);
+    let apart: Vec<(Vec<f64>, f64)> = rivals
+        .iter()
+        .map(|r| (by_block(r).iter().zip(&own).map(|(a, b)| a - b).collect(), price(r) - price(model)))
+        .collect();
+    let mut random = Random(seed);
+    let wins = (0..RESAMPLES)
+        .filter(|_| {
+            let draw: Vec<usize> = (0..own.len()).map(|_| random.below(own.len())).collect();
+            apart.iter().all(|(d, fixed)| draw.iter().map(|b| d[*b]).sum::<f64>() + fixed > 0.0)
+        })
+        .count();
+    wins as f64 / RESAMPLES as f64
+}
+
+/// Probability that what a term explains is not something that no term of the library is: its own part of the joint's holdout cost over
+/// that and what stays beyond noise; of a term that restores the arm file's values, by how much it does.
+fn trust(without: &Fitted, with: &Fitted, evidence: &Evidence, floor: &[f64]) -> f64 {
+    let joint = |set: &Fitted, j: usize| set.costs[1][j].iter().sum::<f64>();
+    let own = (0..floor.len()).max_by(|a, b| {
+        let fell = |j: usize| joint(without, j) - joint(with, j);
+        fell(*a).total_cmp(&fell(*b))
+    });
+    let explains = own.map_or(0.0, |j| {
+        let (fell, left) = (joint(without, j) - joint(with, j), (joint(with, j) - floor[j]).max(0.0));
+        if fell > 0.0 { fell / (fell + left) } else { 0.0 }
+    });
+    let restores = 1.0 - (-evidence.relief.max(0.0) / (2.0 * RESTORES)).exp();
+    explains.max(restores)
+}

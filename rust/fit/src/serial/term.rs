@@ -1,0 +1,193 @@
+//! Terms that a serial arm's model may lack: the library's laws joint by joint, and what changes the arm itself.
+
+use crate::model::EffectInstance;
+use armgap_core::effect::{Quantity, Scope, Trial};
+
+/// A term with values for its parameters.
+#[derive(Debug, Clone)]
+pub struct Term {
+    /// What it is.
+    pub kind: TermKind,
+    /// Values, SI.
+    pub p: Vec<f64>,
+}
+
+/// What a term is.
+#[derive(Debug, Clone, Copy)]
+pub enum TermKind {
+    /// A law of the library on one joint; the values of the instance are an initial guess.
+    Law(EffectInstance),
+    /// A load on the last link: mass and centre of mass in the link's frame, a point mass.
+    Payload,
+    /// The base turned about the two horizontal axes of its frame.
+    BaseTilt,
+    /// One link's mass, first moments and inertia differ from the nominal ones.
+    NominalLink(usize),
+}
+
+/// Name and unit of one parameter.
+#[derive(Debug, Clone, Copy)]
+pub struct TermParameter {
+    /// Name in results.
+    pub name: &'static str,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Bounds.
+    pub bounds: [f64; 2],
+    /// Value at which it does nothing.
+    pub neutral: f64,
+}
+
+const LOAD: [(&str, &str); 4] = [("mass", "kg"), ("com_x", "m"), ("com_y", "m"), ("com_z", "m")];
+const TURN: [(&str, &str); 2] = [("x", "rad"), ("y", "rad")];
+const LINK: [(&str, &str); 10] = [
+    ("mass", "kg"),
+    ("mx", "kg m"),
+    ("my", "kg m"),
+    ("mz", "kg m"),
+    ("ixx", "kg m^2"),
+    ("ixy", "kg m^2"),
+    ("iyy", "kg m^2"),
+    ("ixz", "kg m^2"),
+    ("iyz", "kg m^2"),
+    ("izz", "kg m^2"),
+];
+
+impl Term {
+    /// A law at its initial guess.
+    pub fn of_law(effect: EffectInstance) -> Self {
+        Self { kind: TermKind::Law(effect), p: effect.p[..effect.len()].to_vec() }
+    }
+
+    /// Neither load, nor tilt, nor change.
+    pub fn neutral(kind: TermKind) -> Self {
+        let count = match kind {
+            TermKind::Law(effect) => effect.len(),
+            TermKind::Payload => LOAD.len(),
+            TermKind::BaseTilt => TURN.len(),
+            TermKind::NominalLink(_) => LINK.len(),
+        };
+        Self { kind, p: vec![0.0; count] }
+    }
+
+    /// Name in results.
+    pub fn name(&self) -> &'static str {
+        match self.kind {
+            TermKind::Law(effect) => effect.law.spec().name,
+            TermKind::Payload => "payload",
+            TermKind::BaseTilt => "base_tilt",
+            TermKind::NominalLink(_) => "nominal_link",
+        }
+    }
+
+    /// Name for people.
+    pub fn title(&self) -> &'static str {
+        match self.kind {
+            TermKind::Law(effect) => effect.law.spec().title,
+            TermKind::Payload => "payload on the last link",
+            TermKind::BaseTilt => "base not level",
+            TermKind::NominalLink(_) => "wrong nominal link",
+        }
+    }
+
+    /// 1-based joint; of a link, the joint that moves it; none for what belongs to the whole arm.
+    pub fn joint(&self) -> Option<usize> {
+        match self.kind {
+            TermKind::Law(effect) => effect.joint_number(),
+            TermKind::NominalLink(link) => Some(link + 1),
+            TermKind::Payload | TermKind::BaseTilt => None,
+        }
+    }
+
+    /// Whether both are the same term, whatever their values.
+    pub fn same_place(&self, other: &Self) -> bool {
+        self.name() == other.name() && self.joint() == other.joint()
+    }
+
+    /// Its parameters; `rotary` tells of its joint.
+    pub fn parameters(&self, rotary: bool) -> Vec<TermParameter> {
+        let free = |(name, unit): &(&'static str, &'static str)| TermParameter {
+            name,
+            unit,
+            bounds: [f64::NEG_INFINITY, f64::INFINITY],
+            neutral: 0.0,
+        };
+        match self.kind {
+            TermKind::Law(effect) => effect
+                .law
+                .spec()
+                .parameters
+                .iter()
+                .map(|p| TermParameter {
+                    name: p.name,
+                    unit: p.quantity.unit(rotary),
+                    bounds: [p.lower, p.upper],
+                    neutral: p.neutral,
+                })
+                .collect(),
+            TermKind::Payload => {
+                let mut all: Vec<TermParameter> = LOAD.iter().map(free).collect();
+                all[0].bounds[0] = 0.0;
+                all
+            }
+            TermKind::BaseTilt => TURN.iter().map(free).collect(),
+            TermKind::NominalLink(_) => LINK.iter().map(free).collect(),
+        }
+    }
+
+    /// Number of its first parameters in which its torque is linear and that switch it off; none where the torque is not linear in any.
+    pub fn amplitudes(&self) -> usize {
+        match self.kind {
+            TermKind::Law(effect) => {
+                let spec = effect.law.spec();
+                let is_linear = !spec.hooks.command
+                    && !spec.hooks.measured
+                    && spec.parameters.first().is_some_and(|p| p.quantity != Quantity::Reach);
+                match spec.trial {
+                    Trial::Amplitudes(count) if is_linear => count,
+                    _ => 0,
+                }
+            }
+            TermKind::Payload => 0,
+            TermKind::BaseTilt => TURN.len(),
+            TermKind::NominalLink(_) => LINK.len(),
+        }
+    }
+
+    /// Whether it is sought on every joint by itself.
+    pub fn is_of_a_joint(&self) -> bool {
+        matches!(self.kind, TermKind::Law(effect) if effect.law.spec().scope == Scope::Joint)
+    }
+
+    /// This term with other values.
+    pub fn with(&self, p: Vec<f64>) -> Self {
+        Self { kind: self.kind, p }
+    }
+
+    /// The library's effect with these values; none for what is no law.
+    pub fn effect(&self) -> Option<EffectInstance> {
+        let TermKind::Law(mut effect) = self.kind else { return None };
+        for (slot, value) in effect.p.iter_mut().zip(&self.p) {
+            *slot = *value;
+        }
+        Some(effect)
+    }
+}
+
+/// Change of the last link's ten numbers under a point mass at `p = (mass, x, y, z)`: mass, first moments, inertia about the link's origin
+/// (xx, xy, yy, xz, yz, zz).
+pub fn of_load(p: &[f64]) -> [f64; 10] {
+    let [m, x, y, z] = [p[0], p[1], p[2], p[3]];
+    [
+        m,
+        m * x,
+        m * y,
+        m * z,
+        m * (y * y + z * z),
+        -m * x * y,
+        m * (x * x + z * z),
+        -m * x * z,
+        -m * y * z,
+        m * (x * x + y * y),
+    ]
+}
