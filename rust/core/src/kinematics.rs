@@ -59,7 +59,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<
     #[inline(always)]
     pub fn rotated(&self, joints: &JointState<V, N>, sincos: [SinCos<V>; N]) -> KinematicState<V, N> {
         let equation_terms =
-            self.arm.equation_terms(&self.theta, &self.constant_inertia, &sincos, &joints.dq);
+            self.arm.equation_terms(&self.theta, &self.constant_inertia, &sincos, &joints.q, &joints.dq);
         KinematicState { joints: *joints, sincos, equation_terms }
     }
 }

@@ -16,6 +16,7 @@ extern crate std;
 mod readme {}
 
 pub mod arm;
+pub mod chain;
 pub mod cpu;
 pub mod drivetrain;
 pub mod effect;

@@ -1,7 +1,7 @@
 //! Small symmetric positive definite systems, solved in place without a library's panics.
 
 use crate::number::Number;
-use crate::real::lit;
+use crate::real::{Real, lit};
 
 /// Solves `a x = b` for symmetric positive definite `a` by `L D L'`; an indefinite `a` gives non-finite numbers, not a panic.
 #[inline(always)]
@@ -28,6 +28,23 @@ pub fn solve_positive_definite<V: Number, const N: usize>(mut a: [[V; N]; N], mu
         b[k] = b[k] * pivots[k];
     }
     b
+}
+
+/// Inertia of joint `j` with all other joints free to move, the Schur complement `1 / (M^-1)_jj` of an inertia matrix.
+#[inline]
+pub fn free_inertia<T: Real, const N: usize>(inertia: &[[T; N]; N], j: usize) -> T {
+    if N <= 2 {
+        let mut own = inertia[j][j];
+        for i in 0..N {
+            if i != j {
+                own -= inertia[j][i] * inertia[j][i] / inertia[i][i];
+            }
+        }
+        return own;
+    }
+    let mut unit = [T::zero(); N];
+    unit[j] = T::one();
+    T::one() / solve_positive_definite(*inertia, unit)[j]
 }
 
 /// Two equations by Cramer's rule, which divides once.

@@ -21,7 +21,7 @@ fn check<A: Arm<f64, N, P>, const N: usize, const P: usize>(arm: &A, theta: [f64
     assert!((arm.regressor(&q, &dq, &ddq) * vector - torque).amax() < 1e-12 * scale);
     let sincos = arm.angles(&q.into(), 0.0).map(SinCos::of);
     let EquationTerms { inertia, bias } =
-        arm.equation_terms(&theta, &arm.constant_inertia(&theta), &sincos, &dq.into());
+        arm.equation_terms(&theta, &arm.constant_inertia(&theta), &sincos, &q.into(), &dq.into());
     assert!((SMatrix::from_fn(|i, j| inertia[i][j]) - m).amax() < 1e-12 * scale);
     assert!((SVector::from(bias) - c * dq - arm.gravity(&theta, &q, 0.0)).amax() < 1e-12 * scale);
 

@@ -52,6 +52,7 @@ impl<T: Real> Arm<T, 1, 4> for Axis<T> {
         theta: &[V; 4],
         constant_inertia: &[[V; 1]; 1],
         sincos: &[SinCos<V>; 1],
+        _q: &[V; 1],
         _: &[V; 1],
     ) -> EquationTerms<V, 1> {
         let along = theta[0] * V::of(self.gravity) * sincos[0].sine;

@@ -108,6 +108,8 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     const PARAMETERS: &'static [Parameter];
     /// Number of inertial base parameters.
     const INERTIAL: usize = P - 2 * N;
+    /// Whether the arm moves in one vertical plane, so that the angle of a tilted base says all about gravity.
+    const PLANAR: bool = true;
 
     /// Inertia matrix `M(q)`, symmetric positive definite for physical `theta`.
     fn inertia(&self, theta: &[T; P], q: &SVector<T, N>) -> SMatrix<T, N, N>;
@@ -146,12 +148,14 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// The part of the inertia matrix that does not depend on `q`.
     fn constant_inertia(&self, theta: &[T; P]) -> [[T; N]; N];
 
-    /// Inertia matrix, given its constant part, and `C dq + g` together, for the integrator: of one arm, or of several side by side.
+    /// Inertia matrix, given its constant part, and `C dq + g` together, for the integrator: of one arm, or of several side by side. The
+    /// joint positions are for arms whose prismatic joints move links; angles come as sines and cosines.
     fn equation_terms<V: Number<Real = T>>(
         &self,
         theta: &[V; P],
         constant_inertia: &[[V; N]; N],
         sincos: &[SinCos<V>; N],
+        q: &[V; N],
         dq: &[V; N],
     ) -> EquationTerms<V, N>;
 

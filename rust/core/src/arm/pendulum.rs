@@ -52,6 +52,7 @@ impl<T: Real> Arm<T, 1, 4> for Pendulum<T> {
         theta: &[V; 4],
         constant_inertia: &[[V; 1]; 1],
         sincos: &[SinCos<V>; 1],
+        _q: &[V; 1],
         _: &[V; 1],
     ) -> EquationTerms<V, 1> {
         EquationTerms { inertia: *constant_inertia, bias: [theta[1] * sincos[0].sine] }

@@ -105,6 +105,7 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
         theta: &[V; 9],
         constant_inertia: &[[V; 2]; 2],
         sincos: &[SinCos<V>; 2],
+        _q: &[V; 2],
         dq: &[V; 2],
     ) -> EquationTerms<V, 2> {
         let [SinCos { sine: s1, cosine: c1 }, SinCos { sine: s2, cosine: c2 }] = *sincos;

@@ -20,8 +20,11 @@ use crate::transmission::LatentState;
 use crossing::{Located, TrialStep};
 use nalgebra::SVector;
 
-/// Mode changes located within one sub-step before the rest of it is taken with all crossing joints held.
-const MAX_EVENTS: usize = 16;
+/// Mode changes located within one sub-step before the rest of it is taken with all crossing joints held: eight of each joint, at least
+/// those of two.
+const fn max_events(joints: usize) -> usize {
+    if joints < 2 { 16 } else { 8 * joints }
+}
 
 /// Position, velocity and friction mode of every joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -227,7 +230,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
     #[inline]
     fn exact(&self, state: &mut State<T, N>, from: T, dt: T) {
         let (mut x, mut left) = (from, dt);
-        for _ in 0..MAX_EVENTS {
+        for _ in 0..max_events(N) {
             let k1 = self.settle(state, x);
             let trial = self.runge_kutta(state, x, left, &k1);
             let trial_step = TrialStep { state, x, dt: left, k1: &k1 };

@@ -24,7 +24,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     pub(crate) fn level(&self, j: usize, x: &JointPoint<T>, direction: T) -> T {
         let mut level = self.rigid.coulomb[j];
         if self.hooks[j].coulomb {
-            for effect in self.effects.iter().flatten() {
+            for effect in self.effects() {
                 if effect.joint == j && effect.law.spec().hooks.coulomb {
                     level += effect.law.coulomb(&effect.p, x, direction);
                 }
@@ -38,7 +38,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     pub(crate) fn force(&self, j: usize, x: &JointPoint<T>) -> T {
         let mut sum = T::zero();
         if self.hooks[j].force {
-            for effect in self.effects.iter().flatten() {
+            for effect in self.effects() {
                 if effect.joint == j && effect.law.spec().hooks.force {
                     sum += effect.law.force(&effect.p, x);
                 }

@@ -18,7 +18,7 @@ use crate::transmission::{LatentState, Sides};
 use nalgebra::SVector;
 
 /// Most effects one plant can carry.
-pub const MAX_EFFECTS: usize = 8;
+pub const MAX_EFFECTS: usize = 48;
 
 /// What a joint's dry friction does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,6 +75,7 @@ pub struct Plant<T: Real, A, const N: usize, const P: usize> {
     drivetrain: Drivetrain<T, N>,
     smoothing: T,
     effects: [Option<Active<T>>; MAX_EFFECTS],
+    n_effects: usize,
     hooks: [Hooks; N],
     has_hysteresis: bool,
     jumps: bool,
@@ -90,6 +91,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             drivetrain: Drivetrain::none(),
             smoothing: T::zero(),
             effects: [None; MAX_EFFECTS],
+            n_effects: 0,
             hooks: [Hooks::NONE; N],
             has_hysteresis: false,
             jumps: false,
@@ -102,10 +104,15 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self
     }
 
-    /// Adds an effect; beyond [`MAX_EFFECTS`], or on a joint the arm does not have, `None`.
+    /// Adds an effect; beyond [`MAX_EFFECTS`], on a joint the arm does not have, or a tilt of the base of an arm that does not move in one
+    /// plane, `None`.
     pub fn with_effect(mut self, effect: Active<T>) -> Option<Self> {
-        let slot = self.effects.iter_mut().find(|slot| slot.is_none())?;
-        *slot = Some(effect);
+        let tilt = effect.law.tilt(&effect.p);
+        if tilt != T::zero() && !A::PLANAR {
+            return None;
+        }
+        *self.effects.get_mut(self.n_effects)? = Some(effect);
+        self.n_effects += 1;
         let hooks = effect.law.spec().hooks;
         let joint = effect.joint;
         let on_joint = self.hooks.get_mut(joint)?;
@@ -119,7 +126,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         if let Some(transmission) = effect.law.transmission(&effect.p, own) {
             self.drivetrain.add(joint, transmission, &mut rigid.constant_inertia)?;
         }
-        rigid.tilt += effect.law.tilt(&effect.p);
+        rigid.tilt += tilt;
         self.add_coupling(effect.law.coupling(&effect.p));
         let rigid = &mut self.rigid;
         if let Some((mass, distance)) = effect.law.payload(&effect.p) {
@@ -168,7 +175,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     pub fn memory(&self, q: &SVector<T, N>, latent: &LatentState<T, N>) -> SVector<T, N> {
         let mut memory = latent.memory;
         if self.has_hysteresis {
-            for effect in self.effects.iter().flatten().filter(|e| e.law.spec().hooks.memory) {
+            for effect in self.effects().filter(|e| e.law.spec().hooks.memory) {
                 let j = effect.joint;
                 if let (Some(z), Some(to), Some(from)) = (memory.get_mut(j), q.get(j), latent.anchor.get(j)) {
                     *z = effect.law.hysteresis_after(&effect.p, *z, *to - *from);
@@ -209,7 +216,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
     /// Its effects.
     pub(crate) fn effects(&self) -> impl Iterator<Item = &Active<T>> {
-        self.effects.iter().flatten()
+        self.effects.iter().take(self.n_effects).flatten()
     }
 
     /// Whether joint `j` has dry friction, or effects that may tell in which direction it slides.

@@ -4,6 +4,7 @@ use super::Plant;
 use crate::arm::Arm;
 use crate::effect::Edge;
 use crate::kinematics::JointState;
+use crate::linear::free_inertia;
 use crate::real::{Real, lit};
 use nalgebra::SVector;
 
@@ -19,7 +20,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
 
     /// Positions of joint `j` at which a torque jumps.
     pub fn edges(&self, j: usize) -> impl Iterator<Item = Edge<T>> {
-        let on_joint = self.effects.iter().flatten().filter(move |e| e.joint == j);
+        let on_joint = self.effects().filter(move |e| e.joint == j);
         on_joint.filter_map(|e| e.law.edge(&e.p))
     }
 
@@ -36,17 +37,6 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         })
     }
 
-    /// Inertia of joint `j` at `q` with all other joints free to move.
-    fn free_inertia(j: usize, inertia: &[[T; N]; N]) -> T {
-        let mut least = inertia[j][j];
-        for k in 0..N {
-            if k != j {
-                least -= inertia[j][k] * inertia[j][k] / inertia[k][k];
-            }
-        }
-        least.max(lit(1e-9))
-    }
-
     /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, a motor oscillates against its link, or a joint hits
     /// a joint limit, an impact that is to be resolved and not only stable. Zero for a rigid arm with exact friction.
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
@@ -57,7 +47,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         }
         let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
         for j in 0..N {
-            let free = Self::free_inertia(j, &inertia);
+            let free = free_inertia(&inertia, j).max(lit(1e-9));
             if self.smoothing > T::zero() {
                 let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
                 let braked = match self.drivetrain.get(j) {

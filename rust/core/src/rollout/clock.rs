@@ -2,8 +2,10 @@
 
 use crate::real::Real;
 
-/// Mode changes within one interval before the scalar integrator takes the rest of it.
-pub(super) const MAX_CHANGES: usize = 12;
+/// Mode changes within one interval before the scalar integrator takes the rest of it: six of each joint, at least those of two.
+pub(super) const fn max_changes(joints: usize) -> usize {
+    if joints < 2 { 12 } else { 6 * joints }
+}
 
 /// One lane's time.
 #[derive(Debug, Clone, Copy)]

@@ -1,9 +1,10 @@
 //! One lane's step in which friction modes may have changed, and what to do about it.
 
-use super::clock::{Clock, MAX_CHANGES, Reversal};
+use super::clock::{Clock, Reversal, max_changes};
 use crate::fixed_mode::StaticFriction;
 use crate::integrate::root::{VelocityZero, hermite_root};
 use crate::kinematics::JointState;
+use crate::linear::free_inertia;
 use crate::real::Real;
 
 /// One lane's part of a step.
@@ -40,7 +41,7 @@ impl<T: Real, const N: usize> LaneStep<T, N> {
     /// Decides, and sets the lane's clock and its joints' directions accordingly.
     pub(super) fn judge(&self, clock: &mut Clock<T, N>, direction: &mut [T; N]) -> StepOutcome<T, N> {
         let near = self.range_violation <= T::zero();
-        if !near || clock.changes >= MAX_CHANGES {
+        if !near || clock.changes >= max_changes(N) {
             return StepOutcome::Scalar;
         }
         if let Some(goal) = clock.goal {
@@ -142,12 +143,6 @@ impl<T: Real, const N: usize> LaneStep<T, N> {
 
     /// Change of joint `j`'s acceleration when its dry friction reverses, all other joints free to move.
     fn acceleration_step(&self, j: usize) -> T {
-        let mut own = self.inertia[j][j];
-        for i in 0..N {
-            if i != j {
-                own -= self.inertia[j][i] * self.inertia[j][i] / self.inertia[i][i];
-            }
-        }
-        (self.coulomb[j] + self.coulomb[j]) / own
+        (self.coulomb[j] + self.coulomb[j]) / free_inertia(&self.inertia, j)
     }
 }

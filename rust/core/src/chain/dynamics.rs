@@ -1,0 +1,203 @@
+//! Equation of motion of a chain: inertia matrix, bias, inverse and forward dynamics, energies.
+
+use super::Chain;
+use super::inertia::{LinkInertia, SpatialInertia};
+use super::kinematics::LinkPose;
+use super::vector::{Twist, Wrench, dot, negative, of, scaled_plus, turned, zero};
+use crate::arm::EquationTerms;
+use crate::linear::solve_positive_definite;
+use crate::number::Number;
+use crate::real::{Real, lit};
+
+/// An inertia matrix, by rows.
+pub type InertiaMatrix<V, const N: usize> = [[V; N]; N];
+
+impl<T: Real, const N: usize> Chain<T, N> {
+    /// Inertia matrix `M(q)`, `(N, N)`, kg m^2, of links with these inertial parameters.
+    #[inline(always)]
+    pub fn inertia_matrix<V: Number<Real = T>>(
+        &self,
+        links: &[LinkInertia<V>; N],
+        q: &[V; N],
+    ) -> InertiaMatrix<V, N> {
+        let poses = self.poses(q);
+        let mut inertia = [SpatialInertia::zero(); N];
+        for j in 0..N {
+            inertia[j] = SpatialInertia::of(&links[j], &poses[j]);
+        }
+        composite_inertia(&poses, &mut inertia, &[[zero(); N]; N])
+    }
+
+    /// Torques of a motion by inverse dynamics: `M ddq + C dq + g`, `(N,)`, N m (N).
+    #[inline(always)]
+    pub fn inverse_dynamics<V: Number<Real = T>>(
+        &self,
+        links: &[LinkInertia<V>; N],
+        q: &[V; N],
+        dq: &[V; N],
+        ddq: &[V; N],
+    ) -> [V; N] {
+        let poses = self.poses(q);
+        let motions = self.motions(&poses, dq, Some(ddq));
+        let mut forces = [Wrench::zero(); N];
+        for j in 0..N {
+            forces[j] = motions[j].force(&SpatialInertia::of(&links[j], &poses[j]));
+        }
+        joint_torques(&poses, &mut forces)
+    }
+
+    /// Bias `C dq + g`, `(N,)`, N m (N): the torques of the motion without acceleration.
+    #[inline(always)]
+    pub fn bias<V: Number<Real = T>>(&self, links: &[LinkInertia<V>; N], q: &[V; N], dq: &[V; N]) -> [V; N] {
+        self.equation_terms_at(&self.poses(q), links, &[[zero(); N]; N], dq).bias
+    }
+
+    /// Accelerations under the torques `tau` without friction, `(N,)`, by the `L D L'` factors of the inertia matrix to which
+    /// `constant_inertia` is added.
+    #[inline(always)]
+    pub fn forward_dynamics<V: Number<Real = T>>(
+        &self,
+        links: &[LinkInertia<V>; N],
+        constant_inertia: &InertiaMatrix<V, N>,
+        [q, dq, tau]: [&[V; N]; 3],
+    ) -> [V; N] {
+        let EquationTerms { inertia, bias } =
+            self.equation_terms_at(&self.poses(q), links, constant_inertia, dq);
+        let mut right = *tau;
+        for j in 0..N {
+            right[j] = right[j] - bias[j];
+        }
+        solve_positive_definite(inertia, right)
+    }
+
+    /// Kinetic energy, J, of the links.
+    #[inline(always)]
+    pub fn links_kinetic_energy<V: Number<Real = T>>(
+        &self,
+        links: &[LinkInertia<V>; N],
+        q: &[V; N],
+        dq: &[V; N],
+    ) -> V {
+        let poses = self.poses(q);
+        let motions = self.motions(&poses, dq, None);
+        let mut twice: V = zero();
+        for j in 0..N {
+            let velocity = &motions[j].velocity;
+            twice = twice + velocity.dot(&SpatialInertia::of(&links[j], &poses[j]).times(velocity));
+        }
+        twice * V::of(lit(0.5))
+    }
+
+    /// Potential energy above `q = 0`, J.
+    #[inline(always)]
+    pub fn links_potential_energy<V: Number<Real = T>>(&self, links: &[LinkInertia<V>; N], q: &[V; N]) -> V {
+        let (poses, gravity) = (self.poses(q), of::<V>(&self.gravity));
+        let mut energy: V = zero();
+        for j in 0..N {
+            let [mass, hx, hy, hz, ..] = links[j];
+            let (first, (height, turned_gravity)) = ([hx, hy, hz], &self.reference[j]);
+            let now = scaled_plus(mass, &poses[j].position, &turned(&poses[j].rotation, &first));
+            let before = mass.fused(V::of(*height), dot(&of(turned_gravity), &first));
+            energy = energy + before - dot(&gravity, &now);
+        }
+        energy
+    }
+
+    /// Inertia matrix, with `constant_inertia` added, and bias together.
+    #[inline(always)]
+    pub(super) fn equation_terms_at<V: Number<Real = T>>(
+        &self,
+        poses: &[LinkPose<V>; N],
+        links: &[LinkInertia<V>; N],
+        constant_inertia: &InertiaMatrix<V, N>,
+        dq: &[V; N],
+    ) -> EquationTerms<V, N> {
+        let motions = self.motions(poses, dq, None);
+        let (mut inertia, mut forces) = ([SpatialInertia::zero(); N], [Wrench::zero(); N]);
+        for j in 0..N {
+            inertia[j] = SpatialInertia::of(&links[j], &poses[j]);
+            forces[j] = motions[j].force(&inertia[j]);
+        }
+        let bias = joint_torques(poses, &mut forces);
+        EquationTerms { inertia: composite_inertia(poses, &mut inertia, constant_inertia), bias }
+    }
+
+    /// Velocities and accelerations of all links; without `ddq`, of a motion whose joints do not accelerate.
+    #[inline(always)]
+    pub(super) fn motions<V: Number<Real = T>>(
+        &self,
+        poses: &[LinkPose<V>; N],
+        dq: &[V; N],
+        ddq: Option<&[V; N]>,
+    ) -> [LinkMotion<V>; N] {
+        // Gravity is an acceleration of the base against it.
+        let base = Twist { angular: [zero(); 3], linear: negative(&of(&self.gravity)) };
+        let mut last = LinkMotion { velocity: Twist::zero(), acceleration: base };
+        let mut motions = [last; N];
+        for j in 0..N {
+            let joint = &poses[j].joint;
+            let mut rate = last.velocity.cross(joint);
+            rate = rate.scaled_plus(dq[j], &last.acceleration);
+            if let Some(ddq) = ddq {
+                rate = joint.scaled_plus(ddq[j], &rate);
+            }
+            last = LinkMotion { velocity: joint.scaled_plus(dq[j], &last.velocity), acceleration: rate };
+            motions[j] = last;
+        }
+        motions
+    }
+}
+
+/// Velocity and acceleration of a link as spatial vectors; the acceleration less that of gravity.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LinkMotion<V> {
+    pub(super) velocity: Twist<V>,
+    pub(super) acceleration: Twist<V>,
+}
+
+impl<V: Number> LinkMotion<V> {
+    /// Force that this motion of a link needs, its weight included.
+    #[inline(always)]
+    pub(super) fn force(&self, inertia: &SpatialInertia<V>) -> Wrench<V> {
+        let rate = self.velocity.cross_force(&inertia.times(&self.velocity));
+        inertia.times(&self.acceleration).plus(&rate)
+    }
+}
+
+/// Torques of the joints for these forces on the links, which become those on the chains from each link outwards.
+#[inline(always)]
+pub(super) fn joint_torques<V: Number, const N: usize>(
+    poses: &[LinkPose<V>; N],
+    forces: &mut [Wrench<V>; N],
+) -> [V; N] {
+    let (mut torques, mut outer) = ([zero(); N], Wrench::zero());
+    for j in (0..N).rev() {
+        outer = outer.plus(&forces[j]);
+        forces[j] = outer;
+        torques[j] = poses[j].joint.dot(&outer);
+    }
+    torques
+}
+
+/// The inertia matrix for these inertias of the links, which become those of the composite bodies from each link outwards.
+#[inline(always)]
+pub(super) fn composite_inertia<V: Number, const N: usize>(
+    poses: &[LinkPose<V>; N],
+    inertia: &mut [SpatialInertia<V>; N],
+    constant_inertia: &InertiaMatrix<V, N>,
+) -> InertiaMatrix<V, N> {
+    let (mut matrix, mut outer) = (*constant_inertia, SpatialInertia::zero());
+    for j in (0..N).rev() {
+        outer = outer.plus(&inertia[j]);
+        inertia[j] = outer;
+        let force = outer.times(&poses[j].joint);
+        for i in 0..=j {
+            let entry = poses[i].joint.dot(&force);
+            matrix[i][j] = matrix[i][j] + entry;
+            if i != j {
+                matrix[j][i] = matrix[j][i] + entry;
+            }
+        }
+    }
+    matrix
+}

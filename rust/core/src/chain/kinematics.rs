@@ -1,0 +1,122 @@
+//! Poses of the links, and motion subspaces of the joints, in the base frame.
+
+use super::vector::{Matrix3, Twist, Vector3, add, cross, of, product, scaled_plus, turned, zero};
+use super::{Chain, ChainJoint, JointKind};
+use crate::number::Number;
+use crate::real::{Real, lit};
+use crate::trig::SinCos;
+
+/// Where a link is.
+#[derive(Debug, Clone, Copy)]
+pub struct LinkPose<V> {
+    /// Maps vectors of the link frame into the base frame.
+    pub rotation: Matrix3<V>,
+    /// Origin of the link frame in the base frame, m.
+    pub position: Vector3<V>,
+    /// Motion subspace of its joint: velocity of the link per joint velocity.
+    pub joint: Twist<V>,
+}
+
+impl<V: Number> LinkPose<V> {
+    #[inline(always)]
+    fn none() -> Self {
+        Self { rotation: [[zero(); 3]; 3], position: [zero(); 3], joint: Twist::zero() }
+    }
+}
+
+/// What the pose of a link needs to know of its joint. The rotation from the link frame into that of the parent link is
+/// `fixed + cosine cos q + sine sin q` (Rodrigues).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct JointConstants<T> {
+    fixed: Matrix3<T>,
+    cosine: Matrix3<T>,
+    sine: Matrix3<T>,
+    /// The axis in the parent link's frame.
+    axis: Vector3<T>,
+}
+
+impl<T: Real> JointConstants<T> {
+    pub(super) fn of(joint: &ChainJoint<T>) -> Self {
+        let (r, a) = (&joint.rotation, &joint.axis);
+        let axis = turned(r, a);
+        if joint.kind == JointKind::Prismatic {
+            let none = [[T::zero(); 3]; 3];
+            return Self { fixed: *r, cosine: none, sine: none, axis };
+        }
+        let (mut fixed, mut cosine, mut sine) = (*r, *r, *r);
+        for i in 0..3 {
+            for j in 0..3 {
+                fixed[i][j] = axis[i] * a[j];
+                cosine[i][j] = r[i][j] - fixed[i][j];
+            }
+            // A row of `r` times the matrix of `a x`.
+            sine[i] = cross(&r[i], a);
+        }
+        Self { fixed, cosine, sine, axis }
+    }
+}
+
+impl<T: Real, const N: usize> Chain<T, N> {
+    /// Poses of all links at the joint positions `q`, rad or m.
+    #[inline(always)]
+    pub fn poses<V: Number<Real = T>>(&self, q: &[V; N]) -> [LinkPose<V>; N] {
+        let angles = self.angles_of(q);
+        let mut sincos = [SinCos { sine: zero(), cosine: zero() }; N];
+        for j in 0..N {
+            sincos[j] = SinCos::of(angles[j]);
+        }
+        self.poses_at(&sincos, q)
+    }
+
+    /// Angles by which the joints turn: their positions; 0 for prismatic joints.
+    #[inline(always)]
+    pub(super) fn angles_of<V: Number<Real = T>>(&self, q: &[V; N]) -> [V; N] {
+        let mut angles = *q;
+        for j in 0..N {
+            if self.joints[j].kind == JointKind::Prismatic {
+                angles[j] = V::of(lit(0.0));
+            }
+        }
+        angles
+    }
+
+    /// Poses of all links, given sines and cosines of the revolute joints' positions.
+    #[inline(always)]
+    pub(super) fn poses_at<V: Number<Real = T>>(
+        &self,
+        sincos: &[SinCos<V>; N],
+        q: &[V; N],
+    ) -> [LinkPose<V>; N] {
+        let mut poses = [LinkPose::none(); N];
+        let mut parent: Option<LinkPose<V>> = None;
+        for j in 0..N {
+            let (joint, constants) = (&self.joints[j], &self.constants[j]);
+            let mut local = [[zero(); 3]; 3];
+            for i in 0..3 {
+                local[i] = of(&constants.fixed[i]);
+                if joint.kind == JointKind::Revolute {
+                    for k in 0..3 {
+                        let turned = V::of(constants.cosine[i][k]).fused(sincos[j].cosine, local[i][k]);
+                        local[i][k] = V::of(constants.sine[i][k]).fused(sincos[j].sine, turned);
+                    }
+                }
+            }
+            let (mut rotation, mut position, mut axis) = (local, of(&joint.translation), of(&constants.axis));
+            if let Some(parent) = &parent {
+                rotation = product(&parent.rotation, &local);
+                position = add(&turned(&parent.rotation, &position), &parent.position);
+                axis = turned(&parent.rotation, &axis);
+            }
+            let subspace = match joint.kind {
+                JointKind::Revolute => Twist { angular: axis, linear: cross(&position, &axis) },
+                JointKind::Prismatic => {
+                    position = scaled_plus(q[j], &axis, &position);
+                    Twist { angular: [zero(); 3], linear: axis }
+                }
+            };
+            poses[j] = LinkPose { rotation, position, joint: subspace };
+            parent = Some(poses[j]);
+        }
+        poses
+    }
+}

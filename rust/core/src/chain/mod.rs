@@ -1,0 +1,93 @@
+//! Serial arms of any number of revolute and prismatic joints: open chains of rigid links.
+//!
+//! Poses, velocities, forces and inertias are spatial vectors and matrices at one point, the origin of the base frame, in the axes of the
+//! base frame (Featherstone 2008, section 2): links add up without transformations. The inertia matrix is that of the composite rigid
+//! body algorithm (section 6.2), bias and inverse dynamics are recursive Newton-Euler (section 5.3). Everything is written over
+//! [`crate::number::Number`]: one chain or several side by side.
+//!
+//! Friction, effects and stick-slip come with [`crate::plant::Plant`], for a [`Chain`] is an [`crate::arm::Arm`] too.
+
+mod arm;
+mod dynamics;
+mod inertia;
+mod kinematics;
+mod parameters;
+mod regressor;
+mod vector;
+
+pub use inertia::{LINK_PARAMETERS, LinkInertia, point_mass};
+pub use kinematics::LinkPose;
+pub use parameters::{ChainParameter, PARAMETERS_PER_JOINT, parameter};
+pub use vector::{Matrix3, Twist, Vector3, Wrench};
+
+use crate::real::Real;
+use kinematics::JointConstants;
+
+/// Most joints of a chain for which the crates above this one choose the size at run time.
+pub const MAX_JOINTS: usize = 7;
+
+/// How a joint moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JointKind {
+    /// Turns about its axis; rad, N m.
+    Revolute,
+    /// Slides along its axis; m, N.
+    Prismatic,
+}
+
+/// A joint: its frame in the frame of the parent link at `q = 0`, and its axis. The link frame is the joint frame moved by the joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChainJoint<T> {
+    /// How it moves.
+    pub kind: JointKind,
+    /// Rotation matrix, by rows, from the joint frame into the frame of the parent link; of the first joint, into the base frame.
+    pub rotation: Matrix3<T>,
+    /// Origin of the joint frame in the frame of the parent link, m.
+    pub translation: Vector3<T>,
+    /// Unit vector along the axis, in the joint frame.
+    pub axis: Vector3<T>,
+}
+
+/// A serial arm with `N` joints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Chain<T, const N: usize> {
+    joints: [ChainJoint<T>; N],
+    gravity: Vector3<T>,
+    constants: [JointConstants<T>; N],
+    /// Gravity along the position of each link's origin and in the axes of its frame, at `q = 0`.
+    reference: [(T, Vector3<T>); N],
+}
+
+impl<T: Real, const N: usize> Chain<T, N> {
+    /// The chain of these joints, from the base, under `gravity`, m/s^2, in the base frame. Rotations must be orthogonal and axes of unit
+    /// length.
+    pub fn new(joints: [ChainJoint<T>; N], gravity: Vector3<T>) -> Self {
+        let constants = joints.map(|joint| JointConstants::of(&joint));
+        let mut chain = Self { joints, gravity, constants, reference: [(T::zero(), [T::zero(); 3]); N] };
+        chain.reference = chain.gravity_along(&[T::zero(); N]);
+        chain
+    }
+
+    /// The joints, from the base.
+    pub fn joints(&self) -> &[ChainJoint<T>; N] {
+        &self.joints
+    }
+
+    /// Acceleration of gravity in the base frame, m/s^2.
+    pub fn gravity_vector(&self) -> &Vector3<T> {
+        &self.gravity
+    }
+
+    /// The same chain under another gravity, as when its base is tilted.
+    pub fn with_gravity(&self, gravity: Vector3<T>) -> Self {
+        Self::new(self.joints, gravity)
+    }
+
+    /// Gravity along the position of each link's origin and in the axes of its frame.
+    fn gravity_along(&self, q: &[T; N]) -> [(T, Vector3<T>); N] {
+        let along = |pose: LinkPose<T>| {
+            (vector::dot(&self.gravity, &pose.position), vector::turned_back(&pose.rotation, &self.gravity))
+        };
+        self.poses(q).map(along)
+    }
+}
