@@ -70,6 +70,15 @@ pub enum DiagnoseError {
     BadSamples(String),
     /// The horizon is not a positive number of seconds.
     Horizon(f64),
+    /// A serial arm has this many joints; one to seven are possible.
+    Joints(usize),
+    /// A serial arm has another number of parameters than its joints ask for.
+    Sizes {
+        /// Parameters found.
+        found: usize,
+        /// Parameters needed.
+        needed: usize,
+    },
     /// Too many custom effects, one without a table of torques in some log, or on a joint that is not there.
     CustomEffects,
     /// The observer cancelled the diagnosis.
@@ -90,6 +99,8 @@ impl std::fmt::Display for DiagnoseError {
                 write!(f, "log `{name}` holds values that are not finite, or times that do not increase")
             }
             Self::Horizon(h) => write!(f, "the horizon must be a positive number of seconds, not {h}"),
+            Self::Joints(n) => write!(f, "a serial arm has one to seven joints, not {n}"),
+            Self::Sizes { found, needed } => write!(f, "the arm needs {needed} parameters, not {found}"),
             Self::CustomEffects => write!(
                 f,
                 "effects of your own do not fit the logs; give at most {}, each on a joint of the arm, with one torque per sample of every log",
@@ -120,7 +131,7 @@ pub fn diagnose(
     options: &Options,
     observer: &Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
-    validate(arm, training, holdout, options)?;
+    validate(arm.kind.joints(), training, holdout, options)?;
     let request = Request { arm, training, holdout, options, observer };
     let ended = guarded(|| arm.dispatch(request)).ok_or(DiagnoseError::Stopped)?;
     ended.ok_or(DiagnoseError::Parameters(arm.kind))?
@@ -132,7 +143,7 @@ pub fn diagnose(
 ///
 /// The first thing that cannot be worked with.
 pub(crate) fn validate(
-    arm: &ArmDescription,
+    joints: usize,
     training: &[LogData<'_>],
     holdout: &[LogData<'_>],
     options: &Options,
@@ -153,7 +164,7 @@ pub(crate) fn validate(
             && log.tables.iter().all(|x| x.len() == log.t.len());
         if !fits
             || options.custom_effects.len() > custom_effect::MOST
-            || options.custom_effects.iter().any(|j| *j >= arm.kind.joints())
+            || options.custom_effects.iter().any(|j| *j >= joints)
         {
             return Err(DiagnoseError::CustomEffects);
         }

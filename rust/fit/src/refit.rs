@@ -36,7 +36,7 @@ pub fn refit(
     options: &Options,
     observer: &Observer,
 ) -> Result<Refit, DiagnoseError> {
-    validate(arm, training, holdout, options)?;
+    validate(arm.kind.joints(), training, holdout, options)?;
     let work = RigidFit(Request { arm, training, holdout, options, observer });
     let ended = guarded(|| arm.dispatch(work)).ok_or(DiagnoseError::Stopped)?;
     ended.ok_or(DiagnoseError::Parameters(arm.kind))?

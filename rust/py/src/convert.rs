@@ -1,10 +1,12 @@
 //! Descriptions that both sides share: kinds of arm, effects, and their parameters.
 
 use armgap_core::arm::{ArmKind, LinkParameters, TwoLink};
+use armgap_core::chain::{ChainJoint, JointKind};
 use armgap_core::effect::{Scope, catalogue, find};
 use armgap_core::transmission::Sides;
 use armgap_fit::arm::ArmDescription;
 use armgap_fit::model::EffectInstance;
+use armgap_fit::serial::SerialArm;
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -186,28 +188,29 @@ pub fn matrix<'a>(
         .map_err(|_| PyValueError::new_err(format!("`{name}` must be a C-contiguous array of float64")))
 }
 
+/// An entry of an `arm` dict, if it is there and not None.
+fn get<'py, T: for<'a> FromPyObject<'a, 'py>>(arm: &Bound<'py, PyDict>, key: &str) -> PyResult<Option<T>> {
+    match arm.get_item(key)? {
+        Some(value) if !value.is_none() => Ok(Some(
+            value.extract().map_err(|_| PyValueError::new_err(format!("arm: `{key}` has the wrong type")))?,
+        )),
+        _ => Ok(None),
+    }
+}
+
+/// An entry of an `arm` dict that must be there.
+fn needed<'py, T: for<'a> FromPyObject<'a, 'py>>(arm: &Bound<'py, PyDict>, key: &str) -> PyResult<T> {
+    get(arm, key)?.ok_or_else(|| PyValueError::new_err(format!("arm: `{key}` is missing")))
+}
+
 /// The arm of an `arm` dict.
 pub fn description(arm: &Bound<'_, PyDict>) -> PyResult<ArmDescription> {
-    fn get<'py, T: for<'a> FromPyObject<'a, 'py>>(
-        arm: &Bound<'py, PyDict>,
-        key: &str,
-    ) -> PyResult<Option<T>> {
-        match arm.get_item(key)? {
-            Some(value) if !value.is_none() => Ok(Some(
-                value
-                    .extract()
-                    .map_err(|_| PyValueError::new_err(format!("arm: `{key}` has the wrong type")))?,
-            )),
-            _ => Ok(None),
-        }
-    }
-    let needed = |key: &str| PyValueError::new_err(format!("arm: `{key}` is missing"));
-    let kind: String = get(arm, "kind")?.ok_or_else(|| needed("kind"))?;
+    let kind: String = needed(arm, "kind")?;
     let description = ArmDescription {
         kind: kind_of(&kind)?,
-        gravity: get(arm, "gravity")?.ok_or_else(|| needed("gravity"))?,
-        theta: get(arm, "theta")?.ok_or_else(|| needed("theta"))?,
-        sigma: get(arm, "sigma")?.ok_or_else(|| needed("sigma"))?,
+        gravity: needed(arm, "gravity")?,
+        theta: needed(arm, "theta")?,
+        sigma: needed(arm, "sigma")?,
         counts_per_rev: get(arm, "counts_per_rev")?,
         torque_limit: get(arm, "torque_limit")?,
         link_length: get(arm, "link_length")?,
@@ -229,4 +232,37 @@ pub fn description(arm: &Bound<'_, PyDict>) -> PyResult<ArmDescription> {
         }
     }
     Ok(description)
+}
+
+/// The serial arm of an `arm` dict, whose `chain` has lists of `kinds`, `rotation`, `translation` and `axis`, and `gravity`.
+pub fn serial_arm(arm: &Bound<'_, PyDict>) -> PyResult<SerialArm> {
+    let chain: Bound<'_, PyDict> = needed(arm, "chain")?;
+    let kinds: Vec<String> = needed(&chain, "kinds")?;
+    let rotation: Vec<[[f64; 3]; 3]> = needed(&chain, "rotation")?;
+    let translation: Vec<[f64; 3]> = needed(&chain, "translation")?;
+    let axis: Vec<[f64; 3]> = needed(&chain, "axis")?;
+    let n = kinds.len();
+    if [rotation.len(), translation.len(), axis.len()].iter().any(|length| *length != n) {
+        return Err(PyValueError::new_err(format!("arm: `chain` needs {n} entries in each of its lists")));
+    }
+    let mut joints = Vec::with_capacity(n);
+    for (((name, rotation), translation), axis) in kinds.iter().zip(rotation).zip(translation).zip(axis) {
+        let kind = match name.as_str() {
+            "revolute" => JointKind::Revolute,
+            "prismatic" => JointKind::Prismatic,
+            other => return Err(PyValueError::new_err(format!("arm: `{other}` is no kind of joint"))),
+        };
+        joints.push(ChainJoint { kind, rotation, translation, axis });
+    }
+    let (theta, sigma): (Vec<f64>, Vec<f64>) = (needed(arm, "theta")?, needed(arm, "sigma")?);
+    let counts: Option<Vec<f64>> = get(arm, "counts_per_rev")?;
+    if counts.as_ref().is_some_and(|c| c.len() != n) {
+        return Err(PyValueError::new_err(format!("arm: `counts_per_rev` needs {n} values")));
+    }
+    let step = |(joint, count): (&ChainJoint<f64>, &f64)| match joint.kind {
+        JointKind::Revolute => std::f64::consts::TAU / count,
+        JointKind::Prismatic => 1.0 / count,
+    };
+    let steps = counts.map(|counts| joints.iter().zip(&counts).map(step).collect());
+    Ok(SerialArm { joints, gravity: needed(&chain, "gravity")?, theta, sigma, steps })
 }

@@ -1,9 +1,11 @@
 //! `diagnose`.
 
-use crate::convert::{description, matrix, vector};
+use crate::convert::{description, matrix, serial_arm, vector};
 use crate::progress::with_progress;
+use armgap_fit::arm::ArmDescription;
 use armgap_fit::diagnose::{LogData, Options, diagnose as run};
 use armgap_fit::refit::refit as rigid_fit;
+use armgap_fit::serial::{SerialArm, diagnose as run_serial};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -68,8 +70,8 @@ pub fn diagnose(
     options: &Bound<'_, PyDict>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
-    let arm = description(arm)?;
-    let n = arm.kind.joints();
+    let arm = AnyArm::of(arm)?;
+    let n = arm.joints();
     let training = training.iter().map(|log| copy(log, n)).collect::<PyResult<Vec<_>>>()?;
     let holdout = holdout.iter().map(|log| copy(log, n)).collect::<PyResult<Vec<_>>>()?;
     let mut chosen = Options::default();
@@ -87,10 +89,37 @@ pub fn diagnose(
     }
     let result = with_progress(py, progress.as_ref(), move |observer| {
         let (training, holdout) = (views(&training), views(&holdout));
-        let diagnosis = run(&arm, &training, &holdout, &chosen, observer).map_err(|e| e.to_string())?;
+        let diagnosis = match &arm {
+            AnyArm::Planar(arm) => run(arm, &training, &holdout, &chosen, observer),
+            AnyArm::Serial(arm) => run_serial(arm, &training, &holdout, &chosen, observer),
+        };
+        let diagnosis = diagnosis.map_err(|e| e.to_string())?;
         serde_json::to_string(&diagnosis).map_err(|e| e.to_string())
     })?;
     result.map_err(PyValueError::new_err)
+}
+
+/// A planar arm of a fixed kind, or a serial arm.
+enum AnyArm {
+    Planar(ArmDescription),
+    Serial(SerialArm),
+}
+
+impl AnyArm {
+    fn of(arm: &Bound<'_, PyDict>) -> PyResult<Self> {
+        if arm.contains("chain")? {
+            serial_arm(arm).map(Self::Serial)
+        } else {
+            description(arm).map(Self::Planar)
+        }
+    }
+
+    fn joints(&self) -> usize {
+        match self {
+            Self::Planar(arm) => arm.kind.joints(),
+            Self::Serial(arm) => arm.joints.len(),
+        }
+    }
 }
 
 fn copy(log: &PyLog<'_>, n: usize) -> PyResult<Owned> {

@@ -1,8 +1,8 @@
 //! The weak equation of motion of an arm along its logs, and the torque of any term along the same motion.
 
 use super::intervals::{Intervals, Middle, TestFunction};
-use super::rows::{JointRows, Rows, Signal};
 use super::predict::turned;
+use super::rows::{JointRows, Rows, Signal};
 use super::term::{Term, TermKind, of_load};
 use crate::model::EffectInstance;
 use crate::track::Track;
@@ -104,7 +104,12 @@ impl<const N: usize, const P: usize> Equation<N, P> {
                         *psi += weight * rest[j * P + i] - rise * momentum[j * P + i];
                     }
                 }
-                (y, psi, first_block[phi.log] + (phi.centre / BLOCK_S) as usize, self.floor(phi, &inertia[*i][j]))
+                (
+                    y,
+                    psi,
+                    first_block[phi.log] + (phi.centre / BLOCK_S) as usize,
+                    self.floor(phi, &inertia[*i][j]),
+                )
             };
             let found: Vec<_> = self.kept[j].par_iter().map(row).collect();
             let mut rows = JointRows { y: vec![], psi: vec![], block: vec![], floor: vec![] };
@@ -233,11 +238,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         let needs_load = spec.name == "load_dependent_friction" || spec.name == "gear_efficiency";
         let (mut memory, mut before) = (0.0, None);
         let torque = |m: &Middle<N>| {
-            let load = if needs_load {
-                rigid.equation_terms(&JointState { q: m.q, dq: m.dq }).bias[j]
-            } else {
-                0.0
-            };
+            let load =
+                if needs_load { rigid.equation_terms(&JointState { q: m.q, dq: m.dq }).bias[j] } else { 0.0 };
             if spec.hooks.memory {
                 let travelled = before.map_or(0.0, |q: f64| m.q[j] - q);
                 memory = effect.law.hysteresis_after(&effect.p, memory, travelled);

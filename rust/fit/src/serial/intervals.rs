@@ -99,7 +99,8 @@ impl<const N: usize> Intervals<N> {
     }
 
     fn over(&self, log: usize, stretch: std::ops::Range<usize>, half: f64) -> Vec<TestFunction> {
-        let Some((a, b)) = self.middles.get(stretch.clone()).and_then(|m| Some((m.first()?, m.last()?))) else {
+        let Some((a, b)) = self.middles.get(stretch.clone()).and_then(|m| Some((m.first()?, m.last()?)))
+        else {
             return Vec::new();
         };
         let (begin, end) = (a.t - 0.5 * a.h, b.t + 0.5 * b.h);
@@ -181,8 +182,7 @@ mod tests {
     fn the_weak_form_of_an_acceleration_is_the_acceleration() {
         let log = Intervals::new(&falling(400, 0.0025));
         for phi in log.test_functions(0) {
-            let weak: f64 =
-                phi.reach().map(|k| -phi.rise(&log.middles[k]) * log.middles[k].mean_dq[0]).sum();
+            let weak: f64 = phi.reach().map(|k| -phi.rise(&log.middles[k]) * log.middles[k].mean_dq[0]).sum();
             assert!((weak - 3.0).abs() < 1e-3, "{weak}");
         }
     }

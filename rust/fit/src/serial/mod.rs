@@ -73,7 +73,7 @@ pub fn diagnose(
     options: &Options,
     observer: &Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
-    crate::diagnose::validate_logs(arm.joints.len(), training, holdout, options)?;
+    crate::diagnose::validate(arm.joints.len(), training, holdout, options)?;
     let request = Request { arm, training, holdout, options, observer };
     guarded(|| by_size(&request)).ok_or(DiagnoseError::Stopped)?
 }
@@ -137,7 +137,8 @@ impl Request<'_> {
             progress: &progress,
         };
         let found = search.run(self.options.max_causes, self.options.seed);
-        let mut diagnosis = result::assemble(self.arm, &arm, &training, &holdout, &found, self.options, &progress);
+        let mut diagnosis =
+            result::assemble(self.arm, &arm, &training, &holdout, &found, self.options, &progress);
         diagnosis.seconds = started.elapsed().as_secs_f64();
         Ok(diagnosis)
     }

@@ -46,11 +46,8 @@ pub fn turned<const N: usize>(arm: &Chain<f64, N>, by: [f64; 2]) -> Chain<f64, N
         return *arm;
     }
     let axis = [-by[0] / angle, -by[1] / angle, 0.0];
-    let cross = [
-        axis[1] * g[2] - axis[2] * g[1],
-        axis[2] * g[0] - axis[0] * g[2],
-        axis[0] * g[1] - axis[1] * g[0],
-    ];
+    let cross =
+        [axis[1] * g[2] - axis[2] * g[1], axis[2] * g[0] - axis[0] * g[2], axis[0] * g[1] - axis[1] * g[0]];
     let along: f64 = axis.iter().zip(&g).map(|(a, b)| a * b).sum();
     let (sine, cosine) = angle.sin_cos();
     arm.with_gravity(std::array::from_fn(|i| {

@@ -11,8 +11,8 @@ use crate::locate::Location;
 use crate::progress::{Phase, ProgressReporter};
 use crate::random::Random;
 use crate::report::{
-    ArmSummary, AtHorizon, Bound, Candidate, Cause, Diagnosis, EquivalentSummary, FreeRun, FreeRunSeries, Gap,
-    LogSummary, Named, Noise, OptionSummary, Parameters, RuledOut, Series, Value,
+    ArmSummary, AtHorizon, Bound, Candidate, Cause, Diagnosis, EquivalentSummary, FreeRun, FreeRunSeries,
+    Gap, LogSummary, Named, Noise, OptionSummary, Parameters, RuledOut, Series, Value,
 };
 use crate::verdict::Evidence;
 use crate::window::Dataset;
@@ -56,16 +56,17 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         why: format!("its probability is {:.2}; from {NAMED} on a cause is named", c.probability),
         cause: c,
     };
-    let fitted = |set: &Fitted| std::array::from_fn(|i| set.estimate.theta[i]);
-    let nominal = std::array::from_fn(|i| description.theta[i]);
-    let kept: Vec<Term> =
-        found.named.iter().filter(|n| n.probability >= NAMED).map(|n| n.term.clone()).collect();
-    let reported = if kept.len() == found.named.len() { &found.model } else { &found.refit };
-    let terms: &[Term] = if std::ptr::eq(reported, &found.model) { &found.model.terms } else { &[] };
-    let models =
-        [Model::new(arm, nominal, &[]), Model::new(arm, fitted(&found.refit), &[]), Model::new(arm, fitted(reported), terms)];
-    let noise: [f64; N] =
-        std::array::from_fn(|j| crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect()));
+    let fitted = |set: &Fitted| -> [f64; P] { std::array::from_fn(|i| set.estimate.theta[i]) };
+    let nominal: [f64; P] = std::array::from_fn(|i| description.theta[i]);
+    let reported = &found.reported;
+    let models: [Model<N, P>; 3] = [
+        Model::new(arm, nominal, &[]),
+        Model::new(arm, fitted(&found.refit), &[]),
+        Model::new(arm, fitted(reported), &reported.terms),
+    ];
+    let noise: [f64; N] = std::array::from_fn(|j| {
+        crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
+    });
     let data = &holdout.data;
     let predicted = [0, 1, 2].map(|i| {
         progress.unit();
@@ -146,7 +147,8 @@ fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
 
 fn cause(named: &super::search::Named, rotary: &[bool]) -> Cause {
     let term = &named.term;
-    let alike = |t: &Term| EquivalentSummary { effect: t.name(), joint: t.joint(), why: LOOK_ALIKE.to_owned() };
+    let alike =
+        |t: &Term| EquivalentSummary { effect: t.name(), joint: t.joint(), why: LOOK_ALIKE.to_owned() };
     Cause {
         effect: term.name(),
         title: term.title(),
@@ -168,7 +170,10 @@ fn places<const N: usize, const P: usize>(found: &Found, holdout: &Set<N, P>) ->
     let none = vec![None; N];
     let residual = holdout.equation.rows.residual(&found.refit.estimate.theta, &none);
     let left: Vec<f64> = (0..N)
-        .map(|j| ((square(&residual[j]) - square(&rows[j].floor)) / square(&rows[j].y).max(f64::MIN_POSITIVE)).max(0.0))
+        .map(|j| {
+            ((square(&residual[j]) - square(&rows[j].floor)) / square(&rows[j].y).max(f64::MIN_POSITIVE))
+                .max(0.0)
+        })
         .collect();
     let total: f64 = left.iter().sum();
     let mut places: Vec<Location> = (0..N)
@@ -193,7 +198,8 @@ fn gap<const N: usize, const P: usize>(
 ) -> Gap {
     let still: Vec<f64> =
         data.windows.iter().flat_map(|w| w.initial_state.q.as_slice().repeat(w.rows())).collect();
-    let missed = |i: usize| rms::<N>(&compared.measured, &limited(&compared.measured, &compared.predicted[i]));
+    let missed =
+        |i: usize| rms::<N>(&compared.measured, &limited(&compared.measured, &compared.predicted[i]));
     let [before, refit, after] = [0, 1, 2].map(missed);
     let floor = compared.floor.clone();
     Gap {
@@ -243,9 +249,7 @@ fn closed_interval<const N: usize, const P: usize>(
         let predicted = limited(&compared.measured, predicted);
         let of = |w: &crate::window::Window<N>| {
             let (a, b) = (&compared.measured[w.range()], &predicted[w.range()]);
-            std::array::from_fn(|j| {
-                a.iter().zip(b).skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
-            })
+            std::array::from_fn(|j| a.iter().zip(b).skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum())
         };
         data.windows.iter().map(of).collect()
     };
@@ -277,7 +281,8 @@ fn series<const N: usize, const P: usize>(compared: &Compared<N, P>, data: &Data
             let mut places = Vec::new();
             for w in &windows {
                 start.push(places.len());
-                places.extend((0..w.rows()).step_by(stride).map(|i| (w.first + 1 + i, (w.offset + i) * N + j)));
+                places
+                    .extend((0..w.rows()).step_by(stride).map(|i| (w.first + 1 + i, (w.offset + i) * N + j)));
             }
             let pick = |x: &[f64]| places.iter().map(|(_, at)| x[*at]).collect();
             all.push(Series {
@@ -443,7 +448,10 @@ fn notes<const N: usize, const P: usize>(
         .map(|j| (j + 1).to_string())
         .collect();
     if !still.is_empty() {
-        notes.push(format!("joint {} does not move in the training logs: nothing is said about it", still.join(", ")));
+        notes.push(format!(
+            "joint {} does not move in the training logs: nothing is said about it",
+            still.join(", ")
+        ));
     }
     notes
 }

@@ -49,7 +49,9 @@ pub struct Prior {
 impl Prior {
     /// Squared distance in standard deviations.
     pub fn cost(&self, theta: &[f64]) -> f64 {
-        let off = |i: usize| if self.sigma[i] > 0.0 { ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2) } else { 0.0 };
+        let off = |i: usize| {
+            if self.sigma[i] > 0.0 { ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2) } else { 0.0 }
+        };
         (0..theta.len()).map(off).sum()
     }
 }
@@ -268,11 +270,8 @@ impl<'a> Regression<'a> {
         }
         let residual = self.rows.residual(&value, beside);
         let prior_cost = self.prior.cost(&value);
-        let data: f64 = residual
-            .iter()
-            .zip(&self.weights)
-            .map(|(r, w)| w * r.iter().map(|r| r * r).sum::<f64>())
-            .sum();
+        let data: f64 =
+            residual.iter().zip(&self.weights).map(|(r, w)| w * r.iter().map(|r| r * r).sum::<f64>()).sum();
         Estimate { theta: value, residual, cost: data + prior_cost, prior_cost }
     }
 
@@ -292,7 +291,9 @@ impl<'a> Regression<'a> {
         Some(Score {
             size: size.iter().copied().collect(),
             gain,
-            distinct: (0..k).map(|i| information[(i, i)] / own[(i, i)].max(f64::MIN_POSITIVE)).fold(1.0, f64::min),
+            distinct: (0..k)
+                .map(|i| information[(i, i)] / own[(i, i)].max(f64::MIN_POSITIVE))
+                .fold(1.0, f64::min),
             inverse,
             solved,
         })

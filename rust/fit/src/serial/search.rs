@@ -1,8 +1,8 @@
 //! Which terms a serial arm's model lacks: added one after another, swapped for rivals, dropped when idle.
 
 use super::constants::{
-    ALIKE, ALIKE_COST, ARM_WIDE, CONSEQUENCE, ENOUGH, FINALISTS, HOLDOUT_DEVIATIONS, ITERATIONS, MATTERS, PRICE,
-    RESAMPLES, RESTORES, SIGNIFICANT,
+    ALIKE, ALIKE_COST, ARM_WIDE, CONSEQUENCE, ENOUGH, FINALISTS, HOLDOUT_DEVIATIONS, ITERATIONS, MATTERS,
+    NAMED, PRICE, RESAMPLES, RESTORES, SIGNIFICANT,
 };
 use super::rows::{Estimate, Prior, Regression, Rows, Signal, sum};
 use super::term::{Term, TermKind};
@@ -147,6 +147,8 @@ pub struct Found {
     pub model: Fitted,
     /// Its terms, strongest first.
     pub named: Vec<Named>,
+    /// The model with those of them alone that are probable enough to be named.
+    pub reported: Fitted,
     /// All other places, tested beside the final model.
     pub tested: Vec<Tested>,
     /// Standard deviations of the arm's parameters: re-estimated, and with the terms.
@@ -242,13 +244,14 @@ impl Search<'_> {
                     .map(|(p, b)| {
                         let by = part * rest.next().copied().unwrap_or(0.0);
                         // A shape or a threshold changes by no more than a factor of two in one step.
-                        let by = if *p == 0.0 || b.neutral == 0.0 && p.abs() < by.abs() && term.amplitudes() > 0 {
-                            by
-                        } else if term.amplitudes() == 0 && p.abs() > 0.0 {
-                            by.clamp(-0.5 * p.abs(), p.abs())
-                        } else {
-                            by
-                        };
+                        let by =
+                            if *p == 0.0 || b.neutral == 0.0 && p.abs() < by.abs() && term.amplitudes() > 0 {
+                                by
+                            } else if term.amplitudes() == 0 && p.abs() > 0.0 {
+                                by.clamp(-0.5 * p.abs(), p.abs())
+                            } else {
+                                by
+                            };
                         (p + by).clamp(b.bounds[0], b.bounds[1])
                     })
                     .collect();
@@ -283,7 +286,8 @@ impl Search<'_> {
         let within = |p: &[f64]| p.iter().zip(&bounds).all(|(p, b)| *p >= b.bounds[0] && *p <= b.bounds[1]);
         if let TermKind::Payload = term.kind {
             let last = self.rotary.len() - 1;
-            let columns: Vec<Signal> = (0..4).map(|i| self.unit(&Term::neutral(TermKind::NominalLink(last)), i, theta)).collect();
+            let columns: Vec<Signal> =
+                (0..4).map(|i| self.unit(&Term::neutral(TermKind::NominalLink(last)), i, theta)).collect();
             let score = regression.score(at, &columns)?;
             let mass = score.size[0];
             if mass <= 0.0 {
@@ -379,10 +383,8 @@ impl Search<'_> {
         let screened = self.screened(regression, model);
         let fitted = self.finalists(regression, model, &screened);
         let last = model.terms.len();
-        let accepted: Vec<&Fitted> = fitted
-            .iter()
-            .filter(|with| self.evidence(regression, model, with, last).is_accepted())
-            .collect();
+        let accepted: Vec<&Fitted> =
+            fitted.iter().filter(|with| self.evidence(regression, model, with, last).is_accepted()).collect();
         let best = accepted.iter().min_by(|a, b| a.total().total_cmp(&b.total()))?;
         let term = &best.terms[last];
         Some(self.everywhere(regression, model, &screened, term).unwrap_or_else(|| vec![term.clone()]))
@@ -401,8 +403,11 @@ impl Search<'_> {
         }
         let last = model.terms.len();
         let moving = self.training.rows().joints.iter().filter(|r| !r.y.is_empty()).count();
-        let alike: Vec<&Term> =
-            screened.iter().map(|(t, _)| t).filter(|t| t.name() == best.name() && !t.same_place(best)).collect();
+        let alike: Vec<&Term> = screened
+            .iter()
+            .map(|(t, _)| t)
+            .filter(|t| t.name() == best.name() && !t.same_place(best))
+            .collect();
         let mut all: Vec<Term> = alike
             .par_iter()
             .filter_map(|term| {
@@ -513,20 +518,37 @@ impl Search<'_> {
         let floor = self.floor(regression);
         let mut named: Vec<Named> =
             (0..model.terms.len()).map(|i| self.named(regression, &model, i, &floor, seed)).collect();
-        named.sort_by(|a, b| (b.evidence.gain + b.evidence.holdout_gain).total_cmp(&(a.evidence.gain + a.evidence.holdout_gain)));
+        named.sort_by(|a, b| {
+            (b.evidence.gain + b.evidence.holdout_gain)
+                .total_cmp(&(a.evidence.gain + a.evidence.holdout_gain))
+        });
         let tested = self.tested(regression, &model);
         // Re-estimated costs are comparable only under the same weights.
-        let refit = if model.terms.is_empty() { refit } else { self.fit(regression, Vec::new(), &refit.estimate.theta) };
-        Found { refit, named, tested, sigma: [refit_sigma, regression.sigma()], floor, model }
+        let refit = if model.terms.is_empty() {
+            refit
+        } else {
+            self.fit(regression, Vec::new(), &refit.estimate.theta)
+        };
+        let probable = named.iter().filter(|n| n.probability >= NAMED).map(|n| n.term.clone()).collect();
+        let reported = self.fit(regression, probable, &model.estimate.theta);
+        Found { refit, named, reported, tested, sigma: [refit_sigma, regression.sigma()], floor, model }
     }
 
     /// Cost that noisy positions alone put into the holdout's rows, by joint.
     fn floor(&self, regression: &Regression) -> Vec<f64> {
-        let of = |(rows, w): (&super::rows::JointRows, &f64)| w * rows.floor.iter().map(|f| f * f).sum::<f64>();
+        let of =
+            |(rows, w): (&super::rows::JointRows, &f64)| w * rows.floor.iter().map(|f| f * f).sum::<f64>();
         self.holdout.rows().joints.iter().zip(&regression.weights).map(of).collect()
     }
 
-    fn named(&self, regression: &Regression, model: &Fitted, index: usize, floor: &[f64], seed: u64) -> Named {
+    fn named(
+        &self,
+        regression: &Regression,
+        model: &Fitted,
+        index: usize,
+        floor: &[f64],
+        seed: u64,
+    ) -> Named {
         let term = model.terms[index].clone();
         let without = self.without(regression, model, index);
         let evidence = self.evidence(regression, &without, model, index);
@@ -600,10 +622,14 @@ fn consequence(rows: &Rows, signal: &Signal) -> f64 {
 /// Share of resamples of the blocks, of training and holdout, in which a model costs less than every rival.
 fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64) -> f64 {
     let by_block = |fitted: &Fitted| -> Vec<f64> {
-        fitted.costs.iter().flat_map(|set| {
-            let blocks = set.first().map_or(0, Vec::len);
-            (0..blocks).map(move |b| set.iter().map(|joint| joint[b]).sum::<f64>()).collect::<Vec<f64>>()
-        }).collect()
+        fitted
+            .costs
+            .iter()
+            .flat_map(|set| {
+                let blocks = set.first().map_or(0, Vec::len);
+                (0..blocks).map(move |b| set.iter().map(|joint| joint[b]).sum::<f64>()).collect::<Vec<f64>>()
+            })
+            .collect()
     };
     let price = |fitted: &Fitted| {
         fitted.estimate.prior_cost + 2.0 * fitted.terms.iter().map(|t| t.p.len()).sum::<usize>() as f64
