@@ -351,3 +351,104 @@ pub struct Score {
     /// Parameters that imitate each torque.
     solved: Vec<DVector<f64>>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    const ROWS: usize = 400;
+
+    /// Rows of one joint with two parameters, and what else acts: `y = 3 psi1 + 0.5 psi2 + size extra + noise`.
+    fn rows(size: f64, noise: f64) -> (Rows, Signal) {
+        let mut random = Random(3);
+        let at = |k: usize, rate: f64| (rate * k as f64).sin();
+        let psi: Vec<f64> = (0..ROWS).flat_map(|k| [at(k, 0.11), at(k, 0.23)]).collect();
+        let extra: Vec<f64> = (0..ROWS).map(|k| at(k, 0.37)).collect();
+        let y = (0..ROWS)
+            .map(|k| 3.0 * psi[2 * k] + 0.5 * psi[2 * k + 1] + size * extra[k] + noise * random.normal())
+            .collect();
+        let block = (0..ROWS).map(|k| k / 20).collect();
+        let joint = JointRows { y, psi, block, floor: vec![noise; ROWS] };
+        (Rows { joints: vec![joint], parameters: 2, blocks: ROWS / 20 }, vec![Some(extra)])
+    }
+
+    fn prior(theta: [f64; 2], sigma: [f64; 2]) -> Prior {
+        Prior { theta: theta.to_vec(), sigma: sigma.to_vec(), positive: vec![false, true] }
+    }
+
+    #[test]
+    fn parameters_are_found_beside_a_known_torque() {
+        let (rows, extra) = rows(1.0, 1e-3);
+        let prior = prior([1.0, 1.0], [10.0, 10.0]);
+        let regression = Regression::reweighted(&rows, &prior, &extra);
+        let found = regression.estimate(&extra);
+        assert!((found.theta[0] - 3.0).abs() < 1e-3 && (found.theta[1] - 0.5).abs() < 1e-3, "{:?}", found.theta);
+    }
+
+    #[test]
+    fn values_that_are_not_estimated_stay_and_coefficients_stay_positive() {
+        let (rows, none) = (rows(0.0, 1e-3).0, vec![None]);
+        let fixed = prior([2.0, 1.0], [0.0, 10.0]);
+        assert_eq!(Regression::reweighted(&rows, &fixed, &none).estimate(&none).theta[0], 2.0);
+        let mut turned = rows.clone();
+        turned.joints[0].y.iter_mut().for_each(|y| *y = -*y);
+        let free = prior([1.0, 1.0], [10.0, 10.0]);
+        let found = Regression::reweighted(&turned, &free, &none).estimate(&none).theta;
+        assert!((found[0] + 3.0).abs() < 0.3 && found[1] == 0.0, "{found:?}");
+    }
+
+    #[test]
+    fn a_first_order_test_gives_the_size_and_what_the_cost_falls_by() {
+        let (rows, extra) = rows(0.2, 1e-2);
+        let (prior, none) = (prior([3.0, 0.5], [1.0, 1.0]), vec![None]);
+        let regression = Regression::reweighted(&rows, &prior, &none);
+        let before = regression.estimate(&none);
+        let score = regression.score(&before, std::slice::from_ref(&extra)).unwrap();
+        assert!((score.size[0] - 0.2).abs() < 5e-3, "{}", score.size[0]);
+        let scaled: Signal = vec![extra[0].as_ref().map(|x| x.iter().map(|x| score.size[0] * x).collect())];
+        let after = regression.estimate(&scaled);
+        assert!((before.cost - after.cost - score.gain).abs() < 1e-6 * score.gain);
+    }
+
+    #[test]
+    fn the_sandwich_holds_its_level() {
+        let (prior, none) = (prior([3.0, 0.5], [1.0, 1.0]), vec![None]);
+        let mut random = Random(11);
+        let (mut base, extra) = rows(0.0, 0.0);
+        let clean = base.joints[0].y.clone();
+        let mut outside = 0;
+        for _ in 0..200 {
+            // Noise with a memory of several rows.
+            let mut memory = 0.0;
+            for (y, clean) in base.joints[0].y.iter_mut().zip(&clean) {
+                memory = 0.7 * memory + 0.1 * random.normal();
+                *y = clean + memory;
+            }
+            let regression = Regression::reweighted(&base, &prior, &none);
+            let at = regression.estimate(&none);
+            let column = std::slice::from_ref(&extra);
+            let score = regression.score(&at, column).unwrap();
+            let sigma = regression.sandwich(&at, column, &score)[(0, 0)].sqrt();
+            outside += usize::from(score.size[0].abs() > 1.96 * sigma);
+        }
+        assert!((2..=24).contains(&outside), "{outside} of 200 outside 95 %");
+    }
+
+    #[test]
+    fn correlated_residuals_weigh_less() {
+        let mut random = Random(5);
+        let white: Vec<f64> = (0..2000).map(|_| random.normal()).collect();
+        let mut memory = 0.0;
+        let coloured: Vec<f64> = white
+            .iter()
+            .map(|e| {
+                memory = 0.8 * memory + e;
+                memory
+            })
+            .collect();
+        assert!(correlation_length(&white) < 1.3);
+        // Of a first-order process (1 + a) / (1 - a).
+        assert!((correlation_length(&coloured) / 9.0 - 1.0).abs() < 0.35, "{}", correlation_length(&coloured));
+    }
+}

@@ -385,6 +385,7 @@ impl Search<'_> {
         let last = model.terms.len();
         let accepted: Vec<&Fitted> =
             fitted.iter().filter(|with| self.evidence(regression, model, with, last).is_accepted()).collect();
+        if std::env::var_os("TRACE").is_some() { let mut f: Vec<&Fitted> = fitted.iter().collect(); f.sort_by(|a,b| a.total().total_cmp(&b.total())); eprintln!("-- total {:.1} prior {:.1} holdout {:.1}", model.total(), model.estimate.prior_cost, model.holdout_cost()); for w in f.iter().take(8) { eprintln!("   {} {:?} {:?} total {:.1} {:?}", w.terms[last].name(), w.terms[last].joint(), w.terms[last].p, w.total(), self.evidence(regression, model, w, last)); } for (t,g) in screened.iter().take(12) { eprintln!("      {} {:?} {:.1} {:?}", t.name(), t.joint(), g, t.p);} }
         let best = accepted.iter().min_by(|a, b| a.total().total_cmp(&b.total()))?;
         let term = &best.terms[last];
         Some(self.everywhere(regression, model, &screened, term).unwrap_or_else(|| vec![term.clone()]))
@@ -663,4 +664,156 @@ fn trust(without: &Fitted, with: &Fitted, evidence: &Evidence, floor: &[f64]) ->
     });
     let restores = 1.0 - (-evidence.relief.max(0.0) / (2.0 * RESTORES)).exp();
     explains.max(restores)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::EffectInstance;
+    use crate::progress::{Control, Observer};
+    use crate::serial::rows::JointRows;
+    use armgap_core::effect::find;
+
+    const ROWS: usize = 600;
+    const SIGMA: f64 = 0.02;
+
+    /// Two joints, one parameter each; every law is a sine of its own rate along the joint it acts on.
+    struct Sines {
+        rows: Rows,
+    }
+
+    fn rate(term: &Term) -> f64 {
+        0.2 + 0.01 * term.name().bytes().map(usize::from).sum::<usize>() as f64 % 1.7
+    }
+
+    fn sine(term: &Term, phase: f64) -> Signal {
+        let wave = (0..ROWS).map(|k| term.p[0] * (rate(term) * k as f64 + phase).sin()).collect();
+        (0..2).map(|j| (term.joint() == Some(j + 1)).then(|| Vec::clone(&wave))).collect()
+    }
+
+    impl Sines {
+        /// With these terms in the data; `seed` of the noise.
+        fn with(terms: &[Term], seed: u64) -> Self {
+            let mut random = Random(seed);
+            let joint = |j: usize, random: &mut Random| {
+                let psi: Vec<f64> = (0..ROWS).map(|k| (0.05 * k as f64).cos()).collect();
+                let mut y: Vec<f64> = psi.iter().map(|p| 2.0 * p + SIGMA * random.normal()).collect();
+                for term in terms {
+                    if let Some(s) = &sine(term, 0.0)[j] {
+                        y.iter_mut().zip(s).for_each(|(y, s)| *y += s);
+                    }
+                }
+                let psi = psi.iter().flat_map(|p| if j == 0 { [*p, 0.0] } else { [0.0, *p] }).collect();
+                JointRows { y, psi, block: (0..ROWS).map(|k| k / 30).collect(), floor: vec![SIGMA; ROWS] }
+            };
+            let joints = (0..2).map(|j| joint(j, &mut random)).collect();
+            Self { rows: Rows { joints, parameters: 2, blocks: ROWS / 30 } }
+        }
+    }
+
+    impl Motion for Sines {
+        fn rows(&self) -> &Rows {
+            &self.rows
+        }
+
+        fn signal(&self, term: &Term, _theta: &[f64]) -> Signal {
+            sine(term, 0.0)
+        }
+    }
+
+    fn offset(joint: usize, size: f64) -> Term {
+        law("torque_offset", joint, size)
+    }
+
+    fn law(name: &str, joint: usize, size: f64) -> Term {
+        Term::of_law(EffectInstance::new(find(name).unwrap(), joint, [size, 0.0, 0.0]))
+    }
+
+    fn found(truth: &[Term], most: usize) -> Found {
+        let (training, holdout) = (Sines::with(truth, 1), Sines::with(truth, 2));
+        let prior = Prior { theta: vec![1.8; 2], sigma: vec![0.5; 2], positive: vec![false; 2] };
+        let observer: Observer = std::sync::Arc::new(|_| Control::Go);
+        let progress = ProgressReporter::new(observer);
+        let names = ["torque_offset", "quadratic_drag", "viscous_asymmetry", "load_dependent_friction"];
+        let candidates = names.iter().flat_map(|name| (0..2).map(|j| vec![law(name, j, 0.05)])).collect();
+        let search = Search {
+            training: &training,
+            holdout: &holdout,
+            prior: &prior,
+            candidates,
+            rotary: vec![true; 2],
+            progress: &progress,
+        };
+        search.run(most, 1)
+    }
+
+    fn names(found: &Found) -> Vec<(&'static str, Option<usize>)> {
+        found.named.iter().map(|n| (n.term.name(), n.term.joint())).collect()
+    }
+
+    #[test]
+    fn nothing_is_found_where_nothing_is_missing() {
+        assert!(names(&found(&[], 4)).is_empty());
+    }
+
+    #[test]
+    fn a_term_is_found_with_its_size() {
+        let found = found(&[offset(1, 0.3)], 4);
+        assert_eq!(names(&found), [("torque_offset", Some(2))]);
+        let cause = &found.named[0];
+        assert!((cause.term.p[0] - 0.3).abs() < 4.0 * cause.sigma[0] && cause.sigma[0] < 0.01);
+        assert!(cause.probability > 0.9, "{}", cause.probability);
+    }
+
+    #[test]
+    fn two_terms_are_found_strongest_first() {
+        let found = found(&[offset(0, 0.2), law("quadratic_drag", 1, 0.6)], 4);
+        assert_eq!(names(&found), [("quadratic_drag", Some(2)), ("torque_offset", Some(1))]);
+    }
+
+    #[test]
+    fn no_more_decisions_are_taken_than_allowed() {
+        assert!(found(&[offset(0, 0.5)], 0).named.is_empty());
+        let truth = [offset(0, 0.5), law("quadratic_drag", 1, 0.6)];
+        assert_eq!(found(&truth, 1).named.len(), 1);
+    }
+
+    #[test]
+    fn a_law_on_all_joints_is_one_decision() {
+        let found = found(&[offset(0, 0.5), offset(1, 0.6)], 1);
+        assert_eq!(found.named.len(), 2);
+    }
+
+    #[test]
+    fn a_term_below_consequence_is_not_named() {
+        let tiny = 0.001;
+        assert!(found(&[offset(0, tiny)], 4).named.is_empty());
+    }
+
+    #[test]
+    fn acceptance_needs_every_part_of_the_evidence() {
+        let good = Evidence {
+            parameters: 1,
+            gain: 100.0,
+            relief: 0.0,
+            statistic: 90.0,
+            holdout_gain: 60.0,
+            deviations: 5.0,
+            share: 0.5,
+            consequence: 0.1,
+        };
+        assert!(good.is_accepted());
+        for lacking in [
+            Evidence { statistic: 10.0, ..good },
+            Evidence { gain: 10.0, ..good },
+            Evidence { deviations: 1.0, ..good },
+            Evidence { share: 0.05, ..good },
+            Evidence { consequence: 1e-3, ..good },
+        ] {
+            assert!(!lacking.is_accepted(), "{lacking:?}");
+        }
+        let restoring = Evidence { relief: 30.0, statistic: 0.0, deviations: 0.0, share: 0.0, ..good };
+        assert!(restoring.is_accepted());
+        assert!(!Evidence { deviations: -3.0, ..restoring }.is_accepted());
+    }
 }
