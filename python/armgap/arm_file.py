@@ -23,7 +23,7 @@ from armgap.serial_chain import SERIAL
 if TYPE_CHECKING:
     from armgap.check.corrections import Corrections
 
-__all__ = ["ArmFile", "suggest"]
+__all__ = ["LONGEST_PERIOD_S", "SHORTEST_PERIOD_S", "STRONGEST_GRAVITY", "ArmFile", "suggest"]
 
 _TABLES: dict[str, tuple[str, ...]] = {
     "inertial": ("theta", "sigma"),
@@ -50,10 +50,10 @@ _REMEDY_MARKUP = (
 )
 _INERTIAL_SIGMA = 0.1
 _FRICTION_SIGMA = 0.5
-_STRONGEST_GRAVITY = 30.0  # m/s^2
+STRONGEST_GRAVITY = 30.0  # m/s^2
 # Sample periods beyond these [s] are in another unit.
-_SHORTEST_PERIOD_S = 1e-5
-_LONGEST_PERIOD_S = 0.5
+SHORTEST_PERIOD_S = 1e-5
+LONGEST_PERIOD_S = 0.5
 
 
 class ArmFile:
@@ -99,7 +99,7 @@ class ArmFile:
         kind = self._kind()
         info = kinds()[kind]
         n, b = int(info["n_joints"]), int(info["n_inertial"])
-        gravity = self._number("gravity", default=9.81, lowest=0.0, highest=_STRONGEST_GRAVITY)
+        gravity = self._number("gravity", default=9.81, lowest=0.0, highest=STRONGEST_GRAVITY)
         period = self._sample_period()
         inertial, inertial_sigma = self._inertial(kind, gravity, n, b)
         friction = self._table("friction")
@@ -166,7 +166,7 @@ class ArmFile:
         return float(value)
 
     def _sample_period(self) -> float:
-        return self._number("sample_period", lowest=_SHORTEST_PERIOD_S, highest=_LONGEST_PERIOD_S)
+        return self._number("sample_period", lowest=SHORTEST_PERIOD_S, highest=LONGEST_PERIOD_S)
 
     def _table(self, name: str) -> dict[str, Any]:
         if name not in self.data:

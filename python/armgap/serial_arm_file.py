@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm_file import ArmFile, suggest
+from armgap.arm_file import STRONGEST_GRAVITY, ArmFile, suggest
 from armgap.controller import VECTORS, Controller, DerivativeOn
 from armgap.description.resolved import ResolvedModel
 from armgap.reading import printable
@@ -43,19 +44,32 @@ _PLANAR = {
     "links": "write [[link]] tables, or name a description with urdf or mjcf",
     "geometry": "leave it out: lengths are in the chain",
 }
-_STRONGEST_GRAVITY = 30.0  # m/s^2
 _HEAVIEST_PAYLOAD = 1e4  # kg
 _FURTHEST_COM = 10.0  # m
 _TAU_KINDS = ("command", "measured")
 
 
 class SerialArmFile(ArmFile):
-    """One arm file of a serial arm being checked."""
+    """One arm file of a serial arm being checked.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+    data : dict
+        Its content.
+    described : ResolvedModel, optional
+        The model, where the file names none.
+    """
 
     tables = _TABLES
     scalars = _SCALARS
     joints: tuple[str, ...] = ()
     """Names of the chain's joints, once it is known."""
+
+    def __init__(self, path: Path, data: dict[str, Any], described: ResolvedModel | None = None) -> None:
+        super().__init__(path, data)
+        self.described = described
 
     def fields(self) -> dict[str, Any]:
         """Return the fields of an `Arm`, all of them checked."""
@@ -103,7 +117,7 @@ class SerialArmFile(ArmFile):
             if key in self.data:
                 raise self.error(key, "is not a table of a serial arm", remedy)
         given = [key for key in _SOURCES if key in self.data]
-        if len(given) != 1:
+        if self.described is None and len(given) != 1:
             problem = f"stands beside `{given[0]}`" if given else "is missing"
             raise self.error(
                 given[1] if given else "urdf", problem, "give exactly one of urdf, mjcf and [[link]] tables"
@@ -131,12 +145,14 @@ class SerialArmFile(ArmFile):
         if isinstance(value, list):
             vector = self._vector(self.data, "gravity", 3)
             size = float(np.linalg.norm(vector))
-            if size > _STRONGEST_GRAVITY:
+            if size > STRONGEST_GRAVITY:
                 raise self.error("gravity", f"is {size:g} m/s^2 strong", "give it in m/s^2")
             return vector
-        return np.array([0.0, 0.0, -self._number("gravity", lowest=0.0, highest=_STRONGEST_GRAVITY)])
+        return np.array([0.0, 0.0, -self._number("gravity", lowest=0.0, highest=STRONGEST_GRAVITY)])
 
     def _model(self) -> ResolvedModel:
+        if self.described is not None:
+            return self.described
         gravity = self._gravity()
         if "link" in self.data:
             for key in ("base", "tip"):
@@ -153,7 +169,7 @@ class SerialArmFile(ArmFile):
         file = self.path.parent / self._text(key)
         frozen = {joint: self._frozen(joint) for joint in self._table_or_empty("frozen")}
         base, tip = (self._text(end) if end in self.data else None for end in ("base", "tip"))
-        model = read_description(file, base=base, tip=tip, frozen=frozen, mjcf=key == "mjcf")
+        model = read_description(file, base=base, tip=tip, frozen=frozen, expected=key.upper())
         return model if gravity is None else replace(model, chain=replace(model.chain, gravity=gravity))
 
     def _table_or_empty(self, name: str) -> dict[str, Any]:
