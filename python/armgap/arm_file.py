@@ -177,7 +177,7 @@ class ArmFile:
     def _vector(
         self, table: dict[str, Any], key: str, n: int, minimum: float | None = None, above: float | None = None
     ) -> NDArray[np.float64]:
-        value = table.get(key.split(".")[1])
+        value = table.get(key.rpartition(".")[2])
         if value is None:
             raise self.error(key, "is missing", f"give a list of {n} numbers")
         if not isinstance(value, list) or len(value) != n:

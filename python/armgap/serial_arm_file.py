@@ -198,7 +198,7 @@ class SerialArmFile(ArmFile):
             table = {name: [value[joint] for joint in self.joints]}
         elif value is not None and self.joints and isinstance(value, list) and len(value) != n == len(self.joints):
             raise self.error(key, f"needs {n} numbers, found {len(value)}", f"one per joint: {', '.join(self.joints)}")
-        return super()._vector(table, key if "." in key else f"arm.{key}", n, minimum, above)
+        return super()._vector(table, key, n, minimum, above)
 
     def _nominal(self, key: str, described: Array, free: Array, share: float) -> tuple[Array, Array]:
         """Return nominal values and standard deviations, from the file, else from the description, else 0 and `free`."""
@@ -241,9 +241,7 @@ class SerialArmFile(ArmFile):
             if key not in table:
                 raise self.error(f"payload.{key}", "is missing", "give mass = kg and com = [x, y, z] in m")
         mass = self._scalar(table, "payload.mass", 0.0, _HEAVIEST_PAYLOAD)
-        joints, self.joints = self.joints, ()
-        com = self._vector(table, "payload.com", 3)
-        self.joints = joints
+        com = super()._vector(table, "payload.com", 3)
         if float(np.max(np.abs(com))) > _FURTHEST_COM:
             raise self.error("payload.com", f"is {com.tolist()} m away", "give it in m, in the last link's frame")
         inertia = np.zeros((3, 3))

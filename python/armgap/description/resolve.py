@@ -160,11 +160,13 @@ class _Resolver:
             return next(iter(longest.values()))
         if not longest:
             raise self._no_branch(base)
-        choices = [f"`{link}` ({len(joints)} joints)" for joints, link in longest.items()]
-        common = _common(list(longest))
-        if common:
-            link = self.tree.joints[common[-1]].child
-            choices.insert(0, f"`{link}` ({len(common)} joints), where they part")
+        choices = [f"`{link}` ({_joints(joints)})" for joints, link in longest.items()]
+        common = _common([[joint.child for joint in self.tree.path(link)[skip:]] for link in longest.values()])
+        before = (
+            tuple(joint.name for joint in self.tree.path(common[-1])[skip:] if self._moves(joint)) if common else ()
+        )
+        if before:
+            choices.insert(0, f"`{common[-1]}` ({_joints(before)}), where they part")
         raise self.tree.error(None, "has several branches that move", f"choose a tip: {', '.join(_few(choices))}")
 
     def _no_branch(self, base: str) -> Exception:
@@ -308,11 +310,16 @@ def _few(words: Iterable[str]) -> list[str]:
     return listed if more <= 0 else [*listed[:_LISTED], f"and {more} more"]
 
 
+def _joints(names: tuple[str, ...]) -> str:
+    return "1 joint" if len(names) == 1 else f"{len(names)} joints"
+
+
 def _begins(longer: tuple[str, ...], shorter: tuple[str, ...]) -> bool:
     return len(longer) > len(shorter) and longer[: len(shorter)] == shorter
 
 
-def _common(sequences: list[tuple[str, ...]]) -> tuple[str, ...]:
+def _common(sequences: list[list[str]]) -> list[str]:
+    """Return what several sequences begin with."""
     first, last = min(sequences), max(sequences)
     count = next((i for i, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), min(len(first), len(last)))
     return first[:count]
