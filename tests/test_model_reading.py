@@ -420,6 +420,7 @@ BROKEN = [
     ("an entity", '<robot name', '<!DOCTYPE robot [<!ENTITY a "b">]><robot name', ("entity",), ()),
     ("reduction of no number", "<vendor:thing", '<transmission name="t"><joint name="lift"/><actuator name="m"><mechanicalReduction>x'
      "</mechanicalReduction></actuator></transmission><vendor:thing", ("mechanicalReduction", "'x'"), ()),
+    ("a kilometre too many", 'xyz="0.1 0 0.2"', 'xyz="1e300 0 0"', ("too long to compute with", "kg and m"), ("--tip", "flange")),
     ("folder that is not there", "", "", ("folder does not exist",), ("--tip", "flange", "-o", "none/arm.toml")),
 ]  # fmt: skip
 
@@ -482,6 +483,7 @@ BROKEN_ARMS = [
     ("negative mass of a link", LINKS, "mass = 2.0", "mass = -2.0", ("`link 1.mass`", "-2")),
     ("half an inertia", LINKS, "iyy = 0.03, ", "", ("`link 1.inertia.iyy`",)),
     ("inertia as a list", LINKS, "{ixx = 0.03, iyy = 0.03, izz = 0.01}", "[1, 2, 3]", ("`link 1.inertia`", "ixx")),
+    ("a mass of any size", LINKS, "mass = 2.0\ncom = [0, 0, 0.2]", "mass = 1e300\ncom = [0, 0, 1e9]", ("`link`", "too heavy")),
     ("links and a tip", LINKS, "[[link]]", 'tip = "x"\n[[link]]', ("`tip`", "[[link]]")),
 ]  # fmt: skip
 
@@ -521,7 +523,7 @@ def test_placeholders_are_no_nominal_friction(three: Path) -> None:
         text = text.replace(value, 'damping="3"')
     (three / "three.urdf").write_text(text)
     arm = read_model(three / "three.urdf", tip="flange")
-    assert any("damping 3 on all joints: a placeholder" in note for note in arm.notes)
+    assert any("damping 3 on all joints that have one: a placeholder" in note for note in arm.notes)
     assert arm.theta[-6:].tolist() == [0.0, 0.0, 0.0, 8.0, 1.5, 0.7]
     assert (arm.sigma[-6:] > 0).all()
 

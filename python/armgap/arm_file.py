@@ -6,7 +6,7 @@ import difflib
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -50,6 +50,8 @@ _REMEDY_MARKUP = (
 )
 _INERTIAL_SIGMA = 0.1
 _FRICTION_SIGMA = 0.5
+_LISTED = 40
+"""Words that a message lists: all keys of a table, not all links of a humanoid."""
 STRONGEST_GRAVITY = 30.0  # m/s^2
 # Sample periods beyond these [s] are in another unit.
 SHORTEST_PERIOD_S = 1e-5
@@ -297,8 +299,9 @@ def _markup(text: str) -> str:
     return _MARKUP.get(root[1] if root else "", "XML")
 
 
-def suggest(word: str, known: list[str] | tuple[str, ...], cutoff: float = 0.6) -> str:
-    """Name what is known, and first what is spelt nearly so."""
+def suggest(word: str, known: Sequence[str], cutoff: float = 0.6) -> str:
+    """Name what is known, the first of many, and before it what is spelt nearly so."""
     close = difflib.get_close_matches(word, known, n=1, cutoff=cutoff)
-    listed = ", ".join(known)
+    more = f", and {len(known) - _LISTED} more" if len(known) > _LISTED else ""
+    listed = ", ".join(known[:_LISTED]) + more
     return f"did you mean `{close[0]}`? (known: {listed})" if close else f"known: {listed}"

@@ -83,7 +83,8 @@ def read_model(
         raise OptionError(f"the sample period is {sample_period:g} s", remedy=f"give {bounds} s")
     still = {joint: _finite(value, f"position of `{joint}`") for joint, value in (frozen or {}).items()}
     file = Path(path)
-    model = read_description(file, base=base, tip=tip, frozen=still)
+    with np.errstate(over="ignore", invalid="ignore"):  # sizes are looked at in the end
+        model = read_description(file, base=base, tip=tip, frozen=still)
     if gravity is not None:
         model = replace(model, chain=replace(model.chain, gravity=_vector(gravity)))
     given = {"kind": SERIAL, "trust": trust, "sample_period": sample_period, **({"name": name} if name else {})}

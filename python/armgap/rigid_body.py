@@ -104,11 +104,15 @@ def inconsistency(ten: Array) -> str:
         ``"mass is negative"``, or the principal moments about the centre of mass that break the triangle inequality.
     """
     mass = float(ten[0])
+    if not np.isfinite(ten).all():
+        return "its inertia is not finite"
     if mass < 0:
         return f"its mass is {mass:g} kg"
     if mass == 0:
         return "it has inertia and no mass" if np.any(ten[1:] != 0) else ""
     inertia = about_com(ten)[2]
+    if not np.isfinite(inertia).all():
+        return f"its mass of {mass:g} kg is too small for its first moments"
     covariance = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     if np.linalg.eigvalsh(covariance)[0] >= -_CONSISTENT * max(float(np.trace(symmetric(ten[4:]))), 0.0):
         return ""

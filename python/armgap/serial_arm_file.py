@@ -73,6 +73,10 @@ class SerialArmFile(ArmFile):
 
     def fields(self) -> dict[str, Any]:
         """Return the fields of an `Arm`, all of them checked."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._fields()
+
+    def _fields(self) -> dict[str, Any]:
         self._check_source()
         self._check_keys()
         period = self._sample_period()
@@ -90,6 +94,9 @@ class SerialArmFile(ArmFile):
         viscous = self._nominal("friction.viscous", model.viscous, scale.viscous, FRICTION_SHARE)
         coulomb = self._nominal("friction.coulomb", model.coulomb, scale.coulomb, FRICTION_SHARE)
         gear_ratio = self._either("drive.gear_ratio", "transmission.gear_ratio", n)
+        if not (np.isfinite(inertial).all() and np.isfinite(sigma).all() and np.isfinite(chain.translation).all()):
+            key = next((source for source in _SOURCES if source in self.data), "urdf")
+            raise self.error(key, "gives links too heavy or too long to compute with", "give kg and m")
         return dict(
             name=self._text("name", default=model.name or printable(self.path.stem)),
             kind=SERIAL,

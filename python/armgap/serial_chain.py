@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -29,6 +29,11 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 }
 
 
+def _unknown() -> NDArray[np.float64]:
+    """Return what stands for limits that are not given."""
+    return np.empty(0)
+
+
 @dataclass(frozen=True)
 class SerialChain:
     """A serial chain of n joints.
@@ -52,7 +57,7 @@ class SerialChain:
     gravity : ndarray, shape (3,)
         Acceleration of gravity in the frame of the base [m/s^2].
     lower, upper : ndarray, shape (n,)
-        Limits of position [rad or m]; -inf and inf where unknown.
+        Limits of position [rad or m]; -inf and inf where unknown, which is the default.
     speed : ndarray, shape (n,)
         Limits of speed [rad/s or m/s]; inf where unknown.
     acceleration : ndarray, shape (n,)
@@ -68,14 +73,14 @@ class SerialChain:
     translation: NDArray[np.float64]
     axis: NDArray[np.float64]
     gravity: NDArray[np.float64]
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
-    effort: NDArray[np.float64]
+    lower: NDArray[np.float64] = field(default_factory=_unknown)
+    upper: NDArray[np.float64] = field(default_factory=_unknown)
+    speed: NDArray[np.float64] = field(default_factory=_unknown)
+    acceleration: NDArray[np.float64] = field(default_factory=_unknown)
+    effort: NDArray[np.float64] = field(default_factory=_unknown)
 
     def __post_init__(self) -> None:
-        """Check the shapes and make the arrays read-only.
+        """Check the shapes, fill in limits that are not given, and make the arrays read-only.
 
         Raises
         ------
@@ -85,6 +90,8 @@ class SerialChain:
         n = len(self.joint_names)
         for name, shape in (*((key, (n, *rest)) for key, rest in _SHAPES.items()), ("gravity", (3,))):
             values = np.array(getattr(self, name), dtype=np.float64)
+            if not shape[1:] and values.size == 0 and name != "gravity":
+                values = np.full(n, -np.inf if name == "lower" else np.inf)
             if values.shape != shape:
                 raise OptionError(
                     f"`{name}` of the chain has shape {values.shape}", remedy=f"give {shape} for {n} joints"

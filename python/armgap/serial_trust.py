@@ -104,4 +104,4 @@ def link_sigma(mass: Array, length: Array, trust: Trust) -> Array:
     unknown = _UNKNOWN_KG_PER_M * length
     sigma = np.maximum(sigma, unknown) if trust == "none" else np.where(sigma > 0, sigma, unknown)
     powers = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
-    return np.asarray(sigma[:, None] * length[:, None] ** powers)
+    return np.asarray(np.maximum(sigma[:, None] * length[:, None] ** powers, np.finfo(np.float64).tiny))

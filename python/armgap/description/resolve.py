@@ -70,7 +70,7 @@ class _Resolver:
         """Joints off the chain that nobody froze, and where they stand."""
         for name in frozen:
             if name not in tree.joints:
-                raise tree.error(None, f"has no joint `{name}` to freeze", suggest(name, _few(self._movable())))
+                raise tree.error(None, f"has no joint `{name}` to freeze", suggest(name, self._movable()))
             if tree.joints[name].kind not in (*MOVING, "fixed"):
                 raise tree.error(tree.joints[name], "cannot be frozen at one number", "begin the chain behind it")
 
@@ -125,7 +125,7 @@ class _Resolver:
 
     def _known(self, link: str, what: str) -> str:
         if link not in self.tree.links:
-            raise self.tree.error(None, f"has no link `{link}` for a {what}", suggest(link, _few(self.tree.links)))
+            raise self.tree.error(None, f"has no link `{link}` for a {what}", suggest(link, list(self.tree.links)))
         return link
 
     def _base(self, base: str | None) -> str:
@@ -295,12 +295,15 @@ class _Resolver:
             values = np.where(values < 0, math.nan, values)
         if self.tree.format != "URDF":
             return values
-        given = values[np.isfinite(values)]
-        same = len(given) == len(values) > 1 and given[0] > 0 and bool(np.all(given == given[0]))
-        if same or np.isin(values, _PLACEHOLDERS).any():
-            said = f"{word} {given[0]:g} on all joints" if same else f"{word} of 10, 100 or 1000"
-            notes.append(f"{said}: a placeholder, taken as unknown")
-            values = np.where(np.isin(values, _PLACEHOLDERS) | same, math.nan, values)
+        usual = np.isin(values, _PLACEHOLDERS)
+        rest = values[(values > 0) & ~usual]
+        same = len(rest) > 1 and len(rest) >= 0.5 * len(values) and bool(np.all(rest == rest[0]))
+        if same:
+            notes.append(f"{word} {rest[0]:g} on all joints that have one: a placeholder, taken as unknown")
+        if usual.any():
+            notes.append(f"{word} of 10, 100 or 1000: a placeholder, taken as unknown")
+        if same or usual.any():
+            values = np.where(usual | (same & (values > 0)), math.nan, values)
         return values
 
 

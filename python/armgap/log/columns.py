@@ -221,10 +221,10 @@ def _from_joints(index: Index, arm: Arm | None) -> dict[str, str]:
         return {}
     names: dict[str, str] = {}
     for key, quantity in QUANTITIES.items():
-        own = {f"{key}{j}": f"{joint}/{quantity}" for j, joint in enumerate(arm.chain.joint_names, start=1)}
-        there = any(index.find(name, column) is not None for column, name in own.items())
-        if there and not any(column in index.recording.columns for column in own):
-            names |= own
+        mapped = {f"{key}{j}": f"{joint}/{quantity}" for j, joint in enumerate(arm.chain.joint_names, start=1)}
+        there = any(index.find(name, column) is not None for column, name in mapped.items())
+        if there and not any(column in index.recording.columns for column in mapped):
+            names |= mapped
     return names
 
 
