@@ -413,6 +413,7 @@ BROKEN = [
     ("not XML", "</robot>", "", ("not valid XML", "row"), ()),
     ("xacro by its elements", "<vendor:thing", "<xacro:thing", ("xacro", "robot.urdf", "`xacro:thing`"), ()),
     ("xacro by its values", 'value="6"', 'value="${m}"', ("${m}", "xacro FILE"), ()),
+    ("xacro by its names", '<link name="base">', '<link name="${prefix}base">', ("`link ${prefix}base`", "xacro FILE"), ()),
     ("SDF", URDF, "<sdf><model/></sdf>", ("<sdf>", "convert"), ()),
     ("a table", URDF, "t,q1\n0,1\n", ("no XML", "<robot>"), ()),
     ("empty", URDF, "", ("no XML",), ()),

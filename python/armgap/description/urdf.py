@@ -72,7 +72,7 @@ class _Urdf:
     def _fail(self, element: Element, problem: str, remedy: str) -> NoReturn:
         name = element.attributes.get("name")
         column = f"{element.tag} {name}" if name else element.tag
-        macro = any("${" in value or "$(" in value for value in element.attributes.values())
+        macro = any(map(_is_macro, element.attributes.values()))
         raise ModelFileError(
             problem, remedy=_XACRO if macro else remedy, file=self.path, column=column, row=element.row
         )
@@ -81,6 +81,8 @@ class _Urdf:
         name = element.attributes.get("name", "")
         if not name:
             self._fail(element, "has no name", "give it one")
+        if _is_macro(name):
+            self._fail(element, "is that of a xacro and no URDF yet", _XACRO)
         return name
 
     def _numbers(self, element: Element, key: str, default: tuple[float, ...] | None) -> Array:
@@ -193,6 +195,11 @@ class _Urdf:
                     text = element.text.strip()[:60]
                     self._fail(element, f"is {text!r}, not a number", "correct it")
                 yield joints[0].attributes.get("name", ""), abs(value)
+
+
+def _is_macro(text: str) -> bool:
+    """Whether a value is an expression of xacro."""
+    return "${" in text or "$(" in text
 
 
 def _macros(root: Element) -> Iterator[Element]:
