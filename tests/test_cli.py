@@ -28,6 +28,7 @@ PROMISED = {
     "compare",
     "replay",
     "inspect",
+    "model",
     "identify",
     "simulate",
     "diagnose",

@@ -160,7 +160,7 @@ def test_effects_of_the_other_function(arm, seed_log):
         ("<mujoco model='a'/>", "MJCF"),
         ("<svg/>", "XML"),
         ('kind = "six-axis"', "known: axis, pendulum, two-link"),
-        ('kind = "serial"', "known: axis, pendulum, two-link"),
+        ('kind = "serial"', "give exactly one of urdf, mjcf and [[link]] tables"),
         ('kind = "pendulem"', "did you mean `pendulum`"),
         ("#" * (2**20 + 1), "larger than 1 MiB"),
     ],

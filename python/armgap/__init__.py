@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from armgap.inspection import Inspection, inspect
     from armgap.literals import Filters, Scheme, Status, Verdict
     from armgap.log import Finding, Log
+    from armgap.model import read_model
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
 
@@ -49,6 +50,7 @@ __all__ = [
     "fit",
     "identify",
     "inspect",
+    "read_model",
     "reproduce",
     "seed_torque",
     "simulate",
@@ -78,6 +80,7 @@ _HOMES = {
     "Reproduction": "armgap.reproduction",
     "Inspection": "armgap.inspection",
     "inspect": "armgap.inspection",
+    "read_model": "armgap.model",
     "reproduce": "armgap.reproduction",
     "effects": "armgap.simulation",
     "seed_torque": "armgap.simulation",

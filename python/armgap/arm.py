@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.literals import Side
+from armgap.errors import OptionError
+from armgap.literals import Side, TauKind
+from armgap.serial_chain import SERIAL
 
 if TYPE_CHECKING:
     from armgap.check.corrections import Corrections
+    from armgap.controller import Controller
+    from armgap.serial_chain import SerialChain
 
-__all__ = ["Arm", "kinds"]
+__all__ = ["Arm", "kinds", "listed", "only_planar", "quoted"]
 
 
 @dataclass(frozen=True)
@@ -28,13 +33,14 @@ class Arm:
     name : str
         Name for people.
     kind : str
-        ``"axis"``, ``"pendulum"`` or ``"two-link"``.
+        ``"axis"``, ``"pendulum"``, ``"two-link"`` or ``"serial"``.
     gravity : float
         Acceleration of gravity [m/s^2].
     sample_period : float
         Nominal sample period [s].
     theta, sigma : ndarray, shape (n_parameters,)
-        Inertial base parameters, then viscous, then Coulomb coefficients per joint [SI], and the 1-sigma trust in each.
+        Inertial base parameters, then viscous, then Coulomb coefficients per joint [SI], and the 1-sigma trust in each. Of a serial arm the
+        inertial ones are ten per link, see `armgap.rigid_body`, then the rotors' inertias at the joints.
     counts_per_rev : ndarray, shape (n_joints,), optional
         Encoder counts per revolution (per metre on a linear joint).
     torque_limit : ndarray, shape (n_joints,), optional
@@ -56,6 +62,19 @@ class Arm:
         File it was read from.
     corrections : Corrections, optional
         How columns of the arm's logs are to be read otherwise than they stand.
+    chain : SerialChain, optional
+        Joints and their placements, of a serial arm; gravity as a vector is part of it.
+    controller : Controller, optional
+        Position controller, where logs hold references in place of torques.
+    tau_kind : {"command", "measured"}
+        Whether torques are commands, held until the next row, or measured, interpolated.
+    notes : tuple of str
+        What was noticed while the description was read.
+
+    Raises
+    ------
+    OptionError
+        If a serial arm has no chain, another kind has one, or `theta` does not suit it.
     """
 
     name: str
@@ -75,6 +94,22 @@ class Arm:
     friction_side: tuple[Side, ...] | None = None
     gear_ratio: NDArray[np.float64] | None = None
     corrections: Corrections | None = None
+    chain: SerialChain | None = None
+    controller: Controller | None = None
+    tau_kind: TauKind = "command"
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check that kind, chain and parameters belong together."""
+        if (self.kind == SERIAL) != (self.chain is not None):
+            raise OptionError(
+                f"an arm of kind `{self.kind}` and its chain do not fit", remedy='give kind "serial" a chain'
+            )
+        if self.chain is not None and not len(self.theta) == len(self.sigma) == 13 * self.chain.n_joints:
+            raise OptionError(
+                f"theta has {len(self.theta)} entries, sigma {len(self.sigma)}",
+                remedy=f"give {13 * self.chain.n_joints}: ten per link, then rotor, viscous and Coulomb per joint",
+            )
 
     @classmethod
     def read(cls, path: str | Path) -> Arm:
@@ -98,31 +133,40 @@ class Arm:
     @property
     def n_joints(self) -> int:
         """Number of joints."""
-        return int(self._kind["n_joints"])
+        return int(self._kind["n_joints"]) if self.chain is None else self.chain.n_joints
 
     @property
     def n_inertial(self) -> int:
-        """Number of inertial base parameters."""
-        return int(self._kind["n_inertial"])
+        """Number of inertial base parameters; of a serial arm ten per link and one per rotor."""
+        return int(self._kind["n_inertial"]) if self.chain is None else 11 * self.chain.n_joints
 
     @property
     def rotary(self) -> bool:
-        """Whether positions are angles."""
-        return bool(self._kind["rotary"])
+        """Whether all positions are angles."""
+        return all(self.rotary_joints)
+
+    @property
+    def rotary_joints(self) -> tuple[bool, ...]:
+        """Whether the position of each joint is an angle."""
+        if self.chain is not None:
+            return self.chain.rotary
+        return (bool(self._kind["rotary"]),) * self.n_joints
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the entries of `theta`."""
-        return tuple(self._kind["parameter_names"])
+        return tuple(self._kind["parameter_names"]) if self.chain is None else self.chain.parameter_names
 
     @property
     def parameter_units(self) -> tuple[str, ...]:
         """Units of the entries of `theta`."""
-        return tuple(self._kind["parameter_units"])
+        return tuple(self._kind["parameter_units"]) if self.chain is None else self.chain.parameter_units
 
     @property
     def gravity_parameters(self) -> NDArray[np.intp]:
-        """Indices of the entries of `theta` that are weights: torques or forces of gravity [N m or N]."""
+        """Indices of the entries of `theta` that are weights: torques or forces of gravity [N m or N]; none of a serial arm."""
+        if self.chain is not None:
+            return np.empty(0, dtype=np.intp)
         weight = "N m" if self.rotary else "N"
         return np.array([i for i in range(self.n_inertial) if self.parameter_units[i] == weight], dtype=np.intp)
 
@@ -141,7 +185,7 @@ class Arm:
         """Position step of one encoder count [rad or m], shape (n_joints,)."""
         if self.counts_per_rev is None:
             return None
-        return (2 * np.pi if self.rotary else 1.0) / self.counts_per_rev
+        return np.where(self.rotary_joints, 2 * np.pi, 1.0) / self.counts_per_rev
 
     def _repr_html_(self) -> str:
         """Return kind, conventions and parameters as HTML for a notebook."""
@@ -161,6 +205,7 @@ class Arm:
         def as_list(x: NDArray[np.float64] | None) -> list[float] | None:
             return None if x is None else [float(v) for v in x]
 
+        chain = {} if self.chain is None else {"chain": self.chain.to_native()}
         return {
             "kind": self.kind,
             "gravity": self.gravity,
@@ -172,27 +217,38 @@ class Arm:
             "encoder_at_motor": _at_motor(self.encoder_side),
             "friction_at_motor": _at_motor(self.friction_side),
             "gear_ratio": as_list(self.gear_ratio),
+            **chain,
         }
 
     def to_toml(self) -> str:
-        """Return the arm as an arm file."""
+        """Return the arm as an arm file; that of a serial arm holds its chain and needs no other file."""
+        if self.chain is not None:
+            from armgap.serial_toml import serial_toml
+
+            return serial_toml(self)
         n, b = self.n_joints, self.n_inertial
         lines = [
-            f"name = {_quoted(self.name)}",
-            f"kind = {_quoted(self.kind)}",
+            f"name = {quoted(self.name)}",
+            f"kind = {quoted(self.kind)}",
             f"gravity = {self.gravity!r}",
             f"sample_period = {self.sample_period!r}",
             "",
             "[inertial]",
-            f"theta = {_listed(self.theta[:b])}",
-            f"sigma = {_listed(self.sigma[:b])}",
+            f"theta = {listed(self.theta[:b])}",
+            f"sigma = {listed(self.sigma[:b])}",
             "",
             "[friction]",
-            f"viscous = {_listed(self.theta[b : b + n])}",
-            f"coulomb = {_listed(self.theta[b + n :])}",
-            f"sigma_viscous = {_listed(self.sigma[b : b + n])}",
-            f"sigma_coulomb = {_listed(self.sigma[b + n :])}",
+            f"viscous = {listed(self.theta[b : b + n])}",
+            f"coulomb = {listed(self.theta[b + n :])}",
+            f"sigma_viscous = {listed(self.sigma[b : b + n])}",
+            f"sigma_coulomb = {listed(self.sigma[b + n :])}",
         ]
+        return "\n".join([*lines, *self.table_lines()]) + "\n"
+
+    def table_lines(self) -> list[str]:
+        """Return the lines of an arm file that all kinds of arm have: encoders, transmissions, limits, columns and corrections."""
+        lines: list[str] = []
+        columns = {**self.columns, **({} if self.tau_kind == "command" else {"tau_kind": self.tau_kind})}
         for table, key, value in (
             ("encoder", "counts_per_rev", self.counts_per_rev),
             ("encoder", "side", self.encoder_side),
@@ -204,23 +260,24 @@ class Arm:
         ):
             if value is not None:
                 opened = f"[{table}]" in lines
-                lines += [*(() if opened else ("", f"[{table}]")), f"{key} = {_listed(value)}"]
-        if self.columns:
-            lines += ["", "[columns]", *(f"{k} = {_quoted(v)}" for k, v in self.columns.items())]
+                lines += [*(() if opened else ("", f"[{table}]")), f"{key} = {listed(value)}"]
+        if columns:
+            lines += ["", "[columns]", *(f"{k} = {quoted(v)}" for k, v in columns.items())]
         if self.corrections:
             lines += ["", "[corrections]", *self.corrections.toml_lines()]
         if self.sealed is not None:
-            lines += ["", "[sealed]", f"sha256 = {_quoted(self.sealed)}"]
-        return "\n".join(lines) + "\n"
+            lines += ["", "[sealed]", f"sha256 = {quoted(self.sealed)}"]
+        return lines
 
 
-def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{escaped}"'
+def quoted(text: str) -> str:
+    """Return a text as a basic string of TOML, which escapes what JSON does, and DEL."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _listed(values: Iterable[Any]) -> str:
-    return "[" + ", ".join(_quoted(v) if isinstance(v, str) else repr(float(v)) for v in values) + "]"
+def listed(values: Iterable[Any]) -> str:
+    """Return words or numbers as an array of TOML, numbers at full precision."""
+    return "[" + ", ".join(quoted(v) if isinstance(v, str) else repr(float(v)) for v in values) + "]"
 
 
 def _at_motor(sides: tuple[Side, ...] | None) -> list[bool | None] | None:
@@ -231,3 +288,15 @@ def _at_motor(sides: tuple[Side, ...] | None) -> list[bool | None] | None:
 def kinds() -> dict[str, dict[str, Any]]:
     """Return the kinds of arm by name: joints, number of inertial parameters, parameter names and units."""
     return {entry["kind"]: entry for entry in _native.arm_kinds()}
+
+
+def only_planar(arm: Arm, what: str) -> None:
+    """Raise for a serial arm, where only the closed kinds of arm are supported.
+
+    Raises
+    ------
+    OptionError
+        It names what was asked for.
+    """
+    if arm.chain is not None:
+        raise OptionError(f"{what} does not take serial arms", remedy=f"give an arm of the kind {', '.join(kinds())}")

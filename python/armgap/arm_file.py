@@ -6,6 +6,7 @@ import difflib
 import math
 import re
 import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -17,11 +18,12 @@ from armgap.arm import kinds
 from armgap.errors import ArmFileError, OptionError
 from armgap.literals import Side
 from armgap.reading import printable, read_bounded
+from armgap.serial_chain import SERIAL
 
 if TYPE_CHECKING:
     from armgap.check.corrections import Corrections
 
-__all__ = ["ArmFile"]
+__all__ = ["LONGEST_PERIOD_S", "SHORTEST_PERIOD_S", "STRONGEST_GRAVITY", "ArmFile", "suggest"]
 
 _TABLES: dict[str, tuple[str, ...]] = {
     "inertial": ("theta", "sigma"),
@@ -42,17 +44,25 @@ _FORMATS = "docs/formats.md, Arm file"
 _CLOSE_KIND = 0.75
 """Likeness from which another kind is suggested: a slip of the pen, not another machine (`six-axis` and `axis` have 0.67)."""
 _MARKUP = {"robot": "a URDF", "sdf": "an SDF model", "mujoco": "an MJCF model"}
-_REMEDY_MARKUP = f"write an arm file in TOML, of the kind {', '.join(kinds())}; see {_FORMATS}"
+_KINDS = [*kinds(), SERIAL]
+_REMEDY_MARKUP = (
+    f"make an arm file of it with armgap model, or write one of the kind {', '.join(_KINDS)}; see {_FORMATS}"
+)
 _INERTIAL_SIGMA = 0.1
 _FRICTION_SIGMA = 0.5
-_STRONGEST_GRAVITY = 30.0  # m/s^2
+_LISTED = 40
+"""Words that a message lists: all keys of a table, not all links of a humanoid."""
+STRONGEST_GRAVITY = 30.0  # m/s^2
 # Sample periods beyond these [s] are in another unit.
-_SHORTEST_PERIOD_S = 1e-5
-_LONGEST_PERIOD_S = 0.5
+SHORTEST_PERIOD_S = 1e-5
+LONGEST_PERIOD_S = 0.5
 
 
 class ArmFile:
     """One arm file being checked."""
+
+    tables: Mapping[str, tuple[str, ...]] = _TABLES
+    scalars: tuple[str, ...] = _SCALARS
 
     def __init__(self, path: Path, data: dict[str, Any]) -> None:
         self.path = path
@@ -77,17 +87,22 @@ class ArmFile:
             raise ArmFileError(f"is not valid TOML: {error}", remedy="correct that line", file=path) from None
         return cls(path, data)
 
-    def _error(self, key: str, problem: str, remedy: str) -> ArmFileError:
+    def error(self, key: str, problem: str, remedy: str) -> ArmFileError:
+        """Return the complaint about a key."""
         return ArmFileError(problem, remedy=remedy, file=self.path, column=key)
 
     def fields(self) -> dict[str, Any]:
         """Return the fields of an `Arm`, all of them checked."""
+        if self.data.get("kind") == SERIAL:
+            from armgap.serial_arm_file import SerialArmFile
+
+            return SerialArmFile(self.path, self.data).fields()
         self._check_keys()
         kind = self._kind()
         info = kinds()[kind]
         n, b = int(info["n_joints"]), int(info["n_inertial"])
-        gravity = self._number("gravity", default=9.81, lowest=0.0, highest=_STRONGEST_GRAVITY)
-        period = self._number("sample_period", lowest=_SHORTEST_PERIOD_S, highest=_LONGEST_PERIOD_S)
+        gravity = self._number("gravity", default=9.81, lowest=0.0, highest=STRONGEST_GRAVITY)
+        period = self._sample_period()
         inertial, inertial_sigma = self._inertial(kind, gravity, n, b)
         friction = self._table("friction")
         viscous = self._vector(friction, "friction.viscous", n, minimum=0.0)
@@ -117,63 +132,66 @@ class ArmFile:
         )
 
     def _check_keys(self) -> None:
-        known = [*_SCALARS, *_TABLES]
+        known = [*self.scalars, *self.tables]
         for key, value in self.data.items():
             if key not in known:
-                raise self._error(key, "is not a key of an arm file", _suggest(key, known))
-            if key in _TABLES and not isinstance(value, dict):
-                raise self._error(key, "must be a table", f"write [{key}]")
-            for inner in value if _TABLES.get(key) else ():
-                if inner not in _TABLES[key]:
+                raise self.error(key, "is not a key of an arm file", suggest(key, known))
+            if key in self.tables and not isinstance(value, dict):
+                raise self.error(key, "must be a table", f"write [{key}]")
+            for inner in value if self.tables.get(key) else ():
+                if inner not in self.tables[key]:
                     name = f"{key}.{inner}"
-                    raise self._error(name, f"is not a key of [{key}]", _suggest(inner, _TABLES[key]))
+                    raise self.error(name, f"is not a key of [{key}]", suggest(inner, self.tables[key]))
 
     def _kind(self) -> str:
         kind = self._text("kind")
         if kind not in kinds():
-            remedy = _suggest(kind, list(kinds()), _CLOSE_KIND)
-            raise self._error("kind", f"`{kind}` is not a kind of arm", f"{remedy}; see {_FORMATS}")
+            remedy = suggest(kind, _KINDS, _CLOSE_KIND)
+            raise self.error("kind", f"`{kind}` is not a kind of arm", f"{remedy}; see {_FORMATS}")
         return kind
 
     def _text(self, key: str, default: str | None = None) -> str:
         value = self.data.get(key, default)
         if not isinstance(value, str):
             problem = "is missing" if value is None else "must be a string"
-            raise self._error(key, problem, f'write {key} = "..."')
+            raise self.error(key, problem, f'write {key} = "..."')
         return value
 
     def _number(self, key: str, *, lowest: float, highest: float, default: float | None = None) -> float:
         value = self.data.get(key, default)
         if value is None:
-            raise self._error(key, "is missing", f"write {key} = a number in SI units")
+            raise self.error(key, "is missing", f"write {key} = a number in SI units")
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise self._error(key, f"must be a finite number, not {value!r}", "give it in SI units")
+            raise self.error(key, f"must be a finite number, not {value!r}", "give it in SI units")
         if not lowest <= value <= highest:
-            raise self._error(key, f"is {value}, outside {lowest:g} to {highest:g}", "give it in SI units")
+            raise self.error(key, f"is {value}, outside {lowest:g} to {highest:g}", "give it in SI units")
         return float(value)
+
+    def _sample_period(self) -> float:
+        return self._number("sample_period", lowest=SHORTEST_PERIOD_S, highest=LONGEST_PERIOD_S)
 
     def _table(self, name: str) -> dict[str, Any]:
         if name not in self.data:
-            raise self._error(name, "is missing", f"add a [{name}] table")
+            raise self.error(name, "is missing", f"add a [{name}] table")
         table: dict[str, Any] = self.data[name]
         return table
 
     def _vector(
         self, table: dict[str, Any], key: str, n: int, minimum: float | None = None, above: float | None = None
     ) -> NDArray[np.float64]:
-        value = table.get(key.split(".")[1])
+        value = table.get(key.rpartition(".")[2])
         if value is None:
-            raise self._error(key, "is missing", f"give a list of {n} numbers")
+            raise self.error(key, "is missing", f"give a list of {n} numbers")
         if not isinstance(value, list) or len(value) != n:
             found = f"{len(value)} values" if isinstance(value, list) else repr(value)
-            raise self._error(key, f"needs a list of {n} numbers, found {found}", "one entry per joint or parameter")
+            raise self.error(key, f"needs a list of {n} numbers, found {found}", "one entry per joint or parameter")
         for i, x in enumerate(value):
             if isinstance(x, bool) or not isinstance(x, int | float) or not math.isfinite(x):
-                raise self._error(key, f"entry {i + 1} is {x!r}, not a finite number", "correct it")
+                raise self.error(key, f"entry {i + 1} is {x!r}, not a finite number", "correct it")
             if minimum is not None and x < minimum:
-                raise self._error(key, f"entry {i + 1} is {x}, less than {minimum:g}", "correct its sign")
+                raise self.error(key, f"entry {i + 1} is {x}, less than {minimum:g}", "correct its sign")
             if above is not None and x <= above:
-                raise self._error(key, f"entry {i + 1} is {x}, it must be above {above:g}", "correct it")
+                raise self.error(key, f"entry {i + 1} is {x}, it must be above {above:g}", "correct it")
         return np.array(value, dtype=np.float64)
 
     def _sigma(self, table: dict[str, Any], key: str, values: NDArray[np.float64], share: float) -> NDArray[np.float64]:
@@ -186,7 +204,7 @@ class ArmFile:
     def _inertial(self, kind: str, gravity: float, n: int, b: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         if ("inertial" in self.data) == ("links" in self.data):
             problem = "stands beside [links]" if "inertial" in self.data else "is missing"
-            raise self._error("inertial", problem, "give exactly one of [inertial] and [links]")
+            raise self.error("inertial", problem, "give exactly one of [inertial] and [links]")
         if "inertial" in self.data:
             table = self._table("inertial")
             theta = self._vector(table, "inertial.theta", b)
@@ -211,7 +229,7 @@ class ArmFile:
             return None
         if not isinstance(value, list) or len(value) != n or any(side not in get_args(Side) for side in value):
             words = ", ".join(f'"{side}"' for side in get_args(Side))
-            raise self._error(key, f"needs a list of {n} of {words}, found {value!r}", "one entry per joint")
+            raise self.error(key, f"needs a list of {n} of {words}, found {value!r}", "one entry per joint")
         return tuple(value)
 
     def _lengths(self, n: int) -> NDArray[np.float64] | None:
@@ -224,16 +242,20 @@ class ArmFile:
             return self._vector(self.data["links"], "links.mass", n, above=0.0)
         return self._optional("geometry.link_mass", n)
 
+    def _column_keys(self, n: int) -> list[str]:
+        """Return the columns of a log that can be mapped."""
+        return ["t", *(f"{kind}{j}" for kind in ("q", "tau", "dq") for j in range(1, n + 1))]
+
     def _columns(self, n: int) -> dict[str, str]:
-        known = ["t", *(f"{kind}{j}" for kind in ("q", "tau", "dq") for j in range(1, n + 1))]
+        known = self._column_keys(n)
         mapping = self.data.get("columns", {})
         for key, value in mapping.items():
             if key not in known:
-                raise self._error(f"columns.{key}", "is not a column of a log", _suggest(key, known))
+                raise self.error(f"columns.{key}", "is not a column of a log", suggest(key, known))
             if not isinstance(value, str):
-                raise self._error(f"columns.{key}", "must be a string", "give the log's own name of the column")
+                raise self.error(f"columns.{key}", "must be a string", "give the log's own name of the column")
             if list(mapping.values()).count(value) > 1:
-                raise self._error(f"columns.{key}", f"`{value}` is mapped twice", "map each column once")
+                raise self.error(f"columns.{key}", f"`{value}` is mapped twice", "map each column once")
         return dict(mapping)
 
     def _corrections(self) -> Corrections:
@@ -243,28 +265,28 @@ class ArmFile:
         given = self.data.get("corrections", {})
         for key in given:
             if key not in CORRECTIONS:
-                raise self._error(f"corrections.{key}", "is not a correction", _suggest(key, list(CORRECTIONS)))
+                raise self.error(f"corrections.{key}", "is not a correction", suggest(key, list(CORRECTIONS)))
         try:
             return Corrections.parse(**given)
         except OptionError as error:
-            raise self._error("corrections", error.problem, error.remedy) from None
+            raise self.error("corrections", error.problem, error.remedy) from None
 
     def _sealed(self) -> str | None:
         value = self.data.get("sealed", {}).get("sha256")
         if value is not None and not (isinstance(value, str) and re.fullmatch(r"[0-9a-f]{64}", value)):
-            raise self._error("sealed.sha256", "is not a SHA-256 sum", "give 64 hexadecimal digits")
+            raise self.error("sealed.sha256", "is not a SHA-256 sum", "give 64 hexadecimal digits")
         return value
 
     def _check_inertia(self, kind: str, theta: NDArray[np.float64]) -> None:
         key = "inertial.theta" if "inertial" in self.data else "links"
         if theta[0] <= 0:
-            raise self._error(key, f"theta1 is {theta[0]:g}; an inertia must be positive", "correct it")
+            raise self.error(key, f"theta1 is {theta[0]:g}; an inertia must be positive", "correct it")
         if kind == "two-link":
             # The determinant of M(q) is a parabola in cos q2 that opens downwards: positive at both ends is enough.
             for c in (-1.0, 1.0):
                 m11, m12, m22 = theta[0] + 2 * theta[1] * c, theta[2] + theta[1] * c, theta[2]
                 if m22 <= 0 or m11 * m22 - m12 * m12 <= 0:
-                    raise self._error(
+                    raise self.error(
                         key,
                         "gives an inertia matrix that is not positive definite",
                         "check the order of theta and its units (kg m^2, N m)",
@@ -277,8 +299,9 @@ def _markup(text: str) -> str:
     return _MARKUP.get(root[1] if root else "", "XML")
 
 
-def _suggest(word: str, known: list[str] | tuple[str, ...], cutoff: float = 0.6) -> str:
-    """Name what is known, and first what is spelt nearly so."""
+def suggest(word: str, known: Sequence[str], cutoff: float = 0.6) -> str:
+    """Name what is known, the first of many, and before it what is spelt nearly so."""
     close = difflib.get_close_matches(word, known, n=1, cutoff=cutoff)
-    listed = ", ".join(known)
+    more = f", and {len(known) - _LISTED} more" if len(known) > _LISTED else ""
+    listed = ", ".join(known[:_LISTED]) + more
     return f"did you mean `{close[0]}`? (known: {listed})" if close else f"known: {listed}"

@@ -14,7 +14,7 @@ import numpy as np
 
 from armgap import _native, options
 from armgap._renamed import old_names
-from armgap.arm import Arm
+from armgap.arm import Arm, only_planar
 from armgap.check import Check, Corrections, torque_unit
 from armgap.check.time_shift import causal
 from armgap.custom_effect import CustomEffect, TorqueTables, check_effects
@@ -388,6 +388,7 @@ def diagnose(
     }
     check_effects(effects)
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
+    only_planar(arm, "diagnose")
     with use_callback(progress):
         given = prepare(logs, holdout, arm, corrections or Corrections(), settings, repair=repair)
         return _diagnose(given, settings, effects)

@@ -15,6 +15,7 @@ __all__ = [
     "ColumnError",
     "LogReadError",
     "LogShapeError",
+    "ModelFileError",
     "OptionError",
     "ResultError",
     "SampleError",
@@ -101,6 +102,12 @@ class ArmFileError(ArmgapError, ValueError):
     part = "key"
 
 
+class ModelFileError(ArmgapError, ValueError):
+    """A description of a robot, URDF or MJCF, is missing, damaged, or has no serial arm where one is looked for; rows are its lines."""
+
+    part = "element"
+
+
 class OptionError(ArmgapError, ValueError):
     """An option or argument has an impossible value."""
 
@@ -121,6 +128,7 @@ CATALOGUE: tuple[type[ArmgapError], ...] = (
     UnitError,
     LogShapeError,
     ArmFileError,
+    ModelFileError,
     OptionError,
     ResultError,
 )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native, options
-from armgap.arm import Arm
+from armgap.arm import Arm, only_planar
 from armgap.errors import LogShapeError
 from armgap.log import Log
 
@@ -90,6 +90,7 @@ def fit(log: Log, arm: Arm, *, horizon: float = 0.25) -> ArmFit:
     ----------
     L. Ljung, *System Identification: Theory for the User* (1999), section 7.2.
     """
+    only_planar(arm, "fit")
     horizon = options.positive(horizon, "horizon")
     if log.n_joints != arm.n_joints:
         raise LogShapeError(

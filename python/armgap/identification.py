@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armgap import _native
-from armgap.arm import Arm
+from armgap.arm import Arm, only_planar
 from armgap.errors import ColumnError, OptionError
 from armgap.literals import FILTERS, SCHEMES, VELOCITIES, Filters, Scheme, VelocityMethod
 from armgap.log import Log
@@ -201,6 +201,7 @@ def identify(
     ----------
     F. Reyes and R. Kelly, Robotica 15 (1997) 563-571, equations (20)-(30).
     """
+    only_planar(arm, "identify")
     velocity = velocity or ("backward" if filters == "paper" else "central")
     _check(scheme, filters, cutoff, forgetting, p0, velocity)
     names, units = list(arm.parameter_names), list(arm.parameter_units)

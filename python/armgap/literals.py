@@ -18,6 +18,7 @@ __all__ = [
     "Scheme",
     "Side",
     "Status",
+    "TauKind",
     "VelocityMethod",
     "Verdict",
 ]
@@ -28,6 +29,7 @@ VelocityMethod = Literal["backward", "central", "local-cubic", "sensor", "midpoi
 Verdict = Literal["none", "parameters", "effect", "unexplained", "input"]
 Status = Literal["absent", "not excited", "undecided"]
 Side = Literal["motor", "link", "unknown"]
+TauKind = Literal["command", "measured"]
 CauseStatus = Literal["gone", "unseen", "undecided", "new", "smaller", "larger", "unchanged", "renamed"]
 GapOutcome = Literal["smaller", "larger", "unchanged", "none"]
 

@@ -22,7 +22,8 @@ def provenance(arm: Arm, logs: Mapping[str, Sequence[Log]], options: Mapping[str
     Parameters
     ----------
     arm : Arm
-        The nominal model; the hash is that of its file, or of its text as an arm file.
+        The nominal model; the hash is that of its file, or of its text as an arm file. A serial arm's is always that of its text, which
+        holds what its file takes from a description.
     logs : mapping of str to sequence of Log
         Logs as they were read, by what they are used for. The hash is that of the file, or of the columns of a log that came from
         no regular file.
@@ -37,13 +38,20 @@ def provenance(arm: Arm, logs: Mapping[str, Sequence[Log]], options: Mapping[str
     return {
         "version": _native.__version__,
         "options": dict(options),
-        "arm": _input(arm.path, arm.to_toml().encode()),
+        "arm": _arm(arm),
         "logs": [
             {"name": log.name, "set": use, **_input(log.path, _columns(log))}
             for use, group in logs.items()
             for log in group
         ],
     }
+
+
+def _arm(arm: Arm) -> dict[str, Any]:
+    text = arm.to_toml().encode()
+    if arm.chain is None:
+        return _input(arm.path, text)
+    return {"file": None if arm.path is None else str(arm.path), "sha256": hashlib.sha256(text).hexdigest()}
 
 
 def _input(path: Path | None, content: bytes) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armgap import _native, options
-from armgap.arm import Arm
+from armgap.arm import Arm, only_planar
 from armgap.errors import OptionError
 from armgap.log import Log
 from armgap.progress import report_progress
@@ -149,6 +149,7 @@ def simulate(
     OptionError
         If a shape, an effect or a value is impossible, or the motion diverges.
     """
+    only_planar(arm, "simulate")
     seed = options.seed(seed)
     _check_effects(effects)
     t = np.ascontiguousarray(t, dtype=np.float64)

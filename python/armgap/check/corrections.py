@@ -245,6 +245,10 @@ class Corrections:
         """Return the arm with gravity as these corrections say."""
         if self.gravity is None:
             return arm
+        if arm.chain is not None:
+            gravity = -1.0 * arm.chain.gravity if self.gravity == "reversed" else np.zeros(3)
+            chain = replace(arm.chain, gravity=gravity)
+            return replace(arm, chain=chain, gravity=float(np.linalg.norm(gravity)))
         theta, sigma = arm.theta.copy(), arm.sigma.copy()
         weights = arm.gravity_parameters
         if self.gravity == "reversed":

@@ -22,6 +22,7 @@ COMMANDS = {
     "diagnose": ("armgap.cli.diagnose", "Where the gap lies, what causes it, how far it shrinks."),
     "compare": ("armgap.cli.compare", "Two diagnoses of one arm, as before and after a repair."),
     "fleet": ("armgap.cli.fleet", "Many robots: the same diagnosis for every entry of a manifest."),
+    "model": ("armgap.cli.model", "A URDF or MJCF model as an arm file."),
     "inspect": ("armgap.cli.inspect", "What logs hold, and what they tell about an arm."),
     "identify": ("armgap.cli.identify", "Estimate the arm's parameters from logs."),
     "simulate": ("armgap.cli.simulate", "Simulate an arm, with effects on request."),

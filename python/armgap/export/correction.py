@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.arm import Arm
+from armgap.arm import Arm, only_planar
 from armgap.diagnosis import Cause, Diagnosis, Value
 from armgap.export.corrected import Corrected, placed, value
 from armgap.export.errors import ExportError
@@ -79,6 +79,7 @@ def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_
 
 
 def _check(diagnosis: Diagnosis, arm: Arm, stage: str) -> None:
+    only_planar(arm, "export")
     if stage not in STAGES:
         raise ExportError(f"`{stage}` is not a stage", remedy=f"stages: {', '.join(STAGES)}")
     nominal = diagnosis.parameters["nominal"]

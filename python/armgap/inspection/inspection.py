@@ -38,13 +38,13 @@ class Inspection:
     joints : tuple of JointChannels
         Positions and torques of each joint.
     excitation : Excitation, optional
-        What the log tells about the arm's parameters; None without an arm.
+        What the log tells about the arm's parameters; None without an arm, and for a serial arm.
     findings : tuple of Finding
         What was noticed, recognised or changed while reading.
     source : Log
         The log itself.
     rotary : bool, optional
-        Whether the joints turn; None without an arm.
+        Whether the joints turn; None without an arm, and where some turn and some slide.
     kind : str
         Kind of the arm; empty without one.
     checks : tuple of Check
@@ -139,10 +139,10 @@ def inspect(log: Any, arm: Arm | None = None, *, repair: bool = True) -> Inspect
         columns=dict(log.columns),
         sampling=sampled,
         joints=tuple(joints),
-        excitation=None if arm is None else excitation(log, arm),
+        excitation=None if arm is None or arm.chain is not None else excitation(log, arm),
         findings=log.findings,
         source=log,
-        rotary=None if arm is None else arm.rotary,
+        rotary=None if arm is None or len(set(arm.rotary_joints)) > 1 else arm.rotary,
         kind="" if arm is None else arm.kind,
         checks=checks,
     )
@@ -151,7 +151,7 @@ def inspect(log: Any, arm: Arm | None = None, *, repair: bool = True) -> Inspect
 def _checked(log: Log, arm: Arm | None, *, repair: bool) -> tuple[Log, tuple[Check, ...]]:
     """Return the log, repaired, and what is to be said about it; an arm's own checks judge the last part on the first."""
     log, checks = data_checks(log, arm, repair=repair)
-    if arm is None or log.duration < 4 * _HORIZON_S:
+    if arm is None or arm.chain is not None or log.duration < 4 * _HORIZON_S:
         return log, tuple(checks)
     cut = int(len(log) * _LEARNT)
     parts = [log.part(0, cut, log.name)], [log.part(cut, len(log), log.name)]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from armgap.errors import ColumnError, LogShapeError, SampleError
 from armgap.log.findings import Finding
-from armgap.log.index import Index
+from armgap.log.index import QUANTITIES, Index
 from armgap.log.recording import Recording
 from armgap.progress import report_progress
 
@@ -93,10 +93,11 @@ def resolve(
     """Find the columns in use.
 
     A name given in `mapping` must exist. The arm file's names come next; a log that has the standard name instead,
-    such as one that armgap wrote, is read by that. What neither names is taken from what the file itself says.
+    such as one that armgap wrote, is read by that. Of a serial arm columns called ``joint/position``, ``/velocity`` and ``/effort`` are found by
+    the names of the chain's joints. What none of these names is taken from what the file itself says.
     """
     index = Index(recording, place)
-    names = {**_from_arm(index, arm), **mapping}
+    names = {**_from_joints(index, arm), **_from_arm(index, arm), **mapping}
     n = arm.n_joints if arm is not None else None
     findings: list[Finding] = []
     if recording.suggest is not None:
@@ -210,8 +211,21 @@ def _from_arm(index: Index, arm: Arm | None) -> dict[str, str]:
     return {
         key: name
         for key, name in arm.columns.items()
-        if key not in columns or name in columns or index.find(name, key) is not None
+        if _CANONICAL.match(key) and (key not in columns or name in columns or index.find(name, key) is not None)
     }
+
+
+def _from_joints(index: Index, arm: Arm | None) -> dict[str, str]:
+    """Return the columns that are called after the joints of a chain; all of a kind where there is one, so that a missing one is named."""
+    if arm is None or arm.chain is None:
+        return {}
+    names: dict[str, str] = {}
+    for key, quantity in QUANTITIES.items():
+        mapped = {f"{key}{j}": f"{joint}/{quantity}" for j, joint in enumerate(arm.chain.joint_names, start=1)}
+        there = any(index.find(name, column) is not None for column, name in mapped.items())
+        if there and not any(column in index.recording.columns for column in mapped):
+            names |= mapped
+    return names
 
 
 def _check_mapping(names: Mapping[str, str], place: Path | str, n: int) -> None:

@@ -9,10 +9,10 @@ from armgap.errors import ColumnError
 from armgap.log.recording import Recording
 from armgap.log.spellings import stripped, suffixed
 
-__all__ = ["Index"]
+__all__ = ["QUANTITIES", "Index"]
 
 # What a ROS message calls the quantity of a standard column; `q1=elbow` finds `/joint_states/elbow/position`.
-_QUANTITIES = {"q": "position", "dq": "velocity", "tau": "effort"}
+QUANTITIES = {"q": "position", "dq": "velocity", "tau": "effort"}
 
 
 @dataclass(frozen=True)
@@ -70,5 +70,5 @@ class Index:
 
     @staticmethod
     def _quantity(name: str, key: str) -> str:
-        quantity = _QUANTITIES.get(key.rstrip("0123456789"), "")
+        quantity = QUANTITIES.get(key.rstrip("0123456789"), "")
         return f"/{name}/{quantity}" if quantity else ""

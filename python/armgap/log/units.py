@@ -90,9 +90,9 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
     settled = set(by_user)
 
     def of(group: str, columns: tuple[str, ...]) -> NDArray[np.float64]:
-        if group in by_user:
-            return np.full(len(columns), by_user[group])
-        factors = [_by_file(group, column, names.units.get(column), arm, place) for column in columns]
+        if group in by_user:  # of an arm with both, a unit of angles leaves the lengths as they are
+            return np.where([_suits(group, declared[group], arm, j) for j in range(len(columns))], by_user[group], 1.0)
+        factors = [_by_file(group, column, names.units.get(column), arm, place, j) for j, column in enumerate(columns)]
         units = {unit for column in columns if (unit := names.units.get(column)) is not None}
         if columns and all(column in names.units for column in columns):
             settled.add(group)
@@ -125,10 +125,10 @@ def scaled(arrays: Arrays, scales: Scales) -> Arrays:
     return replace(arrays, q=by(arrays.q, scales.q), tau=by(arrays.tau, scales.tau), dq=dq)
 
 
-def _by_file(group: str, column: str, unit: str | None, arm: Arm | None, place: Path | str) -> float:
+def _by_file(group: str, column: str, unit: str | None, arm: Arm | None, place: Path | str, j: int) -> float:
     if unit is None:
         return 1.0
-    if unit not in FACTORS[group] or not _suits(group, unit, arm):
+    if unit not in FACTORS[group] or not _suits(group, unit, arm, j):
         raise UnitError(
             f"is in {unit}, which is no unit of {WORDS[group]}" + (f" of a {arm.kind}" if arm is not None else ""),
             remedy=f"correct the file, or declare the unit with --units {group}=…",
@@ -144,16 +144,16 @@ def _factor(group: str, unit: str, arm: Arm | None) -> float:
     if unit not in FACTORS[group]:
         known = ", ".join(FACTORS[group])
         raise OptionError(f"`{unit}` is not a unit of {group}", remedy=f"known: {known}")
-    if not _suits(group, unit, arm):
-        assert arm is not None
+    if arm is not None and not any(_suits(group, unit, arm, j) for j in range(arm.n_joints)):
         motion = "turns" if arm.rotary else "slides"
         raise OptionError(f"{group} in {unit} does not suit an arm that {motion}", remedy="declare another unit")
     return FACTORS[group][unit]
 
 
-def _suits(group: str, unit: str, arm: Arm | None) -> bool:
+def _suits(group: str, unit: str, arm: Arm | None, j: int) -> bool:
+    """Whether a unit can be that of a column of joint `j`, from 0."""
     angular = unit.startswith(("rad", "deg", "turns")) or unit.endswith("Nm")
-    return arm is None or group == "t" or angular == arm.rotary
+    return arm is None or group == "t" or j >= arm.n_joints or angular == arm.rotary_joints[j]
 
 
 def recognised(arrays: Arrays, names: Names, arm: Arm | None, settled: frozenset[str]) -> tuple[Arrays, list[Finding]]:
@@ -162,14 +162,15 @@ def recognised(arrays: Arrays, names: Names, arm: Arm | None, settled: frozenset
     Nothing is converted where another joint speaks against it, or where the unit is stated; what merely looks large is left to `check`.
     """
     findings: list[Finding] = []
-    if "q" not in settled and not _slides(arm) and (why := _degrees(arrays, names, arm)):
-        arrays = replace(arrays, q=arrays.q * _DEGREE)
+    turned = np.array([1.0 if _slides(arm, j) else _DEGREE for j in range(arrays.q.shape[1])])
+    if "q" not in settled and not np.all(turned == 1.0) and (why := _degrees(arrays, names, arm)):
+        arrays = replace(arrays, q=arrays.q * turned)
         findings.append(Finding("units", f"positions are in degrees: {why}; converted"))
-    if "dq" not in settled and arrays.dq is not None and names.dq is not None and not _slides(arm):
-        ratios = [_speed_ratio(arrays, j) for j in range(arrays.q.shape[1])]
+    if "dq" not in settled and arrays.dq is not None and names.dq is not None and not np.all(turned == 1.0):
+        ratios = [0.0 if _slides(arm, j) else _speed_ratio(arrays, arm, j) for j in range(arrays.q.shape[1])]
         slow = [r for r in ratios if r > 0]
         if slow and all(_SURE_RATIO[0] < 1 / r < _SURE_RATIO[1] for r in slow):
-            arrays = replace(arrays, dq=arrays.dq * _DEGREE)
+            arrays = replace(arrays, dq=arrays.dq * turned)
             said = f"`{names.dq[ratios.index(slow[0])]}` is {1 / slow[0]:.3g} times faster than the positions move"
             findings.append(Finding("units", f"velocities are in deg/s: {said}; converted"))
     return arrays, findings
@@ -179,7 +180,9 @@ def _degrees(arrays: Arrays, names: Names, arm: Arm | None) -> str:
     """Return the reason why positions must be in degrees; empty if there is none, or one against it."""
     reasons = []
     for j, name in enumerate(names.q):
-        ratio = _speed_ratio(arrays, j) if arrays.dq is not None else 0.0
+        if _slides(arm, j):
+            continue
+        ratio = _speed_ratio(arrays, arm, j) if arrays.dq is not None else 0.0
         if ratio > 0 and not _SURE_RATIO[0] < ratio < _SURE_RATIO[1]:
             return ""
         if _moves_in_counts(arrays, arm, j, 1.0):
@@ -217,18 +220,20 @@ def in_file(
         Whether positions and velocities were recognised as degrees.
     """
     found: dict[str, str] = {}
-    q, dq = (_DEGREE if recognised else 1.0 for recognised in degrees)
+    turned = np.array([1.0 if _slides(arm, j) else _DEGREE for j in range(len(scales.q))])
+    q, dq = (turned if recognised else 1.0 for recognised in degrees)
     groups = {"q": scales.q * q, "tau": scales.tau, "dq": np.empty(0) if scales.dq is None else scales.dq * dq}
     for key, column in names.pairs:
         group = key.rstrip("0123456789")
-        factor = ticks[key] if key in ticks else float(groups[group][int(key[len(group) :]) - 1])
-        found[key] = _named(group.partition("_")[0], factor, names.units.get(column), arm)
+        j = 0 if key in ticks else int(key[len(group) :]) - 1
+        factor = ticks[key] if key in ticks else float(groups[group][j])
+        found[key] = _named(group.partition("_")[0], factor, names.units.get(column), arm, j)
     return found
 
 
-def _named(group: str, factor: float, spelt: str | None, arm: Arm | None) -> str:
-    """Return the unit of a group with this factor: as the file spells it, or those that suit the arm."""
-    fits = [unit for unit, f in FACTORS[group].items() if math.isclose(f, factor) and _suits(group, unit, arm)]
+def _named(group: str, factor: float, spelt: str | None, arm: Arm | None, j: int) -> str:
+    """Return the unit of a column with this factor: as the file spells it, or those that suit the joint."""
+    fits = [unit for unit, f in FACTORS[group].items() if math.isclose(f, factor) and _suits(group, unit, arm, j)]
     return spelt if spelt in fits else " or ".join(fits)
 
 
@@ -245,10 +250,10 @@ def check(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None, decl
 def _velocity(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
     if arrays.dq is None or names.dq is None:
         return
-    low, high = _MILLI_RATIO if _slides(arm) else _DEGREE_RATIO
-    unit, group = ("mm", "mm/s") if _slides(arm) else ("deg", "deg/s")
     for j, name in enumerate(names.dq):
-        ratio = _speed_ratio(arrays, j)
+        low, high = _MILLI_RATIO if _slides(arm, j) else _DEGREE_RATIO
+        unit, group = ("mm", "mm/s") if _slides(arm, j) else ("deg", "deg/s")
+        ratio = _speed_ratio(arrays, arm, j)
         if low <= ratio <= high:
             raise UnitError(
                 f"positions move {ratio:.3g} times faster than `{name}` says",
@@ -265,24 +270,24 @@ def _velocity(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
             )
 
 
-def _speed_ratio(arrays: Arrays, j: int) -> float:
+def _speed_ratio(arrays: Arrays, arm: Arm | None, j: int) -> float:
     """Return the slope of the differenced position over the velocity column; 0 where there is none."""
     assert arrays.dq is not None
-    moved = np.diff(_without_turns(arrays.q[:, j]))
+    moved = np.diff(_without_turns(arrays, arm, j))
     said = 0.5 * (arrays.dq[1:, j] + arrays.dq[:-1, j]) * np.diff(arrays.t)
     power = float(said @ said)
     return float(moved @ said) / power if power > 0 else 0.0
 
 
 def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
-    farthest, fastest, unit = _FARTHEST_RAD, _FASTEST_RAD_S, "deg"
-    if _slides(arm):
-        farthest, fastest, unit = _FARTHEST_M, math.inf, "mm"
     for j, name in enumerate(names.q):
-        travel, speed = _travel(arrays.q[:, j]), _peak_speed(arrays, j)
-        counts = not _slides(arm) and _moves_in_counts(arrays, arm, j, _DEGREE)
+        farthest, fastest, unit = _FARTHEST_RAD, _FASTEST_RAD_S, "deg"
+        if _slides(arm, j):
+            farthest, fastest, unit = _FARTHEST_M, math.inf, "mm"
+        travel, speed = _travel(arrays.q[:, j]), _peak_speed(arrays, arm, j)
+        counts = not _slides(arm, j) and _moves_in_counts(arrays, arm, j, _DEGREE)
         if travel > farthest or speed > fastest or counts:
-            si = "m" if _slides(arm) else "rad"
+            si = "m" if _slides(arm, j) else "rad"
             why = f"moves over {travel:.4g} {si} at up to {speed:.4g} {si}/s"
             why += ", in steps of one encoder count in degrees" if counts else ""
             raise UnitError(
@@ -293,10 +298,10 @@ def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
             )
 
 
-def _peak_speed(arrays: Arrays, j: int) -> float:
+def _peak_speed(arrays: Arrays, arm: Arm | None, j: int) -> float:
     """Return the speed that is exceeded for 1 % of the log."""
     stride = max(1, round(_SPEED_SPAN_S / float(np.median(np.diff(arrays.t[:_ENOUGH])))))
-    t, q = arrays.t[::stride], _without_turns(arrays.q[:, j])[::stride]
+    t, q = arrays.t[::stride], _without_turns(arrays, arm, j)[::stride]
     return float(np.quantile(np.abs(np.diff(q) / np.diff(t)), 0.99)) if len(t) > 1 else 0.0
 
 
@@ -307,9 +312,10 @@ def _travel(q: NDArray[np.float64]) -> float:
     return float(ends[len(q) - 1 - wild] - ends[wild])
 
 
-def _without_turns(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return positions without the jumps of a wrapped encoder, in radians or in degrees: they are no speed."""
-    return unwrapped(unwrapped(q, TURN), 360.0)
+def _without_turns(arrays: Arrays, arm: Arm | None, j: int) -> NDArray[np.float64]:
+    """Return positions without the jumps of a wrapped encoder, in radians or in degrees: they are no speed. Lengths do not wrap."""
+    q = arrays.q[:, j]
+    return q if _slides(arm, j) else unwrapped(unwrapped(q, TURN), 360.0)
 
 
 def _moves_in_counts(arrays: Arrays, arm: Arm | None, j: int, factor: float) -> bool:
@@ -333,7 +339,7 @@ def _torque(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) ->
         peak = float(np.partition(np.abs(arrays.tau[:, j]), -1 - wild)[-1 - wild])
         limit = float(arm.torque_limit[j])
         if peak > _TORQUE_FACTOR * limit:
-            si = "Nm" if arm.rotary else "N"
+            si = "Nm" if arm.rotary_joints[j] else "N"
             raise UnitError(
                 f"reaches {peak:.4g}, {peak / limit:.3g} times the arm's torque limit of {limit:g}",
                 remedy=f"give the torque at the joint in {si}; add --units tau={si} if it is right",
@@ -342,5 +348,6 @@ def _torque(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) ->
             )
 
 
-def _slides(arm: Arm | None) -> bool:
-    return arm is not None and not arm.rotary
+def _slides(arm: Arm | None, j: int) -> bool:
+    """Whether joint `j`, from 0, is known to slide."""
+    return arm is not None and j < arm.n_joints and not arm.rotary_joints[j]

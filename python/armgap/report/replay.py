@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armgap import _native
-from armgap.arm import Arm
+from armgap.arm import Arm, only_planar
 from armgap.errors import ArmgapError, OptionError
 from armgap.evidence.hypothesis import Array, Hypothesis
 from armgap.log import Log
@@ -39,6 +39,7 @@ class RerunMissingError(ArmgapError, ImportError):
 
 def models(arm: Arm, diagnosis: Diagnosis | None) -> dict[str, Hypothesis]:
     """Return what predicts: the arm file as it is and, from a diagnosis, the model with causes."""
+    only_planar(arm, "replay")
     found = {"arm file": Hypothesis(arm, tuple(float(v) for v in arm.theta))}
     if diagnosis is not None:
         data = diagnosis.to_dict()

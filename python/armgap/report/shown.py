@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -55,6 +55,7 @@ class Facts:
         return "\n\n".join([f"**{escape(self.title)}**", escape(self.lead), table, *map(escape, self.notes)]) + "\n"
 
 
+_HEADER = ("parameter", "what it is", "value")
 _CARD = """\
 <div style="max-width: 60em"><p style="font-weight: bold; margin: 0">{{ f.title }}</p><p style="margin: .2em 0">{{ f.lead }}</p>
 {% if f.sketch %}<div style="max-width: 20em">{{ f.sketch | safe }}</div>{% endif %}
@@ -71,14 +72,23 @@ def arm_facts(arm: Arm) -> Facts:
         (name, parameter_text(arm.kind, name), value({"value": v, "sigma": s, "unit": unit}))
         for name, unit, v, s in zip(arm.parameter_names, arm.parameter_units, arm.theta, arm.sigma, strict=True)
     ]
+    slides = "" if arm.chain is None or arm.rotary else f" ({arm.rotary_joints.count(False)} linear)"
     joints = "1 joint" if arm.n_joints == 1 else f"{arm.n_joints} joints"
-    lead = (
-        f"{arm.kind}, {joints}, gravity {figure(arm.gravity)} m/s², sampled every {figure(1e3 * arm.sample_period)} ms"
-    )
-    unit = "N m" if arm.rotary else "N"
-    limits = [] if arm.torque_limit is None else [f"Limits: {', '.join(map(figure, arm.torque_limit))} {unit}."]
+    lead = f"{arm.kind}, {joints}{slides}, gravity {figure(arm.gravity)} m/s², sampled every {figure(1e3 * arm.sample_period)} ms"
+    units = ["N m" if turns else "N" for turns in arm.rotary_joints]
+    limits = [] if arm.torque_limit is None else [f"Limits: {_with_units(arm.torque_limit, units)}."]
+    if arm.chain is not None:
+        chain = f"Chain: {', '.join(arm.chain.joint_names)}."
+        return Facts(arm.name, lead, _HEADER, rows, [chain, *limits, *(f"{note}." for note in arm.notes)])
     notes = [*limits, f"Conventions: {brief(arm.kind)}"]
-    return Facts(arm.name, lead, ("parameter", "what it is", "value"), rows, notes, panel(arm.kind))
+    return Facts(arm.name, lead, _HEADER, rows, notes, panel(arm.kind))
+
+
+def _with_units(values: Iterable[float], units: Sequence[str]) -> str:
+    """Return figures with one unit behind all of them, or each with its own."""
+    if len(set(units)) == 1:
+        return f"{', '.join(map(figure, values))} {units[0]}"
+    return ", ".join(f"{figure(value)} {unit}" for value, unit in zip(values, units, strict=True))
 
 
 def log_facts(log: Log) -> Facts:

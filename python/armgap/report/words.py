@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from armgap import _native
 from armgap._renamed import old_names
+from armgap.serial_chain import SERIAL
 
 __all__ = [
     "SummaryAnswer",
@@ -69,6 +70,13 @@ _NONE_ALLOWED = (
 )
 _ARROW = "\N{NO-BREAK SPACE}→\N{NO-BREAK SPACE}"
 _FRICTION = {"viscous": "viscous friction", "coulomb": "Coulomb friction"}
+_OF_LINK = {
+    "mass": "mass of link",
+    **{f"m{axis}": f"first moment along {axis} of link" for axis in "xyz"},
+    **{f"i{axis}{axis}": f"moment of inertia about {axis} of link" for axis in "xyz"},
+    **{f"i{axes}": f"product of inertia {axes} of link" for axes in ("xy", "xz", "yz")},
+    "rotor": "rotor inertia at joint",
+}
 _INERTIAL = {
     "axis": {"theta1": "moving mass", "theta2": "weight along the axis"},
     "pendulum": {"theta1": "inertia about the joint", "theta2": "gravity torque of the level link"},
@@ -206,6 +214,8 @@ def parameter_text(kind: str, name: str) -> str:
     stem, number = name.rstrip("0123456789"), name[len(name.rstrip("0123456789")) :]
     if stem in _FRICTION:
         return f"{_FRICTION[stem]} of joint {number}"
+    if kind == SERIAL and stem in _OF_LINK:
+        return f"{_OF_LINK[stem]} {number}"
     return _INERTIAL.get(kind, {}).get(name, "")
 
 

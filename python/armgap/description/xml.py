@@ -1,0 +1,93 @@
+"""XML of descriptions without namespaces: prefixes that nobody declares are part of the name, lines are kept for complaints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from armgap.errors import ModelFileError
+from armgap.reading import read_bounded
+
+__all__ = ["Element", "parse", "read_text"]
+
+MOST_BYTES = 64 * 2**20
+"""Size of a description: tens of times those with collision shapes inside."""
+
+
+@dataclass
+class Element:
+    """One element: its name with its prefix, attributes, elements inside, text and line."""
+
+    tag: str
+    attributes: dict[str, str]
+    row: int
+    children: list[Element] = field(default_factory=list)
+    text: str = ""
+
+    def first(self, tag: str) -> Element | None:
+        """Return the first element inside with this name."""
+        return next(self.all(tag), None)
+
+    def all(self, tag: str) -> Iterator[Element]:
+        """Return all elements inside with this name."""
+        return (child for child in self.children if child.tag == tag)
+
+
+def read_text(path: Path) -> bytes:
+    """Return the content of a description.
+
+    Raises
+    ------
+    ModelFileError
+        If it cannot be read.
+    """
+    try:
+        return read_bounded(path, MOST_BYTES)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ModelFileError(
+            f"cannot be read ({reason})", remedy="give the path of a URDF or MJCF file", file=path
+        ) from None
+    except ValueError:
+        raise ModelFileError("is no name of a file", remedy="give the path of a URDF or MJCF file", file=path) from None
+
+
+def parse(data: bytes, path: Path) -> Element:
+    """Return the root element.
+
+    Raises
+    ------
+    ModelFileError
+        If it is not XML; it names the line. Entities of its own are refused.
+    """
+    top = Element("", {}, 0)
+    stack = [top]
+    parser = expat.ParserCreate()
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        element = Element(tag, attributes, parser.CurrentLineNumber)
+        stack[-1].children.append(element)
+        stack.append(element)
+
+    def end(_: str) -> None:
+        stack.pop()
+
+    def text(data: str) -> None:
+        stack[-1].text += data
+
+    def entity(*_: object) -> None:
+        raise ModelFileError("defines an entity", remedy="write it out", file=path, row=parser.CurrentLineNumber)
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler, parser.EntityDeclHandler = text, entity
+    parser.buffer_text = True
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        problem = f"is not valid XML: {expat.ErrorString(error.code)}"
+        raise ModelFileError(problem, remedy="correct that line", file=path, row=error.lineno) from None
+    except (LookupError, ValueError) as error:  # an encoding that nobody knows
+        raise ModelFileError(f"cannot be read as text ({error})", remedy="store it as UTF-8", file=path) from None
+    return top.children[0]

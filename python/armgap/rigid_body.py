@@ -1,0 +1,146 @@
+"""Inertia of rigid bodies in ten numbers, linear in the equation of motion: ``m, m cx, m cy, m cz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz``.
+
+``c`` is the centre of mass and ``I`` the inertia about the origin of the body's frame, along its axes (Khalil 2002, section 9.3;
+Featherstone 2008, section 2.13). The inertia about the centre of mass follows by the parallel axis theorem.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "INERTIAL_NAMES",
+    "INERTIAL_UNITS",
+    "about_com",
+    "about_origin",
+    "inconsistency",
+    "moved",
+    "rpy_matrix",
+    "symmetric",
+    "unit_axis",
+]
+
+Array = NDArray[np.float64]
+
+INERTIAL_NAMES: tuple[str, ...] = ("mass", "mx", "my", "mz", "ixx", "ixy", "iyy", "ixz", "iyz", "izz")
+"""Names of the ten numbers; a joint's number follows."""
+INERTIAL_UNITS: tuple[str, ...] = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
+_ROWS, _COLUMNS = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
+# A negative eigenvalue of the pseudo-inertia that is this small beside the largest is rounding of the description.
+_CONSISTENT = 1e-9
+# A unit vector's length is 1 to this many times the rounding of double precision.
+_UNIT = 4.0 * np.finfo(np.float64).eps
+
+
+def symmetric(six: Sequence[float] | Array) -> Array:
+    """Return the symmetric matrix, shape (3, 3), of ``xx, xy, yy, xz, yz, zz``."""
+    matrix = np.empty((3, 3))
+    matrix[_ROWS, _COLUMNS] = six
+    matrix[_COLUMNS, _ROWS] = six
+    return matrix
+
+
+def _six(matrix: Array) -> Array:
+    return matrix[_ROWS, _COLUMNS]
+
+
+def _steiner(mass: float, com: Array) -> Array:
+    """Return the inertia of a point mass about the origin."""
+    return mass * (float(com @ com) * np.eye(3) - np.outer(com, com))
+
+
+def about_origin(mass: float, com: Array, inertia: Array) -> Array:
+    """Return the ten numbers of a body.
+
+    Parameters
+    ----------
+    mass : float
+        Mass [kg].
+    com : ndarray, shape (3,)
+        Centre of mass [m].
+    inertia : ndarray, shape (3, 3)
+        Inertia about the centre of mass, along the axes of the frame [kg m^2].
+    """
+    return np.concatenate([[mass], mass * com, _six(inertia + _steiner(mass, com))])
+
+
+def about_com(ten: Array) -> tuple[float, Array, Array]:
+    """Return mass, centre of mass and inertia about it; the reverse of `about_origin`, for a mass other than zero."""
+    mass = float(ten[0])
+    com = ten[1:4] / mass
+    return mass, com, symmetric(ten[4:]) - _steiner(mass, com)
+
+
+def moved(ten: Array, rotation: Array, translation: Array) -> Array:
+    """Return the ten numbers in another frame.
+
+    Parameters
+    ----------
+    ten : ndarray, shape (10,)
+        In the body's own frame.
+    rotation : ndarray, shape (3, 3)
+        Its axes in the other frame, as columns.
+    translation : ndarray, shape (3,)
+        Its origin in the other frame [m].
+    """
+    mass, first = float(ten[0]), rotation @ ten[1:4]
+    inertia = rotation @ symmetric(ten[4:]) @ rotation.T
+    # Parallel axes without the centre of mass, which a massless body does not have.
+    cross = np.outer(first, translation)
+    inertia += (2.0 * float(first @ translation)) * np.eye(3) - cross - cross.T + _steiner(mass, translation)
+    return np.concatenate([[mass], first + mass * translation, _six(inertia)])
+
+
+def inconsistency(ten: Array) -> str:
+    """Say why no body has these ten numbers: its pseudo-inertia has to be positive semi-definite (Wensing et al. 2018); empty if one has.
+
+    Returns
+    -------
+    str
+        ``"mass is negative"``, or the principal moments about the centre of mass that break the triangle inequality.
+    """
+    mass = float(ten[0])
+    if not np.isfinite(ten).all():
+        return "its inertia is not finite"
+    if mass < 0:
+        return f"its mass is {mass:g} kg"
+    if mass == 0:
+        return "it has inertia and no mass" if np.any(ten[1:] != 0) else ""
+    inertia = about_com(ten)[2]
+    if not np.isfinite(inertia).all():
+        return f"its mass of {mass:g} kg is too small for its first moments"
+    covariance = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    if np.linalg.eigvalsh(covariance)[0] >= -_CONSISTENT * max(float(np.trace(symmetric(ten[4:]))), 0.0):
+        return ""
+    moments = ", ".join(f"{m:.3g}" for m in np.linalg.eigvalsh(inertia))
+    return f"its principal moments {moments} kg m^2 break the triangle inequality"
+
+
+def rpy_matrix(rpy: Sequence[float] | Array) -> Array:
+    """Return the rotation by roll, pitch and yaw [rad] about the fixed axes x, y, z (URDF), shape (3, 3)."""
+    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in rpy)
+    matrix = np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+    return matrix + 0.0  # no negative zeros
+
+
+def unit_axis(axis: Sequence[float] | Array) -> Array | None:
+    """Return an axis at length 1, shape (3,); one that has it stays as it is to the last bit; None for a zero axis."""
+    vector = np.array(axis, dtype=np.float64)
+    largest = float(np.max(np.abs(vector)))
+    if largest == 0:
+        return None
+    length = float(np.linalg.norm(vector))
+    if abs(length - 1.0) <= _UNIT:
+        return vector
+    vector = vector / largest  # lengths whose squares are too small or too large
+    return vector / float(np.linalg.norm(vector))
