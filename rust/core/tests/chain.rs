@@ -132,6 +132,25 @@ fn check<const N: usize, const P: usize>(numbers: &mut Numbers) {
         assert!((slope - g[j]).abs() < 1e-7 * scale);
     }
 
+    // Derivatives against differences, and the torque beside them.
+    let of_motion = |q: SVector<f64, N>, dq: SVector<f64, N>| {
+        SVector::from(chain.inverse_dynamics(&links, &q.into(), &dq.into(), &ddq.into()))
+    };
+    let analytic = chain.torque_derivatives(&links, [&q.into(), &dq.into(), &ddq.into()]);
+    near(&(SVector::from(analytic.torque) + rotors), &torque);
+    for i in 0..N {
+        let mut by = SVector::<f64, N>::zeros();
+        by[i] = STEP;
+        let by_position = (of_motion(q + by, dq) - of_motion(q - by, dq)) / (2.0 * STEP);
+        let by_velocity = (of_motion(q, dq + by) - of_motion(q, dq - by)) / (2.0 * STEP);
+        for j in 0..N {
+            assert!((analytic.by_position[j][i] - by_position[j]).abs() < 1e-7 * scale);
+            assert!((analytic.by_velocity[j][i] - by_velocity[j]).abs() < 1e-7 * scale);
+            let with_rotor = analytic.by_acceleration[j][i] + constant[j][i];
+            assert!((with_rotor - m[(j, i)]).abs() < ROUNDING * scale);
+        }
+    }
+
     // Several side by side are each like one alone.
     let wide = |x: f64| Lanes::<f64, Portable, 4>::new([x; 4]);
     let terms = Arm::<f64, N, P>::equation_terms(
