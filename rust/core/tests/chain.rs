@@ -231,7 +231,9 @@ fn changes() -> [(usize, SVector<f64, 9>); 9] {
     let l = LINKS.length[0];
     let change = |at: &[(usize, f64)]| {
         let mut change = SVector::zeros();
-        at.iter().for_each(|(i, x)| change[*i] = *x);
+        for (i, x) in at {
+            change[*i] = *x;
+        }
         change
     };
     [
