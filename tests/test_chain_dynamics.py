@@ -156,6 +156,9 @@ def check_against_pinocchio(description: Description, model: Any, seed: int) -> 
     agree(chain.inverse_dynamics(theta, q, dq, ddq), tau)
     # Pinocchio gives a regressor of one joint without its rows.
     agree(chain.regressor(q, dq, ddq), regressor.reshape(len(q), n, 10 * n))
+    partials = [[x.copy() for x in pinocchio.computeRNEADerivatives(model, data, *state)[:2]] for state in states]
+    for k, by in enumerate(chain.torque_derivatives(theta, q, dq, ddq)):
+        agree(by, np.array([partial[k] for partial in partials]))
     # Forward dynamics is as exact as the inertia matrix is well conditioned: what counts is the torque of its accelerations.
     accelerations = chain.acceleration(theta, q, dq, tau)
     agree(np.einsum("rij,rj->ri", inertia, accelerations) + bias, tau)

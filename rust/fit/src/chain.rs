@@ -85,6 +85,10 @@ pub enum Quantity {
     Bias,
     /// Torques of a motion with accelerations, without friction, `(n,)`.
     InverseDynamics,
+    /// Derivatives of the torques of a motion by positions, `(n, n)`; rows are torques.
+    TorqueByPosition,
+    /// Derivatives of the torques of a motion by velocities, `(n, n)`.
+    TorqueByVelocity,
     /// Accelerations under torques, without friction, `(n,)`.
     Acceleration,
     /// Regressor of the torque over the links' parameters, `(n, 10 n)`.
@@ -105,7 +109,7 @@ impl Quantity {
     /// Shape at one row for `n` joints.
     pub fn shape(self, n: usize) -> Vec<usize> {
         match self {
-            Self::Inertia => vec![n, n],
+            Self::Inertia | Self::TorqueByPosition | Self::TorqueByVelocity => vec![n, n],
             Self::Bias | Self::InverseDynamics | Self::Acceleration => vec![n],
             Self::Regressor | Self::MomentumRegressor | Self::PotentialRegressor => {
                 vec![n, LINK_PARAMETERS * n]
@@ -127,7 +131,7 @@ pub struct ChainRows<'a> {
     pub q: &'a [f64],
     /// Velocities; of no account for what does not depend on them.
     pub dq: &'a [f64],
-    /// Accelerations of inverse dynamics and of the torque's regressor, torques of [`Quantity::Acceleration`].
+    /// Accelerations of inverse dynamics, its derivatives and the torque's regressor, torques of [`Quantity::Acceleration`].
     pub input: &'a [f64],
 }
 
@@ -198,6 +202,14 @@ impl Quantity {
             Self::InverseDynamics => {
                 out.copy_from_slice(&chain.inverse_dynamics(links, q, dq, input));
                 (0..N).for_each(|j| out[j] += rotors[j] * input[j]);
+            }
+            Self::TorqueByPosition => {
+                let derivatives = chain.torque_derivatives(links, [q, dq, input]);
+                out.copy_from_slice(derivatives.by_position.as_flattened());
+            }
+            Self::TorqueByVelocity => {
+                let derivatives = chain.torque_derivatives(links, [q, dq, input]);
+                out.copy_from_slice(derivatives.by_velocity.as_flattened());
             }
             Self::Acceleration => {
                 let constant = model.constant_inertia();

@@ -129,7 +129,7 @@ fn check_joint(joint: &ChainJoint<f64>, j: usize) -> PyResult<()> {
         return Err(PyValueError::new_err(format!("`translation` of joint {number} is not finite")));
     }
     let length = dot(&joint.axis, &joint.axis).sqrt();
-    if !((length - 1.0).abs() <= ORTHOGONAL) {
+    if length.is_nan() || (length - 1.0).abs() > ORTHOGONAL {
         return Err(PyValueError::new_err(format!(
             "`axis` of joint {number} has length {length}, expected 1"
         )));
@@ -233,6 +233,20 @@ impl Chain {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let arguments = Arguments { theta: Some(theta), q: &q, dq: Some(&dq), input: Some(("ddq", &ddq)) };
         self.vectors(py, Quantity::InverseDynamics, arguments)
+    }
+
+    fn torque_derivatives<'py>(
+        &self,
+        py: Python<'py>,
+        theta: Vec<f64>,
+        q: PyReadonlyArray2<'py, f64>,
+        dq: PyReadonlyArray2<'py, f64>,
+        ddq: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>)> {
+        let arguments =
+            |theta| Arguments { theta: Some(theta), q: &q, dq: Some(&dq), input: Some(("ddq", &ddq)) };
+        let by_position = self.matrices(py, Quantity::TorqueByPosition, arguments(theta.clone()))?;
+        Ok((by_position, self.matrices(py, Quantity::TorqueByVelocity, arguments(theta))?))
     }
 
     fn acceleration<'py>(
