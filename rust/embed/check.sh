@@ -31,7 +31,8 @@ check() {
 
 cargo build -q --profile embed -p armgap-embed
 check "core" target/embed/libarmgap_embed.a \
-  armgap_start_f64 armgap_update_f64 armgap_start_f32 armgap_update_f32 armgap_advance_f64
+  armgap_start_f64 armgap_update_f64 armgap_start_f32 armgap_update_f32 armgap_advance_f64 \
+  armgap_advance_chain_f64 armgap_chain_torques_f64
 
 cargo rustc -q --profile embed -p armgap-capi --no-default-features --features freestanding --crate-type staticlib --target-dir target/freestanding
 library=target/freestanding/embed/libarmgap.a

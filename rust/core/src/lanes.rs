@@ -78,6 +78,7 @@ impl<T: Real, C: Cpu, const W: usize> Neg for Lanes<T, C, W> {
 
 impl<T: Real, C: Cpu, const W: usize> Number for Lanes<T, C, W> {
     type Real = T;
+    const WIDTH: usize = W;
 
     #[inline(always)]
     fn of(x: T) -> Self {

@@ -14,6 +14,9 @@ pub trait Number:
     /// One of them.
     type Real: Real;
 
+    /// How many there are.
+    const WIDTH: usize;
+
     /// `x` in every lane.
     fn of(x: Self::Real) -> Self;
 
@@ -38,6 +41,7 @@ pub trait Number:
 
 impl<T: Real> Number for T {
     type Real = T;
+    const WIDTH: usize = 1;
 
     #[inline(always)]
     fn of(x: T) -> Self {

@@ -5,6 +5,7 @@
 #![no_std]
 
 use armgap_core::arm::TwoLink;
+use armgap_core::chain::{Chain, ChainJoint, JointKind, TorqueDerivatives};
 use armgap_core::effect::InputSegment;
 use armgap_core::filter::Cutoff;
 use armgap_core::identify::{Estimator, Outcome, Sample, Settings};
@@ -93,4 +94,48 @@ pub unsafe extern "C" fn armgap_advance_f64(
         q.write(state.q.into());
         dq.write(state.dq.into());
     }
+}
+
+/// A six-axis arm of these joints and links in its simulator, with dry friction; moves its state by one interval.
+///
+/// # Safety
+/// `joints` holds six joints, `theta` 78 parameters, `state` was written before, and `tau` holds six numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armgap_advance_chain_f64(
+    joints: *const [ChainJoint<f64>; 6],
+    theta: *const [f64; 78],
+    state: *mut State<f64, 6>,
+    tau: *const [f64; 6],
+    t: f64,
+    h: f64,
+) {
+    let (state, tau, joints) = unsafe { (&mut *state, *tau, *joints) };
+    let plant = Plant::new(Chain::new(joints, [0.0, 0.0, -9.81]), unsafe { *theta });
+    let torque = tau.map(InputSegment::held);
+    advance(&plant, state, &Interval { t, h, torque: &torque }, 1);
+}
+
+/// Torques of a motion of a chain with a linear and five rotary joints, their derivatives, and the regressor.
+///
+/// # Safety
+/// `joint` holds a joint, `links` ten parameters of each link, `motion` positions, velocities and accelerations; `derivatives` and
+/// `regressor` are writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armgap_chain_torques_f64(
+    joint: *const ChainJoint<f64>,
+    links: *const [[f64; 10]; 6],
+    motion: *const [[f64; 6]; 3],
+    derivatives: *mut TorqueDerivatives<f64, 6>,
+    regressor: *mut [[[f64; 10]; 6]; 6],
+) {
+    let (joint, links, [q, dq, ddq], regressor) = unsafe { (*joint, &*links, &*motion, &mut *regressor) };
+    let mut joints = [joint; 6];
+    joints[0].kind = JointKind::Prismatic;
+    let chain = Chain::new(joints, [0.0, 0.0, -9.81]);
+    unsafe { *derivatives = chain.torque_derivatives(links, [q, dq, ddq]) };
+    chain.torque_regressor([q, dq, ddq], |i, k, row| {
+        if let Some(entry) = regressor.get_mut(i).and_then(|rows| rows.get_mut(k)) {
+            *entry = row;
+        }
+    });
 }

@@ -10,6 +10,7 @@ pub mod arm;
 pub mod assemble;
 pub mod attribute;
 pub mod belief;
+pub mod chain;
 mod contact_guess;
 pub mod context;
 pub mod covariance;

@@ -112,9 +112,9 @@ pub fn kind_of(name: &str) -> PyResult<ArmKind> {
     })
 }
 
-/// Effects given as `(name, 1-based joint or None, {parameter: value})`.
+/// Effects given as `(name, 1-based joint or None, {parameter: value})` on an arm with so many joints.
 pub fn effect_instances(
-    kind: ArmKind,
+    joints: usize,
     effects: Vec<(String, Option<usize>, BTreeMap<String, f64>)>,
 ) -> PyResult<Vec<EffectInstance>> {
     effects
@@ -127,15 +127,14 @@ pub fn effect_instances(
             let spec = law.spec();
             let joint = match (spec.scope, joint) {
                 (Scope::Arm, None) => 0,
-                (Scope::Joint, Some(j)) if (1..=kind.joints()).contains(&j) => j - 1,
+                (Scope::Joint, Some(j)) if (1..=joints).contains(&j) => j - 1,
                 (Scope::Arm, Some(_)) => {
                     return Err(PyValueError::new_err(format!(
                         "`{name}` is of the whole arm; leave its joint empty"
                     )));
                 }
                 _ => {
-                    let last = kind.joints();
-                    return Err(PyValueError::new_err(format!("`{name}` needs a joint from 1 to {last}")));
+                    return Err(PyValueError::new_err(format!("`{name}` needs a joint from 1 to {joints}")));
                 }
             };
             let mut values = values;

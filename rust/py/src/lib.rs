@@ -1,6 +1,7 @@
 //! The Python module `armgap._native`: views in, check, release the GIL, arrays out. Nothing is computed here.
 
 mod bench;
+mod chain;
 mod convert;
 mod diagnose;
 mod estimator;
@@ -15,6 +16,8 @@ use pyo3::prelude::*;
 mod _native {
     #[pymodule_export]
     use crate::bench::bench;
+    #[pymodule_export]
+    use crate::chain::Chain;
     #[pymodule_export]
     use crate::convert::{arm_kinds, effects, theta_from_links};
     #[pymodule_export]

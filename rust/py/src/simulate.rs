@@ -36,7 +36,7 @@ pub fn simulate<'py>(
     if q0.len() != n || dq0.len() != n {
         return Err(PyValueError::new_err(format!("`q0` and `dq0` need {n} values")));
     }
-    let effects = effect_instances(kind, effects)?;
+    let effects = effect_instances(kind.joints(), effects)?;
     let arm = ArmDescription::plain(kind, gravity, theta, link_length);
     let rows = t.len();
     let (t, tau, q0, dq0) = (t.to_vec(), tau.to_vec(), q0.to_vec(), dq0.to_vec());
@@ -77,7 +77,7 @@ pub fn inertia<'py>(
     let kind = kind_of(kind)?;
     let (n, rows) = (kind.joints(), numpy::PyUntypedArrayMethods::shape(&*q)[0]);
     let q = matrix(&q, "q", rows, n)?;
-    let effects = effect_instances(kind, effects)?;
+    let effects = effect_instances(kind.joints(), effects)?;
     let arm = ArmDescription::plain(kind, gravity, theta, link_length);
     let found = arm.dispatch(InertiaMatrices { q, effects: &effects }).flatten().ok_or_else(|| {
         PyValueError::new_err("`theta` has the wrong length for this arm, or there are too many effects")

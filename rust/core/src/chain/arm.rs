@@ -56,6 +56,18 @@ fn put_rotors<T: Real, const N: usize, const P: usize>(matrix: &mut SMatrix<T, N
 }
 
 impl<T: Real, const N: usize> Chain<T, N> {
+    /// Inertia and bias in a function of its own: the integrator has a dozen calls, each of them long.
+    #[inline(never)]
+    fn equation_terms_apart<V: Number<Real = T>>(
+        &self,
+        links: &[LinkInertia<V>; N],
+        constant_inertia: &[[V; N]; N],
+        sincos: &[SinCos<V>; N],
+        [q, dq]: [&[V; N]; 2],
+    ) -> EquationTerms<V, N> {
+        self.equation_terms_at(&self.poses_at(sincos, q), links, constant_inertia, dq)
+    }
+
     /// `C(q, dq) dq` of these links: the bias without gravity.
     fn velocity_product<const P: usize>(
         &self,
@@ -129,6 +141,9 @@ impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
     ) -> EquationTerms<V, N> {
         check::<N, P>();
         match links_of(theta) {
+            Some(links) if V::WIDTH == 1 => {
+                self.equation_terms_apart(links, constant_inertia, sincos, [q, dq])
+            }
             Some(links) => self.equation_terms_at(&self.poses_at(sincos, q), links, constant_inertia, dq),
             None => EquationTerms { inertia: *constant_inertia, bias: [vector::zero(); N] },
         }

@@ -122,6 +122,13 @@ impl<T: Real, const N: usize> Chain<T, N> {
         EquationTerms { inertia: composite_inertia(poses, &mut inertia, constant_inertia), bias }
     }
 
+    /// Motion of the base: gravity is an acceleration against it.
+    #[inline(always)]
+    pub(super) fn base_motion<V: Number<Real = T>>(&self) -> LinkMotion<V> {
+        let acceleration = Twist { angular: [zero(); 3], linear: negative(&of(&self.gravity)) };
+        LinkMotion { velocity: Twist::zero(), acceleration }
+    }
+
     /// Velocities and accelerations of all links; without `ddq`, of a motion whose joints do not accelerate.
     #[inline(always)]
     pub(super) fn motions<V: Number<Real = T>>(
@@ -130,9 +137,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         dq: &[V; N],
         ddq: Option<&[V; N]>,
     ) -> [LinkMotion<V>; N] {
-        // Gravity is an acceleration of the base against it.
-        let base = Twist { angular: [zero(); 3], linear: negative(&of(&self.gravity)) };
-        let mut last = LinkMotion { velocity: Twist::zero(), acceleration: base };
+        let mut last = self.base_motion();
         let mut motions = [last; N];
         for j in 0..N {
             let joint = &poses[j].joint;

@@ -8,6 +8,7 @@
 //! Friction, effects and stick-slip come with [`crate::plant::Plant`], for a [`Chain`] is an [`crate::arm::Arm`] too.
 
 mod arm;
+mod derivatives;
 mod dynamics;
 mod inertia;
 mod kinematics;
@@ -15,6 +16,8 @@ mod parameters;
 mod regressor;
 mod vector;
 
+pub use derivatives::TorqueDerivatives;
+pub use dynamics::InertiaMatrix;
 pub use inertia::{LINK_PARAMETERS, LinkInertia, point_mass};
 pub use kinematics::LinkPose;
 pub use parameters::{ChainParameter, PARAMETERS_PER_JOINT, parameter};

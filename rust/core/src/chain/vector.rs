@@ -160,4 +160,9 @@ impl<V: Number> Wrench<V> {
     pub(super) fn plus(&self, other: &Self) -> Self {
         Self { moment: add(&self.moment, &other.moment), force: add(&self.force, &other.force) }
     }
+    /// `s self`.
+    #[inline(always)]
+    pub(super) fn scaled(&self, s: V) -> Self {
+        Self { moment: scaled(s, &self.moment), force: scaled(s, &self.force) }
+    }
 }

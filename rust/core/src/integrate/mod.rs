@@ -9,6 +9,7 @@
 mod backlash;
 mod crossing;
 pub(crate) mod root;
+mod settle;
 
 use crate::arm::Arm;
 use crate::effect::InputSegment;
@@ -262,73 +263,5 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
                 self.stop(j, state);
             }
         }
-    }
-
-    /// Releases stuck joints that friction cannot hold, and sticks joints that were released to no avail; returns the motion.
-    #[inline]
-    fn settle(&self, state: &mut State<T, N>, x: T) -> Accelerations<T, N> {
-        let mut motion = self.motion(x, state);
-        if self.plant.drivetrain().has_backlash() && self.open(x, state, &motion) {
-            motion = self.motion(x, state);
-        }
-        let mut tried = [false; N];
-        for _ in 0..2 * N {
-            let Some((j, mode)) = self.unsettled(state, &motion, x, &tried) else {
-                break;
-            };
-            tried[j] = mode == Mode::Stuck;
-            state.modes[j] = mode;
-            motion = self.motion(x, state);
-        }
-        motion
-    }
-
-    /// Stiction violation of joint `j`, and the direction it would slide in.
-    #[inline]
-    fn stiction_violation(
-        &self,
-        j: usize,
-        x: T,
-        state: &State<T, N>,
-        motion: &Accelerations<T, N>,
-    ) -> (T, T) {
-        let torque = self.interval.torque_at(x);
-        let mut tau = self.plant.drivetrain().torque_at_joints(&torque, &state.latent);
-        if self.plant.drivetrain().brakes_motor(j, &state.latent) {
-            tau[j] = torque[j];
-        }
-        self.plant.stiction_violation(j, self.interval.t + x, state.q[j], tau[j], motion.friction_at_rest[j])
-    }
-
-    /// The joint whose mode contradicts the motion most, and the mode it should have.
-    #[inline]
-    fn unsettled(
-        &self,
-        state: &State<T, N>,
-        motion: &Accelerations<T, N>,
-        x: T,
-        tried: &[bool; N],
-    ) -> Option<(usize, Mode)> {
-        let (mut found, mut worst) = (None, T::zero());
-        for j in 0..N {
-            let velocity = self.plant.friction_velocity(j, &state.dq, &state.latent);
-            if velocity != T::zero() {
-                let contradicts = self.plant.is_dry(j) || state.modes[j] == Mode::Stuck;
-                if contradicts && state.modes[j] != Mode::of(velocity) {
-                    return Some((j, Mode::of(velocity)));
-                }
-            } else if state.modes[j] == Mode::Stuck {
-                let (stiction_violation, direction) = self.stiction_violation(j, x, state, motion);
-                if stiction_violation > worst && !tried[j] {
-                    (found, worst) = (Some((j, Mode::of(direction))), stiction_violation);
-                }
-            } else if self.plant.is_dry(j)
-                && self.plant.friction_acceleration(j, motion, &state.latent) * state.modes[j].direction()
-                    < T::zero()
-            {
-                return Some((j, Mode::Stuck));
-            }
-        }
-        found
     }
 }

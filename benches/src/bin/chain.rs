@@ -1,0 +1,114 @@
+//! Time of a chain's acceleration and torque regressor per state, for six and seven revolute joints: one state at a time with the
+//! instructions of any processor, and several side by side with those this one has.
+
+use armgap_core::chain::{Chain, ChainJoint, JointKind, point_mass};
+use armgap_core::cpu::{Cpu, Kernel, Level};
+use armgap_core::lanes::Lanes;
+use armgap_core::number::Number;
+use std::hint::black_box;
+use std::time::Instant;
+
+/// States per measurement, and measurements of which the shortest counts.
+const STATES: usize = 4096;
+const REPEATS: usize = 30;
+
+/// A chain like a six- or seven-axis arm: axes in turn across and along, links of a third of a metre.
+fn arm<const N: usize>() -> (Chain<f64, N>, [[f64; 10]; N]) {
+    let joints = std::array::from_fn(|j| {
+        let across = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
+        let back = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]];
+        ChainJoint {
+            kind: JointKind::Revolute,
+            rotation: if j % 2 == 0 { across } else { back },
+            translation: [0.02, 0.03, 0.3],
+            axis: [0.0, 0.0, 1.0],
+        }
+    });
+    let link = std::array::from_fn(|j| {
+        let mut link = [0.0; 10];
+        for at in [[0.1, 0.0, 0.0], [0.0, 0.05, 0.2], [-0.05, 0.1, 0.1], [0.0, -0.1, 0.05]] {
+            let point = point_mass(2.0 / (1.0 + j as f64), at);
+            for (sum, x) in link.iter_mut().zip(point) {
+                *sum += x;
+            }
+        }
+        link
+    });
+    (Chain::new(joints, [0.0, 0.0, -9.81]), link)
+}
+
+/// Shortest time per pass of a body, ns. A macro: a closure would not be compiled for the instructions of its surroundings.
+macro_rules! shortest {
+    ($i:ident, $body:block) => {{
+        let mut shortest = f64::INFINITY;
+        for _ in 0..REPEATS {
+            let start = Instant::now();
+            for $i in 0..STATES {
+                $body
+            }
+            shortest = f64::min(shortest, start.elapsed().as_secs_f64() * 1e9 / STATES as f64);
+        }
+        shortest
+    }};
+}
+
+fn state<const N: usize>(i: usize) -> [[f64; N]; 3] {
+    let of = |a: f64| std::array::from_fn(|j| (a * (i * N + j) as f64).sin() * 2.0);
+    [of(0.71), of(1.13), of(1.77)]
+}
+
+/// Times of acceleration and regressor, ns per state, with `W` states side by side.
+#[inline(always)]
+fn times<V: Number<Real = f64>, const N: usize>(of: impl Fn(f64) -> V) -> [f64; 2] {
+    let (chain, links) = arm::<N>();
+    let links = links.map(|link| link.map(&of));
+    let rotors = [[of(0.0); N]; N];
+    let states: Vec<[[V; N]; 3]> = (0..64).map(|i| state::<N>(i).map(|x| x.map(&of))).collect();
+    let acceleration = shortest!(i, {
+        let [q, dq, tau] = &states[i % 64];
+        black_box(chain.forward_dynamics(black_box(&links), &rotors, [q, dq, tau]));
+    });
+    let regressor = shortest!(i, {
+        let [q, dq, ddq] = black_box(&states[i % 64]);
+        let mut matrix = [[[of(0.0); 10]; N]; N];
+        chain.torque_regressor([q, dq, ddq], |i, k, row| matrix[i][k] = row);
+        black_box(&matrix);
+    });
+    [acceleration, regressor].map(|time| time / V::WIDTH as f64)
+}
+
+/// The widest vectors that the processor has.
+struct Wide<const N: usize>;
+
+impl<const N: usize> Kernel for Wide<N> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn run<C: Cpu>(self) -> [f64; 2] {
+        match C::DOUBLES {
+            8 => times::<Lanes<f64, C, 8>, N>(Lanes::of),
+            4 => times::<Lanes<f64, C, 4>, N>(Lanes::of),
+            _ => times::<Lanes<f64, C, 2>, N>(Lanes::of),
+        }
+    }
+}
+
+fn print<const N: usize>() {
+    let [acceleration, regressor] = times::<f64, N>(|x| x);
+    println!(
+        "{N} joints, one state:          acceleration {acceleration:6.0} ns, regressor {regressor:6.0} ns"
+    );
+    for (name, level) in
+        [("portable", Level::PORTABLE), ("AVX2", Level::detect()), ("widest", Level::widest())]
+    {
+        let [acceleration, regressor] = level.run_wide(Wide::<N>);
+        println!(
+            "{N} joints, lanes {name:9}:    acceleration {acceleration:6.0} ns, regressor {regressor:6.0} ns"
+        );
+    }
+}
+
+fn main() {
+    print::<6>();
+    print::<7>();
+}

@@ -1,0 +1,153 @@
+//! Friction modes of joints at rest: which break away at an instant, and in which direction.
+//!
+//! The accelerations `a` of joints at rest minimise `a' M a / 2 - a' r + sum level_j |a_j|`, which is strictly convex (Gauss's principle of
+//! least constraint with dry friction; Moreau 1988), so one set of modes is right. It is found by an active-set method, as for quadratic
+//! programs: the joint with the largest stiction violation is released; on the way to the accelerations of the new modes, the first
+//! joint whose acceleration would change its sign sticks again. Each round lowers the sum, so none comes back to modes it has left.
+
+use super::{State, SubStep};
+use crate::arm::Arm;
+use crate::plant::{Accelerations, Mode};
+use crate::real::Real;
+use nalgebra::SVector;
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A, N, P> {
+    /// Finds the friction modes of joints at rest, and the motion.
+    #[inline]
+    pub(super) fn settle(&self, state: &mut State<T, N>, x: T) -> Accelerations<T, N> {
+        let mut motion = self.motion(x, state);
+        if self.plant.drivetrain().has_backlash() && self.open(x, state, &motion) {
+            motion = self.motion(x, state);
+        }
+        for _ in 0..2 * N {
+            let Some((j, mode)) = self.contradicted(state, &motion) else { break };
+            state.modes[j] = mode;
+            motion = self.motion(x, state);
+        }
+        let mut in_vain = [false; N];
+        for _ in 0..4 * N {
+            let Some((j, mode)) = self.breaking_away(state, &motion, x, &in_vain) else { break };
+            motion = self.released(state, &motion, x, (j, mode), &mut in_vain);
+        }
+        motion
+    }
+
+    /// Releases joint `j`, and sticks joints that are pulled back on the way to the motion without it.
+    #[inline(never)]
+    fn released(
+        &self,
+        state: &mut State<T, N>,
+        motion: &Accelerations<T, N>,
+        x: T,
+        (j, mode): (usize, Mode),
+        in_vain: &mut [bool; N],
+    ) -> Accelerations<T, N> {
+        let mut from = self.friction_accelerations(state, motion);
+        state.modes[j] = mode;
+        for _ in 0..N {
+            let motion = self.motion(x, state);
+            let to = self.friction_accelerations(state, &motion);
+            let Some((k, part)) = self.first_pulled_back(state, &from, &to) else { return motion };
+            // Where the Coulomb level of a sliding joint exceeds that at rest, a joint may be pulled back as it is released.
+            in_vain[k] |= k == j;
+            from += (to - from) * part;
+            from[k] = T::zero();
+            state.modes[k] = Mode::Stuck;
+        }
+        self.motion(x, state)
+    }
+
+    /// Accelerations on which the joints' friction acts.
+    #[inline]
+    fn friction_accelerations(&self, state: &State<T, N>, motion: &Accelerations<T, N>) -> SVector<T, N> {
+        SVector::from_fn(|j, _| self.plant.friction_acceleration(j, motion, &state.latent))
+    }
+
+    /// Whether the friction of joint `j` acts on something at rest.
+    #[inline]
+    fn rests(&self, j: usize, state: &State<T, N>) -> bool {
+        self.plant.friction_velocity(j, &state.dq, &state.latent) == T::zero()
+    }
+
+    /// The released joint at rest whose acceleration is the first to vanish on the way to accelerations against its direction, and the part
+    /// of the way to there.
+    #[inline]
+    fn first_pulled_back(
+        &self,
+        state: &State<T, N>,
+        from: &SVector<T, N>,
+        to: &SVector<T, N>,
+    ) -> Option<(usize, T)> {
+        let mut first = None;
+        for k in 0..N {
+            let along = state.modes[k].direction::<T>();
+            let (before, after) = (from[k] * along, to[k] * along);
+            if after < T::zero() && self.plant.is_dry(k) && self.rests(k, state) {
+                let part = before.max(T::zero()) / (before.max(T::zero()) - after);
+                if first.is_none_or(|(_, least)| part < least) {
+                    first = Some((k, part));
+                }
+            }
+        }
+        first
+    }
+
+    /// A joint whose mode contradicts its velocity, or its acceleration at rest, and the mode it should have.
+    #[inline]
+    fn contradicted(&self, state: &State<T, N>, motion: &Accelerations<T, N>) -> Option<(usize, Mode)> {
+        for j in 0..N {
+            let velocity = self.plant.friction_velocity(j, &state.dq, &state.latent);
+            if velocity != T::zero() {
+                let contradicts = self.plant.is_dry(j) || state.modes[j] == Mode::Stuck;
+                if contradicts && state.modes[j] != Mode::of(velocity) {
+                    return Some((j, Mode::of(velocity)));
+                }
+            } else if state.modes[j] != Mode::Stuck
+                && self.plant.is_dry(j)
+                && self.plant.friction_acceleration(j, motion, &state.latent) * state.modes[j].direction()
+                    < T::zero()
+            {
+                return Some((j, Mode::Stuck));
+            }
+        }
+        None
+    }
+
+    /// The stuck joint with the largest stiction violation, and the mode it should have.
+    #[inline]
+    fn breaking_away(
+        &self,
+        state: &State<T, N>,
+        motion: &Accelerations<T, N>,
+        x: T,
+        in_vain: &[bool; N],
+    ) -> Option<(usize, Mode)> {
+        let (mut found, mut worst) = (None, T::zero());
+        for j in 0..N {
+            if state.modes[j] == Mode::Stuck && !in_vain[j] {
+                let (stiction_violation, direction) = self.stiction_violation(j, x, state, motion);
+                if stiction_violation > worst {
+                    (found, worst) = (Some((j, Mode::of(direction))), stiction_violation);
+                }
+            }
+        }
+        found
+    }
+
+    /// Stiction violation of joint `j`, and the direction it would slide in.
+    #[inline]
+    pub(super) fn stiction_violation(
+        &self,
+        j: usize,
+        x: T,
+        state: &State<T, N>,
+        motion: &Accelerations<T, N>,
+    ) -> (T, T) {
+        let torque = self.interval.torque_at(x);
+        let mut tau = self.plant.drivetrain().torque_at_joints(&torque, &state.latent);
+        if self.plant.drivetrain().brakes_motor(j, &state.latent) {
+            tau[j] = torque[j];
+        }
+        self.plant.stiction_violation(j, self.interval.t + x, state.q[j], tau[j], motion.friction_at_rest[j])
+    }
+}
