@@ -5,6 +5,7 @@ use armgap_core::chain::{ChainJoint, JointKind};
 use armgap_core::effect::{Scope, catalogue, find};
 use armgap_core::transmission::Sides;
 use armgap_fit::arm::ArmDescription;
+use armgap_fit::chain::ChainDescription;
 use armgap_fit::model::EffectInstance;
 use armgap_fit::serial::SerialArm;
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
@@ -263,5 +264,6 @@ pub fn serial_arm(arm: &Bound<'_, PyDict>) -> PyResult<SerialArm> {
         JointKind::Prismatic => 1.0 / count,
     };
     let steps = counts.map(|counts| joints.iter().zip(&counts).map(step).collect());
-    Ok(SerialArm { joints, gravity: needed(&chain, "gravity")?, theta, sigma, steps })
+    let chain = ChainDescription { joints, gravity: needed(&chain, "gravity")? };
+    Ok(SerialArm { chain, theta, sigma, steps })
 }

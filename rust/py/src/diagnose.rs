@@ -117,7 +117,7 @@ impl AnyArm {
     fn joints(&self) -> usize {
         match self {
             Self::Planar(arm) => arm.kind.joints(),
-            Self::Serial(arm) => arm.joints.len(),
+            Self::Serial(arm) => arm.chain.joints.len(),
         }
     }
 }

@@ -15,6 +15,7 @@ mod rows;
 mod search;
 mod term;
 
+use crate::chain::ChainDescription;
 use crate::diagnose::{DiagnoseError, FEWEST_WINDOWS, LogData, Options};
 use crate::progress::{Observer, ProgressReporter, guarded};
 use crate::report::Diagnosis;
@@ -33,10 +34,8 @@ use term::{Term, TermKind};
 /// A serial arm as an arm file describes it.
 #[derive(Debug, Clone)]
 pub struct SerialArm {
-    /// Joints from the base, at most seven.
-    pub joints: Vec<ChainJoint<f64>>,
-    /// Acceleration of gravity in the base frame, m/s^2.
-    pub gravity: [f64; 3],
+    /// Its joints, one to seven, and gravity.
+    pub chain: ChainDescription,
     /// Thirteen parameters per joint: ten of each link, then rotor inertias, viscous and Coulomb coefficients.
     pub theta: Vec<f64>,
     /// Standard deviations of them; zero for a value that is not estimated.
@@ -48,7 +47,7 @@ pub struct SerialArm {
 impl SerialArm {
     /// Whether each joint turns.
     pub fn rotary(&self) -> Vec<bool> {
-        self.joints.iter().map(|j| j.kind == JointKind::Revolute).collect()
+        self.chain.joints.iter().map(|j| j.kind == JointKind::Revolute).collect()
     }
 }
 
@@ -73,14 +72,14 @@ pub fn diagnose(
     options: &Options,
     observer: &Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
-    crate::diagnose::validate(arm.joints.len(), training, holdout, options)?;
+    crate::diagnose::validate(arm.chain.joints.len(), training, holdout, options)?;
     let request = Request { arm, training, holdout, options, observer };
     guarded(|| by_size(&request)).ok_or(DiagnoseError::Stopped)?
 }
 
 /// The diagnosis with its number of joints known at compile time.
 fn by_size(request: &Request<'_>) -> Result<Diagnosis, DiagnoseError> {
-    match request.arm.joints.len() {
+    match request.arm.chain.joints.len() {
         1 => request.run::<1, 13>(),
         2 => request.run::<2, 26>(),
         3 => request.run::<3, 39>(),
@@ -88,7 +87,7 @@ fn by_size(request: &Request<'_>) -> Result<Diagnosis, DiagnoseError> {
         5 => request.run::<5, 65>(),
         6 => request.run::<6, 78>(),
         7 => request.run::<7, 91>(),
-        _ => Err(DiagnoseError::Joints(request.arm.joints.len())),
+        _ => Err(DiagnoseError::Joints(request.arm.chain.joints.len())),
     }
 }
 
@@ -113,13 +112,18 @@ impl Request<'_> {
     fn run<const N: usize, const P: usize>(&self) -> Result<Diagnosis, DiagnoseError> {
         let started = Instant::now();
         let sizes = |found: usize| DiagnoseError::Sizes { found, needed: P };
-        let joints: [ChainJoint<f64>; N] =
-            self.arm.joints.clone().try_into().map_err(|_| DiagnoseError::Joints(self.arm.joints.len()))?;
+        let joints: [ChainJoint<f64>; N] = self
+            .arm
+            .chain
+            .joints
+            .clone()
+            .try_into()
+            .map_err(|_| DiagnoseError::Joints(self.arm.chain.joints.len()))?;
         let theta: [f64; P] = self.arm.theta.clone().try_into().map_err(|_| sizes(self.arm.theta.len()))?;
         if self.arm.sigma.len() != P || P != PARAMETERS_PER_JOINT * N {
             return Err(sizes(self.arm.sigma.len()));
         }
-        let arm = Chain::new(joints, self.arm.gravity);
+        let arm = Chain::new(joints, self.arm.chain.gravity);
         let progress = ProgressReporter::new(Observer::clone(self.observer));
         let training = self.set::<N, P>("training", self.training, &arm, &theta)?;
         let holdout = self.set::<N, P>("holdout", self.holdout, &arm, &theta)?;

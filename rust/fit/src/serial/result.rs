@@ -16,7 +16,7 @@ use crate::report::{
 };
 use crate::verdict::Evidence;
 use crate::window::Dataset;
-use armgap_core::chain::{Chain, parameter};
+use armgap_core::chain::Chain;
 use armgap_core::effect::{Scope, catalogue};
 
 /// Quantile of the normal distribution for bounds at 95 %.
@@ -379,22 +379,20 @@ fn status(found: &Found, tested: &Tested, rotary: &[bool]) -> RuledOut {
 }
 
 fn values(description: &SerialArm, theta: &[f64], sigma: &[f64]) -> Named<Value> {
-    let kinds: Vec<_> = description.joints.iter().map(|j| j.kind).collect();
-    let one = |i: usize| {
-        let p = parameter(&kinds, i)?;
-        Some((p.to_string(), Value { value: theta[i], sigma: sigma[i], unit: p.unit }))
-    };
-    (0..theta.len()).filter_map(one).collect()
+    let names = description.chain.parameters().into_iter();
+    names
+        .zip(theta.iter().zip(sigma))
+        .map(|((name, unit), (value, sigma))| (name, Value { value: *value, sigma: *sigma, unit }))
+        .collect()
 }
 
 fn summary(description: &SerialArm) -> ArmSummary {
-    let kinds: Vec<_> = description.joints.iter().map(|j| j.kind).collect();
-    let parameters: Vec<_> = (0..description.theta.len()).filter_map(|i| parameter(&kinds, i)).collect();
+    let (parameter_names, parameter_units) = description.chain.parameters().into_iter().unzip();
     ArmSummary {
         kind: "serial",
-        n_joints: kinds.len(),
-        parameter_names: parameters.iter().map(ToString::to_string).collect(),
-        parameter_units: parameters.iter().map(|p| p.unit).collect(),
+        n_joints: description.chain.joints.len(),
+        parameter_names,
+        parameter_units,
         joint_unit: description.rotary().iter().map(|turns| if *turns { "rad" } else { "m" }).collect(),
     }
 }

@@ -383,7 +383,11 @@ mod tests {
         let prior = prior([1.0, 1.0], [10.0, 10.0]);
         let regression = Regression::reweighted(&rows, &prior, &extra);
         let found = regression.estimate(&extra);
-        assert!((found.theta[0] - 3.0).abs() < 1e-3 && (found.theta[1] - 0.5).abs() < 1e-3, "{:?}", found.theta);
+        assert!(
+            (found.theta[0] - 3.0).abs() < 1e-3 && (found.theta[1] - 0.5).abs() < 1e-3,
+            "{:?}",
+            found.theta
+        );
     }
 
     #[test]
@@ -449,6 +453,10 @@ mod tests {
             .collect();
         assert!(correlation_length(&white) < 1.3);
         // Of a first-order process (1 + a) / (1 - a).
-        assert!((correlation_length(&coloured) / 9.0 - 1.0).abs() < 0.35, "{}", correlation_length(&coloured));
+        assert!(
+            (correlation_length(&coloured) / 9.0 - 1.0).abs() < 0.35,
+            "{}",
+            correlation_length(&coloured)
+        );
     }
 }

@@ -385,7 +385,29 @@ impl Search<'_> {
         let last = model.terms.len();
         let accepted: Vec<&Fitted> =
             fitted.iter().filter(|with| self.evidence(regression, model, with, last).is_accepted()).collect();
-        if std::env::var_os("TRACE").is_some() { let mut f: Vec<&Fitted> = fitted.iter().collect(); f.sort_by(|a,b| a.total().total_cmp(&b.total())); eprintln!("-- total {:.1} prior {:.1} holdout {:.1}", model.total(), model.estimate.prior_cost, model.holdout_cost()); for w in f.iter().take(8) { eprintln!("   {} {:?} {:?} total {:.1} {:?}", w.terms[last].name(), w.terms[last].joint(), w.terms[last].p, w.total(), self.evidence(regression, model, w, last)); } for (t,g) in screened.iter().take(12) { eprintln!("      {} {:?} {:.1} {:?}", t.name(), t.joint(), g, t.p);} }
+        if std::env::var_os("TRACE").is_some() {
+            let mut f: Vec<&Fitted> = fitted.iter().collect();
+            f.sort_by(|a, b| a.total().total_cmp(&b.total()));
+            eprintln!(
+                "-- total {:.1} prior {:.1} holdout {:.1}",
+                model.total(),
+                model.estimate.prior_cost,
+                model.holdout_cost()
+            );
+            for w in f.iter().take(8) {
+                eprintln!(
+                    "   {} {:?} {:?} total {:.1} {:?}",
+                    w.terms[last].name(),
+                    w.terms[last].joint(),
+                    w.terms[last].p,
+                    w.total(),
+                    self.evidence(regression, model, w, last)
+                );
+            }
+            for (t, g) in screened.iter().take(12) {
+                eprintln!("      {} {:?} {:.1} {:?}", t.name(), t.joint(), g, t.p);
+            }
+        }
         let best = accepted.iter().min_by(|a, b| a.total().total_cmp(&b.total()))?;
         let term = &best.terms[last];
         Some(self.everywhere(regression, model, &screened, term).unwrap_or_else(|| vec![term.clone()]))
