@@ -14,11 +14,12 @@ import numpy as np
 
 from armgap import _native, options
 from armgap._renamed import old_names
-from armgap.arm import Arm, only_planar
+from armgap.arm import Arm
 from armgap.check import Check, Corrections, torque_unit
 from armgap.check.time_shift import causal
 from armgap.custom_effect import CustomEffect, TorqueTables, check_effects
-from armgap.evidence import laws, plausibility
+from armgap.errors import OptionError
+from armgap.evidence import consistency, laws, plausibility
 from armgap.literals import Status, Verdict
 from armgap.log import Log
 from armgap.log.findings import remarks
@@ -388,7 +389,11 @@ def diagnose(
     }
     check_effects(effects)
     arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
-    only_planar(arm, "diagnose")
+    if arm.chain is not None and effects:
+        raise OptionError(
+            "a serial arm's diagnosis takes no effects of your own",
+            remedy="leave them out, or use a planar kind of arm",
+        )
     with use_callback(progress):
         given = prepare(logs, holdout, arm, corrections or Corrections(), settings, repair=repair)
         return _diagnose(given, settings, effects)
@@ -428,8 +433,11 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     data["checks"] = [check.to_dict() for check in checks]
     known, corrected_logs = tables.applied(data, (*training, *held))
     count = len(training)
-    data["laws"] = laws(known, arm, corrected_logs[:count], corrected_logs[count:])
-    data["plausibility"] = plausibility(known, arm)
+    if arm.chain is None:
+        data["laws"] = laws(known, arm, corrected_logs[:count], corrected_logs[count:])
+        data["plausibility"] = plausibility(known, arm)
+    else:
+        data["plausibility"] = consistency(known, arm)
     data["input"] = _input(arm, training, held)
     data["provenance"] = given.provenance
     data["log_findings"] = [
@@ -456,7 +464,13 @@ def _input(arm: Arm, training: list[Log], held: list[Log]) -> dict[str, Any]:
                 "units": dict(log.units),
             }
             found.setdefault((use, name), entry)["rows"] += len(log)
-    return {"logs": list(found.values()), "units": si(arm.rotary)}
+    return {"logs": list(found.values()), "units": si(_rotary(arm))}
+
+
+def _rotary(arm: Arm) -> bool | None:
+    """Whether all joints turn, or none does; None where some do."""
+    turning = set(arm.rotary_joints)
+    return turning.pop() if len(turning) == 1 else None
 
 
 def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> list[Check]:

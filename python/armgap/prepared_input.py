@@ -101,6 +101,8 @@ def _examined(given: PreparedInput, horizon: float, *, repair: bool) -> Prepared
                 remedy="give a longer log or a shorter --horizon",
                 file=log.path or log.name,
             )
+    if given.arm.chain is not None:
+        return replace(given, training=training, holdout=held)
     try:
         found = examine(training, held, given.arm, horizon=horizon, repair=repair)
     except ValueError as error:

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from armgap import _native
 from armgap.errors import OptionError
 from armgap.rigid_body import INERTIAL_NAMES, INERTIAL_UNITS
 
@@ -125,6 +126,21 @@ class SerialChain:
         viscous = ["N m s/rad" if turns else "N s/m" for turns in self.rotary]
         coulomb = ["N m" if turns else "N" for turns in self.rotary]
         return (*(INERTIAL_UNITS * self.n_joints), *rotor, *viscous, *coulomb)
+
+    def native(self) -> _native.Chain:
+        """Return the dynamics of the chain: inertia matrices, torques and regressors over arrays of states, and its simulation.
+
+        Raises
+        ------
+        OptionError
+            If the chain has more joints than the core computes with.
+        """
+        try:
+            return _native.Chain(list(self.kinds), self.rotation, self.translation, self.axis, self.gravity)
+        except ValueError as error:
+            raise OptionError(
+                str(error), remedy="freeze the joints that do not move, see [frozen] of the arm file"
+            ) from None
 
     def to_native(self) -> dict[str, Any]:
         """Return the chain as the compiled core takes it: nested lists."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armgap import _native, options
-from armgap.arm import Arm, only_planar
+from armgap.arm import Arm
 from armgap.errors import OptionError
 from armgap.log import Log
 from armgap.progress import report_progress
@@ -149,7 +149,6 @@ def simulate(
     OptionError
         If a shape, an effect or a value is impossible, or the motion diverges.
     """
-    only_planar(arm, "simulate")
     seed = options.seed(seed)
     _check_effects(effects)
     t = np.ascontiguousarray(t, dtype=np.float64)
@@ -163,22 +162,29 @@ def simulate(
     if not (noise >= 0 and np.isfinite(noise)):
         raise OptionError(f"the noise is {noise}", remedy="give its standard deviation, 0 or more")
     placed = [(e.name, e.joint, dict(e.parameters)) for e in effects]
-    lengths = None if arm.link_length is None else arm.link_length.tolist()
     try:
-        q, dq = _native.simulate(
-            arm.kind,
-            arm.gravity,
-            lengths,
-            arm.theta.tolist(),
-            t,
-            tau,
-            start,
-            speed,
-            placed,
-            tolerance,
-            smoothing,
-            report_progress,
-        )
+        if arm.chain is not None:
+            theta = arm.theta.tolist()
+            motion = arm.chain.native().simulate(
+                theta, t, tau, start, speed, placed, tolerance, smoothing, report_progress
+            )
+        else:
+            lengths = None if arm.link_length is None else arm.link_length.tolist()
+            motion = _native.simulate(
+                arm.kind,
+                arm.gravity,
+                lengths,
+                arm.theta.tolist(),
+                t,
+                tau,
+                start,
+                speed,
+                placed,
+                tolerance,
+                smoothing,
+                report_progress,
+            )
+        q, dq = motion
     except (ValueError, TypeError, OverflowError) as error:
         raise OptionError(str(error), remedy="see `armgap.effects()` and the arm file") from None
     if noise > 0:

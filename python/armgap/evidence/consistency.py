@@ -1,0 +1,46 @@
+"""Whether the estimated links of a serial arm are such as a body can have."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from armgap.arm import Arm
+from armgap.rigid_body import inconsistency
+
+__all__ = ["consistency"]
+
+_NUMBERS = 10
+
+
+def consistency(data: dict[str, Any], arm: Arm) -> list[dict[str, Any]]:
+    """Return what makes the links of a serial arm's model with causes physically possible or not.
+
+    A link's ten numbers are estimated one by one, as motion tells only sums of them; where the nominal values hold the rest, a single link may
+    come out with a mass or inertia that no body has although the arm's torques are right.
+
+    Parameters
+    ----------
+    data : dict
+        JSON object of the diagnosis.
+    arm : Arm
+        Nominal model, of kind ``"serial"``.
+
+    Returns
+    -------
+    list of dict
+        ``check`` in words, ``holds`` (bool) and ``figure`` as `plausibility` returns them; one per link.
+    """
+    if arm.chain is None:
+        return []
+    found = data["parameters"]["with_causes"]
+    values = np.array([found[name]["value"] for name in arm.parameter_names[: _NUMBERS * arm.n_joints]])
+    entries = []
+    for link, ten in zip(arm.chain.link_names, values.reshape(-1, _NUMBERS), strict=True):
+        problem = inconsistency(ten)
+        figure = problem or f"mass {ten[0]:.3g} kg"
+        entries.append(
+            {"check": f"{link} has a mass and inertia that a body can have", "holds": not problem, "figure": figure}
+        )
+    return entries
