@@ -102,7 +102,14 @@ def _examined(given: PreparedInput, horizon: float, *, repair: bool) -> Prepared
                 file=log.path or log.name,
             )
     if given.arm.chain is not None:
-        return replace(given, training=training, holdout=held)
+        corrections, found_in_all = contradictions([*training, *held], given.arm)
+        return replace(
+            given,
+            training=[corrections.on_log(log) for log in training],
+            holdout=[corrections.on_log(log) for log in held],
+            arm=corrections.on_arm(given.arm),
+            checks=(*found_in_all, *given.checks),
+        )
     try:
         found = examine(training, held, given.arm, horizon=horizon, repair=repair)
     except ValueError as error:

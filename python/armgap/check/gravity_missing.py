@@ -13,7 +13,8 @@ __all__ = ["readings"]
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
     """Yield the arm without its weights, where it has any."""
-    if arm.theta[arm.gravity_parameters].any():
+    weighs = arm.theta[arm.gravity_parameters] if arm.chain is None else arm.chain.gravity
+    if weighs.any():
         yield reading(
             "gravity_missing",
             "the torques carry no weight: logged after gravity compensation, or moved in a horizontal plane",

@@ -26,13 +26,13 @@ pub const ALIKE: f64 = 0.05;
 pub const ALIKE_COST: f64 = 4.0;
 
 /// Candidates that are fitted after all were tested to first order.
-pub const FINALISTS: usize = 14;
+pub const FINALISTS: usize = 8;
 
 /// Iterations of a fit at most, and the relative decrease of the cost that ends it.
-pub const ITERATIONS: usize = 10;
+pub const ITERATIONS: usize = 6;
 
 /// See [`ITERATIONS`].
-pub const ENOUGH: f64 = 1e-4;
+pub const ENOUGH: f64 = 1e-3;
 
 /// Resamples of the blocks behind a probability.
 pub const RESAMPLES: usize = 400;

@@ -22,6 +22,9 @@ const MOSTLY_AT_REST: f64 = 0.1;
 /// Displacement of the base's tilt for its derivative, rad; the torque is smooth in it.
 const TILT_STEP: f64 = 1e-4;
 
+/// Time over which the rate of the inertia matrix along the motion is taken, s.
+const RATE_STEP: f64 = 1e-5;
+
 /// An arm along logs.
 pub struct Equation<const N: usize, const P: usize> {
     /// The arm.
@@ -150,6 +153,30 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         (variance * square).sqrt()
     }
 
+    /// Row by row of joint `j`, how the sign of its velocity differs when it is regularised over `width`, rad/s (m/s), as `tanh(dq / width)`.
+    pub fn regularised(&self, j: usize, width: f64) -> Vec<f64> {
+        let row = |i: &usize| {
+            let phi = &self.functions[*i];
+            let middles = &self.logs[phi.log].middles;
+            let at = |k: usize| {
+                let dq = middles[k].dq[j];
+                phi.weight(&middles[k]) * ((dq / width).tanh() - sign(dq))
+            };
+            phi.reach().map(at).sum()
+        };
+        self.kept[j].iter().map(row).collect()
+    }
+
+    /// Regularises the Coulomb friction of every joint over a width; zero leaves it dry.
+    pub fn regularise(&mut self, widths: &[f64]) {
+        for (j, width) in widths.iter().enumerate().filter(|(_, width)| **width > 0.0) {
+            let change = self.regularised(j, *width);
+            for (psi, change) in self.rows.joints[j].psi.chunks_exact_mut(P).zip(change) {
+                psi[P - N + j] += change;
+            }
+        }
+    }
+
     /// The torque of a term that the arm needs on top of its own, row by row: what it would take from the left-hand side.
     pub fn signal(&self, term: &Term, theta: &[f64; P]) -> Signal {
         match term.kind {
@@ -227,14 +254,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         let (spec, j) = (effect.law.spec(), effect.joint);
         let viscous = self.arm.viscous(theta)[j];
         let coulomb = self.arm.coulomb(theta)[j];
-        let rigid = RigidArm {
-            arm: self.arm,
-            theta: *theta,
-            viscous: [0.0; N],
-            coulomb: [0.0; N],
-            constant_inertia: self.arm.constant_inertia(theta),
-            tilt: 0.0,
-        };
+        let rigid = self.rigid(theta);
         let needs_load = spec.name == "load_dependent_friction" || spec.name == "gear_efficiency";
         let (mut memory, mut before) = (0.0, None);
         let torque = |m: &Middle<N>| {
@@ -266,7 +286,6 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     /// Measured positions that are not the joints': difference of the arm's own torque along both.
     fn displaced(&self, effect: &EffectInstance, theta: &[f64; P]) -> Signal {
         let j = effect.joint;
-        let theta = SVector::from(*theta);
         let actual = |reading: f64| {
             let mut q = reading;
             for _ in 0..4 {
@@ -278,29 +297,19 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             .logs
             .iter()
             .map(|log| {
-                log.middles
-                    .par_iter()
-                    .map(|m| {
-                        let mut there = *m;
-                        let step = 0.5 * m.h * m.mean_dq[j];
-                        let (from, to) = (actual(m.q[j] - step), actual(m.q[j] + step));
-                        there.q[j] = 0.5 * (from + to);
-                        there.mean_dq[j] = (to - from) / m.h;
-                        if m.mean_dq[j] != 0.0 {
-                            there.dq[j] = m.dq[j] * there.mean_dq[j] / m.mean_dq[j];
-                        }
-                        let at = |m: &Middle<N>| {
-                            let (q, dq) = (SVector::from(m.q), SVector::from(m.dq));
-                            let momentum: nalgebra::SMatrix<f64, N, P> =
-                                self.arm.momentum_regressor(&q, &SVector::from(m.mean_dq));
-                            let rest: nalgebra::SMatrix<f64, N, P> =
-                                self.arm.potential_regressor(&q, &dq) + self.arm.friction_regressor(&dq);
-                            [momentum * theta, rest * theta]
-                        };
-                        let ([pa, ra], [pb, rb]) = (at(&there), at(m));
-                        [pa - pb, ra - rb]
-                    })
-                    .collect()
+                let at = |m: &Middle<N>| {
+                    let mut there = *m;
+                    let step = 0.5 * m.h * m.mean_dq[j];
+                    let (from, to) = (actual(m.q[j] - step), actual(m.q[j] + step));
+                    there.q[j] = 0.5 * (from + to);
+                    there.mean_dq[j] = (to - from) / m.h;
+                    if m.mean_dq[j] != 0.0 {
+                        there.dq[j] = m.dq[j] * there.mean_dq[j] / m.mean_dq[j];
+                    }
+                    let ([pa, ra], [pb, rb]) = (self.parts(&there, theta), self.parts(m, theta));
+                    [pa - pb, ra - rb]
+                };
+                log.middles.par_iter().map(at).collect()
             })
             .collect();
         let joint = |joint: usize| {
@@ -316,6 +325,28 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             Some(self.kept[joint].iter().map(row).collect())
         };
         (0..N).map(joint).collect()
+    }
+
+    /// Momentum, and the rest of the torque: `C dq + g - dM/dt dq` and friction.
+    fn parts(&self, m: &Middle<N>, theta: &[f64; P]) -> [SVector<f64, N>; 2] {
+        let (q, dq) = (SVector::from(m.q), SVector::from(m.dq));
+        let momentum = self.arm.inertia(theta, &q) * SVector::from(m.mean_dq);
+        let ahead = self.arm.inertia(theta, &(q + dq * RATE_STEP)) * dq;
+        let behind = self.arm.inertia(theta, &(q - dq * RATE_STEP)) * dq;
+        let bias = SVector::from(self.rigid(theta).equation_terms(&JointState { q: m.q, dq: m.dq }).bias);
+        let friction = self.arm.friction(theta, &dq);
+        [momentum, bias - (ahead - behind) / (2.0 * RATE_STEP) + friction]
+    }
+
+    fn rigid(&self, theta: &[f64; P]) -> RigidArm<f64, Chain<f64, N>, N, P> {
+        RigidArm {
+            arm: self.arm,
+            theta: *theta,
+            viscous: [0.0; N],
+            coulomb: [0.0; N],
+            constant_inertia: self.arm.constant_inertia(theta),
+            tilt: 0.0,
+        }
     }
 
     /// Gravity from another direction: to first order in the tilt.

@@ -10,6 +10,7 @@ mod constants;
 mod equation;
 mod intervals;
 mod predict;
+mod regularisation;
 mod result;
 mod rows;
 mod search;
@@ -125,13 +126,19 @@ impl Request<'_> {
         }
         let arm = Chain::new(joints, self.arm.chain.gravity);
         let progress = ProgressReporter::new(Observer::clone(self.observer));
-        let training = self.set::<N, P>("training", self.training, &arm, &theta)?;
-        let holdout = self.set::<N, P>("holdout", self.holdout, &arm, &theta)?;
+        let mut training = self.set::<N, P>("training", self.training, &arm, &theta)?;
+        let mut holdout = self.set::<N, P>("holdout", self.holdout, &arm, &theta)?;
         let prior = Prior {
             theta: theta.to_vec(),
             sigma: self.arm.sigma.clone(),
             positive: (0..P).map(|i| i >= 10 * N).collect(),
         };
+        let widths = {
+            let equation = &training.equation;
+            regularisation::widths(&equation.rows, &prior, |j, width| equation.regularised(j, width))
+        };
+        training.equation.regularise(&widths);
+        holdout.equation.regularise(&widths);
         let search = Search {
             training: &training.equation,
             holdout: &holdout.equation,
@@ -143,6 +150,7 @@ impl Request<'_> {
         let found = search.run(self.options.max_causes, self.options.seed);
         let mut diagnosis =
             result::assemble(self.arm, &arm, &training, &holdout, &found, self.options, &progress);
+        diagnosis.notes.extend(result::regularised(&widths));
         diagnosis.seconds = started.elapsed().as_secs_f64();
         Ok(diagnosis)
     }

@@ -407,6 +407,19 @@ fn logs<const N: usize>(data: &Dataset<N>) -> Vec<LogSummary> {
     data.tracks.iter().enumerate().map(of).collect()
 }
 
+/// Remark on friction that is not dry.
+pub(crate) fn regularised(widths: &[f64]) -> Option<String> {
+    let wide: Vec<String> = widths
+        .iter()
+        .enumerate()
+        .filter(|(_, width)| **width > 0.0)
+        .map(|(j, width)| format!("{width} on joint {}", j + 1))
+        .collect();
+    (!wide.is_empty()).then(|| {
+        format!("the logs fit friction that changes its sign over a width better than dry friction, rad/s (m/s): {}", wide.join(", "))
+    })
+}
+
 /// Remarks: what share of each joint's torque stays unexplained, and which joints hardly move.
 fn notes<const N: usize, const P: usize>(
     found: &Found,

@@ -291,9 +291,6 @@ impl<'a> Regression<'a> {
         Some(Score {
             size: size.iter().copied().collect(),
             gain,
-            distinct: (0..k)
-                .map(|i| information[(i, i)] / own[(i, i)].max(f64::MIN_POSITIVE))
-                .fold(1.0, f64::min),
             inverse,
             solved,
         })
@@ -344,8 +341,6 @@ pub struct Score {
     pub size: Vec<f64>,
     /// Decrease of the cost.
     pub gain: f64,
-    /// Least share of a torque that the parameters cannot imitate.
-    pub distinct: f64,
     /// Inverse of the information on the sizes.
     inverse: DMatrix<f64>,
     /// Parameters that imitate each torque.

@@ -41,6 +41,12 @@ pub struct Search<'a> {
     pub progress: &'a ProgressReporter,
 }
 
+/// A term at an initial guess with the torques of its first-order test, along the training logs.
+struct Guess {
+    term: Term,
+    columns: Vec<Signal>,
+}
+
 /// A model with terms, fitted to the training logs and judged on the holdout.
 #[derive(Debug, Clone)]
 pub struct Fitted {
@@ -129,10 +135,6 @@ pub struct Named {
 pub struct Tested {
     /// The term at its best guess.
     pub term: Term,
-    /// Decrease of the cost, to first order.
-    pub gain: f64,
-    /// Least share of its torque that the parameters cannot imitate.
-    pub distinct: f64,
     /// Size and its robust standard deviation, relative to the term as given.
     pub size: [f64; 2],
     /// RMS of its torque beside that of the joint's, per unit of size.
@@ -153,8 +155,6 @@ pub struct Found {
     pub tested: Vec<Tested>,
     /// Standard deviations of the arm's parameters: re-estimated, and with the terms.
     pub sigma: [Vec<f64>; 2],
-    /// Noise that measured positions put into the holdout's cost, by joint.
-    pub floor: Vec<f64>,
 }
 
 impl Search<'_> {
@@ -166,16 +166,17 @@ impl Search<'_> {
         let mut model = self.fit(&regression, Vec::new(), &self.prior.theta);
         let refit = model.clone();
         let sigma = regression.sigma();
+        let guesses = self.guesses(&model.estimate.theta);
         for _ in 0..most {
-            let Some(added) = self.best_addition(&regression, &model) else { break };
+            let Some(added) = self.best_addition(&guesses, &regression, &model) else { break };
             let mut terms = model.terms.clone();
             terms.extend(added);
             let beside = self.beside(self.training, &terms, &model.estimate.theta);
             regression = Regression::reweighted(self.training.rows(), self.prior, &beside);
             model = self.without_idle(&regression, self.fit(&regression, terms, &model.estimate.theta));
-            model = self.swapped(&regression, model);
+            model = self.swapped(&guesses, &regression, model);
         }
-        self.concluded(&regression, refit, model, sigma, seed)
+        self.concluded(&guesses, &regression, [refit, model], sigma, seed)
     }
 
     /// Torques of all terms together.
@@ -279,27 +280,36 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Tests a term to first order; returns it with the suggested values.
-    fn test(&self, regression: &Regression, at: &Estimate, term: &Term) -> Option<(Term, f64)> {
-        let theta = &at.theta;
+    /// Every candidate at every initial guess with the torques that test it.
+    fn guesses(&self, theta: &[f64]) -> Vec<Vec<Guess>> {
+        let columns = |term: &Term| -> Vec<Signal> {
+            match term.kind {
+                TermKind::Payload => {
+                    let link = Term::neutral(TermKind::NominalLink(self.rotary.len() - 1));
+                    (0..term.p.len()).map(|i| self.unit(&link, i, theta)).collect()
+                }
+                _ if term.amplitudes() == 0 => vec![self.training.signal(term, theta)],
+                _ => (0..term.amplitudes()).map(|i| self.unit(term, i, theta)).collect(),
+            }
+        };
+        let guess = |term: &Term| Guess { term: term.clone(), columns: columns(term) };
+        self.candidates.par_iter().map(|group| group.iter().map(guess).collect()).collect()
+    }
+
+    /// Tests a term to first order; returns it with the values that the test suggests, and the decrease of the cost.
+    fn test(&self, regression: &Regression, at: &Estimate, guess: &Guess) -> Option<(Term, f64)> {
+        let term = &guess.term;
         let bounds = term.parameters(self.rotary_of(term));
         let within = |p: &[f64]| p.iter().zip(&bounds).all(|(p, b)| *p >= b.bounds[0] && *p <= b.bounds[1]);
+        let score = regression.score(at, &guess.columns)?;
         if let TermKind::Payload = term.kind {
-            let last = self.rotary.len() - 1;
-            let columns: Vec<Signal> =
-                (0..4).map(|i| self.unit(&Term::neutral(TermKind::NominalLink(last)), i, theta)).collect();
-            let score = regression.score(at, &columns)?;
             let mass = score.size[0];
-            if mass <= 0.0 {
-                return None;
-            }
-            let p = vec![mass, score.size[1] / mass, score.size[2] / mass, score.size[3] / mass];
-            return Some((term.with(p), score.gain));
+            let p: Vec<f64> =
+                score.size.iter().enumerate().map(|(i, x)| if i == 0 { *x } else { x / mass }).collect();
+            return (mass > 0.0).then(|| (term.with(p), score.gain));
         }
         let count = term.amplitudes();
         if count > 0 {
-            let columns: Vec<Signal> = (0..count).map(|i| self.unit(term, i, theta)).collect();
-            let score = regression.score(at, &columns)?;
             let mut p = term.p.clone();
             for i in 0..count {
                 p[i] = bounds[i].neutral + score.size[i];
@@ -307,8 +317,6 @@ impl Search<'_> {
             return within(&p).then(|| (term.with(p), score.gain));
         }
         let TermKind::Law(effect) = term.kind else { return None };
-        let column = self.training.signal(term, theta);
-        let score = regression.score(at, std::slice::from_ref(&column))?;
         let size = score.size[0];
         let information = score.gain / (size * size).max(f64::MIN_POSITIVE);
         let (p, size) = match effect.law.spec().trial {
@@ -342,18 +350,17 @@ impl Search<'_> {
     }
 
     /// Best initial guess of every place that is not in the model, best first.
-    fn screened(&self, regression: &Regression, model: &Fitted) -> Vec<(Term, f64)> {
-        let open: Vec<&Vec<Term>> = self
-            .candidates
+    fn screened(&self, guesses: &[Vec<Guess>], regression: &Regression, model: &Fitted) -> Vec<(Term, f64)> {
+        let open: Vec<&Vec<Guess>> = guesses
             .iter()
-            .filter(|group| !model.terms.iter().any(|t| group.first().is_some_and(|g| g.same_place(t))))
+            .filter(|group| !model.terms.iter().any(|t| group.first().is_some_and(|g| g.term.same_place(t))))
             .collect();
         self.progress.begin(Phase::Screen, open.len());
         let mut found: Vec<(Term, f64)> = open
             .par_iter()
             .filter_map(|group| {
                 self.progress.unit();
-                let tests = group.iter().filter_map(|term| self.test(regression, &model.estimate, term));
+                let tests = group.iter().filter_map(|guess| self.test(regression, &model.estimate, guess));
                 tests.max_by(|a, b| a.1.total_cmp(&b.1))
             })
             .filter(|(_, gain)| gain.is_finite())
@@ -379,35 +386,17 @@ impl Search<'_> {
     }
 
     /// The terms of the best decision; none where no candidate is accepted.
-    fn best_addition(&self, regression: &Regression, model: &Fitted) -> Option<Vec<Term>> {
-        let screened = self.screened(regression, model);
+    fn best_addition(
+        &self,
+        guesses: &[Vec<Guess>],
+        regression: &Regression,
+        model: &Fitted,
+    ) -> Option<Vec<Term>> {
+        let screened = self.screened(guesses, regression, model);
         let fitted = self.finalists(regression, model, &screened);
         let last = model.terms.len();
         let accepted: Vec<&Fitted> =
             fitted.iter().filter(|with| self.evidence(regression, model, with, last).is_accepted()).collect();
-        if std::env::var_os("TRACE").is_some() {
-            let mut f: Vec<&Fitted> = fitted.iter().collect();
-            f.sort_by(|a, b| a.total().total_cmp(&b.total()));
-            eprintln!(
-                "-- total {:.1} prior {:.1} holdout {:.1}",
-                model.total(),
-                model.estimate.prior_cost,
-                model.holdout_cost()
-            );
-            for w in f.iter().take(8) {
-                eprintln!(
-                    "   {} {:?} {:?} total {:.1} {:?}",
-                    w.terms[last].name(),
-                    w.terms[last].joint(),
-                    w.terms[last].p,
-                    w.total(),
-                    self.evidence(regression, model, w, last)
-                );
-            }
-            for (t, g) in screened.iter().take(12) {
-                eprintln!("      {} {:?} {:.1} {:?}", t.name(), t.joint(), g, t.p);
-            }
-        }
         let best = accepted.iter().min_by(|a, b| a.total().total_cmp(&b.total()))?;
         let term = &best.terms[last];
         Some(self.everywhere(regression, model, &screened, term).unwrap_or_else(|| vec![term.clone()]))
@@ -505,14 +494,14 @@ impl Search<'_> {
     }
 
     /// Puts a rival in the place of a term where the others beside it leave less.
-    fn swapped(&self, regression: &Regression, model: Fitted) -> Fitted {
+    fn swapped(&self, guesses: &[Vec<Guess>], regression: &Regression, model: Fitted) -> Fitted {
         let mut model = model;
         for index in 0..model.terms.len() {
             if model.terms.len() < 2 {
                 break;
             }
             let without = self.without(regression, &model, index);
-            let screened = self.screened(regression, &without);
+            let screened = self.screened(guesses, regression, &without);
             let last = without.terms.len();
             let rival = self
                 .finalists(regression, &without, &screened)
@@ -532,20 +521,19 @@ impl Search<'_> {
     /// Probabilities, look-alikes, and tests of what is not in the model.
     fn concluded(
         &self,
+        guesses: &[Vec<Guess>],
         regression: &Regression,
-        refit: Fitted,
-        model: Fitted,
+        [refit, model]: [Fitted; 2],
         refit_sigma: Vec<f64>,
         seed: u64,
     ) -> Found {
-        let floor = self.floor(regression);
         let mut named: Vec<Named> =
-            (0..model.terms.len()).map(|i| self.named(regression, &model, i, &floor, seed)).collect();
+            (0..model.terms.len()).map(|i| self.named(guesses, regression, &model, i, seed)).collect();
         named.sort_by(|a, b| {
             (b.evidence.gain + b.evidence.holdout_gain)
                 .total_cmp(&(a.evidence.gain + a.evidence.holdout_gain))
         });
-        let tested = self.tested(regression, &model);
+        let tested = self.tested(guesses, regression, &model);
         // Re-estimated costs are comparable only under the same weights.
         let refit = if model.terms.is_empty() {
             refit
@@ -554,7 +542,7 @@ impl Search<'_> {
         };
         let probable = named.iter().filter(|n| n.probability >= NAMED).map(|n| n.term.clone()).collect();
         let reported = self.fit(regression, probable, &model.estimate.theta);
-        Found { refit, named, reported, tested, sigma: [refit_sigma, regression.sigma()], floor, model }
+        Found { refit, named, reported, tested, sigma: [refit_sigma, regression.sigma()], model }
     }
 
     /// Cost that noisy positions alone put into the holdout's rows, by joint.
@@ -566,16 +554,16 @@ impl Search<'_> {
 
     fn named(
         &self,
+        guesses: &[Vec<Guess>],
         regression: &Regression,
         model: &Fitted,
         index: usize,
-        floor: &[f64],
         seed: u64,
     ) -> Named {
         let term = model.terms[index].clone();
         let without = self.without(regression, model, index);
         let evidence = self.evidence(regression, &without, model, index);
-        let mut rivals = self.finalists(regression, &without, &self.screened(regression, &without));
+        let mut rivals = self.finalists(regression, &without, &self.screened(guesses, regression, &without));
         let last = without.terms.len();
         rivals.retain(|r| !r.terms[last].same_place(&term));
         let explained = without.total() - model.total();
@@ -584,7 +572,7 @@ impl Search<'_> {
         let mut against: Vec<&Fitted> = others.iter().collect();
         against.push(&without);
         let wins = stability(model, &against, seed);
-        let trust = trust(&without, model, &evidence, floor);
+        let trust = trust(&without, model, &evidence, &self.floor(regression));
         let columns = self.derivatives(std::slice::from_ref(&term), &model.estimate.theta);
         let sigma = regression.score(&model.estimate, &columns).map_or_else(
             || vec![f64::INFINITY; term.p.len()],
@@ -598,22 +586,22 @@ impl Search<'_> {
     }
 
     /// Tests of every place that is not in the model, beside it.
-    fn tested(&self, regression: &Regression, model: &Fitted) -> Vec<Tested> {
-        let screened = self.screened(regression, model);
+    fn tested(&self, guesses: &[Vec<Guess>], regression: &Regression, model: &Fitted) -> Vec<Tested> {
+        let screened = self.screened(guesses, regression, model);
         let open = self.candidates.iter().filter_map(|group| group.first());
         open.filter(|term| !model.terms.iter().any(|t| t.same_place(term)))
             .map(|first| {
                 let found = screened.iter().find(|(t, _)| t.same_place(first));
-                let (term, gain) = found.map_or((first.clone(), 0.0), |(t, gain)| (t.clone(), *gain));
+                let term = found.map_or_else(|| first.clone(), |(t, _)| t.clone());
                 let signal = self.training.signal(&term, &model.estimate.theta);
                 let column = std::slice::from_ref(&signal);
                 let score = regression.score(&model.estimate, column);
-                let (size, distinct) = score.map_or(([0.0, f64::INFINITY], 0.0), |score| {
+                let size = score.map_or([0.0, f64::INFINITY], |score| {
                     let sigma = regression.sandwich(&model.estimate, column, &score)[(0, 0)].max(0.0).sqrt();
-                    ([score.size[0], sigma], score.distinct)
+                    [score.size[0], sigma]
                 });
                 let consequence = consequence(self.training.rows(), &signal);
-                Tested { term, gain, distinct, size, consequence }
+                Tested { term, size, consequence }
             })
             .collect()
     }

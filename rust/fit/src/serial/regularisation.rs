@@ -1,0 +1,33 @@
+//! Width over which the sign of each joint's dry friction is regularised: a nuisance, fitted and never named.
+//!
+//! Where friction comes from a soft constraint, as in some simulators, or from grease, its torque does not jump at a reversal. What a jump in
+//! the model leaves there looks like a delay of the torque.
+
+use super::constants::PRICE;
+use super::rows::{Prior, Regression, Rows};
+
+/// Widths that are tried, rad/s (m/s).
+const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
+
+/// The width of every joint, zero for dry friction; `change(j, width)` is what a width changes in the sign's column of joint `j`'s rows.
+pub fn widths(rows: &Rows, prior: &Prior, change: impl Fn(usize, f64) -> Vec<f64>) -> Vec<f64> {
+    let joints = rows.joints.len();
+    let none = vec![None; joints];
+    let regression = Regression::reweighted(rows, prior, &none);
+    let dry = regression.estimate(&none);
+    let level = |j: usize| dry.theta[rows.parameters - joints + j];
+    let cost = |j: usize, width: f64| {
+        let mut beside = none.clone();
+        beside[j] = Some(change(j, width).iter().map(|c| level(j) * c).collect());
+        regression.estimate(&beside).cost
+    };
+    let best = |j: usize| {
+        if level(j) <= 0.0 || rows.joints[j].y.is_empty() {
+            return 0.0;
+        }
+        let tried = WIDTHS.iter().map(|width| (*width, cost(j, *width)));
+        let (width, least) = tried.fold((0.0, dry.cost - PRICE), |a, b| if b.1 < a.1 { b } else { a });
+        if least < dry.cost - PRICE { width } else { 0.0 }
+    };
+    (0..joints).map(best).collect()
+}
