@@ -41,6 +41,8 @@ MOST_BYTES = 2**28
 """Size of a diagnosis' file; the largest hold some MB."""
 MOST_CAUSES = 1000
 """More than the library can name on any arm."""
+_FILTERED_HALF_WIDTH_S = 0.4
+"""Half width of the test functions of a log that was low-passed before it was written [s]: they pass half of 1.25 Hz, less than such filters do."""
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
 
@@ -408,6 +410,8 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
         settings = settings | {"max_causes": 0}
     tables = TorqueTables.of(effects, training, held)
     settings = settings | {"own": [e.joint - 1 for e in effects]}
+    if arm.chain is not None and any(check.check == "filtered_positions" for check in given.checks):
+        settings = settings | {"half_width": _FILTERED_HALF_WIDTH_S}
     try:
         text = _native.diagnose(
             arm.to_native(),

@@ -10,6 +10,7 @@ import numpy as np
 
 from armgap.arm import Arm
 from armgap.check import Check, Corrections, copied_holdout, data_checks, examine, torque_unit
+from armgap.check.serial import contradictions
 from armgap.errors import LogShapeError, OptionError
 from armgap.log import Log, gather
 from armgap.log.stretches import choose

@@ -55,7 +55,8 @@ def look(log: Log, arm: Arm | None) -> Outcome:
     found = []
     for j in range(log.n_joints):
         step = None if steps is None else float(steps[j])
-        dry = arm is None or float(arm.theta[len(arm.theta) - arm.n_joints + j]) > 0
+        # A description says little of friction: a serial arm's joints are taken to have some.
+        dry = arm is None or arm.chain is not None or float(arm.theta[len(arm.theta) - arm.n_joints + j]) > 0
         why = _why(log, j, step, dry)
         if why:
             remedy = ("log positions as the encoder gives them",)

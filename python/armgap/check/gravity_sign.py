@@ -19,7 +19,9 @@ def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
     """Yield the arm with its gravity turned over, where it has any that no other check speaks of."""
     if arm.chain is not None:
         if arm.chain.gravity.any():
-            yield reading("gravity_sign", "gravity acts the other way than the arm file says", Corrections(gravity="reversed"))
+            yield reading(
+                "gravity_sign", "gravity acts the other way than the arm file says", Corrections(gravity="reversed")
+            )
         return
     weights = arm.theta[arm.gravity_parameters]
     if not weights.any() or (arm.rotary and arm.expects_weight):

@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.arm import Arm
-from armgap.check import gravity_missing, gravity_sign, joint_order, position_sign, position_unit, position_zero, torque_sign
+from armgap.check import (
+    gravity_missing,
+    gravity_sign,
+    joint_order,
+    position_sign,
+    position_unit,
+    position_zero,
+    torque_sign,
+)
 from armgap.check.check import Check
 from armgap.check.corrections import Corrections
 from armgap.check.reading import Reading
@@ -95,7 +103,10 @@ def contradictions(logs: Sequence[Log], arm: Arm) -> tuple[Corrections, list[Che
     stands = fit(logs, arm)
     if stands is None or (stands.share.max() < _SUSPICIOUS and stands.distance < _FAR * arm.n_joints):
         return Corrections(), []
-    tried = [(reading, fit([reading.corrections.on_log(log) for log in logs], reading.corrections.on_arm(arm))) for reading in _offered(logs, arm)]
+    tried = [
+        (reading, fit([reading.corrections.on_log(log) for log in logs], reading.corrections.on_arm(arm)))
+        for reading in _offered(logs, arm)
+    ]
     found = [(reading, other) for reading, other in tried if other is not None]
     if not found:
         return Corrections(), []

@@ -42,13 +42,16 @@ pub struct Options {
     pub max_causes: usize,
     /// Seed of the resampling that gives probabilities and intervals.
     pub seed: u64,
+    /// Half width of the test functions of a serial arm's equation of motion, s; none for the usual one. Logs that were low-passed before they were
+    /// written ask for one that is wider than that filter.
+    pub half_width: Option<f64>,
     /// Joints, from 0, of the custom effects; their torques lie in the logs' tables.
     pub custom_effects: Vec<usize>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { horizon: 0.25, max_causes: 4, seed: 1, custom_effects: Vec::new() }
+        Self { horizon: 0.25, max_causes: 4, seed: 1, half_width: None, custom_effects: Vec::new() }
     }
 }
 

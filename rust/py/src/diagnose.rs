@@ -81,6 +81,9 @@ pub fn diagnose(
     if let Some(value) = options.get_item("max_causes")? {
         chosen.max_causes = value.extract()?;
     }
+    if let Some(value) = options.get_item("half_width")? {
+        chosen.half_width = value.extract()?;
+    }
     if let Some(value) = options.get_item("own")? {
         chosen.custom_effects = value.extract()?;
     }

@@ -42,3 +42,6 @@ pub const ARM_WIDE: f64 = 0.5;
 
 /// Probability below which a cause is only a candidate.
 pub const NAMED: f64 = 0.3;
+
+/// Smallest eigenvalue of the inertia matrix, scaled to unit diagonal, beside that of the arm file: below, rollouts answer to torques as no arm does.
+pub const CONDITIONED: f64 = 0.2;

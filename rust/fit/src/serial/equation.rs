@@ -25,6 +25,9 @@ const TILT_STEP: f64 = 1e-4;
 /// Time over which the rate of the inertia matrix along the motion is taken, s.
 const RATE_STEP: f64 = 1e-5;
 
+/// Poses in which the inertia matrix is looked at.
+const POSES: usize = 200;
+
 /// An arm along logs.
 pub struct Equation<const N: usize, const P: usize> {
     /// The arm.
@@ -43,11 +46,11 @@ pub struct Equation<const N: usize, const P: usize> {
 type Torques<const N: usize> = [Option<Vec<Vec<f64>>>; N];
 
 impl<const N: usize, const P: usize> Equation<N, P> {
-    /// The equation along these logs; `theta` are nominal values.
-    pub fn new(arm: Chain<f64, N>, theta: &[f64; P], tracks: &[Track<N>]) -> Self {
+    /// The equation along these logs, weighed by test functions of this half width, s; `theta` are nominal values.
+    pub fn new(arm: Chain<f64, N>, theta: &[f64; P], tracks: &[Track<N>], half_width: f64) -> Self {
         let logs: Vec<Intervals<N>> = tracks.iter().map(Intervals::new).collect();
         let functions: Vec<TestFunction> =
-            logs.iter().enumerate().flat_map(|(i, log)| log.test_functions(i)).collect();
+            logs.iter().enumerate().flat_map(|(i, log)| log.test_functions(i, half_width)).collect();
         let mut equation = Self {
             arm,
             rows: Rows { joints: Vec::new(), parameters: P, blocks: 0 },
@@ -325,6 +328,21 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             Some(self.kept[joint].iter().map(row).collect())
         };
         (0..N).map(joint).collect()
+    }
+
+    /// Smallest eigenvalue of the inertia matrix along the logs, of the matrix scaled to unit diagonal.
+    pub fn conditioning(&self, theta: &[f64; P]) -> f64 {
+        let stride = (self.logs.iter().map(|log| log.middles.len()).sum::<usize>() / POSES).max(1);
+        let smallest = |m: &Middle<N>| {
+            let inertia = self.arm.inertia(theta, &SVector::from(m.q));
+            let scale = SVector::<f64, N>::from_fn(|j, _| 1.0 / inertia[(j, j)].max(0.0).sqrt());
+            if scale.iter().any(|s| !s.is_finite()) {
+                return -1.0;
+            }
+            let scaled = nalgebra::DMatrix::from_fn(N, N, |i, j| scale[i] * inertia[(i, j)] * scale[j]);
+            scaled.symmetric_eigenvalues().min()
+        };
+        self.logs.iter().flat_map(|log| log.middles.iter().step_by(stride)).map(smallest).fold(1.0, f64::min)
     }
 
     /// Momentum, and the rest of the torque: `C dq + g - dM/dt dq` and friction.

@@ -82,10 +82,10 @@ impl<const N: usize> Intervals<N> {
         Self { middles: (0..track.len().saturating_sub(1)).map(middle).collect(), noise: track.noise }
     }
 
-    /// Test functions over this log.
-    pub fn test_functions(&self, log: usize) -> Vec<TestFunction> {
+    /// Test functions over this log, of this half width, s, or wider where the log has few samples.
+    pub fn test_functions(&self, log: usize, half_width: f64) -> Vec<TestFunction> {
         let period = crate::track::median(self.middles.iter().map(|m| m.h).collect());
-        let half = HALF_WIDTH_S.max(FEWEST_PERIODS * period);
+        let half = half_width.max(FEWEST_PERIODS * period);
         let mut found = Vec::new();
         let mut first = 0;
         for k in 0..=self.middles.len() {
@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn test_functions_have_unit_area_and_no_net_rise() {
         let log = Intervals::new(&falling(400, 0.0025));
-        let functions = log.test_functions(0);
+        let functions = log.test_functions(0, HALF_WIDTH_S);
         assert!(functions.len() > 30);
         for phi in functions {
             let area: f64 = phi.reach().map(|k| phi.weight(&log.middles[k])).sum();
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn the_weak_form_of_an_acceleration_is_the_acceleration() {
         let log = Intervals::new(&falling(400, 0.0025));
-        for phi in log.test_functions(0) {
+        for phi in log.test_functions(0, HALF_WIDTH_S) {
             let weak: f64 = phi.reach().map(|k| -phi.rise(&log.middles[k]) * log.middles[k].mean_dq[0]).sum();
             assert!((weak - 3.0).abs() < 1e-3, "{weak}");
         }
@@ -192,6 +192,6 @@ mod tests {
         let mut track = falling(400, 0.0025);
         track.t.iter_mut().skip(200).for_each(|t| *t += 0.1);
         let log = Intervals::new(&track);
-        assert!(log.test_functions(0).iter().all(|phi| !phi.reach().contains(&199)));
+        assert!(log.test_functions(0, HALF_WIDTH_S).iter().all(|phi| !phi.reach().contains(&199)));
     }
 }

@@ -27,6 +27,7 @@ use crate::window::Dataset;
 use armgap_core::chain::{Chain, ChainJoint, JointKind, PARAMETERS_PER_JOINT};
 use armgap_core::effect::{Scope, Trial};
 use equation::Equation;
+use intervals::HALF_WIDTH_S;
 use rows::{Prior, Rows, Signal};
 use search::{Motion, Search};
 use std::time::Instant;
@@ -139,12 +140,16 @@ impl Request<'_> {
         };
         training.equation.regularise(&widths);
         holdout.equation.regularise(&widths);
+        let least = constants::CONDITIONED * training.equation.conditioning(&theta).max(0.0);
+        let is_feasible =
+            |values: &[f64]| training.equation.conditioning(&std::array::from_fn(|i| values[i])) > least;
         let search = Search {
             training: &training.equation,
             holdout: &holdout.equation,
             prior: &prior,
             candidates: candidates(&arm, &theta, &training.data.tracks),
             rotary: self.arm.rotary(),
+            is_feasible: &is_feasible,
             progress: &progress,
         };
         let found = search.run(self.options.max_causes, self.options.seed);
@@ -166,7 +171,7 @@ impl Request<'_> {
         let track =
             |log: &LogData<'_>| Track::new(&log.name, log.t, log.q, log.tau, steps).with_moments(log.moment);
         let tracks: Vec<Track<N>> = logs.iter().map(track).collect();
-        let equation = Equation::new(*arm, theta, &tracks);
+        let equation = Equation::new(*arm, theta, &tracks, self.options.half_width.unwrap_or(HALF_WIDTH_S));
         let data = Dataset::new(tracks, self.options.horizon);
         if data.windows.len() < FEWEST_WINDOWS {
             return Err(DiagnoseError::TooShort { set, windows: data.windows.len(), needed: FEWEST_WINDOWS });

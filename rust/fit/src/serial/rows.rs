@@ -288,12 +288,7 @@ impl<'a> Regression<'a> {
         let inverse = crate::solve::scaled_inverse(&information)?;
         let size = &inverse * &slope;
         let gain = slope.dot(&size);
-        Some(Score {
-            size: size.iter().copied().collect(),
-            gain,
-            inverse,
-            solved,
-        })
+        Some(Score { size: size.iter().copied().collect(), gain, inverse, solved })
     }
 
     /// Covariance of the sizes from the scatter of their scores over blocks, at an estimate that includes them (sandwich).

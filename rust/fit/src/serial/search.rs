@@ -37,6 +37,8 @@ pub struct Search<'a> {
     pub candidates: Vec<Vec<Term>>,
     /// Whether each joint turns.
     pub rotary: Vec<bool>,
+    /// Whether an arm with these parameters has a positive definite inertia matrix along its logs.
+    pub is_feasible: &'a (dyn Fn(&[f64]) -> bool + Sync),
     /// Progress report and cancellation.
     pub progress: &'a ProgressReporter,
 }
@@ -193,7 +195,7 @@ impl Search<'_> {
     pub fn fit(&self, regression: &Regression, terms: Vec<Term>, theta: &[f64]) -> Fitted {
         self.progress.check();
         let mut terms = terms;
-        let mut estimate = regression.estimate(&self.beside(self.training, &terms, theta));
+        let mut estimate = self.estimated(regression, &terms, theta);
         for _ in 0..ITERATIONS {
             if terms.is_empty() {
                 break;
@@ -204,7 +206,7 @@ impl Search<'_> {
             let mut better = None;
             for part in [1.0, 0.5, 0.2, 0.05] {
                 let moved = self.moved(&terms, &score.size, part);
-                let there = regression.estimate(&self.beside(self.training, &moved, &theta));
+                let there = self.estimated(regression, &moved, &theta);
                 if there.cost < estimate.cost {
                     better = Some((moved, there));
                     break;
@@ -220,11 +222,47 @@ impl Search<'_> {
         }
         let beside = self.beside(self.holdout, &terms, &estimate.theta);
         let held = self.holdout.rows().residual(&estimate.theta, &beside);
-        let costs = [
-            regression.rows.costs(&regression.weights, &estimate.residual),
-            self.holdout.rows().costs(&regression.weights, &held),
-        ];
+        let scaled = |motion: &dyn Motion, residual: &[Vec<f64>]| {
+            let mut costs = motion.rows().costs(&regression.weights, residual);
+            for (costs, scale) in costs.iter_mut().zip(self.scales(motion, &terms, &estimate.theta)) {
+                costs.iter_mut().for_each(|cost| *cost *= scale);
+            }
+            costs
+        };
+        let costs = [scaled(self.training, &estimate.residual), scaled(self.holdout, &held)];
         Fitted { terms, estimate, costs }
+    }
+
+    /// Parameters beside these terms, and the cost in units of the torque that reaches the joints.
+    fn estimated(&self, regression: &Regression, terms: &[Term], theta: &[f64]) -> Estimate {
+        let mut estimate = regression.estimate(&self.beside(self.training, terms, theta));
+        let scales = self.scales(self.training, terms, theta);
+        if scales.iter().any(|scale| *scale != 1.0) {
+            let data = |(j, r): (usize, &Vec<f64>)| {
+                scales[j] * regression.weights[j] * r.iter().map(|r| r * r).sum::<f64>()
+            };
+            estimate.cost = estimate.prior_cost + estimate.residual.iter().enumerate().map(data).sum::<f64>();
+        }
+        estimate
+    }
+
+    /// By joint, the mean square of the commanded torque over that of the torque which reaches the joint. A term that only makes torques smaller
+    /// makes what stays of them smaller too, and explains nothing by that.
+    fn scales(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Vec<f64> {
+        let mut scales = vec![1.0; self.rotary.len()];
+        let changing: Vec<Signal> =
+            terms.iter().filter(|t| t.changes_command()).map(|t| motion.signal(t, theta)).collect();
+        if changing.is_empty() {
+            return scales;
+        }
+        let square = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>();
+        for (j, signal) in sum(motion.rows(), &changing).iter().enumerate() {
+            let Some(signal) = signal else { continue };
+            let y = &motion.rows().joints[j].y;
+            let reaching = square(&mut y.iter().zip(signal).map(|(y, s)| y - s));
+            scales[j] = square(&mut y.iter().copied()) / reaching.max(f64::MIN_POSITIVE);
+        }
+        scales
     }
 
     fn rotary_of(&self, term: &Term) -> bool {
@@ -335,8 +373,15 @@ impl Search<'_> {
                 (p, share)
             }
         };
-        let gain = (2.0 * score.size[0] - size) * size * information;
-        (gain > 0.0 && within(&p)).then(|| (term.with(p), gain))
+        let mut gain = (2.0 * score.size[0] - size) * size * information;
+        let term = term.with(p);
+        if term.changes_command() {
+            let j = effect.joint;
+            let before = regression.weights[j] * at.residual[j].iter().map(|r| r * r).sum::<f64>();
+            gain = before
+                - (before - gain) * self.scales(self.training, std::slice::from_ref(&term), &at.theta)[j];
+        }
+        (gain > 0.0 && within(&term.p)).then_some((term, gain))
     }
 
     /// Torque per unit of one amplitude, the others switched off.
@@ -541,8 +586,32 @@ impl Search<'_> {
             self.fit(regression, Vec::new(), &refit.estimate.theta)
         };
         let probable = named.iter().filter(|n| n.probability >= NAMED).map(|n| n.term.clone()).collect();
-        let reported = self.fit(regression, probable, &model.estimate.theta);
+        let reported = self.feasible(regression, self.fit(regression, probable, &model.estimate.theta));
+        let refit = self.feasible(regression, refit);
         Found { refit, named, reported, tested, sigma: [refit_sigma, regression.sigma()], model }
+    }
+
+    /// A model whose links are so near to those of the arm file that the inertia matrix is positive definite, with rotor inertias and friction
+    /// estimated again.
+    fn feasible(&self, regression: &Regression, model: Fitted) -> Fitted {
+        if (self.is_feasible)(&model.estimate.theta) {
+            return model;
+        }
+        let links = model.estimate.theta.len() - 3 * self.rotary.len();
+        let mut prior = self.prior.clone();
+        for part in [0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0] {
+            for i in 0..links {
+                let nominal = self.prior.theta[i];
+                prior.theta[i] = nominal + part * (model.estimate.theta[i] - nominal);
+                prior.sigma[i] = 0.0;
+            }
+            let near = Regression::new(self.training.rows(), &prior, regression.weights.clone());
+            let fitted = self.fit(&near, model.terms.clone(), &prior.theta);
+            if (self.is_feasible)(&fitted.estimate.theta) {
+                return fitted;
+            }
+        }
+        model
     }
 
     /// Cost that noisy positions alone put into the holdout's rows, by joint.
@@ -752,6 +821,7 @@ mod tests {
             prior: &prior,
             candidates,
             rotary: vec![true; 2],
+            is_feasible: &|_| true,
             progress: &progress,
         };
         search.run(most, 1)

@@ -159,6 +159,11 @@ impl Term {
         matches!(self.kind, TermKind::Law(effect) if effect.law.spec().scope == Scope::Joint)
     }
 
+    /// Whether it acts on the command before that becomes a torque at the joint.
+    pub fn changes_command(&self) -> bool {
+        matches!(self.kind, TermKind::Law(effect) if effect.law.spec().hooks.command)
+    }
+
     /// This term with other values.
     pub fn with(&self, p: Vec<f64>) -> Self {
         Self { kind: self.kind, p }
