@@ -127,7 +127,9 @@ def test_such_a_limit_is_named_beside_a_push(arm: Arm, reached_in: str) -> None:
 def test_a_push_back_from_the_end_of_the_travel_is_no_stop(arm: Arm, joint: int) -> None:
     """Where the joint comes farthest in any log, so that no other motion contradicts a stop; only the form of the push does."""
     t = np.arange(3000) * arm.sample_period
-    other, torque = (simulate(arm, t, scale * sines(t, seed), noise=1e-5, seed=seed) for seed, scale in ((21, 0.7), (22, 1.0)))
+    other, torque = (
+        simulate(arm, t, scale * sines(t, seed), noise=1e-5, seed=seed) for seed, scale in ((21, 0.7), (22, 1.0))
+    )
     k = int(np.argmax(torque.q[:, joint - 1]))
     assert torque.q[k, joint - 1] > max(0.0, other.q[:, joint - 1].max())
     push = Effect("external_pulse", joint, {"impulse": -0.5, "time": float(t[k]), "duration": 0.06})
