@@ -57,6 +57,16 @@ struct PushedMotion<'a> {
     torque: &'a [f64],
 }
 
+/// A law on a joint that may stand in the place of some of the pushes.
+struct Trial {
+    /// Its first guesses, one of each of those pushes.
+    guesses: Vec<EffectInstance>,
+    /// Those pushes.
+    theirs: Vec<Disturbance>,
+    /// The other pushes.
+    others: Vec<Disturbance>,
+}
+
 /// A model beside some of the pushes, fitted to all windows of all logs, and its likelihood.
 struct Explanation<const N: usize, const P: usize> {
     fit: Fit<P>,
@@ -77,10 +87,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let scale = alone.nodes.last()?.weights.training.scale;
         let effects = &alone.model.hypothesis.effects;
         let taken = |e: &EffectInstance| effects.iter().any(|known| known.same_place(e));
-        let tried: Vec<(Vec<EffectInstance>, Vec<Disturbance>, Vec<Disturbance>)> = (0..N)
+        let tried: Vec<Trial> = (0..N)
             .flat_map(|joint| LAWS.iter().map(move |law| (joint, law)))
-            .flat_map(|(joint, law)| self.guesses(joint, law, disturbances))
-            .filter(|(guesses, ..)| guesses.iter().all(|e| !taken(e)))
+            .flat_map(|(joint, law)| self.trials(joint, law, disturbances))
+            .filter(|trial| !trial.guesses.iter().any(taken))
             .collect();
         if tried.is_empty() {
             return None;
@@ -88,23 +98,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.set_pushes(disturbances);
         let (settled, weights) = self.of_all_windows().settle(&alone.model.hypothesis, scale);
         let pushed = self.of_all_windows().explanation(settled, &weights.training, ROUNDS);
-        let found = tried.into_iter().filter_map(|(guesses, theirs, others)| {
-            self.set_pushes(&others);
-            self.law_among(&guesses, &theirs, &pushed)
+        let found = tried.into_iter().filter_map(|trial| {
+            self.set_pushes(&trial.others);
+            self.law_of(&trial, &pushed)
         });
-        let best = found.max_by(|a, b| a.probability.total_cmp(&b.probability));
+        let best = found.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, law)| law);
         self.set_pushes(&[]);
         best
     }
 
-    /// Guesses of a law on a joint, one of each push that could be its sign, with those pushes and the rest; for each side of zero of its own, as
-    /// a stop has only one.
-    fn guesses(
-        &self,
-        joint: usize,
-        law: &LawGuess,
-        disturbances: &[Disturbance],
-    ) -> Vec<(Vec<EffectInstance>, Vec<Disturbance>, Vec<Disturbance>)> {
+    /// A law on a joint in the place of the pushes that could be its signs; of each side of zero by itself, as a stop has only one.
+    fn trials(&self, joint: usize, law: &LawGuess, disturbances: &[Disturbance]) -> Vec<Trial> {
         let Some(effect) = find::<f64>(law.name) else { return Vec::new() };
         let guess = |e: &Disturbance| {
             let here = (e.push.joint == joint).then(|| pushed_motion(self.track(e.place()), &e.push))?;
@@ -120,41 +124,37 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let pushes = disturbances.iter().cloned().zip(&guessed);
             let (theirs, others): (Vec<_>, Vec<_>) = pushes.partition(|(_, guess)| ours(guess));
             let only = |pairs: Vec<(Disturbance, _)>| pairs.into_iter().map(|(e, _)| e).collect();
-            (guesses, only(theirs), only(others))
+            Trial { guesses, theirs: only(theirs), others: only(others) }
         };
-        [1.0, -1.0].map(of_side).into_iter().filter(|(guesses, ..)| !guesses.is_empty()).collect()
+        [1.0, -1.0].map(of_side).into_iter().filter(|trial| !trial.guesses.is_empty()).collect()
     }
 
-    /// The law that explains what `theirs` explain, if it does; the other pushes are in the logs.
-    fn law_among(
-        &self,
-        guesses: &[EffectInstance],
-        theirs: &[Disturbance],
-        pushed: &Explanation<N, P>,
-    ) -> Option<Cause> {
+    /// The law of a trial, if it explains what its pushes explain, and by how much its information criterion is the lower; the others are in
+    /// the logs.
+    fn law_of(&self, trial: &Trial, pushed: &Explanation<N, P>) -> Option<(f64, Cause)> {
         let all = self.of_all_windows();
         let model = &pushed.fit.hypothesis;
         let bare = all.explanation(pushed.fit.clone(), &pushed.weighting, 0).raw;
         // Windows weigh as the pushes leave them: under a model with neither they would count as outliers.
         let problem = all.problem(&pushed.weighting);
         let fitted: Vec<Fit<P>> =
-            guesses.par_iter().map(|guess| problem.solve(&model.with(*guess), Effort::ROUGH)).collect();
+            trial.guesses.par_iter().map(|guess| problem.solve(&model.with(*guess), Effort::ROUGH)).collect();
         let score = |fit: &Fit<P>| pushed.weighting.total(&fit.costs) + fit.prior_cost;
         let rough = fitted.into_iter().min_by(|a, b| score(a).total_cmp(&score(b)))?;
         let found = all.explanation(rough, &pushed.weighting, ROUNDS);
         let effect = *found.fit.hypothesis.effects.last()?;
         let windows = all.training.data.windows.len() as f64;
         let free = |values: usize| values as f64 * windows.ln();
-        let of_pushes: usize = theirs.iter().map(|e| e.push.len()).sum();
+        let of_pushes: usize = trial.theirs.iter().map(|e| e.push.len()).sum();
         let advantage = pushed.cost + free(of_pushes) - found.cost - free(effect.len());
         if advantage < 0.0 {
             return None;
         }
         let first = found.fit.hypothesis.values().len() - effect.len();
         let sigma = (first..first + effect.len()).map(|i| found.fit.sigma(i)).collect();
-        let likely = theirs.iter().map(|e| e.probability).fold(0.0, f64::max);
+        let likely = trial.theirs.iter().map(|e| e.probability).fold(0.0, f64::max);
         let probability = likely / (1.0 + (-0.5 * advantage).exp());
-        Some(Cause {
+        let cause = Cause {
             effect,
             sigma,
             probability,
@@ -163,7 +163,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             look_alikes: Vec::new(),
             evidence: Evidence { selected: probability, ..Evidence::default() },
             ground: Ground::Motion,
-        })
+        };
+        Some((advantage, cause))
     }
 
     /// This context with the windows of all logs to learn from and to judge on, as their pushes are now.
