@@ -123,6 +123,22 @@ def test_such_a_limit_is_named_beside_a_push(arm: Arm, reached_in: str) -> None:
     assert causes["external_pulse", 1]["impulse"].value == pytest.approx(1.5, rel=1e-2)
 
 
+@pytest.mark.parametrize("joint", [1, 2])
+def test_a_push_back_from_the_end_of_the_travel_is_no_stop(arm: Arm, joint: int) -> None:
+    """Where the joint comes farthest in any log, so that no other motion contradicts a stop; only the form of the push does."""
+    t = np.arange(3000) * arm.sample_period
+    other, torque = (
+        simulate(arm, t, scale * sines(t, seed), noise=1e-5, seed=seed) for seed, scale in ((21, 0.7), (22, 1.0))
+    )
+    k = int(np.argmax(torque.q[:, joint - 1]))
+    assert torque.q[k, joint - 1] > max(0.0, other.q[:, joint - 1].max())
+    push = Effect("external_pulse", joint, {"impulse": -0.5, "time": float(t[k]), "duration": 0.06})
+    pushed = simulate(arm, t, sines(t, 22), effects=[push], noise=1e-5, seed=22)
+    [cause] = diagnose(other, arm, holdout=pushed).causes
+    assert (cause.effect, cause.joint) == ("external_pulse", joint)
+    assert cause.probability > 0.9
+
+
 def test_values_of_one_log_that_differ_are_not_taken_for_pushes(arm: Arm) -> None:
     """Friction that grew between two logs."""
     t = np.arange(3000) * arm.sample_period

@@ -81,6 +81,21 @@ pub struct SplitWeighting<const N: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// This context with other windows, to learn from and to judge on.
+    pub(crate) fn on_windows(&self, data: Dataset<N>) -> Self {
+        Self {
+            arm: self.arm.clone(),
+            prior: self.prior,
+            scales: self.scales.clone(),
+            training: WindowSet::new(data.clone()),
+            holdout: WindowSet::new(data),
+            noise: self.noise,
+            sides: self.sides.clone(),
+            custom_effects: self.custom_effects.clone(),
+            progress: self.progress.aside(),
+        }
+    }
+
     /// The fitting problem on the training windows under this weighting.
     pub fn problem<'a>(&'a self, weighting: &'a Weighting<N>) -> FitProblem<'a, A, N, P> {
         self.on(&self.training, weighting)

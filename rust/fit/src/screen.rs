@@ -5,7 +5,7 @@
 
 use crate::model::{EffectInstance, Hypothesis};
 use crate::scale::Scales;
-use crate::solve::{FitProblem, neutral, scaled_inverse};
+use crate::solve::{FitProblem, inverse_of_seen, neutral};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Trial, catalogue};
 use armgap_core::transmission::Sides;
@@ -113,7 +113,7 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         own[(i, i)] += precision;
         own_score[i] += precision * (problem.prior.theta[i] - base.theta[i]);
     }
-    let inverse = scaled_inverse(&own).unwrap_or_else(|| DMatrix::zeros(k, k));
+    let inverse = inverse_of_seen(&own).unwrap_or_else(|| DMatrix::zeros(k, k));
     let score = |(i, effect): (usize, &EffectInstance)| {
         let c = k + i;
         let cross: DVector<f64> = gram.total.column(c).rows(0, k).into_owned();

@@ -328,6 +328,21 @@ pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(k, k, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
+/// Inverse of a normal matrix over the values that change some prediction; zero for those that change none, such as a stop's that no window
+/// reaches.
+pub fn inverse_of_seen(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let seen: Vec<usize> = (0..normal.nrows()).filter(|&i| normal[(i, i)] > 0.0).collect();
+    let reduced = DMatrix::from_fn(seen.len(), seen.len(), |a, b| normal[(seen[a], seen[b])]);
+    let inverse = scaled_inverse(&reduced)?;
+    let mut whole = DMatrix::zeros(normal.nrows(), normal.nrows());
+    for (a, &i) in seen.iter().enumerate() {
+        for (b, &j) in seen.iter().enumerate() {
+            whole[(i, j)] = inverse[(a, b)];
+        }
+    }
+    Some(whole)
+}
+
 /// The effect switched off: its amplitudes at neutral, its shape as it is.
 pub fn neutral(effect: &EffectInstance) -> EffectInstance {
     let mut off = *effect;
@@ -335,4 +350,20 @@ pub fn neutral(effect: &EffectInstance) -> EffectInstance {
         *value = parameter.neutral;
     }
     off
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_that_changes_nothing_leaves_the_others_their_inverse() {
+        let normal = DMatrix::from_row_slice(3, 3, &[4.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 2.0]);
+        let inverse = inverse_of_seen(&normal).unwrap();
+        let product = &normal * &inverse;
+        for (i, j) in [(0, 0), (0, 2), (2, 0), (2, 2)] {
+            assert!((product[(i, j)] - f64::from(u8::from(i == j))).abs() < 1e-9);
+        }
+        assert!(inverse.row(1).iter().chain(inverse.column(1).iter()).all(|x| *x == 0.0));
+    }
 }

@@ -2,11 +2,11 @@
 //!
 //! [`residual`] is the torque that a log lacks under a model, beside everything the model could be wrong by; [`search`] finds in it what
 //! comes once and does not follow from the state; [`outlying`] finds what is too light for that; [`fit`] sizes it by output error, where
-//! the model is good enough for that; [`limit`] tells it from what a drive does not give.
+//! the model is good enough for that; [`law`] tells it from what a limit of the drive or a stop does.
 
 mod bell;
 mod fit;
-mod limit;
+mod law;
 mod linear;
 mod outlying;
 mod own;
@@ -113,7 +113,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     ///
     /// Where that model describes the arm, pushes are looked for again under it. Beside a remainder they are kept as they were found: there
     /// the second model was seen to take up a part of the pushes, and the second search to find fewer. Pushes beside which predictions miss
-    /// by much more than without are none. A limit that explains some of them in their place stays beside the rest.
+    /// by much more than without are none. A law that explains some of them in their place stays beside the rest.
     pub fn conclude(
         &mut self,
         mut alone: Attribution<N, P>,
@@ -122,16 +122,16 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     ) -> Conclusion<N, P> {
         let faint = alone.causes.is_empty();
         let mut disturbances = self.disturbances(&alone, faint);
-        let limit = self.limit(&alone, &disturbances);
-        if limit.is_some() {
-            alone = self.attribute(max_causes, seed, limit.clone());
+        let law = self.law_in_place(&alone, &disturbances);
+        if law.is_some() {
+            alone = self.attribute(max_causes, seed, law.clone());
             disturbances = self.disturbances(&alone, faint);
         }
         if disturbances.is_empty() {
             return Conclusion::without(alone);
         }
         self.set_pushes(&disturbances);
-        let beside = self.attribute(max_causes, seed, limit);
+        let beside = self.attribute(max_causes, seed, law);
         let harmful = beside.error() > MUCH_WORSE * alone.error();
         if harmful {
             disturbances.clear();

@@ -1,7 +1,7 @@
 //! One recording by itself: the model fitted to it alone, without pushes and with some.
 
 use super::{Disturbance, Place, PushState};
-use crate::context::{DiagnosisContext, WindowSet};
+use crate::context::DiagnosisContext;
 use crate::model::{EffectInstance, Hypothesis};
 use crate::window::Dataset;
 use armgap_core::arm::Arm;
@@ -42,17 +42,7 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> Own<'a, A, N, P> {
         let Some(data) = self.places.iter().map(piece).reduce(Dataset::and) else {
             return self.state.model.clone();
         };
-        let context = DiagnosisContext {
-            arm: self.whole.arm.clone(),
-            prior: self.whole.prior,
-            scales: self.whole.scales.clone(),
-            training: WindowSet::new(data.clone()),
-            holdout: WindowSet::new(data),
-            noise: self.whole.noise,
-            sides: self.whole.sides.clone(),
-            custom_effects: self.whole.custom_effects.clone(),
-            progress: self.whole.progress.aside(),
-        };
+        let context = self.whole.on_windows(data);
         context.settle(self.state.model, self.state.scale).0.hypothesis
     }
 }
