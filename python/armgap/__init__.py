@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from armgap.inspection import Inspection, inspect
     from armgap.literals import Filters, Scheme, Status, Verdict
     from armgap.log import Finding, Log
+    from armgap.planning import Plan, plan
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
 
@@ -37,6 +38,7 @@ __all__ = [
     "Identification",
     "Inspection",
     "Log",
+    "Plan",
     "Reproduction",
     "Scheme",
     "Severity",
@@ -49,6 +51,7 @@ __all__ = [
     "fit",
     "identify",
     "inspect",
+    "plan",
     "reproduce",
     "seed_torque",
     "simulate",
@@ -78,6 +81,8 @@ _HOMES = {
     "Reproduction": "armgap.reproduction",
     "Inspection": "armgap.inspection",
     "inspect": "armgap.inspection",
+    "Plan": "armgap.planning",
+    "plan": "armgap.planning",
     "reproduce": "armgap.reproduction",
     "effects": "armgap.simulation",
     "seed_torque": "armgap.simulation",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +11,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.literals import Side
+from armgap.literals import DampingOn, Side
 
 if TYPE_CHECKING:
     from armgap.check.corrections import Corrections
 
-__all__ = ["Arm", "kinds"]
+__all__ = ["Arm", "Controller", "MotionLimits", "kinds"]
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """What an arm's joints may do; the torque's limit is the arm's `torque_limit`.
+
+    Attributes
+    ----------
+    position_min, position_max : ndarray, shape (n_joints,)
+        Range of positions [rad or m].
+    speed, acceleration : ndarray, shape (n_joints,)
+        Largest speed [rad/s or m/s] and acceleration [rad/s^2 or m/s^2].
+    """
+
+    position_min: NDArray[np.float64]
+    position_max: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Position controller of an arm: ``tau = kp (q_ref - q) + kd (dq_ref - dq)``, or ``- kd dq``.
+
+    Attributes
+    ----------
+    kp, kd : ndarray, shape (n_joints,)
+        Gains [N m/rad and N m s/rad, or N/m and N s/m].
+    kd_on : {"measurement", "error"}
+        Whether the damping acts on the measured velocity or on its error.
+    """
+
+    kp: NDArray[np.float64]
+    kd: NDArray[np.float64]
+    kd_on: DampingOn = "measurement"
 
 
 @dataclass(frozen=True)
@@ -56,6 +91,10 @@ class Arm:
         File it was read from.
     corrections : Corrections, optional
         How columns of the arm's logs are to be read otherwise than they stand.
+    limits : MotionLimits, optional
+        What a planned motion keeps to.
+    controller : Controller, optional
+        Position controller that tracks a planned motion.
     """
 
     name: str
@@ -75,6 +114,8 @@ class Arm:
     friction_side: tuple[Side, ...] | None = None
     gear_ratio: NDArray[np.float64] | None = None
     corrections: Corrections | None = None
+    limits: MotionLimits | None = None
+    controller: Controller | None = None
 
     @classmethod
     def read(cls, path: str | Path) -> Arm:
@@ -205,6 +246,11 @@ class Arm:
             if value is not None:
                 opened = f"[{table}]" in lines
                 lines += [*(() if opened else ("", f"[{table}]")), f"{key} = {_listed(value)}"]
+        if self.limits is not None:
+            lines += ["", "[limits]", *(f"{f.name} = {_listed(getattr(self.limits, f.name))}" for f in fields(self.limits))]
+        if self.controller is not None:
+            gains = (f"{key} = {_listed(getattr(self.controller, key))}" for key in ("kp", "kd"))
+            lines += ["", "[controller]", 'kind = "pd"', *gains, f"kd_on = {_quoted(self.controller.kd_on)}"]
         if self.columns:
             lines += ["", "[columns]", *(f"{k} = {_quoted(v)}" for k, v in self.columns.items())]
         if self.corrections:

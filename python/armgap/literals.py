@@ -13,6 +13,7 @@ __all__ = [
     "VELOCITIES",
     "VERDICTS",
     "CauseStatus",
+    "DampingOn",
     "Filters",
     "GapOutcome",
     "Scheme",
@@ -28,6 +29,7 @@ VelocityMethod = Literal["backward", "central", "local-cubic", "sensor", "midpoi
 Verdict = Literal["none", "parameters", "effect", "unexplained", "input"]
 Status = Literal["absent", "not excited", "undecided"]
 Side = Literal["motor", "link", "unknown"]
+DampingOn = Literal["measurement", "error"]
 CauseStatus = Literal["gone", "unseen", "undecided", "new", "smaller", "larger", "unchanged", "renamed"]
 GapOutcome = Literal["smaller", "larger", "unchanged", "none"]
 
