@@ -150,7 +150,7 @@ class Contestants:
         best: tuple[float, EffectInstance] | None = None
         for effect in self._tried(question.rival, rough.rival, target, columns):
             made, _ = self._usual.differences(Contest(((1.0, (*rough.rival, effect)),), rough.rival))
-            left = remainder(target - made, columns, None)
+            left = float(np.sum(remainder(target - made, columns, None) ** 2))
             if best is None or left < best[0]:
                 best = left, effect
         assert best is not None
@@ -188,8 +188,8 @@ def _even(effects: Iterable[EffectInstance]) -> list[tuple[float, EffectInstance
 
 
 def _few(own: list[tuple[float, tuple[EffectInstance, ...]]]) -> tuple[tuple[float, tuple[EffectInstance, ...]], ...]:
-    """At most two of the models, of middle size, with equal weights: the search needs no more."""
+    """At most four of the models with equal weights, small ones first: the search needs no more."""
     if len(own) <= len(NODES):
         return ((1.0, own[len(own) // 2][1]),)
-    groups = [own[SIZES // 2], own[-1 - SIZES // 2]] if len(own) > SIZES else [own[len(own) // 2]]
-    return tuple((1.0 / len(groups), effects) for _, effects in groups)
+    picked = [own[i] for first in range(0, len(own), SIZES) for i in (first, first + SIZES // 2)][:4]
+    return tuple((1.0 / len(picked), effects) for _, effects in picked)

@@ -1,14 +1,18 @@
 """Expected evidence of a motion for one model against another (T-optimality, Atkinson and Fedorov 1975).
 
 Both models predict the motion's windows from the same starts under the same torques, as a diagnosis does. What counts of their
-difference is what is left after the rival's values, and all of the arm's, are fitted to it to first order, with the arm file's standard
-deviations as prior; half of its square, in units of noise and discrepancy, is the expected log-likelihood ratio.
+difference is what is left after the rival's values, all of the arm's (with the arm file's standard deviations as prior) and a diagnosis'
+nuisances are fitted to it to first order; half of its square, in units of noise and discrepancy, is the expected log-likelihood ratio.
+
+A decision of `armgap.diagnose` needs more than a likely effect: without it the gap has to stand above the noise floor, and most windows
+have to prefer it. Both are counted too, by its own thresholds.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -39,6 +43,19 @@ LEAD = 0.15
 ACCURACY = 0.1
 #: Change of a parameter over which its sensitivity is taken, in standard deviations of its prior, and at most this part of its value.
 STEP_SIGMA, STEP_PART = 0.2, 0.02
+#: Part of a log that a diagnosis fits to; it judges on the rest.
+TRAINED = 0.6
+#: A diagnosis explains a gap whose cost is above the floor by this part of it, with what takes this part of the excess, in windows whose
+#: mean advantage is so many standard errors (`rust/fit/src/acceptance.rs`).
+ABOVE_FLOOR, MATTERS, CERTAIN = 0.25, 0.1, 3.5
+#: Standard deviations by which evidence may exceed what a decision needs before more of it is worth nothing to the search.
+ENOUGH = 3.0
+#: Evidence that the search aims at, over what is enough: the effect may be smaller than thought.
+AIM = 10.0
+#: Widths of the smoothed sign of friction that a diagnosis may choose, in RMS speeds of the motion.
+SMOOTHED = (0.01, 0.05)
+#: Growth of a merit over its range: the smaller, the more the least one counts.
+GROWTH = 1e3
 _MEASURED = ("encoder_offset", "encoder_eccentricity")
 
 
@@ -54,23 +71,32 @@ class Setting:
         Length of a window [s].
     sigma : ndarray, shape (n_joints,)
         Standard deviation of a measured position [rad or m].
+    encoder_step : ndarray, shape (n_joints,)
+        Step of the encoders, zero where it is not known [rad or m].
     discrepancy : ndarray, shape (n_joints,)
         RMS error of predictions that the best model leaves beyond the noise floor [rad or m].
+    excess : float
+        Cost of the best model's predictions above the floor, over the floor's.
     """
 
     model: Hypothesis
     horizon: float
     sigma: Array
+    encoder_step: Array
     discrepancy: Array
+    excess: float
 
     @classmethod
     def of(cls, data: dict[str, Any], model: Hypothesis) -> Setting:
         """Return the setting of a diagnosis (its JSON object)."""
         gap, noise = data["gap"], data["noise"]
         after, floor = np.array(gap["after"], dtype=np.float64), np.array(gap["floor"], dtype=np.float64)
-        least = (FAINT * floor) ** 2
-        sigma = np.array(noise["position_sigma"], dtype=np.float64)
-        return cls(model, float(gap["horizon_s"]), np.maximum(sigma, 1e-12), np.sqrt(np.maximum(after**2 - floor**2, least)))
+        beyond = np.maximum(after**2 - floor**2, 0.0)
+        sigma = np.maximum(np.array(noise["position_sigma"], dtype=np.float64), 1e-12)
+        step = np.array(noise.get("encoder_step") or np.zeros(len(sigma)), dtype=np.float64)
+        discrepancy = np.sqrt(np.maximum(beyond, (FAINT * floor) ** 2))
+        excess = float(np.mean(beyond / np.maximum(floor, 1e-12) ** 2))
+        return cls(model, float(gap["horizon_s"]), sigma, step, discrepancy, excess)
 
     @property
     def arm(self) -> Arm:
@@ -104,20 +130,51 @@ class Contest:
 
 
 class Outcome(NamedTuple):
-    """Expected log-likelihood ratios, one per size: with the rival fitted and without, and the sizes' weights."""
+    """What a motion tells about a contest, one entry per size of the effect.
+
+    Attributes
+    ----------
+    fitted, plain : ndarray
+        Expected log-likelihood ratio with the rival fitted, and without.
+    above : ndarray
+        Cost that the fitted rival leaves above the noise, over what a diagnosis needs to explain it.
+    certain : ndarray
+        Mean advantage of a window, in standard errors.
+    weight : ndarray
+        Weights of the sizes, one together.
+    spread : float
+        Standard deviation of `above` from the noise alone.
+    """
 
     fitted: Array
     plain: Array
+    above: Array
+    certain: Array
     weight: Array
+    spread: float
 
     @property
     def expected(self) -> float:
-        """Mean over the sizes."""
+        """Expected log-likelihood ratio, mean over the sizes."""
         return float(self.weight @ self.fitted)
 
     def settled(self, threshold: float) -> float:
         """Probability of a decision, mean over the sizes."""
-        return float(self.weight @ [settled(x, threshold) for x in self.fitted])
+        likely = [settled(x, threshold) for x in self.fitted]
+        high = [_normal((x - 1.0) / self.spread) for x in self.above]
+        common = [_normal(x - CERTAIN) for x in self.certain]
+        return float(self.weight @ np.min([likely, high, common], axis=0))
+
+    def merit(self, threshold: float) -> float:
+        """How near all that a decision needs is, from 0 to 1, mean over the sizes; it grows with the logarithm."""
+        enough = _enough(threshold)
+        parts = (
+            self.fitted / (AIM * enough),
+            self.above / (AIM * (1.0 + ENOUGH * self.spread)),
+            self.certain / (CERTAIN + ENOUGH),
+        )
+        least = np.clip(np.min(parts, axis=0), 0.0, 1.0)
+        return float(self.weight @ (np.log1p(GROWTH * least) / math.log1p(GROWTH)))
 
     @property
     def kept(self) -> float:
@@ -128,9 +185,18 @@ class Outcome(NamedTuple):
 
 def settled(expected: float, threshold: float) -> float:
     """Probability that a log-likelihood ratio exceeds a threshold: normal, its variance twice its expectation."""
-    if not expected > 0:
-        return 0.0
-    return 0.5 * math.erfc(-(expected - threshold) / (2.0 * math.sqrt(expected)))
+    return _normal((expected - threshold) / math.sqrt(2.0 * expected)) if expected > 0 else 0.0
+
+
+def _normal(x: float) -> float:
+    """Standard normal distribution function."""
+    return 0.5 * math.erfc(-x / math.sqrt(2.0))
+
+
+def _enough(threshold: float) -> float:
+    """Expected log-likelihood ratio that lies `ENOUGH` of its standard deviations above a threshold."""
+    half = ENOUGH / math.sqrt(2.0)
+    return (half + math.sqrt(half * half + threshold)) ** 2
 
 
 class Played:
@@ -150,37 +216,48 @@ class Played:
         self.tau = inverse_dynamics(setting.model, *held)
         self.held = held
         self._known: dict[Any, Array] = {}
-        self._basis, self._weight = self._whitening()
-        self._sensitivity: Array | None = None
+        polynomials, _ = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, self._samples + 1), DEGREES))
+        self._basis: Array = polynomials[:, 2:]
+        self._white, self._whole = self._weights()
+        self._columns: Array | None = None
 
-    def _whitening(self) -> tuple[Array, Array]:
-        """Polynomials of degree 2 and more over a window, and one over the standard deviation of each of their factors per joint.
+    def _weights(self) -> tuple[Array, Array]:
+        """One over the standard deviations of a window's polynomials, from white noise and from all; shape (n_windows, n_degrees, n_joints).
 
-        Noise is white. The discrepancy is that of a torque that changes from window to window: its positions fall with the square of the
-        degree.
+        An encoder's rounding stays the same until the joint has moved by a step. The discrepancy is that of a torque that changes from window
+        to window: its positions fall with the square of the degree.
         """
         setting, n = self._setting, self._samples + 1
-        x = np.linspace(-1.0, 1.0, n)
-        polynomials, _ = np.linalg.qr(np.polynomial.legendre.legvander(x, DEGREES))
-        degree = np.arange(2, DEGREES + 1)[:, None]
-        white = setting.sigma**2 * self._arm.sample_period / setting.step
-        bend = n * (setting.discrepancy / BEND) ** 2
-        return polynomials[:, 2:], 1.0 / np.sqrt(white + bend * (2.0 / degree) ** 4)
+        period = self._arm.sample_period
+        share = period / setting.step
+        way = np.array([np.mean(np.abs(v), axis=0) for v in np.split(self.dq[1:], self._count)]) * period
+        rounding = np.minimum(setting.encoder_step**2 / 12.0, setting.sigma**2)
+        held = np.clip(setting.encoder_step / np.maximum(way, 1e-15), 1.0, setting.horizon / period)
+        noise = (setting.sigma**2 - rounding + rounding * held) * share
+        degree = np.arange(2, DEGREES + 1)[None, :, None]
+        bend = n * (setting.discrepancy / BEND) ** 2 * (2.0 / degree) ** 4
+        shape = (self._count, DEGREES - 1, self._arm.n_joints)
+        white = np.broadcast_to(1.0 / np.sqrt(setting.sigma**2 * share), shape)
+        return white.ravel(), (1.0 / np.sqrt(noise[:, None, :] + bend)).ravel()
 
-    def predicted(self, theta: tuple[float, ...], effects: Sequence[EffectInstance], lead: bool) -> Array:
-        """Whitened predictions of all windows, one column of numbers.
+    def predicted(
+        self, theta: tuple[float, ...], effects: Sequence[EffectInstance], lead: bool, smoothing: float | None = None
+    ) -> Array:
+        """Factors of the polynomials in the predictions of all windows, one column of numbers [rad or m].
 
         Raises
         ------
         ValueError
             If a model's motion diverges.
         """
-        key = (theta, tuple((e.effect, e.joint, *e.parameters.items()) for e in effects), lead)
+        key = (theta, tuple((e.effect, e.joint, *e.parameters.items()) for e in effects), lead, smoothing)
         if key not in self._known:
-            self._known[key] = self._predict(theta, effects, lead)
+            self._known[key] = self._predict(theta, effects, lead, smoothing)
         return self._known[key]
 
-    def _predict(self, theta: tuple[float, ...], effects: Sequence[EffectInstance], lead: bool) -> Array:
+    def _predict(
+        self, theta: tuple[float, ...], effects: Sequence[EffectInstance], lead: bool, smoothing: float | None
+    ) -> Array:
         arm, model, s = self._arm, self._setting.model, self._samples
         before = round(LEAD / self._setting.step) if lead else 0
         first = s * np.arange(self._count)
@@ -194,11 +271,10 @@ class Played:
             rows = slice(int(begin[w]), int(first[w]) + s + 1)
             q, _ = _native.simulate(
                 arm.kind, arm.gravity, lengths, list(theta), self.t[rows], self.tau[rows], q0[w], dq0[w], placed, tolerance,
-                model.smoothing,
+                model.smoothing if smoothing is None else smoothing,
             )  # fmt: skip
             found[w] = q[-(s + 1) :]
-        factors = np.einsum("wsj,sk->wkj", found, self._basis)
-        return np.asarray(factors * self._weight, dtype=np.float64).ravel()
+        return np.asarray(np.einsum("wsj,sk->wkj", found, self._basis), dtype=np.float64).ravel()
 
     def _true_start(self, rows: Array, effects: Sequence[EffectInstance]) -> tuple[Array, Array]:
         """States of the joints behind the encoders, which show the reference."""
@@ -212,28 +288,53 @@ class Played:
         return middle, dq * (above - below) / (2 * step)
 
     def sensitivities(self) -> Array:
-        """Derivatives of the predictions by the arm's parameters, in standard deviations of their prior; shape (n_numbers, n_parameters)."""
-        if self._sensitivity is None:
-            model = self._setting.model
-            lead = latent(model.effects)
-            reference = self.predicted(model.theta, model.effects, lead)
-            columns = []
-            sizes = np.abs(model.theta) + 0.1 * np.max(np.abs(model.theta))
-            for i, sigma in enumerate(self._arm.sigma):
-                step = min(STEP_SIGMA * float(sigma), STEP_PART * float(sizes[i]))
-                theta = tuple(x + step * (k == i) for k, x in enumerate(model.theta))
-                columns.append((self.predicted(theta, model.effects, lead) - reference) * (float(sigma) / step))
-            self._sensitivity = np.column_stack(columns)
-        return self._sensitivity
+        """Derivatives of the predictions by what every model fits, in standard deviations of the prior; shape (n_numbers, n_columns).
+
+        Arm parameters; a delay of all torques, whose prior is one sample; widths of the smoothed sign of friction.
+        """
+        if self._columns is None:
+            self._columns = np.column_stack([*self._of_parameters(), *self._of_nuisances()])
+        return self._columns
+
+    def _of_parameters(self) -> list[Array]:
+        model = self._setting.model
+        lead = latent(model.effects)
+        reference = self.predicted(model.theta, model.effects, lead)
+        columns = []
+        sizes = np.abs(model.theta) + 0.1 * np.max(np.abs(model.theta))
+        for i, sigma in enumerate(self._arm.sigma):
+            step = min(STEP_SIGMA * float(sigma), STEP_PART * float(sizes[i]))
+            theta = tuple(x + step * (k == i) for k, x in enumerate(model.theta))
+            columns.append((self.predicted(theta, model.effects, lead) - reference) * (float(sigma) / step))
+        return columns
+
+    def _of_nuisances(self) -> list[Array]:
+        model, arm = self._setting.model, self._arm
+        columns = []
+        speed = float(np.sqrt(np.mean(self.dq**2)))
+        lead = latent(model.effects)
+        for part in SMOOTHED:
+            width = max(part * speed, 2.0 * model.smoothing)
+            columns.append(self.predicted(model.theta, model.effects, lead, width) - self.predicted(model.theta, model.effects, lead))
+        late = [EffectInstance("actuator_delay", j + 1, {"delay": arm.sample_period}) for j in range(arm.n_joints)]
+        with suppress(ValueError):  # more effects than the simulator carries: the delay is one of them, as a rule
+            delayed = self.predicted(model.theta, (*model.effects, *late), True)
+            columns.append(delayed - self.predicted(model.theta, model.effects, True))
+        return columns
 
     def outcome(self, contest: Contest) -> Outcome:
-        """Expected log-likelihood ratios of a contest over this motion; zero where a model's motion cannot be computed."""
+        """What the motion tells about a contest; nothing where a model's motion cannot be computed."""
         weight = np.array([w for w, _ in contest.own])
+        residuals = 0.5 * self._arm.n_joints * self._setting.horizon / self._arm.sample_period
+        half = TRAINED * self._count * residuals
+        needs = max(MATTERS * self._setting.excess, ABOVE_FLOOR - self._setting.excess) * half
+        spread = math.sqrt(half) / needs
         try:
-            found = np.array([self._ratio(effects, contest) for _, effects in contest.own])
+            found = np.array([self._told(effects, contest, residuals) for _, effects in contest.own])
         except ValueError:
-            return Outcome(np.zeros(len(weight)), np.zeros(len(weight)), weight)
-        return Outcome(found[:, 0], found[:, 1], weight)
+            nothing = np.zeros(len(weight))
+            return Outcome(nothing, nothing, nothing, nothing, weight, spread)
+        return Outcome(*(TRAINED * found[:, i] for i in (0, 1)), TRAINED * found[:, 2] / needs, found[:, 3], weight, spread)
 
     def floors(self, contest: Contest, index: int, floor: Array) -> float:
         """RMS difference of one of the contest's models from the rival, in noise floors, worst joint; infinite if it cannot be computed."""
@@ -241,26 +342,35 @@ class Played:
             delta, _ = self._difference(contest.own[index][1], contest)
         except ValueError:
             return math.inf
-        factors = delta.reshape(self._count, -1, self._arm.n_joints) / self._weight
+        factors = delta.reshape(self._count, -1, self._arm.n_joints)
         rms = np.sqrt(np.sum(factors**2, axis=(0, 1)) / (self._count * (self._samples + 1)))
         return float(np.max(rms / np.maximum(floor, 1e-12)))
 
     def differences(self, contest: Contest) -> tuple[Array, Array]:
-        """Differences of the first model's predictions from the rival's, and the columns that are fitted to them."""
-        return self._difference(contest.own[0][1], contest)[0], self.sensitivities()
+        """Differences of the first model's predictions from the rival's, and the columns that are fitted to them, in standard deviations."""
+        delta = self._difference(contest.own[0][1], contest)[0]
+        return delta * self._whole, self.sensitivities() * self._whole[:, None]
 
     def _difference(self, effects: tuple[EffectInstance, ...], contest: Contest) -> tuple[Array, bool]:
         lead = latent((*effects, *contest.rival))
         theta = self._setting.model.theta
         return self.predicted(theta, effects, lead) - self.predicted(theta, contest.rival, lead), lead
 
-    def _ratio(self, effects: tuple[EffectInstance, ...], contest: Contest) -> tuple[float, float]:
+    def _told(self, effects: tuple[EffectInstance, ...], contest: Contest, residuals: float) -> tuple[float, ...]:
         delta, lead = self._difference(effects, contest)
-        columns = [self.sensitivities()]
-        if contest.free is not None:
-            columns.append(self._of_rival(contest, contest.free, lead))
-        left = remainder(delta, columns[0], columns[1] if len(columns) > 1 else None)
-        return 0.5 * left, 0.5 * float(delta @ delta)
+        free = None if contest.free is None else self._of_rival(contest, contest.free, lead)
+        common = self.sensitivities()
+        left, cost = (
+            0.5 * remainder(delta * w, common * w[:, None], None if free is None else free * w[:, None]) ** 2
+            for w in (self._whole, self._white)
+        )
+        windows = np.sum(cost[:-1].reshape(self._count, -1), axis=1)
+        # Robust weights let a window's cost grow with the logarithm only.
+        advantage = residuals * np.log1p(windows / residuals)
+        scatter = np.var(advantage) + 2.0 * np.mean(advantage)
+        certain = math.sqrt(self._count / scatter) * float(np.mean(advantage)) if scatter > 0 else 0.0
+        plain = 0.5 * float(np.sum((delta * self._whole) ** 2))
+        return float(np.sum(left)), plain, float(np.sum(cost)), certain
 
     def _of_rival(self, contest: Contest, free: EffectInstance, lead: bool) -> Array:
         """Derivatives of the rival's predictions by its effect's values."""
@@ -281,18 +391,19 @@ class Played:
 _FIXED = ("riding", "encoder_at_motor", "friction_at_motor", "rotor_rides")
 
 
-def remainder(delta: Array, arm: Array, free: Array | None) -> float:
-    """Square of a difference after the arm's parameters (with their prior) and the rival's values (without) were fitted to it."""
-    prior = np.eye(arm.shape[1])
-    if free is None:
-        rows, right = np.vstack([arm, prior]), np.concatenate([delta, np.zeros(len(prior))])
-    else:
+def remainder(delta: Array, common: Array, free: Array | None) -> Array:
+    """What is left of a difference after common values (with their prior) and the rival's (without) were fitted to it."""
+    prior = np.eye(common.shape[1])
+    rows = np.vstack([common, prior])
+    if free is not None:
         length = np.linalg.norm(free, axis=0)
         scaled = free / np.where(length > 0, length, 1.0)
-        rows = np.vstack([np.hstack([arm, scaled]), np.hstack([prior, np.zeros((len(prior), free.shape[1]))])])
-        right = np.concatenate([delta, np.zeros(len(prior))])
+        rows = np.hstack([rows, np.vstack([scaled, np.zeros((len(prior), free.shape[1]))])])
+    right = np.concatenate([delta, np.zeros(len(prior))])
     solution = np.linalg.lstsq(rows, right, rcond=1e-12)[0]
-    return float(np.sum((right - rows @ solution) ** 2))
+    # The prior's rows count as evidence too: values that the rival would need and that are not trusted speak against it.
+    left = right - rows @ solution
+    return np.asarray(np.append(left[: len(delta)], np.linalg.norm(left[len(delta) :])), dtype=np.float64)
 
 
 def latent(effects: Sequence[EffectInstance]) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -25,8 +24,6 @@ Array = NDArray[np.float64]
 
 #: Size of the population, and generations after the first.
 POPULATION, GENERATIONS = 16, 9
-#: Standard deviations beyond the threshold from which more evidence for a question is worth nothing.
-ENOUGH = 3.0
 #: Steps in which a motion is scaled down until its torques suffice.
 SHRINKS = 12
 #: Every so many steps of prediction torques are looked at while a motion is scaled down.
@@ -152,18 +149,18 @@ class Search:
         """Return the best motion that is found for some questions; the same seed finds the same."""
         from scipy.optimize import differential_evolution
 
-        enough = evidence_enough(threshold)
         state = _State(np.zeros(len(posed)))
         total = POPULATION * (GENERATIONS + 1)
 
         def cost(numbers: Array) -> float:
             motion = self.motion(numbers)
             played = self.play(motion)
-            ratios = np.array([played.outcome(p.quick).expected for p in posed])
+            told = [played.outcome(p.quick) for p in posed]
             state.count += 1
-            state.most = np.maximum(state.most, ratios)
+            state.most = np.maximum(state.most, [x.expected for x in told])
             report_progress("planning", min(state.count / total, 1.0))
-            worth = float(np.mean(np.log1p(np.minimum(ratios, enough)))) / math.log1p(enough)
+            merits = [x.merit(threshold) for x in told]
+            worth = 0.5 * (float(np.mean(merits)) + min(merits))
             if worth > state.worth:
                 state.worth, state.played, state.motion = worth, played, motion
             return -worth
@@ -198,8 +195,3 @@ class _State:
     played: Played | None = None
     motion: Motion | None = None
 
-
-def evidence_enough(threshold: float) -> float:
-    """Expected log-likelihood ratio that lies `ENOUGH` of its standard deviations above a threshold."""
-    half = ENOUGH / math.sqrt(2.0)
-    return (half + math.sqrt(half * half + threshold)) ** 2
