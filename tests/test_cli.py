@@ -28,6 +28,7 @@ PROMISED = {
     "compare",
     "replay",
     "inspect",
+    "plan",
     "identify",
     "simulate",
     "diagnose",

@@ -247,7 +247,11 @@ class Arm:
                 opened = f"[{table}]" in lines
                 lines += [*(() if opened else ("", f"[{table}]")), f"{key} = {_listed(value)}"]
         if self.limits is not None:
-            lines += ["", "[limits]", *(f"{f.name} = {_listed(getattr(self.limits, f.name))}" for f in fields(self.limits))]
+            lines += [
+                "",
+                "[limits]",
+                *(f"{f.name} = {_listed(getattr(self.limits, f.name))}" for f in fields(self.limits)),
+            ]
         if self.controller is not None:
             gains = (f"{key} = {_listed(getattr(self.controller, key))}" for key in ("kp", "kd"))
             lines += ["", "[controller]", 'kind = "pd"', *gains, f"kd_on = {_quoted(self.controller.kd_on)}"]

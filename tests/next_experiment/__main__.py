@@ -57,7 +57,10 @@ def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any]:
         own = [q for q in open_plan.questions if (q.effect, q.joint) == (case.effect, case.joint)]
         result["promised"] = own[-1].settled if own else None
         result["evidence"] = own[-1].expected_log_likelihood_ratio if own else None
-        result["all"] = [(q.effect, q.joint, q.against, round(q.settled, 3), round(q.expected_log_likelihood_ratio, 1)) for q in open_plan.questions]
+        result["all"] = [
+            (q.effect, q.joint, q.against, round(q.settled, 3), round(q.expected_log_likelihood_ratio, 1))
+            for q in open_plan.questions
+        ]
         for key, reference in (("planned", planned), ("multisine", usual)):
             result[f"{key} expected"] = expected(case, before, arm_file, reference, open_plan.threshold)
             trace = play(case, arm, reference)
@@ -74,7 +77,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--duration", type=float, default=10.0)
     parser.add_argument("--only", default="", help="part of the names of cases")
-    parser.add_argument("--ask", action="store_true", help="ask for the hidden effect; without it, for what the first diagnosis leaves open")
+    parser.add_argument(
+        "--ask",
+        action="store_true",
+        help="ask for the hidden effect; without it, for what the first diagnosis leaves open",
+    )
     parser.add_argument("--json", type=Path, help="write the records")
     options = parser.parse_args()
     records = []

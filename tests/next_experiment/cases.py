@@ -126,7 +126,9 @@ class Sampled:
         return found[0], found[1], found[2]
 
 
-def expected(case: Case, before: armgap.Diagnosis, arm_file: Path, reference: Reference, threshold: float) -> tuple[float, float]:
+def expected(
+    case: Case, before: armgap.Diagnosis, arm_file: Path, reference: Reference, threshold: float
+) -> tuple[float, float]:
     """Expected log-likelihood ratio and probability of a decision at the hidden effect's own size, against its absence."""
     arm = armgap.Arm.read(arm_file)
     model, _ = known_model(before.to_dict(), arm)
@@ -190,7 +192,10 @@ def multisine(arm_file: Path, model: str, duration: float, seed: int) -> Referen
     wave = wave * x**3 * (10 - 15 * x + 6 * x * x)
     rate, bend = (np.gradient(wave, h, axis=0), np.gradient(np.gradient(wave, h, axis=0), h, axis=0))
     room = np.minimum(limits.position_max, -limits.position_min)
-    ratio = [np.max(np.abs(w), axis=0) / (MARGIN * m) for w, m in ((wave, room), (rate, limits.speed), (bend, limits.acceleration))]
+    ratio = [
+        np.max(np.abs(w), axis=0) / (MARGIN * m)
+        for w, m in ((wave, room), (rate, limits.speed), (bend, limits.acceleration))
+    ]
     scale = 1.0 / np.max(ratio, axis=0)
     model_of = Hypothesis(arm, tuple(arm.theta))
     while True:

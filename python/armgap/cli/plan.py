@@ -27,7 +27,9 @@ __all__ = ["command"]
     metavar="EFFECT:JOINT",
     help="Effect to settle; may be repeated. Without it, the five open questions with the largest consequences.",
 )
-@click.option("--duration", type=Number(min=0, min_open=True), default=10.0, show_default=True, help="Length of the motion [s].")
+@click.option(
+    "--duration", type=Number(min=0, min_open=True), default=10.0, show_default=True, help="Length of the motion [s]."
+)
 @click.option("--seed", type=Seed(), default=1, show_default=True, help="Seed of the search.")
 @click.option(
     "-o",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.evidence.hypothesis import EffectInstance, at_motor
-from armgap.planning.criterion import Contest, Played, remainder
+from armgap.planning.criterion import Contest, Played
 from armgap.planning.questions import NONE, Question
 from armgap.planning.sizes import Scales, Shape, levels, shapes
 
@@ -146,27 +146,26 @@ class Contestants:
             values = {name: float(p["value"]) for name, p in entry["parameters"].items()}
             return EffectInstance(*question.rival, {**values, **at_motor(entry.get("sides"))})
         middle = rough.own[len(rough.own) // 2]
-        target, columns = self._usual.differences(Contest((middle,), rough.rival))
+        target = self._usual.difference(Contest((middle,), rough.rival))
         best: tuple[float, EffectInstance] | None = None
-        for effect in self._tried(question.rival, rough.rival, target, columns):
-            made, _ = self._usual.differences(Contest(((1.0, (*rough.rival, effect)),), rough.rival))
-            left = float(np.sum(remainder(target - made, columns, None) ** 2))
+        for effect in self._tried(question.rival, rough.rival, target):
+            made = self._usual.difference(Contest(((1.0, (*rough.rival, effect)),), rough.rival))
+            left, _ = self._usual.left_of(target - made)
             if best is None or left < best[0]:
                 best = left, effect
         assert best is not None
         return best[1]
 
     def _tried(
-        self, place: tuple[str, int | None], without: tuple[EffectInstance, ...], target: Array, columns: Array
+        self, place: tuple[str, int | None], without: tuple[EffectInstance, ...], target: Array
     ) -> Iterable[EffectInstance]:
         """The rival's shapes, each at the size that follows the target best to first order."""
         spec = self._specs[place[0]][0]
         for shape in shapes(*place, self._scales):
             typical = EffectInstance(*place, shape.at(shape.typical))
             yield typical
-            made, _ = self._usual.differences(Contest(((1.0, (*without, typical)),), without))
-            every = np.column_stack([made, columns])
-            factor = float(np.linalg.lstsq(every, target, rcond=1e-12)[0][0])
+            made = self._usual.difference(Contest(((1.0, (*without, typical)),), without))
+            _, factor = self._usual.left_of(target, made)
             size = factor * shape.typical
             if shape.inverse and size <= 0:
                 continue

@@ -54,6 +54,10 @@ ENOUGH = 3.0
 AIM = 10.0
 #: Widths of the smoothed sign of friction that a diagnosis may choose, in RMS speeds of the motion.
 SMOOTHED = (0.01, 0.05)
+#: Steps in which a rival is fitted beyond first order.
+STEPS = 8
+#: Decrease of a step, as a part of what was left, below which the fit has settled.
+SETTLED = 0.02
 #: Growth of a merit over its range: the smaller, the more the least one counts.
 GROWTH = 1e3
 _MEASURED = ("encoder_offset", "encoder_eccentricity")
@@ -216,7 +220,9 @@ class Played:
         self.tau = inverse_dynamics(setting.model, *held)
         self.held = held
         self._known: dict[Any, Array] = {}
-        polynomials, _ = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, self._samples + 1), DEGREES))
+        polynomials, _ = np.linalg.qr(
+            np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, self._samples + 1), DEGREES)
+        )
         self._basis: Array = polynomials[:, 2:]
         self._white, self._whole = self._weights()
         self._columns: Array | None = None
@@ -315,26 +321,43 @@ class Played:
         lead = latent(model.effects)
         for part in SMOOTHED:
             width = max(part * speed, 2.0 * model.smoothing)
-            columns.append(self.predicted(model.theta, model.effects, lead, width) - self.predicted(model.theta, model.effects, lead))
+            columns.append(
+                self.predicted(model.theta, model.effects, lead, width)
+                - self.predicted(model.theta, model.effects, lead)
+            )
         late = [EffectInstance("actuator_delay", j + 1, {"delay": arm.sample_period}) for j in range(arm.n_joints)]
         with suppress(ValueError):  # more effects than the simulator carries: the delay is one of them, as a rule
             delayed = self.predicted(model.theta, (*model.effects, *late), True)
             columns.append(delayed - self.predicted(model.theta, model.effects, True))
         return columns
 
-    def outcome(self, contest: Contest) -> Outcome:
-        """What the motion tells about a contest; nothing where a model's motion cannot be computed."""
+    @property
+    def n_parameters(self) -> int:
+        """Number of the arm's parameters."""
+        return len(self._arm.sigma)
+
+    def outcome(self, contest: Contest, steps: int = STEPS) -> Outcome:
+        """What the motion tells about a contest; nothing where a model's motion cannot be computed.
+
+        Parameters
+        ----------
+        contest : Contest
+            The contest.
+        steps : int, default 8
+            Gauss-Newton steps in which the rival is fitted, beyond the first-order fit.
+        """
         weight = np.array([w for w, _ in contest.own])
         residuals = 0.5 * self._arm.n_joints * self._setting.horizon / self._arm.sample_period
         half = TRAINED * self._count * residuals
         needs = max(MATTERS * self._setting.excess, ABOVE_FLOOR - self._setting.excess) * half
         spread = math.sqrt(half) / needs
         try:
-            found = np.array([self._told(effects, contest, residuals) for _, effects in contest.own])
+            found = np.array([self._told(effects, contest, residuals, steps) for _, effects in contest.own])
         except ValueError:
             nothing = np.zeros(len(weight))
             return Outcome(nothing, nothing, nothing, nothing, weight, spread)
-        return Outcome(*(TRAINED * found[:, i] for i in (0, 1)), TRAINED * found[:, 2] / needs, found[:, 3], weight, spread)
+        left, plain, cost, certain = found.T
+        return Outcome(TRAINED * left, TRAINED * plain, TRAINED * cost / needs, certain, weight, spread)
 
     def floors(self, contest: Contest, index: int, floor: Array) -> float:
         """RMS difference of one of the contest's models from the rival, in noise floors, worst joint; infinite if it cannot be computed."""
@@ -346,68 +369,148 @@ class Played:
         rms = np.sqrt(np.sum(factors**2, axis=(0, 1)) / (self._count * (self._samples + 1)))
         return float(np.max(rms / np.maximum(floor, 1e-12)))
 
-    def differences(self, contest: Contest) -> tuple[Array, Array]:
-        """Differences of the first model's predictions from the rival's, and the columns that are fitted to them, in standard deviations."""
-        delta = self._difference(contest.own[0][1], contest)[0]
-        return delta * self._whole, self.sensitivities() * self._whole[:, None]
+    def difference(self, contest: Contest) -> Array:
+        """Difference of the first model's predictions from the rival's."""
+        return self._difference(contest.own[0][1], contest)[0]
+
+    def left_of(self, delta: Array, column: Array | None = None) -> tuple[float, float]:
+        """Square of what the arm's own values leave of a difference, and the factor of a further column that is fitted with them."""
+        free = np.empty((len(delta), 0)) if column is None else column[:, None]
+        found = Columns(self.sensitivities(), free, (), self.n_parameters).fitted(delta, self._whole)
+        return found.square, 0.0 if column is None else float(found.values[-1])
 
     def _difference(self, effects: tuple[EffectInstance, ...], contest: Contest) -> tuple[Array, bool]:
         lead = latent((*effects, *contest.rival))
         theta = self._setting.model.theta
         return self.predicted(theta, effects, lead) - self.predicted(theta, contest.rival, lead), lead
 
-    def _told(self, effects: tuple[EffectInstance, ...], contest: Contest, residuals: float) -> tuple[float, ...]:
-        delta, lead = self._difference(effects, contest)
-        free = None if contest.free is None else self._of_rival(contest, contest.free, lead)
-        common = self.sensitivities()
-        left, cost = (
-            0.5 * remainder(delta * w, common * w[:, None], None if free is None else free * w[:, None]) ** 2
-            for w in (self._whole, self._white)
-        )
-        windows = np.sum(cost[:-1].reshape(self._count, -1), axis=1)
+    def _told(
+        self, effects: tuple[EffectInstance, ...], contest: Contest, residuals: float, steps: int
+    ) -> tuple[float, float, float, float]:
+        theta = self._setting.model.theta
+        lead = latent((*effects, *contest.rival))
+        truth = self.predicted(theta, effects, lead)
+        delta = truth - self.predicted(theta, contest.rival, lead)
+        columns = Columns.of(self, contest, lead)
+        best = columns.fitted(delta, self._whole)
+        plain = 0.5 * float(np.sum((delta * self._whole) ** 2))
+        for _ in range(steps):
+            # Gauss-Newton: the rival predicts with the fitted values, and what is left is fitted again.
+            moved, rival = self._moved(contest, columns, best.values)
+            try:
+                missed = truth - self.predicted(moved, rival, lead)
+            except ValueError:
+                break
+            linear = columns.product(best.values, simulated=True)
+            again = columns.fitted(missed + linear, self._whole)
+            done = best.square - again.square < SETTLED * best.square
+            delta, best = missed + linear, again
+            if done:
+                break
+        cost = columns.fitted(delta, self._white)
+        windows = 0.5 * np.sum(cost.left.reshape(self._count, -1) ** 2, axis=1)
         # Robust weights let a window's cost grow with the logarithm only.
         advantage = residuals * np.log1p(windows / residuals)
         scatter = np.var(advantage) + 2.0 * np.mean(advantage)
         certain = math.sqrt(self._count / scatter) * float(np.mean(advantage)) if scatter > 0 else 0.0
-        plain = 0.5 * float(np.sum((delta * self._whole) ** 2))
-        return float(np.sum(left)), plain, float(np.sum(cost)), certain
+        return 0.5 * best.square, plain, 0.5 * cost.square, certain
 
-    def _of_rival(self, contest: Contest, free: EffectInstance, lead: bool) -> Array:
-        """Derivatives of the rival's predictions by its effect's values."""
-        theta = self._setting.model.theta
+    def _moved(
+        self, contest: Contest, columns: Columns, values: Array
+    ) -> tuple[tuple[float, ...], tuple[EffectInstance, ...]]:
+        """The rival's model with fitted values; friction and inertia stay positive."""
+        arm, theta = self._arm, np.array(self._setting.model.theta)
+        p = len(theta)
+        changed = theta + arm.sigma * values[:p]
+        kept = np.where(theta > 0, np.maximum(changed, 1e-3 * theta), changed)
+        if contest.free is None:
+            return tuple(kept.tolist()), contest.rival
+        steps = values[columns.common.shape[1] :]
+        parameters = dict(contest.free.parameters)
+        for name, step in zip(columns.names, steps, strict=True):
+            parameters[name] += float(step)
+        moved = contest.free._replace(parameters=parameters)
+        return tuple(kept.tolist()), tuple(moved if e == contest.free else e for e in contest.rival)
+
+    def of_rival(self, contest: Contest, lead: bool) -> tuple[tuple[str, ...], Array]:
+        """Values of the rival's effect that are fitted, and derivatives of its predictions by them."""
+        theta, free = self._setting.model.theta, contest.free
+        if free is None:
+            return (), np.empty((len(self._white), 0))
         reference = self.predicted(theta, contest.rival, lead)
-        columns = []
+        names, columns = [], []
         for name, value in free.parameters.items():
             if name in _FIXED:
                 continue
             step = STEP_PART * (abs(value) or 1.0)
             moved = free._replace(parameters={**free.parameters, name: value + step})
             effects = tuple(moved if e == free else e for e in contest.rival)
-            columns.append(self.predicted(theta, effects, lead) - reference)
-        return np.column_stack(columns)
+            columns.append((self.predicted(theta, effects, lead) - reference) / step)
+            names.append(name)
+        return tuple(names), np.column_stack(columns)
 
 
 #: Values of an effect that say where it sits, not how large it is.
 _FIXED = ("riding", "encoder_at_motor", "friction_at_motor", "rotor_rides")
 
 
-def remainder(delta: Array, common: Array, free: Array | None) -> Array:
-    """What is left of a difference after common values (with their prior) and the rival's (without) were fitted to it."""
-    prior = np.eye(common.shape[1])
-    rows = np.vstack([common, prior])
-    if free is not None:
-        length = np.linalg.norm(free, axis=0)
-        scaled = free / np.where(length > 0, length, 1.0)
-        rows = np.hstack([rows, np.vstack([scaled, np.zeros((len(prior), free.shape[1]))])])
-    right = np.concatenate([delta, np.zeros(len(prior))])
-    solution = np.linalg.lstsq(rows, right, rcond=1e-12)[0]
-    # The prior's rows count as evidence too: values that the rival would need and that are not trusted speak against it.
-    left = right - rows @ solution
-    return np.asarray(np.append(left[: len(delta)], np.linalg.norm(left[len(delta) :])), dtype=np.float64)
+class Fitted(NamedTuple):
+    """Values fitted to a difference, what is left of it in standard deviations, and its square with that of the prior."""
+
+    values: Array
+    left: Array
+    square: float
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns that are fitted to a difference of predictions.
+
+    Attributes
+    ----------
+    common : ndarray, shape (n_numbers, n_common)
+        Of what every model fits, in standard deviations of the prior.
+    free : ndarray, shape (n_numbers, n_free)
+        Of the rival's own values, without a prior.
+    names : tuple of str
+        Those values.
+    simulated : int
+        Leading columns of `common` that are parameters of the arm.
+    """
+
+    common: Array
+    free: Array
+    names: tuple[str, ...]
+    simulated: int
+
+    @classmethod
+    def of(cls, played: Played, contest: Contest, lead: bool) -> Columns:
+        """Return the columns of a contest's rival."""
+        names, free = played.of_rival(contest, lead)
+        return cls(played.sensitivities(), free, names, played.n_parameters)
+
+    def product(self, values: Array, *, simulated: bool) -> Array:
+        """Change of the predictions by some values; `simulated` leaves out what no simulation has: the nuisances."""
+        common = values[: self.common.shape[1]].copy()
+        if simulated:
+            common[self.simulated :] = 0.0
+        return np.asarray(self.common @ common + self.free @ values[self.common.shape[1] :], dtype=np.float64)
+
+    def fitted(self, delta: Array, weight: Array) -> Fitted:
+        """Fit the columns to a difference, each number of which has a weight."""
+        n, k = self.common.shape[1], self.free.shape[1]
+        columns = np.hstack([self.common, self.free]) * weight[:, None]
+        # Values without a prior in units of what they do, so that they are as well scaled as the rest.
+        unit = np.append(np.ones(n), np.maximum(np.linalg.norm(columns[:, n:], axis=0), 1e-300))
+        prior = np.hstack([np.eye(n), np.zeros((n, k))])
+        rows = np.vstack([columns / unit, prior])
+        right = np.concatenate([delta * weight, np.zeros(n)])
+        solution = np.linalg.lstsq(rows, right, rcond=1e-12)[0]
+        left = right - rows @ solution
+        # The prior's part counts: values that the rival would need and that are not trusted speak against it.
+        return Fitted(solution / unit, left[: len(delta)], float(left @ left))
 
 
 def latent(effects: Sequence[EffectInstance]) -> bool:
     """Whether one of the effects has a state that no encoder shows."""
     return any(e.effect in LATENT for e in effects)
-
-

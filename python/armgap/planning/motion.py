@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +89,7 @@ class Motion:
             found = oscillation(t[inside] - begin, end - begin, self.amplitude[i], self.frequency[i])
             for total, part in zip((q, dq, ddq), found, strict=True):
                 total[inside] += part
+        q[t >= self.times[-1]] = self.home
         return self.home + self.scale * (q - self.home), self.scale * dq, self.scale * ddq
 
     def scaled(self, factor: float) -> Motion:
@@ -158,7 +160,7 @@ def _moves(home: Array, centres: Array, limits: MotionLimits) -> list[float]:
     """Shortest times of the three moves, all joints together."""
     poses = [home, *centres, home]
     times = []
-    for before, after in zip(poses, poses[1:], strict=False):
+    for before, after in pairwise(poses):
         way = np.abs(after - before)
         by_speed = BLEND_SPEED * way / limits.speed
         by_acceleration = np.sqrt(BLEND_ACCELERATION * way / limits.acceleration)

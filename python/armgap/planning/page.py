@@ -36,7 +36,14 @@ _ORIGINS = {
 def plan_document(plan: Plan) -> Document:
     """Return the report of a plan."""
     conventions = section(plan.kind)
-    sections = [_motion(plan), _questions(plan), _cannot(plan), _limits(plan), *([conventions] if conventions else []), _method(plan)]
+    sections = [
+        _motion(plan),
+        _questions(plan),
+        _cannot(plan),
+        _limits(plan),
+        *([conventions] if conventions else []),
+        _method(plan),
+    ]
     heading = f"Next experiment: {plan.arm}"
     return Document(heading, lead(plan), answers(plan), [s for s in sections if s is not None], brief(plan.kind))
 
@@ -103,16 +110,15 @@ def _motion(plan: Plan) -> Section:
         (plan.dq_ref, "Reference velocity", f"velocity [{unit}/s]"),
         (plan.tau_ff, "Feed-forward torque of the best model", f"torque [{torque}]"),
     ):
-        curves = [
-            (f"joint {j + 1}", values[::every, j], _COLOURS[j % len(_COLOURS)]) for j in range(values.shape[1])
-        ]
+        curves = [(f"joint {j + 1}", values[::every, j], _COLOURS[j % len(_COLOURS)]) for j in range(values.shape[1])]
         drawings.append(Drawing(f"{what}.", charts.lines("", "time [s]", label, t, curves), _extremes(values, label)))
     return Section("", figures=drawings)
 
 
 def _extremes(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]], label: str) -> Table:
     rows = [
-        (f"joint {j + 1}", figure(float(values[:, j].min())), figure(float(values[:, j].max()))) for j in range(values.shape[1])
+        (f"joint {j + 1}", figure(float(values[:, j].min())), figure(float(values[:, j].max())))
+        for j in range(values.shape[1])
     ]
     return Table(("", f"least {label}", f"most {label}"), rows)
 
@@ -154,8 +160,12 @@ def _limits(plan: Plan) -> Section:
             ("speed", f"{unit}/s", ("speed",)),
             ("torque", torque, ("torque",)),
         ):
-            allowed = " to ".join(figure(limits[key][j]) for key in cell) if limits[cell[0]] is not None else "not limited"
-            rows.append((f"joint {j + 1}", f"{name} [{of}]", " to ".join(figure(used[key][j]) for key in cell), allowed))
+            allowed = (
+                " to ".join(figure(limits[key][j]) for key in cell) if limits[cell[0]] is not None else "not limited"
+            )
+            rows.append(
+                (f"joint {j + 1}", f"{name} [{of}]", " to ".join(figure(used[key][j]) for key in cell), allowed)
+            )
     source = {"arm file": "Limits are those of the arm file.", "logs": "Limits are what the diagnosed logs covered."}
     start = ", ".join(figure(float(x)) for x in plan.limits.home)
     text = [source[plan.limits.source], f"It begins and ends at rest at {start} {unit}: move the arm there first."]

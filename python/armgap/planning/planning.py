@@ -267,7 +267,9 @@ def check_optimiser() -> None:
     from importlib.util import find_spec
 
     if find_spec("scipy") is None:
-        raise OptionError("planning needs scipy, which is not installed", remedy="install it with pip install 'armgap[plan]'")
+        raise OptionError(
+            "planning needs scipy, which is not installed", remedy="install it with pip install 'armgap[plan]'"
+        )
 
 
 def _usable(diagnosis: Diagnosis | str | os.PathLike[str], arm: Arm) -> dict[str, Any]:
@@ -276,7 +278,7 @@ def _usable(diagnosis: Diagnosis | str | os.PathLike[str], arm: Arm) -> dict[str
 
     if isinstance(diagnosis, list | tuple):
         raise OptionError(f"{len(diagnosis)} diagnoses were given", remedy="give one; diagnose its logs together first")
-    read = diagnosis if isinstance(diagnosis, Diagnosis) else read_diagnosis(diagnosis)
+    read = diagnosis if isinstance(diagnosis, Diagnosis) else read_diagnosis(Path(diagnosis))
     file = None if isinstance(diagnosis, Diagnosis) else diagnosis
     data = read.to_dict()
     if read.verdict == "input":
@@ -286,14 +288,18 @@ def _usable(diagnosis: Diagnosis | str | os.PathLike[str], arm: Arm) -> dict[str
             file=file,
         )
     described = data.get("arm") or {}
-    if described.get("kind", arm.kind) != arm.kind or set(data["parameters"]["with_causes"]) != set(arm.parameter_names):
+    if described.get("kind", arm.kind) != arm.kind or set(data["parameters"]["with_causes"]) != set(
+        arm.parameter_names
+    ):
         raise OptionError(
             f"is of an arm of kind {described.get('kind')!r}, the arm file's is {arm.kind!r}",
             remedy="give the arm file that was diagnosed",
             file=file,
         )
     if "noise" not in data:
-        raise OptionError("says nothing of the noise", remedy="give the JSON that `armgap diagnose --json` wrote", file=file)
+        raise OptionError(
+            "says nothing of the noise", remedy="give the JSON that `armgap diagnose --json` wrote", file=file
+        )
     return data
 
 
@@ -316,7 +322,11 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
         posed.sort(key=_urgency)
     chosen = posed if named else posed[:MOST_QUESTIONS]
     settling = {p.question.text for p in chosen}
-    left = [q for q in (p.question for p in posed) if q.text not in settling] if not named else [q for q in questions if q.text not in settling]
+    left = (
+        [q for q in (p.question for p in posed) if q.text not in settling]
+        if not named
+        else [q for q in questions if q.text not in settling]
+    )
     if not chosen:
         raise OptionError("the diagnosis leaves nothing open", remedy="ask for an effect, such as --for backlash:2")
     candidates = len(data["causes"]) + len(data.get("candidates") or []) + len(data["ruled_out"])
@@ -324,7 +334,10 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
     found = search.best(chosen, threshold, seed)
     motion = search.kept(found.motion, chosen)
     played = found.played if motion == found.motion else search.play(motion)
-    answered = [_answer(p, played.outcome(p.contest), float(most), threshold) for p, most in zip(chosen, found.most, strict=True)]
+    answered = [
+        _answer(p, played.outcome(p.contest), float(most), threshold)
+        for p, most in zip(chosen, found.most, strict=True)
+    ]
     t, q, dq, tau = _sampled(motion, setting)
     return Plan(
         arm.name,
@@ -403,9 +416,13 @@ def _obstacle(question: Question, outcome: Outcome, most: float) -> str:
 def _limit_notes(limits: PlanLimits) -> list[str]:
     notes = []
     if limits.source == "logs":
-        notes.append("the arm file has no [limits]; the motion keeps to the positions, speeds and accelerations of the diagnosed logs")
+        notes.append(
+            "the arm file has no [limits]; the motion keeps to the positions, speeds and accelerations of the diagnosed logs"
+        )
     if limits.torque is None:
         notes.append("the arm file has no torque_limit; torques are not limited")
     else:
-        notes.append(f"the feed-forward torque takes at most {TORQUE_MARGIN:.0%} of torque_limit; the rest is the controller's")
+        notes.append(
+            f"the feed-forward torque takes at most {TORQUE_MARGIN:.0%} of torque_limit; the rest is the controller's"
+        )
     return notes

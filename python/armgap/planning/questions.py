@@ -10,7 +10,7 @@ from typing import Any
 from armgap import _native
 from armgap.arm import Arm
 from armgap.errors import OptionError
-from armgap.evidence.hypothesis import EffectInstance, Hypothesis
+from armgap.evidence.hypothesis import Hypothesis
 from armgap.planning.sizes import PLANNED
 
 __all__ = ["NONE", "Question", "asked", "known_model", "open_questions"]
@@ -102,7 +102,9 @@ def open_questions(data: Data) -> tuple[list[Question], list[str]]:
                 remarks.append(f"{pair}: {other.get('why') or 'not a matter of the arm'}; no motion is planned for it")
     for candidate in data.get("candidates") or []:
         if candidate["effect"] in PLANNED:
-            question = Question(candidate["effect"], candidate["joint"], origin="candidate", estimate=_estimate(candidate))
+            question = Question(
+                candidate["effect"], candidate["joint"], origin="candidate", estimate=_estimate(candidate)
+            )
             found.append(replace(question, why=candidate.get("why") or ""))
     for entry in data["ruled_out"]:
         if entry["status"] not in ("undecided", "not excited") or entry["effect"] not in PLANNED:

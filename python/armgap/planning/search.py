@@ -155,7 +155,7 @@ class Search:
         def cost(numbers: Array) -> float:
             motion = self.motion(numbers)
             played = self.play(motion)
-            told = [played.outcome(p.quick) for p in posed]
+            told = [played.outcome(p.quick, steps=1) for p in posed]
             state.count += 1
             state.most = np.maximum(state.most, [x.expected for x in told])
             report_progress("planning", min(state.count / total, 1.0))
@@ -194,4 +194,3 @@ class _State:
     worth: float = 0.0
     played: Played | None = None
     motion: Motion | None = None
-

@@ -110,7 +110,9 @@ class Shape:
         return {self.main: value, **self.others}
 
 
-def _one(main: str, typical: Callable[[Scales, int], float], neutral: float = 0.0) -> Callable[[Scales, int], list[Shape]]:
+def _one(
+    main: str, typical: Callable[[Scales, int], float], neutral: float = 0.0
+) -> Callable[[Scales, int], list[Shape]]:
     return lambda s, j: [Shape(main, typical(s, j), neutral=neutral)]
 
 
@@ -124,7 +126,8 @@ def _stribeck(s: Scales, j: int) -> list[Shape]:
 
 def _presliding(s: Scales, j: int) -> list[Shape]:
     return [
-        Shape("amplitude", _torque(s, j), {"stiffness": times * float(s.torque[j] / s.position[j])}) for times in (30.0, 5.0)
+        Shape("amplitude", _torque(s, j), {"stiffness": times * float(s.torque[j] / s.position[j])})
+        for times in (30.0, 5.0)
     ]
 
 
@@ -226,5 +229,7 @@ def levels(effect: str, joint: int | None, scales: Scales) -> list[dict[str, flo
     for seen, end in ends:
         parts = (np.arange(STEPS) + 0.5) / STEPS
         if (end - seen) * np.sign(end) > 0:
-            found += [{"position": seen + float(x) * (end - seen), "stiffness": stiffness, "damping": damping} for x in parts]
+            found += [
+                {"position": seen + float(x) * (end - seen), "stiffness": stiffness, "damping": damping} for x in parts
+            ]
     return found
