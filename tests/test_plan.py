@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -68,8 +67,10 @@ def diagnosis(limited: Arm) -> Diagnosis:
 
 @pytest.fixture
 def brief(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Search without further generations: these tests are about what is found, not about the best of it."""
+    """Compare six motions only: these tests are about what a plan is, not about the best of them."""
     monkeypatch.setattr(search, "GENERATIONS", 0)
+    monkeypatch.setattr(search, "POPULATION", 6)
+    monkeypatch.setattr(search, "_POSES", ((0.3, 0.7),))
 
 
 def played(diagnosis: Diagnosis, arm: Arm, motion: Motion) -> Played:
@@ -94,11 +95,14 @@ def test_any_numbers_give_a_motion_within_limits_at_rest_at_both_ends(seed):
     motion = build(rng.uniform(0, 1, count(n)), np.zeros(n), limits, rng.uniform(2.0, 12.0), 0.002)
     t = np.linspace(0.0, motion.duration, 20_001)
     q, dq, ddq = motion.at(t)
-    assert np.all(q <= high + PEAKS) and np.all(q >= low - PEAKS)
+    assert np.all(q <= high + PEAKS)
+    assert np.all(q >= low - PEAKS)
     assert np.all(np.abs(dq) <= limits.speed * (1 + PEAKS))
     assert np.all(np.abs(ddq) <= limits.acceleration * (1 + PEAKS))
     for end in (0, -1):
-        assert np.all(q[end] == 0) and np.all(dq[end] == 0) and np.all(ddq[end] == 0)
+        assert np.all(q[end] == 0)
+        assert np.all(dq[end] == 0)
+        assert np.all(ddq[end] == 0)
     assert np.max(np.ptp(q, axis=0)) > 0
 
 
@@ -197,18 +201,21 @@ def test_a_torque_gain_needs_a_trusted_mass(limited, diagnosis, trust, low, high
 def test_a_plan_keeps_its_limits_and_rests_at_both_ends(limited, diagnosis, tmp_path):
     made = plan(diagnosis, limited, questions=["quadratic_drag:1", "backlash:2"], duration=DURATION)
     limits = limited.limits
-    assert limits is not None and limited.torque_limit is not None
+    assert limits is not None
+    assert limited.torque_limit is not None
     made.write(tmp_path / "experiment.csv")
     table = pl.read_csv(tmp_path / "experiment.csv")
     assert table.columns == ["t", "q_ref1", "q_ref2", "dq_ref1", "dq_ref2", "tau_ff1", "tau_ff2"]
     t, q, dq, tau = (table.select(f"^{name}[0-9]*$").to_numpy() for name in ("t", "q_ref", "dq_ref", "tau_ff"))
     np.testing.assert_allclose(np.diff(t[:, 0]), limited.sample_period, rtol=1e-9)
     assert t[-1, 0] == pytest.approx(DURATION)
-    assert np.all(q >= limits.position_min) and np.all(q <= limits.position_max)
+    assert np.all(q >= limits.position_min)
+    assert np.all(q <= limits.position_max)
     assert np.all(np.abs(dq) <= limits.speed)
     assert np.all(np.abs(np.diff(dq, axis=0)) <= limits.acceleration * limited.sample_period)
     assert np.all(np.abs(tau) <= limited.torque_limit)
-    assert np.all(q[[0, -1]] == 0) and np.all(dq[[0, -1]] == 0)
+    assert np.all(q[[0, -1]] == 0)
+    assert np.all(dq[[0, -1]] == 0)
     assert np.ptp(q, axis=0).min() > 0.1
 
 
@@ -219,11 +226,11 @@ def test_the_same_seed_gives_the_same_bytes(limited, diagnosis, tmp_path, run):
     for name in ("a", "b"):
         status, out, err = run(
             "plan", tmp_path / "d.json", "--arm", limited.path, "--for", "stribeck:2", "--duration", DURATION,
-            "-o", tmp_path / f"{name}.csv", "--json", tmp_path / f"{name}.json", "--report", tmp_path / f"{name}.html",
+            "-o", tmp_path / f"{name}.csv", "--json", tmp_path / f"{name}.json", "--report", tmp_path / f"{name}.md",
         )  # fmt: skip
         assert (status, err) == (0, "")
         assert "Stribeck" in out
-        outputs.append([(tmp_path / f"{name}.{ending}").read_bytes() for ending in ("csv", "json")])
+        outputs.append([(tmp_path / f"{name}.{ending}").read_bytes() for ending in ("csv", "json", "md")])
     assert outputs[0] == outputs[1]
     data = json.loads(outputs[0][1])
     assert data["schema"] == "armgap.plan/1"
@@ -232,7 +239,7 @@ def test_the_same_seed_gives_the_same_bytes(limited, diagnosis, tmp_path, run):
     assert question["expected_log_likelihood_ratio"] > 0
     assert 0 <= question["settled"] <= 1
     assert data["limits"]["speed"] == [3.0, 5.0]
-    page = (tmp_path / "a.html").read_text()
+    page = (tmp_path / "a.md").read_text()
     assert "What the motion is for" in page
     assert "Limits" in page
 
@@ -262,7 +269,8 @@ def test_at_most_five_questions_and_the_others_are_named(limited, diagnosis):
 
 
 def test_torque_margin_and_margin_leave_room_for_a_controller():
-    assert TORQUE_MARGIN < 1 and MARGIN < 1
+    assert TORQUE_MARGIN < 1
+    assert MARGIN < 1
     assert criterion.TRAINED < 1
 
 
@@ -271,20 +279,25 @@ def test_torque_margin_and_margin_leave_room_for_a_controller():
 
 def test_limits_and_controller_are_read_and_written(limited, tmp_path):
     limits, controller = limited.limits, limited.controller
-    assert limits is not None and controller is not None
+    assert limits is not None
+    assert controller is not None
     assert limits.position_max.tolist() == [1.2, 2.0]
     assert (controller.kp.tolist(), controller.kd_on) == ([400.0, 30.0], "error")
     copy = tmp_path / "copy.toml"
     copy.write_text(limited.to_toml())
     again = Arm.read(copy)
     assert again.to_toml() == limited.to_toml()
-    assert again.limits is not None and again.limits.acceleration.tolist() == [20.0, 60.0]
+    assert again.limits is not None
+    assert again.limits.acceleration.tolist() == [20.0, 60.0]
 
 
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (("position_max = [1.2, 2.0]", "position_max = [-1.6, 2.0]"), ("limits.position_max", "not above position_min")),
+        (
+            ("position_max = [1.2, 2.0]", "position_max = [-1.6, 2.0]"),
+            ("limits.position_max", "not above position_min"),
+        ),
         (("speed = [3.0, 5.0]", "speed = [3.0]"), ("limits.speed", "needs a list of 2")),
         (("speed = [3.0, 5.0]", "speed = [3.0, -5.0]"), ("limits.speed", "above 0")),
         (("acceleration = [20.0, 60.0]\n", ""), ("limits.acceleration", "is missing")),

@@ -69,10 +69,10 @@ class Case:
 
 CASES = (
     Case("direct-drive", "stribeck", 2, {"amplitude": 0.06, "velocity": 0.05}),
-    Case("direct-drive", "quadratic_drag", 1, {"c": 0.05}),
-    Case("direct-drive", "joint_spring", 2, {"k": 0.03, "q0": 0.4}),
-    Case("direct-drive", "torque_saturation", 2, {"level": 9.0}),
-    Case("geared", "backlash", 2, {"gap": 0.0015, "rotor_share": 0.1}),
+    Case("direct-drive", "quadratic_drag", 1, {"c": 0.1}),
+    Case("direct-drive", "joint_spring", 2, {"k": 0.1, "q0": 0.4}),
+    Case("direct-drive", "torque_saturation", 2, {"level": 6.0}),
+    Case("geared", "backlash", 2, {"gap": 0.004, "rotor_share": 0.1}),
     Case("geared", "torque_ripple", 2, {"amplitude": 0.012, "n": 7.0, "phase": 0.5}),
     Case("geared", "load_dependent_friction", 1, {"mu": 0.008}),
     Case("pendulum", "presliding", 1, {"amplitude": 0.06, "stiffness": 400.0}),

@@ -204,15 +204,30 @@ def _enough(threshold: float) -> float:
 
 
 class Played:
-    """A motion, its torques, and what models predict over its windows."""
+    """A motion, its torques, and what models predict over its windows.
 
-    def __init__(self, setting: Setting, motion: Motion) -> None:
+    Parameters
+    ----------
+    setting : Setting
+        What evidence is counted with.
+    motion : Motion
+        The motion.
+    most : int, optional
+        Windows that are looked at, spread evenly; evidence is that of all.
+    """
+
+    def __init__(self, setting: Setting, motion: Motion, most: int | None = None) -> None:
         self._setting = setting
         self._arm = setting.arm
         h = setting.step
         self._samples = max(round(setting.horizon / h), DEGREES + 2)
-        self._count = int((motion.duration / h) // self._samples)
-        length = self._count * self._samples + 1
+        every = int((motion.duration / h + 1e-6) // self._samples)
+        self._stride = 1 if most is None else -(-every // most)
+        self._windows = np.arange(0, every, self._stride)
+        self._count = len(self._windows)
+        #: Windows that each one looked at stands for.
+        self._share = every / self._count
+        length = every * self._samples + 1
         self.t: Array = h * np.arange(length, dtype=np.float64)
         self.q, self.dq, self.ddq = motion.at(self.t)
         # A torque is held over a step: that of the step's middle.
@@ -236,7 +251,8 @@ class Played:
         setting, n = self._setting, self._samples + 1
         period = self._arm.sample_period
         share = period / setting.step
-        way = np.array([np.mean(np.abs(v), axis=0) for v in np.split(self.dq[1:], self._count)]) * period
+        way = np.array([np.mean(np.abs(v), axis=0) for v in np.split(self.dq[1:], (len(self.dq) - 1) // self._samples)])
+        way = way[self._windows] * period
         rounding = np.minimum(setting.encoder_step**2 / 12.0, setting.sigma**2)
         held = np.clip(setting.encoder_step / np.maximum(way, 1e-15), 1.0, setting.horizon / period)
         noise = (setting.sigma**2 - rounding + rounding * held) * share
@@ -266,7 +282,7 @@ class Played:
     ) -> Array:
         arm, model, s = self._arm, self._setting.model, self._samples
         before = round(LEAD / self._setting.step) if lead else 0
-        first = s * np.arange(self._count)
+        first = s * self._windows
         begin = np.maximum(first - before, 0)
         q0, dq0 = self._true_start(begin, effects)
         placed = [e.on(e.joint) for e in effects]
@@ -348,7 +364,7 @@ class Played:
         """
         weight = np.array([w for w, _ in contest.own])
         residuals = 0.5 * self._arm.n_joints * self._setting.horizon / self._arm.sample_period
-        half = TRAINED * self._count * residuals
+        half = TRAINED * self._share * self._count * residuals
         needs = max(MATTERS * self._setting.excess, ABOVE_FLOOR - self._setting.excess) * half
         spread = math.sqrt(half) / needs
         try:
@@ -357,7 +373,10 @@ class Played:
             nothing = np.zeros(len(weight))
             return Outcome(nothing, nothing, nothing, nothing, weight, spread)
         left, plain, cost, certain = found.T
-        return Outcome(TRAINED * left, TRAINED * plain, TRAINED * cost / needs, certain, weight, spread)
+        share = TRAINED * self._share
+        return Outcome(
+            share * left, share * plain, share * cost / needs, math.sqrt(self._share) * certain, weight, spread
+        )
 
     def floors(self, contest: Contest, index: int, floor: Array) -> float:
         """RMS difference of one of the contest's models from the rival, in noise floors, worst joint; infinite if it cannot be computed."""

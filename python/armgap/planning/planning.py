@@ -333,7 +333,7 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
     threshold = DECISION + math.log(max(candidates, 1))
     found = search.best(chosen, threshold, seed)
     motion = search.kept(found.motion, chosen)
-    played = found.played if motion == found.motion else search.play(motion)
+    played = search.play(motion)
     answered = [
         _answer(p, played.outcome(p.contest), float(most), threshold)
         for p, most in zip(chosen, found.most, strict=True)

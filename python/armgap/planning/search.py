@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 #: Size of the population, and generations after the first.
 POPULATION, GENERATIONS = 16, 9
+#: Windows by which motions are compared.
+WINDOWS = 20
 #: Steps in which a motion is scaled down until its torques suffice.
 SHRINKS = 12
 #: Every so many steps of prediction torques are looked at while a motion is scaled down.
@@ -42,8 +44,6 @@ class Found:
 
     Attributes
     ----------
-    played : Played
-        The motion with its predictions.
     motion : Motion
         The motion.
     evaluations : int
@@ -52,7 +52,6 @@ class Found:
         Most evidence of any motion tried, per question.
     """
 
-    played: Played
     motion: Motion
     evaluations: int
     most: Array
@@ -154,15 +153,15 @@ class Search:
 
         def cost(numbers: Array) -> float:
             motion = self.motion(numbers)
-            played = self.play(motion)
-            told = [played.outcome(p.quick, steps=1) for p in posed]
+            played = Played(self._setting, motion, WINDOWS)
+            told = [played.outcome(p.quick, steps=0) for p in posed]
             state.count += 1
             state.most = np.maximum(state.most, [x.expected for x in told])
             report_progress("planning", min(state.count / total, 1.0))
             merits = [x.merit(threshold) for x in told]
             worth = 0.5 * (float(np.mean(merits)) + min(merits))
             if worth > state.worth:
-                state.worth, state.played, state.motion = worth, played, motion
+                state.worth, state.motion = worth, motion
             return -worth
 
         size = count(self._setting.arm.n_joints)
@@ -170,10 +169,8 @@ class Search:
             cost, [(0.0, 1.0)] * size, init=self._population(seed), maxiter=GENERATIONS, tol=0.0, polish=False,
             recombination=0.5, rng=np.random.default_rng(seed), callback=lambda *_: state.worth >= 1.0 - 1e-9,
         )  # fmt: skip
-        if state.motion is None or state.played is None:
-            state.motion = self.motion(standard(self._setting.arm.n_joints))
-            state.played = self.play(state.motion)
-        return Found(state.played, state.motion, state.count, state.most)
+        best = state.motion or self.motion(standard(self._setting.arm.n_joints))
+        return Found(best, state.count, state.most)
 
     def _population(self, seed: int) -> Array:
         """Usual motions at several poses, and random ones."""
@@ -192,5 +189,4 @@ class _State:
     most: Array
     count: int = 0
     worth: float = 0.0
-    played: Played | None = None
     motion: Motion | None = None
