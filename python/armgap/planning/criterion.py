@@ -43,11 +43,13 @@ LEAD = 0.15
 ACCURACY = 0.1
 #: Change of a parameter over which its sensitivity is taken, in standard deviations of its prior, and at most this part of its value.
 STEP_SIGMA, STEP_PART = 0.2, 0.02
-#: Part of a log that a diagnosis fits to; it judges on the rest.
+#: Part of a log that a diagnosis fits to, its beginning; it judges on the rest.
 TRAINED = 0.6
 #: A diagnosis explains a gap whose cost is above the floor by this part of it, with what takes this part of the excess, in windows whose
 #: mean advantage is so many standard errors (`rust/fit/src/acceptance.rs`).
 ABOVE_FLOOR, MATTERS, CERTAIN = 0.25, 0.1, 3.5
+#: The same on the part of the log that it judges on alone.
+HELD_CERTAIN = 1.0
 #: Standard deviations by which evidence may exceed what a decision needs before more of it is worth nothing to the search.
 ENOUGH = 3.0
 #: Evidence that the search aims at, over what is enough: the effect may be smaller than thought.
@@ -139,11 +141,12 @@ class Outcome(NamedTuple):
     Attributes
     ----------
     fitted, plain : ndarray
-        Expected log-likelihood ratio with the rival fitted, and without.
+        Expected log-likelihood ratio over the windows that a diagnosis fits to, with the rival fitted, and over all windows without.
     above : ndarray
-        Cost that the fitted rival leaves above the noise, over what a diagnosis needs to explain it.
+        Cost that the fitted rival leaves above the noise, over what a diagnosis needs to explain it; the lesser of what it fits to and what
+        it judges on.
     certain : ndarray
-        Mean advantage of a window, in standard errors.
+        Mean advantage of a window, in standard errors; less where what is judged on has less than its part.
     weight : ndarray
         Weights of the sizes, one together.
     spread : float
@@ -197,6 +200,13 @@ def _normal(x: float) -> float:
     return 0.5 * math.erfc(-x / math.sqrt(2.0))
 
 
+def _certainty(advantage: Array, share: float) -> float:
+    """Mean advantage of windows, each of which stands for `share` of them, in standard errors."""
+    mean = float(np.mean(advantage)) if len(advantage) else 0.0
+    scatter = float(np.var(advantage)) + 2.0 * mean if mean > 0 else 0.0
+    return math.sqrt(share * len(advantage) / scatter) * mean if scatter > 0 else 0.0
+
+
 def _enough(threshold: float) -> float:
     """Expected log-likelihood ratio that lies `ENOUGH` of its standard deviations above a threshold."""
     half = ENOUGH / math.sqrt(2.0)
@@ -227,6 +237,7 @@ class Played:
         self._count = len(self._windows)
         #: Windows that each one looked at stands for.
         self._share = every / self._count
+        self._every = every
         length = every * self._samples + 1
         self.t: Array = h * np.arange(length, dtype=np.float64)
         self.q, self.dq, self.ddq = motion.at(self.t)
@@ -364,7 +375,7 @@ class Played:
         """
         weight = np.array([w for w, _ in contest.own])
         residuals = 0.5 * self._arm.n_joints * self._setting.horizon / self._arm.sample_period
-        half = TRAINED * self._share * self._count * residuals
+        half = self._every * residuals
         needs = max(MATTERS * self._setting.excess, ABOVE_FLOOR - self._setting.excess) * half
         spread = math.sqrt(half) / needs
         try:
@@ -372,11 +383,8 @@ class Played:
         except ValueError:
             nothing = np.zeros(len(weight))
             return Outcome(nothing, nothing, nothing, nothing, weight, spread)
-        left, plain, cost, certain = found.T
-        share = TRAINED * self._share
-        return Outcome(
-            share * left, share * plain, share * cost / needs, math.sqrt(self._share) * certain, weight, spread
-        )
+        left, plain, above, certain = found.T
+        return Outcome(left, self._share * plain, above / needs, certain, weight, spread)
 
     def floors(self, contest: Contest, index: int, floor: Array) -> float:
         """RMS difference of one of the contest's models from the rival, in noise floors, worst joint; infinite if it cannot be computed."""
@@ -422,17 +430,21 @@ class Played:
                 break
             linear = columns.product(best.values, simulated=True)
             again = columns.fitted(missed + linear, self._whole)
-            done = best.square - again.square < SETTLED * best.square
-            delta, best = missed + linear, again
-            if done:
+            gain = best.square - again.square
+            if gain > 0:
+                delta, best = missed + linear, again
+            if gain < SETTLED * best.square:
                 break
-        cost = columns.fitted(delta, self._white)
-        windows = 0.5 * np.sum(cost.left.reshape(self._count, -1) ** 2, axis=1)
+        left = 0.5 * np.sum(best.left.reshape(self._count, -1) ** 2, axis=1)
+        prior = 0.5 * best.square - float(np.sum(left))
+        windows = 0.5 * np.sum(columns.fitted(delta, self._white).left.reshape(self._count, -1) ** 2, axis=1)
+        first = self._windows < TRAINED * self._every
+        share = self._share
+        above = share * min(float(np.sum(windows[first])) / TRAINED, float(np.sum(windows[~first])) / (1.0 - TRAINED))
         # Robust weights let a window's cost grow with the logarithm only.
         advantage = residuals * np.log1p(windows / residuals)
-        scatter = np.var(advantage) + 2.0 * np.mean(advantage)
-        certain = math.sqrt(self._count / scatter) * float(np.mean(advantage)) if scatter > 0 else 0.0
-        return 0.5 * best.square, plain, 0.5 * cost.square, certain
+        certain = min(_certainty(advantage, share), CERTAIN / HELD_CERTAIN * _certainty(advantage[~first], share))
+        return share * float(np.sum(left[first])) + max(prior, 0.0), plain, above, certain
 
     def _moved(
         self, contest: Contest, columns: Columns, values: Array
