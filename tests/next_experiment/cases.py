@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import armgap
 from armgap.arm import MotionLimits
 from armgap.evidence.hypothesis import EffectInstance, Hypothesis
-from armgap.planning.criterion import Contest, Played, Setting
+from armgap.planning.criterion import HypothesisPair, PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics
 from armgap.planning.limits import MARGIN, TORQUE_MARGIN
 from armgap.planning.questions import known_model
@@ -72,7 +72,7 @@ CASES = (
     Case("direct-drive", "quadratic_drag", 1, {"c": 0.1}),
     Case("direct-drive", "joint_spring", 2, {"k": 0.1, "q0": 0.4}),
     Case("direct-drive", "torque_saturation", 2, {"level": 6.0}),
-    Case("geared", "backlash", 2, {"gap": 0.004, "rotor_share": 0.1}),
+    Case("geared", "backlash", 2, {"gap": 0.004, "rotor_share": 0.1, "riding": 0.0}),
     Case("geared", "torque_ripple", 2, {"amplitude": 0.012, "n": 7.0, "phase": 0.5}),
     Case("geared", "load_dependent_friction", 1, {"mu": 0.008}),
     Case("pendulum", "presliding", 1, {"amplitude": 0.06, "stiffness": 400.0}),
@@ -133,10 +133,10 @@ def expected(
     arm = armgap.Arm.read(arm_file)
     model, _ = known_model(before.to_dict(), arm)
     t = arm.sample_period * np.arange(len(reference.q))
-    played = Played(Setting.of(before.to_dict(), model), Sampled(t, reference))  # type: ignore[arg-type]
+    played = PredictedMotion(Setting.of(before.to_dict(), model), Sampled(t, reference))  # type: ignore[arg-type]
     without = tuple(e for e in model.effects if (e.effect, e.joint) != (case.effect, case.joint))
     hidden = EffectInstance(case.effect, case.joint, case.parameters)
-    outcome = played.outcome(Contest(((1.0, (*without, hidden)),), without))
+    outcome = played.outcome(HypothesisPair(((1.0, (*without, hidden)),), without))
     return outcome.expected, outcome.settled(threshold)
 
 

@@ -25,7 +25,7 @@ from armgap.evidence.hypothesis import EffectInstance, Hypothesis, true_position
 from armgap.planning.dynamics import LATENT, inverse_dynamics
 from armgap.planning.motion import Motion
 
-__all__ = ["Contest", "Outcome", "Played", "Setting", "settled"]
+__all__ = ["HypothesisPair", "Outcome", "PredictedMotion", "Setting", "settled"]
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ WINDOW_SAMPLES = 50
 #: Polynomials per window and joint; those of degree 0 and 1 take up the start's error.
 DEGREES = 12
 #: Discrepancy at least, as a part of the noise floor.
-FAINT = 0.3
+LEAST_DISCREPANCY = 0.3
 #: RMS of t^2 over an interval, over the RMS of its part of degree 2 (Legendre polynomials).
 BEND = 6.0
 #: Time by which predictions with latent states begin before their windows, s.
@@ -48,6 +48,8 @@ TRAINED = 0.6
 #: A diagnosis explains a gap whose cost is above the floor by this part of it, with what takes this part of the excess, in windows whose
 #: mean advantage is so many standard errors (`rust/fit/src/acceptance.rs`).
 ABOVE_FLOOR, MATTERS, CERTAIN = 0.25, 0.1, 3.5
+#: Standard deviations from its prior that a value of the arm returns by what a diagnosis names without a gap.
+TRUST_SIGMAS = 4.0
 #: The same on the part of the log that it judges on alone.
 HELD_CERTAIN = 1.0
 #: Standard deviations by which evidence may exceed what a decision needs before more of it is worth nothing to the search.
@@ -100,7 +102,7 @@ class Setting:
         beyond = np.maximum(after**2 - floor**2, 0.0)
         sigma = np.maximum(np.array(noise["position_sigma"], dtype=np.float64), 1e-12)
         step = np.array(noise.get("encoder_step") or np.zeros(len(sigma)), dtype=np.float64)
-        discrepancy = np.sqrt(np.maximum(beyond, (FAINT * floor) ** 2))
+        discrepancy = np.sqrt(np.maximum(beyond, (LEAST_DISCREPANCY * floor) ** 2))
         excess = float(np.mean(beyond / np.maximum(floor, 1e-12) ** 2))
         return cls(model, float(gap["horizon_s"]), sigma, step, discrepancy, excess)
 
@@ -117,12 +119,12 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Contest:
+class HypothesisPair:
     """One question as models.
 
     Attributes
     ----------
-    own : tuple of (weight, effects)
+    alternatives : tuple of (weight, effects)
         Models with the effect in question, of several sizes; the weights add up to one.
     rival : tuple of EffectInstance
         Effects of the rival's model.
@@ -130,13 +132,13 @@ class Contest:
         The effect of the rival whose values are fitted.
     """
 
-    own: tuple[tuple[float, tuple[EffectInstance, ...]], ...]
+    alternatives: tuple[tuple[float, tuple[EffectInstance, ...]], ...]
     rival: tuple[EffectInstance, ...]
     free: EffectInstance | None = None
 
 
 class Outcome(NamedTuple):
-    """What a motion tells about a contest, one entry per size of the effect.
+    """What a motion tells about a pair, one entry per size of the effect.
 
     Attributes
     ----------
@@ -147,6 +149,8 @@ class Outcome(NamedTuple):
         it judges on.
     certain : ndarray
         Mean advantage of a window, in standard errors; less where what is judged on has less than its part.
+    prior : ndarray
+        Part of `fitted` that is the prior's: the rival needs values of the arm that are not trusted.
     weight : ndarray
         Weights of the sizes, one together.
     spread : float
@@ -157,6 +161,7 @@ class Outcome(NamedTuple):
     plain: Array
     above: Array
     certain: Array
+    prior: Array
     weight: Array
     spread: float
 
@@ -170,7 +175,9 @@ class Outcome(NamedTuple):
         likely = [settled(x, threshold) for x in self.fitted]
         high = [_normal((x - 1.0) / self.spread) for x in self.above]
         common = [_normal(x - CERTAIN) for x in self.certain]
-        return float(self.weight @ np.min([likely, high, common], axis=0))
+        by_motion = np.min([likely, high, common], axis=0)
+        by_prior = np.minimum(likely, [_normal(math.sqrt(2.0 * x) - TRUST_SIGMAS) for x in self.prior])
+        return float(self.weight @ np.maximum(by_motion, by_prior))
 
     def merit(self, threshold: float) -> float:
         """How near all that a decision needs is, from 0 to 1, mean over the sizes; it grows with the logarithm."""
@@ -180,7 +187,8 @@ class Outcome(NamedTuple):
             self.above / (AIM * (1.0 + ENOUGH * self.spread)),
             self.certain / (CERTAIN + ENOUGH),
         )
-        least = np.clip(np.min(parts, axis=0), 0.0, 1.0)
+        by_prior = np.minimum(parts[0], np.sqrt(2.0 * self.prior) / (TRUST_SIGMAS + ENOUGH))
+        least = np.clip(np.maximum(np.min(parts, axis=0), by_prior), 0.0, 1.0)
         return float(self.weight @ (np.log1p(GROWTH * least) / math.log1p(GROWTH)))
 
     @property
@@ -213,7 +221,7 @@ def _enough(threshold: float) -> float:
     return (half + math.sqrt(half * half + threshold)) ** 2
 
 
-class Played:
+class PredictedMotion:
     """A motion, its torques, and what models predict over its windows.
 
     Parameters
@@ -363,42 +371,42 @@ class Played:
         """Number of the arm's parameters."""
         return len(self._arm.sigma)
 
-    def outcome(self, contest: Contest, steps: int = STEPS) -> Outcome:
-        """What the motion tells about a contest; nothing where a model's motion cannot be computed.
+    def outcome(self, pair: HypothesisPair, steps: int = STEPS) -> Outcome:
+        """What the motion tells about a pair; nothing where a model's motion cannot be computed.
 
         Parameters
         ----------
-        contest : Contest
-            The contest.
+        pair : HypothesisPair
+            The pair.
         steps : int, default 8
             Gauss-Newton steps in which the rival is fitted, beyond the first-order fit.
         """
-        weight = np.array([w for w, _ in contest.own])
+        weight = np.array([w for w, _ in pair.alternatives])
         residuals = 0.5 * self._arm.n_joints * self._setting.horizon / self._arm.sample_period
         half = self._every * residuals
         needs = max(MATTERS * self._setting.excess, ABOVE_FLOOR - self._setting.excess) * half
         spread = math.sqrt(half) / needs
         try:
-            found = np.array([self._told(effects, contest, residuals, steps) for _, effects in contest.own])
+            found = np.array([self._evidence(effects, pair, residuals, steps) for _, effects in pair.alternatives])
         except ValueError:
             nothing = np.zeros(len(weight))
-            return Outcome(nothing, nothing, nothing, nothing, weight, spread)
-        left, plain, above, certain = found.T
-        return Outcome(left, self._share * plain, above / needs, certain, weight, spread)
+            return Outcome(nothing, nothing, nothing, nothing, nothing, weight, spread)
+        left, plain, above, certain, prior = found.T
+        return Outcome(left, self._share * plain, above / needs, certain, prior, weight, spread)
 
-    def floors(self, contest: Contest, index: int, floor: Array) -> float:
-        """RMS difference of one of the contest's models from the rival, in noise floors, worst joint; infinite if it cannot be computed."""
+    def floors(self, pair: HypothesisPair, index: int, floor: Array) -> float:
+        """RMS difference of one of the pair's models from the rival, in noise floors, worst joint; infinite if it cannot be computed."""
         try:
-            delta, _ = self._difference(contest.own[index][1], contest)
+            delta, _ = self._difference(pair.alternatives[index][1], pair)
         except ValueError:
             return math.inf
         factors = delta.reshape(self._count, -1, self._arm.n_joints)
         rms = np.sqrt(np.sum(factors**2, axis=(0, 1)) / (self._count * (self._samples + 1)))
         return float(np.max(rms / np.maximum(floor, 1e-12)))
 
-    def difference(self, contest: Contest) -> Array:
+    def difference(self, pair: HypothesisPair) -> Array:
         """Difference of the first model's predictions from the rival's."""
-        return self._difference(contest.own[0][1], contest)[0]
+        return self._difference(pair.alternatives[0][1], pair)[0]
 
     def left_of(self, delta: Array, column: Array | None = None) -> tuple[float, float]:
         """Square of what the arm's own values leave of a difference, and the factor of a further column that is fitted with them."""
@@ -406,24 +414,24 @@ class Played:
         found = Columns(self.sensitivities(), free, (), self.n_parameters).fitted(delta, self._whole)
         return found.square, 0.0 if column is None else float(found.values[-1])
 
-    def _difference(self, effects: tuple[EffectInstance, ...], contest: Contest) -> tuple[Array, bool]:
-        lead = latent((*effects, *contest.rival))
+    def _difference(self, effects: tuple[EffectInstance, ...], pair: HypothesisPair) -> tuple[Array, bool]:
+        lead = latent((*effects, *pair.rival))
         theta = self._setting.model.theta
-        return self.predicted(theta, effects, lead) - self.predicted(theta, contest.rival, lead), lead
+        return self.predicted(theta, effects, lead) - self.predicted(theta, pair.rival, lead), lead
 
-    def _told(
-        self, effects: tuple[EffectInstance, ...], contest: Contest, residuals: float, steps: int
-    ) -> tuple[float, float, float, float]:
+    def _evidence(
+        self, effects: tuple[EffectInstance, ...], pair: HypothesisPair, residuals: float, steps: int
+    ) -> tuple[float, float, float, float, float]:
         theta = self._setting.model.theta
-        lead = latent((*effects, *contest.rival))
+        lead = latent((*effects, *pair.rival))
         truth = self.predicted(theta, effects, lead)
-        delta = truth - self.predicted(theta, contest.rival, lead)
-        columns = Columns.of(self, contest, lead)
+        delta = truth - self.predicted(theta, pair.rival, lead)
+        columns = Columns.of(self, pair, lead)
         best = columns.fitted(delta, self._whole)
         plain = 0.5 * float(np.sum((delta * self._whole) ** 2))
         for _ in range(steps):
             # Gauss-Newton: the rival predicts with the fitted values, and what is left is fitted again.
-            moved, rival = self._moved(contest, columns, best.values)
+            moved, rival = self._moved(pair, columns, best.values)
             try:
                 missed = truth - self.predicted(moved, rival, lead)
             except ValueError:
@@ -436,7 +444,7 @@ class Played:
             if gain < SETTLED * best.square:
                 break
         left = 0.5 * np.sum(best.left.reshape(self._count, -1) ** 2, axis=1)
-        prior = 0.5 * best.square - float(np.sum(left))
+        prior = max(0.5 * best.square - float(np.sum(left)), 0.0)
         windows = 0.5 * np.sum(columns.fitted(delta, self._white).left.reshape(self._count, -1) ** 2, axis=1)
         first = self._windows < TRAINED * self._every
         share = self._share
@@ -444,38 +452,38 @@ class Played:
         # Robust weights let a window's cost grow with the logarithm only.
         advantage = residuals * np.log1p(windows / residuals)
         certain = min(_certainty(advantage, share), CERTAIN / HELD_CERTAIN * _certainty(advantage[~first], share))
-        return share * float(np.sum(left[first])) + max(prior, 0.0), plain, above, certain
+        return share * float(np.sum(left[first])) + prior, plain, above, certain, prior
 
     def _moved(
-        self, contest: Contest, columns: Columns, values: Array
+        self, pair: HypothesisPair, columns: Columns, values: Array
     ) -> tuple[tuple[float, ...], tuple[EffectInstance, ...]]:
         """The rival's model with fitted values; friction and inertia stay positive."""
         arm, theta = self._arm, np.array(self._setting.model.theta)
         p = len(theta)
         changed = theta + arm.sigma * values[:p]
         kept = np.where(theta > 0, np.maximum(changed, 1e-3 * theta), changed)
-        if contest.free is None:
-            return tuple(kept.tolist()), contest.rival
+        if pair.free is None:
+            return tuple(kept.tolist()), pair.rival
         steps = values[columns.common.shape[1] :]
-        parameters = dict(contest.free.parameters)
+        parameters = dict(pair.free.parameters)
         for name, step in zip(columns.names, steps, strict=True):
             parameters[name] += float(step)
-        moved = contest.free._replace(parameters=parameters)
-        return tuple(kept.tolist()), tuple(moved if e == contest.free else e for e in contest.rival)
+        moved = pair.free._replace(parameters=parameters)
+        return tuple(kept.tolist()), tuple(moved if e == pair.free else e for e in pair.rival)
 
-    def of_rival(self, contest: Contest, lead: bool) -> tuple[tuple[str, ...], Array]:
+    def of_rival(self, pair: HypothesisPair, lead: bool) -> tuple[tuple[str, ...], Array]:
         """Values of the rival's effect that are fitted, and derivatives of its predictions by them."""
-        theta, free = self._setting.model.theta, contest.free
+        theta, free = self._setting.model.theta, pair.free
         if free is None:
             return (), np.empty((len(self._white), 0))
-        reference = self.predicted(theta, contest.rival, lead)
+        reference = self.predicted(theta, pair.rival, lead)
         names, columns = [], []
         for name, value in free.parameters.items():
             if name in _FIXED:
                 continue
             step = STEP_PART * (abs(value) or 1.0)
             moved = free._replace(parameters={**free.parameters, name: value + step})
-            effects = tuple(moved if e == free else e for e in contest.rival)
+            effects = tuple(moved if e == free else e for e in pair.rival)
             columns.append((self.predicted(theta, effects, lead) - reference) / step)
             names.append(name)
         return tuple(names), np.column_stack(columns)
@@ -515,9 +523,9 @@ class Columns:
     simulated: int
 
     @classmethod
-    def of(cls, played: Played, contest: Contest, lead: bool) -> Columns:
-        """Return the columns of a contest's rival."""
-        names, free = played.of_rival(contest, lead)
+    def of(cls, played: PredictedMotion, pair: HypothesisPair, lead: bool) -> Columns:
+        """Return the columns of a pair's rival."""
+        names, free = played.of_rival(pair, lead)
         return cls(played.sensitivities(), free, names, played.n_parameters)
 
     def product(self, values: Array, *, simulated: bool) -> Array:

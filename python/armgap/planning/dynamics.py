@@ -67,7 +67,7 @@ def torque_with(
         return tau
     full = model.only((*(e for e in model.effects if e.effect not in (*LATENT, *UNREACHABLE)), *changed))
     q, dq, ddq = motion
-    lacking = ddq - accelerations(full, q, dq, tau, t)
-    more = np.einsum("kij,kj->ki", full.inertia(q), lacking)
+    missing = ddq - accelerations(full, q, dq, tau, t)
+    more = np.einsum("kij,kj->ki", full.inertia(q), missing)
     moving = np.all(np.abs(dq) > MOVING, axis=1)
     return np.asarray(np.where(moving[:, None], tau + more, tau), dtype=np.float64)

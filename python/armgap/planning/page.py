@@ -57,33 +57,33 @@ def lead(plan: Plan) -> str:
 def answers(plan: Plan) -> list[SummaryAnswer]:
     """What it is for, how sure one will be, and what it does not tell."""
     best = sorted(plan.questions, key=lambda q: -q.settled)
-    told = [f"{_short(q)}: {percent(q.settled)}" for q in best]
-    untold = [q for q in best if q.why]
+    settled = [f"{_short(q)}: {percent(q.settled)}" for q in best]
+    unsettled = [q for q in best if q.why]
     left = f"Left out: {', '.join(plan.left_out)}." if plan.left_out else ""
     return [
         SummaryAnswer("What is it for?", "; ".join(_asked(q) for q in plan.questions), left),
         SummaryAnswer(
             "How sure will one be?",
-            "; ".join(told),
+            "; ".join(settled),
             "Probability of a decision if the effect is in the arm, mean over the sizes it could have.",
         ),
         SummaryAnswer(
             "What will it not tell?",
-            "; ".join(_short(q) for q in untold) or "Nothing of what was asked is out of reach",
-            " ".join(f"{_short(q)}: {q.why}." for q in untold),
+            "; ".join(_short(q) for q in unsettled) or "Nothing of what was asked is out of reach",
+            " ".join(f"{_short(q)}: {q.why}." for q in unsettled),
         ),
     ]
 
 
 def lines(plan: Plan) -> list[str]:
     """A plan as text, one line per question."""
-    told = [
+    settled = [
         f"{_asked(q)}: expected log-likelihood ratio {figure(q.expected_log_likelihood_ratio)}, settled with probability {figure(q.settled, 2)}"
         f"{f' ({q.why})' if q.why else ''}"
         for q in plan.questions
     ]
     left = [f"left out: {', '.join(plan.left_out)}"] if plan.left_out else []
-    return [lead(plan), *told, *left]
+    return [lead(plan), *settled, *left]
 
 
 def _asked(q: PlannedQuestion) -> str:

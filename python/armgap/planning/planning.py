@@ -19,9 +19,9 @@ from armgap.arm import Arm
 from armgap.diagnosis import Diagnosis
 from armgap.errors import OptionError, ResultError
 from armgap.output import STANDARD_STREAM, write
-from armgap.planning.contests import Contestants, Posed
-from armgap.planning.criterion import Outcome, Played, Setting
+from armgap.planning.criterion import Outcome, PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics
+from armgap.planning.hypotheses import HypothesisBuilder, TestedQuestion
 from armgap.planning.limits import TORQUE_MARGIN, PlanLimits, limits_of
 from armgap.planning.motion import Motion
 from armgap.planning.questions import NONE, Question, asked, known_model, open_questions, rank, spelt
@@ -309,21 +309,21 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
     setting = Setting.of(data, model)
     search = Search(setting, limits, duration)
     usual = search.play(search.motion(standard(arm.n_joints)))
-    contestants = Contestants(data, usual, _scales(arm, data, limits, usual, setting), model.effects)
+    builder = HypothesisBuilder(data, usual, _scales(arm, data, limits, usual, setting), model.effects)
     questions, remarks = open_questions(data)
     named = asked(wanted, data, arm)
-    posed = []
+    tested = []
     for question in named or questions:
-        if (one := contestants.pose(question)) is not None:
-            posed.append(one)
+        if (one := builder.pose(question)) is not None:
+            tested.append(one)
         else:
             remarks.append(f"{question.text}: these limits leave nothing that the diagnosed logs did not cover")
     if not named:
-        posed.sort(key=_urgency)
-    chosen = posed if named else posed[:MOST_QUESTIONS]
+        tested.sort(key=_urgency)
+    chosen = tested if named else tested[:MOST_QUESTIONS]
     settling = {p.question.text for p in chosen}
     left = (
-        [q for q in (p.question for p in posed) if q.text not in settling]
+        [q for q in (p.question for p in tested) if q.text not in settling]
         if not named
         else [q for q in questions if q.text not in settling]
     )
@@ -335,8 +335,7 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
     motion = search.kept(found.motion, chosen)
     played = search.play(motion)
     answered = [
-        _answer(p, played.outcome(p.contest), float(most), threshold)
-        for p, most in zip(chosen, found.most, strict=True)
+        _answer(p, played.outcome(p.pair), float(most), threshold) for p, most in zip(chosen, found.most, strict=True)
     ]
     t, q, dq, tau = _sampled(motion, setting)
     return Plan(
@@ -355,13 +354,13 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
     )
 
 
-def _urgency(posed: Posed) -> tuple[int, float]:
+def _urgency(tested: TestedQuestion) -> tuple[int, float]:
     """Causes against equivalents first, then what would cost most."""
-    first = min(rank(posed.question), 2)
-    return first, -min(posed.consequence, 1e9)
+    first = min(rank(tested.question), 2)
+    return first, -min(tested.consequence, 1e9)
 
 
-def _scales(arm: Arm, data: dict[str, Any], limits: PlanLimits, usual: Played, setting: Setting) -> Scales:
+def _scales(arm: Arm, data: dict[str, Any], limits: PlanLimits, usual: PredictedMotion, setting: Setting) -> Scales:
     edges = {r["variable"]: r["edges"] for r in data.get("regimes") or []}
     n, motion = arm.n_joints, limits.motion
     seen = [edges.get(f"q{j}") or [0.0, 0.0] for j in range(1, n + 1)]
@@ -390,15 +389,15 @@ def _sampled(motion: Motion, setting: Setting) -> tuple[Array, Array, Array, Arr
     return t, q, dq, tau
 
 
-def _answer(posed: Posed, outcome: Outcome, most: float, threshold: float) -> PlannedQuestion:
-    question, settled = posed.question, outcome.settled(threshold)
+def _answer(tested: TestedQuestion, outcome: Outcome, most: float, threshold: float) -> PlannedQuestion:
+    question, settled = tested.question, outcome.settled(threshold)
     return PlannedQuestion(
         *question.place,
         *question.rival,
         outcome.expected,
         settled,
         question.origin,
-        posed.sizes,
+        tested.sizes,
         _obstacle(question, outcome, max(most, outcome.expected)) if settled < 0.5 else "",
     )
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from armgap.arm import MotionLimits
 from armgap.errors import OptionError
-from armgap.planning.contests import Posed
-from armgap.planning.criterion import Played, Setting
+from armgap.planning.criterion import PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics, torque_with
+from armgap.planning.hypotheses import TestedQuestion
 from armgap.planning.limits import TORQUE_MARGIN, TORQUE_MOST, PlanLimits
 from armgap.planning.motion import Motion, build, count, named
 from armgap.progress import report_progress
@@ -133,32 +133,32 @@ class Search:
             motion = motion.scaled(max(0.5, min(0.97, 0.98 / ratio)))
         return motion.scaled(0.0)
 
-    def kept(self, motion: Motion, posed: Sequence[Posed]) -> Motion:
+    def kept(self, motion: Motion, tested: Sequence[TestedQuestion]) -> Motion:
         """Scale a motion down until its torques suffice under every model in question."""
-        for p in posed:
-            largest = p.contest.own[-1][1][-1]
+        for p in tested:
+            largest = p.pair.alternatives[-1][1][-1]
             motion = self._within(motion, (largest,), TORQUE_MOST)
         return motion
 
-    def play(self, motion: Motion) -> Played:
+    def play(self, motion: Motion) -> PredictedMotion:
         """Return a motion with its torques and predictions."""
-        return Played(self._setting, motion)
+        return PredictedMotion(self._setting, motion)
 
-    def best(self, posed: Sequence[Posed], threshold: float, seed: int) -> Found:
+    def best(self, tested: Sequence[TestedQuestion], threshold: float, seed: int) -> Found:
         """Return the best motion that is found for some questions; the same seed finds the same."""
         from scipy.optimize import differential_evolution
 
-        state = _State(np.zeros(len(posed)))
+        state = _State(np.zeros(len(tested)))
         total = POPULATION * (GENERATIONS + 1)
 
         def cost(numbers: Array) -> float:
             motion = self.motion(numbers)
-            played = Played(self._setting, motion, WINDOWS)
-            told = [played.outcome(p.quick, steps=0) for p in posed]
+            played = PredictedMotion(self._setting, motion, WINDOWS)
+            outcomes = [played.outcome(p.quick, steps=0) for p in tested]
             state.count += 1
-            state.most = np.maximum(state.most, [x.expected for x in told])
+            state.most = np.maximum(state.most, [x.expected for x in outcomes])
             report_progress("planning", min(state.count / total, 1.0))
-            merits = [x.merit(threshold) for x in told]
+            merits = [x.merit(threshold) for x in outcomes]
             worth = 0.5 * (float(np.mean(merits)) + min(merits))
             if worth > state.worth:
                 state.worth, state.motion = worth, motion

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.evidence.hypothesis import EffectInstance, at_motor
-from armgap.planning.criterion import Contest, Played
+from armgap.planning.criterion import HypothesisPair, PredictedMotion
 from armgap.planning.questions import NONE, Question
 from armgap.planning.sizes import Scales, Shape, levels, shapes
 
-__all__ = ["Contestants", "Posed"]
+__all__ = ["HypothesisBuilder", "TestedQuestion"]
 
 Array = NDArray[np.float64]
 Data = dict[str, Any]
@@ -34,16 +34,16 @@ SPREAD = 1.0
 
 
 @dataclass(frozen=True)
-class Posed:
+class TestedQuestion:
     """A question with its models.
 
     Attributes
     ----------
     question : Question
         The question.
-    contest : Contest
+    pair : HypothesisPair
         Its models.
-    quick : Contest
+    quick : HypothesisPair
         The same with few sizes, for the search.
     consequence : float
         Prediction error that the largest size would cost on a usual motion, in noise floors.
@@ -52,20 +52,20 @@ class Posed:
     """
 
     question: Question
-    contest: Contest
-    quick: Contest
+    pair: HypothesisPair
+    quick: HypothesisPair
     consequence: float
     sizes: tuple[str, float, float] | None
 
 
-class Contestants:
+class HypothesisBuilder:
     """Makes the models of questions from a diagnosis and a usual motion.
 
     Parameters
     ----------
     data : dict
         JSON object of the diagnosis.
-    usual : Played
+    usual : PredictedMotion
         A usual motion within the limits, by which sizes are judged.
     scales : Scales
         Typical sizes in it.
@@ -73,7 +73,7 @@ class Contestants:
         Effects of the best model.
     """
 
-    def __init__(self, data: Data, usual: Played, scales: Scales, base: tuple[EffectInstance, ...]) -> None:
+    def __init__(self, data: Data, usual: PredictedMotion, scales: Scales, base: tuple[EffectInstance, ...]) -> None:
         self._data = data
         self._usual = usual
         self._scales = scales
@@ -81,22 +81,24 @@ class Contestants:
         self._specs = {entry["name"]: entry["parameters"] for entry in _native.effects()}
         self._floor = np.array(data["gap"]["floor"], dtype=np.float64)
 
-    def pose(self, question: Question) -> Posed | None:
+    def pose(self, question: Question) -> TestedQuestion | None:
         """Return a question with its models; None where the limits leave no value that the logs have not covered."""
         without = tuple(e for e in self._base if (e.effect, e.joint) != question.place)
-        groups = self._own(question, without)
+        groups = self._alternatives(question, without)
         if not groups:
             return None
         every = [(w, (*without, e)) for w, e in groups]
-        rough = Contest(tuple(every), without)
+        rough = HypothesisPair(tuple(every), without)
         size = max(self._usual.floors(rough, i, self._floor) for i in range(len(every)))
         free = None if question.against == NONE else self._rival(question, rough)
         rival = without if free is None else (*without, free)
-        contest = Contest(tuple(every), rival, free)
-        quick = Contest(_few(every), rival, free)
-        return Posed(question, contest, quick, size, self._range(question, [e for _, e in groups]))
+        pair = HypothesisPair(tuple(every), rival, free)
+        quick = HypothesisPair(_few(every), rival, free)
+        return TestedQuestion(question, pair, quick, size, self._range(question, [e for _, e in groups]))
 
-    def _own(self, question: Question, without: tuple[EffectInstance, ...]) -> list[tuple[float, EffectInstance]]:
+    def _alternatives(
+        self, question: Question, without: tuple[EffectInstance, ...]
+    ) -> list[tuple[float, EffectInstance]]:
         if question.estimate is not None:
             return self._estimated(question)
         known = shapes(*question.place, self._scales)
@@ -133,23 +135,23 @@ class Contestants:
     def _sizes(self, question: Question, shape: Shape, without: tuple[EffectInstance, ...]) -> Array:
         """Sizes from the one that matters upwards, up to the bound where there is one."""
         effect = EffectInstance(*question.place, shape.at(shape.typical))
-        floors = self._usual.floors(Contest(((1.0, (*without, effect)),), without), 0, self._floor)
+        floors = self._usual.floors(HypothesisPair(((1.0, (*without, effect)),), without), 0, self._floor)
         matters = shape.typical * (SEVERAL / floors if floors > 0 else 1.0)
         matters = min(max(matters, shape.typical / 1e4), shape.typical * REACH)
         if question.bound is None or shape.inverse:
             return np.geomspace(matters, REACH * matters, SIZES)
         return np.geomspace(max(min(matters, question.bound), question.bound / REACH), question.bound, SIZES)
 
-    def _rival(self, question: Question, rough: Contest) -> EffectInstance:
+    def _rival(self, question: Question, rough: HypothesisPair) -> EffectInstance:
         """The rival with the values that the diagnosis has, or with those that follow the effect best over the usual motion."""
         for entry in self._entries(question.rival):
             values = {name: float(p["value"]) for name, p in entry["parameters"].items()}
             return EffectInstance(*question.rival, {**values, **at_motor(entry.get("sides"))})
-        middle = rough.own[len(rough.own) // 2]
-        target = self._usual.difference(Contest((middle,), rough.rival))
+        middle = rough.alternatives[len(rough.alternatives) // 2]
+        target = self._usual.difference(HypothesisPair((middle,), rough.rival))
         best: tuple[float, EffectInstance] | None = None
         for effect in self._tried(question.rival, rough.rival, target):
-            made = self._usual.difference(Contest(((1.0, (*rough.rival, effect)),), rough.rival))
+            made = self._usual.difference(HypothesisPair(((1.0, (*rough.rival, effect)),), rough.rival))
             left, _ = self._usual.left_of(target - made)
             if best is None or left < best[0]:
                 best = left, effect
@@ -164,7 +166,7 @@ class Contestants:
         for shape in shapes(*place, self._scales):
             typical = EffectInstance(*place, shape.at(shape.typical))
             yield typical
-            made = self._usual.difference(Contest(((1.0, (*without, typical)),), without))
+            made = self._usual.difference(HypothesisPair(((1.0, (*without, typical)),), without))
             _, factor = self._usual.left_of(target, made)
             size = factor * shape.typical
             if shape.inverse and size <= 0:
@@ -175,9 +177,9 @@ class Contestants:
         for level in levels(*place, self._scales) if not shapes(*place, self._scales) else ():
             yield EffectInstance(*place, level)
 
-    def _range(self, question: Question, own: list[EffectInstance]) -> tuple[str, float, float] | None:
+    def _range(self, question: Question, effects: list[EffectInstance]) -> tuple[str, float, float] | None:
         name = self._specs[question.effect][0]["name"]
-        values = [e.parameters[name] for e in own if name in e.parameters and e.parameters[name] != 0]
+        values = [e.parameters[name] for e in effects if name in e.parameters and e.parameters[name] != 0]
         return (name, min(values), max(values)) if values else None
 
 
@@ -186,9 +188,11 @@ def _even(effects: Iterable[EffectInstance]) -> list[tuple[float, EffectInstance
     return [(1.0 / len(found), e) for e in found]
 
 
-def _few(own: list[tuple[float, tuple[EffectInstance, ...]]]) -> tuple[tuple[float, tuple[EffectInstance, ...]], ...]:
+def _few(
+    models: list[tuple[float, tuple[EffectInstance, ...]]],
+) -> tuple[tuple[float, tuple[EffectInstance, ...]], ...]:
     """At most four of the models with equal weights, small ones first: the search needs no more."""
-    if len(own) <= len(NODES):
-        return ((1.0, own[len(own) // 2][1]),)
-    picked = [own[i] for first in range(0, len(own), SIZES) for i in (first, first + SIZES // 2)][:4]
+    if len(models) <= len(NODES):
+        return ((1.0, models[len(models) // 2][1]),)
+    picked = [models[i] for first in range(0, len(models), SIZES) for i in (first, first + SIZES // 2)][:4]
     return tuple((1.0 / len(picked), effects) for _, effects in picked)
