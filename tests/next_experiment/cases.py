@@ -19,6 +19,7 @@ from armgap.planning.questions import known_model
 from armgap.trial.armfile import arm_toml, draw_nominal
 from armgap.trial.arms import AXIS, DIRECT_DRIVE, GEARED, PENDULUM, TURN, TrialArm
 from armgap.trial.case import simulated_arm_of
+from armgap.trial.effects.drive import BACKLASH_ROTOR
 from armgap.trial.key import HiddenEffect
 from armgap.trial.simulated_arm import CommandSource, Trace, run
 
@@ -38,6 +39,8 @@ LIMITS = {
     "pendulum": ((-2.0,), (2.0,), (6.0,), (60.0,)),
     "axis": ((-0.45,), (0.45,), (0.8,), (8.0,)),
 }
+#: The motor's part of joint 2's inertia in the simulator.
+ROTOR_SHARE = BACKLASH_ROTOR * GEARED.inertia[1] / GEARED.joint_inertia[1]
 #: Coarse encoders: with fine ones the poor log tells everything.
 STEP, LINEAR_STEP = TURN / 20_000, 2e-5
 ARMS = {
@@ -72,7 +75,7 @@ CASES = (
     Case("direct-drive", "quadratic_drag", 1, {"c": 0.1}),
     Case("direct-drive", "joint_spring", 2, {"k": 0.1, "q0": 0.4}),
     Case("direct-drive", "torque_saturation", 2, {"level": 6.0}),
-    Case("geared", "backlash", 2, {"gap": 0.004, "rotor_share": 0.1, "riding": 0.0}),
+    Case("geared", "backlash", 2, {"gap": 0.02, "rotor_share": ROTOR_SHARE, "riding": 0.0}),
     Case("geared", "torque_ripple", 2, {"amplitude": 0.012, "n": 7.0, "phase": 0.5}),
     Case("geared", "load_dependent_friction", 1, {"mu": 0.008}),
     Case("pendulum", "presliding", 1, {"amplitude": 0.06, "stiffness": 400.0}),

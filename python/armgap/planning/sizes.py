@@ -168,7 +168,8 @@ def _eccentricity(_: Scales, __: int) -> list[Shape]:
 
 
 def _backlash(s: Scales, j: int) -> list[Shape]:
-    return [Shape("gap", 0.01 * float(s.position[j]), {"rotor_share": MOTOR_SHARE, "riding": 0.0})]
+    typical = 0.01 * float(s.position[j])
+    return [Shape("gap", typical, {"rotor_share": share, "riding": 0.0}) for share in (0.03, MOTOR_SHARE)]
 
 
 _SHAPES: dict[str, Callable[[Scales, int], list[Shape]]] = {
