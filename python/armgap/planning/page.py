@@ -144,7 +144,7 @@ def _questions(plan: Plan) -> Section:
 
 def _cannot(plan: Plan) -> Section | None:
     points = [f"{_asked(q)} {q.why[:1].upper()}{q.why[1:]}." for q in plan.questions if q.why]
-    left = [f"Not planned for: {', '.join(plan.left_out)}. Ask for one of them with `--for`."] if plan.left_out else []
+    left = [f"Not planned for: {', '.join(plan.left_out)}. Ask for one of them with --for."] if plan.left_out else []
     if not points and not left:
         return None
     return Section("What the motion will not tell", points=points, notes=left)

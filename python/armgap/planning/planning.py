@@ -406,10 +406,12 @@ def _obstacle(question: Question, outcome: Outcome, most: float) -> str:
     """What keeps a question from being settled."""
     other = "the arm's own values" if question.against == NONE else spelt(*question.rival)
     if outcome.kept < SAME and float(outcome.weight @ outcome.plain) > NEXT_TO_NOTHING:
-        return f"{other}, fitted, makes the same motion: no motion within these limits tells them apart"
+        return f"fitting {other} gives the same motion: no motion within these limits tells them apart"
     if most < NEXT_TO_NOTHING:
         return "none of the motions tried within these limits would show it"
-    return "motions within these limits and of this length show only its larger sizes"
+    return (
+        "at most of its sizes, motions within these limits and of this length give less evidence than a decision needs"
+    )
 
 
 def _limit_notes(limits: PlanLimits) -> list[str]:
