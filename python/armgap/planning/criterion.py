@@ -55,7 +55,7 @@ HELD_CERTAIN = 1.0
 #: Standard deviations by which evidence may exceed what a decision needs before more of it is worth nothing to the search.
 ENOUGH = 3.0
 #: Evidence that the search aims at, over what is enough: the effect may be smaller than thought.
-AIM = 10.0
+AIM = 100.0
 #: Widths of the smoothed sign of friction that a diagnosis may choose, in RMS speeds of the motion.
 SMOOTHED = (0.01, 0.05)
 #: Steps in which a rival is fitted beyond first order.
@@ -63,7 +63,7 @@ STEPS = 8
 #: Decrease of a step, as a part of what was left, below which the fit has settled.
 SETTLED = 0.02
 #: Growth of a merit over its range: the smaller, the more the least one counts.
-GROWTH = 1e3
+GROWTH = 1e4
 _MEASURED = ("encoder_offset", "encoder_eccentricity")
 
 
@@ -180,15 +180,14 @@ class Outcome(NamedTuple):
         return float(self.weight @ np.maximum(by_motion, by_prior))
 
     def merit(self, threshold: float) -> float:
-        """How near all that a decision needs is, from 0 to 1, mean over the sizes; it grows with the logarithm."""
+        """How near all that a decision by the motion needs is, from 0 to 1, mean over the sizes; it grows with the logarithm."""
         enough = _enough(threshold)
         parts = (
             self.fitted / (AIM * enough),
             self.above / (AIM * (1.0 + ENOUGH * self.spread)),
             self.certain / (CERTAIN + ENOUGH),
         )
-        by_prior = np.minimum(parts[0], np.sqrt(2.0 * self.prior) / (TRUST_SIGMAS + ENOUGH))
-        least = np.clip(np.maximum(np.min(parts, axis=0), by_prior), 0.0, 1.0)
+        least = np.clip(np.min(parts, axis=0), 0.0, 1.0)
         return float(self.weight @ (np.log1p(GROWTH * least) / math.log1p(GROWTH)))
 
     @property

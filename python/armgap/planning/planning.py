@@ -332,7 +332,7 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
     candidates = len(data["causes"]) + len(data.get("candidates") or []) + len(data["ruled_out"])
     threshold = DECISION + math.log(max(candidates, 1))
     found = search.best(chosen, threshold, seed)
-    motion = search.kept(found.motion, chosen)
+    motion = found.motion
     played = search.play(motion)
     answered = [
         _answer(p, played.outcome(p.pair), float(most), threshold) for p, most in zip(chosen, found.most, strict=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armgap.arm import MotionLimits
 from armgap.errors import OptionError
-from armgap.planning.criterion import PredictedMotion, Setting
+from armgap.planning.criterion import Outcome, PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics, torque_with
 from armgap.planning.hypotheses import TestedQuestion
 from armgap.planning.limits import TORQUE_MARGIN, TORQUE_MOST, PlanLimits
@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 
 #: Size of the population, and generations after the first.
 POPULATION, GENERATIONS = 16, 9
-#: Windows by which motions are compared.
-WINDOWS = 20
+#: Windows by which motions are compared, and motions of which the best is taken by all windows.
+WINDOWS, FINALISTS = 20, 4
 #: Steps in which a motion is scaled down until its torques suffice.
 SHRINKS = 12
 #: Every so many steps of prediction torques are looked at while a motion is scaled down.
@@ -158,19 +158,24 @@ class Search:
             state.count += 1
             state.most = np.maximum(state.most, [x.expected for x in outcomes])
             report_progress("planning", min(state.count / total, 1.0))
-            merits = [x.merit(threshold) for x in outcomes]
-            worth = 0.5 * (float(np.mean(merits)) + min(merits))
-            if worth > state.worth:
-                state.worth, state.motion = worth, motion
+            worth = _worth(outcomes, threshold)
+            state.best = sorted([*state.best, (worth, state.count, motion)], key=lambda x: (-x[0], x[1]))[:FINALISTS]
             return -worth
 
         size = count(self._setting.arm.n_joints)
         differential_evolution(
             cost, [(0.0, 1.0)] * size, init=self._population(seed), maxiter=GENERATIONS, tol=0.0, polish=False,
-            recombination=0.5, rng=np.random.default_rng(seed), callback=lambda *_: state.worth >= 1.0 - 1e-9,
+            recombination=0.5, rng=np.random.default_rng(seed), callback=lambda *_: state.best[0][0] >= 1.0 - 1e-9,
         )  # fmt: skip
-        best = state.motion or self.motion(standard(self._setting.arm.n_joints))
-        return Found(best, state.count, state.most)
+        return Found(self._final(state, tested, threshold), state.count, state.most)
+
+    def _final(self, state: _State, tested: Sequence[TestedQuestion], threshold: float) -> Motion:
+        """The best of the finalists by all sizes and windows, with the rival fitted in full."""
+        motions = [self.kept(motion, tested) for _, _, motion in state.best]
+        every = [[self.play(motion).outcome(p.pair) for p in tested] for motion in motions]
+        sure = [sum(x.settled(threshold) for x in outcomes) / len(tested) for outcomes in every]
+        order = [(s, _worth(outcomes, threshold)) for s, outcomes in zip(np.round(sure, 2), every, strict=True)]
+        return motions[max(range(len(motions)), key=lambda i: order[i])]
 
     def _population(self, seed: int) -> Array:
         """Usual motions at several poses, and random ones."""
@@ -188,5 +193,10 @@ class _State:
 
     most: Array
     count: int = 0
-    worth: float = 0.0
-    motion: Motion | None = None
+    best: list[tuple[float, int, Motion]] = field(default_factory=list)
+
+
+def _worth(outcomes: Sequence[Outcome], threshold: float) -> float:
+    """Worth of a motion for several questions, from 0 to 1; the worst one counts as much as their mean."""
+    merits = [x.merit(threshold) for x in outcomes]
+    return 0.5 * (float(np.mean(merits)) + min(merits))
