@@ -180,7 +180,7 @@ class HypothesisBuilder:
     def _range(self, question: Question, effects: list[EffectInstance]) -> tuple[str, float, float] | None:
         name = self._specs[question.effect][0]["name"]
         values = [e.parameters[name] for e in effects if name in e.parameters and e.parameters[name] != 0]
-        return (name, min(values), max(values)) if values else None
+        return (name, float(min(values)), float(max(values))) if values else None
 
 
 def _even(effects: Iterable[EffectInstance]) -> list[tuple[float, EffectInstance]]:
