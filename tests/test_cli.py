@@ -29,6 +29,7 @@ PROMISED = {
     "replay",
     "inspect",
     "model",
+    "plan",
     "identify",
     "simulate",
     "diagnose",

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from armgap.literals import Filters, Scheme, Status, Verdict
     from armgap.log import Finding, Log
     from armgap.model import read_model
+    from armgap.planning import Plan, plan
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
 
@@ -38,6 +39,7 @@ __all__ = [
     "Identification",
     "Inspection",
     "Log",
+    "Plan",
     "Reproduction",
     "Scheme",
     "Severity",
@@ -50,6 +52,7 @@ __all__ = [
     "fit",
     "identify",
     "inspect",
+    "plan",
     "read_model",
     "reproduce",
     "seed_torque",
@@ -81,6 +84,8 @@ _HOMES = {
     "Inspection": "armgap.inspection",
     "inspect": "armgap.inspection",
     "read_model": "armgap.model",
+    "Plan": "armgap.planning",
+    "plan": "armgap.planning",
     "reproduce": "armgap.reproduction",
     "effects": "armgap.simulation",
     "seed_torque": "armgap.simulation",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,25 @@ if TYPE_CHECKING:
     from armgap.controller import Controller
     from armgap.serial_chain import SerialChain
 
-__all__ = ["Arm", "kinds", "listed", "only_planar", "quoted"]
+__all__ = ["Arm", "MotionLimits", "kinds", "listed", "only_planar", "quoted"]
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """What an arm's joints may do; the torque's limit is the arm's `torque_limit`.
+
+    Attributes
+    ----------
+    position_min, position_max : ndarray, shape (n_joints,)
+        Range of positions [rad or m].
+    speed, acceleration : ndarray, shape (n_joints,)
+        Largest speed [rad/s or m/s] and acceleration [rad/s^2 or m/s^2].
+    """
+
+    position_min: NDArray[np.float64]
+    position_max: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -62,10 +80,12 @@ class Arm:
         File it was read from.
     corrections : Corrections, optional
         How columns of the arm's logs are to be read otherwise than they stand.
+    limits : MotionLimits, optional
+        What a planned motion keeps to.
     chain : SerialChain, optional
         Joints and their placements, of a serial arm; gravity as a vector is part of it.
     controller : Controller, optional
-        Position controller, where logs hold references in place of torques.
+        Position controller: it tracks a planned motion, and logs may hold its references in place of torques.
     tau_kind : {"command", "measured"}
         Whether torques are commands, held until the next row, or measured, interpolated.
     notes : tuple of str
@@ -94,6 +114,7 @@ class Arm:
     friction_side: tuple[Side, ...] | None = None
     gear_ratio: NDArray[np.float64] | None = None
     corrections: Corrections | None = None
+    limits: MotionLimits | None = None
     chain: SerialChain | None = None
     controller: Controller | None = None
     tau_kind: TauKind = "command"
@@ -261,6 +282,15 @@ class Arm:
             if value is not None:
                 opened = f"[{table}]" in lines
                 lines += [*(() if opened else ("", f"[{table}]")), f"{key} = {listed(value)}"]
+        if self.limits is not None:
+            lines += [
+                "",
+                "[limits]",
+                *(f"{f.name} = {listed(getattr(self.limits, f.name))}" for f in fields(self.limits)),
+            ]
+        if self.controller is not None:
+            gains = (f"{key} = {listed(getattr(self.controller, key))}" for key in ("kp", "kd"))
+            lines += ["", "[controller]", 'kind = "pd"', *gains, f"kd_on = {quoted(self.controller.kd_on)}"]
         if columns:
             lines += ["", "[columns]", *(f"{k} = {quoted(v)}" for k, v in columns.items())]
         if self.corrections:

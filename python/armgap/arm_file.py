@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.arm import kinds
+from armgap.arm import MotionLimits, kinds
+from armgap.controller import Controller, DerivativeOn
 from armgap.errors import ArmFileError, OptionError
 from armgap.literals import Side
 from armgap.reading import printable, read_bounded
@@ -33,6 +34,8 @@ _TABLES: dict[str, tuple[str, ...]] = {
     "transmission": ("friction_side", "gear_ratio"),
     "actuator": ("torque_limit",),
     "geometry": ("link_length", "link_mass"),
+    "limits": ("position_min", "position_max", "speed", "acceleration"),
+    "controller": ("kind", "kp", "kd", "kd_on"),
     "columns": (),
     "corrections": (),
     "sealed": ("sha256",),
@@ -129,6 +132,8 @@ class ArmFile:
             corrections=self._corrections(),
             sealed=self._sealed(),
             path=self.path,
+            limits=self._limits(n),
+            controller=self._controller(n),
         )
 
     def _check_keys(self) -> None:
@@ -245,6 +250,32 @@ class ArmFile:
     def _column_keys(self, n: int) -> list[str]:
         """Return the columns of a log that can be mapped."""
         return ["t", *(f"{kind}{j}" for kind in ("q", "tau", "dq") for j in range(1, n + 1))]
+
+    def _limits(self, n: int) -> MotionLimits | None:
+        if "limits" not in self.data:
+            return None
+        table = self._table("limits")
+        low, high = (self._vector(table, f"limits.{key}", n) for key in ("position_min", "position_max"))
+        for i, (least, most) in enumerate(zip(low, high, strict=True)):
+            if not least < most:
+                problem = f"entry {i + 1} is {most:g}, not above position_min, {least:g}"
+                raise self._error("limits.position_max", problem, "correct one of them")
+        speed, acceleration = (self._vector(table, f"limits.{key}", n, above=0.0) for key in ("speed", "acceleration"))
+        return MotionLimits(low, high, speed, acceleration)
+
+    def _controller(self, n: int) -> Controller | None:
+        if "controller" not in self.data:
+            return None
+        table = self._table("controller")
+        if (kind := table.get("kind")) != "pd":
+            problem = "is missing" if kind is None else f"{kind!r} is not a kind of controller"
+            raise self._error("controller.kind", problem, 'write kind = "pd"')
+        damping = table.get("kd_on", "measurement")
+        if damping not in get_args(DerivativeOn):
+            words = " or ".join(f'"{word}"' for word in get_args(DerivativeOn))
+            raise self._error("controller.kd_on", f"is {damping!r}", f"write {words}")
+        kp = self._vector(table, "controller.kp", n, above=0.0)
+        return Controller(kp, self._vector(table, "controller.kd", n, minimum=0.0), damping)
 
     def _columns(self, n: int) -> dict[str, str]:
         known = self._column_keys(n)

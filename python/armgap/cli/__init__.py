@@ -20,6 +20,7 @@ __all__ = ["main"]
 
 COMMANDS = {
     "diagnose": ("armgap.cli.diagnose", "Where the gap lies, what causes it, how far it shrinks."),
+    "plan": ("armgap.cli.plan", "The next experiment: the motion that settles what a diagnosis left open."),
     "compare": ("armgap.cli.compare", "Two diagnoses of one arm, as before and after a repair."),
     "fleet": ("armgap.cli.fleet", "Many robots: the same diagnosis for every entry of a manifest."),
     "model": ("armgap.cli.model", "A URDF or MJCF model as an arm file."),

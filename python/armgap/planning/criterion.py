@@ -1,0 +1,554 @@
+"""Expected evidence of a motion for one model against another (T-optimality, Atkinson and Fedorov 1975).
+
+Both models predict the motion's windows from the same starts under the same torques, as a diagnosis does. What counts of their
+difference is what is left after the rival's values, all of the arm's (with the arm file's standard deviations as prior) and a diagnosis'
+nuisances are fitted to it to first order; half of its square, in units of noise and discrepancy, is the expected log-likelihood ratio.
+
+A decision of `armgap.diagnose` needs more than a likely effect: without it the gap has to stand above the noise floor, and most windows
+have to prefer it. Both are counted too, by its own thresholds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap import _native
+from armgap.arm import Arm
+from armgap.evidence.hypothesis import EffectInstance, Hypothesis, true_positions
+from armgap.planning.dynamics import LATENT, inverse_dynamics
+from armgap.planning.motion import Motion
+
+__all__ = ["HypothesisPair", "Outcome", "PredictedMotion", "Setting", "settled"]
+
+Array = NDArray[np.float64]
+
+#: Samples per window at which motions are predicted; denser ones than the log's are not taken.
+WINDOW_SAMPLES = 50
+#: Polynomials per window and joint; those of degree 0 and 1 take up the start's error.
+DEGREES = 12
+#: Discrepancy at least, as a part of the noise floor.
+LEAST_DISCREPANCY = 0.3
+#: RMS of t^2 over an interval, over the RMS of its part of degree 2 (Legendre polynomials).
+BEND = 6.0
+#: Time by which predictions with latent states begin before their windows, s.
+LEAD = 0.15
+#: Tolerance of predictions, in standard deviations of a position.
+ACCURACY = 0.1
+#: Change of a parameter over which its sensitivity is taken, in standard deviations of its prior, and at most this part of its value.
+STEP_SIGMA, STEP_PART = 0.2, 0.02
+#: Part of a log that a diagnosis fits to, its beginning; it judges on the rest.
+TRAINED = 0.6
+#: A diagnosis explains a gap whose cost is above the floor by this part of it, with what takes this part of the excess, in windows whose
+#: mean advantage is so many standard errors (`rust/fit/src/acceptance.rs`).
+ABOVE_FLOOR, MATTERS, CERTAIN = 0.25, 0.1, 3.5
+#: Standard deviations from its prior that a value of the arm returns by what a diagnosis names without a gap.
+TRUST_SIGMAS = 4.0
+#: The same on the part of the log that it judges on alone.
+HELD_CERTAIN = 1.0
+#: Standard deviations by which evidence may exceed what a decision needs before more of it is worth nothing to the search.
+ENOUGH = 3.0
+#: Evidence that the search aims at, over what is enough: the effect may be smaller than thought.
+AIM = 100.0
+#: Widths of the smoothed sign of friction that a diagnosis may choose, in RMS speeds of the motion.
+SMOOTHED = (0.01, 0.05)
+#: Steps in which a rival is fitted beyond first order.
+STEPS = 8
+#: Decrease of a step, as a part of what was left, below which the fit has settled.
+SETTLED = 0.02
+#: Growth of a merit over its range: the smaller, the more the least one counts.
+GROWTH = 1e4
+_MEASURED = ("encoder_offset", "encoder_eccentricity")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What evidence is counted with.
+
+    Attributes
+    ----------
+    model : Hypothesis
+        The best model of a diagnosis.
+    horizon : float
+        Length of a window [s].
+    sigma : ndarray, shape (n_joints,)
+        Standard deviation of a measured position [rad or m].
+    encoder_step : ndarray, shape (n_joints,)
+        Step of the encoders, zero where it is not known [rad or m].
+    discrepancy : ndarray, shape (n_joints,)
+        RMS error of predictions that the best model leaves beyond the noise floor [rad or m].
+    excess : float
+        Cost of the best model's predictions above the floor, over the floor's.
+    """
+
+    model: Hypothesis
+    horizon: float
+    sigma: Array
+    encoder_step: Array
+    discrepancy: Array
+    excess: float
+
+    @classmethod
+    def of(cls, data: dict[str, Any], model: Hypothesis) -> Setting:
+        """Return the setting of a diagnosis (its JSON object)."""
+        gap, noise = data["gap"], data["noise"]
+        after, floor = np.array(gap["after"], dtype=np.float64), np.array(gap["floor"], dtype=np.float64)
+        beyond = np.maximum(after**2 - floor**2, 0.0)
+        sigma = np.maximum(np.array(noise["position_sigma"], dtype=np.float64), 1e-12)
+        step = np.array(noise.get("encoder_step") or np.zeros(len(sigma)), dtype=np.float64)
+        discrepancy = np.sqrt(np.maximum(beyond, (LEAST_DISCREPANCY * floor) ** 2))
+        excess = float(np.mean(beyond / np.maximum(floor, 1e-12) ** 2))
+        return cls(model, float(gap["horizon_s"]), sigma, step, discrepancy, excess)
+
+    @property
+    def arm(self) -> Arm:
+        """The arm."""
+        return self.model.arm
+
+    @property
+    def step(self) -> float:
+        """Step of predictions [s], a whole number of sample periods."""
+        period = self.arm.sample_period
+        return period * max(1, round(self.horizon / WINDOW_SAMPLES / period))
+
+
+@dataclass(frozen=True)
+class HypothesisPair:
+    """One question as models.
+
+    Attributes
+    ----------
+    alternatives : tuple of (weight, effects)
+        Models with the effect in question, of several sizes; the weights add up to one.
+    rival : tuple of EffectInstance
+        Effects of the rival's model.
+    free : EffectInstance, optional
+        The effect of the rival whose values are fitted.
+    """
+
+    alternatives: tuple[tuple[float, tuple[EffectInstance, ...]], ...]
+    rival: tuple[EffectInstance, ...]
+    free: EffectInstance | None = None
+
+
+class Outcome(NamedTuple):
+    """What a motion tells about a pair, one entry per size of the effect.
+
+    Attributes
+    ----------
+    fitted, plain : ndarray
+        Expected log-likelihood ratio over the windows that a diagnosis fits to, with the rival fitted, and over all windows without.
+    above : ndarray
+        Cost that the fitted rival leaves above the noise, over what a diagnosis needs to explain it; the lesser of what it fits to and what
+        it judges on.
+    certain : ndarray
+        Mean advantage of a window, in standard errors; less where what is judged on has less than its part.
+    prior : ndarray
+        Part of `fitted` that is the prior's: the rival needs values of the arm that are not trusted.
+    weight : ndarray
+        Weights of the sizes, one together.
+    spread : float
+        Standard deviation of `above` from the noise alone.
+    """
+
+    fitted: Array
+    plain: Array
+    above: Array
+    certain: Array
+    prior: Array
+    weight: Array
+    spread: float
+
+    @property
+    def expected(self) -> float:
+        """Expected log-likelihood ratio, mean over the sizes."""
+        return float(self.weight @ self.fitted)
+
+    def settled(self, threshold: float) -> float:
+        """Probability of a decision, mean over the sizes."""
+        likely = [settled(x, threshold) for x in self.fitted]
+        high = [_normal((x - 1.0) / self.spread) for x in self.above]
+        common = [_normal(x - CERTAIN) for x in self.certain]
+        by_motion = np.min([likely, high, common], axis=0)
+        by_prior = np.minimum(likely, [_normal(math.sqrt(2.0 * x) - TRUST_SIGMAS) for x in self.prior])
+        return float(self.weight @ np.maximum(by_motion, by_prior))
+
+    def merit(self, threshold: float) -> float:
+        """How near all that a decision by the motion needs is, from 0 to 1, mean over the sizes; it grows with the logarithm."""
+        enough = _enough(threshold)
+        parts = (
+            self.fitted / (AIM * enough),
+            self.above / (AIM * (1.0 + ENOUGH * self.spread)),
+            self.certain / (CERTAIN + ENOUGH),
+        )
+        least = np.clip(np.min(parts, axis=0), 0.0, 1.0)
+        return float(self.weight @ (np.log1p(GROWTH * least) / math.log1p(GROWTH)))
+
+    @property
+    def kept(self) -> float:
+        """Part of the difference that fitting the rival leaves."""
+        plain = float(self.weight @ self.plain)
+        return self.expected / plain if plain > 0 else 0.0
+
+
+def settled(expected: float, threshold: float) -> float:
+    """Probability that a log-likelihood ratio exceeds a threshold: normal, its variance twice its expectation."""
+    return _normal((expected - threshold) / math.sqrt(2.0 * expected)) if expected > 0 else 0.0
+
+
+def _normal(x: float) -> float:
+    """Standard normal distribution function."""
+    return 0.5 * math.erfc(-x / math.sqrt(2.0))
+
+
+def _certainty(advantage: Array, share: float) -> float:
+    """Mean advantage of windows, each of which stands for `share` of them, in standard errors."""
+    mean = float(np.mean(advantage)) if len(advantage) else 0.0
+    scatter = float(np.var(advantage)) + 2.0 * mean if mean > 0 else 0.0
+    return math.sqrt(share * len(advantage) / scatter) * mean if scatter > 0 else 0.0
+
+
+def _enough(threshold: float) -> float:
+    """Expected log-likelihood ratio that lies `ENOUGH` of its standard deviations above a threshold."""
+    half = ENOUGH / math.sqrt(2.0)
+    return (half + math.sqrt(half * half + threshold)) ** 2
+
+
+class PredictedMotion:
+    """A motion, its torques, and what models predict over its windows.
+
+    Parameters
+    ----------
+    setting : Setting
+        What evidence is counted with.
+    motion : Motion
+        The motion.
+    most : int, optional
+        Windows that are looked at, spread evenly; evidence is that of all.
+    """
+
+    def __init__(self, setting: Setting, motion: Motion, most: int | None = None) -> None:
+        self._setting = setting
+        self._arm = setting.arm
+        h = setting.step
+        self._samples = max(round(setting.horizon / h), DEGREES + 2)
+        every = int((motion.duration / h + 1e-6) // self._samples)
+        self._stride = 1 if most is None else -(-every // most)
+        self._windows = np.arange(0, every, self._stride)
+        self._count = len(self._windows)
+        #: Windows that each one looked at stands for.
+        self._share = every / self._count
+        self._every = every
+        length = every * self._samples + 1
+        self.t: Array = h * np.arange(length, dtype=np.float64)
+        self.q, self.dq, self.ddq = motion.at(self.t)
+        # A torque is held over a step: that of the step's middle.
+        held = motion.at(self.t + 0.5 * h)
+        self.tau = inverse_dynamics(setting.model, *held)
+        self.held = held
+        self._known: dict[Any, Array] = {}
+        polynomials, _ = np.linalg.qr(
+            np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, self._samples + 1), DEGREES)
+        )
+        self._basis: Array = polynomials[:, 2:]
+        self._white, self._whole = self._weights()
+        self._columns: Array | None = None
+
+    def _weights(self) -> tuple[Array, Array]:
+        """One over the standard deviations of a window's polynomials, from white noise and from all; shape (n_windows, n_degrees, n_joints).
+
+        An encoder's rounding stays the same until the joint has moved by a step. The discrepancy is that of a torque that changes from window
+        to window: its positions fall with the square of the degree.
+        """
+        setting, n = self._setting, self._samples + 1
+        period = self._arm.sample_period
+        share = period / setting.step
+        way = np.array([np.mean(np.abs(v), axis=0) for v in np.split(self.dq[1:], (len(self.dq) - 1) // self._samples)])
+        way = way[self._windows] * period
+        rounding = np.minimum(setting.encoder_step**2 / 12.0, setting.sigma**2)
+        held = np.clip(setting.encoder_step / np.maximum(way, 1e-15), 1.0, setting.horizon / period)
+        noise = (setting.sigma**2 - rounding + rounding * held) * share
+        degree = np.arange(2, DEGREES + 1)[None, :, None]
+        bend = n * (setting.discrepancy / BEND) ** 2 * (2.0 / degree) ** 4
+        shape = (self._count, DEGREES - 1, self._arm.n_joints)
+        white = np.broadcast_to(1.0 / np.sqrt(setting.sigma**2 * share), shape)
+        return white.ravel(), (1.0 / np.sqrt(noise[:, None, :] + bend)).ravel()
+
+    def predicted(
+        self, theta: tuple[float, ...], effects: Sequence[EffectInstance], lead: bool, smoothing: float | None = None
+    ) -> Array:
+        """Factors of the polynomials in the predictions of all windows, one column of numbers [rad or m].
+
+        Raises
+        ------
+        ValueError
+            If a model's motion diverges.
+        """
+        key = (theta, tuple((e.effect, e.joint, *e.parameters.items()) for e in effects), lead, smoothing)
+        if key not in self._known:
+            self._known[key] = self._predict(theta, effects, lead, smoothing)
+        return self._known[key]
+
+    def _predict(
+        self, theta: tuple[float, ...], effects: Sequence[EffectInstance], lead: bool, smoothing: float | None
+    ) -> Array:
+        arm, model, s = self._arm, self._setting.model, self._samples
+        before = round(LEAD / self._setting.step) if lead else 0
+        first = s * self._windows
+        begin = np.maximum(first - before, 0)
+        q0, dq0 = self._true_start(begin, effects)
+        placed = [e.on(e.joint) for e in effects]
+        lengths = None if arm.link_length is None else arm.link_length.tolist()
+        tolerance = max(ACCURACY * float(self._setting.sigma.min()), 1e-9)
+        found = np.empty((self._count, s + 1, arm.n_joints))
+        for w in range(self._count):
+            rows = slice(int(begin[w]), int(first[w]) + s + 1)
+            q, _ = _native.simulate(
+                arm.kind, arm.gravity, lengths, list(theta), self.t[rows], self.tau[rows], q0[w], dq0[w], placed, tolerance,
+                model.smoothing if smoothing is None else smoothing,
+            )  # fmt: skip
+            found[w] = q[-(s + 1) :]
+        return np.asarray(np.einsum("wsj,sk->wkj", found, self._basis), dtype=np.float64).ravel()
+
+    def _true_start(self, rows: Array, effects: Sequence[EffectInstance]) -> tuple[Array, Array]:
+        """States of the joints behind the encoders, which show the reference."""
+        q, dq = self.q[rows], self.dq[rows]
+        sensors = [e for e in effects if e.effect in _MEASURED]
+        if not sensors:
+            return q, dq
+        step = 1e-3
+        many = true_positions(np.concatenate([q, q + step, q - step]), sensors)
+        middle, above, below = np.split(many, 3)
+        return middle, dq * (above - below) / (2 * step)
+
+    def sensitivities(self) -> Array:
+        """Derivatives of the predictions by what every model fits, in standard deviations of the prior; shape (n_numbers, n_columns).
+
+        Arm parameters; a delay of all torques, whose prior is one sample; widths of the smoothed sign of friction.
+        """
+        if self._columns is None:
+            self._columns = np.column_stack([*self._of_parameters(), *self._of_nuisances()])
+        return self._columns
+
+    def _of_parameters(self) -> list[Array]:
+        model = self._setting.model
+        lead = latent(model.effects)
+        reference = self.predicted(model.theta, model.effects, lead)
+        columns = []
+        sizes = np.abs(model.theta) + 0.1 * np.max(np.abs(model.theta))
+        for i, sigma in enumerate(self._arm.sigma):
+            step = min(STEP_SIGMA * float(sigma), STEP_PART * float(sizes[i]))
+            theta = tuple(x + step * (k == i) for k, x in enumerate(model.theta))
+            columns.append((self.predicted(theta, model.effects, lead) - reference) * (float(sigma) / step))
+        return columns
+
+    def _of_nuisances(self) -> list[Array]:
+        model, arm = self._setting.model, self._arm
+        columns = []
+        speed = float(np.sqrt(np.mean(self.dq**2)))
+        lead = latent(model.effects)
+        for part in SMOOTHED:
+            width = max(part * speed, 2.0 * model.smoothing)
+            columns.append(
+                self.predicted(model.theta, model.effects, lead, width)
+                - self.predicted(model.theta, model.effects, lead)
+            )
+        late = [EffectInstance("actuator_delay", j + 1, {"delay": arm.sample_period}) for j in range(arm.n_joints)]
+        with suppress(ValueError):  # more effects than the simulator carries: the delay is one of them, as a rule
+            delayed = self.predicted(model.theta, (*model.effects, *late), True)
+            columns.append(delayed - self.predicted(model.theta, model.effects, True))
+        return columns
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of the arm's parameters."""
+        return len(self._arm.sigma)
+
+    def outcome(self, pair: HypothesisPair, steps: int = STEPS) -> Outcome:
+        """What the motion tells about a pair; nothing where a model's motion cannot be computed.
+
+        Parameters
+        ----------
+        pair : HypothesisPair
+            The pair.
+        steps : int, default 8
+            Gauss-Newton steps in which the rival is fitted, beyond the first-order fit.
+        """
+        weight = np.array([w for w, _ in pair.alternatives])
+        residuals = 0.5 * self._arm.n_joints * self._setting.horizon / self._arm.sample_period
+        half = self._every * residuals
+        needs = max(MATTERS * self._setting.excess, ABOVE_FLOOR - self._setting.excess) * half
+        spread = math.sqrt(half) / needs
+        try:
+            found = np.array([self._evidence(effects, pair, residuals, steps) for _, effects in pair.alternatives])
+        except ValueError:
+            nothing = np.zeros(len(weight))
+            return Outcome(nothing, nothing, nothing, nothing, nothing, weight, spread)
+        left, plain, above, certain, prior = found.T
+        return Outcome(left, self._share * plain, above / needs, certain, prior, weight, spread)
+
+    def floors(self, pair: HypothesisPair, index: int, floor: Array) -> float:
+        """RMS difference of one of the pair's models from the rival, in noise floors, worst joint; infinite if it cannot be computed."""
+        try:
+            delta, _ = self._difference(pair.alternatives[index][1], pair)
+        except ValueError:
+            return math.inf
+        factors = delta.reshape(self._count, -1, self._arm.n_joints)
+        rms = np.sqrt(np.sum(factors**2, axis=(0, 1)) / (self._count * (self._samples + 1)))
+        return float(np.max(rms / np.maximum(floor, 1e-12)))
+
+    def difference(self, pair: HypothesisPair) -> Array:
+        """Difference of the first model's predictions from the rival's."""
+        return self._difference(pair.alternatives[0][1], pair)[0]
+
+    def left_of(self, delta: Array, column: Array | None = None) -> tuple[float, float]:
+        """Square of what the arm's own values leave of a difference, and the factor of a further column that is fitted with them."""
+        free = np.empty((len(delta), 0)) if column is None else column[:, None]
+        found = Columns(self.sensitivities(), free, (), self.n_parameters).fitted(delta, self._whole)
+        return found.square, 0.0 if column is None else float(found.values[-1])
+
+    def _difference(self, effects: tuple[EffectInstance, ...], pair: HypothesisPair) -> tuple[Array, bool]:
+        lead = latent((*effects, *pair.rival))
+        theta = self._setting.model.theta
+        return self.predicted(theta, effects, lead) - self.predicted(theta, pair.rival, lead), lead
+
+    def _evidence(
+        self, effects: tuple[EffectInstance, ...], pair: HypothesisPair, residuals: float, steps: int
+    ) -> tuple[float, float, float, float, float]:
+        theta = self._setting.model.theta
+        lead = latent((*effects, *pair.rival))
+        truth = self.predicted(theta, effects, lead)
+        delta = truth - self.predicted(theta, pair.rival, lead)
+        columns = Columns.of(self, pair, lead)
+        best = columns.fitted(delta, self._whole)
+        plain = 0.5 * float(np.sum((delta * self._whole) ** 2))
+        for _ in range(steps):
+            # Gauss-Newton: the rival predicts with the fitted values, and what is left is fitted again.
+            moved, rival = self._moved(pair, columns, best.values)
+            try:
+                missed = truth - self.predicted(moved, rival, lead)
+            except ValueError:
+                break
+            linear = columns.product(best.values, simulated=True)
+            again = columns.fitted(missed + linear, self._whole)
+            gain = best.square - again.square
+            if gain > 0:
+                delta, best = missed + linear, again
+            if gain < SETTLED * best.square:
+                break
+        left = 0.5 * np.sum(best.left.reshape(self._count, -1) ** 2, axis=1)
+        prior = max(0.5 * best.square - float(np.sum(left)), 0.0)
+        windows = 0.5 * np.sum(columns.fitted(delta, self._white).left.reshape(self._count, -1) ** 2, axis=1)
+        first = self._windows < TRAINED * self._every
+        share = self._share
+        above = share * min(float(np.sum(windows[first])) / TRAINED, float(np.sum(windows[~first])) / (1.0 - TRAINED))
+        # Robust weights let a window's cost grow with the logarithm only.
+        advantage = residuals * np.log1p(windows / residuals)
+        certain = min(_certainty(advantage, share), CERTAIN / HELD_CERTAIN * _certainty(advantage[~first], share))
+        return share * float(np.sum(left[first])) + prior, plain, above, certain, prior
+
+    def _moved(
+        self, pair: HypothesisPair, columns: Columns, values: Array
+    ) -> tuple[tuple[float, ...], tuple[EffectInstance, ...]]:
+        """The rival's model with fitted values; friction and inertia stay positive."""
+        arm, theta = self._arm, np.array(self._setting.model.theta)
+        p = len(theta)
+        changed = theta + arm.sigma * values[:p]
+        kept = np.where(theta > 0, np.maximum(changed, 1e-3 * theta), changed)
+        if pair.free is None:
+            return tuple(kept.tolist()), pair.rival
+        steps = values[columns.common.shape[1] :]
+        parameters = dict(pair.free.parameters)
+        for name, step in zip(columns.names, steps, strict=True):
+            parameters[name] += float(step)
+        moved = pair.free._replace(parameters=parameters)
+        return tuple(kept.tolist()), tuple(moved if e == pair.free else e for e in pair.rival)
+
+    def of_rival(self, pair: HypothesisPair, lead: bool) -> tuple[tuple[str, ...], Array]:
+        """Values of the rival's effect that are fitted, and derivatives of its predictions by them."""
+        theta, free = self._setting.model.theta, pair.free
+        if free is None:
+            return (), np.empty((len(self._white), 0))
+        reference = self.predicted(theta, pair.rival, lead)
+        names, columns = [], []
+        for name, value in free.parameters.items():
+            if name in _FIXED:
+                continue
+            step = STEP_PART * (abs(value) or 1.0)
+            moved = free._replace(parameters={**free.parameters, name: value + step})
+            effects = tuple(moved if e == free else e for e in pair.rival)
+            columns.append((self.predicted(theta, effects, lead) - reference) / step)
+            names.append(name)
+        return tuple(names), np.column_stack(columns)
+
+
+#: Values of an effect that say where it sits, not how large it is.
+_FIXED = ("riding", "encoder_at_motor", "friction_at_motor", "rotor_rides")
+
+
+class Fitted(NamedTuple):
+    """Values fitted to a difference, what is left of it in standard deviations, and its square with that of the prior."""
+
+    values: Array
+    left: Array
+    square: float
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns that are fitted to a difference of predictions.
+
+    Attributes
+    ----------
+    common : ndarray, shape (n_numbers, n_common)
+        Of what every model fits, in standard deviations of the prior.
+    free : ndarray, shape (n_numbers, n_free)
+        Of the rival's own values, without a prior.
+    names : tuple of str
+        Those values.
+    simulated : int
+        Leading columns of `common` that are parameters of the arm.
+    """
+
+    common: Array
+    free: Array
+    names: tuple[str, ...]
+    simulated: int
+
+    @classmethod
+    def of(cls, played: PredictedMotion, pair: HypothesisPair, lead: bool) -> Columns:
+        """Return the columns of a pair's rival."""
+        names, free = played.of_rival(pair, lead)
+        return cls(played.sensitivities(), free, names, played.n_parameters)
+
+    def product(self, values: Array, *, simulated: bool) -> Array:
+        """Change of the predictions by some values; `simulated` leaves out what no simulation has: the nuisances."""
+        common = values[: self.common.shape[1]].copy()
+        if simulated:
+            common[self.simulated :] = 0.0
+        return np.asarray(self.common @ common + self.free @ values[self.common.shape[1] :], dtype=np.float64)
+
+    def fitted(self, delta: Array, weight: Array) -> Fitted:
+        """Fit the columns to a difference, each number of which has a weight."""
+        n, k = self.common.shape[1], self.free.shape[1]
+        columns = np.hstack([self.common, self.free]) * weight[:, None]
+        # Values without a prior in units of what they do, so that they are as well scaled as the rest.
+        unit = np.append(np.ones(n), np.maximum(np.linalg.norm(columns[:, n:], axis=0), 1e-300))
+        prior = np.hstack([np.eye(n), np.zeros((n, k))])
+        rows = np.vstack([columns / unit, prior])
+        right = np.concatenate([delta * weight, np.zeros(n)])
+        solution = np.linalg.lstsq(rows, right, rcond=1e-12)[0]
+        left = right - rows @ solution
+        # The prior's part counts: values that the rival would need and that are not trusted speak against it.
+        return Fitted(solution / unit, left[: len(delta)], float(left @ left))
+
+
+def latent(effects: Sequence[EffectInstance]) -> bool:
+    """Whether one of the effects has a state that no encoder shows."""
+    return any(e.effect in LATENT for e in effects)

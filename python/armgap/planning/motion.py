@@ -1,0 +1,228 @@
+"""Reference motions: fifth-order moves between two poses, around each of which every joint oscillates at two frequencies.
+
+A motion begins and ends at rest at home, moves to a first pose, oscillates around it, goes on to a second pose, oscillates there, and
+returns. Slow reversals, fast oscillations and large travel are special cases. Every number between 0 and 1 gives a motion within the limits:
+poses lie within the range of positions, moves take as long as speed and acceleration ask for, oscillations are scaled down to what
+is left.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm import MotionLimits
+
+__all__ = ["PER_JOINT", "Motion", "build", "count", "named"]
+
+Array = NDArray[np.float64]
+
+PHASES, SINES = 2, 2
+#: Numbers per joint: pose, and amplitude and frequency of every oscillation, in both phases.
+PER_JOINT = PHASES * (1 + 2 * SINES)
+#: Time at rest at either end, s.
+REST = 0.2
+#: Shortest move between two poses, s.
+SHORTEST_MOVE = 0.2
+#: Largest speed and acceleration of a fifth-order move over a unit distance in unit time (Siciliano 2009).
+BLEND_SPEED, BLEND_ACCELERATION = 1.875, 10.0 / math.sqrt(3.0)
+#: Smallest oscillation, as a part of the largest.
+SMALLEST = 0.01
+#: Highest frequency: this many times the one at which speed and acceleration limit the amplitude alike; within these bounds, Hz.
+OVERTONE, HIGHEST, LEAST_HIGHEST = 4.0, 10.0, 1.0
+#: Samples per period at the highest frequency at least.
+SAMPLES_PER_PERIOD = 20
+#: Phases are spread by the golden angle, so that joints and oscillations do not go in step.
+GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
+#: Time over which an oscillation fades in or out: this part of a phase, at most so long, s.
+FADE_PART, FADE = 0.2, 0.6
+#: Points per second at which oscillations are held against their limits.
+LOOK_HZ = 200.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A reference motion.
+
+    Attributes
+    ----------
+    home : ndarray, shape (n_joints,)
+        Pose at the beginning and the end [rad or m].
+    times : tuple of float
+        When the three moves begin and end, six instants [s].
+    duration : float
+        Length [s].
+    centres : ndarray, shape (2, n_joints)
+        Poses of the two phases [rad or m].
+    amplitude, frequency : ndarray, shape (2, n_joints, 2)
+        Oscillations of the two phases [rad or m, Hz].
+    scale : float
+        Factor of all deviations from home, 0 to 1.
+    """
+
+    home: Array
+    times: tuple[float, ...]
+    duration: float
+    centres: Array
+    amplitude: Array
+    frequency: Array
+    scale: float = 1.0
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        """Positions, velocities and accelerations at times `t`, each of shape (n_times, n_joints)."""
+        n = len(self.home)
+        q, dq, ddq = np.tile(self.home, (len(t), 1)), np.zeros((len(t), n)), np.zeros((len(t), n))
+        poses = [self.home, *self.centres, self.home]
+        for i in range(PHASES + 1):
+            begin, end = self.times[2 * i], self.times[2 * i + 1]
+            parts = _blend((t - begin) / (end - begin))
+            step = poses[i + 1] - poses[i]
+            for total, part, power in zip((q, dq, ddq), parts, range(3), strict=True):
+                total += np.outer(part / (end - begin) ** power, step)
+        for i in range(PHASES):
+            begin, end = self.times[2 * i + 1], self.times[2 * i + 2]
+            inside = (t > begin) & (t < end)
+            found = oscillation(t[inside] - begin, end - begin, self.amplitude[i], self.frequency[i])
+            for total, part in zip((q, dq, ddq), found, strict=True):
+                total[inside] += part
+        q[t >= self.times[-1]] = self.home
+        return self.home + self.scale * (q - self.home), self.scale * dq, self.scale * ddq
+
+    def scaled(self, factor: float) -> Motion:
+        """Return the motion with all deviations from home scaled, 0 to 1; it stays within the limits."""
+        return replace(self, scale=self.scale * factor)
+
+
+def count(n_joints: int) -> int:
+    """Return how many numbers make a motion."""
+    return PER_JOINT * n_joints + 1
+
+
+def build(numbers: Array, home: Array, limits: MotionLimits, duration: float, period: float) -> Motion:
+    """Return the motion of some numbers, within the limits.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (`count(n_joints)`,)
+        From 0 to 1: the first phase's part of the time; then per joint and phase the pose, and an amplitude and a frequency for each of
+        two oscillations.
+    home : ndarray, shape (n_joints,)
+        Pose at the beginning and the end [rad or m], within the limits.
+    limits : MotionLimits
+        What is kept to.
+    duration : float
+        Length [s], 2 or more.
+    period : float
+        Sample period [s].
+    """
+    n = len(home)
+    low, high = limits.position_min, limits.position_max
+    share = 0.2 + 0.6 * float(numbers[0])
+    table = numbers[1:].reshape(n, PHASES, 1 + 2 * SINES).transpose(1, 0, 2)
+    centres = low + table[:, :, 0] * (high - low)
+    available = duration - 2 * REST
+    moves = _moves(home, centres, limits)
+    while sum(moves) > 0.5 * available and np.max(np.abs(centres - home)) > 1e-6:
+        centres = home + 0.8 * (centres - home)
+        moves = _moves(home, centres, limits)
+    left = available - sum(moves)
+    lengths = (share * left, (1 - share) * left)
+    instants = REST + np.cumsum([0.0, moves[0], lengths[0], moves[1], lengths[1], moves[2]])
+    lowest = np.array([[1.0 / length] for length in lengths])[:, :, None]
+    frequency = lowest * (highest_frequency(limits, period)[None, :, None] / lowest) ** table[:, :, 2::2]
+    frequency = np.maximum(frequency, lowest)
+    amplitude = np.empty_like(frequency)
+    for i in range(PHASES):
+        room = np.minimum(centres[i] - low, high - centres[i])
+        omega = 2 * np.pi * frequency[i]
+        most = np.minimum(limits.speed[:, None] / omega, limits.acceleration[:, None] / omega**2)
+        wanted = np.minimum(room[:, None], most) * SMALLEST ** (1.0 - table[i, :, 1::2])
+        tau = np.linspace(0.0, lengths[i], max(int(LOOK_HZ * lengths[i]), 2))
+        peaks = [np.max(np.abs(x), axis=0) for x in oscillation(tau, lengths[i], wanted, frequency[i])]
+        allowed = (room, limits.speed, limits.acceleration)
+        ratio = [a / np.maximum(p, 1e-12) for a, p in zip(allowed, peaks, strict=True)]
+        # Between two looks a peak may be higher by a hundredth.
+        amplitude[i] = wanted * np.minimum(1.0, 0.99 * np.min(ratio, axis=0))[:, None]
+    return Motion(home, tuple(float(x) for x in instants), duration, centres, amplitude, frequency)
+
+
+def highest_frequency(limits: MotionLimits, period: float) -> Array:
+    """Return the highest frequency of each joint's oscillations [Hz], shape (n_joints,)."""
+    both = OVERTONE * limits.acceleration / (2 * np.pi * limits.speed)
+    return np.minimum(np.clip(both, LEAST_HIGHEST, HIGHEST), 1.0 / (SAMPLES_PER_PERIOD * period))
+
+
+def _moves(home: Array, centres: Array, limits: MotionLimits) -> list[float]:
+    """Shortest times of the three moves, all joints together."""
+    poses = [home, *centres, home]
+    times = []
+    for before, after in pairwise(poses):
+        way = np.abs(after - before)
+        by_speed = BLEND_SPEED * way / limits.speed
+        by_acceleration = np.sqrt(BLEND_ACCELERATION * way / limits.acceleration)
+        times.append(max(SHORTEST_MOVE, float(np.max(by_speed)), float(np.max(by_acceleration))))
+    return times
+
+
+def oscillation(tau: Array, length: float, amplitude: Array, frequency: Array) -> tuple[Array, Array, Array]:
+    """Oscillation of a phase, faded in and out, with its two derivatives; each of shape (n_times, n_joints).
+
+    Parameters
+    ----------
+    tau : ndarray, shape (n_times,)
+        Times since the phase's beginning [s].
+    length : float
+        Length of the phase [s].
+    amplitude, frequency : ndarray, shape (n_joints, 2)
+        Of the two oscillations [rad or m, Hz].
+    """
+    n = len(amplitude)
+    fade = min(FADE, FADE_PART * length)
+    rise, fall = _blend(tau / fade), _blend((length - tau) / fade)
+    e = rise[0] * fall[0]
+    # Rise and fall do not overlap: where one changes, the other is 1.
+    de, dde = (rise[1] - fall[1]) / fade, (rise[2] + fall[2]) / fade**2
+    omega = 2 * np.pi * frequency
+    offset = GOLDEN * np.arange(n * SINES).reshape(n, SINES)
+    angle = omega[None] * tau[:, None, None] + offset[None]
+    w = np.sum(amplitude * np.sin(angle), axis=2)
+    dw = np.sum(amplitude * omega * np.cos(angle), axis=2)
+    ddw = -np.sum(amplitude * omega**2 * np.sin(angle), axis=2)
+    e, de, dde = e[:, None], de[:, None], dde[:, None]
+    return e * w, e * dw + de * w, e * ddw + 2 * de * dw + dde * w
+
+
+def _blend(x: Array) -> tuple[Array, Array, Array]:
+    """Fifth-order step from 0 to 1 over 0 to 1, with its two derivatives (Siciliano 2009)."""
+    x = np.clip(x, 0.0, 1.0)
+    return x**3 * (10 - 15 * x + 6 * x * x), 30 * x * x * (1 - x) ** 2, 60 * x * (1 - x) * (1 - 2 * x)
+
+
+_SLOW, _SMALL = 0.15, 0.4
+_PATTERNS: dict[str, tuple[tuple[float, float, float, float], tuple[float, float, float, float]]] = {
+    "slow reversals": ((_SMALL, 0.35, 0.5, 0.5), (0.7, _SLOW, _SMALL, 0.4)),
+    "fast multisine": ((1.0, 0.6, 0.9, 0.9), (1.0, 0.75, 0.9, 0.5)),
+    "large travel": ((1.0, _SLOW, 0.3, 0.6), (1.0, 0.3, 0.3, 0.8)),
+    "slow, then fast": ((0.6, 0.25, _SMALL, 0.5), (1.0, 0.6, 0.9, 0.85)),
+}
+
+
+def named(name: str, n_joints: int, poses: tuple[float, float] = (0.5, 0.5)) -> Array:
+    """Return the numbers of a usual motion.
+
+    Parameters
+    ----------
+    name : {"slow reversals", "fast multisine", "large travel", "slow, then fast"}
+        What it is good for: friction, inertia, effects of the position, several.
+    n_joints : int
+        Number of joints.
+    poses : tuple of float, default the middle of the range
+        Where the joints oscillate, from 0 to 1 of their ranges.
+    """
+    first, second = _PATTERNS[name]
+    joint = [poses[0], *first, poses[1], *second]
+    return np.array([0.5, *joint * n_joints])

@@ -1,0 +1,430 @@
+"""`plan`: the next experiment from a diagnosis."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap import options
+from armgap.arm import Arm, only_planar
+from armgap.diagnosis import Diagnosis
+from armgap.errors import OptionError, ResultError
+from armgap.output import STANDARD_STREAM, write
+from armgap.planning.criterion import Outcome, PredictedMotion, Setting
+from armgap.planning.dynamics import inverse_dynamics
+from armgap.planning.hypotheses import HypothesisBuilder, TestedQuestion
+from armgap.planning.limits import TORQUE_MARGIN, PlanLimits, limits_of
+from armgap.planning.motion import Motion
+from armgap.planning.questions import NONE, Question, asked, known_model, open_questions, rank, spelt
+from armgap.planning.search import Search, standard
+from armgap.planning.sizes import Scales
+from armgap.progress import ProgressCallback, use_callback
+
+if TYPE_CHECKING:
+    import polars as pl
+
+__all__ = ["Plan", "PlannedQuestion", "plan"]
+
+Array = NDArray[np.float64]
+
+#: Questions that a motion is planned for unless they are asked for.
+MOST_QUESTIONS = 5
+#: Log-likelihood ratio that a decision needs, beside the logarithm of the number of candidates.
+DECISION = 3.0
+#: Shortest and longest motion, s.
+SHORTEST, LONGEST = 2.0, 120.0
+#: Evidence of less than this is none.
+NEXT_TO_NOTHING = 1.0
+#: Part of a difference that is left after the rival was fitted, below which the two are one.
+SAME = 1e-3
+SCHEMA = "armgap.plan/1"
+
+
+@dataclass(frozen=True)
+class PlannedQuestion:
+    """What a planned motion is expected to tell about one question.
+
+    Attributes
+    ----------
+    effect, joint : str, int or None
+        The effect in question.
+    against, against_joint : str, int or None
+        The effect it is to be told from; ``"none"`` is its absence.
+    expected_log_likelihood_ratio : float
+        Expectation if the effect is in the arm, mean over its sizes.
+    settled : float
+        Probability that the log-likelihood ratio exceeds what a decision needs, mean over its sizes.
+    origin : {"asked", "equivalents", "candidate", "undecided", "not excited"}
+        Why it is open.
+    sizes : (str, float, float), optional
+        Parameter, and the range of its values that the mean is over [SI].
+    why : str
+        What keeps it from being settled; empty where it is as good as settled.
+    """
+
+    effect: str
+    joint: int | None
+    against: str
+    against_joint: int | None
+    expected_log_likelihood_ratio: float
+    settled: float
+    origin: str
+    sizes: tuple[str, float, float] | None = None
+    why: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the question as a JSON object."""
+        against: dict[str, Any] = {"effect": self.against}
+        if self.against != NONE:
+            against["joint"] = self.against_joint
+        sizes = None if self.sizes is None else dict(zip(("parameter", "from", "to"), self.sizes, strict=True))
+        return {
+            "effect": self.effect,
+            "joint": self.joint,
+            "against": against,
+            "expected_log_likelihood_ratio": self.expected_log_likelihood_ratio,
+            "settled": self.settled,
+            "origin": self.origin,
+            "sizes": sizes,
+            "why": self.why,
+        }
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A planned experiment, the result of `plan`.
+
+    Attributes
+    ----------
+    arm : str
+        Name of the arm.
+    kind : str
+        Kind of the arm.
+    t : ndarray, shape (n_samples,)
+        Times, evenly spaced by the arm's sample period [s].
+    q_ref, dq_ref, tau_ff : ndarray, shape (n_samples, n_joints)
+        Reference positions and velocities, and the torque that the best model needs for them from each sample to the next [SI].
+    questions : tuple of PlannedQuestion
+        What it is for.
+    left_out : tuple of str
+        Open questions that it is not for, as ``effect:joint against rival``.
+    limits : PlanLimits
+        What it keeps to.
+    threshold : float
+        Log-likelihood ratio that a decision needs.
+    evaluations : int
+        Motions that were compared.
+    notes : tuple of str
+        What to know about it.
+    """
+
+    arm: str
+    kind: str
+    t: Array = field(repr=False)
+    q_ref: Array = field(repr=False)
+    dq_ref: Array = field(repr=False)
+    tau_ff: Array = field(repr=False)
+    questions: tuple[PlannedQuestion, ...]
+    left_out: tuple[str, ...]
+    limits: PlanLimits
+    threshold: float
+    evaluations: int
+    notes: tuple[str, ...]
+
+    @property
+    def duration(self) -> float:
+        """Length of the motion [s]."""
+        return float(self.t[-1])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the plan but for its motion as a JSON object, schema ``armgap.plan/1``."""
+        return {
+            "schema": SCHEMA,
+            "arm": {"name": self.arm, "kind": self.kind},
+            "duration_s": self.duration,
+            "samples": len(self.t),
+            "questions": [q.to_dict() for q in self.questions],
+            "left_out": list(self.left_out),
+            "limits": self.limits.to_dict(),
+            "used": {
+                "position_min": self.q_ref.min(axis=0).tolist(),
+                "position_max": self.q_ref.max(axis=0).tolist(),
+                "speed": np.abs(self.dq_ref).max(axis=0).tolist(),
+                "torque": np.abs(self.tau_ff).max(axis=0).tolist(),
+            },
+            "start": self.q_ref[0].tolist(),
+            "threshold": self.threshold,
+            "evaluations": self.evaluations,
+            "notes": list(self.notes),
+        }
+
+    def to_json(self, indent: int | None = None) -> str:
+        """Return `to_dict` as JSON."""
+        return json.dumps(self.to_dict(), indent=indent, allow_nan=False)
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return the motion as a table with the columns ``t, q_ref1, ..., dq_ref1, ..., tau_ff1, ...``."""
+        import polars as pl
+
+        columns = {"t": self.t}
+        for name, values in (("q_ref", self.q_ref), ("dq_ref", self.dq_ref), ("tau_ff", self.tau_ff)):
+            columns |= {f"{name}{j + 1}": values[:, j] for j in range(values.shape[1])}
+        return pl.DataFrame(columns)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion, as CSV or Parquet by the name's ending; ``-`` is CSV on standard output.
+
+        Raises
+        ------
+        ResultError
+            If the ending is another, or the file cannot be written.
+        """
+        check_output(path)
+        table = self.to_polars()
+        if Path(path).suffix.lower() in _PARQUET:
+            write(path, partial(table.write_parquet, compression="zstd"))
+        else:
+            write(path, table.write_csv())
+
+    def summary(self) -> str:
+        """Return what the motion is for and how sure one will be after it, one line per question."""
+        from armgap.planning.page import lines
+
+        return "\n".join(lines(self))
+
+
+_PARQUET = (".parquet", ".pq")
+
+
+def check_output(path: str | os.PathLike[str]) -> None:
+    """Raise if a motion cannot be written under this name."""
+    if os.fspath(path) != STANDARD_STREAM and Path(path).suffix.lower() not in (*_PARQUET, ".csv"):
+        raise ResultError("has an unknown ending", remedy="write .csv or .parquet", file=path)
+
+
+def plan(
+    diagnosis: Diagnosis | str | os.PathLike[str],
+    arm: Arm | str | os.PathLike[str],
+    *,
+    questions: Sequence[str] = (),
+    duration: float = 10.0,
+    seed: int = 1,
+    progress: ProgressCallback | None = None,
+) -> Plan:
+    """Plan the motion that settles best what a diagnosis left open.
+
+    Of the motions tried, the one with the most expected evidence is taken: the log-likelihood ratio of the effect in question against its
+    rival, both with all values fitted to the planned motion (T-optimality, Atkinson and Fedorov 1975). It keeps to the arm file's limits, or to
+    what the diagnosed logs covered, and begins and ends at rest.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis or path
+        What is known so far.
+    arm : Arm or path
+        The arm that was diagnosed.
+    questions : sequence of str, default none
+        Effects to settle, ``"EFFECT:JOINT"`` each, against their absence and their equivalents. Without it, the five open questions
+        with the largest consequences.
+    duration : float, default 10
+        Length of the motion [s], 2 to 120.
+    seed : int, default 1
+        Seed of the search; the same seed gives the same motion.
+    progress : callable, optional
+        As for `armgap.diagnose`.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    ArmgapError
+        A leaf of it, if the diagnosis, the arm or an option cannot be used, or nothing is open.
+    """
+    seconds = options.positive(duration, "duration")
+    if not SHORTEST <= seconds <= LONGEST:
+        raise OptionError(f"the duration is {seconds:g} s", remedy=f"give {SHORTEST:g} to {LONGEST:g} s")
+    number = options.seed(seed)
+    check_optimiser()
+    arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
+    only_planar(arm, "plan")
+    data = _usable(diagnosis, arm)
+    with use_callback(progress):
+        return _plan(data, arm, questions, seconds, number)
+
+
+def check_optimiser() -> None:
+    """Raise if the package that searches for motions is not installed."""
+    from importlib.util import find_spec
+
+    if find_spec("scipy") is None:
+        raise OptionError(
+            "planning needs scipy, which is not installed", remedy="install it with pip install 'armgap[plan]'"
+        )
+
+
+def _usable(diagnosis: Diagnosis | str | os.PathLike[str], arm: Arm) -> dict[str, Any]:
+    """Return the JSON object of a diagnosis that belongs to the arm and leaves something to ask."""
+    from armgap.export import read_diagnosis
+
+    if isinstance(diagnosis, list | tuple):
+        raise OptionError(f"{len(diagnosis)} diagnoses were given", remedy="give one; diagnose its logs together first")
+    read = diagnosis if isinstance(diagnosis, Diagnosis) else read_diagnosis(Path(diagnosis))
+    file = None if isinstance(diagnosis, Diagnosis) else diagnosis
+    data = read.to_dict()
+    if read.verdict == "input":
+        raise OptionError(
+            "its verdict is `input`: logs and arm file contradict each other",
+            remedy="apply the remedy that it names and diagnose again",
+            file=file,
+        )
+    described = data.get("arm") or {}
+    if described.get("kind", arm.kind) != arm.kind or set(data["parameters"]["with_causes"]) != set(
+        arm.parameter_names
+    ):
+        raise OptionError(
+            f"is of an arm of kind {described.get('kind')!r}, the arm file's is {arm.kind!r}",
+            remedy="give the arm file that was diagnosed",
+            file=file,
+        )
+    if "noise" not in data:
+        raise OptionError(
+            "says nothing of the noise", remedy="give the JSON that `armgap diagnose --json` wrote", file=file
+        )
+    return data
+
+
+def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float, seed: int) -> Plan:
+    limits = limits_of(arm, data)
+    model, notes = known_model(data, arm)
+    setting = Setting.of(data, model)
+    search = Search(setting, limits, duration)
+    usual = search.play(search.motion(standard(arm.n_joints)))
+    builder = HypothesisBuilder(data, usual, _scales(arm, data, limits, usual, setting), model.effects)
+    questions, remarks = open_questions(data)
+    named = asked(wanted, data, arm)
+    tested = []
+    for question in named or questions:
+        if (one := builder.pose(question)) is not None:
+            tested.append(one)
+        else:
+            remarks.append(f"{question.text}: these limits leave nothing that the diagnosed logs did not cover")
+    if not named:
+        tested.sort(key=_urgency)
+    chosen = tested if named else tested[:MOST_QUESTIONS]
+    settling = {p.question.text for p in chosen}
+    left = (
+        [q for q in (p.question for p in tested) if q.text not in settling]
+        if not named
+        else [q for q in questions if q.text not in settling]
+    )
+    if not chosen:
+        raise OptionError("the diagnosis leaves nothing open", remedy="ask for an effect, such as --for backlash:2")
+    candidates = len(data["causes"]) + len(data.get("candidates") or []) + len(data["ruled_out"])
+    threshold = DECISION + math.log(max(candidates, 1))
+    found = search.best(chosen, threshold, seed)
+    motion = found.motion
+    played = search.play(motion)
+    answered = [
+        _answer(p, played.outcome(p.pair), float(most), threshold) for p, most in zip(chosen, found.most, strict=True)
+    ]
+    t, q, dq, tau = _sampled(motion, setting)
+    return Plan(
+        arm.name,
+        arm.kind,
+        t,
+        q,
+        dq,
+        tau,
+        tuple(answered),
+        tuple(q.text for q in left),
+        limits,
+        threshold,
+        found.evaluations,
+        (*_limit_notes(limits), *notes, *remarks),
+    )
+
+
+def _urgency(tested: TestedQuestion) -> tuple[int, float]:
+    """Causes against equivalents first, then what would cost most."""
+    first = min(rank(tested.question), 2)
+    return first, -min(tested.consequence, 1e9)
+
+
+def _scales(arm: Arm, data: dict[str, Any], limits: PlanLimits, usual: PredictedMotion, setting: Setting) -> Scales:
+    edges = {r["variable"]: r["edges"] for r in data.get("regimes") or []}
+    n, motion = arm.n_joints, limits.motion
+    seen = [edges.get(f"q{j}") or [0.0, 0.0] for j in range(1, n + 1)]
+    torque = np.array([(edges.get(f"abs(tau{j})") or [0.0])[-1] for j in range(1, n + 1)], dtype=np.float64)
+    most = np.abs(usual.tau).max(axis=0) if limits.torque is None else limits.torque
+    return Scales.of(
+        arm,
+        (usual.q, usual.dq),
+        usual.tau,
+        setting.model.inertia(limits.home[None])[0],
+        low=motion.position_min,
+        high=motion.position_max,
+        seen_low=np.array([s[0] for s in seen], dtype=np.float64),
+        seen_high=np.array([s[-1] for s in seen], dtype=np.float64),
+        seen_torque=torque,
+        most_torque=np.maximum(most, 1e-9),
+    )
+
+
+def _sampled(motion: Motion, setting: Setting) -> tuple[Array, Array, Array, Array]:
+    """The motion at the arm's sample period; a torque is that of the middle of its sample, the last one that of rest."""
+    period = setting.arm.sample_period
+    t = period * np.arange(round(motion.duration / period) + 1, dtype=np.float64)
+    q, dq, _ = motion.at(t)
+    tau = inverse_dynamics(setting.model, *motion.at(t + 0.5 * period))
+    return t, q, dq, tau
+
+
+def _answer(tested: TestedQuestion, outcome: Outcome, most: float, threshold: float) -> PlannedQuestion:
+    question, settled = tested.question, outcome.settled(threshold)
+    return PlannedQuestion(
+        *question.place,
+        *question.rival,
+        outcome.expected,
+        settled,
+        question.origin,
+        tested.sizes,
+        _obstacle(question, outcome, max(most, outcome.expected)) if settled < 0.5 else "",
+    )
+
+
+def _obstacle(question: Question, outcome: Outcome, most: float) -> str:
+    """What keeps a question from being settled."""
+    other = "the arm's own values" if question.against == NONE else spelt(*question.rival)
+    if outcome.kept < SAME and float(outcome.weight @ outcome.plain) > NEXT_TO_NOTHING:
+        return f"fitting {other} gives the same motion: no motion within these limits tells them apart"
+    if most < NEXT_TO_NOTHING:
+        return "none of the motions tried within these limits would show it"
+    return (
+        "at most of its sizes, motions within these limits and of this length give less evidence than a decision needs"
+    )
+
+
+def _limit_notes(limits: PlanLimits) -> list[str]:
+    notes = []
+    if limits.source == "logs":
+        notes.append(
+            "the arm file has no [limits]; the motion keeps to the positions, speeds and accelerations of the diagnosed logs"
+        )
+    if limits.torque is None:
+        notes.append("the arm file has no torque_limit; torques are not limited")
+    else:
+        notes.append(
+            f"the feed-forward torque takes at most {TORQUE_MARGIN:.0%} of torque_limit; the rest is the controller's"
+        )
+    return notes

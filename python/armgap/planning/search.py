@@ -1,0 +1,202 @@
+"""The motion with the most evidence for all questions: differential evolution from usual motions (Storn and Price 1997)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm import MotionLimits
+from armgap.errors import OptionError
+from armgap.planning.criterion import Outcome, PredictedMotion, Setting
+from armgap.planning.dynamics import inverse_dynamics, torque_with
+from armgap.planning.hypotheses import TestedQuestion
+from armgap.planning.limits import TORQUE_MARGIN, TORQUE_MOST, PlanLimits
+from armgap.planning.motion import Motion, build, count, named
+from armgap.progress import report_progress
+
+__all__ = ["Found", "Search", "standard"]
+
+Array = NDArray[np.float64]
+
+#: Size of the population, and generations after the first.
+POPULATION, GENERATIONS = 16, 9
+#: Windows by which motions are compared, and motions of which the best is taken by all windows.
+WINDOWS, FINALISTS = 20, 4
+#: Steps in which a motion is scaled down until its torques suffice.
+SHRINKS = 12
+#: Every so many steps of prediction torques are looked at while a motion is scaled down.
+COARSE = 4
+#: Poses per joint at which the torque left for accelerations is looked at; at least this part of the limit counts as left.
+POSES, LEFT = 5, 0.1
+#: Part of the torque left that a joint's own acceleration takes; the rest is for the other joints' accelerations.
+COUPLED = 0.6
+_SEEDS = ("slow, then fast", "large travel", "fast multisine", "slow reversals")
+_POSES = ((0.5, 0.5), (0.3, 0.7), (0.8, 0.35))
+
+
+@dataclass(frozen=True)
+class Found:
+    """The best motion of a search.
+
+    Attributes
+    ----------
+    motion : Motion
+        The motion.
+    evaluations : int
+        Motions that were tried.
+    most : ndarray, shape (n_questions,)
+        Most evidence of any motion tried, per question.
+    """
+
+    motion: Motion
+    evaluations: int
+    most: Array
+
+
+def standard(n_joints: int) -> Array:
+    """Return the numbers of the usual motion by which sizes are judged."""
+    return named("slow, then fast", n_joints, (0.35, 0.65))
+
+
+class Search:
+    """Motions within limits, and their worth for some questions.
+
+    Parameters
+    ----------
+    setting : Setting
+        What evidence is counted with.
+    limits : PlanLimits
+        What is kept to.
+    duration : float
+        Length of the motion [s].
+    """
+
+    def __init__(self, setting: Setting, limits: PlanLimits, duration: float) -> None:
+        self._setting = setting
+        self._limits = limits
+        self._duration = duration
+        self._check_home()
+        self._inner = self._reachable(limits.inner())
+
+    def _check_home(self) -> None:
+        """Raise if the arm cannot be held where the motion begins."""
+        if self._limits.torque is None:
+            return
+        rest = np.zeros((1, len(self._limits.home)))
+        needed = np.abs(inverse_dynamics(self._setting.model, self._limits.home[None], rest, rest)[0])
+        for j in np.flatnonzero(needed > TORQUE_MARGIN * self._limits.torque):
+            raise OptionError(
+                f"joint {j + 1} needs {needed[j]:.3g} of its {self._limits.torque[j]:.3g} torque to rest where the motion begins",
+                remedy="correct torque_limit, or choose limits that contain a pose that takes less",
+            )
+
+    def _reachable(self, inner: MotionLimits) -> MotionLimits:
+        """Limits whose accelerations are roughly those that the torque left beside gravity and friction gives."""
+        if self._limits.torque is None:
+            return inner
+        arm, model = self._setting.arm, self._setting.model
+        ends = [np.linspace(a, b, POSES) for a, b in zip(inner.position_min, inner.position_max, strict=True)]
+        poses = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, arm.n_joints)
+        rest = np.zeros_like(poses)
+        carried = np.abs(inverse_dynamics(model, poses, rest, rest)).max(axis=0)
+        theta, first = np.array(model.theta), arm.n_inertial
+        friction = theta[first + arm.n_joints :] + theta[first : first + arm.n_joints] * inner.speed
+        left = np.maximum(TORQUE_MARGIN * self._limits.torque - carried - friction, LEFT * self._limits.torque)
+        inertia = np.array([np.diag(m) for m in model.inertia(poses)]).max(axis=0)
+        return replace(inner, acceleration=np.minimum(inner.acceleration, COUPLED * left / inertia))
+
+    def motion(self, numbers: Array) -> Motion:
+        """Return the motion of some numbers from 0 to 1, within limits of position, speed, acceleration and torque."""
+        period = self._setting.arm.sample_period
+        motion = build(numbers, self._limits.home, self._inner, self._duration, period)
+        return self._within(motion, (), TORQUE_MARGIN)
+
+    def _within(self, motion: Motion, effects: Sequence[Any], part: float) -> Motion:
+        """Scale a motion down until its torques, under the best model with some effects added, are within a part of the limit."""
+        limit = self._limits.torque
+        if limit is None:
+            return motion
+        h = self._setting.step * COARSE
+        t = np.arange(0.0, motion.duration, h)
+        for _ in range(SHRINKS):
+            states = motion.at(t)
+            tau = inverse_dynamics(self._setting.model, *states)
+            if effects:
+                tau = torque_with(self._setting.model, effects, t, states, tau)
+            ratio = float(np.max(np.abs(tau) / (part * limit)))
+            if ratio <= 1.0:
+                return motion
+            motion = motion.scaled(max(0.5, min(0.97, 0.98 / ratio)))
+        return motion.scaled(0.0)
+
+    def kept(self, motion: Motion, tested: Sequence[TestedQuestion]) -> Motion:
+        """Scale a motion down until its torques suffice under every model in question."""
+        for p in tested:
+            largest = p.pair.alternatives[-1][1][-1]
+            motion = self._within(motion, (largest,), TORQUE_MOST)
+        return motion
+
+    def play(self, motion: Motion) -> PredictedMotion:
+        """Return a motion with its torques and predictions."""
+        return PredictedMotion(self._setting, motion)
+
+    def best(self, tested: Sequence[TestedQuestion], threshold: float, seed: int) -> Found:
+        """Return the best motion that is found for some questions; the same seed finds the same."""
+        from scipy.optimize import differential_evolution
+
+        state = _State(np.zeros(len(tested)))
+        total = POPULATION * (GENERATIONS + 1)
+
+        def cost(numbers: Array) -> float:
+            motion = self.motion(numbers)
+            played = PredictedMotion(self._setting, motion, WINDOWS)
+            outcomes = [played.outcome(p.quick, steps=0) for p in tested]
+            state.count += 1
+            state.most = np.maximum(state.most, [x.expected for x in outcomes])
+            report_progress("planning", min(state.count / total, 1.0))
+            worth = _worth(outcomes, threshold)
+            state.best = sorted([*state.best, (worth, state.count, motion)], key=lambda x: (-x[0], x[1]))[:FINALISTS]
+            return -worth
+
+        size = count(self._setting.arm.n_joints)
+        differential_evolution(
+            cost, [(0.0, 1.0)] * size, init=self._population(seed), maxiter=GENERATIONS, tol=0.0, polish=False,
+            recombination=0.5, rng=np.random.default_rng(seed), callback=lambda *_: state.best[0][0] >= 1.0 - 1e-9,
+        )  # fmt: skip
+        return Found(self._final(state, tested, threshold), state.count, state.most)
+
+    def _final(self, state: _State, tested: Sequence[TestedQuestion], threshold: float) -> Motion:
+        """The best of the finalists by all sizes and windows, with the rival fitted in full."""
+        motions = [self.kept(motion, tested) for _, _, motion in state.best]
+        every = [[self.play(motion).outcome(p.pair) for p in tested] for motion in motions]
+        sure = [sum(x.settled(threshold) for x in outcomes) / len(tested) for outcomes in every]
+        order = [(s, _worth(outcomes, threshold)) for s, outcomes in zip(np.round(sure, 2), every, strict=True)]
+        return motions[max(range(len(motions)), key=lambda i: order[i])]
+
+    def _population(self, seed: int) -> Array:
+        """Usual motions at several poses, and random ones."""
+        n = self._setting.arm.n_joints
+        rng = np.random.default_rng([seed, 1])
+        usual = [named(name, n, poses) for poses in _POSES for name in _SEEDS]
+        jitter = [np.clip(x + 0.05 * rng.standard_normal(len(x)), 0.0, 1.0) for x in usual]
+        random = [rng.uniform(0.0, 1.0, count(n)) for _ in range(POPULATION - len(jitter))]
+        return np.array([*jitter, *random])
+
+
+@dataclass
+class _State:
+    """What a search has seen so far."""
+
+    most: Array
+    count: int = 0
+    best: list[tuple[float, int, Motion]] = field(default_factory=list)
+
+
+def _worth(outcomes: Sequence[Outcome], threshold: float) -> float:
+    """Worth of a motion for several questions, from 0 to 1; the worst one counts as much as their mean."""
+    merits = [x.merit(threshold) for x in outcomes]
+    return 0.5 * (float(np.mean(merits)) + min(merits))

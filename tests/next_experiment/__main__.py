@@ -1,0 +1,111 @@
+"""Plan, play and diagnose cases with a hidden effect: ``python -m tests.next_experiment --help``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import armgap
+
+from .cases import CASES, LIMITS, Case, Reference, expected, log_of, multisine, play, poor, write_arm
+
+
+def named(diagnosis: armgap.Diagnosis, case: Case) -> tuple[str, float]:
+    """What became of the hidden effect: named alone, named with look-alikes, a candidate, or not named; and its probability."""
+    for cause in diagnosis.causes:
+        if (cause.effect, cause.joint) == (case.effect, case.joint):
+            return ("named, look-alikes" if cause.equivalents else "named"), cause.probability
+    for cause in diagnosis.causes:
+        if any((e.effect, e.joint) == (case.effect, case.joint) for e in cause.equivalents):
+            return "look-alike", cause.probability
+    if any((c.effect, c.joint) == (case.effect, case.joint) for c in diagnosis.candidates):
+        return "candidate", 0.0
+    status = [r.status for r in diagnosis.ruled_out if (r.effect, r.joint) == (case.effect, case.joint)]
+    return (status[0] if status else "not named"), 0.0
+
+
+def used(trace: Any, model: str, limit: tuple[float, ...]) -> dict[str, float]:
+    """Largest part of each limit that the played motion took."""
+    low, high, speed, _ = (np.array(x) for x in LIMITS[model])
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    return {
+        "position": float(np.max(np.abs(trace.q_true - middle) / half)),
+        "speed": float(np.max(np.abs(trace.dq_true) / speed)),
+        "torque": float(np.max(np.abs(trace.tau) / np.array(limit))),
+    }
+
+
+def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any]:
+    """Poor log, diagnosis, plan, both motions played, both diagnosed."""
+    with tempfile.TemporaryDirectory() as name:
+        arm, arm_file = write_arm(case, seed, Path(name))
+        first = log_of(play(case, arm, poor(arm, case.arm)), "first")
+        before = armgap.diagnose(first, arm_file)
+        began = time.perf_counter()
+        wanted = [case.asked] if ask else []
+        open_plan = armgap.plan(before, arm_file, questions=wanted, duration=duration, seed=seed)
+        seconds = time.perf_counter() - began
+        usual = multisine(arm_file, case.arm, duration, seed)
+        planned = Reference(open_plan.q_ref, open_plan.dq_ref, open_plan.tau_ff)
+        result: dict[str, Any] = {"case": case.name, "seed": seed, "before": named(before, case), "seconds": seconds}
+        own = [q for q in open_plan.questions if (q.effect, q.joint) == (case.effect, case.joint)]
+        result["promised"] = own[-1].settled if own else None
+        result["evidence"] = own[-1].expected_log_likelihood_ratio if own else None
+        result["all"] = [
+            (q.effect, q.joint, q.against, round(q.settled, 3), round(q.expected_log_likelihood_ratio, 1))
+            for q in open_plan.questions
+        ]
+        for key, reference in (("planned", planned), ("multisine", usual)):
+            result[f"{key} expected"] = expected(case, before, arm_file, reference, open_plan.threshold)
+            trace = play(case, arm, reference)
+            after = armgap.diagnose([first, log_of(trace, key)], arm_file)
+            result[key] = named(after, case)
+            result[f"{key} used"] = used(trace, case.arm, arm.torque_limit)
+            result[f"{key} causes"] = [(c.effect, c.joint) for c in after.causes]
+    return result
+
+
+def main() -> None:
+    """Run the cases and print the table."""
+    parser = argparse.ArgumentParser(prog="python -m tests.next_experiment", description=__doc__)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--duration", type=float, default=10.0)
+    parser.add_argument("--only", default="", help="part of the names of cases")
+    parser.add_argument(
+        "--ask",
+        action="store_true",
+        help="ask for the hidden effect; without it, for what the first diagnosis leaves open",
+    )
+    parser.add_argument("--json", type=Path, help="write the records")
+    options = parser.parse_args()
+    records = []
+    head = (
+        "case", "first log", "promised", "at its size", "planned motion", "at its size", "multisine", "position", "speed", "torque", "s",
+    )  # fmt: skip
+    print("| " + " | ".join(head) + " |")
+    print("| " + " | ".join(["---"] * len(head)) + " |")
+    for case in CASES:
+        if options.only not in case.name:
+            continue
+        r = one(case, options.seed, options.duration, options.ask)
+        records.append(r)
+        took = r["planned used"]
+        shown = [f"{r[k][0]}{f' {r[k][1]:.2f}' if r[k][1] else ''}" for k in ("before", "planned", "multisine")]
+        row = (
+            case.name, shown[0],
+            "not among its questions" if r["promised"] is None else f"{r['promised']:.2f}", f"{r['planned expected'][1]:.2f}",
+            shown[1], f"{r['multisine expected'][1]:.2f}", shown[2], *(f"{took[k]:.2f}" for k in ("position", "speed", "torque")),
+            f"{r['seconds']:.0f}",
+        )  # fmt: skip
+        print("| " + " | ".join(row) + " |", flush=True)
+    if options.json:
+        options.json.write_text(json.dumps(records, indent=1), encoding="utf-8")
+
+
+main()

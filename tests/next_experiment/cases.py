@@ -1,0 +1,213 @@
+"""Arms with a hidden effect, a poor first log, and motions played in MuJoCo under a PD controller."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import armgap
+from armgap.arm import MotionLimits
+from armgap.evidence.hypothesis import EffectInstance, Hypothesis
+from armgap.planning.criterion import HypothesisPair, PredictedMotion, Setting
+from armgap.planning.dynamics import inverse_dynamics
+from armgap.planning.limits import MARGIN, TORQUE_MARGIN
+from armgap.planning.questions import known_model
+from armgap.trial.armfile import arm_toml, draw_nominal
+from armgap.trial.arms import AXIS, DIRECT_DRIVE, GEARED, PENDULUM, TURN, TrialArm
+from armgap.trial.case import simulated_arm_of
+from armgap.trial.effects.drive import BACKLASH_ROTOR
+from armgap.trial.key import HiddenEffect
+from armgap.trial.simulated_arm import CommandSource, Trace, run
+
+Array = NDArray[np.float64]
+
+#: Bandwidth of the controllers, rad/s.
+BANDWIDTH = 14.0
+#: Length of the poor log, s; part of the range it covers; its frequencies, Hz.
+POOR_S, POOR_PART, POOR_HZ = 4.0, 0.08, (0.3, 0.5)
+#: Harmonics of the standard multisine, and its base frequency, Hz.
+HARMONICS, BASE_HZ = 5, 0.2
+REST = 0.2
+
+LIMITS = {
+    "direct-drive": ((-1.5, -2.0), (1.5, 2.0), (3.0, 5.0), (20.0, 60.0)),
+    "geared": ((-1.8, -2.0), (1.8, 2.0), (6.0, 6.0), (40.0, 60.0)),
+    "pendulum": ((-2.0,), (2.0,), (6.0,), (60.0,)),
+    "axis": ((-0.45,), (0.45,), (0.8,), (8.0,)),
+}
+#: The motor's part of joint 2's inertia in the simulator.
+ROTOR_SHARE = BACKLASH_ROTOR * GEARED.inertia[1] / GEARED.joint_inertia[1]
+#: Coarse encoders: with fine ones the poor log tells everything.
+STEP, LINEAR_STEP = TURN / 20_000, 2e-5
+ARMS = {
+    "direct-drive": replace(DIRECT_DRIVE, step=(STEP, STEP)),
+    "geared": replace(GEARED, step=(STEP, STEP)),
+    "pendulum": replace(PENDULUM, step=(STEP,)),
+    "axis": replace(AXIS, step=(LINEAR_STEP,)),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A hidden effect on an arm."""
+
+    arm: str
+    effect: str
+    joint: int | None
+    parameters: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        where = "" if self.joint is None else f":{self.joint}"
+        return f"{self.arm} {self.effect}{where}"
+
+    @property
+    def asked(self) -> str:
+        return self.effect if self.joint is None else f"{self.effect}:{self.joint}"
+
+
+CASES = (
+    Case("direct-drive", "stribeck", 2, {"amplitude": 0.06, "velocity": 0.05}),
+    Case("direct-drive", "quadratic_drag", 1, {"c": 0.1}),
+    Case("direct-drive", "joint_spring", 2, {"k": 0.1, "q0": 0.4}),
+    Case("direct-drive", "torque_saturation", 2, {"level": 6.0}),
+    Case("geared", "backlash", 2, {"gap": 0.02, "rotor_share": ROTOR_SHARE, "riding": 0.0}),
+    Case("geared", "torque_ripple", 2, {"amplitude": 0.012, "n": 7.0, "phase": 0.5}),
+    Case("geared", "load_dependent_friction", 1, {"mu": 0.008}),
+    Case("pendulum", "presliding", 1, {"amplitude": 0.06, "stiffness": 400.0}),
+    Case("pendulum", "encoder_eccentricity", 1, {"a": 0.001, "b": -0.001}),
+    Case("axis", "viscous_asymmetry", 1, {"delta": 0.8}),
+)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Samples of a motion with its feed-forward torque."""
+
+    q: Array
+    dq: Array
+    tau: Array
+
+    def source(self, arm: TrialArm) -> CommandSource:
+        """A controller that follows it: PD on measured positions, and the feed-forward."""
+        inertia = np.array(arm.joint_inertia)
+        kp, kd = inertia * BANDWIDTH**2, 1.4 * inertia * BANDWIDTH
+        limit = np.array(arm.torque_limit)
+        last: list[Array] = []
+
+        def command(t: float, q: list[float]) -> list[float]:
+            k = min(round(t / arm.sample_period), len(self.q) - 1)
+            measured = np.array(q)
+            speed = (measured - last.pop()) / arm.sample_period if last else np.zeros(len(q))
+            last.append(measured)
+            tau = self.tau[k] + kp * (self.q[k] - measured) + kd * (self.dq[k] - speed)
+            return [float(x) for x in np.clip(tau, -limit, limit)]
+
+        return command
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A reference as what evidence is computed for: it may be evaluated between its samples."""
+
+    t: Array
+    reference: Reference
+
+    @property
+    def duration(self) -> float:
+        return float(self.t[-1])
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        """Positions, velocities and accelerations at some times."""
+        r = self.reference
+        every = (r.q, r.dq, np.gradient(r.dq, self.t, axis=0))
+        found = [np.column_stack([np.interp(t, self.t, x[:, j]) for j in range(x.shape[1])]) for x in every]
+        return found[0], found[1], found[2]
+
+
+def expected(
+    case: Case, before: armgap.Diagnosis, arm_file: Path, reference: Reference, threshold: float
+) -> tuple[float, float]:
+    """Expected log-likelihood ratio and probability of a decision at the hidden effect's own size, against its absence."""
+    arm = armgap.Arm.read(arm_file)
+    model, _ = known_model(before.to_dict(), arm)
+    t = arm.sample_period * np.arange(len(reference.q))
+    played = PredictedMotion(Setting.of(before.to_dict(), model), Sampled(t, reference))  # type: ignore[arg-type]
+    without = tuple(e for e in model.effects if (e.effect, e.joint) != (case.effect, case.joint))
+    hidden = EffectInstance(case.effect, case.joint, case.parameters)
+    outcome = played.outcome(HypothesisPair(((1.0, (*without, hidden)),), without))
+    return outcome.expected, outcome.settled(threshold)
+
+
+def limits_toml(model: str) -> str:
+    """The limits of an arm as a table of an arm file."""
+    keys = ("position_min", "position_max", "speed", "acceleration")
+    return "\n[limits]\n" + "".join(f"{k} = {list(v)}\n" for k, v in zip(keys, LIMITS[model], strict=True))
+
+
+def write_arm(case: Case, seed: int, folder: Path) -> tuple[TrialArm, Path]:
+    """The true arm, and an arm file whose values are off by draws from their standard deviations."""
+    arm = ARMS[case.arm]
+    nominal = draw_nominal(np.random.default_rng([seed, 7]), arm, exact=False)
+    text = arm_toml(arm, nominal, case.name, "0" * 64) + limits_toml(case.arm)
+    path = folder / "arm.toml"
+    path.write_text(text, encoding="utf-8")
+    return arm, path
+
+
+def play(case: Case, arm: TrialArm, reference: Reference) -> Trace:
+    """Play a reference on the arm with the hidden effect."""
+    hidden = [HiddenEffect(case.effect, case.joint, case.parameters, None, "library")]
+    duration = (len(reference.q) - 1) * arm.sample_period
+    return run(simulated_arm_of(arm, hidden, "log"), reference.source(arm), duration)
+
+
+def poor(arm: TrialArm, model: str) -> Reference:
+    """A small, slow and short motion: two sines per joint."""
+    low, high = (np.array(x) for x in LIMITS[model][:2])
+    t = arm.sample_period * np.arange(round(POOR_S / arm.sample_period) + 1)
+    size = 0.5 * POOR_PART * (high - low)
+    q = sum(
+        np.outer(np.ones_like(t), 0.5 * size) * np.sin(2 * math.pi * f * t[:, None] + np.arange(len(size)))
+        for f in POOR_HZ
+    )
+    fade = np.minimum(np.minimum(t, t[-1] - t) / 0.5, 1.0)[:, None]
+    q = np.asarray(q) * fade * fade * (3 - 2 * fade)
+    return Reference(q, np.gradient(q, t, axis=0), np.zeros_like(q))
+
+
+def multisine(arm_file: Path, model: str, duration: float, seed: int) -> Reference:
+    """A random Fourier series of five harmonics, as large as the limits let it be."""
+    arm = armgap.Arm.read(arm_file)
+    assert arm.limits is not None
+    limits: MotionLimits = arm.limits
+    rng = np.random.default_rng([seed, 11])
+    h, n = arm.sample_period, arm.n_joints
+    t = h * np.arange(round(duration / h) + 1)
+    k = np.arange(1, HARMONICS + 1)
+    phase, share = rng.uniform(0, 2 * math.pi, (n, HARMONICS)), rng.uniform(0.4, 1.0, (n, HARMONICS)) / np.sqrt(k)
+    wave = np.einsum("jk,tjk->tj", share, np.sin(2 * math.pi * BASE_HZ * k * t[:, None, None] + phase))
+    x = np.clip(np.minimum(t - REST, t[-1] - REST - t) / 1.0, 0.0, 1.0)[:, None]
+    wave = wave * x**3 * (10 - 15 * x + 6 * x * x)
+    rate, bend = (np.gradient(wave, h, axis=0), np.gradient(np.gradient(wave, h, axis=0), h, axis=0))
+    room = np.minimum(limits.position_max, -limits.position_min)
+    ratio = [
+        np.max(np.abs(w), axis=0) / (MARGIN * m)
+        for w, m in ((wave, room), (rate, limits.speed), (bend, limits.acceleration))
+    ]
+    scale = 1.0 / np.max(ratio, axis=0)
+    model_of = Hypothesis(arm, tuple(arm.theta))
+    while True:
+        tau = inverse_dynamics(model_of, wave * scale, rate * scale, bend * scale)
+        if arm.torque_limit is None or np.all(np.abs(tau) <= TORQUE_MARGIN * arm.torque_limit):
+            return Reference(wave * scale, rate * scale, tau)
+        scale = 0.95 * scale
+
+
+def log_of(trace: Trace, name: str) -> armgap.Log:
+    """What a log of the played motion shows."""
+    return armgap.Log(name, trace.t, trace.q, trace.tau, None)
