@@ -259,7 +259,7 @@ class ArmFile:
         for i, (least, most) in enumerate(zip(low, high, strict=True)):
             if not least < most:
                 problem = f"entry {i + 1} is {most:g}, not above position_min, {least:g}"
-                raise self._error("limits.position_max", problem, "correct one of them")
+                raise self.error("limits.position_max", problem, "correct one of them")
         speed, acceleration = (self._vector(table, f"limits.{key}", n, above=0.0) for key in ("speed", "acceleration"))
         return MotionLimits(low, high, speed, acceleration)
 
@@ -269,11 +269,11 @@ class ArmFile:
         table = self._table("controller")
         if (kind := table.get("kind")) != "pd":
             problem = "is missing" if kind is None else f"{kind!r} is not a kind of controller"
-            raise self._error("controller.kind", problem, 'write kind = "pd"')
+            raise self.error("controller.kind", problem, 'write kind = "pd"')
         damping = table.get("kd_on", "measurement")
         if damping not in get_args(DerivativeOn):
             words = " or ".join(f'"{word}"' for word in get_args(DerivativeOn))
-            raise self._error("controller.kd_on", f"is {damping!r}", f"write {words}")
+            raise self.error("controller.kd_on", f"is {damping!r}", f"write {words}")
         kp = self._vector(table, "controller.kp", n, above=0.0)
         return Controller(kp, self._vector(table, "controller.kd", n, minimum=0.0), damping)
 
