@@ -1,0 +1,221 @@
+"""The serial trial's generator agrees with something else, its effects act where its keys say, and easy cases are diagnosed right."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+mujoco = pytest.importorskip("mujoco")
+
+from armgap import _native  # noqa: E402
+from armgap.rigid_body import inconsistency  # noqa: E402
+from serial_trial.arms import FAMILIES, STEP, SerialRobot, draw_robot, perturbed  # noqa: E402
+from serial_trial.case import LEAST, NULLS, OFF, TRUST, effect_of, hidden_effect, make_case, sigma_of  # noqa: E402
+from serial_trial.effects import EFFECTS, Effect, Moment, Null  # noqa: E402
+from serial_trial.motion import Controller, Run, draw_controller, draw_reference, simulate, use_of  # noqa: E402
+from serial_trial.run import OUTCOMES, ask, outcome, report  # noqa: E402
+
+#: MuJoCo keeps inertias as principal moments and orientations as quaternions; relative to the largest torque of a joint.
+SAME = 1e-6
+#: Share of a joint's torque by which sharp friction of MuJoCo, an impedance of 0.9999, misses its Coulomb level while a joint moves.
+SHARP = 2e-3
+#: Speed [rad/s or m/s] from which a joint moves.
+MOVING = 0.02
+#: Effects of which the torque at another joint may change by more than at their own, relative to that joint's torque: what they change is part
+#: of the arm, or both ends of a cable.
+OF_THE_ARM = {"nominal_link", "cable_spring"}
+PERIOD, SAMPLES = 0.004, 750
+
+
+def chain_of(robot: SerialRobot) -> _native.Chain:
+    return _native.Chain(list(robot.kinds), robot.rotation, robot.translation, robot.axis, robot.gravity)
+
+
+def moved(robot: SerialRobot, seed: int, effect: Effect | None = None, truth: SerialRobot | None = None) -> Run:
+    """Three seconds under PD with gravity, without disturbances."""
+    rng = np.random.default_rng(seed)
+    reference = draw_reference(robot, SAMPLES, PERIOD, rng)
+    by: Controller = draw_controller("pd", robot, reference, PERIOD, rng)
+    nothing = np.zeros((SAMPLES, robot.n))
+    return simulate(truth or robot, robot, effect or Null(None), reference, by, nothing, PERIOD)
+
+
+def frictionless(robot: SerialRobot) -> SerialRobot:
+    return replace(robot, viscous=np.zeros(robot.n), coulomb=np.zeros(robot.n))
+
+
+@pytest.fixture(scope="module")
+def robot() -> SerialRobot:
+    return draw_robot(np.random.default_rng(5), "UR10-like", 4)
+
+
+@pytest.mark.parametrize("family", list(FAMILIES))
+def test_without_friction_a_log_obeys_the_inverse_dynamics_of_the_chain(family) -> None:
+    arm = frictionless(draw_robot(np.random.default_rng(3), family))
+    run = moved(arm, 1)
+    of_chain = chain_of(arm).inverse_dynamics(arm.theta, run.true_q, run.true_dq, run.true_ddq)
+    model = arm.model()
+    data = mujoco.MjData(model)
+    of_engine = np.empty_like(of_chain)
+    for k in range(len(run.t)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = run.true_q[k], run.true_dq[k], run.true_ddq[k]
+        mujoco.mj_inverse(model, data)
+        of_engine[k] = data.qfrc_inverse
+    largest = np.max(np.abs(of_engine), axis=0)
+    assert np.all(np.abs(of_chain - of_engine) < SAME * largest)
+    assert np.all(np.abs(of_chain - run.applied) < SAME * largest), (
+        "the torques of the log are not those that moved the arm"
+    )
+
+
+def test_friction_is_viscous_and_sharp(robot) -> None:
+    run = moved(robot, 1)
+    rigid = chain_of(robot).inverse_dynamics(frictionless(robot).theta, run.true_q, run.true_dq, run.true_ddq)
+    friction = run.applied - rigid
+    law = robot.viscous * run.true_dq + robot.coulomb * np.sign(run.true_dq)
+    size = np.sqrt(np.mean(run.applied**2, axis=0))
+    # At the sample that follows a reversal the velocity has not the sign that the step ends with.
+    going = np.abs(run.true_dq) > MOVING + np.abs(run.true_ddq) * STEP
+    assert np.all(going.any(axis=0))
+    assert np.all(np.where(going, np.abs(friction - law), 0.0) < SHARP * size)
+
+
+def test_commands_are_held_and_positions_are_counts(robot) -> None:
+    run = moved(robot, 1)
+    counts = run.q / robot.step
+    assert np.allclose(counts, np.round(counts), atol=1e-6)
+    assert np.all(np.abs(run.q - run.true_q) <= 0.5001 * robot.step)
+    # An impulse at the beginning of a step is the mean of the torques before and after.
+    assert np.allclose(run.applied[1:], 0.5 * (run.tau[1:] + run.tau[:-1]))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_truth_is_within_the_prior_and_can_exist(seed) -> None:
+    rng = np.random.default_rng(seed)
+    arm = draw_robot(rng)
+    for trust, shares in TRUST.items():
+        truth = perturbed(arm, rng, *(OFF * share for share in shares))
+        sigma = sigma_of(arm, trust)
+        assert np.all(np.abs(truth.theta - arm.theta) <= sigma)
+        assert np.any(np.abs(truth.theta - arm.theta) > 0.2 * sigma)
+        assert not any(inconsistency(link.ten) for link in (*arm.links, *truth.links))
+
+
+@pytest.mark.parametrize("name", list(EFFECTS))
+def test_an_effect_changes_the_joint_that_it_names(robot, name) -> None:
+    rng = np.random.default_rng(2)
+    kind = EFFECTS[name]
+    hidden = kind.draw(robot, 1 if kind.per_joint else None, 0.2, use_of(moved(robot, 1)), rng)
+    there = moved(robot, 1, hidden, hidden.changed(hidden.without(robot)))
+    clean = moved(robot, 1, truth=hidden.without(robot))
+    differ = np.sqrt(np.mean((there.tau - clean.tau) ** 2, axis=0)) / np.sqrt(np.mean(clean.tau**2, axis=0))
+    if hidden.joint is None:
+        assert differ.max() > LEAST
+    else:
+        assert hidden.joint == 1
+        assert differ[1] > 0.3 * LEAST
+        if name not in OF_THE_ARM:
+            assert np.argmax(differ) == 1
+
+
+@pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if e.per_joint and n not in OF_THE_ARM])
+def test_an_effect_acts_on_its_joint_alone(robot, name) -> None:
+    """Every hook of an effect, at states and commands all over, touches no other joint."""
+    rng = np.random.default_rng(4)
+    hidden = EFFECTS[name].draw(robot, 2, 0.2, use_of(moved(robot, 1)), rng)
+    hidden.begin(rng.normal(size=robot.n))
+    touched = np.zeros(robot.n)
+    for _ in range(200):
+        q, dq, command, load = rng.normal(size=(4, robot.n))
+        command *= 100.0
+        now = Moment(float(rng.uniform(0, 10)), q, dq, command, 100.0 * load)
+        touched += np.abs(hidden.drive(command) - command) + np.abs(hidden.reading(q) - q)
+        for more in (hidden.torque(now), hidden.dry(now)):
+            touched += 0.0 if more is None else np.abs(more)
+    touched += np.abs(hidden.changed(robot).rotor - robot.rotor) + np.abs(hidden.without(robot).rotor - robot.rotor)
+    assert np.array_equal(np.flatnonzero(touched), [2])
+
+
+def test_a_case_is_what_its_seed_and_number_say() -> None:
+    one, again, other = (make_case(3, n, "joint_spring", duration=4.0) for n in (1, 1, 2))
+    assert one.key == again.key != other.key
+    assert json.loads(json.dumps(one.key)) == one.key
+    assert hidden_effect(one.key).values == one.key["values"]
+    for a, b in zip((*one.training, *one.holdout), (*again.training, *again.holdout), strict=True):
+        assert np.array_equal(a.q, b.q)
+        assert np.array_equal(a.tau, b.tau)
+    assert one.key["change"] >= LEAST
+    assert len(one.training) == 2
+    assert len(one.holdout) == 1
+
+
+def test_every_effect_comes_once_in_a_round() -> None:
+    for seed in (1, 2):
+        for begin in (0, len(EFFECTS)):
+            assert {effect_of(seed, begin + i) for i in range(len(EFFECTS))} == set(EFFECTS)
+    assert [effect_of(1, i) for i in range(26)] != [effect_of(2, i) for i in range(26)]
+
+
+def record(effect: str, joint: int | None, causes: list[tuple[str, int | None]], **more) -> dict:
+    named = [{"effect": e, "joint": j, "probability": 0.9, "equivalents": []} for e, j in causes]
+    made = {
+        "family": "R-P-R",
+        "kinds": "RPR",
+        "period": 0.004,
+        "controller": "pd",
+        "noise": 0.01,
+        "change": 0.1,
+        "number": 0,
+    }
+    return {
+        "effect": effect, "joint": joint, "joints": 3, "values": {}, "outside": False, "causes": named, "candidates": [], "verdict": "effect",
+        "seconds": 1.0, **made, **more,
+    }  # fmt: skip
+
+
+def test_answers_are_scored_by_the_first_cause() -> None:
+    spring, offset = ("joint_spring", 2), ("torque_offset", 2)
+    assert outcome(record(*spring, [spring])) == "right"
+    assert outcome(record(*spring, [("joint_spring", 1)])) == "wrong"
+    assert outcome(record(*spring, [offset])) == "joint only"
+    assert outcome(record(*spring, [offset, spring])) == "later"
+    alike = record(*spring, [offset])
+    alike["causes"][0]["equivalents"] = [{"effect": "joint_spring", "joint": 2}]
+    assert outcome(alike) == "look-alike"
+    assert outcome(record(*spring, [])) == "not named"
+    assert outcome(record(*spring, [], candidates=[{"effect": "joint_spring", "joint": 2}])) == "candidate"
+    assert outcome(record("null", None, [])) == "not named"
+    assert outcome(record("null", None, [offset])) == "wrong"
+    assert outcome(record("torque_drift", 2, [("friction_warmup", 2)], outside=True)) == "wrong"
+    theta = [0.0] * 30 + [1.0, 2.0, 3.0] + [0.0] * 6
+    rotor = {"values": {"lacking": False, "inertia": 1.0}, "theta": theta}
+    assert outcome(record("rotor_inertia", 2, [], parameters={"rotor2": 1.9}, **rotor)) == "value"
+    assert outcome(record("rotor_inertia", 2, [], parameters={"rotor2": 1.0}, **rotor)) == "not named"
+
+
+def test_the_report_counts_every_answer() -> None:
+    right = record("joint_spring", 2, [("joint_spring", 2)])
+    wrong = record("joint_spring", 2, [("torque_offset", 1)])
+    null = record("null", None, [("torque_offset", 1)], number=NULLS)
+    records = [r | {"outcome": outcome(r)} for r in (right, right, wrong, null)] + [
+        {"number": 7, "failed": "ValueError: no"}
+    ]
+    text = report(records)
+    counts = next(line for line in text.splitlines() if line.startswith("joint_spring")).split()[1:]
+    assert counts == ["3", *("2" if o == "right" else "1" if o == "wrong" else "-" for o in OUTCOMES)]
+    assert "4 answers, 1 failed" in text
+    assert "no effect: 1 of 1 with a cause named" in text
+    assert "case 7: ValueError: no" in text
+    assert "joint_spring:2" in text
+    assert "-> wrong: effect [torque_offset:1 0.90] ()" in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["payload", "torque_offset"])
+def test_an_easy_case_is_diagnosed_right(name) -> None:
+    case = make_case(11, 0, name, family="R-P-R", duration=8.0)
+    found = ask(case)
+    assert found["outcome"] in ("right", "look-alike")
