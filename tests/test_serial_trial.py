@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +22,7 @@ from serial_trial.effects import EFFECTS, Effect, Moment, Null  # noqa: E402
 from serial_trial.motion import Controller, Run, draw_controller, draw_reference, simulate, use_of  # noqa: E402
 from serial_trial.run import OUTCOMES, ask, outcome, report  # noqa: E402
 
+ROOT = Path(__file__).resolve().parents[1]
 #: MuJoCo keeps inertias as principal moments and orientations as quaternions; relative to the largest torque of a joint.
 SAME = 1e-6
 #: Share of a joint's torque by which sharp friction of MuJoCo, an impedance of 0.9999, misses its Coulomb level while a joint moves.
@@ -27,7 +32,7 @@ MOVING = 0.02
 #: Effects of which the torque at another joint may change by more than at their own, relative to that joint's torque: what they change is part
 #: of the arm, or both ends of a cable.
 OF_THE_ARM = {"nominal_link", "cable_spring"}
-PERIOD, SAMPLES = 0.004, 750
+PERIOD, SAMPLES = 0.004, 600
 
 
 def chain_of(robot: SerialRobot) -> _native.Chain:
@@ -35,7 +40,7 @@ def chain_of(robot: SerialRobot) -> _native.Chain:
 
 
 def moved(robot: SerialRobot, seed: int, effect: Effect | None = None, truth: SerialRobot | None = None) -> Run:
-    """Three seconds under PD with gravity, without disturbances."""
+    """A log under PD with gravity, without disturbances."""
     rng = np.random.default_rng(seed)
     reference = draw_reference(robot, SAMPLES, PERIOD, rng)
     by: Controller = draw_controller("pd", robot, reference, PERIOD, rng)
@@ -50,6 +55,11 @@ def frictionless(robot: SerialRobot) -> SerialRobot:
 @pytest.fixture(scope="module")
 def robot() -> SerialRobot:
     return draw_robot(np.random.default_rng(5), "UR10-like", 4)
+
+
+@pytest.fixture(scope="module")
+def clean(robot) -> Run:
+    return moved(robot, 1)
 
 
 @pytest.mark.parametrize("family", list(FAMILIES))
@@ -71,8 +81,8 @@ def test_without_friction_a_log_obeys_the_inverse_dynamics_of_the_chain(family) 
     )
 
 
-def test_friction_is_viscous_and_sharp(robot) -> None:
-    run = moved(robot, 1)
+def test_friction_is_viscous_and_sharp(robot, clean) -> None:
+    run = clean
     rigid = chain_of(robot).inverse_dynamics(frictionless(robot).theta, run.true_q, run.true_dq, run.true_ddq)
     friction = run.applied - rigid
     law = robot.viscous * run.true_dq + robot.coulomb * np.sign(run.true_dq)
@@ -83,8 +93,8 @@ def test_friction_is_viscous_and_sharp(robot) -> None:
     assert np.all(np.where(going, np.abs(friction - law), 0.0) < SHARP * size)
 
 
-def test_commands_are_held_and_positions_are_counts(robot) -> None:
-    run = moved(robot, 1)
+def test_commands_are_held_and_positions_are_counts(robot, clean) -> None:
+    run = clean
     counts = run.q / robot.step
     assert np.allclose(counts, np.round(counts), atol=1e-6)
     assert np.all(np.abs(run.q - run.true_q) <= 0.5001 * robot.step)
@@ -105,13 +115,14 @@ def test_the_truth_is_within_the_prior_and_can_exist(seed) -> None:
 
 
 @pytest.mark.parametrize("name", list(EFFECTS))
-def test_an_effect_changes_the_joint_that_it_names(robot, name) -> None:
+def test_an_effect_changes_the_joint_that_it_names(robot, clean, name) -> None:
     rng = np.random.default_rng(2)
     kind = EFFECTS[name]
-    hidden = kind.draw(robot, 1 if kind.per_joint else None, 0.2, use_of(moved(robot, 1)), rng)
+    hidden = kind.draw(robot, 1 if kind.per_joint else None, 0.2, use_of(clean), rng)
     there = moved(robot, 1, hidden, hidden.changed(hidden.without(robot)))
-    clean = moved(robot, 1, truth=hidden.without(robot))
-    differ = np.sqrt(np.mean((there.tau - clean.tau) ** 2, axis=0)) / np.sqrt(np.mean(clean.tau**2, axis=0))
+    bare = hidden.without(robot)
+    without = clean if bare is robot else moved(robot, 1, truth=bare)
+    differ = np.sqrt(np.mean((there.tau - without.tau) ** 2, axis=0)) / np.sqrt(np.mean(without.tau**2, axis=0))
     if hidden.joint is None:
         assert differ.max() > LEAST
     else:
@@ -122,10 +133,10 @@ def test_an_effect_changes_the_joint_that_it_names(robot, name) -> None:
 
 
 @pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if e.per_joint and n not in OF_THE_ARM])
-def test_an_effect_acts_on_its_joint_alone(robot, name) -> None:
+def test_an_effect_acts_on_its_joint_alone(robot, clean, name) -> None:
     """Every hook of an effect, at states and commands all over, touches no other joint."""
     rng = np.random.default_rng(4)
-    hidden = EFFECTS[name].draw(robot, 2, 0.2, use_of(moved(robot, 1)), rng)
+    hidden = EFFECTS[name].draw(robot, 2, 0.2, use_of(clean), rng)
     hidden.begin(rng.normal(size=robot.n))
     touched = np.zeros(robot.n)
     for _ in range(200):
@@ -140,7 +151,7 @@ def test_an_effect_acts_on_its_joint_alone(robot, name) -> None:
 
 
 def test_a_case_is_what_its_seed_and_number_say() -> None:
-    one, again, other = (make_case(3, n, "joint_spring", duration=4.0) for n in (1, 1, 2))
+    one, again, other = (make_case(3, n, "joint_spring", duration=3.0) for n in (1, 1, 2))
     assert one.key == again.key != other.key
     assert json.loads(json.dumps(one.key)) == one.key
     assert hidden_effect(one.key).values == one.key["values"]
@@ -211,6 +222,17 @@ def test_the_report_counts_every_answer() -> None:
     assert "case 7: ValueError: no" in text
     assert "joint_spring:2" in text
     assert "-> wrong: effect [torque_offset:1 0.90] ()" in text
+
+
+def test_the_command_counts_a_case_that_fails_and_goes_on(tmp_path) -> None:
+    file = tmp_path / "answers.jsonl"
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    run = subprocess.run(
+        [sys.executable, "-m", "tests.serial_trial", "--seed", "1", "--cases", "1", "--nulls", "0", "--timeout", "0.01", "--json", str(file)],
+        capture_output=True, text=True, cwd=ROOT, env=environment, check=True,
+    )  # fmt: skip
+    assert run.stdout.startswith("0 answers, 1 failed")
+    assert [json.loads(line)["number"] for line in file.read_text().splitlines()] == [0]
 
 
 @pytest.mark.slow

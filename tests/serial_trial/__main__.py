@@ -11,8 +11,6 @@ import click
 
 #: What decides how many threads a process takes; each process has one.
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
-#: Longest time for one case [s].
-_TIMEOUT_S = 900
 
 
 @click.command(name="python -m tests.serial_trial", context_settings={"max_content_width": 100, "show_default": True})
@@ -20,10 +18,11 @@ _TIMEOUT_S = 900
 @click.option("--cases", type=click.IntRange(0), default=26, help="Cases with a hidden effect.")
 @click.option("--nulls", type=click.IntRange(0), default=5, help="Cases without one.")
 @click.option("--jobs", type=click.IntRange(1), default=1, help="Processes side by side, of one thread each.")
+@click.option("--timeout", type=click.FloatRange(0, min_open=True), default=900.0, help="Longest time for a case [s].")
 @click.option(
     "--json", "file", type=click.Path(dir_okay=False, path_type=Path), help="File for answers and keys, one a line."
 )
-def main(seed: int, cases: int, nulls: int, jobs: int, file: Path | None) -> None:
+def main(seed: int, cases: int, nulls: int, jobs: int, timeout: float, file: Path | None) -> None:
     """Diagnose arms of three to seven joints that a physics engine moves with one hidden effect each."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
     from pebble import ProcessPool
@@ -34,7 +33,7 @@ def main(seed: int, cases: int, nulls: int, jobs: int, file: Path | None) -> Non
     numbers = [*range(cases), *range(NULLS, NULLS + nulls)]
     records: list[dict[str, Any]] = []
     with ProcessPool(jobs) as pool:
-        tasks = [(number, pool.schedule(answer, args=[seed, number], timeout=_TIMEOUT_S)) for number in numbers]
+        tasks = [(number, pool.schedule(answer, args=[seed, number], timeout=timeout)) for number in numbers]
         for number, task in tasks:
             try:
                 record = task.result()
@@ -47,4 +46,5 @@ def main(seed: int, cases: int, nulls: int, jobs: int, file: Path | None) -> Non
     click.echo(report(records))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -166,7 +166,7 @@ class SerialRobot:
             )
         return (
             '<mujoco><compiler angle="radian" balanceinertia="false" boundmass="0" boundinertia="0" inertiafromgeom="false"/>'
-            f'<option timestep="{STEP}" gravity="{_numbers(self.gravity)}" integrator="implicitfast" tolerance="1e-12" '
+            f'<option timestep="{STEP}" gravity="{_numbers(self.gravity)}" integrator="RK4" tolerance="1e-12" '
             'iterations="100"><flag contact="disable"/></option>'
             f"<worldbody>{''.join(opened)}{'</body>' * self.n}</worldbody></mujoco>"
         )
