@@ -449,9 +449,11 @@ class ActuatorLag(Effect):
         self._state = float(command[self.joint])
 
     def drive(self, command):
-        self._state += (command[self.joint] - self._state) * (1.0 - math.exp(-STEP / self.time))
+        apart, decay = self._state - command[self.joint], math.exp(-STEP / self.time)
         out = command.copy()
-        out[self.joint] = self._state
+        # The mean over the step.
+        out[self.joint] = command[self.joint] + apart * (1.0 - decay) * self.time / STEP
+        self._state = command[self.joint] + apart * decay
         return out
 
 

@@ -180,8 +180,8 @@ def simulate(
 ) -> Run:
     """Simulate one log from rest at the reference.
 
-    The controller knows the nominal arm, positions as encoders show them, and velocities from these. MuJoCo's step is an impulse at its
-    beginning (semi-implicit Euler), so a torque that is held acts there as the mean of the torques before and after.
+    The controller knows the nominal arm, positions as encoders show them, and velocities from these. Torques are held over each step of
+    the Runge-Kutta integration: along motions of this kind accelerations are within 0.02 % of those with steps ten times shorter.
 
     Parameters
     ----------
@@ -206,7 +206,6 @@ def simulate(
     steps = round(period / STEP)
     forget = 1.0 - math.exp(-TURN * _VELOCITY_HZ * period)
     dry_here = bool(np.any(truth.coulomb > 0))
-    before: Array | None = None
     shown, speed = np.zeros(n), np.zeros(n)
     load = np.zeros(n)
     for k in range(samples):
@@ -224,13 +223,13 @@ def simulate(
             total = now + disturbance[k]
             if (extra := effect.torque(moment)) is not None:
                 total = total + extra
-            data.qfrc_applied[:] = total if before is None else 0.5 * (before + total)
+            data.qfrc_applied[:] = total
             if dry_here and (more := effect.dry(moment)) is not None:
                 model.dof_frictionloss[:] = np.maximum(truth.coulomb + more, 0.0)
-            mujoco.mj_step(model, data)
             if i == 0:
-                out["true_ddq"][k], out["applied"][k] = data.qacc, data.qfrc_applied
-            before = total
+                mujoco.mj_forward(model, data)
+                out["true_ddq"][k], out["applied"][k] = data.qacc, total
+            mujoco.mj_step(model, data)
             mujoco.mj_mulM(model, data, load, data.qacc)
             load += data.qfrc_bias - truth.rotor * data.qacc
     return Run(period * np.arange(samples), **out)
