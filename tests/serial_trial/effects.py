@@ -407,7 +407,9 @@ class JointSpring(Effect):
 
 @dataclass
 class Contact(Effect):
-    """A stop: a stiff spring and damper beyond a position, which never pull (Siciliano 2009, section 9.2)."""
+    """A stop: a stiff spring and damper beyond a position, towards larger positions (`side` 1) or smaller (-1), which never pull (Siciliano
+    2009, section 9.2).
+    """
 
     position: float
     side: float

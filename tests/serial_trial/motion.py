@@ -82,7 +82,15 @@ class Run:
     applied: Array
 
     def sane(self, robot: SerialRobot, reference: Reference, *, follows: bool) -> bool:
-        """Whether the joints stayed in their ranges and near the reference, and commands within twice the effort on average."""
+        """Whether the log is one that somebody would keep: every joint moves, in its range and where it should, and commands do not chatter.
+
+        Parameters
+        ----------
+        robot, reference
+            What moved, and what it was to follow.
+        follows : bool
+            Whether the controller is one that keeps near the reference.
+        """
         if not np.isfinite(self.true_q).all():
             return False
         reach = np.where(robot.rotary, 1.0, 0.3) * _OUTSIDE
