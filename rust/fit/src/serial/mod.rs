@@ -149,6 +149,7 @@ impl Request<'_> {
             prior: &prior,
             candidates: candidates(&arm, &theta, &training.data.tracks),
             rotary: self.arm.rotary(),
+            period: training.data.tracks.first().map_or(0.0, Track::period),
             is_feasible: &is_feasible,
             progress: &progress,
         };

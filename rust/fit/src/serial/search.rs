@@ -37,6 +37,8 @@ pub struct Search<'a> {
     pub candidates: Vec<Vec<Term>>,
     /// Whether each joint turns.
     pub rotary: Vec<bool>,
+    /// Sample period, s. A delay or lag below it is the way in which torques and positions were sampled, and is not named.
+    pub period: f64,
     /// Whether an arm with these parameters has a positive definite inertia matrix along its logs.
     pub is_feasible: &'a (dyn Fn(&[f64]) -> bool + Sync),
     /// Progress report and cancellation.
@@ -442,6 +444,7 @@ impl Search<'_> {
         let last = model.terms.len();
         let accepted: Vec<&Fitted> =
             fitted.iter().filter(|with| self.evidence(regression, model, with, last).is_accepted()).collect();
+        if std::env::var_os("TRACE").is_some() { let mut f: Vec<&Fitted> = fitted.iter().collect(); f.sort_by(|a,b| a.total().total_cmp(&b.total())); eprintln!("-- total {:.1} prior {:.1} holdout {:.1}", model.total(), model.estimate.prior_cost, model.holdout_cost()); for w in f.iter().take(8) { let e = self.evidence(regression, model, w, last); eprintln!("   {} {:?} {:.3?} total {:.1} gain {:.1} stat {:.1} hold {:.1} dev {:.2} share {:.3} cons {:.3}", w.terms[last].name(), w.terms[last].joint(), w.terms[last].p, w.total(), e.gain, e.statistic, e.holdout_gain, e.deviations, e.share, e.consequence); } for (t,g) in screened.iter().take(6) { eprintln!("      {} {:?} {:.1} {:.3?}", t.name(), t.joint(), g, t.p);} }
         let best = accepted.iter().min_by(|a, b| a.total().total_cmp(&b.total()))?;
         let term = &best.terms[last];
         Some(self.everywhere(regression, model, &screened, term).unwrap_or_else(|| vec![term.clone()]))
@@ -471,13 +474,21 @@ impl Search<'_> {
                 let mut terms = model.terms.clone();
                 terms.push((*term).clone());
                 let with = self.fit(regression, terms, &model.estimate.theta);
-                let accepted = self.evidence(regression, model, &with, last).is_accepted();
+                let accepted = self.is_accepted(regression, [model, &with], last);
                 accepted.then(|| with.terms[last].clone())
             })
             .collect();
         all.push(best.clone());
         let enough = (ARM_WIDE * moving as f64).max(2.0);
         (all.len() as f64 >= enough).then_some(all)
+    }
+
+    /// Whether term `index` of the second model is accepted beside the first, which lacks it.
+    fn is_accepted(&self, regression: &Regression, [without, with]: [&Fitted; 2], index: usize) -> bool {
+        let term = &with.terms[index];
+        let is_sampling =
+            ["actuator_delay", "actuator_lag"].contains(&term.name()) && term.p[0] < self.period;
+        !is_sampling && self.evidence(regression, without, with, index).is_accepted()
     }
 
     /// What speaks for term `index` of `with` beside the model `without` it.
@@ -529,7 +540,7 @@ impl Search<'_> {
         let mut index = 0;
         while index + 1 < model.terms.len() {
             let without = self.without(regression, &model, index);
-            if self.evidence(regression, &without, &model, index).is_accepted() {
+            if self.is_accepted(regression, [&without, &model], index) {
                 index += 1;
             } else {
                 model = without;
@@ -551,7 +562,7 @@ impl Search<'_> {
             let rival = self
                 .finalists(regression, &without, &screened)
                 .into_iter()
-                .filter(|with| self.evidence(regression, &without, with, last).is_accepted())
+                .filter(|with| self.is_accepted(regression, [&without, with], last))
                 .min_by(|a, b| a.total().total_cmp(&b.total()));
             if let Some(rival) = rival
                 && rival.total() < model.total() - ALIKE_COST
@@ -821,6 +832,7 @@ mod tests {
             prior: &prior,
             candidates,
             rotary: vec![true; 2],
+            period: 0.0025,
             is_feasible: &|_| true,
             progress: &progress,
         };

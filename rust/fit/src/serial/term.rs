@@ -1,7 +1,7 @@
 //! Terms that a serial arm's model may lack: the library's laws joint by joint, and what changes the arm itself.
 
 use crate::model::EffectInstance;
-use armgap_core::effect::{Quantity, Scope, Trial};
+use armgap_core::effect::{JointPoint, Quantity, Scope, Trial};
 
 /// A term with values for its parameters.
 #[derive(Debug, Clone)]
@@ -159,9 +159,12 @@ impl Term {
         matches!(self.kind, TermKind::Law(effect) if effect.law.spec().scope == Scope::Joint)
     }
 
-    /// Whether it acts on the command before that becomes a torque at the joint.
+    /// Whether it changes the torque that a command becomes at the joint: of the command itself, or by a torque that depends on it.
     pub fn changes_command(&self) -> bool {
-        matches!(self.kind, TermKind::Law(effect) if effect.law.spec().hooks.command)
+        let TermKind::Law(effect) = self.kind else { return false };
+        let x = |tau| JointPoint { t: 1.0, q: 0.1, dq: 1.0, tau, load: 0.0, friction: 1.0, other: 1.0, memory: 0.0 };
+        let force = |tau| effect.law.force(&effect.p, &x(tau));
+        effect.law.spec().hooks.command || (effect.law.spec().hooks.force && force(1.0) != force(2.0))
     }
 
     /// This term with other values.

@@ -1,0 +1,50 @@
+"""Make cases of a seed, ask the diagnosis, print how it did: ``python -m tests.serial_trial --help``."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+#: What decides how many threads a process takes; each process has one.
+THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
+
+
+@click.command(name="python -m tests.serial_trial", context_settings={"max_content_width": 100, "show_default": True})
+@click.option("--seed", type=click.IntRange(0), required=True, help="Seed of all cases.")
+@click.option("--cases", type=click.IntRange(0), default=26, help="Cases with a hidden effect.")
+@click.option("--nulls", type=click.IntRange(0), default=5, help="Cases without one.")
+@click.option("--jobs", type=click.IntRange(1), default=1, help="Processes side by side, of one thread each.")
+@click.option("--timeout", type=click.FloatRange(0, min_open=True), default=900.0, help="Longest time for a case [s].")
+@click.option(
+    "--json", "file", type=click.Path(dir_okay=False, path_type=Path), help="File for answers and keys, one a line."
+)
+def main(seed: int, cases: int, nulls: int, jobs: int, timeout: float, file: Path | None) -> None:
+    """Diagnose arms of three to seven joints that a physics engine moves with one hidden effect each."""
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    from pebble import ProcessPool
+
+    from .case import NULLS
+    from .run import answer, report
+
+    numbers = [*range(cases), *range(NULLS, NULLS + nulls)]
+    records: list[dict[str, Any]] = []
+    with ProcessPool(jobs) as pool:
+        tasks = [(number, pool.schedule(answer, args=[seed, number], timeout=timeout)) for number in numbers]
+        for number, task in tasks:
+            try:
+                record = task.result()
+            except Exception as error:  # one case that fails must not end the run; it is counted
+                record = {"number": number, "seed": seed, "failed": f"{type(error).__name__}: {error}"}
+            records.append(record)
+            if file is not None:
+                file.write_text("".join(json.dumps(r) + "\n" for r in records))
+            click.echo(f"{len(records)} of {len(numbers)}", err=True)
+    click.echo(report(records))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,193 @@
+"""Cases: an arm, logs of its motion, and a key that says what is hidden; all of it from a seed and a number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import armgap
+from armgap.serial_chain import SERIAL, SerialChain
+
+from .arms import SerialRobot, draw_robot, perturbed
+from .effects import EFFECTS, Effect, Null
+from .motion import PERIODS, Run, coloured, draw_controller, draw_reference, draw_torque, simulate, use_of
+
+Array = NDArray[np.float64]
+
+#: What the arm file states: standard deviations of the inertial values, as shares of mass times powers of the link's length, of rotor inertias
+#: and of friction, as shares of these.
+TRUST = {"published": (0.1, 0.3, 0.5), "trusted": (0.01, 0.05, 0.5)}
+#: The truth is off by less than this many of these standard deviations.
+OFF = 0.8
+#: Least change of the torque of a joint by a hidden effect, RMS, as a share of that torque.
+LEAST = 0.03
+#: Disturbances that the log does not show, as shares of the joint's RMS torque.
+NOISE = (0.0, 0.01, 0.02)
+#: Draws of a case until one has a motion and an effect of a size that matters.
+_DRAWS = 80
+_LOGS = ("train-1", "train-2", "holdout-1")
+_DURATION_S = 12.0
+#: Numbers of null cases begin here.
+NULLS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case.
+
+    Attributes
+    ----------
+    arm : armgap.Arm
+        Nominal model.
+    training, holdout : list of armgap.Log
+        Logs.
+    key : dict
+        What is hidden: ``effect``, ``joint`` (from 1; None for the whole arm), ``values``, ``outside`` (whether armgap's library has no such
+        effect), ``change`` (RMS of the joint's torque with and without it, as a share); and how the case was made.
+    """
+
+    arm: armgap.Arm
+    training: list[armgap.Log]
+    holdout: list[armgap.Log]
+    key: dict[str, Any]
+
+
+def effect_of(seed: int, number: int) -> str:
+    """Return the effect of a case: every effect comes once in as many cases as there are effects, in an order of the seed's."""
+    turn, place = divmod(number, len(EFFECTS))
+    return list(EFFECTS)[int(np.random.default_rng([seed, turn, 7]).permutation(len(EFFECTS))[place])]
+
+
+def sigma_of(robot: SerialRobot, trust: str) -> Array:
+    """Return the standard deviations that the arm file states, shape (13 n,)."""
+    inertial, rotor, friction = TRUST[trust]
+    powers = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
+    links = [inertial * link.mass * size**powers for link, size in zip(robot.links, robot.lengths, strict=True)]
+    return np.concatenate([*links, rotor * robot.rotor, friction * robot.viscous, friction * robot.coulomb])
+
+
+def arm_of(robot: SerialRobot, period: float, trust: str) -> armgap.Arm:
+    """Return an arm as armgap takes it."""
+    chain = SerialChain(
+        tuple(f"joint{j + 1}" for j in range(robot.n)), tuple(f"link{j + 1}" for j in range(robot.n)),
+        robot.kinds, robot.rotation, robot.translation, robot.axis, robot.gravity, robot.lower, robot.upper,
+    )  # fmt: skip
+    gravity = float(np.linalg.norm(robot.gravity))
+    return armgap.Arm(
+        robot.name,
+        SERIAL,
+        gravity,
+        period,
+        robot.theta,
+        sigma_of(robot, trust),
+        robot.counts,
+        robot.effort,
+        chain=chain,
+    )
+
+
+def make_case(
+    seed: int, number: int, effect: str | None = None, *, family: str | None = None, duration: float = _DURATION_S
+) -> Case:
+    """Make a case.
+
+    Parameters
+    ----------
+    seed, number : int
+        They decide everything; null cases have numbers from `NULLS`.
+    effect : str, optional
+        Name of the hidden effect, ``"null"`` for none; by default that of the number.
+    family : str, optional
+        Family of the arm; drawn by default.
+    duration : float, default 12
+        Of each log [s].
+
+    Raises
+    ------
+    RuntimeError
+        If no draw has a motion and an effect that makes a difference.
+    """
+    name = effect or ("null" if number >= NULLS else effect_of(seed, number))
+    for draw in range(_DRAWS):
+        case = _draw(np.random.default_rng([seed, number, draw]), name, family, duration)
+        if case is not None:
+            case.key.update(seed=seed, number=number, draw=draw)
+            return case
+    raise RuntimeError(f"case {number} of seed {seed}: no draw of {name} makes a difference")
+
+
+def _draw(rng: np.random.Generator, name: str, family: str | None, duration: float) -> Case | None:
+    robot = draw_robot(rng, family)
+    kind = EFFECTS.get(name, Null)
+    trust = "trusted" if kind.trusted_inertia else "published"
+    period = float(rng.choice(PERIODS))
+    noise = float(rng.choice(NOISE))
+    samples = round(duration / period)
+    clean = perturbed(robot, rng, *(OFF * share for share in TRUST[trust]))
+    references = [draw_reference(robot, samples, period, rng) for _ in _LOGS]
+    controllers = ["pd", "computed_torque", "excited", *(["open"] if robot.upside_down else [])]
+    controlled = str(rng.choice(controllers))
+    following = draw_controller(controlled if controlled != "open" else "pd", robot, references[0], period, rng)
+    times = rng.uniform(0.05, 0.3, robot.n)
+    seeds = rng.integers(0, 2**31, len(_LOGS))
+    joint = int(rng.integers(robot.n)) if kind.per_joint else None
+    share = float(np.exp(rng.uniform(np.log(0.05), np.log(0.3))))
+
+    quiet = np.zeros((samples, robot.n))
+    pd = replace(following, kind="pd") if controlled == "excited" else following
+    first = simulate(clean, robot, Null(None), references[0], pd, quiet, period)
+    if not first.sane(robot, references[0], follows=True):
+        return None
+    use = use_of(first)
+    hidden = kind.draw(clean, joint, share, use, rng)
+    robot, bare = hidden.without(robot), hidden.without(clean)
+    if bare is not clean:
+        clean = bare
+        first = simulate(clean, robot, Null(None), references[0], pd, quiet, period)
+    truth = hidden.changed(clean)
+    there = simulate(truth, robot, hidden, references[0], pd, quiet, period)
+    change = _change(first, there)
+    at = hidden.joint if hidden.joint is not None else int(np.argmax(change))
+    if not isinstance(hidden, Null) and not (np.isfinite(change[at]) and change[at] >= LEAST):
+        return None
+
+    runs = []
+    for reference, own in zip(references, seeds, strict=True):
+        random = np.random.default_rng(own)
+        disturbance = coloured(noise * use.torque, times, samples, period, random)
+        by = following
+        if controlled == "excited":
+            size = random.uniform(0.1, 0.3) * use.torque
+            by = replace(following, played=draw_torque(size, samples, period, random))
+        elif controlled == "open":
+            before = simulate(clean, robot, Null(None), reference, following, quiet, period)
+            by = replace(following, kind="open", played=before.tau)
+        run = simulate(truth, robot, hidden, reference, by, disturbance, period)
+        if not run.sane(robot, reference, follows=controlled in ("pd", "computed_torque")):
+            return None
+        runs.append(run)
+    arm = arm_of(robot, period, trust)
+    logs = [armgap.Log.from_arrays(r.t, r.q, r.tau, name=n, arm=arm) for n, r in zip(_LOGS, runs, strict=True)]
+    key = {
+        "effect": hidden.name, "joint": None if hidden.joint is None else hidden.joint + 1, "values": hidden.values,
+        "outside": hidden.outside, "change": float(change[at]), "changes": change.tolist(), "family": robot.name, "joints": robot.n,
+        "kinds": "".join(kind[0].upper() for kind in robot.kinds), "period": period, "noise": noise, "controller": controlled,
+        "theta": truth.theta.tolist(),
+    }  # fmt: skip
+    return Case(arm, logs[:-1], logs[-1:], key)
+
+
+def _change(without: Run, with_it: Run) -> Array:
+    """RMS by which the torques of two runs of one reference differ, as a share of the torque, shape (n,)."""
+    differ = np.sqrt(np.mean((with_it.tau - without.tau) ** 2, axis=0))
+    return np.asarray(differ / np.sqrt(np.mean(with_it.tau**2, axis=0)))
+
+
+def hidden_effect(key: dict[str, Any]) -> Effect:
+    """Return the effect that a key describes."""
+    joint = None if key["joint"] is None else key["joint"] - 1
+    values = {k: np.array(v) if isinstance(v, list) else v for k, v in key["values"].items()}
+    return EFFECTS.get(key["effect"], Null)(joint, **values)

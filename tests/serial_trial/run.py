@@ -1,0 +1,141 @@
+"""Ask the diagnosis about cases, compare its answers with the keys, and print tables."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import armgap
+
+from .case import Case, make_case
+
+Record = dict[str, Any]
+
+#: What an answer may be, the best first: the first cause is the hidden effect on its joint; it has that among its look-alikes; a later cause
+#: is; a wrong value of the arm file was estimated right and no cause was named; no cause is named though a candidate is the hidden effect;
+#: no cause is named; the first cause is another effect on the right joint; neither effect nor joint are right.
+OUTCOMES = ("right", "look-alike", "later", "value", "candidate", "not named", "joint only", "wrong")
+#: A rotor inertia that is estimated to within this share is right.
+_VALUE = 0.2
+#: Entries of a key that an answer takes along.
+_TOLD = (
+    "seed", "number", "draw", "effect", "joint", "values", "outside", "change", "family", "joints", "kinds", "period", "noise", "controller",
+)  # fmt: skip
+
+
+def ask(case: Case) -> Record:
+    """Diagnose a case; return its key beside what was found."""
+    began = time.perf_counter()
+    found = armgap.diagnose(case.training, case.arm, holdout=case.holdout)
+    seconds = time.perf_counter() - began
+    data = found.to_dict()
+    kept = ("effect", "joint", "probability", "closed", "equivalents", "why", "parameters")
+    causes, candidates = ([{k: c[k] for k in kept if k in c} for c in data[part]] for part in ("causes", "candidates"))
+    record = {
+        **{name: case.key[name] for name in _TOLD},
+        "verdict": found.verdict, "causes": causes, "candidates": candidates, "gap": data["gap"], "seconds": seconds,
+        "parameters": {name: value.value for name, value in found.parameters["refit"].items()},
+        "theta": case.key["theta"], "notes": data["notes"],
+    }  # fmt: skip
+    return record | {"outcome": outcome(record)}
+
+
+def answer(seed: int, number: int) -> Record:
+    """Make a case and diagnose it."""
+    return ask(make_case(seed, number))
+
+
+def is_hidden(record: Record, name: dict[str, Any]) -> bool:
+    """Whether a cause, a candidate or an equivalent is what the case hides; an effect of all joints may be named on any of them."""
+    if record["effect"] == "stribeck_all":
+        return bool(name["effect"] == "stribeck")
+    return bool(name["effect"] == record["effect"] and name["joint"] == record["joint"])
+
+
+def outcome(record: Record) -> str:
+    """Return which of the `OUTCOMES` an answer is; without an effect to be found it is ``"not named"`` or ``"wrong"``."""
+    causes = record["causes"]
+    if record["effect"] == "null" or record["outside"]:
+        return "wrong" if causes else "not named"
+    if not causes:
+        if _restored(record):
+            return "value"
+        return "candidate" if any(is_hidden(record, c) for c in record["candidates"]) else "not named"
+    first = causes[0]
+    if is_hidden(record, first):
+        return "right"
+    if any(is_hidden(record, e) for e in first["equivalents"]):
+        return "look-alike"
+    if any(is_hidden(record, c) for c in causes[1:]):
+        return "later"
+    return "joint only" if first["joint"] is not None and first["joint"] == record["joint"] else "wrong"
+
+
+def _restored(record: Record) -> bool:
+    """Whether a rotor inertia that the arm file has wrong was estimated right."""
+    if record["effect"] != "rotor_inertia" or record["values"]["lacking"]:
+        return False
+    true = record["theta"][10 * record["joints"] + record["joint"] - 1]
+    return bool(abs(record["parameters"][f"rotor{record['joint']}"] / true - 1) < _VALUE)
+
+
+def report(records: list[Record]) -> str:
+    """Return the tables, and every case that is not right, as text."""
+    failed = [r for r in records if "failed" in r]
+    answers = [r for r in records if "failed" not in r]
+    hidden = [r for r in answers if r["effect"] != "null" and not r["outside"]]
+    outside = [r for r in answers if r["outside"]]
+    nulls = [r for r in answers if r["effect"] == "null"]
+    lines = [f"{len(answers)} answers, {len(failed)} failed", ""]
+    lines += _table("effect", hidden, lambda r: r["effect"])
+    lines += _table("joints", hidden, lambda r: r["joints"])
+    for label, of in (("no effect", nulls), ("effects outside the library", outside)):
+        if of:
+            named = [r for r in of if r["causes"]]
+            sure = sum(r["causes"][0]["probability"] >= 0.5 for r in named)
+            lines.append(
+                f"{label}: {len(named)} of {len(of)} with a cause named, {sure} of them at a probability of 0.5 or more"
+            )
+    if answers:
+        seconds = [r["seconds"] for r in answers]
+        lines.append(f"seconds per diagnosis: median {np.median(seconds):.1f}, longest {max(seconds):.1f}")
+    good = ("right", "look-alike", "value")
+    missed = [r for r in hidden if r["outcome"] not in good] + [r for r in (*outside, *nulls) if r["causes"]]
+    lines += ["", *(_line(r) for r in missed), *(f"case {r['number']}: {r['failed']}" for r in failed)]
+    return "\n".join(lines).rstrip()
+
+
+def _table(label: str, records: list[Record], group: Callable[[Record], Any]) -> list[str]:
+    groups = sorted({group(r) for r in records})
+    rows = [[str(g), *_counts([r for r in records if group(r) == g])] for g in groups]
+    rows = [[label, "cases", *OUTCOMES], *rows, ["all", *_counts(records)]]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = [
+        "  ".join(cell.rjust(w) if i else cell.ljust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True)))
+        for row in rows
+    ]
+    return [*(line.rstrip() for line in lines), ""]
+
+
+def _counts(records: list[Record]) -> list[str]:
+    return [str(len(records)), *(str(sum(r["outcome"] == word for r in records) or "-") for word in OUTCOMES)]
+
+
+def _line(r: Record) -> str:
+    """One case that is not right: what is hidden and what was said."""
+
+    def name(c: dict[str, Any]) -> str:
+        alike = ",".join(f"{e['effect']}:{e['joint'] or ''}" for e in c["equivalents"])
+        return f"{c['effect']}:{c['joint'] or ''} {c['probability']:.2f}{f' ~{alike}' if alike else ''}"
+
+    values = ", ".join(f"{k} {_short(v)}" for k, v in r["values"].items())
+    made = f"{r['family']} {r['kinds']}, {1e3 * r['period']:g} ms, {r['controller']}, noise {100 * r['noise']:g} %"
+    said = f"{r['verdict']} [{'; '.join(map(name, r['causes']))}] ({'; '.join(map(name, r['candidates']))})"
+    return f"case {r['number']}: {r['effect']}:{r['joint'] or ''} ({values}; {100 * r['change']:.0f} %; {made}) -> {r['outcome']}: {said}"
+
+
+def _short(value: Any) -> str:
+    return "/".join(f"{v:.3g}" for v in value) if isinstance(value, list) else f"{value:.3g}"
