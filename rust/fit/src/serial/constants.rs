@@ -7,8 +7,9 @@ pub const SIGNIFICANT: f64 = 25.0;
 /// Decrease of the training cost, per parameter, that pays for it: twice the logarithm of some hundred candidates.
 pub const PRICE: f64 = 12.0;
 
-/// Standard deviations by which the cost of the holdout's blocks has to fall on average.
-pub const HOLDOUT_DEVIATIONS: f64 = 2.0;
+/// Standard deviations by which the cost of the holdout's blocks has to fall on average. A dozen blocks of which some hold little of an effect scatter
+/// so much that 2 refuses effects of a tenth of the torque.
+pub const HOLDOUT_DEVIATIONS: f64 = 1.5;
 
 /// Share of what one joint's holdout rows leave that a term has to take.
 pub const MATTERS: f64 = 0.1;
@@ -16,8 +17,16 @@ pub const MATTERS: f64 = 0.1;
 /// Torque of a term, RMS, beside the torque of the joint it acts on most: below it makes no difference to anyone.
 pub const CONSEQUENCE: f64 = 0.005;
 
-/// Decrease of the squared distance from the arm file's values, per parameter, from which a term that only restores these is believed.
-pub const RESTORES: f64 = 9.0;
+/// Decrease of the squared distance from the arm file's values from which a term that only restores these is believed: this much, and
+/// `RESTORES_EACH` more for every parameter of the term. Values as far off as their standard deviations say give a load of four parameters more
+/// than that once in 2,000 logs.
+pub const RESTORES: f64 = 14.0;
+
+/// See [`RESTORES`].
+pub const RESTORES_EACH: f64 = 1.5;
+
+/// Standard deviations of the arm file within which a term that replaces values of a link keeps what motion does not tell of them.
+pub const LOOSE: f64 = 10.0;
 
 /// Two models whose costs differ by less than this part of what the term explains, or by less than `ALIKE_COST`, are alike.
 pub const ALIKE: f64 = 0.05;

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 const BLOCK_S: f64 = 1.0;
 
 /// A row of which the joint is at rest for more than this share is no datum.
-const MOSTLY_AT_REST: f64 = 0.1;
+const MOSTLY_AT_REST: f64 = 0.05;
 
 /// Displacement of the base's tilt for its derivative, rad; the torque is smooth in it.
 const TILT_STEP: f64 = 1e-4;
@@ -330,9 +330,26 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         (0..N).map(joint).collect()
     }
 
+    /// Mean inertia of every joint along the logs.
+    pub fn mean_inertia(&self, theta: &[f64; P]) -> Vec<f64> {
+        let mut total = [0.0; N];
+        let mut count = 0.0;
+        for m in self.poses() {
+            let inertia = self.arm.inertia(theta, &SVector::from(m.q));
+            (0..N).for_each(|j| total[j] += inertia[(j, j)]);
+            count += 1.0;
+        }
+        total.map(|t| t / count).to_vec()
+    }
+
+    /// Some poses along the logs.
+    fn poses(&self) -> impl Iterator<Item = &Middle<N>> {
+        let stride = (self.logs.iter().map(|log| log.middles.len()).sum::<usize>() / POSES).max(1);
+        self.logs.iter().flat_map(move |log| log.middles.iter().step_by(stride))
+    }
+
     /// Smallest eigenvalue of the inertia matrix along the logs, of the matrix scaled to unit diagonal.
     pub fn conditioning(&self, theta: &[f64; P]) -> f64 {
-        let stride = (self.logs.iter().map(|log| log.middles.len()).sum::<usize>() / POSES).max(1);
         let smallest = |m: &Middle<N>| {
             let inertia = self.arm.inertia(theta, &SVector::from(m.q));
             let scale = SVector::<f64, N>::from_fn(|j, _| 1.0 / inertia[(j, j)].max(0.0).sqrt());
@@ -342,7 +359,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             let scaled = nalgebra::DMatrix::from_fn(N, N, |i, j| scale[i] * inertia[(i, j)] * scale[j]);
             scaled.symmetric_eigenvalues().min()
         };
-        self.logs.iter().flat_map(|log| log.middles.iter().step_by(stride)).map(smallest).fold(1.0, f64::min)
+        self.poses().map(smallest).fold(1.0, f64::min)
     }
 
     /// Momentum, and the rest of the torque: `C dq + g - dM/dt dq` and friction.

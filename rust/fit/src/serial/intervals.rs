@@ -26,6 +26,10 @@ const SPACING: f64 = 0.5;
 /// A joint moves where positions differ by more than so many standard deviations of their difference; at rest dry friction is a bound and no datum.
 const AT_REST: f64 = 3.0;
 
+/// A joint slower than this share of its RMS speed is at rest too: it may creep, before it slides, under a torque below its Coulomb level. A reversal at
+/// a tenth of the largest acceleration is as slow as that for some milliseconds.
+const SLOW: f64 = 0.01;
+
 /// Samples on either side over which positions are compared before a joint is taken to be at rest.
 const LONGEST_DIFFERENCE: usize = 12;
 
@@ -82,6 +86,10 @@ impl<const N: usize> Intervals<N> {
     pub fn new(track: &Track<N>) -> Self {
         let smoothed = track.smoothed();
         let begin = track.t.first().copied().unwrap_or(0.0);
+        let slow: [f64; N] = std::array::from_fn(|j| {
+            let square: f64 = smoothed.iter().map(|s| s[j].local.dq.powi(2)).sum();
+            SLOW * (square / smoothed.len().max(1) as f64).sqrt()
+        });
         let middle = |k: usize| -> Middle<N> {
             let h = track.t[k + 1] - track.t[k];
             let shortest: [Option<f64>; N] = std::array::from_fn(|j| shortest_difference(track, j, k));
@@ -95,7 +103,7 @@ impl<const N: usize> Intervals<N> {
                 }),
                 mean_dq: std::array::from_fn(|j| (track.q[k + 1][j] - track.q[k][j]) / h),
                 tau: std::array::from_fn(|j| track.held[k][j].mean()),
-                rest: shortest.map(|dq| dq.is_none()),
+                rest: std::array::from_fn(|j| shortest[j].is_none_or(|dq| dq.abs() < slow[j])),
             }
         };
         Self { middles: (0..track.len().saturating_sub(1)).map(middle).collect(), noise: track.noise }

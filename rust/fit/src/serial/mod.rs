@@ -18,6 +18,7 @@ mod term;
 
 use crate::chain::ChainDescription;
 use crate::diagnose::{DiagnoseError, FEWEST_WINDOWS, LogData, Options};
+use crate::model::EffectInstance;
 use crate::progress::{Observer, ProgressReporter, guarded};
 use crate::report::Diagnosis;
 use crate::scale::Scales;
@@ -25,7 +26,7 @@ use crate::screen::effect_instances;
 use crate::track::Track;
 use crate::window::Dataset;
 use armgap_core::chain::{Chain, ChainJoint, JointKind, PARAMETERS_PER_JOINT};
-use armgap_core::effect::{Scope, Trial};
+use armgap_core::effect::{Quantity, Scope, Trial};
 use equation::Equation;
 use intervals::HALF_WIDTH_S;
 use rows::{Prior, Rows, Signal};
@@ -101,6 +102,10 @@ impl<const N: usize, const P: usize> Motion for Equation<N, P> {
     fn signal(&self, term: &Term, theta: &[f64]) -> Signal {
         let theta = std::array::from_fn(|i| theta[i]);
         Equation::signal(self, term, &theta)
+    }
+
+    fn inertia(&self, theta: &[f64]) -> Vec<f64> {
+        self.mean_inertia(&std::array::from_fn(|i| theta[i]))
     }
 }
 
@@ -181,6 +186,9 @@ impl Request<'_> {
     }
 }
 
+/// Half cycles of a ripple over a joint's travel, at most.
+const HALF_CYCLES: usize = 80;
+
 /// Every term at each of its initial guesses, grouped by place. Effects with latent states between motor and link, and those stated for the
 /// plane, are not among them.
 fn candidates<const N: usize, const P: usize>(
@@ -199,6 +207,16 @@ fn candidates<const N: usize, const P: usize>(
         }
         // A rotor inertia that the arm file has is one of the arm's parameters.
         if spec.name == "rotor_inertia" && theta[10 * N + effect.joint] > 0.0 {
+            continue;
+        }
+        // Both phases are tested together, at as many cycles over the travel as test functions pass.
+        if effect.is_periodic() {
+            if !groups.iter().any(|group| group[0].same_place(&Term::of_law(effect))) {
+                let cycles = scales.size(Quantity::Cycles, effect.joint);
+                let guess =
+                    |half: usize| EffectInstance { p: [1.0, 0.5 * half as f64 * cycles, 0.0], ..effect };
+                groups.push((1..=HALF_CYCLES).map(|half| Term::of_law(guess(half))).collect());
+            }
             continue;
         }
         let term = Term::of_law(effect);

@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Residuals correlated over this many rows at most count as one.
-const LONGEST_CORRELATION: usize = 40;
+/// Residuals count as correlated over this many rows at most, a quarter of a second: disturbances have memories of 0.05 to 0.3 s, and what is correlated
+/// for longer is what the model lacks.
+const LONGEST_CORRELATION: usize = 10;
 
 /// Rounds in which weights follow from residuals.
 const WEIGHT_ROUNDS: usize = 4;
@@ -275,8 +276,9 @@ impl<'a> Regression<'a> {
         Estimate { theta: value, residual, cost: data + prior_cost, prior_cost }
     }
 
-    /// To first order, what further torques with free sizes explain of a residual beside the parameters.
-    pub fn score(&self, at: &Estimate, columns: &[Signal]) -> Option<Score> {
+    /// To first order, what further torques explain of a residual beside the parameters; `ridge` is the precision to which sizes are known to be
+    /// small.
+    pub fn score(&self, at: &Estimate, columns: &[Signal], ridge: &[f64]) -> Option<Score> {
         let k = columns.len();
         let system = self.system(&self.fixed())?;
         let along: Vec<DVector<f64>> = columns.iter().map(|c| self.along(c)).collect();
@@ -285,7 +287,8 @@ impl<'a> Regression<'a> {
         let slope = DVector::from_fn(k, |i, _| self.product(&columns[i], &residual));
         let own = DMatrix::from_fn(k, k, |i, j| self.product(&columns[i], &columns[j]));
         let information = DMatrix::from_fn(k, k, |i, j| own[(i, j)] - along[i].dot(&solved[j]));
-        let inverse = crate::solve::scaled_inverse(&information)?;
+        let held = DMatrix::from_fn(k, k, |i, j| information[(i, j)] + if i == j { ridge[i] } else { 0.0 });
+        let inverse = crate::solve::scaled_inverse(&held)?;
         let size = &inverse * &slope;
         let gain = slope.dot(&size);
         Some(Score { size: size.iter().copied().collect(), gain, inverse, solved })
@@ -398,7 +401,7 @@ mod tests {
         let (prior, none) = (prior([3.0, 0.5], [1.0, 1.0]), vec![None]);
         let regression = Regression::reweighted(&rows, &prior, &none);
         let before = regression.estimate(&none);
-        let score = regression.score(&before, std::slice::from_ref(&extra)).unwrap();
+        let score = regression.score(&before, std::slice::from_ref(&extra), &[0.0]).unwrap();
         assert!((score.size[0] - 0.2).abs() < 5e-3, "{}", score.size[0]);
         let scaled: Signal = vec![extra[0].as_ref().map(|x| x.iter().map(|x| score.size[0] * x).collect())];
         let after = regression.estimate(&scaled);
@@ -422,7 +425,7 @@ mod tests {
             let regression = Regression::reweighted(&base, &prior, &none);
             let at = regression.estimate(&none);
             let column = std::slice::from_ref(&extra);
-            let score = regression.score(&at, column).unwrap();
+            let score = regression.score(&at, column, &[0.0]).unwrap();
             let sigma = regression.sandwich(&at, column, &score)[(0, 0)].sqrt();
             outside += usize::from(score.size[0].abs() > 1.96 * sigma);
         }

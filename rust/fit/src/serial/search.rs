@@ -1,8 +1,8 @@
 //! Which terms a serial arm's model lacks: added one after another, swapped for rivals, dropped when idle.
 
 use super::constants::{
-    ALIKE, ALIKE_COST, ARM_WIDE, CONSEQUENCE, ENOUGH, FINALISTS, HOLDOUT_DEVIATIONS, ITERATIONS, MATTERS,
-    NAMED, PRICE, RESAMPLES, RESTORES, SIGNIFICANT,
+    ALIKE, ALIKE_COST, ARM_WIDE, CONSEQUENCE, ENOUGH, FINALISTS, HOLDOUT_DEVIATIONS, ITERATIONS, LOOSE,
+    MATTERS, NAMED, PRICE, RESAMPLES, RESTORES, RESTORES_EACH, SIGNIFICANT,
 };
 use super::rows::{Estimate, Prior, Regression, Rows, Signal, sum};
 use super::term::{Term, TermKind};
@@ -23,6 +23,8 @@ pub trait Motion: Sync {
     fn rows(&self) -> &Rows;
     /// Torque of a term, given the arm's parameters.
     fn signal(&self, term: &Term, theta: &[f64]) -> Signal;
+    /// Mean inertia of every joint along the logs.
+    fn inertia(&self, theta: &[f64]) -> Vec<f64>;
 }
 
 /// What a search works with.
@@ -107,7 +109,7 @@ impl Evidence {
 
     /// Whether it brings the arm's parameters back to where the arm file has them, and the holdout does not speak against it.
     pub fn restores(&self) -> bool {
-        self.relief > RESTORES * self.parameters.min(4) as f64
+        self.relief > RESTORES + RESTORES_EACH * self.parameters as f64
             && self.gain > PRICE + 2.0 * self.parameters as f64
             && self.deviations > -HOLDOUT_DEVIATIONS
             && self.consequence > CONSEQUENCE
@@ -204,7 +206,7 @@ impl Search<'_> {
             }
             let theta = estimate.theta.clone();
             let columns = self.derivatives(&terms, &theta);
-            let Some(score) = regression.score(&estimate, &columns) else { break };
+            let Some(score) = regression.score(&estimate, &columns, &self.ridge(&terms)) else { break };
             let mut better = None;
             for part in [1.0, 0.5, 0.2, 0.05] {
                 let moved = self.moved(&terms, &score.size, part);
@@ -238,7 +240,7 @@ impl Search<'_> {
     /// Parameters beside these terms, and the cost in units of the torque that reaches the joints.
     fn estimated(&self, regression: &Regression, terms: &[Term], theta: &[f64]) -> Estimate {
         let mut estimate = regression.estimate(&self.beside(self.training, terms, theta));
-        let scales = self.scales(self.training, terms, theta);
+        let scales = self.scales(self.training, terms, &estimate.theta);
         if scales.iter().any(|scale| *scale != 1.0) {
             let data = |(j, r): (usize, &Vec<f64>)| {
                 scales[j] * regression.weights[j] * r.iter().map(|r| r * r).sum::<f64>()
@@ -248,8 +250,9 @@ impl Search<'_> {
         estimate
     }
 
-    /// By joint, the mean square of the commanded torque over that of the torque which reaches the joint. A term that only makes torques smaller
-    /// makes what stays of them smaller too, and explains nothing by that.
+    /// By joint, the factor between squared residuals with these terms and without, for terms that change what a command becomes: what they leave
+    /// is to be seen beside the torque that reaches the joint, and beside the inertia that it moves. A term that makes torques smaller, and with them
+    /// all parameters, makes what stays of them smaller too, and explains nothing by that.
     fn scales(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Vec<f64> {
         let mut scales = vec![1.0; self.rotary.len()];
         let changing: Vec<Signal> =
@@ -258,11 +261,14 @@ impl Search<'_> {
             return scales;
         }
         let square = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>();
+        let moved = [&self.prior.theta[..], theta].map(|theta| motion.inertia(theta));
         for (j, signal) in sum(motion.rows(), &changing).iter().enumerate() {
             let Some(signal) = signal else { continue };
             let y = &motion.rows().joints[j].y;
             let reaching = square(&mut y.iter().zip(signal).map(|(y, s)| y - s));
-            scales[j] = square(&mut y.iter().copied()) / reaching.max(f64::MIN_POSITIVE);
+            let torque = square(&mut y.iter().copied()) / reaching.max(f64::MIN_POSITIVE);
+            let inertia = (moved[0][j] / moved[1][j]).powi(2);
+            scales[j] = if inertia.is_finite() { torque.max(inertia) } else { torque };
         }
         scales
     }
@@ -328,6 +334,11 @@ impl Search<'_> {
                     let link = Term::neutral(TermKind::NominalLink(self.rotary.len() - 1));
                     (0..term.p.len()).map(|i| self.unit(&link, i, theta)).collect()
                 }
+                TermKind::Law(effect) if effect.is_periodic() => {
+                    let at =
+                        |phase: f64| self.training.signal(&term.with(vec![1.0, term.p[1], phase]), theta);
+                    vec![at(0.0), at(std::f64::consts::FRAC_PI_2)]
+                }
                 _ if term.amplitudes() == 0 => vec![self.training.signal(term, theta)],
                 _ => (0..term.amplitudes()).map(|i| self.unit(term, i, theta)).collect(),
             }
@@ -341,12 +352,16 @@ impl Search<'_> {
         let term = &guess.term;
         let bounds = term.parameters(self.rotary_of(term));
         let within = |p: &[f64]| p.iter().zip(&bounds).all(|(p, b)| *p >= b.bounds[0] && *p <= b.bounds[1]);
-        let score = regression.score(at, &guess.columns)?;
+        let score = regression.score(at, &guess.columns, &self.ridge_of(term, guess.columns.len()))?;
         if let TermKind::Payload = term.kind {
             let mass = score.size[0];
             let p: Vec<f64> =
                 score.size.iter().enumerate().map(|(i, x)| if i == 0 { *x } else { x / mass }).collect();
             return (mass > 0.0).then(|| (term.with(p), score.gain));
+        }
+        if matches!(term.kind, TermKind::Law(effect) if effect.is_periodic()) {
+            let (sine, cosine) = (score.size[0], score.size[1]);
+            return Some((term.with(vec![sine.hypot(cosine), term.p[1], cosine.atan2(sine)]), score.gain));
         }
         let count = term.amplitudes();
         if count > 0 {
@@ -444,7 +459,6 @@ impl Search<'_> {
         let last = model.terms.len();
         let accepted: Vec<&Fitted> =
             fitted.iter().filter(|with| self.evidence(regression, model, with, last).is_accepted()).collect();
-        if std::env::var_os("TRACE").is_some() { let mut f: Vec<&Fitted> = fitted.iter().collect(); f.sort_by(|a,b| a.total().total_cmp(&b.total())); eprintln!("-- total {:.1} prior {:.1} holdout {:.1}", model.total(), model.estimate.prior_cost, model.holdout_cost()); for w in f.iter().take(8) { let e = self.evidence(regression, model, w, last); eprintln!("   {} {:?} {:.3?} total {:.1} gain {:.1} stat {:.1} hold {:.1} dev {:.2} share {:.3} cons {:.3}", w.terms[last].name(), w.terms[last].joint(), w.terms[last].p, w.total(), e.gain, e.statistic, e.holdout_gain, e.deviations, e.share, e.consequence); } for (t,g) in screened.iter().take(6) { eprintln!("      {} {:?} {:.1} {:.3?}", t.name(), t.joint(), g, t.p);} }
         let best = accepted.iter().min_by(|a, b| a.total().total_cmp(&b.total()))?;
         let term = &best.terms[last];
         Some(self.everywhere(regression, model, &screened, term).unwrap_or_else(|| vec![term.clone()]))
@@ -483,6 +497,22 @@ impl Search<'_> {
         (all.len() as f64 >= enough).then_some(all)
     }
 
+    /// Precision that holds what motion does not tell of the values of these terms.
+    fn ridge(&self, terms: &[Term]) -> Vec<f64> {
+        terms.iter().flat_map(|term| self.ridge_of(term, term.p.len())).collect()
+    }
+
+    /// The same of one term with so many columns: of a link's ten numbers by the arm file's trust in them, of laws none.
+    fn ridge_of(&self, term: &Term, columns: usize) -> Vec<f64> {
+        match term.kind {
+            TermKind::NominalLink(link) => {
+                let sigma = &self.prior.sigma[10 * link..];
+                (0..columns).map(|i| if sigma[i] > 0.0 { (LOOSE * sigma[i]).powi(-2) } else { 0.0 }).collect()
+            }
+            _ => vec![0.0; columns],
+        }
+    }
+
     /// Whether term `index` of the second model is accepted beside the first, which lacks it.
     fn is_accepted(&self, regression: &Regression, [without, with]: [&Fitted; 2], index: usize) -> bool {
         let term = &with.terms[index];
@@ -496,7 +526,7 @@ impl Search<'_> {
         let term = &with.terms[index];
         let signal = self.training.signal(term, &with.estimate.theta);
         let column = std::slice::from_ref(&signal);
-        let statistic = regression.score(&with.estimate, column).map_or(0.0, |score| {
+        let statistic = regression.score(&with.estimate, column, &[0.0]).map_or(0.0, |score| {
             1.0 / regression.sandwich(&with.estimate, column, &score)[(0, 0)].max(f64::MIN_POSITIVE)
         });
         let joints = self.rotary.len();
@@ -654,13 +684,14 @@ impl Search<'_> {
         let wins = stability(model, &against, seed);
         let trust = trust(&without, model, &evidence, &self.floor(regression));
         let columns = self.derivatives(std::slice::from_ref(&term), &model.estimate.theta);
-        let sigma = regression.score(&model.estimate, &columns).map_or_else(
-            || vec![f64::INFINITY; term.p.len()],
-            |score| {
-                let covariance = regression.sandwich(&model.estimate, &columns, &score);
-                (0..term.p.len()).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect()
-            },
-        );
+        let sigma =
+            regression.score(&model.estimate, &columns, &self.ridge_of(&term, columns.len())).map_or_else(
+                || vec![f64::INFINITY; term.p.len()],
+                |score| {
+                    let covariance = regression.sandwich(&model.estimate, &columns, &score);
+                    (0..term.p.len()).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect()
+                },
+            );
         let alike = same.into_iter().map(|r| r.terms[last].clone()).collect();
         Named { term, sigma, evidence, probability: wins * trust, alike }
     }
@@ -675,7 +706,7 @@ impl Search<'_> {
                 let term = found.map_or_else(|| first.clone(), |(t, _)| t.clone());
                 let signal = self.training.signal(&term, &model.estimate.theta);
                 let column = std::slice::from_ref(&signal);
-                let score = regression.score(&model.estimate, column);
+                let score = regression.score(&model.estimate, column, &[0.0]);
                 let size = score.map_or([0.0, f64::INFINITY], |score| {
                     let sigma = regression.sandwich(&model.estimate, column, &score)[(0, 0)].max(0.0).sqrt();
                     [score.size[0], sigma]
@@ -752,7 +783,7 @@ fn trust(without: &Fitted, with: &Fitted, evidence: &Evidence, floor: &[f64]) ->
         let (fell, left) = (joint(without, j) - joint(with, j), (joint(with, j) - floor[j]).max(0.0));
         if fell > 0.0 { fell / (fell + left) } else { 0.0 }
     });
-    let restores = 1.0 - (-evidence.relief.max(0.0) / (2.0 * RESTORES)).exp();
+    let restores = 1.0 - (-evidence.relief.max(0.0) / RESTORES).exp();
     explains.max(restores)
 }
 
@@ -808,6 +839,10 @@ mod tests {
 
         fn signal(&self, term: &Term, _theta: &[f64]) -> Signal {
             sine(term, 0.0)
+        }
+
+        fn inertia(&self, _theta: &[f64]) -> Vec<f64> {
+            vec![1.0; 2]
         }
     }
 

@@ -162,9 +162,19 @@ impl Term {
     /// Whether it changes the torque that a command becomes at the joint: of the command itself, or by a torque that depends on it.
     pub fn changes_command(&self) -> bool {
         let TermKind::Law(effect) = self.kind else { return false };
-        let x = |tau| JointPoint { t: 1.0, q: 0.1, dq: 1.0, tau, load: 0.0, friction: 1.0, other: 1.0, memory: 0.0 };
-        let force = |tau| effect.law.force(&effect.p, &x(tau));
-        effect.law.spec().hooks.command || (effect.law.spec().hooks.force && force(1.0) != force(2.0))
+        let x = |tau| JointPoint {
+            t: 1.0,
+            q: 0.1,
+            dq: 1.0,
+            tau,
+            load: 0.0,
+            friction: 1.0,
+            other: 1.0,
+            memory: 0.0,
+        };
+        let torque = |tau| effect.law.force(&effect.p, &x(tau)) - effect.law.coulomb(&effect.p, &x(tau), 1.0);
+        let hooks = effect.law.spec().hooks;
+        hooks.command || ((hooks.force || hooks.coulomb) && torque(1.0) != torque(2.0))
     }
 
     /// This term with other values.
