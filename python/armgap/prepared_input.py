@@ -103,7 +103,7 @@ def _examined(given: PreparedInput, horizon: float, *, repair: bool) -> Prepared
                 file=log.path or log.name,
             )
     if given.arm.chain is not None:
-        corrections, found_in_all = contradictions([*training, *held], given.arm)
+        corrections, found_in_all = contradictions([*training, *held], given.arm, repair=repair)
         return replace(
             given,
             training=[corrections.on_log(log) for log in training],

@@ -47,11 +47,20 @@ _ROUNDS = 4
 _SUSPICIOUS = 0.3
 # Distance of the parameters from the arm file, per joint, from which other readings are asked for: five standard deviations of one value.
 _FAR = 25.0
-# A reading is right where the cost falls by this part of it at least, to less than `_EXPLAINS` of every joint's mean square torque that it concerns.
-_BETTER = 0.5
+# A reading is right where the cost falls by as much as if the unexplained part of one joint's torque fell to a third, and less than `_EXPLAINS` of every
+# joint's mean square torque stays unexplained, or half of what did.
+_BETTER = 1.0
 _EXPLAINS = 0.15
+# A factor that costs no more than this is 1: friction alone has no unit.
+_UNDECIDED = 10.0
 # Two readings whose costs differ by less than this part of what they gain are alike.
 _ALIKE = 0.02
+
+# Factors within these are gains and no other units.
+_NO_UNIT = (0.5, 2.0)
+# Factors that are tried on a torque, with both signs: three decades either way, then between them.
+_COARSE = np.concatenate([np.geomspace(1e-3, 1e3, 61), -np.geomspace(1e-3, 1e3, 61)])
+_FINE = np.geomspace(0.8, 1.25, 11)
 
 _READINGS: tuple[Callable[[Arm, float], Iterable[Reading]], ...] = (
     torque_sign.readings,
@@ -76,14 +85,17 @@ class Fit:
         Part of each joint's mean square torque that stays unexplained.
     distance : float
         Squared distance of the parameters from the arm file in its standard deviations.
+    count : float
+        Rows of one joint that count, as neighbours are correlated.
     """
 
     cost: float
     share: Array
     distance: float
+    count: float
 
 
-def contradictions(logs: Sequence[Log], arm: Arm) -> tuple[Corrections, list[Check]]:
+def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tuple[Corrections, list[Check]]:
     """Look for a reading of the columns under which logs and arm file agree where they do not as they stand.
 
     Parameters
@@ -92,13 +104,15 @@ def contradictions(logs: Sequence[Log], arm: Arm) -> tuple[Corrections, list[Che
         Logs of the arm.
     arm : Arm
         Nominal model, of kind ``"serial"``.
+    repair : bool, default True
+        Whether torques in another unit are brought to N m (N); without it they are only said.
 
     Returns
     -------
     Corrections
         How columns are to be read; empty where nothing is wrong.
     list of Check
-        What is wrong, at most one.
+        What is wrong: one contradiction, or the joints whose torques are in another unit.
     """
     stands = fit(logs, arm)
     if stands is None or (stands.share.max() < _SUSPICIOUS and stands.distance < _FAR * arm.n_joints):
@@ -108,22 +122,51 @@ def contradictions(logs: Sequence[Log], arm: Arm) -> tuple[Corrections, list[Che
         for reading in _offered(logs, arm)
     ]
     found = [(reading, other) for reading, other in tried if other is not None]
-    if not found:
+    if found:
+        best, least = min(found, key=lambda pair: pair[1].cost)
+        if _is_right(stands, least):
+            return best.corrections, [_contradiction(stands, best, least, found)]
+    scaled = _factors(logs, arm)
+    if scaled is None or not _is_right(stands, scaled[1]):
         return Corrections(), []
-    best, least = min(found, key=lambda pair: pair[1].cost)
-    gained = stands.cost - least.cost
-    if least.cost > _BETTER * stands.cost or least.share.max() > max(_EXPLAINS, 0.5 * stands.share.max()):
-        return Corrections(), []
+    return _rescaled(stands, *scaled, repair=repair)
+
+
+def _is_right(stands: Fit, other: Fit) -> bool:
+    explains = other.share.max() < max(_EXPLAINS, 0.5 * stands.share.max())
+    return bool(explains and stands.cost - other.cost > _BETTER * stands.count)
+
+
+def _contradiction(stands: Fit, best: Reading, least: Fit, found: Sequence[tuple[Reading, Fit]]) -> Check:
     remedies = list(best.remedies)
     for other, result in found:
-        if other is not best and result.cost - least.cost < _ALIKE * gained:
+        if other is not best and result.cost - least.cost < _ALIKE * (stands.cost - least.cost):
             remedies += [remedy for remedy in other.remedies if remedy not in remedies]
     worst = int(np.argmax(stands.share - least.share))
     message = (
         f"logs and arm file agree as if {best.what}: of joint {worst + 1}'s torque {_percent(stands.share[worst])} stays unexplained as the "
         f"columns stand (RMS) and {_percent(least.share[worst])} read like that"
     )
-    return best.corrections, [Check(best.check, "error", message, tuple(remedies), best.joint)]
+    return Check(best.check, "error", message, tuple(remedies), best.joint)
+
+
+def _rescaled(stands: Fit, factors: Array, found: Fit, *, repair: bool) -> tuple[Corrections, list[Check]]:
+    """Say which torques are in another unit; a factor between one half and two is a gain, which is no matter of units."""
+    low, high = _NO_UNIT
+    checks = []
+    factor = {}
+    for j, value in enumerate(factors):
+        share = f"{_percent(found.share[j])} of them stay unexplained (RMS; {_percent(stands.share[j])} as they stand)"
+        if not low < abs(value) < high:
+            message = f"torques of joint {j + 1} are as if in another unit: times {value:.3g} they agree with the arm file's masses, and {share}"
+            remedy = f"--factor tau{j + 1}={value:.3g}"
+            checks.append(Check("torque_unit", "repaired" if repair else "warning", message, (remedy,), j + 1))
+            factor[f"tau{j + 1}"] = float(f"{value:.3g}")
+        elif value < 0:
+            message = f"torques of joint {j + 1} count the other way: {share}"
+            checks.append(Check("torque_sign", "error", message, (f"--flip tau{j + 1}",), j + 1))
+    flip = tuple(f"tau{check.joint}" for check in checks if check.check == "torque_sign")
+    return Corrections(factor=factor if repair else {}, flip=flip), checks
 
 
 def _percent(share: float) -> str:
@@ -136,47 +179,93 @@ def _offered(logs: Sequence[Log], arm: Arm) -> Iterator[Reading]:
         yield from readings(arm, travel)
 
 
+@dataclass(frozen=True)
+class _Rows:
+    """Torques, shape (rows, n), and the products of their regressors that fits need, joint by joint."""
+
+    y: Array
+    square: Array
+    normal: Array
+    right: Array
+
+    @classmethod
+    def of(cls, logs: Sequence[Log], arm: Arm) -> _Rows | None:
+        """Rows of logs; None where they hold too few samples, or where no joint has a torque."""
+        if arm.chain is None:
+            return None
+        chain = arm.chain.native()
+        most = max(_MOST_INTERVALS // len(logs), 1)
+        found = [rows for log in logs if (rows := _rows(chain, log, most)) is not None]
+        if not found:
+            return None
+        y = np.concatenate([torque for torque, _ in found])
+        psi = np.concatenate([regressor for _, regressor in found])
+        square = (y**2).sum(axis=0)
+        if not square.any():
+            return None
+        normal = np.stack([x.T @ x for x in psi.transpose(1, 0, 2)])
+        return cls(y, square, normal, np.stack([x.T @ t for x, t in zip(psi.transpose(1, 0, 2), y.T, strict=True)]))
+
+    def fit(self, arm: Arm, factors: Array) -> Fit:
+        """Estimate the arm's parameters from torques times factors, one per joint."""
+        precision = np.zeros(len(arm.sigma))
+        free = arm.sigma > 0
+        precision[free] = arm.sigma[free] ** -2.0
+        moved = self.square > 0
+        square = np.where(moved, factors**2 * self.square, 1.0)
+        count = len(self.y)
+        left = 0.01 * square
+        theta = arm.theta
+        for _ in range(_ROUNDS):
+            weights = moved * count / left / _CORRELATED
+            normal = np.einsum("j,jik->ik", weights, self.normal)
+            right = np.einsum("j,ji->i", weights * factors, self.right) + precision * arm.theta
+            normal[np.diag_indices_from(normal)] += precision
+            theta = _estimate(normal, right, arm.theta, precision == 0, arm.n_joints)
+            explained = (self.normal @ theta) @ theta - 2 * factors * (self.right @ theta)
+            left = np.maximum(square + explained, 1e-8 * square)
+        distance = float((precision * (theta - arm.theta) ** 2).sum())
+        share = np.where(moved, left / square, 0.0)
+        # Measured from one part in 10,000, below which a joint's torque is as good as explained.
+        likelihood = count / _CORRELATED * float(np.log(np.maximum(share[moved], 1e-4) / 1e-4).sum())
+        return Fit(likelihood + distance, share, distance, count / _CORRELATED)
+
+
 def fit(logs: Sequence[Log], arm: Arm) -> Fit | None:
     """Estimate the arm's parameters from torques; None where the logs hold too few samples."""
-    if arm.chain is None:
-        return None
-    chain = arm.chain.native()
-    most = max(_MOST_INTERVALS // len(logs), 1)
-    rows = [found for log in logs if (found := _rows(chain, log, most)) is not None]
-    if not rows:
-        return None
-    y = np.concatenate([torque for torque, _ in rows])
-    psi = np.concatenate([regressor for _, regressor in rows])
-    free = arm.sigma > 0
-    precision = np.zeros(len(arm.sigma))
-    precision[free] = arm.sigma[free] ** -2.0
-    square = (y**2).mean(axis=0)
-    moved = square > 0
-    if not moved.any():
-        return None
-    effective = len(y) / _CORRELATED
-    variance = np.where(moved, 0.01 * square, 1.0)
-    theta = arm.theta
-    residual = y
-    for _ in range(_ROUNDS):
-        theta = _estimate(y, psi, moved / variance / _CORRELATED, arm.theta, precision, arm.n_joints)
-        residual = y - psi @ theta
-        variance = np.where(moved, np.maximum((residual**2).mean(axis=0), 1e-8 * square), 1.0)
-    distance = float((precision * (theta - arm.theta) ** 2).sum())
-    share = np.where(moved, (residual**2).mean(axis=0) / np.where(moved, square, 1.0), 0.0)
-    # Measured from one part in 10,000, below which a joint's torque is as good as explained.
-    likelihood = effective * float(np.log(np.maximum(share[moved], 1e-4) / 1e-4).sum())
-    return Fit(likelihood + distance, share, distance)
+    rows = _Rows.of(logs, arm)
+    return None if rows is None else rows.fit(arm, np.ones(arm.n_joints))
 
 
-def _estimate(y: Array, psi: Array, weights: Array, prior: Array, precision: Array, n_joints: int) -> Array:
-    """Weighted least squares with a prior; rotor inertias and friction are held at zero where they would be negative."""
-    scaled = psi * np.sqrt(weights)[None, :, None]
-    flat = scaled.reshape(-1, psi.shape[2])
-    normal = flat.T @ flat
-    right = flat.T @ (y * np.sqrt(weights)).ravel() + precision * prior
-    normal[np.diag_indices_from(normal)] += precision
-    held = precision == 0
+def _factors(logs: Sequence[Log], arm: Arm) -> tuple[Array, Fit] | None:
+    """Find the factors on torques with which the logs agree best with the arm file: joint by joint over a grid, in turns."""
+    rows = _Rows.of(logs, arm)
+    if rows is None:
+        return None
+    factors = np.ones(arm.n_joints)
+    best = rows.fit(arm, factors)
+
+    def with_factor(j: int, factor: float) -> tuple[Array, Fit]:
+        tried = factors.copy()
+        tried[j] = factor
+        return tried, rows.fit(arm, tried)
+
+    for grid in (_COARSE, _COARSE, _FINE):
+        for j in range(arm.n_joints):
+            factors, best = min(
+                ((factors, best), *(with_factor(j, factor) for factor in factors[j] * grid)),
+                key=lambda found: found[1].cost,
+            )
+    for j in range(arm.n_joints):
+        plain = with_factor(j, float(np.sign(factors[j])))
+        if plain[1].cost < best.cost + _UNDECIDED:
+            factors, best = plain
+    return factors, best
+
+
+def _estimate(normal: Array, right: Array, prior: Array, fixed: NDArray[np.bool_], n_joints: int) -> Array:
+    """Solve normal equations; rotor inertias and friction are held at zero where they would be negative."""
+    held = fixed.copy()
     value = np.where(held, prior, 0.0)
     first = 10 * n_joints
     for _ in range(3 * n_joints + 1):

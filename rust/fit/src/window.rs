@@ -29,6 +29,10 @@ const MAX_SUBSTEPS_DRIVEN: usize = 5;
 /// Most sub-steps per sample for joints that hit a joint limit.
 const MAX_SUBSTEPS_IMPACT: usize = 12;
 
+/// Most sub-steps per sample for joints whose viscous friction stops them within less than a sample, as that of a geared wrist does whose rotor
+/// the model lacks.
+const MAX_SUBSTEPS_STIFF: usize = 100;
+
 /// Samples `first ..= last` of one track; row 0 is sample `first + 1`.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<const N: usize> {
@@ -154,7 +158,7 @@ impl<const N: usize> Dataset<N> {
         hypothesis: &Hypothesis<P>,
     ) -> Vec<f64> {
         self.predict_by(arm, hypothesis, &self.zero_offsets(), |runs| {
-            runs.par_iter_mut().for_each(run_scalar);
+            runs.par_iter_mut().for_each(run_stiff);
         })
     }
 
@@ -305,6 +309,21 @@ fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'
         } else {
             row.copy_from_slice(state.q.as_slice());
         }
+    }
+}
+
+/// Simulates one run in as many steps per sample as keep its viscous friction stable.
+fn run_stiff<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
+    let state = &mut run.state;
+    for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
+        let h = run.t[k + 1] - run.t[k];
+        let rate = run.plant.fastest(&state.q).max(run.plant.viscous_rate(&state.q));
+        let steps = substeps(h * rate).min(MAX_SUBSTEPS_STIFF);
+        advance(run.plant, state, &Interval { t: run.t[k], h, torque: &run.torque[k] }, steps);
+        if !state.is_finite() || state.q.amax() > DIVERGED {
+            break;
+        }
+        row.copy_from_slice(state.q.as_slice());
     }
 }
 

@@ -37,6 +37,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         })
     }
 
+    /// Fastest rate at `q`, 1/s, at which viscous friction stops a joint.
+    pub fn viscous_rate(&self, q: &SVector<T, N>) -> T {
+        let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
+        (0..N).fold(T::zero(), |fastest: T, j| {
+            fastest.max(self.rigid.viscous[j] / free_inertia(&inertia, j).max(lit(1e-9)))
+        })
+    }
+
     /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, a motor oscillates against its link, or a joint hits
     /// a joint limit, an impact that is to be resolved and not only stable. Zero for a rigid arm with exact friction.
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
