@@ -47,8 +47,8 @@ _ROUNDS = 4
 _SUSPICIOUS = 0.3
 # Distance of the parameters from the arm file, per joint, from which other readings are asked for: five standard deviations of one value.
 _FAR = 25.0
-# A reading is right where the cost falls by as much as if the unexplained part of one joint's torque fell to a third, and less than `_EXPLAINS` of every
-# joint's mean square torque stays unexplained, or half of what did.
+# A reading is right where the cost falls by as much as if the unexplained part of one joint's torque fell to a third, and less than `_EXPLAINS`
+# of every joint's mean square torque stays unexplained, or half of what did.
 _BETTER = 1.0
 _EXPLAINS = 0.15
 # A factor that costs no more than this is 1: friction alone has no unit.
