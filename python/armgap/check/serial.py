@@ -8,7 +8,7 @@ that is right lowers both what stays of the torques and the distance from the ar
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,8 @@ _FAR = 25.0
 # of every joint's mean square torque stays unexplained, or half of what did.
 _BETTER = 1.0
 _EXPLAINS = 0.15
+# A load may be many times as heavy as the last link.
+_LOADED = 30.0
 # A factor that costs no more than this is 1: friction alone has no unit.
 _UNDECIDED = 10.0
 # Two readings whose costs differ by less than this part of what they gain are alike.
@@ -117,6 +119,12 @@ def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tup
     stands = fit(logs, arm)
     if stands is None or (stands.share.max() < _SUSPICIOUS and stands.distance < _FAR * arm.n_joints):
         return Corrections(), []
+    # A load on the last link is no contradiction: what it explains no other reading is asked for.
+    loaded = fit(logs, _with_load(arm))
+    if loaded is not None and loaded.cost < stands.cost:
+        stands = loaded
+        if stands.share.max() < _SUSPICIOUS and stands.distance < _FAR * arm.n_joints:
+            return Corrections(), []
     tried = [
         (reading, fit([reading.corrections.on_log(log) for log in logs], reading.corrections.on_arm(arm)))
         for reading in _offered(logs, arm)
@@ -130,6 +138,13 @@ def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tup
     if scaled is None or not _is_right(stands, scaled[1]):
         return Corrections(), []
     return _rescaled(stands, *scaled, repair=repair)
+
+
+def _with_load(arm: Arm) -> Arm:
+    """Return the arm with the last link's ten numbers as good as free."""
+    sigma = arm.sigma.copy()
+    sigma[10 * (arm.n_joints - 1) : 10 * arm.n_joints] *= _LOADED
+    return replace(arm, sigma=sigma)
 
 
 def _is_right(stands: Fit, other: Fit) -> bool:
