@@ -332,6 +332,13 @@ impl<'a> Regression<'a> {
     }
 }
 
+impl Score {
+    /// Covariance of the sizes if residuals were as independent as their weights take them to be, and the parameters as well known as their prior says.
+    pub fn inverse(&self) -> &DMatrix<f64> {
+        &self.inverse
+    }
+}
+
 /// A first-order test of further torques.
 #[derive(Debug, Clone)]
 pub struct Score {

@@ -689,7 +689,9 @@ impl Search<'_> {
                 || vec![f64::INFINITY; term.p.len()],
                 |score| {
                     let covariance = regression.sandwich(&model.estimate, &columns, &score);
-                    (0..term.p.len()).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect()
+                    // Blocks do not show how far the arm file's values are off; the information does, which holds their prior.
+                    let variance = |i: usize| covariance[(i, i)].max(score.inverse()[(i, i)]).max(0.0);
+                    (0..term.p.len()).map(|i| variance(i).sqrt()).collect()
                 },
             );
         let alike = same.into_iter().map(|r| r.terms[last].clone()).collect();
