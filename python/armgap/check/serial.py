@@ -127,7 +127,8 @@ def contradictions(logs: Sequence[Log], arm: Arm) -> tuple[Corrections, list[Che
 
 
 def _percent(share: float) -> str:
-    return f"{100 * np.sqrt(share):.2g} %"
+    percent = 100 * float(np.sqrt(share))
+    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.2g} %"
 
 
 def _offered(logs: Sequence[Log], arm: Arm) -> Iterator[Reading]:
