@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from armgap import Arm, CustomEffect, Diagnosis, Log, diagnose, simulate
 from armgap.check import Corrections
 from armgap.errors import LogShapeError, OptionError
 from armgap.fleet import read_manifest, run_fleet
+from armgap.report import diagnosis_document, diagnosis_report
 from armgap.simulation import Effect
 
 #: A hanging arm of three joints: the base turns about the vertical, shoulder and elbow about horizontal axes.
@@ -313,3 +315,30 @@ def test_a_fleet_takes_serial_arms(sticky: list[Log], arm_path: Path, tmp_path: 
     assert fleet.failed.is_empty()
     assert fleet.summary["effect"].to_list()[0] == "stribeck"
     assert (tmp_path / "out" / "index.html").is_file()
+
+
+# Reports
+
+
+def test_a_report_has_no_empty_section(found: Diagnosis) -> None:
+    document = diagnosis_document(found)
+    titles = [section.title for section in document.sections]
+    assert not {
+        "Ranking of causes",
+        "The gap by joint and regime",
+        "The evidence: each cause against its own variable",
+    } & set(titles)
+    for section in document.sections:
+        assert any((section.text, section.figures, section.tables, section.points, section.notes)), section.title
+        assert all(table.rows for table in section.tables), section.title
+    for text in (diagnosis_report(found, "gap.md"), diagnosis_report(found, "gap.html")):
+        assert "Stribeck" in text
+        assert "armgap export DIAGNOSIS.json" not in text
+
+
+def test_joints_that_slide_have_their_own_unit(found: Diagnosis) -> None:
+    data = found.to_dict()
+    data["arm"] = data["arm"] | {"joint_unit": ["rad", "m", "rad"]}
+    [far] = [a for a in diagnosis_document(data).answers if a.question == "How far does it shrink?"]
+    units = re.findall(r"joint \d: [^;]*?(mrad|mm)", far.detail, re.IGNORECASE)
+    assert units == ["mrad", "mm", "mrad"]
