@@ -13,6 +13,7 @@ import pytest
 
 from armgap import Arm, CustomEffect, Diagnosis, Log, diagnose, simulate
 from armgap.check import Corrections
+from armgap.check.serial import contradictions
 from armgap.errors import LogShapeError, OptionError
 from armgap.fleet import read_manifest, run_fleet
 from armgap.report import diagnosis_document, diagnosis_report
@@ -224,6 +225,14 @@ def test_columns_that_contradict_the_arm_file(
     mended = asked(given, arm, corrections=read(remedy))
     assert mended.verdict in ("none", "parameters")
     assert not [c for c in mended.checks if c.severity == "error"]
+
+
+def test_a_sign_has_one_remedy_where_the_arm_is_not_its_mirror_image(arm_path: Path) -> None:
+    path = arm_path.with_name("askew.toml")
+    path.write_text(THREE.replace("rpy = [1.5707963267948966, 0.0, 0.0]", "rpy = [2.0, 0.4, 0.6]"))
+    askew = Arm.read(path)
+    _, [error] = contradictions(wrong(logs(askew), askew, flipped), askew)
+    assert (error.check, error.remedies) == ("torque_sign", ("--flip tau2",))
 
 
 def test_a_log_that_is_too_short(arm: Arm) -> None:

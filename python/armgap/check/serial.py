@@ -114,7 +114,7 @@ def contradictions(logs: Sequence[Log], arm: Arm) -> tuple[Corrections, list[Che
     gained = stands.cost - least.cost
     if least.cost > _BETTER * stands.cost or least.share.max() > max(_EXPLAINS, 0.5 * stands.share.max()):
         return Corrections(), []
-    remedies = list(best.remedies)
+    remedies = _alike(best, least.cost + _ALIKE * gained, logs, arm)
     for other, result in found:
         if other is not best and result.cost - least.cost < _ALIKE * gained:
             remedies += [remedy for remedy in other.remedies if remedy not in remedies]
@@ -124,6 +124,34 @@ def contradictions(logs: Sequence[Log], arm: Arm) -> tuple[Corrections, list[Che
         f"columns stand (RMS) and {_percent(least.share[worst])} read like that"
     )
     return best.corrections, [Check(best.check, "error", message, tuple(remedies), best.joint)]
+
+
+def _alike(best: Reading, most: float, logs: Sequence[Log], arm: Arm) -> list[str]:
+    """Remedies of a reading: its own, and of the others those that explain the logs as well.
+
+    On planar arms the equation of motion is odd in positions and torques together, so that a sign may be mended on either; on serial arms that
+    holds only where the chain is its own mirror image.
+    """
+    remedies = [best.remedies[0]]
+    for remedy in best.remedies[1:]:
+        corrections = _of_options(remedy)
+        result = (
+            None if corrections is None else fit([corrections.on_log(log) for log in logs], corrections.on_arm(arm))
+        )
+        if result is None or result.cost < most:
+            remedies.append(remedy)
+    return remedies
+
+
+def _of_options(remedy: str) -> Corrections | None:
+    """Corrections that a remedy such as ``--flip q1,tau2`` stands for; None for one that is no list of corrections."""
+    words = remedy.split()
+    if len(words) % 2 or any(word not in ("--flip", "--zero", "--swap") for word in words[::2]):
+        return None
+    given: dict[str, list[str]] = {}
+    for option, word in zip(words[::2], words[1::2], strict=True):
+        given.setdefault(option.removeprefix("--"), []).append(word)
+    return Corrections.parse(**given)
 
 
 def _percent(share: float) -> str:

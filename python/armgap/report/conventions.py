@@ -45,7 +45,7 @@ WORDS: dict[str, tuple[str, ...]] = {
 
 _OF_SERIAL_ARMS = (
     "q = 0 and the positive direction of each joint are those of the description that the arm file names, or of its [[link]] tables.",
-    f"{_TORQUE.replace('its joint', 'a joint that turns')} Positive force pushes a joint that slides towards greater q.",
+    f"{_TORQUE.replace('its joint', 'a revolute joint')} Positive force pushes a prismatic joint towards greater q.",
     "Gravity is given in the frame of the base.",
 )
 
