@@ -19,6 +19,19 @@ from armgap.log.units import FACTORS
 
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST_EXAMPLE = 60  # lines
+#: What the arm file of a serial arm in the documentation describes: two joints and a finger.
+ROBOT = """\
+<robot name="bench arm"><link name="base_link"/>
+<link name="upper"><inertial><origin xyz="0 0 0.1"/><mass value="3"/>
+  <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="tool0"><inertial><origin xyz="0 0 0.1"/><mass value="2"/>
+  <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="tip"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="shoulder" type="continuous"><parent link="base_link"/><child link="upper"/><axis xyz="0 1 0"/></joint>
+<joint name="elbow" type="continuous"><parent link="upper"/><child link="tool0"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/></joint>
+<joint name="finger" type="prismatic"><parent link="tool0"/><child link="tip"/><axis xyz="1 0 0"/>
+  <limit lower="0" upper="0.04" effort="10" velocity="1"/></joint></robot>
+"""
 
 
 def modules() -> list[str]:
@@ -70,7 +83,13 @@ def test_links_between_documents_lead_somewhere():
 
 def test_arm_file_of_the_documentation_is_valid(tmp_path):
     text = (ROOT / "docs" / "formats.md").read_text()
-    [example] = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    planar, described, links = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "robot.urdf").write_text(ROBOT)
     path = tmp_path / "arm.toml"
-    path.write_text(example.replace("…", "0" * 64))
-    assert armgap.Arm.read(path).n_joints == 2
+    for example, n_joints in (
+        (planar.replace("…", "0" * 64), 2),
+        (described, 2),
+        (f'kind = "serial"\nsample_period = 0.002\n{links}', 1),
+    ):
+        path.write_text(example)
+        assert armgap.Arm.read(path).n_joints == n_joints

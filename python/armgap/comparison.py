@@ -12,6 +12,7 @@ from armgap.diagnosis import MOST_BYTES, Cause, Diagnosis, RuledOut, Value
 from armgap.errors import OptionError
 from armgap.literals import CauseStatus, GapOutcome, Verdict
 from armgap.reading import read_bounded
+from armgap.report.words import joint_units
 
 __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare", "read_diagnosis"]
 
@@ -119,6 +120,8 @@ class Comparison:
         What the two diagnoses are called.
     kind : str
         Kind of the arm.
+    joint_units : tuple of str
+        Unit of each joint's position; a serial arm may have joints that turn and joints that slide.
     """
 
     outcome: GapOutcome
@@ -132,6 +135,7 @@ class Comparison:
     horizon_s: float
     names: tuple[str, str]
     kind: str = ""
+    joint_units: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object, schema ``armgap.comparison/1``."""
@@ -197,6 +201,7 @@ def compare(before: Diagnosis, after: Diagnosis, names: tuple[str, str] = ("befo
         before.gap.horizon_s,
         names,
         str((before.to_dict().get("arm") or {}).get("kind", "")),
+        tuple(joint_units(before.to_dict())),
     )
 
 

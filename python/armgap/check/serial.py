@@ -45,8 +45,11 @@ _ROUNDS = 4
 # Share of a joint's mean square torque that stays unexplained, from which other readings are asked for. Friction that the model lacks leaves up
 # to a fifth on logs of real arms.
 _SUSPICIOUS = 0.3
-# Distance of the parameters from the arm file, per joint, from which other readings are asked for: five standard deviations of one value.
-_FAR = 25.0
+# Squared distance of the parameters from the arm file, per joint, from which other readings are asked for. A joint has six or seven parameters that
+# motion tells, so that one of a right arm file is as large as that.
+_FAR = 8.0
+# A reading that lowers that distance by this much, and to less than a third, is right too: six standard deviations of one value.
+_RESTORED = 36.0
 # A reading is right where the cost falls by as much as if the unexplained part of one joint's torque fell to a third, and less than `_EXPLAINS`
 # of every joint's mean square torque stays unexplained, or half of what did.
 _BETTER = 1.0
@@ -133,7 +136,8 @@ def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tup
     if found:
         best, least = min(found, key=lambda pair: pair[1].cost)
         if _is_right(stands, least):
-            return best.corrections, [_contradiction(stands, best, least, found)]
+            remedies = _alike(best, least.cost + _ALIKE * (stands.cost - least.cost), logs, arm)
+            return best.corrections, [_contradiction(stands, best, least, found, remedies)]
     scaled = _factors(logs, arm)
     if scaled is None or not _is_right(stands, scaled[1]):
         return Corrections(), []
@@ -149,11 +153,13 @@ def _with_load(arm: Arm) -> Arm:
 
 def _is_right(stands: Fit, other: Fit) -> bool:
     explains = other.share.max() < max(_EXPLAINS, 0.5 * stands.share.max())
-    return bool(explains and stands.cost - other.cost > _BETTER * stands.count)
+    restores = stands.distance - other.distance > _RESTORED and other.distance < stands.distance / 3
+    return bool(explains and (restores or stands.cost - other.cost > _BETTER * stands.count))
 
 
-def _contradiction(stands: Fit, best: Reading, least: Fit, found: Sequence[tuple[Reading, Fit]]) -> Check:
-    remedies = list(best.remedies)
+def _contradiction(
+    stands: Fit, best: Reading, least: Fit, found: Sequence[tuple[Reading, Fit]], remedies: list[str]
+) -> Check:
     for other, result in found:
         if other is not best and result.cost - least.cost < _ALIKE * (stands.cost - least.cost):
             remedies += [remedy for remedy in other.remedies if remedy not in remedies]
@@ -184,8 +190,37 @@ def _rescaled(stands: Fit, factors: Array, found: Fit, *, repair: bool) -> tuple
     return Corrections(factor=factor if repair else {}, flip=flip), checks
 
 
+def _alike(best: Reading, most: float, logs: Sequence[Log], arm: Arm) -> list[str]:
+    """Remedies of a reading: its own, and of the others those that explain the logs as well.
+
+    On planar arms the equation of motion is odd in positions and torques together, so that a sign may be mended on either; on serial arms that
+    holds only where the chain is its own mirror image.
+    """
+    remedies = [best.remedies[0]]
+    for remedy in best.remedies[1:]:
+        corrections = _of_options(remedy)
+        result = (
+            None if corrections is None else fit([corrections.on_log(log) for log in logs], corrections.on_arm(arm))
+        )
+        if result is None or result.cost < most:
+            remedies.append(remedy)
+    return remedies
+
+
+def _of_options(remedy: str) -> Corrections | None:
+    """Corrections that a remedy such as ``--flip q1,tau2`` stands for; None for one that is no list of corrections."""
+    words = remedy.split()
+    if len(words) % 2 or any(word not in ("--flip", "--zero", "--swap") for word in words[::2]):
+        return None
+    given: dict[str, list[str]] = {}
+    for option, word in zip(words[::2], words[1::2], strict=True):
+        given.setdefault(option.removeprefix("--"), []).append(word)
+    return Corrections.parse(**given)
+
+
 def _percent(share: float) -> str:
-    return f"{100 * np.sqrt(share):.2g} %"
+    percent = 100 * float(np.sqrt(share))
+    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.2g} %"
 
 
 def _offered(logs: Sequence[Log], arm: Arm) -> Iterator[Reading]:

@@ -7,6 +7,7 @@ from typing import Any
 
 from armgap import _native
 from armgap.report.words import doubtful, named, percent, title
+from armgap.serial_chain import SERIAL
 
 __all__ = ["next_steps"]
 
@@ -17,6 +18,10 @@ LISTED = 3
 #: Share of the gap above the floor that may stay before it is worth a line: less is what other motions alone vary it by.
 REMAINDER = 0.2
 _EXPORT = "`armgap export DIAGNOSIS.json --arm ARM.toml -o corrected.toml` (`.xml` for MuJoCo, `.urdf` for URDF)"
+_BY_HAND = (
+    "write the values into the arm file (`[friction]`, `[drive]`, `[payload]`, `[[link]]`) or the simulator's model; `armgap export` does not take "
+    "serial arms"
+)
 _AGAIN = "After a repair, diagnose a log of the same motion and compare: `armgap compare DIAGNOSIS.json REPAIRED.json`."
 _LOG_MORE = (
     "Log more: the measured torque (motor current times torque constant), mapped to the tau columns in place of the command, tells "
@@ -33,7 +38,11 @@ def next_steps(data: Data) -> list[str]:
     data : dict
         JSON object of a diagnosis.
     """
-    return [*_impossible(data), *_BY_VERDICT.get(data["verdict"], _none)(data)]
+    return [*([] if _is_serial(data) else _impossible(data)), *_BY_VERDICT.get(data["verdict"], _none)(data)]
+
+
+def _is_serial(data: Data) -> bool:
+    return (data.get("arm") or {}).get("kind") == SERIAL
 
 
 def _input(data: Data) -> list[str]:
@@ -56,12 +65,17 @@ def _none(data: Data) -> list[str]:
 
 
 def _parameters(data: Data) -> list[str]:
+    if _is_serial(data):
+        return [f"Take over the re-estimated values: {_BY_HAND}.", *_excite(data)]
     return [f"Take over the re-estimated values: {_EXPORT}.", *_excite(data)]
 
 
 def _effect(data: Data) -> list[str]:
     steps = [_alike(c) for c in data["causes"] if c.get("equivalents")]
-    steps.append(f"Export the corrected model: {_EXPORT}.")
+    if _is_serial(data):
+        steps.append(f"Bring what was found into the model: {_BY_HAND}.")
+    else:
+        steps.append(f"Export the corrected model: {_EXPORT}.")
     steps.append(_AGAIN)
     left = 1.0 - float(data["gap"]["closed"])
     if doubtful(data) or left > REMAINDER:
@@ -77,7 +91,7 @@ def _alike(cause: Data) -> str:
 def _unexplained(data: Data) -> list[str]:
     places = data.get("where") or []
     steps = [f"Look at joint {places[0]['joint']} first: that is where the torque is lacking."] if places else []
-    return [*steps, _LOG_MORE, _OWN, *_excite(data)]
+    return [*steps, _LOG_MORE, *([] if _is_serial(data) else [_OWN]), *_excite(data)]
 
 
 def _excite(data: Data) -> list[str]:

@@ -11,7 +11,19 @@ from armgap.report import charts
 from armgap.report.conventions import brief, section
 from armgap.report.document import Document
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
-from armgap.report.words import SummaryAnswer, each_joint, error_text, figure, joint_text, percent, sizes, title, value
+from armgap.report.words import (
+    SummaryAnswer,
+    each_joint,
+    error_text,
+    figure,
+    joint_text,
+    milli_unit,
+    percent,
+    sizes,
+    title,
+    value,
+)
+from armgap.serial_chain import SERIAL
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -66,7 +78,7 @@ def _shrunk(c: Comparison) -> tuple[str, str]:
     gap = c.gap[0]
     factor = "" if gap.factor is None else f" Above the sensors' floor it is {_times(gap.factor)}."
     return (
-        each_joint(gap.before, gap.after, unit=c.unit),
+        each_joint(gap.before, gap.after, units=c.joint_units),
         f"RMS error of the arm file as it is, predicted over {c.horizon_s:g} s on held-out motion.{factor}",
     )
 
@@ -106,7 +118,7 @@ def _bars(c: Comparison, i: int, joints: list[str]) -> Drawing:
     gap = c.gap[i]
     pair = list(zip(c.names, (gap.before, gap.after), _COLOURS, strict=True))
     series = [(name, [1e3 * v for v in values], colour) for name, values, colour in pair]
-    caption = f"{_MODELS[gap.model].capitalize()}: RMS prediction error over {c.horizon_s:g} s [m{c.unit}, log scale]"
+    caption = f"{_MODELS[gap.model].capitalize()}: RMS prediction error over {c.horizon_s:g} s [{milli_unit(c.joint_units)}, log scale]"
     top = max((*gap.before, *gap.after), default=0.0) or 1.0
     rows: list[tuple[Cell, ...]] = [
         (joint, name, Bar(values[j] / top, error_text(1e3 * values[j]), colour))
@@ -114,7 +126,9 @@ def _bars(c: Comparison, i: int, joints: list[str]) -> Drawing:
         for name, values, colour in pair
     ]
     table = Table(("joint", "diagnosis", caption.replace(", log scale", "")), rows)
-    return Drawing(caption, charts.bars("", f"m{c.unit}, log scale", joints, series, log=True, height=260), table)
+    return Drawing(
+        caption, charts.bars("", f"{milli_unit(c.joint_units)}, log scale", joints, series, log=True, height=260), table
+    )
 
 
 def _causes(c: Comparison) -> Section:
@@ -150,8 +164,11 @@ def _parameters(c: Comparison) -> Section:
         f"Re-estimated together with the causes. A value counts as changed if it moved by more than {SIGMAS:g} standard deviations of the "
         f"difference and by more than {percent(SHARE)}."
     )
+    fold = f"All {len(rows)} values" if c.kind == SERIAL else ""
     return Section(
-        "The arm's own values", text=[text], tables=[Table(("parameter", *c.names, "change [sigma]", ""), rows)]
+        "The arm's own values",
+        text=[text],
+        tables=[Table(("parameter", *c.names, "change [sigma]", ""), rows, fold=fold)],
     )
 
 
@@ -172,7 +189,10 @@ def comparison_summary(c: Comparison) -> RenderableType:
     from armgap.report.terminal import answer_lines
 
     grid = Grid(
-        box=box.SIMPLE_HEAD, pad_edge=False, title=f"RMS error over {c.horizon_s:g} s [m{c.unit}]", title_justify="left"
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        title=Text(f"RMS error over {c.horizon_s:g} s [{milli_unit(c.joint_units)}]"),
+        title_justify="left",
     )
     for name in ("joint", "model", *c.names):
         grid.add_column(name, justify="left" if name in ("joint", "model") else "right", overflow="fold")

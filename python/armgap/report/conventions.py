@@ -7,6 +7,7 @@ from typing import Any
 
 from armgap.report.page import Section, Table
 from armgap.report.sketch import panel
+from armgap.serial_chain import SERIAL
 
 __all__ = ["TITLE", "WORDS", "brief", "section"]
 
@@ -42,7 +43,14 @@ WORDS: dict[str, tuple[str, ...]] = {
 }
 """Kind of arm to its conventions, one sentence or two each."""
 
+_OF_SERIAL_ARMS = (
+    "q = 0 and the positive direction of each joint are those of the description that the arm file names, or of its [[link]] tables.",
+    f"{_TORQUE.replace('its joint', 'a revolute joint')} Positive force pushes a prismatic joint towards greater q.",
+    "Gravity is given in the frame of the base.",
+)
+
 _BRIEF = {
+    SERIAL: "zeros and directions are those of the chain's description; positive torque or force moves its joint towards greater q.",
     "axis": "positive force pushes towards greater q1.",
     "pendulum": "q1 = 0 hangs straight down; positive torque turns the joint towards greater q1.",
     "two-link": "q = 0 hangs straight down; q2 is relative to link 1; positive torque turns its joint towards greater q.",
@@ -55,6 +63,7 @@ _QUANTITIES = {
     "dq": "velocity of joint {}",
 }
 _FORCE = {"tau": "force of joint {}"}
+_FOLD = "Columns of the logs, and their units"
 _KEY = re.compile(r"(t_tau|t|q|tau|dq)([0-9]*)")
 _SHOWN = {"Nm": "N m", "mNm": "mN m"}
 
@@ -76,10 +85,12 @@ def section(kind: str, logs: list[Data] | None = None, si: Data | None = None) -
     si : dict, optional
         ``input.units`` of a diagnosis: SI unit of each group of columns.
     """
-    if kind not in WORDS:
+    if kind not in WORDS and kind != SERIAL:
         return None
     tables = _tables(kind, logs or [], si or {})
     title = TITLE if tables else "Conventions"
+    if kind == SERIAL:
+        return Section(title, points=_OF_SERIAL_ARMS, tables=tables, name="conventions")
     return Section(title, sketch=panel(kind), points=WORDS[kind], tables=tables, name="conventions")
 
 
@@ -90,7 +101,11 @@ def _tables(kind: str, logs: list[Data], si: Data) -> list[Table]:
         names = groups.setdefault(repr((log["columns"], log["units"])), (log, []))[1]
         names += [log["name"]] if log["name"] not in names else []
     return [
-        Table(("column", "what it is", f"in {', '.join(names)}", "unit there", "used as"), _rows(kind, log, si))
+        Table(
+            ("column", "what it is", f"in {', '.join(names)}", "unit there", "used as"),
+            _rows(kind, log, si),
+            fold=_FOLD * (kind == SERIAL),
+        )
         for log, names in groups.values()
         if log["columns"]
     ]

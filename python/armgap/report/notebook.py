@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 from armgap._renamed import old_names
 from armgap.errors import ArmgapError, OptionError
 from armgap.report import charts, words
-from armgap.report.sections.model_labels import length_unit, model_labels, torque_unit
+from armgap.report.sections.model_labels import joint_unit, model_labels, small_unit, torque_unit
+from armgap.serial_chain import SERIAL
 
 if TYPE_CHECKING:
     import polars as pl
@@ -22,6 +23,8 @@ if not TYPE_CHECKING:
     __getattr__ = old_names(__name__)
 
 Data = dict[str, Any]
+
+_OTHER = "of serial arms plot gap, prediction or error"
 
 
 class PlotLibraryMissingError(ArmgapError, ImportError):
@@ -167,13 +170,15 @@ def _gap(data: Data, ax: Axes) -> Axes:
         ax.bar(at, [1e3 * v for v in gap[key]], 0.9 * width, color=colour, label=label)
     ax.set_yscale("log")
     ax.set_xticks(range(len(gap["before"])), [f"joint {j + 1}" for j in range(len(gap["before"]))])
-    return _finish(ax, f"RMS error over {gap['horizon_s']:g} s on held-out motion", "", f"[m{length_unit(data)}]")
+    return _finish(ax, f"RMS error over {gap['horizon_s']:g} s on held-out motion", "", f"[{small_unit(data)}]")
 
 
 def _where(data: Data, ax: Axes) -> Axes:
     regimes = data.get("regimes") or []
     if not regimes:
-        raise OptionError("this diagnosis has no map of the gap", remedy="diagnose the logs again")
+        raise OptionError(
+            "this diagnosis has no map of the gap", remedy=_OTHER if _is_serial(data) else "diagnose the logs again"
+        )
     width = max(len(r["refit"]) for r in regimes)
     tiles = [[*r["refit"], *([float("nan")] * (width - len(r["refit"])))] for r in regimes]
     image = ax.imshow(tiles, aspect="auto", cmap="cividis")
@@ -183,8 +188,14 @@ def _where(data: Data, ax: Axes) -> Axes:
     return ax
 
 
+def _is_serial(data: Data) -> bool:
+    return (data.get("arm") or {}).get("kind") == SERIAL
+
+
 def _ranking(data: Data, ax: Axes) -> Axes:
     ranked = list(reversed(data.get("ranking") or []))
+    if not ranked and _is_serial(data):
+        raise OptionError("a serial arm's diagnosis has no ranking", remedy=_OTHER)
     named = {(c["effect"], c["joint"]) for c in data.get("causes") or []}
     colours = [charts.AFTER if (r["effect"], r["joint"]) in named else charts.MEASURED for r in ranked]
     ax.barh([words.named(r) for r in ranked], [max(100 * r["closed"], 0.0) for r in ranked], color=colours)
@@ -214,7 +225,7 @@ def _curves(data: Data, what: str, joint: int, log: str | None, ax: Axes) -> Axe
     if found is None:
         known = ", ".join(dict.fromkeys(s["log"] for s in series))
         raise OptionError(f"no prediction of joint {joint} of {log or 'any log'}", remedy=f"logs kept are {known}")
-    unit = length_unit(data)
+    unit = joint_unit(data, joint)
     if what == "prediction":
         ax.plot(found["t"], found["measured"], color=charts.MEASURED, lw=2.5, label="measured")
     for label, key, colour in model_labels(data):

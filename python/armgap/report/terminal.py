@@ -60,12 +60,15 @@ def gap_table(data: Data) -> Table:
     """The gap per joint: a row per joint, a column per model."""
     from rich import box
     from rich.table import Table
+    from rich.text import Text
 
     gap = data["gap"]
     table = Table(
         box=box.SIMPLE_HEAD,
         pad_edge=False,
-        title=f"RMS error over {gap['horizon_s']:g} s on held-out motion [m{gap.get('unit', 'rad')}]",
+        title=Text(
+            f"RMS error over {gap['horizon_s']:g} s on held-out motion [{words.milli_unit(words.joint_units(data))}]"
+        ),
         title_justify="left",
     )
     table.add_column("joint")

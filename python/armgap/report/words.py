@@ -21,6 +21,8 @@ __all__ = [
     "error_text",
     "figure",
     "joint_text",
+    "joint_units",
+    "milli_unit",
     "millis",
     "named",
     "parameter_text",
@@ -45,6 +47,8 @@ DOUBTFUL = 0.5
 MINOR_JOINT = 0.02
 #: Shares beyond which percentages have one and two decimals.
 NEARLY, ALMOST = 0.99, 0.995
+#: Joints of which a sentence gives the errors; tables and charts have all.
+MOST_JOINTS = 3
 #: Decimal places, and size, beyond which a number is written with an exponent.
 MOST_PLACES, MOST = 6, 1e5
 
@@ -88,6 +92,8 @@ _INERTIAL = {
         "theta5": "gravity torque of link 2",
     },
 }
+#: Terms of a serial arm that are no effects of the library.
+_OF_SERIAL_ARMS = {"nominal_link": "wrong nominal link"}
 _SYMBOLS = {"q": "position", "dq": "speed", "ddq": "acceleration", "tau": "torque"}
 _SYMBOL = re.compile(r"(q|dq|ddq|tau)[0-9]+")
 _VARIABLES = {"dq": "speed", "reversal": "near a reversal", "q": "position", "tau": "torque", "t": "time"}
@@ -124,7 +130,7 @@ def _titles() -> dict[str, str]:
 
 def title(effect: str) -> str:
     """Name of an effect for people."""
-    return _titles().get(effect, effect.replace("_", " "))
+    return _OF_SERIAL_ARMS.get(effect) or _titles().get(effect, effect.replace("_", " "))
 
 
 def joint_text(joint: int | None) -> str:
@@ -184,28 +190,61 @@ def error_text(number: float) -> str:
     return figure(number) if abs(number) >= 100 or number == 0 else f"{number:#.2g}".rstrip(".")
 
 
-def millis(values: Sequence[float], unit: str) -> str:
-    """RMS errors per joint in thousandths, or in whole units where one is that large."""
-    scale, prefix = (1.0, "") if max(values) >= 1.0 else (1e3, "m")
-    numbers = [error_text(scale * v) for v in values]
-    return f"{' and '.join(filter(None, (', '.join(numbers[:-1]), numbers[-1])))} {prefix}{unit}"
+def joint_units(data: Data) -> list[str]:
+    """Unit of each joint's position; a serial arm may have joints that turn and joints that slide."""
+    n_joints = len(data["gap"]["before"])
+    units = list((data.get("arm") or {}).get("joint_unit") or [])
+    return units if len(units) == n_joints else [str(data["gap"].get("unit", "rad"))] * n_joints
 
 
-def each_joint(*models: Sequence[float], unit: str) -> str:
-    r"""The errors of each joint from one model to the next, in thousandths, or in whole units where one is that large.
+def milli_unit(units: Sequence[str]) -> str:
+    """Thousandths of the joints' units, for the heading of a column or an axis.
 
     Examples
     --------
-    >>> each_joint([0.0076, 0.0396], [3.3e-5, 2.9e-5], unit="rad").split("; ")
+    >>> milli_unit(["rad", "rad"]), milli_unit(["rad", "m"])
+    ('mrad', 'mrad or mm')
+    """
+    return " or ".join(f"m{unit}" for unit in dict.fromkeys(units))
+
+
+def millis(values: Sequence[float], units: Sequence[str]) -> str:
+    """RMS errors per joint in thousandths, or in whole units where one is that large; one unit behind all of them, or each with its own.
+
+    Examples
+    --------
+    >>> millis([0.001, 0.002], ["rad", "rad"]), millis([0.001, 0.002], ["rad", "m"])
+    ('1.0 and 2.0 mrad', '1.0 mrad and 2.0 mm')
+    """
+    scale, prefix = (1.0, "") if max(values) >= 1.0 else (1e3, "m")
+    alike = len(set(units)) == 1
+    numbers = [
+        error_text(scale * v) + ("" if alike else f" {prefix}{unit}") for v, unit in zip(values, units, strict=True)
+    ]
+    text = " and ".join(filter(None, (", ".join(numbers[:-1]), numbers[-1])))
+    return f"{text} {prefix}{units[0]}" if alike else text
+
+
+def each_joint(*models: Sequence[float], units: Sequence[str], joints: Sequence[int] | None = None) -> str:
+    r"""The errors of each joint from one model to the next, in thousandths, or in whole units where one is that large.
+
+    `joints` are those that the errors belong to, from 1; by default all of them in their order.
+
+    Examples
+    --------
+    >>> each_joint([0.0076, 0.0396], [3.3e-5, 2.9e-5], units=["rad", "rad"]).split("; ")
     ['Joint 1: 7.6\xa0→\xa00.033\xa0mrad', 'joint 2: 40\xa0→\xa00.029\xa0mrad']
     """
     scale, prefix = (1.0, "") if max(max(values) for values in models) >= 1.0 else (1e3, "m")
     ends = [
         f"{_ARROW.join(error_text(scale * v) for v in errors)}\N{NO-BREAK SPACE}{prefix}{unit}"
-        for errors in zip(*models, strict=True)
+        for unit, *errors in zip(units, *models, strict=True)
     ]
+    numbers = joints or range(1, len(ends) + 1)
     return (
-        ends[0] if len(ends) == 1 else _capital("; ".join(f"joint {j}: {end}" for j, end in enumerate(ends, start=1)))
+        ends[0]
+        if len(ends) == 1
+        else _capital("; ".join(f"joint {j}: {e}" for j, e in zip(numbers, ends, strict=True)))
     )
 
 
@@ -399,20 +438,32 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def _missed_most(errors: Sequence[float]) -> list[int]:
+    """Joints, from 1, that a sentence lists: all where they are few, else those with the largest errors."""
+    numbers = range(1, len(errors) + 1)
+    if len(errors) <= MOST_JOINTS:
+        return list(numbers)
+    return sorted(sorted(numbers, key=lambda j: -errors[j - 1])[:MOST_JOINTS])
+
+
 def _how_far(data: Data) -> tuple[str, str]:
     gap = data["gap"]
-    unit = gap.get("unit", "rad")
+    joints = _missed_most(gap["before"])
+    units = [joint_units(data)[j - 1] for j in joints]
+    few = len(joints) < len(gap["before"])
+    before, refit, after, floor = ([gap[key][j - 1] for j in joints] for key in ("before", "refit", "after", "floor"))
     if data["verdict"] == "input":
-        headline, errors = "With the remedy applied", each_joint(gap["before"], gap["refit"], unit=unit)
+        headline, errors = "With the remedy applied", each_joint(before, refit, units=units, joints=joints)
     elif data["verdict"] == "none":
-        headline, errors = "Nothing to shrink", each_joint(gap["after"], unit=unit)
+        headline, errors = "Nothing to shrink", each_joint(after, units=units, joints=joints)
     elif data["verdict"] == "unexplained":
-        headline, errors = "It stays", each_joint(gap["after"], unit=unit)
+        headline, errors = "It stays", each_joint(after, units=units, joints=joints)
     else:
-        headline, errors = f"By {percent(gap['closed'])}", each_joint(gap["before"], gap["after"], unit=unit)
+        headline, errors = f"By {percent(gap['closed'])}", each_joint(before, after, units=units, joints=joints)
     detail = (
-        f"{errors}: RMS error of predictions over {gap['horizon_s']:g} s on held-out motion. Re-estimating the arm file's own values alone "
-        f"leaves {millis(gap['refit'], unit)}, sensor noise {millis(gap['floor'], unit)}."
+        f"{errors}: RMS error of predictions over {gap['horizon_s']:g} s on held-out motion"
+        f"{', of the joints that the arm file misses most' if few else ''}. Re-estimating the arm file's own values alone "
+        f"leaves {millis(refit, units)}, sensor noise {millis(floor, units)}."
     )
     if data["verdict"] not in ("none", "input"):
         low, high = gap["closed_ci"]

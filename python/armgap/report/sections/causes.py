@@ -7,7 +7,7 @@ from typing import Any
 
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
-from armgap.report.sections.model_labels import Data, length_unit, load_text
+from armgap.report.sections.model_labels import Data, load_text, small_unit
 from armgap.report.words import error_text, figure, joint_text, named, percent, sizes, symbol_text, title
 
 __all__ = ["candidates", "evidence", "look_alikes", "ranking"]
@@ -67,7 +67,7 @@ def ranking(data: Data) -> Section | None:
         "candidate",
         "share of the gap removed",
         "probability",
-        f"RMS per joint [m{length_unit(data)}]",
+        f"RMS per joint [{small_unit(data)}]",
         "size",
         "distance from trusted values [σ²]",
     )
@@ -104,13 +104,13 @@ def _cause(data: Data, ranked: Data) -> Any:
 def _course(data: Data) -> list[str]:
     """How one cause after another came in."""
     stages = data.get("stages") or []
-    unit = length_unit(data)
+    unit = small_unit(data)
     lines: list[str] = []
     for before, after in pairwise(stages):
         if before.get("added"):
             errors = [" / ".join(error_text(1e3 * v) for v in s["rms"]) for s in (before, after)]
             lines.append(
-                f"Step {len(lines) + 1}: {named(before['added'])} was added, and the error fell from {errors[0]} to {errors[1]} m{unit}."
+                f"Step {len(lines) + 1}: {named(before['added'])} was added, and the error fell from {errors[0]} to {errors[1]} {unit}."
             )
     return lines
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, HeatMap, Section, Table, Tile
-from armgap.report.sections.model_labels import Data, length_unit, load_text, model_labels, torque_unit
+from armgap.report.sections.model_labels import Data, load_text, model_labels, small_unit, torque_unit
 from armgap.report.words import error_text, figure, percent, unit_text, variable_text
 
 __all__ = ["first_picture", "gap_map"]
@@ -24,12 +24,12 @@ NOTHING = 1e-4
 def first_picture(data: Data) -> Section:
     """The gap before and after, and the map of where it lies."""
     gap = data["gap"]
-    unit = length_unit(data)
+    unit = small_unit(data)
     joints = [f"joint {j + 1}" for j in range(len(gap["before"]))]
     series = [(label, [1e3 * v for v in gap[key]], colour) for label, key, colour in model_labels(data)]
     series.append(("sensor noise alone", [1e3 * v for v in gap["floor"]], charts.FLOOR))
-    caption = f"How far: RMS prediction error over {gap['horizon_s']:g} s [m{unit}, log scale]"
-    chart = charts.bars("", f"m{unit}, log scale", joints, series, log=True, height=300)
+    caption = f"How far: RMS prediction error over {gap['horizon_s']:g} s [{unit}, log scale]"
+    chart = charts.bars("", f"{unit}, log scale", joints, series, log=True, height=300)
     key = "before" if data["verdict"] == "parameters" else "refit"
     name = {"before": "arm file's model", "refit": "re-estimated model"}[key]
     what = f"Where: {load_text(data)} missing in the {name} [RMS, {torque_unit(data)}]; below the tiles, the limits of each range"
@@ -46,7 +46,7 @@ def _bars(data: Data) -> Table:
         for j in range(len(gap["before"]))
         for label, key in shown
     ]
-    return Table(("joint", "model", f"RMS error over {gap['horizon_s']:g} s [m{length_unit(data)}]"), rows)
+    return Table(("joint", "model", f"RMS error over {gap['horizon_s']:g} s [{small_unit(data)}]"), rows)
 
 
 def _heats(data: Data, wanted: Sequence[tuple[str, str]]) -> list[HeatMap]:

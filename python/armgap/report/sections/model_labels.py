@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from armgap.report import charts
+from armgap.report.words import joint_units, milli_unit
 
-__all__ = ["Data", "ModelLabel", "length_unit", "load_text", "model_labels", "torque_unit"]
+__all__ = ["Data", "ModelLabel", "joint_unit", "load_text", "model_labels", "small_unit", "torque_unit"]
 
 Data = dict[str, Any]
 ModelLabel = tuple[str, str, str]
@@ -21,16 +22,26 @@ def model_labels(data: Data) -> tuple[ModelLabel, ...]:
     return (_BEFORE, _REFIT, _AFTER) if data.get("causes") else (_BEFORE, _REFIT)
 
 
-def length_unit(data: Data) -> str:
-    """Unit of positions."""
-    return str(data["gap"].get("unit", "rad"))
+def joint_unit(data: Data, joint: int) -> str:
+    """Unit of the position of a joint, counted from 1."""
+    units = joint_units(data)
+    return units[joint - 1] if joint <= len(units) else str(data["gap"].get("unit", "rad"))
+
+
+def small_unit(data: Data) -> str:
+    """Unit of position errors, for headings: ``mrad``, ``mm``, or both."""
+    return milli_unit(joint_units(data))
+
+
+def _slides(data: Data) -> bool:
+    return set(joint_units(data)) == {"m"}
 
 
 def load_text(data: Data) -> str:
     """What drives a joint of this arm."""
-    return "force" if length_unit(data) == "m" else "torque"
+    return "force" if _slides(data) else "torque"
 
 
 def torque_unit(data: Data) -> str:
     """Unit of torques."""
-    return "N" if length_unit(data) == "m" else "N m"
+    return "N" if _slides(data) else "N m"

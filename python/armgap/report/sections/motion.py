@@ -8,8 +8,8 @@ import numpy as np
 
 from armgap.report import charts
 from armgap.report.page import Drawing, Section, Table
-from armgap.report.sections.model_labels import Data, length_unit, model_labels
-from armgap.report.words import each_joint, figure
+from armgap.report.sections.model_labels import Data, joint_unit, model_labels
+from armgap.report.words import each_joint, figure, joint_units
 
 __all__ = ["free_run", "horizons", "predictions"]
 
@@ -28,8 +28,10 @@ def predictions(data: Data) -> Section | None:
         position, error = _position(data, s), _error(data, s)
         error.x_range = position.x_range
         drawn += [
-            Drawing(f"{s['log']}, joint {s['joint']}: position [{length_unit(data)}]", position),
-            Drawing(f"{s['log']}, joint {s['joint']}: measured minus predicted [m{length_unit(data)}]", error),
+            Drawing(f"{s['log']}, joint {s['joint']}: position [{joint_unit(data, s['joint'])}]", position),
+            Drawing(
+                f"{s['log']}, joint {s['joint']}: measured minus predicted [m{joint_unit(data, s['joint'])}]", error
+            ),
         ]
     text = (
         "Every window starts from its measured state and runs under the logged torque. Drag over a stretch of time to zoom in, or use Ctrl and the "
@@ -57,7 +59,7 @@ def _error(data: Data, s: Data) -> Any:
 
 def horizons(data: Data) -> Section | None:
     """The gap at several prediction horizons."""
-    gap, unit = data["gap"], length_unit(data)
+    gap, units = data["gap"], joint_units(data)
     every = sorted([gap, *gap.get("horizons", [])], key=lambda h: float(h["horizon_s"]))
     if len(every) < 2:
         return None
@@ -65,8 +67,8 @@ def horizons(data: Data) -> Section | None:
     rows = [
         (
             figure(h["horizon_s"]),
-            each_joint(*(h[key] for _, key, _ in model_labels(data)), unit=unit),
-            each_joint(h["floor"], unit=unit),
+            each_joint(*(h[key] for _, key, _ in model_labels(data)), units=units),
+            each_joint(h["floor"], units=units),
         )
         for h in every
     ]
@@ -79,16 +81,16 @@ def horizons(data: Data) -> Section | None:
 
 def free_run(data: Data) -> Section:
     """The whole holdout from its first sample."""
-    gap, unit = data["gap"], length_unit(data)
+    gap, units = data["gap"], joint_units(data)
     run = gap["free_run"]
     last = "with the causes" if data.get("causes") else "re-estimated"
     text = (
         "Simulated from the first sample of each held-out log to its last, without looking at the measurement again. Errors add up, and where "
         "the motion is sensitive a small one decides the rest; the windows above are the fairer judge. "
-        f"{each_joint(run['before'], run['after'], unit=unit)} (RMS error with the arm file → {last})."
+        f"{each_joint(run['before'], run['after'], units=units)} (RMS error with the arm file → {last})."
     )
     drawn = [
-        Drawing(f"{s['log']}, joint {s['joint']} [{unit}]", _whole_run(s, last))
+        Drawing(f"{s['log']}, joint {s['joint']} [{joint_unit(data, s['joint'])}]", _whole_run(s, last))
         for s in data.get("free_run_series") or []
     ]
     return Section("Free run", text=[text], figures=drawn, columns=2)

@@ -8,12 +8,14 @@ from armgap.report import charts
 from armgap.report.page import Cell, IntervalLine, Section, Table
 from armgap.report.sections.model_labels import Data
 from armgap.report.words import figure, named, parameter_text, unit_text, value
+from armgap.serial_chain import SERIAL
 
 __all__ = ["parameters"]
 
 #: Half of the line on which values are shown, in sigmas of the arm file's trust; the shaded middle is two of them.
 REACH = 5.0
 MIDDLE = 2.0
+_LINK_NUMBERS = 10
 
 
 def parameters(data: Data) -> Section:
@@ -22,7 +24,24 @@ def parameters(data: Data) -> Section:
         "Value ± one standard deviation; for the arm file, how far it is trusted. On the line, the shaded middle is two of these standard "
         "deviations around the arm file's value, the ends are five; yellow is re-estimated, blue with causes."
     ]
-    return Section("Parameters", text=text, tables=[_values(data), *_plausibility(data)], notes=_impossible(data))
+    tables = [_values(data)] if not _is_serial(data) else _values_of_serial_arm(data)
+    return Section("Parameters", text=text, tables=[*tables, *_plausibility(data)], notes=_impossible(data))
+
+
+def _is_serial(data: Data) -> bool:
+    return (data.get("arm") or {}).get("kind") == SERIAL
+
+
+def _values_of_serial_arm(data: Data) -> list[Table]:
+    """Causes, rotor inertias and friction; the links' numbers, ten each, folded."""
+    table, causes = _values(data), data.get("causes") or []
+    count = _LINK_NUMBERS * int(data["arm"]["n_joints"])
+    last = len(table.rows) - sum(len(cause["parameters"]) for cause in causes)
+    shown, links = [*table.rows[last:], *table.rows[count:last]], table.rows[:count]
+    return [
+        Table(table.header, shown),
+        Table(table.header, links, fold="Masses, first moments and inertias of the links"),
+    ]
 
 
 def _values(data: Data) -> Table:
@@ -65,4 +84,9 @@ def _impossible(data: Data) -> list[str]:
     broken = [c["check"] for c in data.get("plausibility") or [] if not c["holds"]]
     if not broken:
         return []
+    if _is_serial(data):
+        return [
+            "Motion determines sums of the links' numbers, not each by itself: a single link may come out as no body can be while the arm's "
+            "torques are right. Use the values of all links together, or keep the arm file's."
+        ]
     return [f"Not physically possible: that {', and that '.join(broken)}, does not hold. Something else is wrong."]

@@ -932,14 +932,14 @@ mod tests {
             consequence: 0.1,
         };
         assert!(good.is_accepted());
-        for lacking in [
+        for weak in [
             Evidence { statistic: 10.0, ..good },
             Evidence { gain: 10.0, ..good },
             Evidence { deviations: 1.0, ..good },
             Evidence { share: 0.05, ..good },
             Evidence { consequence: 1e-3, ..good },
         ] {
-            assert!(!lacking.is_accepted(), "{lacking:?}");
+            assert!(!weak.is_accepted(), "{weak:?}");
         }
         let restoring = Evidence { relief: 30.0, statistic: 0.0, deviations: 0.0, share: 0.0, ..good };
         assert!(restoring.is_accepted());
