@@ -182,6 +182,10 @@ impl Search<'_> {
             model = self.without_idle(&regression, self.fit(&regression, terms, &model.estimate.theta));
             model = self.swapped(&guesses, &regression, model);
         }
+        if model.terms.iter().any(|term| self.is_sampling(term)) {
+            let kept = model.terms.iter().filter(|term| !self.is_sampling(term)).cloned().collect();
+            model = self.fit(&regression, kept, &model.estimate.theta);
+        }
         self.concluded(&guesses, &regression, [refit, model], sigma, seed)
     }
 
@@ -861,7 +865,13 @@ mod tests {
         let prior = Prior { theta: vec![1.8; 2], sigma: vec![0.5; 2], positive: vec![false; 2] };
         let observer: Observer = std::sync::Arc::new(|_| Control::Go);
         let progress = ProgressReporter::new(observer);
-        let names = ["torque_offset", "quadratic_drag", "viscous_asymmetry", "load_dependent_friction"];
+        let names = [
+            "torque_offset",
+            "quadratic_drag",
+            "viscous_asymmetry",
+            "load_dependent_friction",
+            "actuator_delay",
+        ];
         let candidates = names.iter().flat_map(|name| (0..2).map(|j| vec![law(name, j, 0.05)])).collect();
         let search = Search {
             training: &training,
@@ -911,6 +921,12 @@ mod tests {
     fn a_law_on_all_joints_is_one_decision() {
         let found = found(&[offset(0, 0.5), offset(1, 0.6)], 1);
         assert_eq!(found.named.len(), 2);
+    }
+
+    #[test]
+    fn a_delay_below_the_sample_period_is_not_named() {
+        let period = 0.0025;
+        assert!(found(&[law("actuator_delay", 0, 0.5 * period)], 4).named.is_empty());
     }
 
     #[test]
