@@ -519,10 +519,12 @@ impl Search<'_> {
 
     /// Whether term `index` of the second model is accepted beside the first, which lacks it.
     fn is_accepted(&self, regression: &Regression, [without, with]: [&Fitted; 2], index: usize) -> bool {
-        let term = &with.terms[index];
-        let is_sampling =
-            ["actuator_delay", "actuator_lag"].contains(&term.name()) && term.p[0] < self.period;
-        !is_sampling && self.evidence(regression, without, with, index).is_accepted()
+        !self.is_sampling(&with.terms[index]) && self.evidence(regression, without, with, index).is_accepted()
+    }
+
+    /// Whether a term is a delay or lag of less than a sample period.
+    fn is_sampling(&self, term: &Term) -> bool {
+        ["actuator_delay", "actuator_lag"].contains(&term.name()) && term.p[0] < self.period
     }
 
     /// What speaks for term `index` of `with` beside the model `without` it.
