@@ -90,7 +90,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             .functions
             .par_iter()
             .map(|phi| {
-                let m = &self.logs[phi.log].middles[(phi.first + phi.last) / 2];
+                let m = &self.logs[phi.log].middles[usize::midpoint(phi.first, phi.last)];
                 let inertia = self.arm.inertia(theta, &SVector::from(m.q));
                 std::array::from_fn(|j| std::array::from_fn(|k| inertia[(j, k)]))
             })

@@ -233,7 +233,9 @@ impl Search<'_> {
         let scaled = |motion: &dyn Motion, residual: &[Vec<f64>]| {
             let mut costs = motion.rows().costs(&regression.weights, residual);
             for (costs, scale) in costs.iter_mut().zip(self.scales(motion, &terms, &estimate.theta)) {
-                costs.iter_mut().for_each(|cost| *cost *= scale);
+                for cost in costs {
+                    *cost *= scale;
+                }
             }
             costs
         };
