@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.errors import OptionError
-from armgap.literals import Side, TauKind
-from armgap.serial_chain import SERIAL
+from armgap.literals import SERIAL, Side, TauKind
 
 if TYPE_CHECKING:
     from armgap.check.corrections import Corrections
@@ -289,8 +288,9 @@ class Arm:
                 *(f"{f.name} = {listed(getattr(self.limits, f.name))}" for f in fields(self.limits)),
             ]
         if self.controller is not None:
-            gains = (f"{key} = {listed(getattr(self.controller, key))}" for key in ("kp", "kd"))
-            lines += ["", "[controller]", 'kind = "pd"', *gains, f"kd_on = {quoted(self.controller.kd_on)}"]
+            kind = [f"kind = {quoted(self.controller.kind)}", f"kd_on = {quoted(self.controller.kd_on)}"]
+            gains = [f"{name} = {listed(values)}" for name, values in self.controller.vectors]
+            lines += ["", "[controller]", *kind, *gains]
         if columns:
             lines += ["", "[columns]", *(f"{k} = {quoted(v)}" for k, v in columns.items())]
         if self.corrections:

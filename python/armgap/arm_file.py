@@ -17,9 +17,8 @@ from armgap import _native
 from armgap.arm import MotionLimits, kinds
 from armgap.controller import Controller, DerivativeOn
 from armgap.errors import ArmFileError, OptionError
-from armgap.literals import Side
+from armgap.literals import SERIAL, Side
 from armgap.reading import printable, read_bounded
-from armgap.serial_chain import SERIAL
 
 if TYPE_CHECKING:
     from armgap.check.corrections import Corrections

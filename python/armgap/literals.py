@@ -9,6 +9,7 @@ __all__ = [
     "FILTERS",
     "GAP_OUTCOMES",
     "SCHEMES",
+    "SERIAL",
     "STATUSES",
     "VELOCITIES",
     "VERDICTS",
@@ -33,6 +34,8 @@ TauKind = Literal["command", "measured"]
 CauseStatus = Literal["gone", "unseen", "undecided", "new", "smaller", "larger", "unchanged", "renamed"]
 GapOutcome = Literal["smaller", "larger", "unchanged", "none"]
 
+SERIAL = "serial"
+"""The kind of an arm that has a chain."""
 SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
 """The regression models, in the order of Reyes and Kelly (1997)."""
 FILTERS: tuple[Filters, ...] = get_args(Filters)

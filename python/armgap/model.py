@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from armgap.arm import Arm
 from armgap.arm_file import LONGEST_PERIOD_S, SHORTEST_PERIOD_S, STRONGEST_GRAVITY
 from armgap.errors import OptionError
+from armgap.literals import SERIAL
 from armgap.options import positive
-from armgap.serial_chain import SERIAL
 from armgap.serial_trust import TRUSTS
 
 __all__ = ["read_model"]

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from armgap.arm_file import STRONGEST_GRAVITY, ArmFile, suggest
 from armgap.controller import VECTORS, Controller, DerivativeOn
 from armgap.description.resolved import ResolvedModel
+from armgap.literals import SERIAL
 from armgap.reading import printable
 from armgap.rigid_body import about_origin, inconsistency, symmetric
-from armgap.serial_chain import SERIAL
 from armgap.serial_links import LinkTables
 from armgap.serial_trust import FRICTION_SHARE, TRUSTS, Scales, Trust, link_sigma
 

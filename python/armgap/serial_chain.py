@@ -12,12 +12,10 @@ from armgap import _native
 from armgap.errors import OptionError
 from armgap.rigid_body import INERTIAL_NAMES, INERTIAL_UNITS
 
-__all__ = ["SERIAL", "JointKind", "SerialChain"]
+__all__ = ["JointKind", "SerialChain"]
 
 JointKind = Literal["revolute", "prismatic"]
 
-SERIAL = "serial"
-"""The kind of an arm that has a chain."""
 _SHAPES: dict[str, tuple[int, ...]] = {
     "rotation": (3, 3),
     "translation": (3,),

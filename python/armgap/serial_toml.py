@@ -73,14 +73,6 @@ def serial_toml(arm: Arm) -> str:
         f"rotor_inertia = {listed(arm.theta[rotor])}",
         f"sigma_rotor_inertia = {listed(arm.sigma[rotor])}",
     ]
-    if arm.controller is not None:
-        lines += [
-            "",
-            "[controller]",
-            f"kind = {quoted(arm.controller.kind)}",
-            f"kd_on = {quoted(arm.controller.kd_on)}",
-        ]
-        lines += [f"{name} = {listed(values)}" for name, values in arm.controller.vectors]
     return "\n".join([*lines, *arm.table_lines()]) + "\n"
 
 

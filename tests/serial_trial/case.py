@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import armgap
-from armgap.serial_chain import SERIAL, SerialChain
+from armgap.literals import SERIAL
+from armgap.serial_chain import SerialChain
 
 from .arms import SerialRobot, draw_robot, perturbed
 from .effects import EFFECTS, Effect, Null

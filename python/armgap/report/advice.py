@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from armgap import _native
+from armgap.literals import SERIAL
 from armgap.report.words import doubtful, named, percent, title
-from armgap.serial_chain import SERIAL
 
 __all__ = ["next_steps"]
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from armgap.comparison import SHARE, SIGMAS, CauseChange, Comparison
 from armgap.diagnosis import Value
+from armgap.literals import SERIAL
 from armgap.report import charts
 from armgap.report.conventions import brief, section
 from armgap.report.document import Document
@@ -23,7 +24,6 @@ from armgap.report.words import (
     title,
     value,
 )
-from armgap.serial_chain import SERIAL
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

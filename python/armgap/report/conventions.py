@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from armgap.literals import SERIAL
 from armgap.report.page import Section, Table
 from armgap.report.sketch import panel
-from armgap.serial_chain import SERIAL
 
 __all__ = ["TITLE", "WORDS", "brief", "section"]
 

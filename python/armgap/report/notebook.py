@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from armgap._renamed import old_names
 from armgap.errors import ArmgapError, OptionError
+from armgap.literals import SERIAL
 from armgap.report import charts, words
 from armgap.report.sections.model_labels import joint_unit, model_labels, small_unit, torque_unit
-from armgap.serial_chain import SERIAL
 
 if TYPE_CHECKING:
     import polars as pl

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from armgap import _native
 from armgap._renamed import old_names
-from armgap.serial_chain import SERIAL
+from armgap.literals import SERIAL
 
 __all__ = [
     "SummaryAnswer",

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import platform
 
+from armgap.literals import SERIAL
 from armgap.report.page import Section, Table
 from armgap.report.sections.model_labels import Data, small_unit
 from armgap.report.words import error_text, figure
-from armgap.serial_chain import SERIAL
 
 __all__ = ["data_quality", "method"]
 

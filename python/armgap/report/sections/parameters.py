@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from armgap.literals import SERIAL
 from armgap.report import charts
 from armgap.report.page import Cell, IntervalLine, Section, Table
 from armgap.report.sections.model_labels import Data
 from armgap.report.words import figure, named, parameter_text, unit_text, value
-from armgap.serial_chain import SERIAL
 
 __all__ = ["parameters"]
 
