@@ -134,11 +134,9 @@ impl Request<'_> {
         let progress = ProgressReporter::new(Observer::clone(self.observer));
         let mut training = self.set::<N, P>("training", self.training, &arm, &theta)?;
         let mut holdout = self.set::<N, P>("holdout", self.holdout, &arm, &theta)?;
-        // A rotor inertia that the arm file does not give is an effect to be named, not a value to be estimated.
-        let is_missing = |i: usize| (10 * N..11 * N).contains(&i) && theta[i] == 0.0;
         let prior = Prior {
             theta: theta.to_vec(),
-            sigma: (0..P).map(|i| if is_missing(i) { 0.0 } else { self.arm.sigma[i] }).collect(),
+            sigma: self.arm.sigma.clone(),
             positive: (0..P).map(|i| i >= 10 * N).collect(),
         };
         let widths = {
