@@ -126,7 +126,7 @@ def random_states(n: int, seed: int) -> tuple[Array, Array, Array]:
 
 
 def agree(found: Array, expected: Array, rounding: float = ROUNDING, least: float = 0.0) -> None:
-    """Compare relative to the largest entry, or to `least` where all entries may vanish."""
+    """Compare relative to the largest entry, or to `least` where all are small."""
     assert found.shape == expected.shape
     scale = max(np.abs(expected).max(), least)
     assert np.abs(found - expected).max() <= rounding * scale
@@ -159,8 +159,8 @@ def check_against_pinocchio(description: Description, model: Any, seed: int) -> 
     agree(chain.regressor(q, dq, ddq), regressor.reshape(len(q), n, 10 * n))
     partials = [[x.copy() for x in pinocchio.computeRNEADerivatives(model, data, *state)[:2]] for state in states]
     for k, by in enumerate(chain.torque_derivatives(theta, q, dq, ddq)):
-        # One joint has no torque that depends on its velocity.
-        agree(by, np.array([partial[k] for partial in partials]), least=np.abs(tau).max())
+        # One joint's torque does not depend on its velocity.
+        agree(by, np.array([partial[k] for partial in partials]), least=float(np.abs(tau).max()))
     # Forward dynamics is as exact as the inertia matrix is well conditioned: what counts is the torque of its accelerations.
     accelerations = chain.acceleration(theta, q, dq, tau)
     agree(np.einsum("rij,rj->ri", inertia, accelerations) + bias, tau)

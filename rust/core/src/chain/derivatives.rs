@@ -131,7 +131,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
                 .plus(&operator.times(&first[j]).scaled(two));
             // Of the motion of joints inwards on this one.
             let transposed = scaled(two, &operator.transposed(joint));
-            for i in 0..=j {
+            for i in (0..N).take(j + 1) {
                 let inner = &poses[i].joint;
                 all.by_position[i][j] = inner.dot(&by_position);
                 all.by_velocity[i][j] = two * inner.dot(&by_velocity);

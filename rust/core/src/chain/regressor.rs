@@ -30,7 +30,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
             let a = cross_plus(w, &velocity.linear, &acceleration.linear);
             let force = first_moments_force(w, alpha);
             let moment = second_moments_moment(w, alpha);
-            for i in 0..=k {
+            for i in (0..N).take(k + 1) {
                 let Twist { angular, linear } = in_link(&poses[i].joint, pose);
                 let h = cross_plus(&a, &angular, &turned_back(&force, &linear));
                 let mut row = [dot(&linear, &a), h[0], h[1], h[2], a[0], a[0], a[0], a[0], a[0], a[0]];
@@ -59,7 +59,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
             rates[k] = motions[k].velocity.cross(&poses[k].joint);
             let (velocity, g) =
                 (in_link(&motions[k].velocity, &poses[k]), turned_back(&poses[k].rotation, &gravity));
-            for i in 0..=k {
+            for i in (0..N).take(k + 1) {
                 let joint = in_link(&poses[i].joint, &poses[k]);
                 let momentum = momentum_row(&joint, &velocity);
                 // What a motion adds to a momentum by turning its subspace is no force.

@@ -43,16 +43,21 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         in_vain: &mut [bool; N],
     ) -> Accelerations<T, N> {
         let mut from = self.friction_accelerations(state, motion);
+        if j >= N {
+            // No joint is; said here so that no index below needs a panic.
+            return *motion;
+        }
         state.modes[j] = mode;
         for _ in 0..N {
             let motion = self.motion(x, state);
             let to = self.friction_accelerations(state, &motion);
             let Some((k, part)) = self.first_pulled_back(state, &from, &to) else { return motion };
             // Where the Coulomb level of a sliding joint exceeds that at rest, a joint may be pulled back as it is released.
-            in_vain[k] |= k == j;
+            in_vain[j] |= k == j;
             from += (to - from) * part;
-            from[k] = T::zero();
-            state.modes[k] = Mode::Stuck;
+            if let (Some(acceleration), Some(mode)) = (from.get_mut(k), state.modes.get_mut(k)) {
+                (*acceleration, *mode) = (T::zero(), Mode::Stuck);
+            }
         }
         self.motion(x, state)
     }
