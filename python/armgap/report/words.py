@@ -68,6 +68,10 @@ _NO_CAUSE = {
     ),
     "input": ("None is named", "While the input contradicts itself, any effect would only imitate the contradiction."),
 }
+_NO_CAUSE_OF_SERIAL = (
+    "None that was tested",
+    "Every effect that is tested on serial arms was tried and none explains the gap; elasticity, backlash and pushes are not among them.",
+)
 _NONE_ALLOWED = (
     "None was allowed",
     "The number of causes was limited to 0, so no effect was tried as one; allow at least one (--max-causes 1).",
@@ -409,6 +413,8 @@ def _which(data: Data) -> tuple[str, str]:
     if not causes and none_allowed(data):
         return _NONE_ALLOWED
     if not causes:
+        if data["verdict"] == "unexplained" and (data.get("arm") or {}).get("kind") == SERIAL:
+            return _NO_CAUSE_OF_SERIAL
         return _NO_CAUSE.get(data["verdict"], ("No cause was named", ""))
     headline = _capital(" and ".join(_counted([f"{title(c['effect'])}, {joint_text(c['joint'])}" for c in causes])))
     text = " ".join(_about(cause, alone=len(causes) == 1) for cause in causes)
