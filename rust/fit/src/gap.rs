@@ -15,10 +15,10 @@ use armgap_core::arm::Arm;
 use rayon::prelude::*;
 
 /// Points of a drawn curve at most.
-pub(crate) const DRAWN: usize = 2500;
+const DRAWN: usize = 2500;
 
 /// Holdout logs that are drawn.
-pub(crate) const DRAWN_LOGS: usize = 3;
+const DRAWN_LOGS: usize = 3;
 
 /// Resamples of the holdout windows for the interval of the closed share.
 const RESAMPLES: usize = 500;
@@ -78,36 +78,11 @@ impl<const N: usize> Errors<N> {
         &self,
         context: &DiagnosisContext<A, N, P>,
     ) -> Vec<Series> {
-        let data = &context.holdout.data;
-        let mut all = Vec::new();
-        for (index, track) in data.tracks.iter().enumerate().take(DRAWN_LOGS) {
-            let stride = track.len().div_ceil(DRAWN);
-            for j in 0..N {
-                let mut s = Series {
-                    log: track.name.clone(),
-                    joint: j + 1,
-                    t: Vec::new(),
-                    measured: Vec::new(),
-                    before: Vec::new(),
-                    refit: Vec::new(),
-                    after: Vec::new(),
-                    window_start: Vec::new(),
-                };
-                for window in data.windows.iter().filter(|w| w.track == index) {
-                    s.window_start.push(s.t.len());
-                    for i in (0..window.rows()).step_by(stride) {
-                        let at = (window.offset + i) * N + j;
-                        s.t.push(track.t[window.first + 1 + i]);
-                        s.measured.push(context.holdout.measured[at]);
-                        s.before.push(self.before[at]);
-                        s.refit.push(self.refit[at]);
-                        s.after.push(self.after[at]);
-                    }
-                }
-                all.push(s);
-            }
-        }
-        all
+        window_series(
+            &context.holdout.data,
+            &context.holdout.measured,
+            [&self.before, &self.refit, &self.after],
+        )
     }
 }
 
@@ -371,22 +346,68 @@ impl<const N: usize> FreeRuns<N> {
 
     /// Curves for drawing.
     pub fn series(&self) -> Vec<FreeRunSeries> {
-        let mut all = Vec::new();
-        for window in self.data.windows.iter().take(DRAWN_LOGS) {
-            let track = &self.data.tracks[window.track];
-            let rows: Vec<usize> = (0..window.rows()).step_by(window.rows().div_ceil(DRAWN)).collect();
-            for j in 0..N {
-                let pick = |x: &[f64]| rows.iter().map(|i| x[(window.offset + i) * N + j]).collect();
-                all.push(FreeRunSeries {
-                    log: track.name.clone(),
-                    joint: j + 1,
-                    t: rows.iter().map(|i| track.t[i + 1]).collect(),
-                    measured: pick(&self.measured),
-                    before: pick(&self.before),
-                    after: pick(&self.after),
-                });
-            }
-        }
-        all
+        free_run_series(&self.data, &self.measured, [&self.before, &self.after])
     }
+}
+
+/// Curves of whole logs: measured positions, and predictions of the arm file as it is and of the model with causes.
+pub(crate) fn free_run_series<const N: usize>(
+    data: &Dataset<N>,
+    measured: &[f64],
+    [before, after]: [&[f64]; 2],
+) -> Vec<FreeRunSeries> {
+    let mut all = Vec::new();
+    for window in data.windows.iter().take(DRAWN_LOGS) {
+        let track = &data.tracks[window.track];
+        let rows: Vec<usize> = (0..window.rows()).step_by(window.rows().div_ceil(DRAWN)).collect();
+        for j in 0..N {
+            let pick = |x: &[f64]| rows.iter().map(|i| x[(window.offset + i) * N + j]).collect();
+            all.push(FreeRunSeries {
+                log: track.name.clone(),
+                joint: j + 1,
+                t: rows.iter().map(|i| track.t[i + 1]).collect(),
+                measured: pick(measured),
+                before: pick(before),
+                after: pick(after),
+            });
+        }
+    }
+    all
+}
+
+/// Curves of windows: measured positions, and predictions of the arm file as it is, re-estimated, and with causes.
+pub(crate) fn window_series<const N: usize>(
+    data: &Dataset<N>,
+    measured: &[f64],
+    [before, refit, after]: [&[f64]; 3],
+) -> Vec<Series> {
+    let mut all = Vec::new();
+    for (index, track) in data.tracks.iter().enumerate().take(DRAWN_LOGS) {
+        let stride = track.len().div_ceil(DRAWN);
+        for j in 0..N {
+            let mut s = Series {
+                log: track.name.clone(),
+                joint: j + 1,
+                t: Vec::new(),
+                measured: Vec::new(),
+                before: Vec::new(),
+                refit: Vec::new(),
+                after: Vec::new(),
+                window_start: Vec::new(),
+            };
+            for window in data.windows.iter().filter(|w| w.track == index) {
+                s.window_start.push(s.t.len());
+                for i in (0..window.rows()).step_by(stride) {
+                    let at = (window.offset + i) * N + j;
+                    s.t.push(track.t[window.first + 1 + i]);
+                    s.measured.push(measured[at]);
+                    s.before.push(before[at]);
+                    s.refit.push(refit[at]);
+                    s.after.push(after[at]);
+                }
+            }
+            all.push(s);
+        }
+    }
+    all
 }

@@ -2,9 +2,9 @@
 
 use crate::convert::{effect_instances, matrix, vector};
 use crate::progress::with_progress;
+use crate::simulate::{Inputs, Motion};
 use armgap_core::chain::{ChainJoint, JointKind, MAX_JOINTS, PARAMETERS_PER_JOINT};
 use armgap_fit::chain::{ChainDescription, ChainRows, Quantity};
-use armgap_fit::progress::{Observer, ProgressReporter, guarded};
 use armgap_fit::simulate::Simulation;
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
@@ -327,40 +327,17 @@ impl Chain {
         tolerance: f64,
         smoothing: f64,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+    ) -> PyResult<Motion<'py>> {
         let (n, theta) = (self.joints(), self.parameters_of(Some(theta))?);
-        let t = vector(&t, "t")?;
-        let tau = matrix(&tau, "tau", t.len(), n)?;
-        let (q0, dq0) = (vector(&q0, "q0")?, vector(&dq0, "dq0")?);
-        if q0.len() != n || dq0.len() != n {
-            return Err(PyValueError::new_err(format!("`q0` and `dq0` need {n} values")));
-        }
         let effects = effect_instances(n, effects)?;
         if effects.iter().any(|effect| effect.law.tilt(&effect.p) != 0.0) {
             return Err(PyValueError::new_err(
                 "`base_tilt` is of arms that move in one vertical plane; turn the `gravity` of a chain instead",
             ));
         }
-        let (rows, description) = (t.len(), self.description.clone());
-        let (t, tau, q0, dq0) = (t.to_vec(), tau.to_vec(), q0.to_vec(), dq0.to_vec());
-        let ended = with_progress(py, progress.as_ref(), move |observer| {
-            let reporter = ProgressReporter::new(Observer::clone(observer));
-            let work = Simulation {
-                t: &t,
-                tau: &tau,
-                q0: &q0,
-                dq0: &dq0,
-                effects: &effects,
-                tolerance,
-                smoothing,
-                progress: &reporter,
-            };
-            guarded(|| description.dispatch_arm(&theta, work))
-        })?;
-        // Stopped only when this thread has left already.
-        let trajectory =
-            ended.flatten().ok_or_else(wrong_size)?.map_err(|e| PyValueError::new_err(e.to_string()))?;
-        let shape = |x: Vec<f64>| PyArray1::from_vec(py, x).reshape([rows, n]);
-        Ok((shape(trajectory.q)?, shape(trajectory.dq)?))
+        let description = self.description.clone();
+        let inputs = Inputs { t: &t, tau: &tau, start: [&q0, &dq0], effects, tolerance, smoothing };
+        let run = move |work: Simulation<'_>| description.dispatch_arm(&theta, work);
+        inputs.run(py, n, progress, run)?.ok_or_else(wrong_size)
     }
 }

@@ -3,8 +3,9 @@
 use crate::convert::{effect_instances, kind_of, matrix, vector};
 use crate::progress::with_progress;
 use armgap_fit::arm::ArmDescription;
+use armgap_fit::model::EffectInstance;
 use armgap_fit::progress::{Observer, ProgressReporter, guarded};
-use armgap_fit::simulate::{InertiaMatrices, Simulation};
+use armgap_fit::simulate::{InertiaMatrices, Simulation, SimulationError, Trajectory};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -27,40 +28,68 @@ pub fn simulate<'py>(
     tolerance: f64,
     smoothing: f64,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+) -> PyResult<Motion<'py>> {
     let kind = kind_of(kind)?;
-    let n = kind.joints();
-    let t = vector(&t, "t")?;
-    let tau = matrix(&tau, "tau", t.len(), n)?;
-    let (q0, dq0) = (vector(&q0, "q0")?, vector(&dq0, "dq0")?);
-    if q0.len() != n || dq0.len() != n {
-        return Err(PyValueError::new_err(format!("`q0` and `dq0` need {n} values")));
-    }
     let effects = effect_instances(kind.joints(), effects)?;
+    let wrong = format!("`theta` needs {} values", kind.parameters().len());
     let arm = ArmDescription::plain(kind, gravity, theta, link_length);
-    let rows = t.len();
-    let (t, tau, q0, dq0) = (t.to_vec(), tau.to_vec(), q0.to_vec(), dq0.to_vec());
-    let ended = with_progress(py, progress.as_ref(), move |observer| {
-        let reporter = ProgressReporter::new(Observer::clone(observer));
-        let work = Simulation {
-            t: &t,
-            tau: &tau,
-            q0: &q0,
-            dq0: &dq0,
-            effects: &effects,
-            tolerance,
-            smoothing,
-            progress: &reporter,
-        };
-        guarded(|| arm.dispatch(work))
-    })?;
-    // Stopped only when this thread has left already.
-    let trajectory = ended
-        .flatten()
-        .ok_or_else(|| PyValueError::new_err(format!("`theta` needs {} values", kind.parameters().len())))?
-        .map_err(|e| PyValueError::new_err(e.to_string()))?;
-    let shape = |x: Vec<f64>| PyArray1::from_vec(py, x).reshape([rows, n]);
-    Ok((shape(trajectory.q)?, shape(trajectory.dq)?))
+    let inputs = Inputs { t: &t, tau: &tau, start: [&q0, &dq0], effects, tolerance, smoothing };
+    let run = move |work: Simulation<'_>| arm.dispatch(work);
+    inputs.run(py, kind.joints(), progress, run)?.ok_or_else(|| PyValueError::new_err(wrong))
+}
+
+/// What a simulation of any arm takes.
+pub(crate) struct Inputs<'a, 'py> {
+    pub(crate) t: &'a PyReadonlyArray1<'py, f64>,
+    pub(crate) tau: &'a PyReadonlyArray2<'py, f64>,
+    /// Positions and velocities at the first sample.
+    pub(crate) start: [&'a PyReadonlyArray1<'py, f64>; 2],
+    pub(crate) effects: Vec<EffectInstance>,
+    pub(crate) tolerance: f64,
+    pub(crate) smoothing: f64,
+}
+
+/// Positions and velocities, one row per sample.
+pub(crate) type Motion<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
+impl Inputs<'_, '_> {
+    /// Simulates `n` joints by `run`; none where that refuses the arm.
+    pub(crate) fn run(
+        self,
+        py: Python<'_>,
+        n: usize,
+        progress: Option<Py<PyAny>>,
+        run: impl FnOnce(Simulation<'_>) -> Option<Result<Trajectory, SimulationError>> + Send + 'static,
+    ) -> PyResult<Option<Motion<'_>>> {
+        let t = vector(self.t, "t")?;
+        let tau = matrix(self.tau, "tau", t.len(), n)?;
+        let (q0, dq0) = (vector(self.start[0], "q0")?, vector(self.start[1], "dq0")?);
+        if q0.len() != n || dq0.len() != n {
+            return Err(PyValueError::new_err(format!("`q0` and `dq0` need {n} values")));
+        }
+        let Self { effects, tolerance, smoothing, .. } = self;
+        let rows = t.len();
+        let (t, tau, q0, dq0) = (t.to_vec(), tau.to_vec(), q0.to_vec(), dq0.to_vec());
+        let ended = with_progress(py, progress.as_ref(), move |observer| {
+            let reporter = ProgressReporter::new(Observer::clone(observer));
+            let work = Simulation {
+                t: &t,
+                tau: &tau,
+                q0: &q0,
+                dq0: &dq0,
+                effects: &effects,
+                tolerance,
+                smoothing,
+                progress: &reporter,
+            };
+            guarded(|| run(work))
+        })?;
+        // Stopped only when this thread has left already.
+        let Some(result) = ended.flatten() else { return Ok(None) };
+        let trajectory = result.map_err(|e| PyValueError::new_err(e.to_string()))?;
+        let shape = |x: Vec<f64>| PyArray1::from_vec(py, x).reshape([rows, n]);
+        Ok(Some((shape(trajectory.q)?, shape(trajectory.dq)?)))
+    }
 }
 
 /// Inertia matrices at some positions, effects included.

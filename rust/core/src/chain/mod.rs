@@ -20,7 +20,7 @@ pub use derivatives::TorqueDerivatives;
 pub use dynamics::InertiaMatrix;
 pub use inertia::{LINK_PARAMETERS, LinkInertia, point_mass};
 pub use kinematics::LinkPose;
-pub use parameters::{ChainParameter, PARAMETERS_PER_JOINT, parameter};
+pub use parameters::{ChainParameter, LINK_NAMES, PARAMETERS_PER_JOINT, parameter};
 pub use vector::{Matrix3, Twist, Vector3, Wrench};
 
 use crate::real::Real;

@@ -7,7 +7,8 @@ use core::fmt::{Display, Formatter, Result};
 /// Parameters per joint: ten of its link, the rotor's inertia, viscous and Coulomb friction.
 pub const PARAMETERS_PER_JOINT: usize = LINK_PARAMETERS + 3;
 
-const LINK: [(&str, &str); LINK_PARAMETERS] = [
+/// Name and unit of a link's ten numbers.
+pub const LINK_NAMES: [(&str, &str); LINK_PARAMETERS] = [
     ("mass", "kg"),
     ("mx", "kg m"),
     ("my", "kg m"),
@@ -46,7 +47,7 @@ impl Display for ChainParameter {
 pub fn parameter(kinds: &[JointKind], index: usize) -> Option<ChainParameter> {
     let inertial = LINK_PARAMETERS * kinds.len();
     if index < inertial {
-        let (stem, unit) = *LINK.get(index % LINK_PARAMETERS)?;
+        let (stem, unit) = *LINK_NAMES.get(index % LINK_PARAMETERS)?;
         return Some(ChainParameter { stem, number: index / LINK_PARAMETERS + 1, unit });
     }
     let j = (index - inertial).checked_rem(kinds.len())?;

@@ -3,7 +3,7 @@
 use super::intervals::{Intervals, Middle, TestFunction};
 use super::predict::turned;
 use super::rows::{JointRows, Rows, Signal};
-use super::term::{Term, TermKind, of_load};
+use super::term::{Term, TermKind, depends, of_load};
 use crate::model::EffectInstance;
 use crate::track::Track;
 use armgap_core::arm::Arm;
@@ -258,7 +258,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         let viscous = self.arm.viscous(theta)[j];
         let coulomb = self.arm.coulomb(theta)[j];
         let rigid = self.rigid(theta);
-        let needs_load = spec.name == "load_dependent_friction" || spec.name == "gear_efficiency";
+        let needs_load = depends(effect, |x, value| x.load = value);
         let (mut memory, mut before) = (0.0, None);
         let torque = |m: &Middle<N>| {
             let load =

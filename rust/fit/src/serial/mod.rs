@@ -8,11 +8,14 @@
 
 mod constants;
 mod equation;
+mod evidence;
+mod fitting;
 mod intervals;
 mod predict;
 mod regularisation;
 mod result;
 mod rows;
+mod screening;
 mod search;
 mod term;
 
@@ -206,7 +209,7 @@ fn candidates<const N: usize, const P: usize>(
             continue;
         }
         // A rotor inertia that the arm file has is one of the arm's parameters.
-        if spec.name == "rotor_inertia" && theta[10 * N + effect.joint] > 0.0 {
+        if effect.law.inertia(&effect.p) > 0.0 && theta[10 * N + effect.joint] > 0.0 {
             continue;
         }
         // Both phases are tested together, at as many cycles over the travel as test functions pass.

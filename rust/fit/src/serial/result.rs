@@ -1,18 +1,19 @@
 //! From the end of a search to the diagnosis as data.
 
 use super::constants::{CONSEQUENCE, NAMED, SIGNIFICANT};
+use super::fitting::Fitted;
 use super::predict::{Model, floor};
-use super::search::{Fitted, Found, Tested};
+use super::search::{Found, Tested};
 use super::term::{Term, TermKind};
 use super::{SerialArm, Set};
 use crate::diagnose::Options;
-use crate::gap::{DRAWN, DRAWN_LOGS, HORIZONS, closed, limited, rms, whole};
+use crate::gap::{HORIZONS, closed, free_run_series, limited, rms, whole, window_series};
 use crate::locate::Location;
 use crate::progress::{Phase, ProgressReporter};
 use crate::random::Random;
 use crate::report::{
     ArmSummary, AtHorizon, Bound, Candidate, Cause, Diagnosis, EquivalentSummary, FreeRun, FreeRunSeries,
-    Gap, LogSummary, Named, Noise, OptionSummary, Parameters, RuledOut, Series, Value,
+    Gap, LogSummary, Named, Noise, OptionSummary, Parameters, RuledOut, Value,
 };
 use crate::verdict::Evidence;
 use crate::window::Dataset;
@@ -113,7 +114,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         ranking: Vec::new(),
         stages: Vec::new(),
         regimes: Vec::new(),
-        series: series(&compared, data),
+        series: window_series(data, &compared.measured, compared.predicted.each_ref().map(Vec::as_slice)),
         free_run_series,
         noise: Noise {
             position_sigma: noise.to_vec(),
@@ -271,35 +272,6 @@ fn closed_interval<const N: usize, const P: usize>(
     [shares[RESAMPLES / 40], shares[RESAMPLES - 1 - RESAMPLES / 40]]
 }
 
-fn series<const N: usize, const P: usize>(compared: &Compared<N, P>, data: &Dataset<N>) -> Vec<Series> {
-    let mut all = Vec::new();
-    for (index, track) in data.tracks.iter().enumerate().take(DRAWN_LOGS) {
-        let stride = track.len().div_ceil(DRAWN);
-        let windows: Vec<_> = data.windows.iter().filter(|w| w.track == index).collect();
-        for j in 0..N {
-            let mut start = Vec::new();
-            let mut places = Vec::new();
-            for w in &windows {
-                start.push(places.len());
-                places
-                    .extend((0..w.rows()).step_by(stride).map(|i| (w.first + 1 + i, (w.offset + i) * N + j)));
-            }
-            let pick = |x: &[f64]| places.iter().map(|(_, at)| x[*at]).collect();
-            all.push(Series {
-                log: track.name.clone(),
-                joint: j + 1,
-                t: places.iter().map(|(k, _)| track.t[*k]).collect(),
-                measured: pick(&compared.measured),
-                before: pick(&compared.predicted[0]),
-                refit: pick(&compared.predicted[1]),
-                after: pick(&compared.predicted[2]),
-                window_start: start,
-            });
-        }
-    }
-    all
-}
-
 fn free_runs<const N: usize, const P: usize>(
     compared: &Compared<N, P>,
     data: &Dataset<N>,
@@ -307,23 +279,8 @@ fn free_runs<const N: usize, const P: usize>(
     let data = whole(data);
     let measured = data.measured();
     let [before, after] = [0, 2].map(|i| limited(&measured, &compared.models[i].predict(&data)));
-    let mut all = Vec::new();
-    for window in data.windows.iter().take(DRAWN_LOGS) {
-        let track = &data.tracks[window.track];
-        let rows: Vec<usize> = (0..window.rows()).step_by(window.rows().div_ceil(DRAWN)).collect();
-        for j in 0..N {
-            let pick = |x: &[f64]| rows.iter().map(|i| x[(window.offset + i) * N + j]).collect();
-            all.push(FreeRunSeries {
-                log: track.name.clone(),
-                joint: j + 1,
-                t: rows.iter().map(|i| track.t[i + 1]).collect(),
-                measured: pick(&measured),
-                before: pick(&before),
-                after: pick(&after),
-            });
-        }
-    }
-    (all, FreeRun { before: rms::<N>(&measured, &before), after: rms::<N>(&measured, &after) })
+    let run = FreeRun { before: rms::<N>(&measured, &before), after: rms::<N>(&measured, &after) };
+    (free_run_series(&data, &measured, [&before, &after]), run)
 }
 
 /// Status of every place that is not in the model.

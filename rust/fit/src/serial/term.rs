@@ -1,6 +1,7 @@
 //! Terms that a serial arm's model may lack: the library's laws joint by joint, and what changes the arm itself.
 
 use crate::model::EffectInstance;
+use armgap_core::chain::LINK_NAMES;
 use armgap_core::effect::{JointPoint, Quantity, Scope, Trial};
 
 /// A term with values for its parameters.
@@ -40,18 +41,6 @@ pub struct TermParameter {
 
 const LOAD: [(&str, &str); 4] = [("mass", "kg"), ("com_x", "m"), ("com_y", "m"), ("com_z", "m")];
 const TURN: [(&str, &str); 2] = [("x", "rad"), ("y", "rad")];
-const LINK: [(&str, &str); 10] = [
-    ("mass", "kg"),
-    ("mx", "kg m"),
-    ("my", "kg m"),
-    ("mz", "kg m"),
-    ("ixx", "kg m^2"),
-    ("ixy", "kg m^2"),
-    ("iyy", "kg m^2"),
-    ("ixz", "kg m^2"),
-    ("iyz", "kg m^2"),
-    ("izz", "kg m^2"),
-];
 
 impl Term {
     /// A law at its initial guess.
@@ -65,7 +54,7 @@ impl Term {
             TermKind::Law(effect) => effect.len(),
             TermKind::Payload => LOAD.len(),
             TermKind::BaseTilt => TURN.len(),
-            TermKind::NominalLink(_) => LINK.len(),
+            TermKind::NominalLink(_) => LINK_NAMES.len(),
         };
         Self { kind, p: vec![0.0; count] }
     }
@@ -131,7 +120,7 @@ impl Term {
                 all
             }
             TermKind::BaseTilt => TURN.iter().map(free).collect(),
-            TermKind::NominalLink(_) => LINK.iter().map(free).collect(),
+            TermKind::NominalLink(_) => LINK_NAMES.iter().map(free).collect(),
         }
     }
 
@@ -150,7 +139,7 @@ impl Term {
             }
             TermKind::Payload => 0,
             TermKind::BaseTilt => TURN.len(),
-            TermKind::NominalLink(_) => LINK.len(),
+            TermKind::NominalLink(_) => LINK_NAMES.len(),
         }
     }
 
@@ -162,19 +151,14 @@ impl Term {
     /// Whether it changes the torque that a command becomes at the joint: of the command itself, or by a torque that depends on it.
     pub fn changes_command(&self) -> bool {
         let TermKind::Law(effect) = self.kind else { return false };
-        let x = |tau| JointPoint {
-            t: 1.0,
-            q: 0.1,
-            dq: 1.0,
-            tau,
-            load: 0.0,
-            friction: 1.0,
-            other: 1.0,
-            memory: 0.0,
-        };
-        let torque = |tau| effect.law.force(&effect.p, &x(tau)) - effect.law.coulomb(&effect.p, &x(tau), 1.0);
-        let hooks = effect.law.spec().hooks;
-        hooks.command || ((hooks.force || hooks.coulomb) && torque(1.0) != torque(2.0))
+        effect.law.spec().hooks.command || depends(&effect, |x, value| x.tau = value)
+    }
+
+    /// Whether it delays the command: a time is all that it has.
+    pub fn is_delay(&self) -> bool {
+        let TermKind::Law(effect) = self.kind else { return false };
+        let spec = effect.law.spec();
+        spec.hooks.command && spec.parameters.iter().all(|p| p.quantity == Quantity::Time)
     }
 
     /// This term with other values.
@@ -190,6 +174,25 @@ impl Term {
         }
         Some(effect)
     }
+}
+
+/// Whether a law's torque depends on what `set` changes of the joint's state.
+pub fn depends(effect: &EffectInstance, set: impl Fn(&mut JointPoint<f64>, f64)) -> bool {
+    let torque = |value: f64| {
+        let mut x = JointPoint {
+            t: 1.0,
+            q: 0.1,
+            dq: 1.0,
+            tau: 0.5,
+            load: 0.5,
+            friction: 1.0,
+            other: 1.0,
+            memory: 0.0,
+        };
+        set(&mut x, value);
+        effect.law.force(&effect.p, &x) - effect.law.coulomb(&effect.p, &x, 1.0)
+    };
+    torque(1.0) != torque(2.0)
 }
 
 /// Change of the last link's ten numbers under a point mass at `p = (mass, x, y, z)`: mass, first moments, inertia about the link's origin

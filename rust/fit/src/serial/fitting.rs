@@ -1,0 +1,207 @@
+//! A model with terms, fitted to the training logs and judged on the holdout.
+
+use super::constants::{ENOUGH, ITERATIONS, LOOSE};
+use super::rows::{Estimate, Regression, Signal, sum};
+use super::search::{Motion, Search};
+use super::term::{Term, TermKind};
+use rayon::prelude::*;
+
+/// Relative step of numerical derivatives of a term's torque.
+const STEP: f64 = 1e-3;
+
+/// A model with terms, fitted to the training logs and judged on the holdout.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// Its terms.
+    pub terms: Vec<Term>,
+    /// Parameters and what they leave of the training logs.
+    pub estimate: Estimate,
+    /// Weighted squared residuals by joint and block: training, holdout.
+    pub costs: [Vec<Vec<f64>>; 2],
+}
+
+impl Fitted {
+    pub(super) fn holdout_cost(&self) -> f64 {
+        self.costs[1].iter().flatten().sum()
+    }
+
+    /// What ranks models: cost of training logs, prior and holdout, and the price of its parameters.
+    pub(super) fn total(&self) -> f64 {
+        let parameters: usize = self.terms.iter().map(|t| t.p.len()).sum();
+        self.estimate.cost + self.holdout_cost() + 2.0 * parameters as f64
+    }
+}
+
+impl Search<'_> {
+    /// Torques of all terms together.
+    pub(super) fn beside(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Signal {
+        if terms.is_empty() {
+            return vec![None; self.rotary.len()];
+        }
+        let signals: Vec<Signal> = terms.iter().map(|t| motion.signal(t, theta)).collect();
+        sum(motion.rows(), &signals)
+    }
+
+    /// Fits the arm's parameters and those of all terms to the training logs (variable projection, Golub and Pereyra 1973), and judges them on
+    /// the holdout.
+    pub fn fit(&self, regression: &Regression, terms: Vec<Term>, theta: &[f64]) -> Fitted {
+        self.progress.check();
+        let mut terms = terms;
+        let mut estimate = self.estimated(regression, &terms, theta);
+        for _ in 0..ITERATIONS {
+            if terms.is_empty() {
+                break;
+            }
+            let theta = estimate.theta.clone();
+            let columns = self.derivatives(&terms, &theta);
+            let Some(score) = regression.score(&estimate, &columns, &self.ridge(&terms)) else { break };
+            let mut better = None;
+            for part in [1.0, 0.5, 0.2, 0.05] {
+                let moved = self.moved(&terms, &score.size, part);
+                let there = self.estimated(regression, &moved, &theta);
+                if there.cost < estimate.cost {
+                    better = Some((moved, there));
+                    break;
+                }
+            }
+            let Some((moved, there)) = better else { break };
+            let fell = estimate.cost - there.cost;
+            let is_enough = fell < ENOUGH * estimate.cost;
+            (terms, estimate) = (moved, there);
+            if is_enough {
+                break;
+            }
+        }
+        let beside = self.beside(self.holdout, &terms, &estimate.theta);
+        let held = self.holdout.rows().residual(&estimate.theta, &beside);
+        let scaled = |motion: &dyn Motion, residual: &[Vec<f64>]| {
+            let mut costs = motion.rows().costs(&regression.weights, residual);
+            for (costs, scale) in costs.iter_mut().zip(self.scales(motion, &terms, &estimate.theta)) {
+                for cost in costs {
+                    *cost *= scale;
+                }
+            }
+            costs
+        };
+        let costs = [scaled(self.training, &estimate.residual), scaled(self.holdout, &held)];
+        Fitted { terms, estimate, costs }
+    }
+
+    /// Parameters beside these terms, and the cost in units of the torque that reaches the joints.
+    pub(super) fn estimated(&self, regression: &Regression, terms: &[Term], theta: &[f64]) -> Estimate {
+        let mut estimate = regression.estimate(&self.beside(self.training, terms, theta));
+        let scales = self.scales(self.training, terms, &estimate.theta);
+        if scales.iter().any(|scale| *scale != 1.0) {
+            let data = |(j, r): (usize, &Vec<f64>)| {
+                scales[j] * regression.weights[j] * r.iter().map(|r| r * r).sum::<f64>()
+            };
+            estimate.cost = estimate.prior_cost + estimate.residual.iter().enumerate().map(data).sum::<f64>();
+        }
+        estimate
+    }
+
+    /// By joint, the factor between squared residuals with these terms and without, for terms that change what a command becomes: what they leave
+    /// is to be seen beside the torque that reaches the joint, and beside the inertia that it moves. A term that makes torques smaller, and with them
+    /// all parameters, makes what stays of them smaller too, and explains nothing by that.
+    pub(super) fn scales(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Vec<f64> {
+        let mut scales = vec![1.0; self.rotary.len()];
+        let changing: Vec<Signal> =
+            terms.iter().filter(|t| t.changes_command()).map(|t| motion.signal(t, theta)).collect();
+        if changing.is_empty() {
+            return scales;
+        }
+        let square = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>();
+        let moved = [&self.prior.theta[..], theta].map(|theta| motion.inertia(theta));
+        for (j, signal) in sum(motion.rows(), &changing).iter().enumerate() {
+            let Some(signal) = signal else { continue };
+            let y = &motion.rows().joints[j].y;
+            let reaching = square(&mut y.iter().zip(signal).map(|(y, s)| y - s));
+            let torque = square(&mut y.iter().copied()) / reaching.max(f64::MIN_POSITIVE);
+            let inertia = (moved[0][j] / moved[1][j]).powi(2);
+            scales[j] = if inertia.is_finite() { torque.max(inertia) } else { torque };
+        }
+        scales
+    }
+
+    pub(super) fn rotary_of(&self, term: &Term) -> bool {
+        term.joint().is_none_or(|j| self.rotary[j - 1])
+    }
+
+    /// Terms moved by part of a step, within their bounds.
+    pub(super) fn moved(&self, terms: &[Term], step: &[f64], part: f64) -> Vec<Term> {
+        let mut rest = step.iter();
+        terms
+            .iter()
+            .map(|term| {
+                let bounds = term.parameters(self.rotary_of(term));
+                let p = term
+                    .p
+                    .iter()
+                    .zip(&bounds)
+                    .map(|(p, b)| {
+                        let by = part * rest.next().copied().unwrap_or(0.0);
+                        // A shape or a threshold changes by no more than a factor of two in one step.
+                        let by =
+                            if *p == 0.0 || b.neutral == 0.0 && p.abs() < by.abs() && term.amplitudes() > 0 {
+                                by
+                            } else if term.amplitudes() == 0 && p.abs() > 0.0 {
+                                by.clamp(-0.5 * p.abs(), p.abs())
+                            } else {
+                                by
+                            };
+                        (p + by).clamp(b.bounds[0], b.bounds[1])
+                    })
+                    .collect();
+                term.with(p)
+            })
+            .collect()
+    }
+
+    /// Derivatives of the terms' torques by all their parameters.
+    pub(super) fn derivatives(&self, terms: &[Term], theta: &[f64]) -> Vec<Signal> {
+        let places: Vec<(usize, usize)> =
+            terms.iter().enumerate().flat_map(|(i, t)| (0..t.p.len()).map(move |k| (i, k))).collect();
+        places
+            .par_iter()
+            .map(|&(i, k)| {
+                let term = &terms[i];
+                let step = STEP * if term.p[k] == 0.0 { 1.0 } else { term.p[k].abs() };
+                let at = |sign: f64| {
+                    let mut p = term.p.clone();
+                    p[k] += sign * step;
+                    self.training.signal(&term.with(p), theta)
+                };
+                difference(&at(1.0), &at(-1.0), 2.0 * step)
+            })
+            .collect()
+    }
+
+    /// Precision that holds what motion does not tell of the values of these terms.
+    pub(super) fn ridge(&self, terms: &[Term]) -> Vec<f64> {
+        terms.iter().flat_map(|term| self.ridge_of(term, term.p.len())).collect()
+    }
+
+    /// The same of one term with so many columns: of a link's ten numbers by the arm file's trust in them, of laws none.
+    pub(super) fn ridge_of(&self, term: &Term, columns: usize) -> Vec<f64> {
+        match term.kind {
+            TermKind::NominalLink(link) => {
+                let sigma = &self.prior.sigma[10 * link..];
+                (0..columns).map(|i| if sigma[i] > 0.0 { (LOOSE * sigma[i]).powi(-2) } else { 0.0 }).collect()
+            }
+            _ => vec![0.0; columns],
+        }
+    }
+}
+
+/// Difference of two signals over a step.
+fn difference(a: &Signal, b: &Signal, step: f64) -> Signal {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| match (a, b) {
+            (Some(a), Some(b)) => Some(a.iter().zip(b).map(|(a, b)| (a - b) / step).collect()),
+            (Some(a), None) => Some(a.iter().map(|a| a / step).collect()),
+            (None, Some(b)) => Some(b.iter().map(|b| -b / step).collect()),
+            (None, None) => None,
+        })
+        .collect()
+}

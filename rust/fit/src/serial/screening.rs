@@ -1,0 +1,152 @@
+//! First-order tests of all candidates, and fits of those that pass.
+
+use super::constants::{FINALISTS, PRICE};
+use super::fitting::Fitted;
+use super::rows::{Estimate, Regression, Signal};
+use super::search::Search;
+use super::term::{Term, TermKind};
+use crate::progress::Phase;
+use armgap_core::effect::Trial;
+use rayon::prelude::*;
+
+/// A first-order test is not trusted farther than so many initial guesses.
+const FARTHEST: f64 = 50.0;
+
+/// A term at an initial guess with the torques of its first-order test, along the training logs.
+pub struct Guess {
+    pub(super) term: Term,
+    pub(super) columns: Vec<Signal>,
+}
+
+impl Search<'_> {
+    /// Every candidate at every initial guess with the torques that test it.
+    pub(super) fn guesses(&self, theta: &[f64]) -> Vec<Vec<Guess>> {
+        let columns = |term: &Term| -> Vec<Signal> {
+            match term.kind {
+                TermKind::Payload => {
+                    let link = Term::neutral(TermKind::NominalLink(self.rotary.len() - 1));
+                    (0..term.p.len()).map(|i| self.unit(&link, i, theta)).collect()
+                }
+                TermKind::Law(effect) if effect.is_periodic() => {
+                    let at =
+                        |phase: f64| self.training.signal(&term.with(vec![1.0, term.p[1], phase]), theta);
+                    vec![at(0.0), at(std::f64::consts::FRAC_PI_2)]
+                }
+                _ if term.amplitudes() == 0 => vec![self.training.signal(term, theta)],
+                _ => (0..term.amplitudes()).map(|i| self.unit(term, i, theta)).collect(),
+            }
+        };
+        let guess = |term: &Term| Guess { term: term.clone(), columns: columns(term) };
+        self.candidates.par_iter().map(|group| group.iter().map(guess).collect()).collect()
+    }
+
+    /// Tests a term to first order; returns it with the values that the test suggests, and the decrease of the cost.
+    pub(super) fn test(&self, regression: &Regression, at: &Estimate, guess: &Guess) -> Option<(Term, f64)> {
+        let term = &guess.term;
+        let bounds = term.parameters(self.rotary_of(term));
+        let within = |p: &[f64]| p.iter().zip(&bounds).all(|(p, b)| *p >= b.bounds[0] && *p <= b.bounds[1]);
+        let score = regression.score(at, &guess.columns, &self.ridge_of(term, guess.columns.len()))?;
+        if let TermKind::Payload = term.kind {
+            let mass = score.size[0];
+            let p: Vec<f64> =
+                score.size.iter().enumerate().map(|(i, x)| if i == 0 { *x } else { x / mass }).collect();
+            return (mass > 0.0).then(|| (term.with(p), score.gain));
+        }
+        if matches!(term.kind, TermKind::Law(effect) if effect.is_periodic()) {
+            let (sine, cosine) = (score.size[0], score.size[1]);
+            return Some((term.with(vec![sine.hypot(cosine), term.p[1], cosine.atan2(sine)]), score.gain));
+        }
+        let count = term.amplitudes();
+        if count > 0 {
+            let mut p = term.p.clone();
+            for i in 0..count {
+                p[i] = bounds[i].neutral + score.size[i];
+            }
+            return within(&p).then(|| (term.with(p), score.gain));
+        }
+        let TermKind::Law(effect) = term.kind else { return None };
+        let size = score.size[0];
+        let information = score.gain / (size * size).max(f64::MIN_POSITIVE);
+        let (p, size) = match effect.law.spec().trial {
+            // A threshold has no small version of itself.
+            Trial::Whole => (term.p.clone(), 1.0),
+            Trial::Ray => {
+                let share = size.clamp(0.0, FARTHEST);
+                (term.p.iter().map(|p| p * share).collect(), share)
+            }
+            _ => {
+                let neutral = bounds[0].neutral;
+                let mut p = term.p.clone();
+                p[0] = (neutral + size.clamp(-FARTHEST, FARTHEST) * (p[0] - neutral))
+                    .clamp(bounds[0].bounds[0], bounds[0].bounds[1]);
+                let share = (p[0] - neutral) / (term.p[0] - neutral);
+                (p, share)
+            }
+        };
+        let mut gain = (2.0 * score.size[0] - size) * size * information;
+        let term = term.with(p);
+        if term.changes_command() {
+            let j = effect.joint;
+            let before = regression.weights[j] * at.residual[j].iter().map(|r| r * r).sum::<f64>();
+            gain = before
+                - (before - gain) * self.scales(self.training, std::slice::from_ref(&term), &at.theta)[j];
+        }
+        (gain > 0.0 && within(&term.p)).then_some((term, gain))
+    }
+
+    /// Torque per unit of one amplitude, the others switched off.
+    pub(super) fn unit(&self, term: &Term, amplitude: usize, theta: &[f64]) -> Signal {
+        let neutral = term.parameters(self.rotary_of(term));
+        let mut p = term.p.clone();
+        for (i, value) in p.iter_mut().enumerate().take(term.amplitudes()) {
+            *value = neutral[i].neutral + if i == amplitude { 1.0 } else { 0.0 };
+        }
+        self.training.signal(&term.with(p), theta)
+    }
+
+    /// Best initial guess of every place that is not in the model, best first.
+    pub(super) fn screened(
+        &self,
+        guesses: &[Vec<Guess>],
+        regression: &Regression,
+        model: &Fitted,
+    ) -> Vec<(Term, f64)> {
+        let open: Vec<&Vec<Guess>> = guesses
+            .iter()
+            .filter(|group| !model.terms.iter().any(|t| group.first().is_some_and(|g| g.term.same_place(t))))
+            .collect();
+        self.progress.begin(Phase::Screen, open.len());
+        let mut found: Vec<(Term, f64)> = open
+            .par_iter()
+            .filter_map(|group| {
+                self.progress.unit();
+                let tests = group.iter().filter_map(|guess| self.test(regression, &model.estimate, guess));
+                tests.max_by(|a, b| a.1.total_cmp(&b.1))
+            })
+            .filter(|(_, gain)| gain.is_finite())
+            .collect();
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        found
+    }
+
+    /// Models with one more term each, fitted: the finalists of the screening.
+    pub(super) fn finalists(
+        &self,
+        regression: &Regression,
+        model: &Fitted,
+        screened: &[(Term, f64)],
+    ) -> Vec<Fitted> {
+        let worth = |(term, gain): &&(Term, f64)| *gain > PRICE + 2.0 * term.p.len() as f64;
+        let wanted: Vec<&(Term, f64)> = screened.iter().filter(worth).take(FINALISTS).collect();
+        self.progress.begin(Phase::Candidates, wanted.len());
+        wanted
+            .par_iter()
+            .map(|(term, _)| {
+                self.progress.unit();
+                let mut terms = model.terms.clone();
+                terms.push(term.clone());
+                self.fit(regression, terms, &model.estimate.theta)
+            })
+            .collect()
+    }
+}
