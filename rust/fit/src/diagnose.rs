@@ -45,13 +45,23 @@ pub struct Options {
     /// Half width of the test functions of a serial arm's equation of motion, s; none for the usual one. Logs that were low-passed before they were
     /// written ask for one that is wider than that filter.
     pub half_width: Option<f64>,
+    /// Whether the unit of a serial arm's torques is known by itself. Where it was taken from the arm file's masses, logs cannot say that one of these
+    /// is wrong too: loads, wrong links and gains are no candidates.
+    pub known_units: bool,
     /// Joints, from 0, of the custom effects; their torques lie in the logs' tables.
     pub custom_effects: Vec<usize>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { horizon: 0.25, max_causes: 4, seed: 1, half_width: None, custom_effects: Vec::new() }
+        Self {
+            horizon: 0.25,
+            max_causes: 4,
+            seed: 1,
+            half_width: None,
+            known_units: true,
+            custom_effects: Vec::new(),
+        }
     }
 }
 

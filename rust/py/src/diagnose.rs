@@ -84,6 +84,9 @@ pub fn diagnose(
     if let Some(value) = options.get_item("half_width")? {
         chosen.half_width = value.extract()?;
     }
+    if let Some(value) = options.get_item("known_units")? {
+        chosen.known_units = value.extract()?;
+    }
     if let Some(value) = options.get_item("own")? {
         chosen.custom_effects = value.extract()?;
     }

@@ -23,15 +23,12 @@ const FEWEST_PERIODS: f64 = 5.0;
 /// Distance between test functions, in half widths.
 const SPACING: f64 = 0.5;
 
-/// A joint moves where positions differ by more than so many standard deviations of their difference; at rest dry friction is a bound and no datum.
+/// A joint is at rest where its velocity is below so many of its standard deviations; dry friction then is a bound and no datum.
 const AT_REST: f64 = 3.0;
 
 /// A joint slower than this share of its RMS speed is at rest too: it may creep, before it slides, under a torque below its Coulomb level. A reversal at
 /// a tenth of the largest acceleration is as slow as that for some milliseconds.
 const SLOW: f64 = 0.01;
-
-/// Samples on either side over which positions are compared before a joint is taken to be at rest.
-const LONGEST_DIFFERENCE: usize = 12;
 
 /// The time between two samples in so many periods ends a stretch.
 const GAP: f64 = 3.5;
@@ -55,23 +52,6 @@ pub struct Middle<const N: usize> {
     pub rest: [bool; N],
 }
 
-/// Velocity of a joint in the middle of an interval from the fewest samples around it that differ by more than noise; none where the joint is at
-/// rest.
-///
-/// Beside a reversal local cubics smooth the jump of the acceleration and cross zero too early or too late, which looks like a torque that is late;
-/// the shortest difference that is sure of its sign does not.
-fn shortest_difference<const N: usize>(track: &Track<N>, j: usize, k: usize) -> Option<f64> {
-    let (last, sure) = (track.len() - 1, AT_REST * track.noise[j] * std::f64::consts::SQRT_2);
-    for reach in 0..=LONGEST_DIFFERENCE {
-        let (from, to) = (k.saturating_sub(reach), (k + 1 + reach).min(last));
-        let moved = track.q[to][j] - track.q[from][j];
-        if moved.abs() > sure {
-            return Some(moved / (track.t[to] - track.t[from]));
-        }
-    }
-    None
-}
-
 /// A log's intervals.
 #[derive(Debug, Clone)]
 pub struct Intervals<const N: usize> {
@@ -92,18 +72,19 @@ impl<const N: usize> Intervals<N> {
         });
         let middle = |k: usize| -> Middle<N> {
             let h = track.t[k + 1] - track.t[k];
-            let shortest: [Option<f64>; N] = std::array::from_fn(|j| shortest_difference(track, j, k));
+            let (a, b) = (&smoothed[k], &smoothed[k + 1]);
+            let dq: [f64; N] = std::array::from_fn(|j| 0.5 * (a[j].local.dq + b[j].local.dq));
             Middle {
                 t: 0.5 * (track.t[k] + track.t[k + 1]) - begin,
                 h,
                 q: std::array::from_fn(|j| 0.5 * (track.q[k][j] + track.q[k + 1][j])),
-                dq: std::array::from_fn(|j| {
-                    let smooth = 0.5 * (smoothed[k][j].local.dq + smoothed[k + 1][j].local.dq);
-                    shortest[j].map_or(0.0, |dq| if dq * smooth > 0.0 { smooth } else { dq })
-                }),
+                dq,
                 mean_dq: std::array::from_fn(|j| (track.q[k + 1][j] - track.q[k][j]) / h),
                 tau: std::array::from_fn(|j| track.held[k][j].mean()),
-                rest: std::array::from_fn(|j| shortest[j].is_none_or(|dq| dq.abs() < slow[j])),
+                rest: std::array::from_fn(|j| {
+                    let deviation = track.noise[j] * a[j].local.covariance[2].sqrt();
+                    dq[j].abs() < slow[j].max(AT_REST * deviation)
+                }),
             }
         };
         Self { middles: (0..track.len().saturating_sub(1)).map(middle).collect(), noise: track.noise }

@@ -155,7 +155,7 @@ impl Request<'_> {
             training: &training.equation,
             holdout: &holdout.equation,
             prior: &prior,
-            candidates: candidates(&arm, &theta, &training.data.tracks),
+            candidates: candidates(&arm, &theta, &training.data.tracks, self.options.known_units),
             rotary: self.arm.rotary(),
             period: training.data.tracks.first().map_or(0.0, Track::period),
             is_feasible: &is_feasible,
@@ -198,6 +198,7 @@ fn candidates<const N: usize, const P: usize>(
     arm: &Chain<f64, N>,
     theta: &[f64; P],
     tracks: &[Track<N>],
+    known_units: bool,
 ) -> Vec<Vec<Term>> {
     let gravity = arm.gravity_vector().iter().map(|g| g * g).sum::<f64>().sqrt();
     let scales = Scales::new(arm, theta, tracks, gravity, None);
@@ -223,15 +224,20 @@ fn candidates<const N: usize, const P: usize>(
             continue;
         }
         let term = Term::of_law(effect);
+        if !known_units && term.is_gain() {
+            continue;
+        }
         match groups.iter_mut().find(|group| group[0].same_place(&term)) {
             Some(group) => group.push(term),
             None => groups.push(vec![term]),
         }
     }
-    groups.push(vec![Term::neutral(TermKind::Payload)]);
     if gravity > 0.0 {
         groups.push(vec![Term::neutral(TermKind::BaseTilt)]);
     }
-    groups.extend((0..N).map(|link| vec![Term::neutral(TermKind::NominalLink(link))]));
+    if known_units {
+        groups.push(vec![Term::neutral(TermKind::Payload)]);
+        groups.extend((0..N).map(|link| vec![Term::neutral(TermKind::NominalLink(link))]));
+    }
     groups
 }

@@ -1,4 +1,4 @@
-//! Which terms a serial arm's model lacks: added one after another, swapped for rivals, dropped when idle.
+//! Which terms a serial arm's model lacks: added one after another, dropped when idle.
 
 use super::constants::{ALIKE, ALIKE_COST, ARM_WIDE, NAMED};
 use super::evidence::{Evidence, consequence, stability, trust};
@@ -98,7 +98,6 @@ impl Search<'_> {
             let beside = self.beside(self.training, &terms, &model.estimate.theta);
             regression = Regression::reweighted(self.training.rows(), self.prior, &beside);
             model = self.without_idle(&regression, self.fit(&regression, terms, &model.estimate.theta));
-            model = self.swapped(&guesses, &regression, model);
         }
         if model.terms.iter().any(|term| self.is_sampling(term)) {
             let kept = model.terms.iter().filter(|term| !self.is_sampling(term)).cloned().collect();
@@ -184,31 +183,6 @@ impl Search<'_> {
                 index += 1;
             } else {
                 model = without;
-            }
-        }
-        model
-    }
-
-    /// Puts a rival in the place of a term where the others beside it leave less.
-    fn swapped(&self, guesses: &[Vec<Guess>], regression: &Regression, model: Fitted) -> Fitted {
-        let mut model = model;
-        for index in 0..model.terms.len() {
-            if model.terms.len() < 2 {
-                break;
-            }
-            let without = self.without(regression, &model, index);
-            let screened = self.screened(guesses, regression, &without);
-            let last = without.terms.len();
-            let rival = self
-                .finalists(regression, &without, &screened)
-                .into_iter()
-                .filter(|with| self.is_accepted(regression, [&without, with], last))
-                .min_by(|a, b| a.total().total_cmp(&b.total()));
-            if let Some(rival) = rival
-                && rival.total() < model.total() - ALIKE_COST
-                && !rival.terms[last].same_place(&model.terms[index])
-            {
-                model = rival;
             }
         }
         model

@@ -154,6 +154,13 @@ impl Term {
         effect.law.spec().hooks.command || depends(&effect, |x, value| x.tau = value)
     }
 
+    /// Whether it is a factor on the command.
+    pub fn is_gain(&self) -> bool {
+        let TermKind::Law(effect) = self.kind else { return false };
+        let spec = effect.law.spec();
+        spec.hooks.command && spec.parameters.iter().all(|p| p.quantity == Quantity::Ratio)
+    }
+
     /// Whether it delays the command: a time is all that it has.
     pub fn is_delay(&self) -> bool {
         let TermKind::Law(effect) = self.kind else { return false };
