@@ -207,9 +207,10 @@ def simulate(
     samples, n = reference.q.shape
     model = truth.model()
     data = mujoco.MjData(model)
-    # At rest where the encoders show the reference.
-    data.qpos[:] = 2 * reference.q[0] - effect.reading(reference.q[0])
+    # At rest where the encoders show the reference, after drives have held it.
     side = _Nominal(nominal)
+    effect.begin(side.command(controller, reference, 0, reference.q[0], np.zeros(n), truth.effort))
+    data.qpos[:] = 2 * reference.q[0] - effect.reading(reference.q[0])
     out = {name: np.empty((samples, n)) for name in ("q", "tau", "true_q", "true_dq", "true_ddq", "applied")}
     steps = round(period / STEP)
     forget = 1.0 - math.exp(-TURN * _VELOCITY_HZ * period)
@@ -223,8 +224,6 @@ def simulate(
         command = side.command(controller, reference, k, shown, speed, truth.effort)
         out["q"][k], out["tau"][k] = shown, command
         out["true_q"][k], out["true_dq"][k] = data.qpos, data.qvel
-        if k == 0:
-            effect.begin(command)
         for i in range(steps):
             now = effect.drive(command)
             moment = Moment(k * period + i * STEP, data.qpos, data.qvel, now, load)

@@ -7,9 +7,9 @@ pub const SIGNIFICANT: f64 = 25.0;
 /// Decrease of the training cost, per parameter, that pays for it: twice the logarithm of some hundred candidates.
 pub const PRICE: f64 = 12.0;
 
-/// Standard deviations by which the cost of the holdout's blocks has to fall on average. A dozen blocks of which some hold little of an effect scatter
-/// so much that 2 refuses effects of a tenth of the torque.
-pub const HOLDOUT_DEVIATIONS: f64 = 1.5;
+/// Standard deviations by which the size that the holdout gives a term differs from zero: one false term in 700 passes by chance, after the
+/// training logs let it pass.
+pub const HOLDOUT_DEVIATIONS: f64 = 3.0;
 
 /// Share of what one joint's holdout rows leave that a term has to take.
 pub const MATTERS: f64 = 0.1;
@@ -38,7 +38,7 @@ pub const ALIKE_COST: f64 = 4.0;
 pub const FINALISTS: usize = 8;
 
 /// Iterations of a fit at most, and the relative decrease of the cost that ends it.
-pub const ITERATIONS: usize = 6;
+pub const ITERATIONS: usize = 12;
 
 /// See [`ITERATIONS`].
 pub const ENOUGH: f64 = 1e-3;

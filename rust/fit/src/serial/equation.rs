@@ -4,6 +4,7 @@ use super::intervals::{Intervals, Middle, TestFunction};
 use super::predict::turned;
 use super::rows::{JointRows, Rows, Signal};
 use super::term::{Term, TermKind, depends, of_load};
+use super::transmission::Computed;
 use crate::model::EffectInstance;
 use crate::track::Track;
 use armgap_core::arm::Arm;
@@ -40,6 +41,8 @@ pub struct Equation<const N: usize, const P: usize> {
     functions: Vec<TestFunction>,
     /// Test functions of each joint's rows.
     kept: Vec<Vec<usize>>,
+    /// Torques of transmissions.
+    pub(super) computed: Computed<P>,
 }
 
 /// Torques per interval of every log on the joints that a term acts on.
@@ -59,6 +62,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             held: tracks.iter().map(|t| t.held.clone()).collect(),
             functions,
             kept: Vec::new(),
+            computed: Computed::default(),
         };
         equation.kept = (0..N).map(|j| equation.moving(j)).collect();
         equation.rows = equation.all_rows(theta);
@@ -191,6 +195,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             TermKind::Payload => self.of_link(N - 1, &of_load(&term.p)),
             TermKind::NominalLink(link) => self.of_link(link, &std::array::from_fn(|i| term.p[i])),
             TermKind::BaseTilt => self.of_tilt(&term.p, theta),
+            TermKind::Transmission(law) => self.of_transmission(&law, term.p[0], theta),
         }
     }
 
@@ -315,12 +320,17 @@ impl<const N: usize, const P: usize> Equation<N, P> {
                 log.middles.par_iter().map(at).collect()
             })
             .collect();
+        self.weak_parts(&differences)
+    }
+
+    /// Rows of a change of the momentum and of the rest of the torque, interval by interval.
+    pub(super) fn weak_parts(&self, changes: &[Vec<[SVector<f64, N>; 2]>]) -> Signal {
         let joint = |joint: usize| {
             let row = |i: &usize| {
                 let phi = &self.functions[*i];
                 let log = &self.logs[phi.log];
                 let part = |k: usize| {
-                    let ([momentum, rest], m) = (&differences[phi.log][k], &log.middles[k]);
+                    let ([momentum, rest], m) = (&changes[phi.log][k], &log.middles[k]);
                     phi.weight(m) * rest[joint] - phi.rise(m) * momentum[joint]
                 };
                 phi.reach().map(part).sum()
@@ -328,6 +338,11 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             Some(self.kept[joint].iter().map(row).collect())
         };
         (0..N).map(joint).collect()
+    }
+
+    /// The logs, interval by interval.
+    pub(super) fn logs(&self) -> &[Intervals<N>] {
+        &self.logs
     }
 
     /// Mean inertia of every joint along the logs.
@@ -363,7 +378,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// Momentum, and the rest of the torque: `C dq + g - dM/dt dq` and friction.
-    fn parts(&self, m: &Middle<N>, theta: &[f64; P]) -> [SVector<f64, N>; 2] {
+    pub(super) fn parts(&self, m: &Middle<N>, theta: &[f64; P]) -> [SVector<f64, N>; 2] {
         let (q, dq) = (SVector::from(m.q), SVector::from(m.dq));
         let momentum = self.arm.inertia(theta, &q) * SVector::from(m.mean_dq);
         let ahead = self.arm.inertia(theta, &(q + dq * RATE_STEP)) * dq;
@@ -373,7 +388,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         [momentum, bias - (ahead - behind) / (2.0 * RATE_STEP) + friction]
     }
 
-    fn rigid(&self, theta: &[f64; P]) -> RigidArm<f64, Chain<f64, N>, N, P> {
+    pub(super) fn rigid(&self, theta: &[f64; P]) -> RigidArm<f64, Chain<f64, N>, N, P> {
         RigidArm {
             arm: self.arm,
             theta: *theta,

@@ -11,8 +11,8 @@ use crate::random::Random;
 /// What speaks for a term: the model with it against the model without.
 #[derive(Debug, Clone, Copy)]
 pub struct Evidence {
-    /// Number of its parameters.
-    pub parameters: usize,
+    /// Effective number of its parameters.
+    pub parameters: f64,
     /// Decrease of the training cost, prior included.
     pub gain: f64,
     /// Of it, decrease of the distance from the prior.
@@ -21,7 +21,7 @@ pub struct Evidence {
     pub statistic: f64,
     /// Decrease of the holdout's cost.
     pub holdout_gain: f64,
-    /// Its mean over blocks in standard deviations.
+    /// Size that the holdout gives the term, one being the training logs' (see [`Search::evidence`]), in its standard deviations.
     pub deviations: f64,
     /// Largest share of one joint's holdout cost that it takes.
     pub share: f64,
@@ -33,7 +33,8 @@ impl Evidence {
     /// Whether the logs ask for the term by what it explains.
     pub fn explains(&self) -> bool {
         self.statistic > SIGNIFICANT
-            && self.gain > PRICE * self.parameters as f64
+            && self.gain > PRICE * self.parameters
+            && self.holdout_gain > 0.0
             && self.deviations > HOLDOUT_DEVIATIONS
             && self.share > MATTERS
             && self.consequence > CONSEQUENCE
@@ -41,8 +42,8 @@ impl Evidence {
 
     /// Whether it brings the arm's parameters back to where the arm file has them, and the holdout does not speak against it.
     pub fn restores(&self) -> bool {
-        self.relief > RESTORES + RESTORES_EACH * self.parameters as f64
-            && self.gain > PRICE + 2.0 * self.parameters as f64
+        self.relief > RESTORES + RESTORES_EACH * self.parameters
+            && self.gain > PRICE + 2.0 * self.parameters
             && self.deviations > -HOLDOUT_DEVIATIONS
             && self.consequence > CONSEQUENCE
     }
@@ -55,6 +56,10 @@ impl Evidence {
 
 impl Search<'_> {
     /// What speaks for term `index` of `with` beside the model `without` it.
+    ///
+    /// The holdout judges by a regression of what the model without the term leaves on what the term takes from it: a slope of one says that it is there as
+    /// the training logs have it, a slope of zero that it is not. Its standard deviation comes from the scatter of the blocks' scores. How unevenly an
+    /// effect is spread over the blocks does not count against it: a stop may be met twice in a log.
     pub(super) fn evidence(
         &self,
         regression: &Regression,
@@ -69,14 +74,7 @@ impl Search<'_> {
             1.0 / regression.sandwich(&with.estimate, column, &score)[(0, 0)].max(f64::MIN_POSITIVE)
         });
         let joints = self.rotary.len();
-        let blocks = without.costs[1].first().map_or(0, Vec::len);
-        let fell: Vec<f64> = (0..blocks)
-            .map(|b| (0..joints).map(|j| without.costs[1][j][b] - with.costs[1][j][b]).sum())
-            .collect();
-        let used = fell.iter().filter(|d| **d != 0.0).count().max(1) as f64;
-        let total: f64 = fell.iter().sum();
-        let mean = total / used;
-        let variance = fell.iter().filter(|d| **d != 0.0).map(|d| (d - mean).powi(2)).sum::<f64>() / used;
+        let holdout_gain = without.holdout_cost() - with.holdout_cost();
         let share = (0..joints)
             .map(|j| {
                 let before: f64 = without.costs[1][j].iter().sum();
@@ -85,16 +83,38 @@ impl Search<'_> {
             })
             .fold(0.0, f64::max);
         Evidence {
-            parameters: term.p.len(),
+            parameters: term.degrees,
             gain: without.estimate.cost - with.estimate.cost,
             relief: without.estimate.prior_cost - with.estimate.prior_cost,
             statistic,
-            holdout_gain: total,
-            deviations: mean * used.sqrt() / variance.sqrt().max(f64::MIN_POSITIVE),
+            holdout_gain,
+            deviations: confirmed(&regression.weights, self.holdout.rows(), without, with),
             share,
             consequence: consequence(self.training.rows(), &signal),
         }
     }
+}
+
+/// Slope of the holdout's residuals without a term on their change by it, over the slope's standard deviation from the scatter over blocks.
+fn confirmed(weights: &[f64], rows: &Rows, without: &Fitted, with: &Fitted) -> f64 {
+    let mut information = 0.0;
+    let mut product = 0.0;
+    let mut blocks = vec![[0.0; 2]; rows.blocks];
+    for (j, rows) in rows.joints.iter().enumerate() {
+        for ((left, stays), block) in without.held[j].iter().zip(&with.held[j]).zip(&rows.block) {
+            let taken = left - stays;
+            let [own, square] = [weights[j] * left * taken, weights[j] * taken * taken];
+            product += own;
+            information += square;
+            blocks[*block][0] += own;
+            blocks[*block][1] += square;
+        }
+    }
+    let slope = product / information.max(f64::MIN_POSITIVE);
+    let scores = blocks.iter().filter(|b| b[1] > 0.0).map(|[own, square]| own - slope * square);
+    let (used, scatter) = scores.fold((0.0, 0.0), |(n, total), score| (n + 1.0, total + score * score));
+    let small_sample = used / (used - 1.0_f64).max(1.0);
+    slope * information / (small_sample * scatter).sqrt().max(f64::MIN_POSITIVE)
 }
 
 /// Largest RMS torque of a signal beside that of the joint it acts on.
@@ -119,9 +139,7 @@ pub(super) fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64) -> f64 {
             })
             .collect()
     };
-    let price = |fitted: &Fitted| {
-        fitted.estimate.prior_cost + 2.0 * fitted.terms.iter().map(|t| t.p.len()).sum::<usize>() as f64
-    };
+    let price = |fitted: &Fitted| fitted.estimate.prior_cost + 2.0 * fitted.parameters();
     let own = by_block(model);
     let apart: Vec<(Vec<f64>, f64)> = rivals
         .iter()
@@ -151,4 +169,52 @@ pub(super) fn trust(without: &Fitted, with: &Fitted, evidence: &Evidence, floor:
     });
     let restores = 1.0 - (-evidence.relief.max(0.0) / RESTORES).exp();
     explains.max(restores)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use crate::serial::rows::Estimate;
+
+    const ROWS: usize = 240;
+
+    /// A holdout's residuals without a term and with it; the term takes `taken` of the row.
+    fn deviations(truth: impl Fn(usize) -> f64, taken: impl Fn(usize) -> f64) -> f64 {
+        let mut random = Random(7);
+        let noise: Vec<f64> = (0..ROWS).map(|_| 0.1 * random.normal()).collect();
+        let fitted = |left: Vec<f64>| Fitted {
+            terms: Vec::new(),
+            estimate: Estimate { theta: vec![], residual: vec![], cost: 0.0, prior_cost: 0.0 },
+            costs: [vec![], vec![]],
+            held: vec![left],
+        };
+        let without = fitted((0..ROWS).map(|k| truth(k) + noise[k]).collect());
+        let with = fitted((0..ROWS).map(|k| truth(k) + noise[k] - taken(k)).collect());
+        let joint = JointRows {
+            y: vec![0.0; ROWS],
+            psi: vec![],
+            block: (0..ROWS).map(|k| k / 20).collect(),
+            floor: vec![0.1; ROWS],
+        };
+        confirmed(&[1.0], &Rows { joints: vec![joint], parameters: 0, blocks: ROWS / 20 }, &without, &with)
+    }
+
+    #[test]
+    fn an_effect_in_two_blocks_of_twelve_is_confirmed() {
+        let stop = |k: usize| if k / 20 == 3 || k / 20 == 8 { 0.5 } else { 0.0 };
+        assert!(deviations(stop, stop) > HOLDOUT_DEVIATIONS);
+    }
+
+    #[test]
+    fn what_is_not_in_the_holdout_is_not_confirmed() {
+        let wave = |k: usize| 0.1 * (0.4 * k as f64).sin();
+        assert!(deviations(|_| 0.0, wave).abs() < HOLDOUT_DEVIATIONS);
+    }
+
+    #[test]
+    fn one_block_alone_confirms_nothing() {
+        let wave = |k: usize| (0.4 * k as f64).sin();
+        assert!(deviations(|k| if k / 20 == 5 { 0.3 * wave(k) } else { 0.0 }, wave) < HOLDOUT_DEVIATIONS);
+    }
 }

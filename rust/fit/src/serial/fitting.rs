@@ -18,17 +18,23 @@ pub struct Fitted {
     pub estimate: Estimate,
     /// Weighted squared residuals by joint and block: training, holdout.
     pub costs: [Vec<Vec<f64>>; 2],
+    /// Residuals of the holdout by joint, in units of the torque that reaches it ([`Search::scales`]).
+    pub held: Vec<Vec<f64>>,
 }
 
 impl Fitted {
+    /// Effective number of its terms' parameters.
+    pub(super) fn parameters(&self) -> f64 {
+        self.terms.iter().map(|t| t.degrees).sum()
+    }
+
     pub(super) fn holdout_cost(&self) -> f64 {
         self.costs[1].iter().flatten().sum()
     }
 
     /// What ranks models: cost of training logs, prior and holdout, and the price of its parameters.
     pub(super) fn total(&self) -> f64 {
-        let parameters: usize = self.terms.iter().map(|t| t.p.len()).sum();
-        self.estimate.cost + self.holdout_cost() + 2.0 * parameters as f64
+        self.estimate.cost + self.holdout_cost() + 2.0 * self.parameters()
     }
 }
 
@@ -74,17 +80,20 @@ impl Search<'_> {
         }
         let beside = self.beside(self.holdout, &terms, &estimate.theta);
         let held = self.holdout.rows().residual(&estimate.theta, &beside);
-        let scaled = |motion: &dyn Motion, residual: &[Vec<f64>]| {
-            let mut costs = motion.rows().costs(&regression.weights, residual);
-            for (costs, scale) in costs.iter_mut().zip(self.scales(motion, &terms, &estimate.theta)) {
-                for cost in costs {
-                    *cost *= scale;
-                }
-            }
-            costs
+        let scaled = |motion: &dyn Motion, residual: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            let scales = self.scales(motion, &terms, &estimate.theta);
+            residual
+                .iter()
+                .zip(scales)
+                .map(|(r, scale)| r.iter().map(|r| scale.sqrt() * r).collect())
+                .collect()
         };
-        let costs = [scaled(self.training, &estimate.residual), scaled(self.holdout, &held)];
-        Fitted { terms, estimate, costs }
+        let held = scaled(self.holdout, &held);
+        let costs =
+            |motion: &dyn Motion, residual: &[Vec<f64>]| motion.rows().costs(&regression.weights, residual);
+        let costs =
+            [costs(self.training, &scaled(self.training, &estimate.residual)), costs(self.holdout, &held)];
+        Fitted { terms, estimate, costs, held }
     }
 
     /// Parameters beside these terms, and the cost in units of the torque that reaches the joints.

@@ -44,6 +44,8 @@ pub struct Middle<const N: usize> {
     pub q: [f64; N],
     /// Velocities from local cubics.
     pub dq: [f64; N],
+    /// Accelerations from local cubics.
+    pub ddq: [f64; N],
     /// Mean velocities: differences of positions.
     pub mean_dq: [f64; N],
     /// Mean torques.
@@ -79,6 +81,7 @@ impl<const N: usize> Intervals<N> {
                 h,
                 q: std::array::from_fn(|j| 0.5 * (track.q[k][j] + track.q[k + 1][j])),
                 dq,
+                ddq: std::array::from_fn(|j| 0.5 * (a[j].local.ddq + b[j].local.ddq)),
                 mean_dq: std::array::from_fn(|j| (track.q[k + 1][j] - track.q[k][j]) / h),
                 tau: std::array::from_fn(|j| track.held[k][j].mean()),
                 rest: std::array::from_fn(|j| {

@@ -18,6 +18,7 @@ mod rows;
 mod screening;
 mod search;
 mod term;
+mod transmission;
 
 use crate::chain::ChainDescription;
 use crate::diagnose::{DiagnoseError, FEWEST_WINDOWS, LogData, Options};
@@ -36,6 +37,7 @@ use rows::{Prior, Rows, Signal};
 use search::{Motion, Search};
 use std::time::Instant;
 use term::{Term, TermKind};
+use transmission::{Compliance, TransmissionLaw};
 
 /// A serial arm as an arm file describes it.
 #[derive(Debug, Clone)]
@@ -192,6 +194,9 @@ impl Request<'_> {
 /// Half cycles of a ripple over a joint's travel, at most.
 const HALF_CYCLES: usize = 80;
 
+/// Torque within which a link crosses its backlash, in parts of the joint's RMS torque.
+const CROSSINGS: [f64; 2] = [0.03, 0.15];
+
 /// Every term at each of its initial guesses, grouped by place. Effects with latent states between motor and link, and those stated for the
 /// plane, are not among them.
 fn candidates<const N: usize, const P: usize>(
@@ -230,6 +235,17 @@ fn candidates<const N: usize, const P: usize>(
         match groups.iter_mut().find(|group| group[0].same_place(&term)) {
             Some(group) => group.push(term),
             None => groups.push(vec![term]),
+        }
+    }
+    for joint in 0..N {
+        let torque = scales.size(Quantity::Torque, joint);
+        let crossings = CROSSINGS.map(|share| Compliance::Backlash(share * torque));
+        for laws in [&[Compliance::Elastic][..], &crossings] {
+            let places = laws.iter().flat_map(|law| [true, false].map(|at_motor| (*law, at_motor)));
+            let term = |(compliance, encoder_at_motor)| {
+                Term::neutral(TermKind::Transmission(TransmissionLaw { joint, encoder_at_motor, compliance }))
+            };
+            groups.push(places.map(term).collect());
         }
     }
     if gravity > 0.0 {

@@ -3,7 +3,9 @@
 use super::term::{Term, TermKind, of_load};
 use crate::model::Hypothesis;
 use crate::window::{Dataset, Window};
+use armgap_core::arm::Arm;
 use armgap_core::chain::Chain;
+use nalgebra::SVector;
 
 /// An arm with parameters and terms, as the integrator takes it.
 pub struct Model<const N: usize, const P: usize> {
@@ -20,6 +22,13 @@ impl<const N: usize, const P: usize> Model<N, P> {
                 TermKind::Law(_) => model.hypothesis.effects.extend(term.effect()),
                 TermKind::Payload => model.add(N - 1, &of_load(&term.p)),
                 TermKind::NominalLink(link) => model.add(link, &std::array::from_fn(|i| term.p[i])),
+                TermKind::Transmission(law) => {
+                    let j = law.joint;
+                    let inertia = arm.inertia(&theta, &SVector::zeros())[(j, j)];
+                    let (effect, taken) = law.instance(term.p[0], theta[10 * N + j], inertia);
+                    model.hypothesis.theta[10 * N + j] -= taken;
+                    model.hypothesis.effects.push(effect);
+                }
                 TermKind::BaseTilt => model.arm = turned(&model.arm, [term.p[0], term.p[1]]),
             }
         }

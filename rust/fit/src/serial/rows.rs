@@ -291,7 +291,7 @@ impl<'a> Regression<'a> {
         let inverse = crate::solve::scaled_inverse(&held)?;
         let size = &inverse * &slope;
         let gain = slope.dot(&size);
-        Some(Score { size: size.iter().copied().collect(), gain, inverse, solved })
+        Some(Score { size: size.iter().copied().collect(), gain, information, inverse, solved })
     }
 
     /// Covariance of the sizes from the scatter of their scores over blocks, at an estimate that includes them (sandwich).
@@ -333,6 +333,11 @@ impl<'a> Regression<'a> {
 }
 
 impl Score {
+    /// Information on size `i` beside the parameters, without the ridge.
+    pub fn information(&self, i: usize) -> f64 {
+        self.information[(i, i)]
+    }
+
     /// Covariance of the sizes if residuals were as independent as their weights take them to be, and the parameters as well known as their prior says.
     pub fn inverse(&self) -> &DMatrix<f64> {
         &self.inverse
@@ -346,7 +351,9 @@ pub struct Score {
     pub size: Vec<f64>,
     /// Decrease of the cost.
     pub gain: f64,
-    /// Inverse of the information on the sizes.
+    /// Information of the data on the sizes beside the parameters.
+    information: DMatrix<f64>,
+    /// Inverse of it with the ridge.
     inverse: DMatrix<f64>,
     /// Parameters that imitate each torque.
     solved: Vec<DVector<f64>>,

@@ -20,7 +20,8 @@ pub struct Guess {
 
 impl Search<'_> {
     /// Every candidate at every initial guess with the torques that test it.
-    pub(super) fn guesses(&self, theta: &[f64]) -> Vec<Vec<Guess>> {
+    pub(super) fn guesses(&self, regression: &Regression, at: &Estimate) -> Vec<Vec<Guess>> {
+        let theta = &at.theta;
         let columns = |term: &Term| -> Vec<Signal> {
             match term.kind {
                 TermKind::Payload => {
@@ -36,8 +37,28 @@ impl Search<'_> {
                 _ => (0..term.amplitudes()).map(|i| self.unit(term, i, theta)).collect(),
             }
         };
-        let guess = |term: &Term| Guess { term: term.clone(), columns: columns(term) };
+        let guess = |term: &Term| {
+            let columns = columns(term);
+            let degrees = self.degrees(regression, at, term, &columns);
+            Guess { term: Term { degrees, ..term.clone() }, columns }
+        };
         self.candidates.par_iter().map(|group| group.iter().map(guess).collect()).collect()
+    }
+
+    /// Effective number of a term's parameters (Moody 1992): where the arm's own parameters imitate it, only the directions in which the logs know more
+    /// than the arm file count, `trace(I diag(sigma)^2)` with the information `I` on its sizes beside the arm's parameters.
+    fn degrees(&self, regression: &Regression, at: &Estimate, term: &Term, columns: &[Signal]) -> f64 {
+        let link = match term.kind {
+            TermKind::NominalLink(link) => link,
+            TermKind::Payload => self.rotary.len() - 1,
+            TermKind::Law(_) | TermKind::BaseTilt | TermKind::Transmission(_) => return term.degrees,
+        };
+        let sigma = &self.prior.sigma[10 * link..][..columns.len()];
+        let ridge: Vec<f64> =
+            sigma.iter().map(|s| if *s > 0.0 { s.powi(-2) } else { f64::MAX.sqrt() }).collect();
+        regression.score(at, columns, &ridge).map_or(term.degrees, |score| {
+            sigma.iter().enumerate().map(|(i, s)| (score.information(i) * s * s).clamp(0.0, 1.0)).sum()
+        })
     }
 
     /// Tests a term to first order; returns it with the values that the test suggests, and the decrease of the cost.
@@ -136,7 +157,7 @@ impl Search<'_> {
         model: &Fitted,
         screened: &[(Term, f64)],
     ) -> Vec<Fitted> {
-        let worth = |(term, gain): &&(Term, f64)| *gain > PRICE + 2.0 * term.p.len() as f64;
+        let worth = |(term, gain): &&(Term, f64)| *gain > PRICE + 2.0 * term.degrees;
         let wanted: Vec<&(Term, f64)> = screened.iter().filter(worth).take(FINALISTS).collect();
         self.progress.begin(Phase::Candidates, wanted.len());
         wanted

@@ -69,6 +69,8 @@ pub struct Tested {
 pub struct Found {
     /// The arm's own parameters, without terms.
     pub refit: Fitted,
+    /// The same where the inertia matrix is positive definite, for predictions.
+    pub refit_feasible: Fitted,
     /// The model with all terms.
     pub model: Fitted,
     /// Its terms, strongest first.
@@ -90,7 +92,7 @@ impl Search<'_> {
         let mut model = self.fit(&regression, Vec::new(), &self.prior.theta);
         let refit = model.clone();
         let sigma = regression.sigma();
-        let guesses = self.guesses(&model.estimate.theta);
+        let guesses = self.guesses(&regression, &model.estimate);
         for _ in 0..most {
             let Some(added) = self.best_addition(&guesses, &regression, &model) else { break };
             let mut terms = model.terms.clone();
@@ -212,8 +214,16 @@ impl Search<'_> {
         };
         let probable = named.iter().filter(|n| n.probability >= NAMED).map(|n| n.term.clone()).collect();
         let reported = self.feasible(regression, self.fit(regression, probable, &model.estimate.theta));
-        let refit = self.feasible(regression, refit);
-        Found { refit, named, reported, tested, sigma: [refit_sigma, regression.sigma()], model }
+        let refit_feasible = self.feasible(regression, refit.clone());
+        Found {
+            refit,
+            refit_feasible,
+            named,
+            reported,
+            tested,
+            sigma: [refit_sigma, regression.sigma()],
+            model,
+        }
     }
 
     /// A model whose links are so near to those of the arm file that the inertia matrix is positive definite, with rotor inertias and friction
@@ -260,7 +270,10 @@ impl Search<'_> {
         let last = without.terms.len();
         rivals.retain(|r| !r.terms[last].same_place(&term));
         let explained = without.total() - model.total();
-        let alike = |rival: &Fitted| rival.total() - model.total() < (ALIKE * explained).max(ALIKE_COST);
+        let alike = |rival: &Fitted| {
+            rival.total() - model.total() < (ALIKE * explained).max(ALIKE_COST)
+                || rival.terms[last].includes(&term, self.rotary.len())
+        };
         let (same, others): (Vec<Fitted>, Vec<Fitted>) = rivals.into_iter().partition(alike);
         let mut against: Vec<&Fitted> = others.iter().collect();
         against.push(&without);
@@ -277,7 +290,13 @@ impl Search<'_> {
                     (0..term.p.len()).map(|i| variance(i).sqrt()).collect()
                 },
             );
-        let alike = same.into_iter().map(|r| r.terms[last].clone()).collect();
+        let mut alike: Vec<Term> = same.into_iter().map(|r| r.terms[last].clone()).collect();
+        let including = self.candidates.iter().filter_map(|group| group.first());
+        for other in including.filter(|other| other.includes(&term, self.rotary.len())) {
+            if !alike.iter().any(|t| t.same_place(other)) {
+                alike.push(other.clone());
+            }
+        }
         Named { term, sigma, evidence, probability: wins * trust, alike }
     }
 
@@ -449,7 +468,7 @@ mod tests {
     #[test]
     fn acceptance_needs_every_part_of_the_evidence() {
         let good = Evidence {
-            parameters: 1,
+            parameters: 1.0,
             gain: 100.0,
             relief: 0.0,
             statistic: 90.0,

@@ -1,5 +1,6 @@
 //! Terms that a serial arm's model may lack: the library's laws joint by joint, and what changes the arm itself.
 
+use super::transmission::TransmissionLaw;
 use crate::model::EffectInstance;
 use armgap_core::chain::LINK_NAMES;
 use armgap_core::effect::{JointPoint, Quantity, Scope, Trial};
@@ -11,6 +12,8 @@ pub struct Term {
     pub kind: TermKind,
     /// Values, SI.
     pub p: Vec<f64>,
+    /// Effective number of parameters: of a link's ten those that the logs know better than the arm file does.
+    pub degrees: f64,
 }
 
 /// What a term is.
@@ -24,6 +27,8 @@ pub enum TermKind {
     BaseTilt,
     /// One link's mass, first moments and inertia differ from the nominal ones.
     NominalLink(usize),
+    /// A shaft that twists, or backlash: its compliance or its gap.
+    Transmission(TransmissionLaw),
 }
 
 /// Name and unit of one parameter.
@@ -37,6 +42,8 @@ pub struct TermParameter {
     pub bounds: [f64; 2],
     /// Value at which it does nothing.
     pub neutral: f64,
+    /// Name and unit of its inverse, where results state that.
+    pub inverse: Option<(&'static str, &'static str)>,
 }
 
 const LOAD: [(&str, &str); 4] = [("mass", "kg"), ("com_x", "m"), ("com_y", "m"), ("com_z", "m")];
@@ -45,7 +52,8 @@ const TURN: [(&str, &str); 2] = [("x", "rad"), ("y", "rad")];
 impl Term {
     /// A law at its initial guess.
     pub fn of_law(effect: EffectInstance) -> Self {
-        Self { kind: TermKind::Law(effect), p: effect.p[..effect.len()].to_vec() }
+        let p = effect.p[..effect.len()].to_vec();
+        Self { kind: TermKind::Law(effect), degrees: p.len() as f64, p }
     }
 
     /// Neither load, nor tilt, nor change.
@@ -55,8 +63,9 @@ impl Term {
             TermKind::Payload => LOAD.len(),
             TermKind::BaseTilt => TURN.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
+            TermKind::Transmission(_) => 1,
         };
-        Self { kind, p: vec![0.0; count] }
+        Self { kind, p: vec![0.0; count], degrees: count as f64 }
     }
 
     /// Name in results.
@@ -66,6 +75,7 @@ impl Term {
             TermKind::Payload => "payload",
             TermKind::BaseTilt => "base_tilt",
             TermKind::NominalLink(_) => "nominal_link",
+            TermKind::Transmission(law) => law.name(),
         }
     }
 
@@ -76,6 +86,7 @@ impl Term {
             TermKind::Payload => "payload on the last link",
             TermKind::BaseTilt => "base not level",
             TermKind::NominalLink(_) => "wrong nominal link",
+            TermKind::Transmission(law) => law.title(),
         }
     }
 
@@ -84,6 +95,7 @@ impl Term {
         match self.kind {
             TermKind::Law(effect) => effect.joint_number(),
             TermKind::NominalLink(link) => Some(link + 1),
+            TermKind::Transmission(law) => Some(law.joint + 1),
             TermKind::Payload | TermKind::BaseTilt => None,
         }
     }
@@ -93,6 +105,11 @@ impl Term {
         self.name() == other.name() && self.joint() == other.joint()
     }
 
+    /// Whether it can be all that another term is, whatever the motion: a change of the last of so many links includes a load on it.
+    pub fn includes(&self, other: &Self, links: usize) -> bool {
+        matches!((self.kind, other.kind), (TermKind::NominalLink(link), TermKind::Payload) if link + 1 == links)
+    }
+
     /// Its parameters; `rotary` tells of its joint.
     pub fn parameters(&self, rotary: bool) -> Vec<TermParameter> {
         let free = |(name, unit): &(&'static str, &'static str)| TermParameter {
@@ -100,6 +117,7 @@ impl Term {
             unit,
             bounds: [f64::NEG_INFINITY, f64::INFINITY],
             neutral: 0.0,
+            inverse: None,
         };
         match self.kind {
             TermKind::Law(effect) => effect
@@ -112,6 +130,7 @@ impl Term {
                     unit: p.quantity.unit(rotary),
                     bounds: [p.lower, p.upper],
                     neutral: p.neutral,
+                    inverse: None,
                 })
                 .collect(),
             TermKind::Payload => {
@@ -121,6 +140,7 @@ impl Term {
             }
             TermKind::BaseTilt => TURN.iter().map(free).collect(),
             TermKind::NominalLink(_) => LINK_NAMES.iter().map(free).collect(),
+            TermKind::Transmission(law) => vec![law.parameter(rotary)],
         }
     }
 
@@ -140,12 +160,17 @@ impl Term {
             TermKind::Payload => 0,
             TermKind::BaseTilt => TURN.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
+            TermKind::Transmission(_) => 1,
         }
     }
 
     /// Whether it is sought on every joint by itself.
     pub fn is_of_a_joint(&self) -> bool {
-        matches!(self.kind, TermKind::Law(effect) if effect.law.spec().scope == Scope::Joint)
+        match self.kind {
+            TermKind::Law(effect) => effect.law.spec().scope == Scope::Joint,
+            TermKind::Transmission(_) => true,
+            TermKind::Payload | TermKind::BaseTilt | TermKind::NominalLink(_) => false,
+        }
     }
 
     /// Whether it changes the torque that a command becomes at the joint: of the command itself, or by a torque that depends on it.
@@ -170,7 +195,7 @@ impl Term {
 
     /// This term with other values.
     pub fn with(&self, p: Vec<f64>) -> Self {
-        Self { kind: self.kind, p }
+        Self { kind: self.kind, p, degrees: self.degrees }
     }
 
     /// The library's effect with these values; none for what is no law.
