@@ -22,6 +22,7 @@ SIZES: dict[str, dict[str, float]] = {
     "joint_spring": {"k": 3.0, "q0": 0.4},
     "hardening_spring": {"cubic": 0.8, "k": 2.0, "q0": -0.3},
     "quadratic_drag": {"c": 0.3},
+    "cubic_drag": {"c3": 0.2},
     "torque_offset": {"offset": 0.6},
     "coulomb_asymmetry": {"delta": 0.2},
     "torque_gain": {"gain": 1.2},

@@ -69,6 +69,8 @@ def passive(
         extra[-1] = p["k"] * x + p["cubic"] * x**3
     elif name == "quadratic_drag":
         extra[-1] = p["c"] * dq[-1] * abs(dq[-1])
+    elif name == "cubic_drag":
+        extra[-1] = p["c3"] * dq[-1] ** 3
     elif name == "contact":
         extra[-1] = p["stiffness"] * max(q[-1] - p["position"], 0.0)
     return theta, extra, p.get("angle", 0.0)
@@ -144,6 +146,7 @@ def test_what_cannot_be_built_can_still_be_written_as_values() -> None:
         "joint_spring",
         "hardening_spring",
         "quadratic_drag",
+        "cubic_drag",
         "base_tilt",
         "encoder_offset",
         "contact",

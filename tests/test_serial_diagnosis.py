@@ -342,7 +342,8 @@ def test_a_report_has_no_empty_section(found: Diagnosis) -> None:
         assert all(table.rows for table in section.tables), section.title
     for text in (diagnosis_report(found, "gap.md"), diagnosis_report(found, "gap.html")):
         assert "Stribeck" in text
-        assert "armgap export DIAGNOSIS.json" not in text
+        assert "armgap export DIAGNOSIS.json" in text
+        assert "--model ROBOT.urdf" in text
 
 
 def test_joints_that_slide_have_their_own_unit(found: Diagnosis) -> None:

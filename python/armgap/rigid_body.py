@@ -15,11 +15,15 @@ from numpy.typing import NDArray
 __all__ = [
     "INERTIAL_NAMES",
     "INERTIAL_UNITS",
+    "about_axis",
     "about_com",
     "about_origin",
     "inconsistency",
     "moved",
+    "pseudo_inertia",
+    "rotation_between",
     "rpy_matrix",
+    "rpy_of",
     "symmetric",
     "unit_axis",
 ]
@@ -118,6 +122,47 @@ def inconsistency(ten: Array) -> str:
         return ""
     moments = ", ".join(f"{m:.3g}" for m in np.linalg.eigvalsh(inertia))
     return f"its principal moments {moments} kg m^2 break the triangle inequality"
+
+
+def pseudo_inertia(ten: Array) -> Array:
+    """Return the pseudo-inertia of ten numbers, shape (4, 4), which is linear in them and positive semi-definite for every body that can exist.
+
+    Its upper left part is the second moment ``integral of x x' dm`` about the origin, its last column first moments and mass (Wensing, Kim and
+    Slotine 2018, equation 6).
+    """
+    inertia = symmetric(ten[4:])
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    return np.block([[second, ten[1:4, None]], [ten[None, 1:4], ten[:1, None]]])
+
+
+def about_axis(axis: Array, angle: float) -> Array:
+    """Return the rotation about a unit vector by an angle [rad], shape (3, 3) (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    half = math.sin(0.5 * angle)
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (2.0 * half * half) * (cross @ cross))
+
+
+def rotation_between(start: Array, end: Array) -> Array:
+    """Return the smallest rotation that turns one unit vector into another, shape (3, 3)."""
+    normal, cosine = np.cross(start, end), float(start @ end)
+    sine = float(np.linalg.norm(normal))
+    if sine > _UNIT:
+        return about_axis(normal / sine, math.atan2(sine, cosine))
+    if cosine > 0:
+        return np.eye(3)
+    across = np.cross(start, np.eye(3)[int(np.argmin(np.abs(start)))])
+    return about_axis(across / np.linalg.norm(across), math.pi)
+
+
+def rpy_of(rotation: Array) -> Array:
+    """Return roll, pitch and yaw [rad] of a rotation, shape (3,); the reverse of `rpy_matrix`, with a roll of zero where pitch is a right angle."""
+    r = rotation
+    level = math.hypot(r[0, 0], r[1, 0])
+    pitch = math.atan2(-r[2, 0], level)
+    if level < _UNIT:
+        return np.array([0.0, pitch, math.atan2(-r[0, 1], r[1, 1])])
+    return np.array([math.atan2(r[2, 1], r[2, 2]), pitch, math.atan2(r[1, 0], r[0, 0])]) + 0.0
 
 
 def rpy_matrix(rpy: Sequence[float] | Array) -> Array:

@@ -91,7 +91,13 @@ def arm_of(robot: SerialRobot, period: float, trust: str) -> armgap.Arm:
 
 
 def make_case(
-    seed: int, number: int, effect: str | None = None, *, family: str | None = None, duration: float = _DURATION_S
+    seed: int,
+    number: int,
+    effect: str | type[Effect] | None = None,
+    *,
+    family: str | None = None,
+    joints: int | None = None,
+    duration: float = _DURATION_S,
 ) -> Case:
     """Make a case.
 
@@ -99,10 +105,12 @@ def make_case(
     ----------
     seed, number : int
         They decide everything; null cases have numbers from `NULLS`.
-    effect : str, optional
-        Name of the hidden effect, ``"null"`` for none; by default that of the number.
+    effect : str or type of Effect, optional
+        The hidden effect or its name, ``"null"`` for none; by default that of the number.
     family : str, optional
         Family of the arm; drawn by default.
+    joints : int, optional
+        Number of joints, of those that the family has; drawn by default.
     duration : float, default 12
         Of each log [s].
 
@@ -112,17 +120,19 @@ def make_case(
         If no draw has a motion and an effect that makes a difference.
     """
     name = effect or ("null" if number >= NULLS else effect_of(seed, number))
+    kind = EFFECTS.get(name, Null) if isinstance(name, str) else name
     for draw in range(_DRAWS):
-        case = _draw(np.random.default_rng([seed, number, draw]), name, family, duration)
+        case = _draw(np.random.default_rng([seed, number, draw]), kind, family, joints, duration)
         if case is not None:
             case.key.update(seed=seed, number=number, draw=draw)
             return case
-    raise RuntimeError(f"case {number} of seed {seed}: no draw of {name} makes a difference")
+    raise RuntimeError(f"case {number} of seed {seed}: no draw of {kind.name} makes a difference")
 
 
-def _draw(rng: np.random.Generator, name: str, family: str | None, duration: float) -> Case | None:
-    robot = draw_robot(rng, family)
-    kind = EFFECTS.get(name, Null)
+def _draw(
+    rng: np.random.Generator, kind: type[Effect], family: str | None, joints: int | None, duration: float
+) -> Case | None:
+    robot = draw_robot(rng, family, joints)
     trust = "trusted" if kind.trusted_inertia else "published"
     period = float(rng.choice(PERIODS))
     noise = float(rng.choice(NOISE))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import threading
@@ -26,6 +27,8 @@ __all__ = [
     "columns_option",
     "console",
     "corrections_options",
+    "freeze_option",
+    "frozen_positions",
     "interruptible",
     "json_option",
     "parse_columns",
@@ -54,6 +57,13 @@ units_option = click.option(
     type=Words(),
     metavar="t=ms,q=deg",
     help="Units of the log where they are not SI; also settles what looks like another unit.",
+)
+freeze_option = click.option(
+    "--freeze",
+    multiple=True,
+    type=Words(),
+    metavar="JOINT=VALUE",
+    help="Joint that stands still, with its position [rad or m]; may be repeated.",
 )
 json_option = click.option(
     "--json", "json_file", type=OutputFile(), metavar="OUT", help="Write the result as JSON; - is standard output."
@@ -179,3 +189,20 @@ def interruptible(work: Callable[[], Result]) -> Result:
     if failed:
         raise failed[0]
     return done[0]
+
+
+def frozen_positions(words: tuple[str, ...]) -> dict[str, float]:
+    """Read ``JOINT=VALUE``, once per joint."""
+    frozen: dict[str, float] = {}
+    for word in words:
+        joint, _, text = (part.strip() for part in word.rpartition("="))
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not joint or not math.isfinite(value):
+            raise OptionError(f"--freeze: `{word}` is no joint and position", remedy="write --freeze JOINT=0.04")
+        if joint in frozen:
+            raise OptionError(f"--freeze: `{joint}` is given twice", remedy="give each joint one position")
+        frozen[joint] = value
+    return frozen

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armgap.cli.common import console, quiet_option
+from armgap.cli.common import console, freeze_option, frozen_positions, quiet_option
 from armgap.cli.files import Command, InputFile, OutputFile, Words
-from armgap.errors import OptionError
 from armgap.output import is_stdout, write
 from armgap.serial_trust import TRUSTS
 
@@ -32,13 +31,7 @@ __all__ = ["command"]
     show_default=True,
     help="How far masses and inertias are trusted: to 10 %, 30 %, 100 %, or not at all.",
 )
-@click.option(
-    "--freeze",
-    multiple=True,
-    type=Words(),
-    metavar="JOINT=VALUE",
-    help="Joint that stands still, with its position [rad or m]; may be repeated.",
-)
+@freeze_option
 @click.option("--name", type=Words(), help="Name of the arm; the description's by default.")
 @click.option("--sample-period", default=0.002, show_default=True, help="Sample period of the logs [s].")
 @click.option(
@@ -60,7 +53,13 @@ def command(
     from armgap.model import read_model
 
     arm = read_model(
-        description, base=base, tip=tip, frozen=_frozen(freeze), trust=trust, name=name, sample_period=sample_period
+        description,
+        base=base,
+        tip=tip,
+        frozen=frozen_positions(freeze),
+        trust=trust,
+        name=name,
+        sample_period=sample_period,
     )
     write(output, arm.to_toml())
     if not (quiet or is_stdout(output)):
@@ -70,23 +69,6 @@ def command(
         for note in arm.notes:
             say.print(f"note: {note}", highlight=False, markup=False)
         say.print(f"arm file: {output}", highlight=False, markup=False)
-
-
-def _frozen(words: tuple[str, ...]) -> dict[str, float]:
-    """Return positions by joint."""
-    frozen: dict[str, float] = {}
-    for word in words:
-        joint, _, text = (part.strip() for part in word.rpartition("="))
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not joint or not math.isfinite(value):
-            raise OptionError(f"--freeze: `{word}` is no joint and position", remedy="write --freeze JOINT=0.04")
-        if joint in frozen:
-            raise OptionError(f"--freeze: `{joint}` is given twice", remedy="give each joint one position")
-        frozen[joint] = value
-    return frozen
 
 
 def _table(chain: SerialChain, masses: list[float]) -> Table:

@@ -13,7 +13,7 @@ from armgap.description.urdf import urdf_tree
 from armgap.description.xml import parse, read_text
 from armgap.errors import ModelFileError
 
-__all__ = ["read_description"]
+__all__ = ["read_description", "read_tree"]
 
 _ROOT = re.compile(rb"<\s*([A-Za-z_][\w:.-]*)")
 _ASIDE = re.compile(rb"<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>]*>", re.DOTALL)
@@ -41,10 +41,11 @@ def read_description(
     OptionError
         If it is MJCF and MuJoCo is not installed.
     """
-    return resolve(_tree(path, expected), base=base, tip=tip, frozen=frozen)
+    return resolve(read_tree(path, expected), base=base, tip=tip, frozen=frozen)
 
 
-def _tree(path: Path, expected: str | None) -> Tree:
+def read_tree(path: Path, expected: str | None = None) -> Tree:
+    """Read a URDF or MJCF file as a tree of links and joints; parameters and errors as for `read_description`."""
     data = read_text(path)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         first = parse(data, path).tag

@@ -13,14 +13,16 @@ from armgap.arm_file import suggest
 from armgap.controller import Controller
 from armgap.description.resolved import ResolvedModel
 from armgap.description.tree import MOVING, Joint, Tree
-from armgap.rigid_body import inconsistency, moved
+from armgap.rigid_body import about_axis, inconsistency, moved
 from armgap.serial_chain import JointKind, SerialChain
 
-__all__ = ["resolve"]
+__all__ = ["Carried", "Located", "locate", "resolve"]
 
 Array = NDArray[np.float64]
 
 _LISTED = 12
+# Placements agree to this [m]: what rounding of a description's numbers leaves of them.
+_SAME_PLACE = 1e-6
 _MOST_FOLLOWED = 16
 # Dampings and frictions that stand for nothing: some tools write them so that a simulation calms down.
 _PLACEHOLDERS = (10.0, 100.0, 1000.0)
@@ -35,6 +37,54 @@ class _Pose:
 
     def then(self, rotation: Array, translation: Array) -> _Pose:
         return _Pose(self.rotation @ rotation, self.translation + self.rotation @ translation)
+
+
+@dataclass(frozen=True)
+class Carried:
+    """A link of a description that one of the chain's links carries.
+
+    Attributes
+    ----------
+    link : str
+        Name.
+    rotation : ndarray, shape (3, 3)
+        Its axes in the frame of the chain's link, as columns.
+    translation : ndarray, shape (3,)
+        Its origin there [m].
+    rigid : bool
+        Whether only fixed joints lie between.
+    """
+
+    link: str
+    rotation: Array
+    translation: Array
+    rigid: bool
+
+
+@dataclass(frozen=True)
+class Located:
+    """Where a chain lies in a description.
+
+    Attributes
+    ----------
+    base : str
+        The link in whose frame the chain begins.
+    rotation : ndarray, shape (3, 3)
+        Axes of its frame in that of the root, as columns.
+    translation : ndarray, shape (3,)
+        Its origin there [m].
+    before, behind : ndarray, shapes (3, 3) and (3,)
+        Axes, as columns, and origin [m] of the link before the first joint in the frame of the base.
+    carried : tuple of tuple of Carried
+        Per link of the chain what it carries, itself included.
+    """
+
+    base: str
+    rotation: Array
+    translation: Array
+    before: Array
+    behind: Array
+    carried: tuple[tuple[Carried, ...], ...]
 
 
 def _here() -> _Pose:
@@ -60,6 +110,27 @@ def resolve(tree: Tree, *, base: str | None, tip: str | None, frozen: Mapping[st
         If there is no such chain, or several; it lists the links to choose from.
     """
     return _Resolver(tree, frozen).model(base, tip)
+
+
+def locate(tree: Tree, chain: SerialChain, frozen: Mapping[str, float]) -> Located:
+    """Find a chain that was resolved from a description in it again.
+
+    Parameters
+    ----------
+    tree : Tree
+        Links and joints.
+    chain : SerialChain
+        Its joints have the names and placements of the description's.
+    frozen : mapping of str to float
+        Positions of joints that stand still, as for `resolve`; others that are not part of the chain stand at 0, or at the limit next to it.
+
+    Raises
+    ------
+    ModelFileError
+        If the description is of another arm.
+    """
+    resolver = _Resolver(tree, frozen)
+    return resolver.located(chain)
 
 
 class _Resolver:
@@ -212,7 +283,7 @@ class _Resolver:
         position = self._position(joint)
         if joint.kind == "prismatic":
             return placed.then(np.eye(3), position * joint.axis)
-        return placed.then(_turned(joint.axis, position), np.zeros(3))
+        return placed.then(about_axis(joint.axis, position), np.zeros(3))
 
     def _fused(self, path: list[Joint], base: str) -> tuple[list[_Pose], Array]:
         """Return the placements of the moving joints, and the ten numbers of each link with all that hangs on it."""
@@ -235,11 +306,16 @@ class _Resolver:
 
     def _hanging(self, link: str, pose: _Pose, onward: Joint | None) -> Array:
         """Return the ten numbers of a link with all that hangs on it, but for what comes behind the joint `onward` of the chain."""
-        total = np.zeros(10)
-        ahead = [(link, pose)]
+        bodies = self._carried(link, pose, onward)
+        return sum((moved(self.tree.links[b.link], b.rotation, b.translation) for b in bodies), np.zeros(10))
+
+    def _carried(self, link: str, pose: _Pose, onward: Joint | None, *, rigid: bool = True) -> list[Carried]:
+        """Return a link and all that hangs on it, but for what comes behind the joint `onward` of the chain."""
+        found: list[Carried] = []
+        ahead = [(link, pose, rigid)]
         while ahead:
-            name, at = ahead.pop()
-            total += moved(self.tree.links[name], at.rotation, at.translation)
+            name, at, fixed = ahead.pop()
+            found.append(Carried(name, at.rotation, at.translation, fixed))
             for joint in self.tree.child_joints.get(name, ()):
                 if joint is onward:
                     continue
@@ -248,8 +324,61 @@ class _Resolver:
                     raise self.tree.error(joint, problem, "take it out of the description")
                 if self._moves(joint):
                     self.still[joint.name] = self._position(joint)
-                ahead.append((joint.child, self._moved(at, joint)))
-        return total
+                ahead.append((joint.child, self._moved(at, joint), fixed and joint.kind == "fixed"))
+        return found
+
+    def located(self, chain: SerialChain) -> Located:
+        """Return where the chain lies in the tree; every moving joint that is not part of it stands still."""
+        tree, joints = self.tree, [self.tree.joints.get(name) for name in chain.joint_names]
+        for name, joint in zip(chain.joint_names, joints, strict=True):
+            if joint is None or joint.kind not in MOVING:
+                raise tree.error(None, f"has no moving joint `{name}`", "give the description that the arm file is of")
+        path = tree.path(joints[-1].child)  # type: ignore[union-attr]
+        moving = [joint for joint in path if joint.name in chain.joint_names]
+        if tuple(joint.name for joint in moving) != chain.joint_names:
+            problem = "has the joints of the arm in another order or on several branches"
+            raise tree.error(None, problem, "give the description that the arm file is of")
+        carried: list[list[Carried]] = []
+        poses: list[_Pose] = []
+        pose, rigid = _here(), True
+        bases = {path[0].parent: pose}
+        for joint, onward in zip(path, [*path[1:], None], strict=True):
+            if joint in moving:
+                poses.append(pose.then(joint.rotation, joint.translation))
+                carried.append([])
+                pose, rigid = _here(), True
+            else:
+                pose, rigid = self._moved(pose, joint), rigid and joint.kind == "fixed"
+            if carried:
+                carried[-1] += self._carried(joint.child, pose, onward, rigid=rigid)
+            else:
+                bases[joint.child] = pose
+        for j in range(1, chain.n_joints):
+            self._same_place(chain, j, poses[j])
+        base, at = self._base_of(chain, bases, poses[0])
+        last = bases[moving[0].parent]
+        before, behind = at.rotation.T @ last.rotation, at.rotation.T @ (last.translation - at.translation)
+        return Located(base, at.rotation, at.translation, before, behind, tuple(map(tuple, carried)))
+
+    def _base_of(self, chain: SerialChain, bases: dict[str, _Pose], first: _Pose) -> tuple[str, _Pose]:
+        """Return the link before the first joint in whose frame that joint lies as the chain says."""
+        for name, at in bases.items():
+            rotation = at.rotation.T @ first.rotation
+            translation = at.rotation.T @ (first.translation - at.translation)
+            if _close(rotation, chain.rotation[0]) and _close(translation, chain.translation[0]):
+                return name, at
+        self._same_place(chain, 0, first)
+        raise AssertionError("the root is a base")
+
+    def _same_place(self, chain: SerialChain, j: int, pose: _Pose) -> None:
+        joint = self.tree.joints[chain.joint_names[j]]
+        axis = joint.axis if joint.axis is not None else np.zeros(3)
+        same = _close(pose.rotation, chain.rotation[j]) and _close(pose.translation, chain.translation[j])
+        if not (same and _close(axis, chain.axis[j])):
+            problem = "lies elsewhere than in the arm file"
+            raise self.tree.error(
+                joint, problem, "give the description of the arm file, and the frozen joints' positions"
+            )
 
     def _gravity(self, to_base: Iterable[Joint]) -> Array:
         """Return gravity in the frame of the base."""
@@ -307,6 +436,10 @@ class _Resolver:
         return values
 
 
+def _close(one: Array, other: Array) -> bool:
+    return bool(np.all(np.abs(one - other) <= _SAME_PLACE))
+
+
 def _few(words: Iterable[str]) -> list[str]:
     listed = list(words)
     more = len(listed) - _LISTED
@@ -334,14 +467,6 @@ def _kind(joint: Joint) -> JointKind:
 
 def _values(joints: list[Joint], name: str) -> Array:
     return np.array([getattr(joint, name) for joint in joints], dtype=np.float64)
-
-
-def _turned(axis: Array, angle: float) -> Array:
-    """Return the rotation about a unit vector (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    half = math.sin(0.5 * angle)
-    return np.asarray(np.eye(3) + math.sin(angle) * cross + (2.0 * half * half) * (cross @ cross))
 
 
 def _gear_ratio(moving: list[Joint], notes: list[str]) -> Array | None:

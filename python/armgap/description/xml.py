@@ -18,13 +18,15 @@ MOST_BYTES = 64 * 2**20
 
 @dataclass
 class Element:
-    """One element: its name with its prefix, attributes, elements inside, text and line."""
+    """One element: its name with its prefix, attributes, elements inside, text, line, and the bytes at which it begins and its end tag does."""
 
     tag: str
     attributes: dict[str, str]
     row: int
     children: list[Element] = field(default_factory=list)
     text: str = ""
+    begins: int = 0
+    ends: int = 0
 
     def first(self, tag: str) -> Element | None:
         """Return the first element inside with this name."""
@@ -67,12 +69,12 @@ def parse(data: bytes, path: Path) -> Element:
     parser = expat.ParserCreate()
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        element = Element(tag, attributes, parser.CurrentLineNumber)
+        element = Element(tag, attributes, parser.CurrentLineNumber, begins=parser.CurrentByteIndex)
         stack[-1].children.append(element)
         stack.append(element)
 
     def end(_: str) -> None:
-        stack.pop()
+        stack.pop().ends = parser.CurrentByteIndex
 
     def text(data: str) -> None:
         stack[-1].text += data

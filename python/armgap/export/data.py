@@ -18,7 +18,7 @@ SCHEMA = "armgap.export/1"
 
 
 def to_dict(model: Corrected) -> dict[str, Any]:
-    """Return the JSON object: base parameters, links, joints, effects with their fields, and notes."""
+    """Return the JSON object: parameters, links, joints, effects with their fields, and notes."""
     arm = model.arm
     triples = zip(arm.parameter_names, model.theta, model.sigma, arm.parameter_units, strict=True)
     return {
@@ -28,20 +28,11 @@ def to_dict(model: Corrected) -> dict[str, Any]:
         "verdict": model.verdict,
         "stage": model.stage,
         "parameters": {n: {"value": float(v), "sigma": float(s), "unit": u} for n, v, s, u in triples},
-        "links": _links(model),
-        "slope": None if model.links is None else model.links.slope,
-        "base_tilt": model.tilt,
+        **model.data(),
         "joints": [asdict(joint) for joint in model.joints],
         "effects": [_effect(model, cause) for cause in model.causes],
         "notes": list(model.remarks("json")),
     }
-
-
-def _links(model: Corrected) -> list[dict[str, Any]] | None:
-    if model.links is None:
-        return None
-    columns = (model.links.mass, model.links.com, model.links.inertia, model.links.length)
-    return [dict(zip(("mass", "com", "inertia", "length"), row, strict=True)) for row in zip(*columns, strict=True)]
 
 
 def _effect(model: Corrected, cause: Cause) -> dict[str, Any]:

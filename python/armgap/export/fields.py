@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from armgap.literals import SERIAL
+
 __all__ = ["FIELDS", "FORMATS", "Field", "field_of"]
 
 #: Formats and the endings of their files.
@@ -38,6 +40,7 @@ FIELDS: dict[str, Field] = {
     "joint_spring": Field(mjcf="joint stiffness, springref"),
     "hardening_spring": Field(mjcf="joint stiffness, third coefficient, springref"),
     "quadratic_drag": Field(mjcf="joint damping, second coefficient"),
+    "cubic_drag": Field(mjcf="joint damping, third coefficient"),
     "torque_offset": Field(mjcf="general biasprm"),
     "coulomb_asymmetry": Field(
         mjcf="general biasprm",
@@ -47,7 +50,7 @@ FIELDS: dict[str, Field] = {
     "torque_saturation": Field(mjcf="general ctrlrange", urdf="limit effort", short="clipped before any lag"),
     "actuator_lag": Field(mjcf="general dyntype filterexact, dynprm"),
     "actuator_delay": Field(mjcf="general delay, nsample", short="in whole time steps"),
-    "base_tilt": Field(mjcf="body euler", urdf="joint origin rpy"),
+    "base_tilt": Field(mjcf="option gravity", urdf="joint origin rpy"),
     "encoder_offset": Field(mjcf="joint ref", urdf="joint origin"),
     "contact": Field(
         mjcf="tendon springlength, stiffness", short="its damping, which acts in contact only, has no field"
@@ -59,6 +62,12 @@ FIELDS: dict[str, Field] = {
 }
 """Every effect that some format has a field for, or that needs a word; any other effect has none."""
 
+_OF_SERIAL = FIELDS | {
+    "payload": Field("inertial", "inertial", "link"),
+    "nominal_link": Field("inertial", "inertial", "link"),
+    "rotor_inertia": Field(mjcf="joint armature", toml="drive.rotor_inertia"),
+    "base_tilt": Field("option gravity", "joint origin rpy", "gravity"),
+}
 _SAME_AS_LINK = "inertial of link 1, whose inertia it adds to without a difference"
 
 
@@ -76,6 +85,8 @@ def field_of(effect: str, joint: int | None, form: str, kind: str) -> str | None
     kind : str
         Kind of arm.
     """
+    if kind == SERIAL:
+        return _OF_SERIAL.get(effect, Field()).of(form)
     if effect == "rotor_inertia" and joint == 1 and form in ("urdf", "toml"):
         return _SAME_AS_LINK if form == "urdf" else "inertial.theta"
     if effect == "base_tilt" and kind == "axis":

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-__all__ = ["ON_JOINT", "Joint"]
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from armgap.diagnosis import Cause
+
+__all__ = ["ON_JOINT", "Joint", "with_causes"]
 
 
 @dataclass(frozen=True)
@@ -20,8 +27,8 @@ class Joint:
         Inertia on the joint's own acceleration only.
     stiffness, cubic, rest : float
         Spring ``-stiffness (q - rest) - cubic (q - rest)^3``.
-    drag : float
-        Torque ``-drag dq |dq|``.
+    drag, cubic_drag : float
+        Torques ``-drag dq |dq|`` and ``-cubic_drag dq^3``.
     offset, gain, delay, lag : float
         Drive: torque ``gain u + offset`` with the command `u` delayed [s] and lagged [s].
     limit : float, optional
@@ -46,6 +53,21 @@ class Joint:
     limit: float | None = None
     reading: float = 0.0
     stop: tuple[float, float] | None = None
+    cubic_drag: float = 0.0
+
+    @property
+    def damping(self) -> NDArray[np.float64]:
+        """Coefficients of ``dq``, ``dq |dq|`` and ``dq^3`` in the torque against the velocity, up to the last that is not zero."""
+        given = [self.viscous, self.drag, self.cubic_drag]
+        return np.array(given[: 3 if self.cubic_drag else 2 if self.drag else 1])
+
+    def free(self, far: float) -> tuple[float, float, float] | None:
+        """Range of readings without the stop's spring, which ends at `far` on the other side, and its stiffness; None without a stop."""
+        if self.stop is None:
+            return None
+        position, stiffness = self.stop
+        edge = position + self.reading
+        return (-far, edge, stiffness) if position >= 0 else (edge, far, stiffness)
 
 
 def _spring(joint: Joint, p: Mapping[str, float]) -> Joint:
@@ -69,6 +91,7 @@ ON_JOINT: dict[str, Callable[[Joint, Mapping[str, float]], Joint]] = {
     "joint_spring": _spring,
     "hardening_spring": _spring,
     "quadratic_drag": lambda j, p: replace(j, drag=j.drag + p["c"]),
+    "cubic_drag": lambda j, p: replace(j, cubic_drag=j.cubic_drag + p["c3"]),
     "torque_offset": lambda j, p: replace(j, offset=j.offset + p["offset"]),
     "coulomb_asymmetry": lambda j, p: replace(j, offset=j.offset - p["delta"]),
     "torque_gain": lambda j, p: replace(j, gain=j.gain * p["gain"]),
@@ -79,3 +102,13 @@ ON_JOINT: dict[str, Callable[[Joint, Mapping[str, float]], Joint]] = {
     "contact": lambda j, p: replace(j, stop=(p["position"], p["stiffness"])),
 }
 """What an effect of a joint changes in it; payload and tilt concern the whole arm."""
+
+
+def with_causes(joints: Iterable[Joint], causes: Iterable[Cause]) -> tuple[Joint, ...]:
+    """Return joints with what the causes change in them, one after the other."""
+    changed = list(joints)
+    for cause in causes:
+        if cause.effect in ON_JOINT and cause.joint is not None:
+            values = {name: v.value for name, v in cause.parameters.items()}
+            changed[cause.joint - 1] = ON_JOINT[cause.effect](changed[cause.joint - 1], values)
+    return tuple(changed)

@@ -18,10 +18,7 @@ LISTED = 3
 #: Share of the gap above the floor that may stay before it is worth a line: less is what other motions alone vary it by.
 REMAINDER = 0.2
 _EXPORT = "`armgap export DIAGNOSIS.json --arm ARM.toml -o corrected.toml` (`.xml` for MuJoCo, `.urdf` for URDF)"
-_BY_HAND = (
-    "write the values into the arm file (`[friction]`, `[drive]`, `[payload]`, `[[link]]`) or the simulator's model; `armgap export` does not take "
-    "serial arms"
-)
+_INTO_MODEL = "; `--model ROBOT.urdf -o corrected.urdf` writes them into your own description"
 _AGAIN = "After a repair, diagnose a log of the same motion and compare: `armgap compare DIAGNOSIS.json REPAIRED.json`."
 _LOG_MORE = (
     "Log more: the measured torque (motor current times torque constant), mapped to the tau columns in place of the command, tells "
@@ -45,6 +42,10 @@ def _is_serial(data: Data) -> bool:
     return (data.get("arm") or {}).get("kind") == SERIAL
 
 
+def _export(data: Data) -> str:
+    return _EXPORT + (_INTO_MODEL if _is_serial(data) else "")
+
+
 def _input(data: Data) -> list[str]:
     remedies = [_remedy(c) for c in data.get("checks") or [] if c["severity"] == "error"]
     steps = [f"Apply the remedy and diagnose again: {text}." for text in dict.fromkeys(filter(None, remedies))]
@@ -65,17 +66,12 @@ def _none(data: Data) -> list[str]:
 
 
 def _parameters(data: Data) -> list[str]:
-    if _is_serial(data):
-        return [f"Take over the re-estimated values: {_BY_HAND}.", *_excite(data)]
-    return [f"Take over the re-estimated values: {_EXPORT}.", *_excite(data)]
+    return [f"Take over the re-estimated values: {_export(data)}.", *_excite(data)]
 
 
 def _effect(data: Data) -> list[str]:
     steps = [_alike(c) for c in data["causes"] if c.get("equivalents")]
-    if _is_serial(data):
-        steps.append(f"Bring what was found into the model: {_BY_HAND}.")
-    else:
-        steps.append(f"Export the corrected model: {_EXPORT}.")
+    steps.append(f"Export the corrected model: {_export(data)}.")
     steps.append(_AGAIN)
     left = 1.0 - float(data["gap"]["closed"])
     if doubtful(data) or left > REMAINDER:

@@ -1,0 +1,187 @@
+"""The nearest links that bodies can be.
+
+Motion determines combinations of the links' numbers only (base parameters, Khalil 2002). Estimated one by one, a single link may come
+out with numbers that no body has although all torques are right. Of the links with the same torques, those are wanted that are bodies,
+whose pseudo-inertias are positive definite (Wensing, Kim and Slotine 2018), and that are nearest to the nominal ones, in units of these'
+standard deviations (Sousa and Cortesao 2014). This is a convex problem::
+
+    minimise  |Y (x - found)|^2 / 2 + |(x - nominal)/sigma|^2 / 2 - mu sum log det P_k(x)
+
+with torques `Y x` in units of a share of each joint's own, so small that torques stay where they can, and a barrier `mu` that goes to zero
+(Boyd and Vandenberghe 2004, section 11.3). Where no bodies have these torques, the solution is the one that misses them least.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.rigid_body import inconsistency, pseudo_inertia
+
+__all__ = ["TOLERANCE", "Bodies", "nearest_bodies"]
+
+Array = NDArray[np.float64]
+
+#: Torques that differ by less than this share of the joint's own are the same: what is left of an estimate is ten times that and more.
+TOLERANCE = 1e-3
+#: A torque that differs by this share of the joint's own costs as much as a value that is one standard deviation away: where the torques can be
+#: kept, and where they cannot. There a smaller share makes links absurd (rods of many times the mass) and torques hardly better.
+_SHARES = (1e-5, 1e-3)
+#: Barriers from one that the torques hardly count beside to one that hardly counts beside a tenth of a standard deviation.
+_BARRIERS = 10.0 ** np.arange(10.0, -3.0, -2.0)
+_MOST_STEPS = 60
+#: Newton decrement, in units of the barrier, at which its minimum is reached.
+_REACHED = 1e-6
+_SLOPE = 0.1
+_LEAST_PART = 1e-10
+_UNIT_PSEUDO_INERTIAS = np.array([pseudo_inertia(unit) for unit in np.eye(10)])
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Links that bodies can be.
+
+    Attributes
+    ----------
+    inertial : ndarray, shape (n_joints, 10)
+        Inertia of each link.
+    rotor : ndarray, shape (n_joints,)
+        Rotor inertias, none of them negative.
+    changed : tuple of int
+        Links, from 0, that no body has as they were found; empty if nothing was changed.
+    torque_error : ndarray, shape (n_joints,)
+        RMS change of each joint's torque by it, as a share of that torque.
+    """
+
+    inertial: Array
+    rotor: Array
+    changed: tuple[int, ...]
+    torque_error: Array
+
+    @property
+    def same_torques(self) -> bool:
+        """Whether the torques are those found."""
+        return bool(np.all(self.torque_error < TOLERANCE))
+
+
+def nearest_bodies(
+    found: Array, nominal: Array, sigma: Array, regressor: Array, beside: Array, *, exact: bool = True
+) -> Bodies:
+    """Return links that bodies can be, with the torques of those found.
+
+    Parameters
+    ----------
+    found, nominal, sigma : ndarray, shape (11 n,)
+        Ten numbers per link, then the rotors' inertias: as they were found, nominal, and the standard deviations of these.
+    regressor : ndarray, shape (n_states, n_joints, 11 n)
+        Torques per unit of each of them in the states that count.
+    beside : ndarray, shape (n_joints, 10)
+        Inertia of what hangs on each link and is to stay as it is; the rest has to be a body.
+    exact : bool, default True
+        Whether torques are kept to `TOLERANCE` where that is possible; else they are weighed against the distance from the nominal values.
+    """
+    n = len(beside)
+    links, rotors = found[: 10 * n].reshape(n, 10), found[10 * n :]
+    # Numbers of zero may hide a massless link: nothing that a simulator could integrate.
+    wrong = tuple(k for k in range(n) if inconsistency(links[k] - beside[k]) or links[k][0] <= beside[k][0])
+    if not wrong and np.all(rotors >= 0):
+        return Bodies(links, rotors, (), np.zeros(n))
+    size = np.sqrt(np.mean((regressor @ found) ** 2, axis=0))
+    torque = regressor / np.where(size > 0, size, 1.0)[:, None]
+    sigma = np.where(sigma > 0, sigma, TOLERANCE * np.maximum(np.abs(nominal), np.median(sigma[sigma > 0])))
+    for share in _SHARES if exact else _SHARES[1:]:
+        x = _minimised(found, nominal, sigma, torque.reshape(-1, 11 * n) / (share * np.sqrt(len(torque))), beside)
+        error = np.sqrt(np.mean((torque @ (x - found)) ** 2, axis=0))
+        if np.all(error < TOLERANCE):
+            break
+    return Bodies(x[: 10 * n].reshape(n, 10), x[10 * n :], wrong, error)
+
+
+def _minimised(found: Array, nominal: Array, sigma: Array, rows: Array, beside: Array) -> Array:
+    """Return the values that minimise ``|rows (x - found)|^2 + |(x - nominal)/sigma|^2`` among those of bodies, by Newton's method with barriers."""
+    n = len(beside)
+    # Rotors that are not there stay so.
+    free = np.concatenate([np.ones(10 * n, dtype=bool), found[10 * n :] > 0])
+    barrier = _Barrier(n, beside, np.flatnonzero(free[10 * n :]))
+    x = _start(nominal, sigma, barrier)
+    x[~free] = 0.0
+    scaled = rows * sigma
+    quadratic = scaled.T @ scaled
+
+    def cost(at: Array, mu: float) -> float:
+        a, b = (at - found) / sigma, (at - nominal) / sigma
+        return float(0.5 * (a @ quadratic @ a + b @ b)) + mu * barrier.value(at)
+
+    for mu in _BARRIERS:
+        for _ in range(_MOST_STEPS):
+            slope, curvature = barrier.derivatives(x)
+            gradient = quadratic @ ((x - found) / sigma) + (x - nominal) / sigma + mu * sigma * slope
+            hessian = quadratic + np.eye(11 * n) + mu * curvature * np.outer(sigma, sigma)
+            step = np.zeros(11 * n)
+            step[free] = -sigma[free] * np.linalg.solve(hessian[np.ix_(free, free)], gradient[free])
+            decrement = -float(gradient @ (step / sigma))
+            if decrement < _REACHED * mu:
+                break
+            here, part = cost(x, mu), 1.0
+            while part > _LEAST_PART and not cost(x + part * step, mu) <= here - _SLOPE * part * decrement:
+                part *= 0.5
+            if part <= _LEAST_PART:
+                break  # rounding
+            x = x + part * step
+    return x
+
+
+class _Barrier:
+    """``-sum log det P_k - sum log rotor_j`` of links without what is beside them, and of the rotors that there are."""
+
+    def __init__(self, n: int, beside: Array, rotors: NDArray[np.intp]) -> None:
+        self.n = n
+        self.beside = beside
+        self.rotors = 10 * n + rotors
+
+    def pseudo_inertias(self, x: Array) -> Array:
+        """Pseudo-inertias of the links, shape (n, 4, 4)."""
+        return np.tensordot(x[: 10 * self.n].reshape(self.n, 10) - self.beside, _UNIT_PSEUDO_INERTIAS, axes=1)
+
+    def value(self, x: Array) -> float:
+        """Return its value; infinite where a link is no body."""
+        if np.any(x[self.rotors] <= 0):
+            return float("inf")
+        try:
+            roots = np.linalg.cholesky(self.pseudo_inertias(x))
+        except np.linalg.LinAlgError:
+            return float("inf")
+        diagonals = np.diagonal(roots, axis1=1, axis2=2)
+        return -2.0 * float(np.log(diagonals).sum()) - float(np.log(x[self.rotors]).sum())
+
+    def derivatives(self, x: Array) -> tuple[Array, Array]:
+        """Return gradient and second derivatives."""
+        gradient, hessian = np.zeros(len(x)), np.zeros((len(x), len(x)))
+        for k, inverse in enumerate(np.linalg.inv(self.pseudo_inertias(x))):
+            by = inverse @ _UNIT_PSEUDO_INERTIAS
+            rows = slice(10 * k, 10 * k + 10)
+            gradient[rows] = -np.trace(by, axis1=1, axis2=2)
+            hessian[rows, rows] = np.einsum("aij,bji->ab", by, by)
+        gradient[self.rotors] = -1.0 / x[self.rotors]
+        hessian[self.rotors, self.rotors] = x[self.rotors] ** -2
+        return gradient, hessian
+
+
+def _start(nominal: Array, sigma: Array, barrier: _Barrier) -> Array:
+    """Return the nominal values with balls around the links' origins so heavy that every link is a body."""
+    n, x = barrier.n, nominal.copy()
+    x[barrier.rotors] = np.maximum(x[barrier.rotors], sigma[barrier.rotors])
+    for k in range(n):
+        mass, moment = sigma[10 * k], sigma[10 * k + 4]
+        ball = np.array([mass, 0, 0, 0, moment, 0, moment, 0, 0, moment])
+        share = 0.0
+        while not np.isfinite(_Barrier(1, barrier.beside[k : k + 1], np.empty(0, dtype=np.intp)).value(_one(x, k))):
+            share = max(2.0 * share, TOLERANCE)
+            x[10 * k : 10 * k + 10] = nominal[10 * k : 10 * k + 10] + share * ball
+    return x
+
+
+def _one(x: Array, k: int) -> Array:
+    return x[10 * k : 10 * k + 10]

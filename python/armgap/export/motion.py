@@ -1,0 +1,69 @@
+"""States in which torques are compared: along the motion that was diagnosed, and throughout the arm's range."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm import Arm
+from armgap.diagnosis import Diagnosis
+
+__all__ = ["States", "any_states", "diagnosed_states", "positions"]
+
+Array = NDArray[np.float64]
+States = tuple[Array, Array, Array]
+"""Positions, velocities and accelerations, shape (n_states, n_joints) each."""
+
+#: States that are taken from the motion, and at random.
+_STATES = 400
+#: Half width of the cubics that velocities and accelerations are taken from [s]: as wide as the test functions of the diagnosis.
+_HALF_WIDTH_S = 0.05
+_FEWEST = 7
+#: Speed [rad/s or m/s] and acceleration of random states.
+_SPEED, _ACCELERATION = 1.0, 3.0
+
+
+def positions(diagnosis: Diagnosis, n: int) -> list[tuple[Array, Array]]:
+    """Return times [s] and measured positions, shape (n_samples, n_joints), of the holdout logs that the diagnosis has drawn."""
+    logs: dict[str, dict[int, tuple[Array, Array]]] = {}
+    for s in diagnosis.extra.get("series", ()):
+        logs.setdefault(s["log"], {})[s["joint"]] = (np.array(s["t"]), np.array(s["measured"]))
+    whole = [joints for joints in logs.values() if len(joints) == n]
+    return [(joints[1][0], np.column_stack([joints[j + 1][1] for j in range(n)])) for joints in whole]
+
+
+def diagnosed_states(diagnosis: Diagnosis, n: int) -> States | None:
+    """Return states along the holdout, from local cubics; None if the diagnosis holds no motion."""
+    found: list[Array] = []
+    logs = [(t, q) for t, q in positions(diagnosis, n) if len(t) > 2 * _FEWEST]
+    for t, q in logs:
+        count = max(_STATES // len(logs), 1)
+        for k in np.linspace(_FEWEST, len(t) - 1 - _FEWEST, count).astype(int):
+            near = np.flatnonzero(np.abs(t - t[k]) <= _HALF_WIDTH_S)
+            if len(near) < _FEWEST:
+                near = np.arange(k - _FEWEST // 2, k + _FEWEST // 2 + 1)
+            powers = (t[near] - t[k])[:, None] ** np.arange(4)
+            cubic = np.linalg.lstsq(powers / np.abs(powers).max(axis=0), q[near], rcond=None)[0]
+            cubic /= np.abs(powers).max(axis=0)[:, None]
+            found.append(np.array([cubic[0], cubic[1], 2.0 * cubic[2]]))
+    if not found:
+        return None
+    q, dq, ddq = np.ascontiguousarray(np.swapaxes(found, 0, 1))
+    return q, dq, ddq
+
+
+def any_states(arm: Arm) -> States:
+    """Return random states within the limits of position, a turn or a metre where there is none."""
+    chain, rng = arm.chain, np.random.default_rng(1)
+    assert chain is not None
+    reach = np.where(chain.rotary, math.pi, 0.5)
+    low, high = np.maximum(chain.lower, -reach), np.minimum(chain.upper, reach)
+    low, high = np.minimum(low, high), np.maximum(low, high)
+    shape = (_STATES, chain.n_joints)
+    return (
+        rng.uniform(low, high, shape),
+        rng.uniform(-_SPEED, _SPEED, shape),
+        rng.uniform(-_ACCELERATION, _ACCELERATION, shape),
+    )
