@@ -105,9 +105,14 @@ impl Term {
         self.name() == other.name() && self.joint() == other.joint()
     }
 
-    /// Whether it can be all that another term is, whatever the motion: a change of the last of so many links includes a load on it.
+    /// Whether it can be all that another term is, whatever the motion: a load on the last of so many links is a change of that link, and a heavier
+    /// last link is a load on it.
     pub fn includes(&self, other: &Self, links: usize) -> bool {
-        matches!((self.kind, other.kind), (TermKind::NominalLink(link), TermKind::Payload) if link + 1 == links)
+        match (self.kind, other.kind) {
+            (TermKind::NominalLink(link), TermKind::Payload) => link + 1 == links,
+            (TermKind::Payload, TermKind::NominalLink(link)) => link + 1 == links && other.p[0] > 0.0,
+            _ => false,
+        }
     }
 
     /// Its parameters; `rotary` tells of its joint.
