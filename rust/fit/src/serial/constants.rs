@@ -1,8 +1,11 @@
 //! What decides in the diagnosis of a serial arm: every constant with its unit, its reason, and what other values did.
 
-/// Robust test statistic (squared, sandwich over blocks) that a term needs on the training logs: five standard deviations, which one of
-/// 300 candidates exceeds by chance once in 6,000 searches.
-pub const SIGNIFICANT: f64 = 25.0;
+/// Robust test statistic (squared, sandwich over blocks) that a term needs on training logs and holdout together: five standard deviations on the
+/// former, which one of 300 candidates exceeds by chance once in 6,000 searches, and three on the latter. A stop may be met in the holdout only.
+pub const SIGNIFICANT: f64 = 34.0;
+
+/// Part of it that the training logs have to give alone: three standard deviations.
+pub const NOTICED: f64 = 9.0;
 
 /// Decrease of the training cost, per parameter, that pays for it: twice the logarithm of some hundred candidates.
 pub const PRICE: f64 = 12.0;

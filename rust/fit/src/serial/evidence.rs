@@ -1,7 +1,7 @@
 //! What speaks for a term: the model with it against the model without, and what probability that makes.
 
 use super::constants::{
-    CONSEQUENCE, HOLDOUT_DEVIATIONS, MATTERS, PRICE, RESAMPLES, RESTORES, RESTORES_EACH, SIGNIFICANT,
+    CONSEQUENCE, HOLDOUT_DEVIATIONS, MATTERS, NOTICED, PRICE, RESAMPLES, RESTORES, RESTORES_EACH, SIGNIFICANT,
 };
 use super::fitting::Fitted;
 use super::rows::{JointRows, Regression, Rows, Signal};
@@ -19,7 +19,7 @@ pub struct Evidence {
     pub relief: f64,
     /// Squared robust test statistic.
     pub statistic: f64,
-    /// Decrease of the holdout's cost.
+    /// Decrease of the holdout's cost, on the joints that the term acts on.
     pub holdout_gain: f64,
     /// Size that the holdout gives the term, one being the training logs' (see [`Search::evidence`]), in its standard deviations.
     pub deviations: f64,
@@ -32,7 +32,8 @@ pub struct Evidence {
 impl Evidence {
     /// Whether the logs ask for the term by what it explains.
     pub fn explains(&self) -> bool {
-        self.statistic > SIGNIFICANT
+        self.statistic > NOTICED
+            && self.statistic + self.deviations.max(0.0).powi(2) > SIGNIFICANT
             && self.gain > PRICE * self.parameters
             && self.holdout_gain > 0.0
             && self.deviations > HOLDOUT_DEVIATIONS
@@ -58,8 +59,9 @@ impl Search<'_> {
     /// What speaks for term `index` of `with` beside the model `without` it.
     ///
     /// The holdout judges by a regression of what the model without the term leaves on what the term takes from it: a slope of one says that it is there as
-    /// the training logs have it, a slope of zero that it is not. Its standard deviation comes from the scatter of the blocks' scores. How unevenly an
-    /// effect is spread over the blocks does not count against it: a stop may be met twice in a log.
+    /// the training logs have it, a slope of zero that it is not. It judges on the joints that the term acts on, as the scatter of the other joints'
+    /// parameters says nothing about it. The slope's standard deviation comes from the scatter of the blocks' scores. How unevenly an effect is spread over
+    /// the blocks does not count against it: a stop may be met twice in a log.
     pub(super) fn evidence(
         &self,
         regression: &Regression,
@@ -74,21 +76,20 @@ impl Search<'_> {
             1.0 / regression.sandwich(&with.estimate, column, &score)[(0, 0)].max(f64::MIN_POSITIVE)
         });
         let joints = self.rotary.len();
-        let holdout_gain = without.holdout_cost() - with.holdout_cost();
+        let acts_on: Vec<usize> = (0..joints).filter(|j| signal[*j].is_some()).collect();
+        let cost = |set: &Fitted, j: usize| set.costs[1][j].iter().sum::<f64>();
         let share = (0..joints)
-            .map(|j| {
-                let before: f64 = without.costs[1][j].iter().sum();
-                let after: f64 = with.costs[1][j].iter().sum();
-                if before > 0.0 { (before - after) / before } else { 0.0 }
-            })
+            .map(|j| (1.0 - cost(with, j) / cost(without, j)).max(0.0))
+            .filter(|share| share.is_finite())
             .fold(0.0, f64::max);
+        let holdout_gain = acts_on.iter().map(|j| cost(without, *j) - cost(with, *j)).sum();
         Evidence {
             parameters: term.degrees,
             gain: without.estimate.cost - with.estimate.cost,
             relief: without.estimate.prior_cost - with.estimate.prior_cost,
             statistic,
             holdout_gain,
-            deviations: confirmed(&regression.weights, self.holdout.rows(), without, with),
+            deviations: confirmed(&acts_on, &regression.weights, self.holdout.rows(), [without, with]),
             share,
             consequence: consequence(self.training.rows(), &signal),
         }
@@ -96,12 +97,12 @@ impl Search<'_> {
 }
 
 /// Slope of the holdout's residuals without a term on their change by it, over the slope's standard deviation from the scatter over blocks.
-fn confirmed(weights: &[f64], rows: &Rows, without: &Fitted, with: &Fitted) -> f64 {
+fn confirmed(joints: &[usize], weights: &[f64], rows: &Rows, [without, with]: [&Fitted; 2]) -> f64 {
     let mut information = 0.0;
     let mut product = 0.0;
     let mut blocks = vec![[0.0; 2]; rows.blocks];
-    for (j, rows) in rows.joints.iter().enumerate() {
-        for ((left, stays), block) in without.held[j].iter().zip(&with.held[j]).zip(&rows.block) {
+    for j in joints.iter().copied() {
+        for ((left, stays), block) in without.held[j].iter().zip(&with.held[j]).zip(&rows.joints[j].block) {
             let taken = left - stays;
             let [own, square] = [weights[j] * left * taken, weights[j] * taken * taken];
             product += own;
@@ -197,7 +198,8 @@ mod tests {
             block: (0..ROWS).map(|k| k / 20).collect(),
             floor: vec![0.1; ROWS],
         };
-        confirmed(&[1.0], &Rows { joints: vec![joint], parameters: 0, blocks: ROWS / 20 }, &without, &with)
+        let rows = Rows { joints: vec![joint], parameters: 0, blocks: ROWS / 20 };
+        confirmed(&[0], &[1.0], &rows, [&without, &with])
     }
 
     #[test]

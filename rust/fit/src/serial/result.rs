@@ -1,6 +1,6 @@
 //! From the end of a search to the diagnosis as data.
 
-use super::constants::{CONSEQUENCE, NAMED, SIGNIFICANT};
+use super::constants::{CONSEQUENCE, NAMED, NOTICED, SIGNIFICANT};
 use super::fitting::Fitted;
 use super::predict::{Model, floor};
 use super::search::{Found, Tested};
@@ -344,7 +344,7 @@ fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &
     }
     let statistic = (size / sigma.max(f64::MIN_POSITIVE)).powi(2);
     let largest = size.abs() + NORMAL_95 * sigma;
-    if statistic > SIGNIFICANT && largest * tested.consequence > 10.0 * CONSEQUENCE {
+    if statistic > SIGNIFICANT - NOTICED && largest * tested.consequence > 10.0 * CONSEQUENCE {
         let why = "explains a part of what remains, and too little of it to be named".to_owned();
         return entry("undecided", None, Some(why));
     }

@@ -479,7 +479,8 @@ mod tests {
         };
         assert!(good.is_accepted());
         for weak in [
-            Evidence { statistic: 10.0, ..good },
+            Evidence { statistic: 8.0, ..good },
+            Evidence { statistic: 20.0, deviations: 3.5, ..good },
             Evidence { gain: 10.0, ..good },
             Evidence { deviations: 1.0, ..good },
             Evidence { share: 0.05, ..good },
