@@ -1,6 +1,8 @@
 //! From the end of a search to the diagnosis as data.
 
+use super::closed_loop::ClosedLoop;
 use super::constants::{CONSEQUENCE, NAMED, SIGNIFICANT};
+use super::controller::JointController;
 use super::fitting::Fitted;
 use super::predict::{Model, floor};
 use super::search::{Found, Tested};
@@ -60,10 +62,20 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let fitted = |set: &Fitted| -> [f64; P] { std::array::from_fn(|i| set.estimate.theta[i]) };
     let nominal: [f64; P] = std::array::from_fn(|i| description.theta[i]);
     let reported = &found.reported;
+    let differences = |theta: &[f64]| theta.get(P..).unwrap_or_default().to_vec();
+    let closed_loop = |theta: &[f64], terms: &[Term]| {
+        holdout.equation.commanded.as_ref().map(|commanded| ClosedLoop {
+            joints: with_settings(commanded.controller.with_differences(&differences(theta)), terms),
+            held_before: holdout.equation.held_before(theta, terms),
+        })
+    };
+    let known: Vec<f64> =
+        nominal.iter().copied().chain(differences(&found.refit.estimate.theta).iter().map(|_| 0.0)).collect();
     let models: [Model<N, P>; 3] = [
-        Model::new(arm, nominal, &[]),
-        Model::new(arm, fitted(&found.refit), &[]),
-        Model::new(arm, fitted(reported), &reported.terms),
+        Model::new(arm, nominal, &[]).behind(closed_loop(&known, &[])),
+        Model::new(arm, fitted(&found.refit), &[]).behind(closed_loop(&found.refit.estimate.theta, &[])),
+        Model::new(arm, fitted(reported), &reported.terms)
+            .behind(closed_loop(&reported.estimate.theta, &reported.terms)),
     ];
     let noise: [f64; N] = std::array::from_fn(|j| {
         crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
@@ -131,6 +143,16 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         notes: notes(found, training, holdout, &rotary),
         gap,
     }
+}
+
+/// Controllers with the settings that terms say.
+fn with_settings(mut joints: Vec<JointController>, terms: &[Term]) -> Vec<JointController> {
+    for term in terms {
+        if let TermKind::Controller(of) = term.kind {
+            joints[of.joint] = of.on(&joints[of.joint], term.p[0]);
+        }
+    }
+    joints
 }
 
 fn rotary_of(term: &Term, rotary: &[bool]) -> bool {

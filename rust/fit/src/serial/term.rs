@@ -1,5 +1,6 @@
 //! Terms that a serial arm's model may lack: the library's laws joint by joint, and what changes the arm itself.
 
+use super::controller_term::{ControllerTerm, Setting};
 use crate::model::EffectInstance;
 use armgap_core::chain::LINK_NAMES;
 use armgap_core::effect::{JointPoint, Quantity, Scope, Trial};
@@ -24,6 +25,8 @@ pub enum TermKind {
     BaseTilt,
     /// One link's mass, first moments and inertia differ from the nominal ones.
     NominalLink(usize),
+    /// A setting of a position controller.
+    Controller(ControllerTerm),
 }
 
 /// Name and unit of one parameter.
@@ -55,6 +58,7 @@ impl Term {
             TermKind::Payload => LOAD.len(),
             TermKind::BaseTilt => TURN.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
+            TermKind::Controller(_) => 1,
         };
         Self { kind, p: vec![0.0; count] }
     }
@@ -66,6 +70,7 @@ impl Term {
             TermKind::Payload => "payload",
             TermKind::BaseTilt => "base_tilt",
             TermKind::NominalLink(_) => "nominal_link",
+            TermKind::Controller(of) => of.setting.name(),
         }
     }
 
@@ -76,6 +81,7 @@ impl Term {
             TermKind::Payload => "payload on the last link",
             TermKind::BaseTilt => "base not level",
             TermKind::NominalLink(_) => "wrong nominal link",
+            TermKind::Controller(of) => of.setting.title(),
         }
     }
 
@@ -84,6 +90,7 @@ impl Term {
         match self.kind {
             TermKind::Law(effect) => effect.joint_number(),
             TermKind::NominalLink(link) => Some(link + 1),
+            TermKind::Controller(of) => Some(of.joint + 1),
             TermKind::Payload | TermKind::BaseTilt => None,
         }
     }
@@ -121,6 +128,7 @@ impl Term {
             }
             TermKind::BaseTilt => TURN.iter().map(free).collect(),
             TermKind::NominalLink(_) => LINK_NAMES.iter().map(free).collect(),
+            TermKind::Controller(of) => vec![of.setting.parameter(rotary)],
         }
     }
 
@@ -137,7 +145,7 @@ impl Term {
                     _ => 0,
                 }
             }
-            TermKind::Payload => 0,
+            TermKind::Payload | TermKind::Controller(_) => 0,
             TermKind::BaseTilt => TURN.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
         }
@@ -145,12 +153,16 @@ impl Term {
 
     /// Whether it is sought on every joint by itself.
     pub fn is_of_a_joint(&self) -> bool {
-        matches!(self.kind, TermKind::Law(effect) if effect.law.spec().scope == Scope::Joint)
+        match self.kind {
+            TermKind::Law(effect) => effect.law.spec().scope == Scope::Joint,
+            TermKind::Controller(_) => true,
+            _ => false,
+        }
     }
 
     /// Whether it changes the torque that a command becomes at the joint: of the command itself, or by a torque that depends on it.
     pub fn changes_command(&self) -> bool {
-        let TermKind::Law(effect) = self.kind else { return false };
+        let TermKind::Law(effect) = self.kind else { return matches!(self.kind, TermKind::Controller(_)) };
         effect.law.spec().hooks.command || depends(&effect, |x, value| x.tau = value)
     }
 
@@ -163,7 +175,9 @@ impl Term {
 
     /// Whether it delays the command: a time is all that it has.
     pub fn is_delay(&self) -> bool {
-        let TermKind::Law(effect) = self.kind else { return false };
+        let TermKind::Law(effect) = self.kind else {
+            return matches!(self.kind, TermKind::Controller(of) if of.setting == Setting::ReferenceDelay);
+        };
         let spec = effect.law.spec();
         spec.hooks.command && spec.parameters.iter().all(|p| p.quantity == Quantity::Time)
     }
