@@ -23,6 +23,9 @@ const RESOLVED: f64 = 0.2;
 /// Periods in a sample interval at most.
 const MOST_PERIODS: usize = 100;
 
+/// Part of a period by which an interval may be longer than a whole number of them: times are rounded.
+const ROUNDING: f64 = 1e-6;
+
 /// Time constants of a lag after which it has forgotten.
 const FORGOTTEN: f64 = 8.0;
 
@@ -222,5 +225,115 @@ fn periods<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     };
     let servo = servos.iter().enumerate().map(rate).fold(0.0, f64::max);
     let rate = (servo / RESOLVED).max(plant.fastest(q).max(plant.viscous_rate(q)) / 1.5);
-    ((h * rate.max(1.0 / PERIOD)).ceil() as usize).clamp(1, MOST_PERIODS)
+    ((h * rate.max(1.0 / PERIOD) - ROUNDING).ceil() as usize).clamp(1, MOST_PERIODS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::{Reference, Track};
+    use armgap_core::arm::Pendulum;
+
+    const PERIOD: f64 = 0.005;
+    const INERTIA: f64 = 0.5;
+    const VISCOUS: f64 = 0.4;
+    const SERVO: JointController = JointController {
+        gains: [200.0, 6.0, 0.0],
+        rate_of_error: false,
+        reference_delay: 0.0,
+        delay: 0.0,
+        deadband: 0.0,
+        speed_limit: f64::INFINITY,
+        torque_limit: f64::INFINITY,
+    };
+    /// Position by which periods of a servo of one millisecond and steps of 20 microseconds differ, after a step of the reference of 0.1 rad.
+    const STEPPED: f64 = 1e-3;
+
+    /// The reference steps from 0 to 0.1 rad after a fifth of a second, from rest.
+    fn target(k: usize) -> f64 {
+        if k < 40 { 0.0 } else { 0.1 }
+    }
+
+    /// A pendulum without gravity that is at rest in its log: it is predicted, and not compared.
+    fn predicted(servo: JointController, effects: Vec<EffectInstance>) -> Vec<f64> {
+        let count = 160;
+        let t: Vec<f64> = (0..count).map(|k| PERIOD * k as f64).collect();
+        let mut track = Track::<1>::new("", &t, &vec![0.0; count], &[], Some([1e-6]));
+        track.reference = Some(Reference { q: (0..count).map(|k| [target(k)]).collect(), dq: None });
+        let data = crate::gap::whole(&Dataset { tracks: vec![track], windows: Vec::new(), rows: 0 });
+        let hypothesis = Hypothesis { effects, ..Hypothesis::rigid([INERTIA, 0.0, VISCOUS, 0.0]) };
+        let closed_loop = ClosedLoop { joints: vec![servo], held_before: vec![[0.0]] };
+        closed_loop.predict(&data, &Pendulum { gravity: 0.0 }, &hypothesis)
+    }
+
+    /// The same by explicit Euler steps; `torque` makes the delivered torque of those asked for so far.
+    fn stepped(servo: &JointController, torque: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+        let steps = 250;
+        let dt = PERIOD / f64::from(steps);
+        let (mut q, mut dq, mut asked, mut positions) = (0.0, 0.0, Vec::new(), Vec::new());
+        for k in 0..159 {
+            for _ in 0..steps {
+                let [kp, kd, _] = servo.gains;
+                asked.push((kp * (target(k) - q) - kd * dq).clamp(-servo.torque_limit, servo.torque_limit));
+                dq += dt * (torque(&asked) - VISCOUS * dq) / INERTIA;
+                q += dt * dq;
+            }
+            positions.push(q);
+        }
+        positions
+    }
+
+    fn apart(a: &[f64], b: &[f64]) -> f64 {
+        assert_eq!(a.len(), b.len());
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    fn last(asked: &[f64]) -> f64 {
+        asked[asked.len() - 1]
+    }
+
+    #[test]
+    fn a_servo_answers_a_step_of_its_reference() {
+        let found = predicted(SERVO, Vec::new());
+        let off = apart(&found, &stepped(&SERVO, last));
+        assert!(off < STEPPED && (found[158] - 0.1).abs() < 0.01, "{off}");
+    }
+
+    #[test]
+    fn limits_and_delays_act_in_the_loop() {
+        let limited = JointController { torque_limit: 3.0, ..SERVO };
+        let off = apart(&predicted(limited, Vec::new()), &stepped(&limited, last));
+        assert!(off < STEPPED, "{off}");
+        // A delay of 8 ms is 400 steps, by the controller itself or by an effect of the drive.
+        let late = |asked: &[f64]| asked.len().checked_sub(401).map_or(0.0, |i| asked[i]);
+        let wanted = stepped(&SERVO, late);
+        assert!(apart(&wanted, &stepped(&SERVO, last)) > 10.0 * STEPPED);
+        let own = predicted(JointController { delay: 0.008, ..SERVO }, Vec::new());
+        assert!(apart(&own, &wanted) < STEPPED, "{}", apart(&own, &wanted));
+        let law = find::<f64>("actuator_delay").unwrap();
+        let effect = predicted(SERVO, vec![EffectInstance::new(law, 0, [0.008, 0.0, 0.0])]);
+        assert!(apart(&effect, &wanted) < STEPPED, "{}", apart(&effect, &wanted));
+    }
+
+    #[test]
+    fn a_late_reference_moves_the_answer() {
+        let late = predicted(JointController { reference_delay: 2.0 * PERIOD, ..SERVO }, Vec::new());
+        let prompt = predicted(SERVO, Vec::new());
+        let off = apart(&late[2..], &prompt[..157]);
+        assert!(off < 1e-9, "{off}");
+    }
+
+    #[test]
+    fn what_an_integral_part_held_goes_on() {
+        let servo = JointController { gains: [200.0, 6.0, 1e-6], ..SERVO };
+        let (count, held) = (160, 2.0);
+        let t: Vec<f64> = (0..count).map(|k| PERIOD * k as f64).collect();
+        let mut track = Track::<1>::new("", &t, &vec![0.0; count], &[], Some([1e-6]));
+        track.reference = Some(Reference { q: vec![[0.0]; count], dq: None });
+        let data = crate::gap::whole(&Dataset { tracks: vec![track], windows: Vec::new(), rows: 0 });
+        let closed_loop = ClosedLoop { joints: vec![servo], held_before: vec![[held]] };
+        let hypothesis = Hypothesis::rigid([INERTIA, 0.0, VISCOUS, 0.0]);
+        let found = closed_loop.predict(&data, &Pendulum { gravity: 0.0 }, &hypothesis);
+        assert!((found[158] - held / 200.0).abs() < STEPPED, "{}", found[158]);
+    }
 }

@@ -21,8 +21,11 @@ pub struct Commanded<const N: usize> {
     /// What they are given, log by log.
     pub given: Vec<[Given; N]>,
     /// Means of torque and regressor over each log, by log and joint, of joints with an integral part.
-    levels: Vec<Vec<Option<(f64, Vec<f64>)>>>,
+    levels: Vec<Vec<Option<Level>>>,
 }
+
+/// Means of torque and regressor over the rows of one joint in one log.
+type Level = (f64, Vec<f64>);
 
 /// Torques of a controller along a track's measured path, in place of logged ones; none for a track without a reference.
 pub fn torques<const N: usize>(
@@ -141,13 +144,15 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// Leaves the mean over each log out of values of joint `j`'s rows, if it has an integral part.
-    pub(super) fn centre(&self, j: usize, values: &mut Vec<f64>) {
+    pub(super) fn centre(&self, j: usize, values: &mut [f64]) {
         if !self.integrates(j) {
             return;
         }
         for rows in self.rows_by_log(j) {
             let mean = rows.iter().map(|i| values[*i]).sum::<f64>() / rows.len().max(1) as f64;
-            rows.into_iter().for_each(|i| values[i] -= mean);
+            for i in rows {
+                values[i] -= mean;
+            }
         }
     }
 
@@ -184,5 +189,132 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             }
         }
         held
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::serial::controller::tests::SERVO;
+    use crate::serial::controller_term::Setting;
+    use crate::serial::intervals::HALF_WIDTH_S;
+    use crate::track::Reference;
+    use armgap_core::chain::{Chain, ChainJoint, JointKind};
+
+    const PERIOD: f64 = 0.004;
+    const INERTIA: f64 = 0.7;
+    const VISCOUS: f64 = 0.9;
+    /// Torque that the joint needs beside these, as of an offset, N m.
+    const OFFSET: f64 = 1.3;
+    /// Torques of some 8 N m are met to this by test functions, local cubics and references that are straight between rows, N m.
+    const MET: f64 = 0.02;
+
+    /// One joint about the vertical, its inertial parameter and viscous friction known.
+    fn arm() -> (Chain<f64, 1>, [f64; 13]) {
+        let joint = ChainJoint {
+            kind: JointKind::Revolute,
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            translation: [0.0; 3],
+            axis: [0.0, 0.0, 1.0],
+        };
+        let mut theta = [0.0; 13];
+        (theta[0], theta[9], theta[11]) = (1.0, INERTIA, VISCOUS);
+        (Chain::new([joint], [0.0; 3]), theta)
+    }
+
+    /// A log in which a servo with gains `kp` times and `kd` times those of `stated` makes the joint follow a sum of sines against `offset`.
+    fn track(stated: &JointController, [kp, kd]: [f64; 2], offset: f64) -> Track<1> {
+        let t: Vec<f64> = (0..1500).map(|k| PERIOD * f64::from(k)).collect();
+        let path = |t: f64| {
+            let wave = |size: f64, rate: f64| {
+                let (sine, cosine) = (rate * t).sin_cos();
+                [size * sine, size * rate * cosine, -size * rate * rate * sine]
+            };
+            let (a, b) = (wave(0.6, 2.0), wave(0.2, 5.3));
+            [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+        };
+        let q: Vec<f64> = t.iter().map(|t| path(*t)[0]).collect();
+        let wanted = |t: f64| {
+            // In the middle of the row over which it is held.
+            let [q, dq, ddq] = path(t + 0.5 * PERIOD);
+            let torque = INERTIA * ddq + VISCOUS * dq + offset;
+            q + (torque + kd * stated.gains[1] * dq) / (kp * stated.gains[0])
+        };
+        let mut track = Track::<1>::new("", &t, &q, &[], Some([1e-9]));
+        track.reference = Some(Reference { q: t.iter().map(|t| [wanted(*t)]).collect(), dq: None });
+        track
+    }
+
+    fn equation(controller: &PositionController, mut track: Track<1>) -> Equation<1, 13> {
+        track.held = torques(controller, &track).unwrap();
+        let (arm, theta) = arm();
+        let tracks = [track];
+        Equation::new(arm, &theta, &tracks, HALF_WIDTH_S).behind(controller, &tracks)
+    }
+
+    fn known(joint: JointController) -> PositionController {
+        PositionController { joints: vec![joint], sigma: [vec![0.0], vec![0.0], vec![0.0]] }
+    }
+
+    fn worst(residual: &[Vec<f64>]) -> f64 {
+        assert!(residual[0].len() > 100);
+        residual[0].iter().fold(0.0, |worst, r| r.abs().max(worst))
+    }
+
+    #[test]
+    fn the_torque_of_the_controller_is_what_the_arm_needs() {
+        let equation = equation(&known(SERVO), track(&SERVO, [1.0; 2], 0.0));
+        let left = worst(&equation.rows.residual(&arm().1, &vec![None]));
+        assert!(left < MET, "{left}");
+    }
+
+    #[test]
+    fn estimated_gains_are_parameters_beside_the_arm_s() {
+        let controller = PositionController { sigma: [vec![4.0], vec![0.3], vec![0.0]], ..known(SERVO) };
+        let equation = equation(&controller, track(&SERVO, [1.2, 0.8], 0.0));
+        assert_eq!(equation.rows.parameters, 15);
+        let mut theta = arm().1.to_vec();
+        theta.extend([0.2 * SERVO.gains[0], -0.2 * SERVO.gains[1]]);
+        let left = worst(&equation.rows.residual(&theta, &vec![None]));
+        assert!(left < MET, "{left}");
+        let joints = controller.with_differences(&theta[13..]);
+        assert!((joints[0].gains[0] - 1.2 * SERVO.gains[0]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn settings_of_the_controller_are_terms() {
+        let equation = equation(&known(SERVO), track(&SERVO, [1.2, 1.0], 0.0));
+        let term = ControllerTerm { setting: Setting::Gain, joint: 0 };
+        let left = worst(&equation.rows.residual(&arm().1, &equation.of_controller(term, 1.2)));
+        assert!(left < MET, "{left}");
+        assert!(worst(&equation.rows.residual(&arm().1, &vec![None])) > 20.0 * MET);
+    }
+
+    #[test]
+    fn what_an_integral_held_before_is_an_offset() {
+        let with_integral = JointController { gains: [SERVO.gains[0], SERVO.gains[1], 1e-9], ..SERVO };
+        let plain = equation(&known(SERVO), track(&SERVO, [1.0; 2], -OFFSET));
+        let held = equation(&known(with_integral), track(&SERVO, [1.0; 2], -OFFSET));
+        let theta = arm().1;
+        assert!(worst(&plain.rows.residual(&theta, &vec![None])) > OFFSET - MET);
+        assert!(worst(&held.rows.residual(&theta, &vec![None])) < MET);
+        // The servo gives `OFFSET` less than the motion needs, which the integral must have held.
+        assert!((held.held_before(&theta, &[])[0][0] - OFFSET).abs() < MET);
+    }
+
+    #[test]
+    fn the_floor_holds_the_noise_of_positions_times_the_gains() {
+        let stiff = JointController { gains: [4000.0, 30.0, 0.0], ..SERVO };
+        let equation = equation(&known(stiff), track(&stiff, [1.0; 2], 0.0));
+        let (half, noise) = (HALF_WIDTH_S, equation.logs[0].noise[0]);
+        // White noise of q in `int (kp phi - kd phi' + I phi'') q dt`, phi a raised cosine of unit area.
+        let [kp, kd, _] = stiff.gains;
+        let pi2 = std::f64::consts::PI.powi(2);
+        let square = 0.75 * kp * kp / half
+            + 0.25 * pi2 * (kd * kd - 2.0 * kp * INERTIA) / half.powi(3)
+            + 0.25 * pi2 * pi2 * INERTIA * INERTIA / half.powi(5);
+        let wanted = noise * (PERIOD * square).sqrt();
+        let floor = equation.rows.joints[0].floor[50];
+        assert!((floor / wanted - 1.0).abs() < 0.03, "{floor} {wanted}");
     }
 }

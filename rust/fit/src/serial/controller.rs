@@ -131,7 +131,7 @@ impl JointController {
             from = at(1.0);
             InputSegment { start, middle: at(0.5), end: at(1.0) }
         };
-        let mut column = given.target.iter().enumerate().map(follow).collect();
+        let mut column: Vec<_> = given.target.iter().enumerate().map(follow).collect();
         late(&given.t, self.reference_delay, &mut column);
         column
     }
@@ -142,20 +142,17 @@ impl JointController {
         if !self.rate_of_error {
             return vec![InputSegment::held(0.0); count];
         }
-        let mut column: Vec<InputSegment<f64>> = match &given.target_rate {
-            Some(rate) => rate.iter().map(|rate| InputSegment::held(*rate)).collect(),
-            None => {
-                let slope = |k: usize| {
-                    let (a, b) = (k.saturating_sub(1), (k + 1).min(count - 1));
-                    (given.target[b] - given.target[a]) / (given.t[b] - given.t[a])
-                };
-                let between = |k: usize| {
-                    let (start, end) = (slope(k), slope((k + 1).min(count - 1)));
-                    InputSegment { start, middle: 0.5 * (start + end), end }
-                };
-                (0..count).map(between).collect()
-            }
+        let slope = |k: usize| {
+            let (a, b) = (k.saturating_sub(1), (k + 1).min(count - 1));
+            (given.target[b] - given.target[a]) / (given.t[b] - given.t[a])
         };
+        let between = |k: usize| {
+            let (start, end) = (slope(k), slope((k + 1).min(count - 1)));
+            InputSegment { start, middle: 0.5 * (start + end), end }
+        };
+        let logged = given.target_rate.as_ref();
+        let of_row = |k: usize| logged.map_or_else(|| between(k), |rate| InputSegment::held(rate[k]));
+        let mut column: Vec<InputSegment<f64>> = (0..count).map(of_row).collect();
         late(&given.t, self.reference_delay, &mut column);
         column
     }
@@ -209,7 +206,7 @@ impl JointController {
             middle: within(tau.middle) * e.middle,
             end: within(tau.end) * e.end,
         };
-        let mut column =
+        let mut column: Vec<InputSegment<f64>> =
             self.asked(&errors).into_iter().zip(&errors[gain]).map(|(tau, e)| free(tau, e)).collect();
         late(&given.t, self.delay, &mut column);
         column.iter().map(InputSegment::mean).collect()
@@ -217,7 +214,7 @@ impl JointController {
 }
 
 /// Delays a column, by the law of the library.
-fn late(t: &[f64], delay: f64, column: &mut Vec<InputSegment<f64>>) {
+fn late(t: &[f64], delay: f64, column: &mut [InputSegment<f64>]) {
     if delay > 0.0
         && let Some(law) = find::<f64>("actuator_delay")
     {
@@ -226,7 +223,7 @@ fn late(t: &[f64], delay: f64, column: &mut Vec<InputSegment<f64>>) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::track::Reference;
 
@@ -234,7 +231,7 @@ mod tests {
     const COUNT: usize = 500;
     /// What local cubics, which may be as wide as a tenth of a second, and their middles miss of these torques of up to 10 N m.
     const CUBIC: f64 = 3e-3;
-    const SERVO: JointController = JointController {
+    pub(in crate::serial) const SERVO: JointController = JointController {
         gains: [40.0, 3.0, 0.0],
         rate_of_error: false,
         reference_delay: 0.0,

@@ -165,7 +165,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             };
             phi.reach().map(at).sum()
         };
-        let mut change = self.kept[j].iter().map(row).collect();
+        let mut change: Vec<f64> = self.kept[j].iter().map(row).collect();
         self.centre(j, &mut change);
         change
     }

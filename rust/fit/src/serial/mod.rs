@@ -10,6 +10,7 @@ mod closed_loop;
 mod commanded;
 mod constants;
 pub mod controller;
+mod controller_report;
 mod controller_term;
 mod equation;
 mod evidence;

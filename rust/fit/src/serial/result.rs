@@ -2,7 +2,8 @@
 
 use super::closed_loop::ClosedLoop;
 use super::constants::{CONSEQUENCE, NAMED, SIGNIFICANT};
-use super::controller::JointController;
+use super::controller::PositionController;
+use super::controller_report::{behind_controller, gains_note, with_settings};
 use super::fitting::Fitted;
 use super::predict::{Model, floor};
 use super::search::{Found, Tested};
@@ -53,30 +54,15 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
 ) -> Diagnosis {
     progress.begin(Phase::Result, 6);
     let rotary = description.rotary();
-    let causes: Vec<Cause> = found.named.iter().map(|n| cause(n, &rotary)).collect();
+    let commanded = holdout.equation.commanded.as_ref().map(|commanded| &commanded.controller);
+    let causes: Vec<Cause> = found.named.iter().map(|n| cause(n, &rotary, commanded)).collect();
     let (named, unnamed): (Vec<Cause>, Vec<Cause>) = causes.into_iter().partition(|c| c.probability >= NAMED);
     let why = |c: Cause| Candidate {
         why: format!("its probability is {:.2}; from {NAMED} on a cause is named", c.probability),
         cause: c,
     };
-    let fitted = |set: &Fitted| -> [f64; P] { std::array::from_fn(|i| set.estimate.theta[i]) };
-    let nominal: [f64; P] = std::array::from_fn(|i| description.theta[i]);
     let reported = &found.reported;
-    let differences = |theta: &[f64]| theta.get(P..).unwrap_or_default().to_vec();
-    let closed_loop = |theta: &[f64], terms: &[Term]| {
-        holdout.equation.commanded.as_ref().map(|commanded| ClosedLoop {
-            joints: with_settings(commanded.controller.with_differences(&differences(theta)), terms),
-            held_before: holdout.equation.held_before(theta, terms),
-        })
-    };
-    let known: Vec<f64> =
-        nominal.iter().copied().chain(differences(&found.refit.estimate.theta).iter().map(|_| 0.0)).collect();
-    let models: [Model<N, P>; 3] = [
-        Model::new(arm, nominal, &[]).behind(closed_loop(&known, &[])),
-        Model::new(arm, fitted(&found.refit), &[]).behind(closed_loop(&found.refit.estimate.theta, &[])),
-        Model::new(arm, fitted(reported), &reported.terms)
-            .behind(closed_loop(&reported.estimate.theta, &reported.terms)),
-    ];
+    let models = models(description, arm, holdout, found);
     let noise: [f64; N] = std::array::from_fn(|j| {
         crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
     });
@@ -145,16 +131,6 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     }
 }
 
-/// Controllers with the settings that terms say.
-fn with_settings(mut joints: Vec<JointController>, terms: &[Term]) -> Vec<JointController> {
-    for term in terms {
-        if let TermKind::Controller(of) = term.kind {
-            joints[of.joint] = of.on(&joints[of.joint], term.p[0]);
-        }
-    }
-    joints
-}
-
 fn rotary_of(term: &Term, rotary: &[bool]) -> bool {
     term.joint().is_none_or(|j| rotary[j - 1])
 }
@@ -168,11 +144,11 @@ fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
     parameters.iter().enumerate().map(value).collect()
 }
 
-fn cause(named: &super::search::Named, rotary: &[bool]) -> Cause {
+fn cause(named: &super::search::Named, rotary: &[bool], controller: Option<&PositionController>) -> Cause {
     let term = &named.term;
     let alike =
         |t: &Term| EquivalentSummary { effect: t.name(), joint: t.joint(), why: LOOK_ALIKE.to_owned() };
-    Cause {
+    let mut cause = Cause {
         effect: term.name(),
         title: term.title(),
         joint: term.joint(),
@@ -183,7 +159,31 @@ fn cause(named: &super::search::Named, rotary: &[bool]) -> Cause {
         evidence: None,
         sides: None,
         log: None,
-    }
+    };
+    let behind = controller.and_then(|controller| behind_controller(&cause, controller));
+    cause.equivalents.extend(behind);
+    cause
+}
+
+/// The arm as the arm file has it, with its parameters estimated again, and with the named terms; behind the position controllers of the holdout.
+fn models<const N: usize, const P: usize>(
+    description: &SerialArm,
+    arm: &Chain<f64, N>,
+    holdout: &Set<N, P>,
+    found: &Found,
+) -> [Model<N, P>; 3] {
+    let equation = &holdout.equation;
+    let of = |theta: &[f64], terms: &[Term]| {
+        let closed_loop = equation.commanded.as_ref().map(|commanded| ClosedLoop {
+            joints: with_settings(commanded.controller.with_differences(&theta[P..]), terms),
+            held_before: equation.held_before(theta, terms),
+        });
+        Model::new(arm, std::array::from_fn(|i| theta[i]), terms).behind(closed_loop)
+    };
+    let mut nominal = description.theta.clone();
+    nominal.resize(equation.rows.parameters, 0.0);
+    let (refit, reported) = (&found.refit.estimate.theta, &found.reported);
+    [of(&nominal, &[]), of(refit, &[]), of(&reported.estimate.theta, &reported.terms)]
 }
 
 /// Share of each joint in the torque that the re-estimated arm leaves unexplained, in units of the joint's own torque.
@@ -443,5 +443,8 @@ fn notes<const N: usize, const P: usize>(
             still.join(", ")
         ));
     }
+    let controller = holdout.equation.commanded.as_ref().map(|commanded| &commanded.controller);
+    let gains = |c| gains_note(c, &found.reported.estimate.theta[P..], &found.sigma[1][P..]);
+    notes.extend(controller.and_then(gains));
     notes
 }
