@@ -94,17 +94,11 @@ def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None 
     arrays: dict[str, Any] = {
         name: None if (x := getattr(log, name)) is None else x[kept] for name in ("t", "q", "dq", "dq_ref")
     }
-    q_ref = (
-        None
-        if log.q_ref is None
-        else np.add.reduceat((log.q_ref * held)[first:], starts) / _durations(held, first, starts)
-    )
+    q_ref = None
+    if log.q_ref is not None:
+        q_ref = np.add.reduceat((log.q_ref * held)[first:], starts) / np.add.reduceat(held[first:], starts)
+        q_ref[alone] = log.q_ref[kept[alone]]
     return replace(log, **arrays, tau=tau, q_ref=q_ref, moment=_moment(log, kept, tau, valid))
-
-
-def _durations(held: NDArray[np.float64], first: int, starts: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return the time from each kept row to the next, shape (n, 1)."""
-    return np.asarray(np.add.reduceat(held[first:], starts))
 
 
 def _moment(

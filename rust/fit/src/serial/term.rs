@@ -162,8 +162,13 @@ impl Term {
 
     /// Whether it changes the torque that a command becomes at the joint: of the command itself, or by a torque that depends on it.
     pub fn changes_command(&self) -> bool {
-        let TermKind::Law(effect) = self.kind else { return matches!(self.kind, TermKind::Controller(_)) };
+        let TermKind::Law(effect) = self.kind else { return self.share_of_command().is_some() };
         effect.law.spec().hooks.command || depends(&effect, |x, value| x.tau = value)
+    }
+
+    /// Factor that a controller's proportional gain puts on its torque; its derivative part is as good as viscous friction, which no factor tells of.
+    pub fn share_of_command(&self) -> Option<f64> {
+        matches!(self.kind, TermKind::Controller(of) if of.setting == Setting::Gain).then(|| self.p[0])
     }
 
     /// Whether it is a factor on the command.
