@@ -1,7 +1,8 @@
 //! Predictions of an arm behind position controllers: they act on the predicted motion, under the logged reference.
 //!
-//! Within a sample interval the controllers run at a period of a millisecond or less, as servos do, and hold their torque over it. Effects that change
-//! what a command becomes are given the torques of the last periods, before a window's start those along the measured path.
+//! Within a sample interval the controllers run at a period of a millisecond or less and hold their torque over it, that of the state expected in its
+//! middle: a torque of the state at its start would be late by half a period, which at a stiff gain is a force along the velocity. Effects that change what a
+//! command becomes are given the torques of the last periods, before a window's start those along the measured path.
 
 use super::controller::{Given, JointController};
 use crate::model::{EffectInstance, Hypothesis};
@@ -171,23 +172,29 @@ fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 ) {
     let mut state = hypothesis.initial_state(window.initial_state.q, window.initial_state.dq);
     let mut past: Vec<Past> = servos.iter().map(|servo| servo.past(t, window.first)).collect();
+    let mut ddq = SVector::<f64, N>::zeros();
     let mut integral: Vec<f64> = servos.iter().map(|servo| servo.integral[window.first].start).collect();
     for (row, k) in positions.chunks_exact_mut(N).zip(window.first..) {
         let h = t[k + 1] - t[k];
         let count = periods(plant, servos, &state.q, h);
         let period = h / count as f64;
         for i in 0..count {
-            let (from, now) = (i as f64 / count as f64, t[k] + i as f64 * period);
+            let (halfway, now) = ((i as f64 + 0.5) / count as f64, t[k] + i as f64 * period);
+            let expected = state.q + 0.5 * period * state.dq;
+            let expected = State { q: expected, dq: state.dq + 0.5 * period * ddq, ..state };
             let torque = std::array::from_fn(|j| {
                 let servo = &servos[j];
-                let (q, dq) = shown(hypothesis, &state, j);
-                let error = servo.reference[k].at(from) - q;
-                let inputs = [servo.controller.proportional(error), servo.rate[k].at(from) - dq, integral[j]];
+                let (q, dq) = shown(hypothesis, &expected, j);
+                let error = servo.reference[k].at(halfway) - q;
+                let inputs =
+                    [servo.controller.proportional(error), servo.rate[k].at(halfway) - dq, integral[j]];
                 integral[j] += period * error;
                 let asked: f64 = servo.controller.gains.iter().zip(inputs).map(|(gain, e)| gain * e).sum();
                 servo.delivered(&mut past[j], now, period, servo.controller.clipped(asked))
             });
+            let before = state.dq;
             advance(plant, &mut state, &Interval { t: now, h: period, torque: &torque }, 1);
+            ddq = (state.dq - before) / period;
         }
         if !state.is_finite() || state.q.amax() > DIVERGED {
             break;
@@ -247,7 +254,7 @@ mod tests {
         torque_limit: f64::INFINITY,
     };
     /// Position by which periods of a servo of one millisecond and steps of 20 microseconds differ, after a step of the reference of 0.1 rad.
-    const STEPPED: f64 = 1e-3;
+    const STEPPED: f64 = 1e-4;
 
     /// The reference steps from 0 to 0.1 rad after a fifth of a second, from rest.
     fn target(k: usize) -> f64 {
