@@ -84,11 +84,11 @@ impl Given {
             let h = interval(&track.t, k);
             let (a, b) = (&smoothed[k][j].local, &smoothed[next][j].local);
             let middle = 0.5 * (a.q + b.q) + 0.125 * h * (a.dq - b.dq);
-            let rate = 1.5 * (b.q - a.q) / h - 0.25 * (a.dq + b.dq);
-            let rate = if next > k { rate } else { a.dq };
+            // The same mean velocity as viscous friction has in the equation, so that no term can be the difference of the two.
+            let mean = 0.5 * (a.dq + b.dq);
             (
                 InputSegment { start: a.q, middle, end: b.q },
-                InputSegment { start: a.dq, middle: rate, end: b.dq },
+                InputSegment { start: a.dq, middle: mean, end: b.dq },
             )
         };
         let (q, dq) = (0..track.len()).map(at).unzip();
