@@ -41,6 +41,8 @@ inertia = {ixx = 0.01, iyy = 0.004, izz = 0.01}
 """
 CONTROLLER = '\n[controller]\nkind = "pd"\nkp = [60.0, 30.0]\nkd = [2.0, 1.0]\n'
 COUNT, PERIOD = 1200, 0.01
+#: Share to which delays of all references at once come out: friction of `kp` times the delay imitates each, up to the change of the torque meanwhile.
+DELAY = 0.2
 
 
 def arm_of(folder: Path, text: str = ARM + CONTROLLER) -> Arm:
@@ -248,17 +250,20 @@ def test_gains_that_are_not_trusted_are_estimated(null) -> None:
 
 
 def test_a_late_reference_is_named(null) -> None:
-    late = [
-        replace(log, q_ref=np.vstack([log.q_ref[6:], np.repeat(log.q_ref[-1:], 6, axis=0)])) for log in null.training
-    ]
-    held = [
-        replace(log, q_ref=np.vstack([log.q_ref[6:], np.repeat(log.q_ref[-1:], 6, axis=0)])) for log in null.holdout
-    ]
-    result = diagnose(late, null.arm, holdout=held)
+    rows = 6
+
+    def late(log: Log) -> Log:
+        """The servo follows what the log says six rows before it is logged."""
+        assert log.q_ref is not None
+        early = np.vstack([log.q_ref[rows:], np.repeat(log.q_ref[-1:], rows, axis=0)])
+        return replace(log, q_ref=early)
+
+    result = diagnose([late(log) for log in null.training], null.arm, holdout=[late(log) for log in null.holdout])
     assert {cause.effect for cause in result.causes} == {"reference_delay"}
-    period = null.arm.sample_period
     for cause in result.causes:
-        assert cause.parameters["delay"].value == pytest.approx(6 * period, rel=0.1)
+        late_by = cause.parameters["delay"].value
+        assert late_by == pytest.approx(rows * null.arm.sample_period, rel=DELAY)
+    assert {cause.joint for cause in result.causes} == set(range(1, null.arm.n_joints + 1))
 
 
 def test_an_order_that_contradicts_the_arm_file(null) -> None:
