@@ -21,9 +21,10 @@ from armgap.rigid_body import inconsistency  # noqa: E402
 from serial_trial import arms, motion  # noqa: E402
 from serial_trial.arms import FAMILIES, STEP, SerialRobot, draw_robot, perturbed  # noqa: E402
 from serial_trial.case import LEAST, NULLS, OFF, TRUST, effect_of, hidden_effect, make_case, sigma_of  # noqa: E402
-from serial_trial.effects import COMMANDED, EFFECTS, Effect, Moment, Null  # noqa: E402
+from serial_trial.effects import EFFECTS, Effect, Moment, Null  # noqa: E402
 from serial_trial.motion import SERVOS, Controller, Reference, Run, draw_controller, draw_reference, simulate, use_of  # noqa: E402
 from serial_trial.run import OUTCOMES, ask, outcome, report  # noqa: E402
+from serial_trial.servo import COMMANDED  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 #: MuJoCo keeps inertias as principal moments and orientations as quaternions; relative to the largest torque of a joint.

@@ -14,7 +14,7 @@ from armgap.literals import SERIAL
 from armgap.serial_chain import SerialChain
 
 from .arms import SerialRobot, draw_robot, perturbed
-from .effects import COMMANDED, EFFECTS, Effect, Null
+from .effects import EFFECTS, Effect, Null
 from .motion import (
     COMMANDED_PERIODS,
     PERIODS,
@@ -28,6 +28,7 @@ from .motion import (
     simulate,
     use_of,
 )
+from .servo import COMMANDED
 
 Array = NDArray[np.float64]
 
