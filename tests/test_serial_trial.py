@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -14,14 +16,15 @@ import pytest
 
 mujoco = pytest.importorskip("mujoco")
 
-from armgap import _native  # noqa: E402
+from armgap import _native, controller  # noqa: E402
 from armgap.rigid_body import inconsistency  # noqa: E402
 from serial_trial import arms, motion  # noqa: E402
 from serial_trial.arms import FAMILIES, STEP, SerialRobot, draw_robot, perturbed  # noqa: E402
 from serial_trial.case import LEAST, NULLS, OFF, TRUST, effect_of, hidden_effect, make_case, sigma_of  # noqa: E402
 from serial_trial.effects import EFFECTS, Effect, Moment, Null  # noqa: E402
-from serial_trial.motion import Controller, Reference, Run, draw_controller, draw_reference, simulate, use_of  # noqa: E402
+from serial_trial.motion import SERVOS, Controller, Reference, Run, draw_controller, draw_reference, simulate, use_of  # noqa: E402
 from serial_trial.run import OUTCOMES, ask, outcome, report  # noqa: E402
+from serial_trial.servo import COMMANDED  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 #: MuJoCo keeps inertias as principal moments and orientations as quaternions; relative to the largest torque of a joint.
@@ -38,6 +41,9 @@ AGREE, OTHERWISE = 0.01, {"load_dependent_friction": 0.25, "coulomb_asymmetry": 
 #: Effects of which the torque at another joint may change by more than at their own, relative to that joint's torque: what they change is part
 #: of the arm, or both ends of a cable.
 OF_THE_ARM = {"nominal_link", "cable_spring"}
+#: Share of the position error, and of the torque, by which a servo that holds its torque over half a millisecond and reads whole counts differs
+#: from one that does not.
+SERVO = 0.02
 PERIOD, SAMPLES = 0.004, 600
 
 
@@ -155,6 +161,62 @@ def test_commands_are_held_and_positions_are_counts(robot, clean) -> None:
     assert np.allclose(counts, np.round(counts), atol=1e-6)
     assert np.all(np.abs(run.q - run.true_q) <= 0.5001 * robot.step)
     assert np.array_equal(run.applied, run.tau)
+
+
+@pytest.mark.parametrize("kind", list(SERVOS))
+def test_a_servo_moves_the_arm_as_position_actuators_of_the_engine_do(robot, kind) -> None:
+    rng = np.random.default_rng(3)
+    reference = reference_of(robot)
+    by = draw_controller(kind, robot, reference, PERIOD, rng)
+    run = simulate(robot, robot, Null(None), reference, by, np.zeros((SAMPLES, robot.n)), PERIOD)
+    numbers = itertools.count()
+    named = re.sub(r"<joint ", lambda _: f'<joint name="j{next(numbers)}" ', robot.mjcf())
+    actuators = "".join(
+        f'<position joint="j{j}" kp="{by.kp[j]:.17g}" kv="{by.kd[j]:.17g}" forcerange="{-robot.effort[j]:.17g} {robot.effort[j]:.17g}"/>'
+        for j in range(robot.n)
+    )
+    model = mujoco.MjModel.from_xml_string(named.replace("</mujoco>", f"<actuator>{actuators}</actuator></mujoco>"))
+    data = mujoco.MjData(model)
+    data.qpos[:] = run.true_q[0]
+    moved_by_engine = np.empty_like(run.true_q)
+    for k in range(SAMPLES):
+        moved_by_engine[k] = data.qpos
+        data.ctrl[:] = reference.q[k]
+        for _ in range(round(PERIOD / STEP)):
+            mujoco.mj_step(model, data)
+    error = np.std(reference.q - run.true_q, axis=0)
+    assert np.all(np.std(moved_by_engine - run.true_q, axis=0) < SERVO * error)
+    # The mean torque of the log is that of the stated gains on the mean position and velocity, half a step ago as it is held over steps.
+    ago = run.true_q - 0.5 * STEP * run.true_dq
+    mean = controller.Controller(by.kp, by.kd).torque(run.t, ago, reference.q, limit=robot.effort)
+    size = np.sqrt(np.mean(run.tau**2, axis=0))
+    assert np.all(np.std((mean - run.tau)[:-1], axis=0) < SERVO * size)
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDED if name not in EFFECTS])
+def test_a_setting_of_a_servo_acts_on_its_joint_alone(robot, clean, name) -> None:
+    hidden = COMMANDED[name].draw(robot, 2, 0.2, use_of(clean), np.random.default_rng(4))
+    kp, kd, reference = np.full(robot.n, 50.0), np.full(robot.n, 5.0), np.zeros(robot.n)
+    changed = np.zeros(robot.n)
+    for k in range(200):
+        reference = reference + 0.01 * (k + 1)
+        gains = hidden.gains(kp, kd)
+        changed += np.abs(gains[0] - kp) + np.abs(gains[1] - kd) + np.abs(hidden.arriving(reference) - reference)
+    assert np.array_equal(np.flatnonzero(changed), [2])
+
+
+def test_a_late_reference_is_late_by_its_time() -> None:
+    late = COMMANDED["reference_delay"](0, 4 * STEP)
+    arrived = [float(late.arriving(np.array([float(k)]))[0]) for k in range(10)]
+    assert arrived == [0, 0, 0, 0, 0, 1, 2, 3, 4, 5]
+
+
+def test_a_commanded_case_hides_its_torques() -> None:
+    case = make_case(3, 1, "controller_gain", duration=3.0, commanded=True)
+    assert case.key["controller"] in SERVOS
+    assert not any(log.has_torques for log in (*case.training, *case.holdout))
+    assert case.arm.controller is not None
+    assert {effect_of(1, i, commanded=True) for i in range(len(COMMANDED))} == set(COMMANDED)
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -225,7 +225,9 @@ class Arm:
         def as_list(x: NDArray[np.float64] | None) -> list[float] | None:
             return None if x is None else [float(v) for v in x]
 
-        chain = {} if self.chain is None else {"chain": self.chain.to_native()}
+        chain: dict[str, Any] = {} if self.chain is None else {"chain": self.chain.to_native()}
+        if self.chain is not None and self.controller is not None:
+            chain["controller"] = self.controller.to_native()
         return {
             "kind": self.kind,
             "gravity": self.gravity,

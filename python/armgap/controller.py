@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,8 @@ class Controller:
     ki : ndarray, shape (n_joints,), optional
         Integral gain [N m/(rad s)].
     sigma_kp, sigma_kd, sigma_ki : ndarray, shape (n_joints,), optional
-        One standard deviation of trust in the gains.
+        One standard deviation of trust in the gains; without `sigma_kp` they are known exactly, with it those of `kd` and `ki` are by default the
+        same shares of the gains as that of `kp`.
     delay : ndarray, shape (n_joints,), optional
         Time by which the controller's torque is late [s].
     deadband : ndarray, shape (n_joints,), optional
@@ -49,6 +50,59 @@ class Controller:
     deadband: NDArray[np.float64] | None = None
     speed_limit: NDArray[np.float64] | None = None
     kind: Literal["pd"] = "pd"
+
+    @property
+    def sigmas(self) -> dict[str, NDArray[np.float64]]:
+        """Standard deviations of ``kp``, ``kd`` and ``ki``, zero for a gain that is known exactly."""
+        none = np.zeros(len(self.kp))
+        shares = (
+            none if self.sigma_kp is None else np.divide(self.sigma_kp, self.kp, out=none.copy(), where=self.kp > 0)
+        )
+        found = {"sigma_kp": none if self.sigma_kp is None else self.sigma_kp}
+        for name, gain, given in (("sigma_kd", self.kd, self.sigma_kd), ("sigma_ki", self.ki, self.sigma_ki)):
+            found[name] = given if given is not None else none if gain is None else shares * gain
+        return found
+
+    def torque(
+        self,
+        t: NDArray[np.float64],
+        q: NDArray[np.float64],
+        q_ref: NDArray[np.float64],
+        dq_ref: NDArray[np.float64] | None = None,
+        limit: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Return the mean torques of the controller over the intervals of a log: to compare them with an arm, without delay, deadband and integral.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n_samples,)
+            Sample times [s].
+        q, q_ref : ndarray, shape (n_samples, n_joints)
+            Positions [rad or m], and references that are held until the next sample.
+        dq_ref : ndarray, as `q_ref`, optional
+            Velocities of the reference; taken from `q_ref` without them.
+        limit : ndarray, shape (n_joints,), optional
+            Largest torques [N m or N].
+
+        Returns
+        -------
+        ndarray, shape (n_samples, n_joints)
+            The last row repeats the one before.
+        """
+        h = np.diff(t)[:, None]
+        rate = -np.diff(q, axis=0) / h
+        if self.kd_on == "error":
+            rate = rate + (np.gradient(q_ref, t, axis=0) if dq_ref is None else dq_ref)[:-1]
+        tau = self.kp * (q_ref[:-1] - 0.5 * (q[1:] + q[:-1])) + self.kd * rate
+        if limit is not None:
+            tau = np.clip(tau, -limit, limit)
+        return np.concatenate([tau, tau[-1:]])
+
+    def to_native(self) -> dict[str, Any]:
+        """Return the controller as the compiled core takes it."""
+        given = {name: values.tolist() for name, values in self.vectors if not name.startswith("sigma")}
+        sigmas = {name: values.tolist() for name, values in self.sigmas.items()}
+        return {**given, **sigmas, "rate_of_error": self.kd_on == "error"}
 
     @property
     def vectors(self) -> Iterator[tuple[str, NDArray[np.float64]]]:

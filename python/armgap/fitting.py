@@ -98,7 +98,7 @@ def fit(log: Log, arm: Arm, *, horizon: float = 0.25) -> ArmFit:
             remedy="use the arm file that belongs to this log",
             file=log.path or log.name,
         )
-    t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.tau))
+    t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.with_torques("a fit").tau))
     found = _native.fit(arm.to_native(), t, q, tau, horizon)
     if found is None:
         raise LogShapeError(

@@ -248,7 +248,7 @@ def _estimates(
 ) -> dict[str, Any]:
     """The online estimator over the whole log, from `start`."""
     lengths = None if arm.link_length is None else arm.link_length.tolist()
-    t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.tau))
+    t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.with_torques("identification").tau))
     return _native.identify(
         arm.kind, arm.gravity, lengths, arm.theta.tolist(), *settings, start.tolist(), t, q, tau, dq
     )

@@ -13,6 +13,7 @@ from armgap.check import Check, Corrections, copied_holdout, data_checks, examin
 from armgap.check.serial import contradictions
 from armgap.errors import LogShapeError, OptionError
 from armgap.log import Log, gather
+from armgap.log.columns import no_controller
 from armgap.log.stretches import choose
 from armgap.provenance import provenance
 from armgap.reading import printable
@@ -144,6 +145,11 @@ def _read(logs: Any, arm: Arm) -> list[Log]:
                 remedy="use the arm file that belongs to this log",
                 file=log.path or log.name,
             )
+        if not log.has_torques:
+            if arm.chain is None:
+                log.with_torques(f"the diagnosis of an arm of kind `{arm.kind}`")
+            if arm.controller is None:
+                raise no_controller(arm, log.path or log.name)
     return read
 
 

@@ -64,5 +64,5 @@ def _input(path: Path | None, content: bytes) -> dict[str, Any]:
 def _columns(log: Log) -> bytes:
     if log.path is not None and log.path.is_file():
         return b""
-    arrays = [log.t, log.q, log.tau] + ([] if log.dq is None else [log.dq])
+    arrays = [log.t, log.q, log.tau, *(x for x in (log.dq, log.q_ref, log.dq_ref) if x is not None)]
     return b"".join(np.ascontiguousarray(x).tobytes() for x in arrays)

@@ -17,12 +17,15 @@ THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLA
 @click.option("--seed", type=click.IntRange(0), required=True, help="Seed of all cases.")
 @click.option("--cases", type=click.IntRange(0), default=26, help="Cases with a hidden effect.")
 @click.option("--nulls", type=click.IntRange(0), default=5, help="Cases without one.")
+@click.option(
+    "--commanded", is_flag=True, help="Servos follow references, and the logs hold these in place of torques."
+)
 @click.option("--jobs", type=click.IntRange(1), default=1, help="Processes side by side, of one thread each.")
 @click.option("--timeout", type=click.FloatRange(0, min_open=True), default=900.0, help="Longest time for a case [s].")
 @click.option(
     "--json", "file", type=click.Path(dir_okay=False, path_type=Path), help="File for answers and keys, one a line."
 )
-def main(seed: int, cases: int, nulls: int, jobs: int, timeout: float, file: Path | None) -> None:
+def main(seed: int, cases: int, nulls: int, *, commanded: bool, jobs: int, timeout: float, file: Path | None) -> None:
     """Diagnose arms of three to seven joints that a physics engine moves with one hidden effect each."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
     from pebble import ProcessPool
@@ -33,7 +36,10 @@ def main(seed: int, cases: int, nulls: int, jobs: int, timeout: float, file: Pat
     numbers = [*range(cases), *range(NULLS, NULLS + nulls)]
     records: list[dict[str, Any]] = []
     with ProcessPool(jobs) as pool:
-        tasks = [(number, pool.schedule(answer, args=[seed, number], timeout=timeout)) for number in numbers]
+        tasks = [
+            (number, pool.schedule(answer, args=[seed, number], kwargs={"commanded": commanded}, timeout=timeout))
+            for number in numbers
+        ]
         for number, task in tasks:
             try:
                 record = task.result()

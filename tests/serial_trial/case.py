@@ -9,12 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 import armgap
+import armgap.controller
 from armgap.literals import SERIAL
 from armgap.serial_chain import SerialChain
 
 from .arms import SerialRobot, draw_robot, perturbed
 from .effects import EFFECTS, Effect, Null
-from .motion import PERIODS, Run, coloured, draw_controller, draw_reference, draw_torque, simulate, use_of
+from .motion import (
+    COMMANDED_PERIODS,
+    PERIODS,
+    SERVOS,
+    Controller,
+    Run,
+    coloured,
+    draw_controller,
+    draw_reference,
+    draw_torque,
+    simulate,
+    use_of,
+)
+from .servo import COMMANDED
 
 Array = NDArray[np.float64]
 
@@ -56,10 +70,11 @@ class Case:
     key: dict[str, Any]
 
 
-def effect_of(seed: int, number: int) -> str:
+def effect_of(seed: int, number: int, *, commanded: bool = False) -> str:
     """Return the effect of a case: every effect comes once in as many cases as there are effects, in an order of the seed's."""
-    turn, place = divmod(number, len(EFFECTS))
-    return list(EFFECTS)[int(np.random.default_rng([seed, turn, 7]).permutation(len(EFFECTS))[place])]
+    effects = list(COMMANDED if commanded else EFFECTS)
+    turn, place = divmod(number, len(effects))
+    return effects[int(np.random.default_rng([seed, turn, 7]).permutation(len(effects))[place])]
 
 
 def sigma_of(robot: SerialRobot, trust: str) -> Array:
@@ -70,8 +85,8 @@ def sigma_of(robot: SerialRobot, trust: str) -> Array:
     return np.concatenate([*links, rotor * robot.rotor, friction * robot.viscous, friction * robot.coulomb])
 
 
-def arm_of(robot: SerialRobot, period: float, trust: str) -> armgap.Arm:
-    """Return an arm as armgap takes it."""
+def arm_of(robot: SerialRobot, period: float, trust: str, by: Controller | None = None) -> armgap.Arm:
+    """Return an arm as armgap takes it, with its position controller where the logs hold references."""
     chain = SerialChain(
         tuple(f"joint{j + 1}" for j in range(robot.n)), tuple(f"link{j + 1}" for j in range(robot.n)),
         robot.kinds, robot.rotation, robot.translation, robot.axis, robot.gravity, robot.lower, robot.upper,
@@ -87,6 +102,7 @@ def arm_of(robot: SerialRobot, period: float, trust: str) -> armgap.Arm:
         robot.counts,
         robot.effort,
         chain=chain,
+        controller=None if by is None else armgap.controller.Controller(by.kp, by.kd),
     )
 
 
@@ -98,6 +114,7 @@ def make_case(
     family: str | None = None,
     joints: int | None = None,
     duration: float = _DURATION_S,
+    commanded: bool = False,
 ) -> Case:
     """Make a case.
 
@@ -113,16 +130,19 @@ def make_case(
         Number of joints, of those that the family has; drawn by default.
     duration : float, default 12
         Of each log [s].
+    commanded : bool, default False
+        Whether servos follow references, and the logs hold these in place of torques.
 
     Raises
     ------
     RuntimeError
         If no draw has a motion and an effect that makes a difference.
     """
-    name = effect or ("null" if number >= NULLS else effect_of(seed, number))
-    kind = EFFECTS.get(name, Null) if isinstance(name, str) else name
+    name = effect or ("null" if number >= NULLS else effect_of(seed, number, commanded=commanded))
+    kind = COMMANDED.get(name, Null) if isinstance(name, str) else name
     for draw in range(_DRAWS):
-        case = _draw(np.random.default_rng([seed, number, draw]), kind, family, joints, duration)
+        rng = np.random.default_rng([seed, number, draw])
+        case = _draw(rng, kind, family, joints, duration, commanded=commanded)
         if case is not None:
             case.key.update(seed=seed, number=number, draw=draw)
             return case
@@ -130,16 +150,23 @@ def make_case(
 
 
 def _draw(
-    rng: np.random.Generator, kind: type[Effect], family: str | None, joints: int | None, duration: float
+    rng: np.random.Generator,
+    kind: type[Effect],
+    family: str | None,
+    joints: int | None,
+    duration: float,
+    *,
+    commanded: bool,
 ) -> Case | None:
     robot = draw_robot(rng, family, joints)
     trust = "trusted" if kind.trusted_inertia else "published"
-    period = float(rng.choice(PERIODS))
+    period = float(rng.choice(COMMANDED_PERIODS if commanded else PERIODS))
     noise = float(rng.choice(NOISE))
     samples = round(duration / period)
     clean = perturbed(robot, rng, *(OFF * share for share in TRUST[trust]))
     references = [draw_reference(robot, samples, period, rng) for _ in _LOGS]
     controllers = ["pd", "computed_torque", "excited", *(["open"] if robot.upside_down else [])]
+    controllers = list(SERVOS) if commanded else controllers
     controlled = str(rng.choice(controllers))
     following = draw_controller(controlled if controlled != "open" else "pd", robot, references[0], period, rng)
     times = rng.uniform(0.05, 0.3, robot.n)
@@ -177,11 +204,16 @@ def _draw(
             before = simulate(clean, robot, Null(None), reference, following, quiet, period)
             by = replace(following, kind="open", played=before.tau)
         run = simulate(truth, robot, hidden, reference, by, disturbance, period)
-        if not run.sane(robot, reference, follows=controlled in ("pd", "computed_torque")):
+        if not run.sane(robot, reference, follows=controlled in ("pd", "computed_torque", *SERVOS)):
             return None
         runs.append(run)
-    arm = arm_of(robot, period, trust)
-    logs = [armgap.Log.from_arrays(r.t, r.q, r.tau, name=n, arm=arm) for n, r in zip(_LOGS, runs, strict=True)]
+    arm = arm_of(robot, period, trust, following if commanded else None)
+    logs = [
+        armgap.Log.from_arrays(
+            r.t, r.q, None if commanded else r.tau, q_ref=reference.q if commanded else None, name=name, arm=arm
+        )
+        for name, r, reference in zip(_LOGS, runs, references, strict=True)
+    ]
     key = {
         "effect": hidden.name, "joint": None if hidden.joint is None else hidden.joint + 1, "values": hidden.values,
         "outside": hidden.outside, "change": float(change[at]), "changes": change.tolist(), "family": robot.name, "joints": robot.n,
@@ -201,4 +233,4 @@ def hidden_effect(key: dict[str, Any]) -> Effect:
     """Return the effect that a key describes."""
     joint = None if key["joint"] is None else key["joint"] - 1
     values = {k: np.array(v) if isinstance(v, list) else v for k, v in key["values"].items()}
-    return EFFECTS.get(key["effect"], Null)(joint, **values)
+    return COMMANDED.get(key["effect"], Null)(joint, **values)

@@ -103,6 +103,14 @@ class Effect:
         """Return what encoders show before they round."""
         return q
 
+    def gains(self, kp: Array, kd: Array) -> tuple[Array, Array]:
+        """Return the gains that servos have where they are said to have these."""
+        return kp, kd
+
+    def arriving(self, reference: Array) -> Array:
+        """Return the reference that servos know of during the next `STEP`."""
+        return reference
+
     def at(self, j: int, value: float, n: int) -> Array:
         """Return a vector of zeros with one value."""
         out = np.zeros(n)

@@ -17,6 +17,11 @@ Array = NDArray[np.float64]
 
 #: Sample periods [s].
 PERIODS = (0.002, 0.004, 0.005, 0.008)
+#: Sample periods of logs of references [s].
+COMMANDED_PERIODS = (0.002, 0.004, 0.005, 0.008, 0.01)
+#: Natural frequencies [rad/s] that servos give the nominal arm's inertia, and their damping ratios.
+SERVOS = {"stiff": (25.0, 45.0), "soft": (8.0, 14.0)}
+_DAMPING = (0.4, 1.0)
 #: Sines in a reference and their band [Hz].
 _SINES, _BAND_HZ = 5, (0.05, 0.8)
 #: Time over which a motion begins [s].
@@ -33,9 +38,9 @@ class Controller:
 
     Attributes
     ----------
-    kind : {"pd", "computed_torque", "excited", "open"}
+    kind : {"pd", "computed_torque", "excited", "open", "stiff", "soft"}
         PD with the nominal arm's gravity; the same with the nominal inverse dynamics of the reference; weak PD with gravity beside a
-        multisine torque of its own; a torque table that is played back.
+        multisine torque of its own; a torque table that is played back; a servo that knows nothing of the arm, `kd` on the measured velocity.
     kp, kd : ndarray, shape (n,)
         Gains.
     played : ndarray, shape (n_samples, n_joints), optional
@@ -46,6 +51,11 @@ class Controller:
     kp: Array
     kd: Array
     played: Array | None = None
+
+    @property
+    def is_servo(self) -> bool:
+        """Whether it runs at every step of the integration, whatever the log's period."""
+        return self.kind in SERVOS
 
 
 @dataclass(frozen=True)
@@ -66,7 +76,7 @@ class Run:
     t : ndarray, shape (n_samples,)
         Times [s].
     q, tau : ndarray, shape (n_samples, n_joints)
-        Positions as encoders show them, and commands, held until the next sample.
+        Positions as encoders show them, and commands, held until the next sample; of a servo with the gains that are stated, their mean.
     true_q, true_dq, true_ddq : ndarray, shape (n_samples, n_joints)
         The joints' motion at the samples.
     applied : ndarray, shape (n_samples, n_joints)
@@ -134,6 +144,9 @@ def draw_controller(
         mujoco.mj_forward(model, data)
         mujoco.mj_fullM(model, data, full)
         inertia += np.diag(full) / len(poses)
+    if kind in SERVOS:
+        rate, ratio = float(rng.uniform(*SERVOS[kind])), float(rng.uniform(*_DAMPING))
+        return Controller(kind, inertia * rate**2, 2.0 * ratio * inertia * rate)
     bandwidth = min(float(rng.uniform(10.0, 20.0)), 0.06 / period)
     if kind == "excited":
         bandwidth = 4.0
@@ -207,10 +220,18 @@ def simulate(
     samples, n = reference.q.shape
     model = truth.model()
     data = mujoco.MjData(model)
-    # At rest where the encoders show the reference, after drives have held it.
-    side = _Nominal(nominal)
-    effect.begin(side.command(controller, reference, 0, reference.q[0], np.zeros(n), truth.effort))
+    side, servo = _Nominal(nominal), _Servo(controller, truth)
+    if controller.is_servo:
+        effect.begin(np.zeros(n))
+    else:
+        # Drives have held the arm for long.
+        effect.begin(side.command(controller, reference, 0, reference.q[0], np.zeros(n), truth.effort))
+    # At rest where the encoders show the reference.
     data.qpos[:] = 2 * reference.q[0] - effect.reading(reference.q[0])
+    if controller.is_servo:
+        # At rest where the servos carry the arm's weight.
+        mujoco.mj_forward(model, data)
+        data.qpos[:] -= data.qfrc_bias / controller.kp
     out = {name: np.empty((samples, n)) for name in ("q", "tau", "true_q", "true_dq", "true_ddq", "applied")}
     steps = round(period / STEP)
     forget = 1.0 - math.exp(-TURN * _VELOCITY_HZ * period)
@@ -221,10 +242,17 @@ def simulate(
         last, shown = shown, np.round(effect.reading(data.qpos.copy()) / truth.step) * truth.step
         if k:
             speed = speed + forget * ((shown - last) / period - speed)
-        command = side.command(controller, reference, k, shown, speed, truth.effort)
+        command = np.zeros(n)
+        if not controller.is_servo:
+            command = side.command(controller, reference, k, shown, speed, truth.effort)
         out["q"][k], out["tau"][k] = shown, command
         out["true_q"][k], out["true_dq"][k] = data.qpos, data.qvel
         for i in range(steps):
+            if controller.is_servo:
+                command = servo.command(effect, reference.q[k], data)
+                out["tau"][k] += servo.stated / steps
+                if k == i == 0:
+                    effect.begin(command)
             now = effect.drive(command)
             moment = Moment(k * period + i * STEP, data.qpos, data.qvel, now, load)
             total = now + disturbance[k]
@@ -240,6 +268,26 @@ def simulate(
             mujoco.mj_mulM(model, data, load, data.qacc)
             load += data.qfrc_bias - truth.rotor * data.qacc
     return Run(period * np.arange(samples), **out)
+
+
+class _Servo:
+    """PD controllers at every step: what they are said to do, and what they do."""
+
+    def __init__(self, controller: Controller, robot: SerialRobot) -> None:
+        self.kp, self.kd = controller.kp, controller.kd
+        self.step, self.effort = robot.step, robot.effort
+        self.stated = np.zeros(robot.n)
+
+    def command(self, effect: Effect, reference: Array, data: Any) -> Array:
+        """Return the torques of this step; `stated` holds those that stated gains give with a reference in time."""
+        q, moved = data.qpos.copy(), 1e-6
+        shown = effect.reading(q)
+        speed = (effect.reading(q + moved * data.qvel) - shown) / moved
+        shown = np.round(shown / self.step) * self.step
+        self.stated = np.clip(self.kp * (reference - shown) - self.kd * speed, -self.effort, self.effort)
+        kp, kd = effect.gains(self.kp, self.kd)
+        out = kp * (effect.arriving(reference) - shown) - kd * speed
+        return np.clip(out, -self.effort, self.effort)
 
 
 class _Nominal:

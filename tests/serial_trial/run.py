@@ -43,9 +43,9 @@ def ask(case: Case) -> Record:
     return record | {"outcome": outcome(record)}
 
 
-def answer(seed: int, number: int) -> Record:
+def answer(seed: int, number: int, *, commanded: bool = False) -> Record:
     """Make a case and diagnose it."""
-    return ask(make_case(seed, number))
+    return ask(make_case(seed, number, commanded=commanded))
 
 
 def is_hidden(record: Record, name: dict[str, Any]) -> bool:
@@ -75,7 +75,10 @@ def outcome(record: Record) -> str:
 
 
 def _restored(record: Record) -> bool:
-    """Whether a rotor inertia that the arm file has wrong was estimated right."""
+    """Whether a rotor inertia that the arm file has wrong was estimated right, or damping of a servo as the viscous friction that it is."""
+    if record["effect"] == "controller_damping":
+        true = record["theta"][11 * record["joints"] + record["joint"] - 1] + record["values"]["difference"]
+        return bool(abs(record["parameters"][f"viscous{record['joint']}"] / true - 1) < _VALUE)
     if record["effect"] != "rotor_inertia" or record["values"]["lacking"]:
         return False
     true = record["theta"][10 * record["joints"] + record["joint"] - 1]

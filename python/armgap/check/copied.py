@@ -1,6 +1,6 @@
 """Holdout logs that hold rows of the training logs: their contents are compared, whatever the files are called.
 
-A row is the same if all its positions and torques are. Rows that occur more than once in a log (a joint at rest) say nothing. What is
+A row is the same if all its positions and torques, or references, are. Rows that occur more than once in a log (a joint at rest) say nothing. What is
 left has to agree in time too: the same distance between the clocks for many rows.
 """
 
@@ -57,7 +57,8 @@ def copied_holdout(training: Sequence[Log], holdout: Sequence[Log]) -> list[Chec
 def _rows(log: Log) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:
     """Return a number for each row's contents, sorted, and the row, of contents that occur once."""
     keys = np.zeros(len(log), dtype=np.uint64)
-    for column in (*log.q.T, *log.tau.T):
+    driven = log.tau if log.q_ref is None else log.q_ref
+    for column in (*log.q.T, *driven.T):
         # Multiply and shift (a mixing step of SplitMix64): equal rows give equal numbers, others hardly ever.
         keys ^= (np.ascontiguousarray(column) + 0.0).view(np.uint64)
         keys *= np.uint64(0xBF58476D1CE4E5B9)

@@ -13,6 +13,7 @@ import numpy as np
 
 from armgap.errors import ColumnError, OptionError
 from armgap.log.findings import Finding
+from armgap.log.log import SIGNALS
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
@@ -26,11 +27,12 @@ PositionUnit = Literal["deg", "turns"]
 _COLUMN = re.compile(r"(q|dq|tau)([1-9]\d*)")
 _POSITION = re.compile(r"q([1-9]\d*)")
 _TORQUE = re.compile(r"tau([1-9]\d*)?")
-_SIGNALS = ("q", "tau", "dq", "moment")
 # A shift this near to a whole number of sample periods is one.
 _WHOLE = 0.05
 # Arrays of a log that a column of each kind stands for.
-_TOGETHER = {"q": ("q", "dq"), "dq": ("dq",), "tau": ("tau", "moment")}
+_TOGETHER = {"q": ("q", "dq", "q_ref", "dq_ref"), "dq": ("dq",), "tau": ("tau", "moment")}
+# Of these, those that a zero or a unit of the positions is about.
+_POSITIONS = ("q", "q_ref")
 _ANGLE = re.compile(r"(?P<number>[-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|m|turns)?")
 _ANGLE_UNITS = {"deg": math.pi / 180, "rad": 1.0, "m": 1.0, "turns": 2 * math.pi, None: 1.0}
 _SPAN = re.compile(r"(?:(?P<log>.+):)?(?P<first>[\d.]+)-(?P<last>[\d.]+)")
@@ -193,7 +195,7 @@ class Corrections:
             return log
         self._check_joints(log)
         columns: dict[str, Any] = {
-            name: None if (values := getattr(log, name)) is None else values.copy() for name in ("t", *_SIGNALS)
+            name: None if (values := getattr(log, name)) is None else values.copy() for name in ("t", *SIGNALS)
         }
         self._positions(columns)
         for column, value in self.factor.items():
@@ -214,7 +216,8 @@ class Corrections:
     def _positions(self, columns: dict[str, Any]) -> None:
         """Correct unit, order, signs, zeros and reference of the columns in place."""
         if self.unit is not None:
-            columns["q"] *= _ANGLE_UNITS[self.unit]
+            for values in _of(columns, _POSITIONS):
+                values *= _ANGLE_UNITS[self.unit]
         for a, b in self.swap:
             (kind, i), (_, j) = _split(a), _split(b)
             for values in _of(columns, _TOGETHER[kind]):
@@ -224,7 +227,8 @@ class Corrections:
             for values in _of(columns, _TOGETHER[kind]):
                 values[:, j] *= -1.0
         for column, value in self.zero.items():
-            columns["q"][:, _split(column)[1]] += value
+            for values in _of(columns, _POSITIONS):
+                values[:, _split(column)[1]] += value
         for names, sign in ((self.absolute, -1.0), (self.relative, 1.0)):
             for column in names:
                 _, j = _split(column)
@@ -280,7 +284,8 @@ CORRECTIONS: tuple[str, ...] = tuple(f.name for f in fields(Corrections))
 
 
 def _of(columns: Mapping[str, Any], names: Iterable[str]) -> list[Any]:
-    return [columns[name] for name in names if columns[name] is not None]
+    """Return the arrays that there are; torques of a log of references have no columns."""
+    return [x for name in names if (x := columns[name]) is not None and x.shape[1]]
 
 
 def _shifted(t: Any, period: float, seconds: float) -> tuple[Any, Any]:

@@ -158,6 +158,8 @@ def _reversals(pieces: list[Array], moving: list[NDArray[np.bool_]]) -> int:
 
 def _driven(log: Log, j: int, rows: list[slice], moving: list[NDArray[np.bool_]]) -> bool:
     """Whether torques explain the high frequencies: held torques accelerate, so sixth differences follow fourth ones of torque."""
+    if not log.has_torques:
+        return False
     y = np.concatenate([np.diff(log.q[r, j], n=6)[m[3:-3]] for r, m in zip(rows, moving, strict=True)])
     columns = []
     for r, m in zip(rows, moving, strict=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,7 @@ def seconds(time: float) -> str:
 
 
 def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None = None) -> Log:
-    """Return some rows of a log, each with the mean torque from its time to that of the next one.
+    """Return some rows of a log, each with the mean torque, or reference, from its time to that of the next one.
 
     The torque's impulse over every interval and its first moment are what they were, so that an arm gains the same momentum and goes the
     same way.
@@ -79,7 +80,7 @@ def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None 
         Torques that count; a row without any valid one takes the torque before it.
     """
     held = np.append(np.diff(log.t), log.sample_period)[:, None]
-    weight = np.broadcast_to(held, log.tau.shape) if valid is None else held * valid
+    weight = np.broadcast_to(held, log.tau.shape) if valid is None or not log.has_torques else held * valid
     first = int(kept[0])
     starts = kept - first
     impulse = np.add.reduceat(np.where(weight > 0, log.tau, 0.0)[first:] * weight[first:], starts)
@@ -90,8 +91,14 @@ def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None 
     tau[alone] = log.tau[kept[alone]]  # no rounding where nothing was left out
     for row, j in np.argwhere(empty):
         tau[row, j] = tau[row - 1, j] if row else 0.0
-    dq = None if log.dq is None else log.dq[kept]
-    return replace(log, t=log.t[kept], q=log.q[kept], tau=tau, dq=dq, moment=_moment(log, kept, tau, valid))
+    arrays: dict[str, Any] = {
+        name: None if (x := getattr(log, name)) is None else x[kept] for name in ("t", "q", "dq", "dq_ref")
+    }
+    q_ref = None
+    if log.q_ref is not None:
+        q_ref = np.add.reduceat((log.q_ref * held)[first:], starts) / np.add.reduceat(held[first:], starts)
+        q_ref[alone] = log.q_ref[kept[alone]]
+    return replace(log, **arrays, tau=tau, q_ref=q_ref, moment=_moment(log, kept, tau, valid))
 
 
 def _moment(

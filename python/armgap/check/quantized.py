@@ -31,7 +31,7 @@ _STAYS, _ONE_STEP, _EQUALLY_LONG = 5, 0.5, 0.2
 def look(log: Log, arm: Arm | None) -> Outcome:
     """Say which torques are rounded so that it matters."""
     found = []
-    for j in range(log.n_joints):
+    for j in range(log.tau.shape[1]):
         tau = np.concatenate([log.tau[rows, j] for rows in blocks(len(log))])
         spread = float(np.std(tau))
         step = grid_step(tau)

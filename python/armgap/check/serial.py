@@ -119,6 +119,10 @@ def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tup
     list of Check
         What is wrong: one contradiction, or the joints whose torques are in another unit.
     """
+    commanded = not all(log.has_torques for log in logs)
+    if commanded and (arm.controller is None or arm.controller.ki is not None):
+        # What an integral part held before a log began is in no column.
+        return Corrections(), []
     stands = fit(logs, arm)
     if stands is None or (stands.share.max() < _SUSPICIOUS and stands.distance < _FAR * arm.n_joints):
         return Corrections(), []
@@ -138,7 +142,8 @@ def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tup
         if _is_right(stands, least):
             remedies = _alike(best, least.cost + _ALIKE * (stands.cost - least.cost), logs, arm)
             return best.corrections, [_contradiction(stands, best, least, found, remedies)]
-    scaled = _factors(logs, arm)
+    # Torques of a controller have the unit of its gains.
+    scaled = None if commanded else _factors(logs, arm)
     if scaled is None or not _is_right(stands, scaled[1]):
         return Corrections(), []
     return _rescaled(stands, *scaled, repair=repair)
@@ -245,7 +250,7 @@ class _Rows:
             return None
         chain = arm.chain.native()
         most = max(_MOST_INTERVALS // len(logs), 1)
-        found = [rows for log in logs if (rows := _rows(chain, log, most)) is not None]
+        found = [rows for log in logs if (rows := _rows(chain, log, _torques(log, arm), most)) is not None]
         if not found:
             return None
         y = np.concatenate([torque for torque, _ in found])
@@ -329,7 +334,14 @@ def _estimate(normal: Array, right: Array, prior: Array, fixed: NDArray[np.bool_
     return value
 
 
-def _rows(chain: _native.Chain, log: Log, most: int) -> tuple[Array, Array] | None:
+def _torques(log: Log, arm: Arm) -> Array:
+    """Torques of a log: as logged, or those of the arm's controller under the logged references."""
+    if log.has_torques or log.q_ref is None or arm.controller is None:
+        return log.tau
+    return arm.controller.torque(log.t, log.q, log.q_ref, log.dq_ref, arm.torque_limit)
+
+
+def _rows(chain: _native.Chain, log: Log, torques: Array, most: int) -> tuple[Array, Array] | None:
     """Torques, shape (rows, n), and regressors, shape (rows, n, 13 n), of one log in the weak form."""
     period = float(np.median(np.diff(log.t)))
     taps = max(round(_HALF_WIDTH_S / period), _FEWEST_PERIODS)
@@ -358,7 +370,7 @@ def _rows(chain: _native.Chain, log: Log, most: int) -> tuple[Array, Array] | No
     momentum[:, joints, 10 * n + joints] = mean_dq
     rest[:, joints, 11 * n + joints] = dq
     rest[:, joints, 12 * n + joints] = np.sign(dq)
-    tau = log.tau[:-1][part]
+    tau = torques[:-1][part]
     torque = np.einsum("k,wkj->wj", weight, tau[index])
     regressor = np.zeros((len(starts), n, 13 * n))
     for k in range(2 * taps):

@@ -54,12 +54,17 @@ def look(log: Log, arm: Arm | None) -> Outcome:
     wild = np.zeros(len(log), dtype=bool)
     valid = np.ones(log.tau.shape, dtype=bool)
     for j in range(log.n_joints):
-        q, tau = np.ascontiguousarray(log.q[:, j]), np.ascontiguousarray(log.tau[:, j])
-        for name, values, rows in ((f"q{j + 1}", q, _positions(q)), (f"tau{j + 1}", tau, _torques(log.t, q, tau))):
+        q = np.ascontiguousarray(log.q[:, j])
+        columns = [(f"q{j + 1}", q, _positions(q))]
+        if log.has_torques:
+            tau = np.ascontiguousarray(log.tau[:, j])
+            columns.append((f"tau{j + 1}", tau, _torques(log.t, q, tau)))
+        for name, values, rows in columns:
             if not len(rows) or len(rows) > max(_LONGEST, _MOST * len(log)):
                 continue
             wild[rows] = True
-            valid[rows, j] &= name[0] == "q"
+            if name[0] != "q":
+                valid[rows, j] = False
             found.append(_said(log, name, values, rows, j))
     if not found:
         return NOTHING

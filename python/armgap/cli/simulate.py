@@ -113,6 +113,7 @@ def command(
         source = Log.read(torque, columns=parse_columns(columns), units=parse_units(units), arm=arm)
         for finding in () if quiet else source.findings:
             console(error=True).print(f"note: {source.name}: {finding.message}", highlight=False, markup=False)
+        source = source.with_torques("a simulation")
         keep = source.t <= (duration if duration is not None else source.duration)
         t, tau, start, name = source.t[keep], source.tau[keep], _start(source), source.name
     with working("simulating", quiet=quiet):

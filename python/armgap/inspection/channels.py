@@ -49,7 +49,7 @@ class JointChannels:
     joint : int
         Counted from 1.
     q_range, tau_range : tuple of float
-        Smallest and largest position [rad or m] and torque [N m or N].
+        Smallest and largest position [rad or m] and torque [N m or N]; no torque of a log that holds references in its place.
     q_step, tau_step : float, optional
         Step in whole multiples of which values change; None if they change by any amount.
     q_step_arm : float, optional
@@ -68,7 +68,7 @@ class JointChannels:
     q_range: tuple[float, float]
     q_step: float | None
     q_step_arm: float | None
-    tau_range: tuple[float, float]
+    tau_range: tuple[float, float] | None
     tau_step: float | None
     top_speed: float
     rest: float
@@ -79,7 +79,8 @@ class JointChannels:
 
 def joint(log: Log, j: int, arm: Arm | None) -> JointChannels:
     """Return what the channels of joint `j` (from 0) look like."""
-    q, tau = np.ascontiguousarray(log.q[:, j]), np.ascontiguousarray(log.tau[:, j])
+    q = np.ascontiguousarray(log.q[:, j])
+    tau = np.ascontiguousarray(log.tau[:, j]) if log.has_torques else None
     step = step_of(q)
     dq = _speeds(log.t, q, log.sample_period)
     top = float(np.quantile(np.abs(dq), 0.99)) if len(dq) else 0.0
@@ -90,13 +91,13 @@ def joint(log: Log, j: int, arm: Arm | None) -> JointChannels:
         q_range=(float(q.min()), float(q.max())),
         q_step=step,
         q_step_arm=None if arm is None or arm.encoder_step is None else float(arm.encoder_step[j]),
-        tau_range=(float(tau.min()), float(tau.max())),
-        tau_step=step_of(tau),
+        tau_range=None if tau is None else (float(tau.min()), float(tau.max())),
+        tau_step=None if tau is None else step_of(tau),
         top_speed=top,
         rest=float(still.mean()) if len(still) else 1.0,
         motion=float(1.0 - still.mean()) if len(still) else 0.0,
         reversals=int(np.sum(moving[1:] != moving[:-1])),
-        flat_tops=_flat_tops(tau, log.sample_period),
+        flat_tops=() if tau is None else _flat_tops(tau, log.sample_period),
     )
 
 

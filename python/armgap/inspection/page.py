@@ -77,10 +77,15 @@ def _over_time(found: Inspection) -> list[Any]:
     figures: list[Any] = []
     length, load = found.units
     for j in range(log.n_joints):
-        for name, title, values in (
-            (f"q{j + 1}", f"position of joint {j + 1}, q{j + 1} [{length}]", log.q[:, j]),
-            (f"tau{j + 1}", f"torque of joint {j + 1}, tau{j + 1} [{load}]", log.tau[:, j]),
+        for name, title, unit, signal in (
+            ("q", "position", length, log.q),
+            ("q_ref", "reference", length, log.q_ref),
+            ("tau", "torque", load, log.tau if log.has_torques else None),
         ):
+            if signal is None:
+                continue
+            name, values = f"{name}{j + 1}", signal[:, j]
+            title = f"{title} of joint {j + 1}, {name} [{unit}]"
             t, shown = _envelope(log.t, values)
             options = {"x_range": figures[0].x_range} if figures else {}
             curve = [(name, shown, charts.MEASURED)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -97,17 +98,20 @@ def grids(found: Inspection) -> list[tuple[str, Grid]]:
 def _joints(found: Inspection) -> Grid:
     header = ["", *(f"joint {j.joint}" for j in found.joints)]
     length, load = found.units
-    lines = (
+    lines: list[tuple[str, Callable[[JointChannels], str]]] = [
         (f"position [{length}]", lambda j: f"{j.q_range[0]:.4g} to {j.q_range[1]:.4g}"),
         (f"position step [{length}]", _position_step),
         (f"speed, 99 % below [{_rate(length)}]", lambda j: f"{j.top_speed:.4g}"),
         ("at rest", lambda j: f"{100 * j.rest:.1f} %"),
         ("in motion", lambda j: f"{100 * j.motion:.1f} %"),
         ("reversals", lambda j: f"{j.reversals}"),
-        (f"torque [{load}]", lambda j: f"{j.tau_range[0]:.4g} to {j.tau_range[1]:.4g}"),
-        (f"torque step [{load}]", lambda j: "none" if j.tau_step is None else f"{j.tau_step:.4g}"),
-        ("torque cut off", _flat),
-    )
+    ]
+    if found.source.has_torques:
+        lines += [
+            (f"torque [{load}]", lambda j: " to ".join(f"{x:.4g}" for x in j.tau_range or ())),
+            (f"torque step [{load}]", lambda j: "none" if j.tau_step is None else f"{j.tau_step:.4g}"),
+            ("torque cut off", _flat),
+        ]
     return header, [[name, *(of(j) for j in found.joints)] for name, of in lines]
 
 

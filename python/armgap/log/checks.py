@@ -63,23 +63,22 @@ def without_repeats(arrays: Arrays) -> tuple[Arrays, list[Finding]]:
         return arrays, []
     keep = np.ones(len(arrays.t), dtype=bool)
     keep[again] = False
-    dq = None if arrays.dq is None else arrays.dq[keep]
     said = f"left out: {counted(len(again), 'row')} like the row before in every value, the first of them row {again[0] + 1}"
     when = tuple((arrays.t[again[:_DRAWN]] - arrays.t[0]).tolist())
-    return Arrays(arrays.t[keep], arrays.q[keep], arrays.tau[keep], dq), [Finding("cleaned", said, when)]
+    return arrays.rows(keep), [Finding("cleaned", said, when)]
 
 
 def _repeat(arrays: Arrays, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Whether the row after each of `rows` is the same in every value."""
     same: NDArray[np.bool_] = arrays.t[rows + 1] == arrays.t[rows]
-    for values in (arrays.q, arrays.tau, arrays.dq):
+    for values in (arrays.q, arrays.tau, arrays.dq, arrays.q_ref, arrays.dq_ref):
         if values is not None:
             same &= np.all(values[rows + 1] == values[rows], axis=1)
     return same
 
 
 def motion(arrays: Arrays, place: Path | str, names: Names) -> None:
-    """Raise unless some joint moves and some torque acts."""
+    """Raise unless some joint moves and, where torques are logged, some torque acts."""
     if np.all(arrays.q == arrays.q[0]):
         raise LogShapeError(
             "no joint moves",
@@ -87,7 +86,7 @@ def motion(arrays: Arrays, place: Path | str, names: Names) -> None:
             file=place,
             column=names.q[0],
         )
-    if np.all(arrays.tau == 0):
+    if names.tau and np.all(arrays.tau == 0):
         raise LogShapeError(
             "all torques are zero",
             remedy="map the columns of the commanded torque with --columns tau1=NAME",

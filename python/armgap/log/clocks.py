@@ -65,7 +65,7 @@ def in_seconds(
     findings: list[Finding] = []
     factor = raw.tick_s or scales.t or _unit(raw.t, names.t, arm, place, findings)
     if raw.t_tau is None or names.t_tau is None:
-        return Arrays(_seconds(raw.t, raw.t[0], factor), raw.q, raw.tau, raw.dq), findings
+        return Arrays(_seconds(raw.t, raw.t[0], factor), raw.q, raw.tau, raw.dq, raw.q_ref, raw.dq_ref), findings
     tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, arm, place, findings)
     start, tau_start = raw.t[0], raw.t_tau[0]
     # Both clocks count from the same moment; the first position is that moment from here on.

@@ -1,4 +1,4 @@
-"""From a recording's own columns to ``t, q, tau, dq``."""
+"""From a recording's own columns to ``t, q, tau, dq``, or ``q_ref, dq_ref`` in place of torques."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
@@ -21,9 +21,9 @@ from armgap.progress import report_progress
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["Arrays", "Names", "Raw", "extract", "resolve", "unused_velocities"]
+__all__ = ["Arrays", "Names", "Raw", "extract", "no_controller", "resolve", "unused_velocities"]
 
-_CANONICAL = re.compile(r"^(t|t_tau|(q|tau|dq)(?P<joint>[1-9][0-9]*))$")
+_CANONICAL = re.compile(r"^(t|t_tau|(q|tau|dq|q_ref|dq_ref)(?P<joint>[1-9][0-9]*))$")
 _TIMES = ("t", "t_tau")
 _LISTED = 24
 _TICKS_S = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}
@@ -31,19 +31,23 @@ _TICKS_S = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}
 
 @dataclass(frozen=True)
 class Names:
-    """The recording's names of the columns in use, and the units it states for them."""
+    """The recording's names of the columns in use, and the units it states for them; either `tau` or `q_ref` is empty."""
 
     t: str
     q: tuple[str, ...]
     tau: tuple[str, ...]
     dq: tuple[str, ...] | None
     t_tau: str | None = None
+    q_ref: tuple[str, ...] = ()
+    dq_ref: tuple[str, ...] | None = None
     units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
         """Standard name and column of everything in use."""
-        groups = (("q", self.q), ("tau", self.tau), ("dq", self.dq or ()))
+        groups = (
+            ("q", self.q), ("tau", self.tau), ("dq", self.dq or ()), ("q_ref", self.q_ref), ("dq_ref", self.dq_ref or ()),
+        )  # fmt: skip
         joints = [(f"{prefix}{j}", name) for prefix, group in groups for j, name in enumerate(group, start=1)]
         return [("t", self.t), *joints, *([("t_tau", self.t_tau)] if self.t_tau else [])]
 
@@ -60,12 +64,19 @@ class Names:
 
 @dataclass(frozen=True)
 class Arrays:
-    """Columns as arrays, not yet checked against each other."""
+    """Columns as arrays, not yet checked against each other; of a log of references torques have no columns."""
 
     t: NDArray[np.float64]
     q: NDArray[np.float64]
     tau: NDArray[np.float64]
     dq: NDArray[np.float64] | None
+    q_ref: NDArray[np.float64] | None = None
+    dq_ref: NDArray[np.float64] | None = None
+
+    def rows(self, kept: NDArray[Any]) -> Arrays:
+        """Return some of the rows, by index or mask."""
+        parts = (self.t, self.q, self.tau, self.dq, self.q_ref, self.dq_ref)
+        return Arrays(*(None if x is None else x[kept] for x in parts))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -85,6 +96,8 @@ class Raw:
     t_tau: NDArray[np.float64] | NDArray[np.int64] | None
     tick_s: float | None
     tau_tick_s: float | None
+    q_ref: NDArray[np.float64] | None = None
+    dq_ref: NDArray[np.float64] | None = None
 
 
 def resolve(
@@ -113,29 +126,74 @@ def resolve(
             file=place,
             column=f"q{n + 1}",
         )
-    return _pick_all(index, names, mapping, n), findings
+    return _pick_all(index, names, mapping, n, arm), findings
 
 
-def _pick_all(index: Index, names: Mapping[str, str], mapping: Mapping[str, str], n: int) -> Names:
+def _pick_all(index: Index, names: Mapping[str, str], mapping: Mapping[str, str], n: int, arm: Arm | None) -> Names:
     first = index.find(names.get("q1", "q1"), "q1")
     wanted = [f"dq{j}" for j in range(1, n + 1)]
     t = _time(index, names, first)
     q = tuple(_pick(index, names, f"q{j}", t) for j in range(1, n + 1))
-    tau = tuple(_pick(index, names, f"tau{j}", t) for j in range(1, n + 1))
-    t_tau = _torque_clock(index, names, t, tau)
     _one_clock(index, t, q, "positions")
-    _one_clock(index, t_tau or t, tau, "torques")
-    needed = any(key in mapping for key in wanted)
-    dq = None
-    if needed or all(index.find(names.get(key, key), key, within=t) for key in wanted):
-        dq = tuple(_pick(index, names, key, t) for key in wanted)
-    if dq is not None and (needed or all(c in index.recording.stream_of(t).columns for c in dq)):
-        _one_clock(index, t, dq, "velocities")
+    if _commanded(index, names, t, n, arm):
+        tau: tuple[str, ...] = ()
+        t_tau = None
+        q_ref: tuple[str, ...] = tuple(_pick(index, names, f"q_ref{j}", t) for j in range(1, n + 1))
+        _one_clock(index, t, q_ref, "references and positions")
+        dq_ref = _if_all(index, names, mapping, [f"dq_ref{j}" for j in range(1, n + 1)], t)
     else:
-        dq = None
-    found = Names(t, q, tau, dq, t_tau)
+        tau = tuple(_pick(index, names, f"tau{j}", t) for j in range(1, n + 1))
+        t_tau = _torque_clock(index, names, t, tau)
+        _one_clock(index, t_tau or t, tau, "torques")
+        q_ref, dq_ref = (), None
+    found = Names(t, q, tau, _if_all(index, names, mapping, wanted, t), t_tau, q_ref, dq_ref)
     _check_once(index, found)
     return replace(found, units={c: unit for _, c in found.pairs if (unit := index.unit(c)) is not None})
+
+
+def _if_all(
+    index: Index, names: Mapping[str, str], mapping: Mapping[str, str], wanted: list[str], t: str
+) -> tuple[str, ...] | None:
+    """Return columns that are used only where all of them are there, on the clock of `t`; those that are asked for must be."""
+    needed = any(key in mapping for key in wanted)
+    found = None
+    if needed or all(index.find(names.get(key, key), key, within=t) for key in wanted):
+        found = tuple(_pick(index, names, key, t) for key in wanted)
+    if found is not None and (needed or all(c in index.recording.stream_of(t).columns for c in found)):
+        _one_clock(index, t, found, "velocities")
+        return found
+    return None
+
+
+def _commanded(index: Index, names: Mapping[str, str], t: str, n: int, arm: Arm | None) -> bool:
+    """Whether a log holds references of a position controller in place of torques, which serial arms may be diagnosed by."""
+
+    def there(prefix: str) -> bool:
+        keys = [f"{prefix}{j}" for j in range(1, n + 1)]
+        return any(index.find(names.get(key, key), key, within=t) is not None for key in keys)
+
+    if there("tau") or any(key.startswith("tau") for key in names) or (arm is not None and arm.chain is None):
+        return False
+    if arm is not None and not there("q_ref"):
+        raise ColumnError(
+            "is missing, and so are references `q_ref1` in its place",
+            remedy="map torques with --columns tau1=NAME, or references with --columns q_ref1=NAME beside a [controller] in the arm file",
+            file=index.place,
+            column="tau1",
+        )
+    if arm is not None and arm.controller is None:
+        raise no_controller(arm, index.place)
+    return there("q_ref")
+
+
+def no_controller(arm: Arm, place: Path | str) -> ColumnError:
+    """Return the error of a log of references whose arm has no controller."""
+    return ColumnError(
+        f"is missing, and {arm.path or arm.name} has no [controller] that makes torques of the references `q_ref1`",
+        remedy="map torques with --columns tau1=NAME, or add [controller] with kp and kd to the arm file",
+        file=place,
+        column="tau1",
+    )
 
 
 def _time(index: Index, names: Mapping[str, str], first: str | None) -> str:
@@ -234,7 +292,7 @@ def _check_mapping(names: Mapping[str, str], place: Path | str, n: int) -> None:
         if match is None:
             raise ColumnError(
                 f"`{key}` is not a column of a log",
-                remedy="map t, q1 ..., tau1 ... or dq1 ... to the file's names",
+                remedy="map t, q1 ..., tau1 ..., dq1 ..., q_ref1 ... or dq_ref1 ... to the file's names",
                 file=place,
                 column=key,
             )
@@ -275,7 +333,7 @@ def extract(recording: Recording, place: Path | str, names: Names) -> Raw:
     """Return the columns in use as finite arrays."""
 
     def several(group: tuple[str, ...]) -> NDArray[np.float64]:
-        values: NDArray[np.float64] | None = None
+        values = np.empty((len(t), 0)) if not group else None
         for j, name in enumerate(group):
             report_progress(f"reading {label}", names.order(name))
             column = _column(recording.stream_of(name).fetch(name), place, name)
@@ -289,8 +347,9 @@ def extract(recording: Recording, place: Path | str, names: Names) -> Raw:
     if len(t) == 0:
         raise LogShapeError("holds no samples", remedy="give a log with samples", file=place)
     t_tau, tau_tick_s = (None, None) if names.t_tau is None else _times(recording, place, names.t_tau)
-    dq = None if names.dq is None else several(names.dq)
-    return Raw(t, several(names.q), several(names.tau), dq, t_tau, tick_s, tau_tick_s)
+    dq, dq_ref = (None if group is None else several(group) for group in (names.dq, names.dq_ref))
+    q_ref = several(names.q_ref) if names.q_ref else None
+    return Raw(t, several(names.q), several(names.tau), dq, t_tau, tick_s, tau_tick_s, q_ref, dq_ref)
 
 
 def _times(

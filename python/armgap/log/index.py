@@ -12,7 +12,9 @@ from armgap.log.spellings import stripped, suffixed
 __all__ = ["QUANTITIES", "Index"]
 
 # What a ROS message calls the quantity of a standard column; `q1=elbow` finds `/joint_states/elbow/position`.
-QUANTITIES = {"q": "position", "dq": "velocity", "tau": "effort"}
+QUANTITIES = {
+    "q": "position", "dq": "velocity", "tau": "effort", "q_ref": "reference", "dq_ref": "reference_velocity",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import ArrayLike, NDArray
 
-from armgap.errors import OptionError
+from armgap.errors import ColumnError, OptionError
 from armgap.log import checks, clocks, columns, frames, units
 from armgap.log.findings import Finding
 from armgap.log.formats import record
@@ -22,7 +22,10 @@ from armgap.output import write
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["Log"]
+__all__ = ["SIGNALS", "Log"]
+
+SIGNALS = ("q", "tau", "dq", "moment", "q_ref", "dq_ref")
+"""Arrays of a log with one row per sample, beside its times."""
 
 _NS = 1e9
 
@@ -40,7 +43,7 @@ class Log:
     q : ndarray, shape (n_samples, n_joints)
         Positions as measured [rad or m].
     tau : ndarray, shape (n_samples, n_joints)
-        Torques commanded at `t` and held until the next sample [N m or N].
+        Torques commanded at `t` and held until the next sample [N m or N]; shape (n_samples, 0) where the log holds references in their place.
     dq : ndarray, shape (n_samples, n_joints), optional
         Velocities, where a sensor gives them [rad/s or m/s].
     findings : tuple of Finding
@@ -57,6 +60,9 @@ class Log:
         Row of that log, from 0, that it begins with.
     units : mapping
         Unit that each of these columns had in the file, by standard name; the arrays are in SI units.
+    q_ref, dq_ref : ndarray, shape (n_samples, n_joints), optional
+        Positions [rad or m] that a position controller was given at `t` and held until the next sample, of a log without torques, and velocities
+        [rad/s or m/s] where they are logged.
     """
 
     name: str
@@ -71,6 +77,8 @@ class Log:
     part_of: str | None = None
     first_row: int = 0
     units: Mapping[str, str] = field(default_factory=dict)
+    q_ref: NDArray[np.float64] | None = None
+    dq_ref: NDArray[np.float64] | None = None
 
     @classmethod
     def read(
@@ -137,9 +145,11 @@ class Log:
         cls,
         t: ArrayLike,
         q: ArrayLike,
-        tau: ArrayLike,
+        tau: ArrayLike | None,
         dq: ArrayLike | None = None,
         *,
+        q_ref: ArrayLike | None = None,
+        dq_ref: ArrayLike | None = None,
         name: str = "log",
         arm: Arm | None = None,
     ) -> Log:
@@ -150,7 +160,9 @@ class Log:
         t : array_like, shape (n_samples,)
             Sample times [s].
         q, tau, dq : array_like, shape (n_samples, n_joints), or (n_samples,) for one joint
-            Positions [rad or m], torques [N m or N], velocities [rad/s or m/s].
+            Positions [rad or m], torques [N m or N], velocities [rad/s or m/s]; `tau` is None where references stand in its place.
+        q_ref, dq_ref : array_like, as `q` and `dq`, optional
+            References of a position controller, which count where `tau` is None.
         name : str
             Name of the log in results and errors.
         arm : Arm, optional
@@ -162,7 +174,7 @@ class Log:
             If the shapes do not fit; otherwise as `read`.
         """
         data: dict[str, NDArray[np.float64]] = {"t": np.asarray(t, dtype=np.float64)}
-        for prefix, values in (("q", q), ("tau", tau), ("dq", dq)):
+        for prefix, values in (("q", q), ("tau", tau), ("dq", dq), ("q_ref", q_ref), ("dq_ref", dq_ref)):
             if values is None:
                 continue
             array = np.asarray(values, dtype=np.float64)
@@ -206,13 +218,16 @@ class Log:
             *checks.notice(arrays, names, arm), *checks.unused(recording, names),
         ]  # fmt: skip
         arrays.t.__isub__(arrays.t[0])
-        log = cls(name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key, units=there)
+        log = cls(
+            name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key, units=there,
+            q_ref=arrays.q_ref, dq_ref=arrays.dq_ref,
+        )  # fmt: skip
         return log if arm is None or arm.corrections is None else arm.corrections.on_log(log)
 
     def __post_init__(self) -> None:
         """Put times on whole nanoseconds, so that a log is the same log in every format, and make the arrays read-only."""
         object.__setattr__(self, "t", np.rint(self.t * _NS) / _NS)
-        for name in ("t", "q", "tau", "dq", "moment"):
+        for name in ("t", *SIGNALS):
             values = getattr(self, name)
             if values is not None:
                 view = values.view()
@@ -223,6 +238,33 @@ class Log:
     def n_joints(self) -> int:
         """Number of joints."""
         return int(self.q.shape[1])
+
+    @property
+    def has_torques(self) -> bool:
+        """Whether torques are logged; of other logs references of a position controller are."""
+        return bool(self.tau.shape[1])
+
+    def with_torques(self, use: str) -> Log:
+        """Return the log itself if it holds torques.
+
+        Parameters
+        ----------
+        use : str
+            What needs them, in words.
+
+        Raises
+        ------
+        ColumnError
+            If it holds references in their place.
+        """
+        if not self.has_torques:
+            raise ColumnError(
+                f"is missing: {use} needs torques, and references do not replace them there",
+                remedy="give a log with torques",
+                file=self.path or self.name,
+                column="tau1",
+            )
+        return self
 
     @cached_property
     def sample_period(self) -> float:
@@ -261,11 +303,13 @@ class Log:
         It inherits the findings unless others are given.
         """
         rows = slice(first, last)
-        dq = None if self.dq is None else self.dq[rows]
+        arrays: dict[str, Any] = {
+            key: None if (x := getattr(self, key)) is None else x[rows] for key in ("t", *SIGNALS)
+        }
         found = self.findings if findings is None else findings
-        part = Log(name, self.t[rows], self.q[rows], self.tau[rows], dq, found, self.path, self.columns)
-        moment = None if self.moment is None else self.moment[rows]
-        return replace(part, units=self.units, moment=moment, part_of=self.recording, first_row=self.first_row + first)
+        return replace(
+            self, **arrays, name=name, findings=found, part_of=self.recording, first_row=self.first_row + first
+        )
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
         """Return the log with other findings."""
@@ -274,15 +318,17 @@ class Log:
     def to_native(self, tables: Sequence[NDArray[np.float64]] = ()) -> tuple[Any, ...]:
         """Return the log as the compiled core takes it, with a table of torques per custom effect."""
         fix = np.ascontiguousarray
-        moment = None if self.moment is None else fix(self.moment)
-        return (self.name, fix(self.t), fix(self.q), fix(self.tau), list(tables), moment)
+        moment, dq_ref = (None if x is None else fix(x) for x in (self.moment, self.dq_ref))
+        reference = None if self.q_ref is None or self.has_torques else (fix(self.q_ref), dq_ref)
+        return (self.name, fix(self.t), fix(self.q), fix(self.tau), list(tables), moment, reference)
 
     def to_polars(self) -> pl.DataFrame:
-        """Return the log as a table with the columns ``t, q1 …, tau1 …`` and, where there are any, ``dq1 …``."""
+        """Return the log as a table with the columns ``t, q1 …, tau1 …`` and, where there are any, ``dq1 …, q_ref1 …, dq_ref1 …``."""
         data = {"t": self.t}
-        for prefix, values in (("q", self.q), ("tau", self.tau), ("dq", self.dq)):
+        for prefix in ("q", "tau", "dq", "q_ref", "dq_ref"):
+            values = getattr(self, prefix)
             if values is not None:
-                data |= {f"{prefix}{j + 1}": values[:, j] for j in range(self.n_joints)}
+                data |= {f"{prefix}{j + 1}": values[:, j] for j in range(values.shape[1])}
         return pl.DataFrame(data)
 
     def write(self, path: str | Path) -> None:

@@ -133,7 +133,7 @@ def _ranges(speeds: Sequence[_Speeds]) -> _Ranges:
     """Return ranges from a view of the logs that is as thin as the speeds are."""
     tops = [np.quantile(np.abs(s.of(slice(0, len(s.log)))[0]), 0.999, axis=0) for s in speeds]
     q = [s.log.q[:: s.stride] for s in speeds]
-    tau = [np.abs(s.log.tau[:: s.stride]) for s in speeds]
+    tau = [_load(s.log, slice(None, None, s.stride)) for s in speeds]
     return _Ranges(
         np.min([x.min(axis=0) for x in q], axis=0),
         np.max([x.max(axis=0) for x in q], axis=0),
@@ -152,6 +152,11 @@ def _cells(log: Log, speeds: _Speeds, rows: slice, ranges: _Ranges) -> NDArray[n
     return np.concatenate([_joint_cells(log, at, dq, moving, j, ranges) for j in range(log.n_joints)])
 
 
+def _load(log: Log, rows: slice | NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the size of the torques in some rows, shape (n, n_joints); behind a position controller that of the position errors."""
+    return np.abs(log.tau[rows] if log.q_ref is None or log.has_torques else log.q_ref[rows] - log.q[rows])
+
+
 def _width() -> int:
     return 2 * _POSITIONS + _SPEEDS + 2 * _TORQUES
 
@@ -164,7 +169,7 @@ def _joint_cells(
     place = np.clip((_POSITIONS * (log.q[at, j] - ranges.low[j]) / span).astype(int), 0, _POSITIONS - 1)
     ratio = np.abs(dq[:, j]) / max(float(ranges.speed[j]), 1e-12)
     slow = np.clip((-2 * np.log10(np.maximum(ratio, 1e-12))).astype(int), 0, _SPEEDS - 1)
-    load = np.abs(log.tau[at, j]) / max(float(ranges.torque[j]), 1e-12)
+    load = _load(log, at)[:, j] / max(float(ranges.torque[j]), 1e-12)
     level = np.minimum((_TORQUES * load).astype(int), _TORQUES - 1)
     turned = np.flatnonzero((np.sign(dq[1:, j]) != np.sign(dq[:-1, j])) & (go[1:] | go[:-1]))
     counts = [

@@ -59,8 +59,8 @@ class Scales:
     ----------
     t, t_tau : float, optional
         Of the times; None where nothing says it.
-    q, tau, dq : ndarray, shape (n_joints,)
-        Of each column.
+    q, tau, dq, q_ref, dq_ref : ndarray, shape (n_joints,)
+        Of each column; references are in the units of positions and velocities unless the file says otherwise.
     settled : frozenset of str
         Groups whose unit is stated by the user or by the file.
     """
@@ -70,6 +70,8 @@ class Scales:
     q: NDArray[np.float64]
     tau: NDArray[np.float64]
     dq: NDArray[np.float64] | None
+    q_ref: NDArray[np.float64]
+    dq_ref: NDArray[np.float64] | None
     settled: frozenset[str]
     findings: tuple[Finding, ...]
 
@@ -103,6 +105,7 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
         return np.array(factors, dtype=np.float64)
 
     q, tau, dq, t = (of(group, groups[group]) for group in ("q", "tau", "dq", "t"))
+    q_ref, dq_ref = of("q", names.q_ref), of("dq", names.dq_ref or ())
     t_tau = names.units.get(names.t_tau or "")
     return Scales(
         t=float(t[0]) if "t" in settled else None,
@@ -110,19 +113,30 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
         q=q,
         tau=tau,
         dq=dq if names.dq is not None else None,
+        q_ref=q_ref,
+        dq_ref=dq_ref if names.dq_ref is not None else None,
         settled=frozenset(settled),
         findings=tuple(findings),
     )
 
 
 def scaled(arrays: Arrays, scales: Scales) -> Arrays:
-    """Return positions, torques and velocities in SI units."""
+    """Return positions, torques, velocities and references in SI units."""
 
     def by(values: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
         return values if np.all(factors == 1.0) else values * factors
 
-    dq = None if arrays.dq is None or scales.dq is None else by(arrays.dq, scales.dq)
-    return replace(arrays, q=by(arrays.q, scales.q), tau=by(arrays.tau, scales.tau), dq=dq)
+    def if_there(values: NDArray[np.float64] | None, factors: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+        return None if values is None or factors is None else by(values, factors)
+
+    return replace(
+        arrays,
+        q=by(arrays.q, scales.q),
+        tau=by(arrays.tau, scales.tau),
+        dq=if_there(arrays.dq, scales.dq),
+        q_ref=if_there(arrays.q_ref, scales.q_ref),
+        dq_ref=if_there(arrays.dq_ref, scales.dq_ref),
+    )
 
 
 def _by_file(group: str, column: str, unit: str | None, arm: Arm | None, place: Path | str, j: int) -> float:
@@ -164,13 +178,15 @@ def recognised(arrays: Arrays, names: Names, arm: Arm | None, settled: frozenset
     findings: list[Finding] = []
     turned = np.array([1.0 if _slides(arm, j) else _DEGREE for j in range(arrays.q.shape[1])])
     if "q" not in settled and not np.all(turned == 1.0) and (why := _degrees(arrays, names, arm)):
-        arrays = replace(arrays, q=arrays.q * turned)
+        q_ref = None if arrays.q_ref is None else arrays.q_ref * turned
+        arrays = replace(arrays, q=arrays.q * turned, q_ref=q_ref)
         findings.append(Finding("units", f"positions are in degrees: {why}; converted"))
     if "dq" not in settled and arrays.dq is not None and names.dq is not None and not np.all(turned == 1.0):
         ratios = [0.0 if _slides(arm, j) else _speed_ratio(arrays, arm, j) for j in range(arrays.q.shape[1])]
         slow = [r for r in ratios if r > 0]
         if slow and all(_SURE_RATIO[0] < 1 / r < _SURE_RATIO[1] for r in slow):
-            arrays = replace(arrays, dq=arrays.dq * turned)
+            dq_ref = None if arrays.dq_ref is None else arrays.dq_ref * turned
+            arrays = replace(arrays, dq=arrays.dq * turned, dq_ref=dq_ref)
             said = f"`{names.dq[ratios.index(slow[0])]}` is {1 / slow[0]:.3g} times faster than the positions move"
             findings.append(Finding("units", f"velocities are in deg/s: {said}; converted"))
     return arrays, findings
@@ -222,7 +238,13 @@ def in_file(
     found: dict[str, str] = {}
     turned = np.array([1.0 if _slides(arm, j) else _DEGREE for j in range(len(scales.q))])
     q, dq = (turned if recognised else 1.0 for recognised in degrees)
-    groups = {"q": scales.q * q, "tau": scales.tau, "dq": np.empty(0) if scales.dq is None else scales.dq * dq}
+    groups = {
+        "q": scales.q * q,
+        "tau": scales.tau,
+        "dq": np.empty(0) if scales.dq is None else scales.dq * dq,
+        "q_ref": scales.q_ref * (q if len(scales.q_ref) else 1.0),
+        "dq_ref": np.empty(0) if scales.dq_ref is None else scales.dq_ref * dq,
+    }
     for key, column in names.pairs:
         group = key.rstrip("0123456789")
         j = 0 if key in ticks else int(key[len(group) :]) - 1
@@ -245,6 +267,7 @@ def check(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None, decl
         _position(arrays, place, names, arm)
     if "tau" not in declared:
         _torque(arrays, place, names, arm)
+    _reference(arrays, place, names, arm)
 
 
 def _velocity(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
@@ -265,6 +288,24 @@ def _velocity(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
             raise UnitError(
                 f"is {1 / ratio:.3g} times faster than `{names.q[j]}` moves",
                 remedy=f"velocities look like {group}: add --units dq={group}",
+                file=place,
+                column=name,
+            )
+
+
+def _reference(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
+    """Raise where a reference covers a range that the positions do only in another unit."""
+    if arrays.q_ref is None:
+        return
+    for j, name in enumerate(names.q_ref):
+        low, high = _MILLI_RATIO if _slides(arm, j) else _DEGREE_RATIO
+        wanted, moved = float(np.std(arrays.q_ref[:, j])), float(np.std(arrays.q[:, j]))
+        ratio = wanted / moved if moved > 0 else 0.0
+        if low <= ratio <= high or (ratio > 0 and low <= 1 / ratio <= high):
+            more = f"{ratio:.3g} times farther than" if ratio > 1 else f"{1 / ratio:.3g} times less far than"
+            raise UnitError(
+                f"moves {more} `{names.q[j]}`, which follows it",
+                remedy="bring references and positions to one unit in the file",
                 file=place,
                 column=name,
             )

@@ -96,9 +96,10 @@ def log_facts(log: Log) -> Facts:
     rotary = {"rad": True, "deg": True, "m": False, "mm": False}.get(log.units.get("q1", ""))
     units = si(rotary)
     rows = [("t", log.columns.get("t", ""), f"{figure(log.t[0])} to {figure(log.t[-1], 5)}", units["t"])]
-    for group, values in (("q", log.q), ("tau", log.tau), ("dq", log.dq)):
-        for j in range(0 if values is None else log.n_joints):
-            assert values is not None
+    units |= {"q_ref": units["q"], "dq_ref": units["dq"]}
+    for group in ("q", "tau", "dq", "q_ref", "dq_ref"):
+        values = getattr(log, group)
+        for j in range(0 if values is None else values.shape[1]):
             span = f"{figure(values[:, j].min())} to {figure(values[:, j].max())}"
             rows.append((f"{group}{j + 1}", log.columns.get(f"{group}{j + 1}", ""), span, unit_text(units[group])))
     rate = f", {figure(1 / log.sample_period, 4)} Hz" if len(log) > 1 else ""

@@ -97,7 +97,14 @@ _INERTIAL = {
     },
 }
 #: Terms of a serial arm that are no effects of the library.
-_OF_SERIAL_ARMS = {"nominal_link": "wrong nominal link"}
+_OF_SERIAL_ARMS = {
+    "nominal_link": "wrong nominal link",
+    "controller_gain": "wrong proportional gain of the position controller",
+    "controller_damping": "wrong derivative gain of the position controller",
+    "reference_delay": "late reference",
+    "reference_offset": "offset of the reference",
+    "viscous_friction": "viscous friction other than the arm file's",
+}
 _SYMBOLS = {"q": "position", "dq": "speed", "ddq": "acceleration", "tau": "torque"}
 _SYMBOL = re.compile(r"(q|dq|ddq|tau)[0-9]+")
 _VARIABLES = {"dq": "speed", "reversal": "near a reversal", "q": "position", "tau": "torque", "t": "time"}

@@ -78,6 +78,7 @@ fn stretch<'a>(log: &LogData<'a>, range: std::ops::Range<usize>) -> LogData<'a> 
         q: &log.q[rows.clone()],
         moment: log.moment.map(|moment| &moment[rows.clone()]),
         tau: &log.tau[rows],
+        reference: None,
         tables: log.tables.iter().map(|table| &table[range.clone()]).collect(),
     }
 }
@@ -110,6 +111,7 @@ mod tests {
             t: &t,
             q: &values,
             tau: &values,
+            reference: None,
             moment: None,
             tables: vec![&values[..2000]],
         };

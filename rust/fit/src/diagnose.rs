@@ -25,8 +25,10 @@ pub struct LogData<'a> {
     pub t: &'a [f64],
     /// Positions, one row per sample.
     pub q: &'a [f64],
-    /// Torques, one row per sample, held until the next.
+    /// Torques, one row per sample, held until the next; none of a log that holds references in their place.
     pub tau: &'a [f64],
+    /// Positions that a controller was to reach, one row per sample, held until the next, and velocities where they are logged.
+    pub reference: Option<(&'a [f64], Option<&'a [f64]>)>,
     /// First moment of every torque about the middle of its interval, where it is the mean of several, N m s^2 (N s^2).
     pub moment: Option<&'a [f64]>,
     /// Torque per unit of size of each custom effect, sample by sample.
@@ -94,6 +96,8 @@ pub enum DiagnoseError {
     },
     /// Too many custom effects, one without a table of torques in some log, or on a joint that is not there.
     CustomEffects,
+    /// A log holds no torques, and there is no controller that makes them from its references.
+    NoTorque(String),
     /// The observer cancelled the diagnosis.
     Stopped,
 }
@@ -119,6 +123,12 @@ impl std::fmt::Display for DiagnoseError {
                 "effects of your own do not fit the logs; give at most {}, each on a joint of the arm, with one torque per sample of every log",
                 custom_effect::MOST
             ),
+            Self::NoTorque(name) => {
+                write!(
+                    f,
+                    "log `{name}` holds no torques; give references and the controller that follows them"
+                )
+            }
             Self::Stopped => write!(f, "the diagnosis was stopped"),
         }
     }
@@ -171,6 +181,7 @@ pub(crate) fn validate(
             .chain(log.q)
             .chain(log.tau)
             .chain(log.moment.into_iter().flatten())
+            .chain(log.reference.into_iter().flat_map(|(q, dq)| q.iter().chain(dq.into_iter().flatten())))
             .chain(log.tables.iter().copied().flatten())
             .all(|x| x.is_finite());
         let fits = log.tables.len() == options.custom_effects.len()

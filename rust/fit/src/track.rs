@@ -48,6 +48,8 @@ pub struct Track<const N: usize> {
     pub pushes: Vec<EffectInstance>,
     /// Torque per unit of size of each custom effect, sample by sample.
     pub tables: Vec<Vec<f64>>,
+    /// Reference of a position controller, of a log that holds one in place of torques.
+    pub reference: Option<Reference<N>>,
     /// Acceleration that the torque gives each joint from a sample to the next, `M(q)^-1 tau`; none for a joint whose measured motion is no
     /// smoother without it.
     driven: [Option<Vec<f64>>; N],
@@ -55,6 +57,15 @@ pub struct Track<const N: usize> {
     path: OnceLock<Vec<MeasuredState<N>>>,
     /// Local cubics, once they are asked for.
     smoothed: OnceLock<Vec<[Smoothed; N]>>,
+}
+
+/// The reference of a position controller, row by row, held until the next sample.
+#[derive(Debug, Clone)]
+pub struct Reference<const N: usize> {
+    /// Positions.
+    pub q: Vec<[f64; N]>,
+    /// Velocities, where they are logged.
+    pub dq: Option<Vec<[f64; N]>>,
 }
 
 /// A local cubic as wide as the motion around its sample allows.
@@ -97,6 +108,7 @@ impl<const N: usize> Track<N> {
             step: [0.0; N],
             pushes: Vec::new(),
             tables: Vec::new(),
+            reference: None,
             driven: std::array::from_fn(|_| None),
             path: OnceLock::new(),
             smoothed: OnceLock::new(),

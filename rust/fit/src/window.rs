@@ -18,7 +18,7 @@ use nalgebra::SVector;
 use rayon::prelude::*;
 
 /// A prediction that left this range [rad or m] has diverged; it is kept there so that its cost stays finite.
-const DIVERGED: f64 = 1e3;
+pub(crate) const DIVERGED: f64 = 1e3;
 
 /// Sub-steps per sample are capped here; what is too stiff for them is refused by its cost.
 const MAX_SUBSTEPS: usize = 4;

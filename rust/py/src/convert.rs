@@ -8,6 +8,7 @@ use armgap_fit::arm::ArmDescription;
 use armgap_fit::chain::ChainDescription;
 use armgap_fit::model::EffectInstance;
 use armgap_fit::serial::SerialArm;
+use armgap_fit::serial::controller::{JointController, PositionController};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -265,5 +266,41 @@ pub fn serial_arm(arm: &Bound<'_, PyDict>) -> PyResult<SerialArm> {
     };
     let steps = counts.map(|counts| joints.iter().zip(&counts).map(step).collect());
     let chain = ChainDescription { joints, gravity: needed(&chain, "gravity")? };
-    Ok(SerialArm { chain, theta, sigma, steps })
+    let controller = get::<Bound<'_, PyDict>>(arm, "controller")?;
+    let limits: Option<Vec<f64>> = get(arm, "torque_limit")?;
+    let controller = controller.map(|table| position_controller(&table, limits, n)).transpose()?;
+    Ok(SerialArm { chain, theta, sigma, steps, controller })
+}
+
+/// The position controller of `n` joints; lists that are not given are without effect.
+fn position_controller(
+    table: &Bound<'_, PyDict>,
+    limits: Option<Vec<f64>>,
+    n: usize,
+) -> PyResult<PositionController> {
+    let of = |given: Option<Vec<f64>>, key: &str, without: f64| match given {
+        Some(values) if values.len() != n => {
+            Err(PyValueError::new_err(format!("arm: `{key}` needs {n} values")))
+        }
+        values => Ok(values.unwrap_or_else(|| vec![without; n])),
+    };
+    let list = |key: &str, without: f64| of(get(table, key)?, key, without);
+    let [kp, kd, ki] = [list("kp", 0.0)?, list("kd", 0.0)?, list("ki", 0.0)?];
+    let (delay, deadband) = (list("delay", 0.0)?, list("deadband", 0.0)?);
+    let speed_limit = list("speed_limit", f64::INFINITY)?;
+    let torque_limit = of(limits, "torque_limit", f64::INFINITY)?;
+    let rate_of_error: bool = needed(table, "rate_of_error")?;
+    let joint = |j: usize| JointController {
+        gains: [kp[j], kd[j], ki[j]],
+        rate_of_error,
+        reference_delay: 0.0,
+        delay: delay[j],
+        deadband: deadband[j],
+        speed_limit: speed_limit[j],
+        torque_limit: torque_limit[j],
+    };
+    Ok(PositionController {
+        joints: (0..n).map(joint).collect(),
+        sigma: [list("sigma_kp", 0.0)?, list("sigma_kd", 0.0)?, list("sigma_ki", 0.0)?],
+    })
 }

@@ -11,7 +11,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Name, times, positions, torques, the torques of the custom effects, and first moments of torques that are means.
+/// Positions of a reference, and velocities where they are logged.
+type PyReference<'py> = (PyReadonlyArray2<'py, f64>, Option<PyReadonlyArray2<'py, f64>>);
+
+/// Name, times, positions, torques, the torques of the custom effects, first moments of torques that are means, and the reference of a log that holds
+/// one in place of torques.
 type PyLog<'py> = (
     String,
     PyReadonlyArray1<'py, f64>,
@@ -19,6 +23,7 @@ type PyLog<'py> = (
     PyReadonlyArray2<'py, f64>,
     Vec<PyReadonlyArray1<'py, f64>>,
     Option<PyReadonlyArray2<'py, f64>>,
+    Option<PyReference<'py>>,
 );
 
 /// A log's own copy of its numbers, for a thread that may outlive the caller.
@@ -29,6 +34,7 @@ struct Owned {
     tau: Vec<f64>,
     tables: Vec<Vec<f64>>,
     moment: Option<Vec<f64>>,
+    reference: Option<(Vec<f64>, Option<Vec<f64>>)>,
 }
 
 /// The arm's parameters estimated again without any effect: `theta`, `sigma`, and per joint the RMS errors `before` and `refit` and
@@ -129,17 +135,22 @@ impl AnyArm {
 }
 
 fn copy(log: &PyLog<'_>, n: usize) -> PyResult<Owned> {
-    let (name, t, q, tau, tables, moment) = log;
+    let (name, t, q, tau, tables, moment, reference) = log;
     let t = vector(t, "t")?;
+    let rows =
+        |x: &PyReadonlyArray2<'_, f64>, name: &str| Ok::<_, PyErr>(matrix(x, name, t.len(), n)?.to_vec());
     Ok(Owned {
         name: name.clone(),
         t: t.to_vec(),
-        q: matrix(q, "q", t.len(), n)?.to_vec(),
-        tau: matrix(tau, "tau", t.len(), n)?.to_vec(),
+        q: rows(q, "q")?,
+        tau: if reference.is_some() { Vec::new() } else { rows(tau, "tau")? },
         tables: tables.iter().map(|x| Ok(vector(x, "effects")?.to_vec())).collect::<PyResult<_>>()?,
-        moment: moment
+        moment: moment.as_ref().map(|x| rows(x, "moment")).transpose()?,
+        reference: reference
             .as_ref()
-            .map(|x| Ok::<_, PyErr>(matrix(x, "moment", t.len(), n)?.to_vec()))
+            .map(|(q, dq)| {
+                Ok::<_, PyErr>((rows(q, "q_ref")?, dq.as_ref().map(|dq| rows(dq, "dq_ref")).transpose()?))
+            })
             .transpose()?,
     })
 }
@@ -150,6 +161,7 @@ fn views<'a>(logs: &'a [Owned]) -> Vec<LogData<'a>> {
         t: &log.t,
         q: &log.q,
         tau: &log.tau,
+        reference: log.reference.as_ref().map(|(q, dq)| (q.as_slice(), dq.as_deref())),
         moment: log.moment.as_deref(),
         tables: log.tables.iter().map(Vec::as_slice).collect(),
     };

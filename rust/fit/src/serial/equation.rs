@@ -1,5 +1,6 @@
 //! The weak equation of motion of an arm along its logs, and the torque of any term along the same motion.
 
+use super::commanded::Commanded;
 use super::intervals::{Intervals, Middle, TestFunction};
 use super::predict::turned;
 use super::rows::{JointRows, Rows, Signal};
@@ -35,18 +36,20 @@ pub struct Equation<const N: usize, const P: usize> {
     pub arm: Chain<f64, N>,
     /// Rows.
     pub rows: Rows,
-    logs: Vec<Intervals<N>>,
+    pub(super) logs: Vec<Intervals<N>>,
     times: Vec<Vec<f64>>,
     held: Vec<Vec<[InputSegment<f64>; N]>>,
-    functions: Vec<TestFunction>,
+    pub(super) functions: Vec<TestFunction>,
     /// Test functions of each joint's rows.
-    kept: Vec<Vec<usize>>,
+    pub(super) kept: Vec<Vec<usize>>,
     /// Torques of transmissions.
     pub(super) computed: Computed<P>,
+    /// The position controllers behind the torques, of logs that hold references in their place.
+    pub(super) commanded: Option<Commanded<N>>,
 }
 
 /// Torques per interval of every log on the joints that a term acts on.
-type Torques<const N: usize> = [Option<Vec<Vec<f64>>>; N];
+pub(super) type Torques<const N: usize> = [Option<Vec<Vec<f64>>>; N];
 
 impl<const N: usize, const P: usize> Equation<N, P> {
     /// The equation along these logs, weighed by test functions of this half width, s; `theta` are nominal values.
@@ -63,6 +66,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             functions,
             kept: Vec::new(),
             computed: Computed::default(),
+            commanded: None,
         };
         equation.kept = (0..N).map(|j| equation.moving(j)).collect();
         equation.rows = equation.all_rows(theta);
@@ -148,14 +152,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     /// Standard deviation that noisy positions put into a row, through the momentum.
     fn floor(&self, phi: &TestFunction, inertia: &[f64; N]) -> f64 {
         let log = &self.logs[phi.log];
-        let mut before = 0.0;
-        let mut square = 0.0;
-        for k in phi.reach() {
-            let slope = phi.rise(&log.middles[k]) / log.middles[k].h;
-            square += (slope - before).powi(2);
-            before = slope;
-        }
-        square += before * before;
+        let factors = phi.on_positions(&log.middles, [1.0, 0.0, 0.0]);
+        let square: f64 = factors.iter().map(|factor| factor.powi(2)).sum();
         let variance: f64 = (0..N).map(|k| (inertia[k] * log.noise[k]).powi(2)).sum();
         (variance * square).sqrt()
     }
@@ -171,14 +169,17 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             };
             phi.reach().map(at).sum()
         };
-        self.kept[j].iter().map(row).collect()
+        let mut change: Vec<f64> = self.kept[j].iter().map(row).collect();
+        self.centre(j, &mut change);
+        change
     }
 
     /// Regularises the Coulomb friction of every joint over a width; zero leaves it dry.
     pub fn regularise(&mut self, widths: &[f64]) {
         for (j, width) in widths.iter().enumerate().filter(|(_, width)| **width > 0.0) {
             let change = self.regularised(j, *width);
-            for (psi, change) in self.rows.joints[j].psi.chunks_exact_mut(P).zip(change) {
+            let columns = self.rows.parameters;
+            for (psi, change) in self.rows.joints[j].psi.chunks_exact_mut(columns).zip(change) {
                 psi[P - N + j] += change;
             }
         }
@@ -186,6 +187,17 @@ impl<const N: usize, const P: usize> Equation<N, P> {
 
     /// The torque of a term that the arm needs on top of its own, row by row: what it would take from the left-hand side.
     pub fn signal(&self, term: &Term, theta: &[f64; P]) -> Signal {
+        let mut signal = self.signal_with_mean(term, theta);
+        for (j, values) in signal.iter_mut().enumerate() {
+            if let Some(values) = values {
+                self.centre(j, values);
+            }
+        }
+        signal
+    }
+
+    /// The same before the mean over each log is left out of joints with an integral controller.
+    pub(super) fn signal_with_mean(&self, term: &Term, theta: &[f64; P]) -> Signal {
         match term.kind {
             TermKind::Law(_) => match term.effect() {
                 Some(effect) if effect.law.spec().hooks.measured => self.displaced(&effect, theta),
@@ -196,6 +208,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             TermKind::NominalLink(link) => self.of_link(link, &std::array::from_fn(|i| term.p[i])),
             TermKind::BaseTilt => self.of_tilt(&term.p, theta),
             TermKind::Transmission(law) => self.of_transmission(&law, term.p[0], theta),
+            TermKind::Controller(setting) => self.of_controller(setting, term.p[0]),
         }
     }
 
@@ -204,14 +217,14 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         let joint = |(j, rows): (usize, &JointRows)| {
             (j <= link).then(|| {
                 let along = |psi: &[f64]| psi[10 * link..][..10].iter().zip(change).map(|(a, b)| a * b).sum();
-                rows.psi.chunks_exact(P).map(along).collect()
+                rows.psi.chunks_exact(self.rows.parameters).map(along).collect()
             })
         };
         self.rows.joints.iter().enumerate().map(joint).collect()
     }
 
     /// Averages of torques per interval over the test functions of each joint's rows.
-    fn weak(&self, torques: &Torques<N>) -> Signal {
+    pub(super) fn weak(&self, torques: &Torques<N>) -> Signal {
         let joint = |j: usize| {
             torques[j].as_ref().map(|torque| {
                 let row = |i: &usize| {

@@ -114,8 +114,16 @@ impl Search<'_> {
     /// all parameters, makes what stays of them smaller too, and explains nothing by that.
     pub(super) fn scales(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Vec<f64> {
         let mut scales = vec![1.0; self.rotary.len()];
-        let changing: Vec<Signal> =
-            terms.iter().filter(|t| t.changes_command()).map(|t| motion.signal(t, theta)).collect();
+        let taken = |term: &Term| match (term.share_of_command(), term.joint()) {
+            (Some(share), Some(joint)) => {
+                let y = &motion.rows().joints[joint - 1].y;
+                let mut taken: Signal = vec![None; self.rotary.len()];
+                taken[joint - 1] = Some(y.iter().map(|y| (1.0 - share) * y).collect());
+                taken
+            }
+            _ => motion.signal(term, theta),
+        };
+        let changing: Vec<Signal> = terms.iter().filter(|t| t.changes_command()).map(taken).collect();
         if changing.is_empty() {
             return scales;
         }

@@ -156,6 +156,24 @@ impl TestFunction {
         self.value(m.t + 0.5 * m.h) - self.value(m.t - 0.5 * m.h)
     }
 
+    /// Factors on the positions, sample by sample from that before the first interval on, of a row that takes `momentum` times the mean velocity
+    /// into its momentum, and takes from the torque `stiffness` times the position and `damping` times the velocity.
+    pub fn on_positions<const N: usize>(
+        &self,
+        middles: &[Middle<N>],
+        [momentum, stiffness, damping]: [f64; 3],
+    ) -> Vec<f64> {
+        let mut factors = vec![0.0; self.last - self.first + 1];
+        for k in self.reach() {
+            let (m, at) = (&middles[k], k - self.first);
+            let (weight, rise) = (self.weight(m), self.rise(m));
+            let slope = (damping * weight - momentum * rise) / m.h;
+            factors[at] += 0.5 * stiffness * weight - slope;
+            factors[at + 1] += 0.5 * stiffness * weight + slope;
+        }
+        factors
+    }
+
     fn value(&self, t: f64) -> f64 {
         let x = ((t - self.centre) / self.half).clamp(-1.0, 1.0);
         0.5 * (1.0 + (PI * x).cos()) / self.half

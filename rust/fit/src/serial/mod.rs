@@ -6,7 +6,12 @@
 //! how far the gap shrinks. The way of the data is `intervals` (log) -> `equation` (rows, torques of terms) -> `rows` (regression) ->
 //! `search` (which terms) -> `predict` (gap) -> `result`.
 
+mod closed_loop;
+mod commanded;
 mod constants;
+pub mod controller;
+mod controller_report;
+mod controller_term;
 mod equation;
 mod evidence;
 mod fitting;
@@ -27,10 +32,12 @@ use crate::progress::{Observer, ProgressReporter, guarded};
 use crate::report::Diagnosis;
 use crate::scale::Scales;
 use crate::screen::effect_instances;
-use crate::track::Track;
+use crate::track::{Reference, Track};
 use crate::window::Dataset;
 use armgap_core::chain::{Chain, ChainJoint, JointKind, PARAMETERS_PER_JOINT};
 use armgap_core::effect::{Quantity, Scope, Trial};
+use controller::PositionController;
+use controller_term::{ControllerTerm, Setting};
 use equation::Equation;
 use intervals::HALF_WIDTH_S;
 use rows::{Prior, Rows, Signal};
@@ -50,6 +57,8 @@ pub struct SerialArm {
     pub sigma: Vec<f64>,
     /// Smallest step of each position measurement.
     pub steps: Option<Vec<f64>>,
+    /// Position controller, behind logs that hold references in place of torques.
+    pub controller: Option<PositionController>,
 }
 
 impl SerialArm {
@@ -139,25 +148,28 @@ impl Request<'_> {
         let progress = ProgressReporter::new(Observer::clone(self.observer));
         let mut training = self.set::<N, P>("training", self.training, &arm, &theta)?;
         let mut holdout = self.set::<N, P>("holdout", self.holdout, &arm, &theta)?;
-        let prior = Prior {
-            theta: theta.to_vec(),
-            sigma: self.arm.sigma.clone(),
-            positive: (0..P).map(|i| i >= 10 * N).collect(),
-        };
+        let controller = training.equation.commanded.as_ref().map(|commanded| commanded.controller.clone());
+        let prior = self.prior(&theta, controller.as_ref());
         let widths = {
             let equation = &training.equation;
-            regularisation::widths(&equation.rows, &prior, |j, width| equation.regularised(j, width))
+            regularisation::widths(&equation.rows, &prior, P - N, |j, width| equation.regularised(j, width))
         };
         training.equation.regularise(&widths);
         holdout.equation.regularise(&widths);
         let least = constants::CONDITIONED * training.equation.conditioning(&theta).max(0.0);
         let is_feasible =
             |values: &[f64]| training.equation.conditioning(&std::array::from_fn(|i| values[i])) > least;
+        let mut candidates = candidates(&arm, &theta, &training.data.tracks, self.options.known_units);
+        if let Some(controller) = &controller {
+            let inertia = training.equation.mean_inertia(&theta);
+            let period = training.data.tracks.first().map_or(0.0, Track::period);
+            candidates.extend(controller_settings(controller, &inertia, period));
+        }
         let search = Search {
             training: &training.equation,
             holdout: &holdout.equation,
             prior: &prior,
-            candidates: candidates(&arm, &theta, &training.data.tracks, self.options.known_units),
+            candidates,
             rotary: self.arm.rotary(),
             period: training.data.tracks.first().map_or(0.0, Track::period),
             is_feasible: &is_feasible,
@@ -171,6 +183,19 @@ impl Request<'_> {
         Ok(diagnosis)
     }
 
+    /// Prior of the arm's parameters and of the controller's gains that are estimated, as differences from the arm file.
+    fn prior<const P: usize>(&self, theta: &[f64; P], controller: Option<&PositionController>) -> Prior {
+        let gains: Vec<f64> = controller.map_or_else(Vec::new, |controller| {
+            controller.estimated().into_iter().map(|(gain, j)| controller.sigma[gain][j]).collect()
+        });
+        let joints = self.arm.chain.joints.len();
+        Prior {
+            theta: theta.iter().copied().chain(gains.iter().map(|_| 0.0)).collect(),
+            sigma: self.arm.sigma.iter().chain(&gains).copied().collect(),
+            positive: (0..P + gains.len()).map(|i| (10 * joints..P).contains(&i)).collect(),
+        }
+    }
+
     fn set<const N: usize, const P: usize>(
         &self,
         set: &'static str,
@@ -179,16 +204,38 @@ impl Request<'_> {
         theta: &[f64; P],
     ) -> Result<Set<N, P>, DiagnoseError> {
         let steps = self.arm.steps.as_ref().map(|steps| std::array::from_fn(|j| steps[j]));
-        let track =
-            |log: &LogData<'_>| Track::new(&log.name, log.t, log.q, log.tau, steps).with_moments(log.moment);
-        let tracks: Vec<Track<N>> = logs.iter().map(track).collect();
-        let equation = Equation::new(*arm, theta, &tracks, self.options.half_width.unwrap_or(HALF_WIDTH_S));
+        let track = |log: &LogData<'_>| -> Result<Track<N>, DiagnoseError> {
+            let mut track = Track::new(&log.name, log.t, log.q, log.tau, steps).with_moments(log.moment);
+            let Some((q, dq)) = log.reference else { return Ok(track) };
+            let rows = |x: &[f64]| -> Vec<[f64; N]> { x.as_chunks().0.to_vec() };
+            track.reference = Some(Reference { q: rows(q), dq: dq.map(rows) });
+            let made = self.arm.controller.as_ref().and_then(|c| commanded::torques(c, &track));
+            track.held = made.ok_or_else(|| DiagnoseError::NoTorque(log.name.clone()))?;
+            Ok(track)
+        };
+        let tracks: Vec<Track<N>> = logs.iter().map(track).collect::<Result<_, _>>()?;
+        let mut equation =
+            Equation::new(*arm, theta, &tracks, self.options.half_width.unwrap_or(HALF_WIDTH_S));
+        if let Some(controller) = &self.arm.controller {
+            equation = equation.behind(controller, &tracks);
+        }
         let data = Dataset::new(tracks, self.options.horizon);
         if data.windows.len() < FEWEST_WINDOWS {
             return Err(DiagnoseError::TooShort { set, windows: data.windows.len(), needed: FEWEST_WINDOWS });
         }
         Ok(Set { equation, data })
     }
+}
+
+/// Settings of the controllers that may differ from the arm file's, at their initial guesses, grouped by place.
+fn controller_settings(controller: &PositionController, inertia: &[f64], period: f64) -> Vec<Vec<Term>> {
+    let group = |setting: Setting, joint: usize| {
+        let guesses = setting.guesses(&controller.joints[joint], inertia[joint], period);
+        let kind = TermKind::Controller(ControllerTerm { setting, joint });
+        guesses.into_iter().map(|value| Term { kind, p: vec![value], degrees: 1.0 }).collect()
+    };
+    let all = Setting::ALL.into_iter().flat_map(|s| (0..controller.joints.len()).map(move |j| (s, j)));
+    all.map(|(setting, joint)| group(setting, joint)).collect()
 }
 
 /// Half cycles of a ripple over a joint's travel, at most.

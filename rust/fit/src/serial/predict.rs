@@ -1,5 +1,6 @@
 //! Predictions of a serial arm with terms, over short windows and over whole logs.
 
+use super::closed_loop::ClosedLoop;
 use super::term::{Term, TermKind, of_load};
 use crate::model::Hypothesis;
 use crate::window::{Dataset, Window};
@@ -11,12 +12,13 @@ use nalgebra::SVector;
 pub struct Model<const N: usize, const P: usize> {
     arm: Chain<f64, N>,
     hypothesis: Hypothesis<P>,
+    closed_loop: Option<ClosedLoop<N>>,
 }
 
 impl<const N: usize, const P: usize> Model<N, P> {
     /// The arm with these parameters and terms.
     pub fn new(arm: &Chain<f64, N>, theta: [f64; P], terms: &[Term]) -> Self {
-        let mut model = Self { arm: *arm, hypothesis: Hypothesis::rigid(theta) };
+        let mut model = Self { arm: *arm, hypothesis: Hypothesis::rigid(theta), closed_loop: None };
         for term in terms {
             match term.kind {
                 TermKind::Law(_) => model.hypothesis.effects.extend(term.effect()),
@@ -30,9 +32,16 @@ impl<const N: usize, const P: usize> Model<N, P> {
                     model.hypothesis.effects.push(effect);
                 }
                 TermKind::BaseTilt => model.arm = turned(&model.arm, [term.p[0], term.p[1]]),
+                // A part of the closed loop.
+                TermKind::Controller(_) => {}
             }
         }
         model
+    }
+
+    /// The model with position controllers in place of logged torques.
+    pub fn behind(self, closed_loop: Option<ClosedLoop<N>>) -> Self {
+        Self { closed_loop, ..self }
     }
 
     fn add(&mut self, link: usize, change: &[f64; 10]) {
@@ -43,7 +52,10 @@ impl<const N: usize, const P: usize> Model<N, P> {
 
     /// Predicted positions of all windows.
     pub fn predict(&self, data: &Dataset<N>) -> Vec<f64> {
-        data.predict_singly(&self.arm, &self.hypothesis)
+        match &self.closed_loop {
+            Some(closed_loop) => closed_loop.predict(data, &self.arm, &self.hypothesis),
+            None => data.predict_singly(&self.arm, &self.hypothesis),
+        }
     }
 }
 

@@ -9,13 +9,19 @@ use super::rows::{Prior, Regression, Rows};
 /// Widths that are tried, rad/s (m/s).
 const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
 
-/// The width of every joint, zero for dry friction; `change(j, width)` is what a width changes in the sign's column of joint `j`'s rows.
-pub fn widths(rows: &Rows, prior: &Prior, change: impl Fn(usize, f64) -> Vec<f64>) -> Vec<f64> {
+/// The width of every joint, zero for dry friction; `coulomb` is the first Coulomb coefficient among the parameters, `change(j, width)` what a width
+/// changes in the sign's column of joint `j`'s rows.
+pub fn widths(
+    rows: &Rows,
+    prior: &Prior,
+    coulomb: usize,
+    change: impl Fn(usize, f64) -> Vec<f64>,
+) -> Vec<f64> {
     let joints = rows.joints.len();
     let none = vec![None; joints];
     let regression = Regression::reweighted(rows, prior, &none);
     let dry = regression.estimate(&none);
-    let level = |j: usize| dry.theta[rows.parameters - joints + j];
+    let level = |j: usize| dry.theta[coulomb + j];
     let cost = |j: usize, width: f64| {
         let mut beside = none.clone();
         beside[j] = Some(change(j, width).iter().map(|c| level(j) * c).collect());

@@ -1,6 +1,9 @@
 //! From the end of a search to the diagnosis as data.
 
+use super::closed_loop::ClosedLoop;
 use super::constants::{CONSEQUENCE, NAMED, NOTICED, SIGNIFICANT};
+use super::controller::PositionController;
+use super::controller_report::{behind_controller, gains_note, with_settings};
 use super::fitting::Fitted;
 use super::predict::{Model, floor};
 use super::search::{Found, Tested};
@@ -54,20 +57,15 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
 ) -> Diagnosis {
     progress.begin(Phase::Result, 6);
     let rotary = description.rotary();
-    let causes: Vec<Cause> = found.named.iter().map(|n| cause(n, &rotary)).collect();
+    let commanded = holdout.equation.commanded.as_ref().map(|commanded| &commanded.controller);
+    let causes: Vec<Cause> = found.named.iter().map(|n| cause(n, &rotary, commanded)).collect();
     let (named, unnamed): (Vec<Cause>, Vec<Cause>) = causes.into_iter().partition(|c| c.probability >= NAMED);
     let why = |c: Cause| Candidate {
         why: format!("its probability is {:.2}; from {NAMED} on a cause is named", c.probability),
         cause: c,
     };
-    let fitted = |set: &Fitted| -> [f64; P] { std::array::from_fn(|i| set.estimate.theta[i]) };
-    let nominal: [f64; P] = std::array::from_fn(|i| description.theta[i]);
     let reported = &found.reported;
-    let models: [Model<N, P>; 3] = [
-        Model::new(arm, nominal, &[]),
-        Model::new(arm, fitted(&found.refit_feasible), &[]),
-        Model::new(arm, fitted(reported), &reported.terms),
-    ];
+    let models = models(description, arm, holdout, found);
     let noise: [f64; N] = std::array::from_fn(|j| {
         crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
     });
@@ -154,11 +152,11 @@ fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
     parameters.iter().enumerate().map(value).collect()
 }
 
-fn cause(named: &super::search::Named, rotary: &[bool]) -> Cause {
+fn cause(named: &super::search::Named, rotary: &[bool], controller: Option<&PositionController>) -> Cause {
     let term = &named.term;
     let alike =
         |t: &Term| EquivalentSummary { effect: t.name(), joint: t.joint(), why: LOOK_ALIKE.to_owned() };
-    Cause {
+    let mut cause = Cause {
         effect: term.name(),
         title: term.title(),
         joint: term.joint(),
@@ -169,7 +167,31 @@ fn cause(named: &super::search::Named, rotary: &[bool]) -> Cause {
         evidence: None,
         sides: None,
         log: None,
-    }
+    };
+    let behind = controller.and_then(|controller| behind_controller(&cause, controller));
+    cause.equivalents.extend(behind);
+    cause
+}
+
+/// The arm as the arm file has it, with its parameters estimated again, and with the named terms; behind the position controllers of the holdout.
+fn models<const N: usize, const P: usize>(
+    description: &SerialArm,
+    arm: &Chain<f64, N>,
+    holdout: &Set<N, P>,
+    found: &Found,
+) -> [Model<N, P>; 3] {
+    let equation = &holdout.equation;
+    let of = |theta: &[f64], terms: &[Term]| {
+        let closed_loop = equation.commanded.as_ref().map(|commanded| ClosedLoop {
+            joints: with_settings(commanded.controller.with_differences(&theta[P..]), terms),
+            held_before: equation.held_before(theta, terms),
+        });
+        Model::new(arm, std::array::from_fn(|i| theta[i]), terms).behind(closed_loop)
+    };
+    let mut nominal = description.theta.clone();
+    nominal.resize(equation.rows.parameters, 0.0);
+    let (refit, reported) = (&found.refit_feasible.estimate.theta, &found.reported);
+    [of(&nominal, &[]), of(refit, &[]), of(&reported.estimate.theta, &reported.terms)]
 }
 
 /// Share of each joint in the torque that the re-estimated arm leaves unexplained, in units of the joint's own torque.
@@ -445,5 +467,8 @@ fn notes<const N: usize, const P: usize>(
             still.join(", ")
         ));
     }
+    let controller = holdout.equation.commanded.as_ref().map(|commanded| &commanded.controller);
+    let gains = |c| gains_note(c, &found.reported.estimate.theta[P..], &found.sigma[1][P..]);
+    notes.extend(controller.and_then(gains));
     notes
 }

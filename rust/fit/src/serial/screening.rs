@@ -51,7 +51,7 @@ impl Search<'_> {
         let link = match term.kind {
             TermKind::NominalLink(link) => link,
             TermKind::Payload => self.rotary.len() - 1,
-            TermKind::Law(_) | TermKind::BaseTilt | TermKind::Transmission(_) => return term.degrees,
+            _ => return term.degrees,
         };
         let sigma = &self.prior.sigma[10 * link..][..columns.len()];
         let ridge: Vec<f64> =
@@ -85,10 +85,13 @@ impl Search<'_> {
             }
             return within(&p).then(|| (term.with(p), score.gain));
         }
-        let TermKind::Law(effect) = term.kind else { return None };
+        let trial = match term.kind {
+            TermKind::Law(effect) => effect.law.spec().trial,
+            _ => Trial::Amplitudes(1),
+        };
         let size = score.size[0];
         let information = score.gain / (size * size).max(f64::MIN_POSITIVE);
-        let (p, size) = match effect.law.spec().trial {
+        let (p, size) = match trial {
             // A threshold has no small version of itself.
             Trial::Whole => (term.p.clone(), 1.0),
             Trial::Ray => {
@@ -106,8 +109,9 @@ impl Search<'_> {
         };
         let mut gain = (2.0 * score.size[0] - size) * size * information;
         let term = term.with(p);
-        if term.changes_command() {
-            let j = effect.joint;
+        if term.changes_command()
+            && let Some(j) = term.joint().map(|j| j - 1)
+        {
             let before = regression.weights[j] * at.residual[j].iter().map(|r| r * r).sum::<f64>();
             gain = before
                 - (before - gain) * self.scales(self.training, std::slice::from_ref(&term), &at.theta)[j];

@@ -7,6 +7,7 @@ use super::rows::{JointRows, Prior, Regression, Rows, Signal};
 use super::screening::Guess;
 use super::term::Term;
 use crate::progress::{Phase, ProgressReporter};
+use armgap_core::chain::LINK_PARAMETERS;
 use rayon::prelude::*;
 
 /// Rows of an arm along some logs, and the torques of terms along them.
@@ -232,7 +233,7 @@ impl Search<'_> {
         if (self.is_feasible)(&model.estimate.theta) {
             return model;
         }
-        let links = model.estimate.theta.len() - 3 * self.rotary.len();
+        let links = LINK_PARAMETERS * self.rotary.len();
         let mut prior = self.prior.clone();
         for part in [0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0] {
             for i in 0..links {

@@ -1,5 +1,6 @@
 //! Terms that a serial arm's model may lack: the library's laws joint by joint, and what changes the arm itself.
 
+use super::controller_term::{ControllerTerm, Setting};
 use super::transmission::TransmissionLaw;
 use crate::model::EffectInstance;
 use armgap_core::chain::LINK_NAMES;
@@ -29,6 +30,8 @@ pub enum TermKind {
     NominalLink(usize),
     /// A shaft that twists, or backlash: its compliance or its gap.
     Transmission(TransmissionLaw),
+    /// A setting of a position controller.
+    Controller(ControllerTerm),
 }
 
 /// Name and unit of one parameter.
@@ -64,6 +67,7 @@ impl Term {
             TermKind::BaseTilt => TURN.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
             TermKind::Transmission(_) => 1,
+            TermKind::Controller(_) => 1,
         };
         Self { kind, p: vec![0.0; count], degrees: count as f64 }
     }
@@ -76,6 +80,7 @@ impl Term {
             TermKind::BaseTilt => "base_tilt",
             TermKind::NominalLink(_) => "nominal_link",
             TermKind::Transmission(law) => law.name(),
+            TermKind::Controller(of) => of.setting.name(),
         }
     }
 
@@ -87,6 +92,7 @@ impl Term {
             TermKind::BaseTilt => "base not level",
             TermKind::NominalLink(_) => "wrong nominal link",
             TermKind::Transmission(law) => law.title(),
+            TermKind::Controller(of) => of.setting.title(),
         }
     }
 
@@ -96,6 +102,7 @@ impl Term {
             TermKind::Law(effect) => effect.joint_number(),
             TermKind::NominalLink(link) => Some(link + 1),
             TermKind::Transmission(law) => Some(law.joint + 1),
+            TermKind::Controller(of) => Some(of.joint + 1),
             TermKind::Payload | TermKind::BaseTilt => None,
         }
     }
@@ -146,6 +153,7 @@ impl Term {
             TermKind::BaseTilt => TURN.iter().map(free).collect(),
             TermKind::NominalLink(_) => LINK_NAMES.iter().map(free).collect(),
             TermKind::Transmission(law) => vec![law.parameter(rotary)],
+            TermKind::Controller(of) => vec![of.setting.parameter(rotary)],
         }
     }
 
@@ -162,7 +170,7 @@ impl Term {
                     _ => 0,
                 }
             }
-            TermKind::Payload => 0,
+            TermKind::Payload | TermKind::Controller(_) => 0,
             TermKind::BaseTilt => TURN.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
             TermKind::Transmission(_) => 1,
@@ -173,15 +181,20 @@ impl Term {
     pub fn is_of_a_joint(&self) -> bool {
         match self.kind {
             TermKind::Law(effect) => effect.law.spec().scope == Scope::Joint,
-            TermKind::Transmission(_) => true,
+            TermKind::Transmission(_) | TermKind::Controller(_) => true,
             TermKind::Payload | TermKind::BaseTilt | TermKind::NominalLink(_) => false,
         }
     }
 
     /// Whether it changes the torque that a command becomes at the joint: of the command itself, or by a torque that depends on it.
     pub fn changes_command(&self) -> bool {
-        let TermKind::Law(effect) = self.kind else { return false };
+        let TermKind::Law(effect) = self.kind else { return self.share_of_command().is_some() };
         effect.law.spec().hooks.command || depends(&effect, |x, value| x.tau = value)
+    }
+
+    /// Factor that a controller's proportional gain puts on its torque; its derivative part is as good as viscous friction, which no factor tells of.
+    pub fn share_of_command(&self) -> Option<f64> {
+        matches!(self.kind, TermKind::Controller(of) if of.setting == Setting::Gain).then(|| self.p[0])
     }
 
     /// Whether it is a factor on the command.
@@ -193,7 +206,9 @@ impl Term {
 
     /// Whether it delays the command: a time is all that it has.
     pub fn is_delay(&self) -> bool {
-        let TermKind::Law(effect) = self.kind else { return false };
+        let TermKind::Law(effect) = self.kind else {
+            return matches!(self.kind, TermKind::Controller(of) if of.setting == Setting::ReferenceDelay);
+        };
         let spec = effect.law.spec();
         spec.hooks.command && spec.parameters.iter().all(|p| p.quantity == Quantity::Time)
     }

@@ -1,0 +1,346 @@
+//! Predictions of an arm behind position controllers: they act on the predicted motion, under the logged reference.
+//!
+//! Within a sample interval the controllers run at a period of a millisecond or less and hold their torque over it, that of the state expected in its
+//! middle: a torque of the state at its start would be late by half a period, which at a stiff gain is a force along the velocity. Effects that change what a
+//! command becomes are given the torques of the last periods, before a window's start those along the measured path.
+
+use super::controller::{Given, JointController};
+use crate::model::{EffectInstance, Hypothesis};
+use crate::window::{DIVERGED, Dataset, Window};
+use armgap_core::arm::Arm;
+use armgap_core::effect::{InputSegment, Quantity, find};
+use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::plant::Plant;
+use armgap_core::transmission::Sides;
+use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
+
+/// Longest period of a controller, s.
+const PERIOD: f64 = 1e-3;
+
+/// Part of the controller's own time constant that a period may take.
+const RESOLVED: f64 = 0.2;
+
+/// Periods in a sample interval at most.
+const MOST_PERIODS: usize = 100;
+
+/// Part of a period by which an interval may be longer than a whole number of them: times are rounded.
+const ROUNDING: f64 = 1e-6;
+
+/// Time constants of a lag after which it has forgotten.
+const FORGOTTEN: f64 = 8.0;
+
+/// Position controllers in closed loop with an arm.
+#[derive(Debug, Clone)]
+pub struct ClosedLoop<const N: usize> {
+    /// The controllers.
+    pub joints: Vec<JointController>,
+    /// Torque that the integral part of each held when a log began, log by log.
+    pub held_before: Vec<[f64; N]>,
+}
+
+/// One joint's controller along a log.
+struct Servo {
+    controller: JointController,
+    reference: Vec<InputSegment<f64>>,
+    rate: Vec<InputSegment<f64>>,
+    integral: Vec<InputSegment<f64>>,
+    /// Prompt torque along the measured path.
+    measured: Vec<InputSegment<f64>>,
+    /// Laws that the command passes, the controller's own delay first.
+    laws: Vec<EffectInstance>,
+    /// Time for which they remember it, s.
+    memory: f64,
+}
+
+/// Torques of the last periods of one joint, each with the time it began at.
+#[derive(Default)]
+struct Past {
+    t: Vec<f64>,
+    torque: Vec<InputSegment<f64>>,
+}
+
+impl Servo {
+    fn new(
+        controller: JointController,
+        given: &Given,
+        held_before: f64,
+        effects: &[EffectInstance],
+        j: usize,
+    ) -> Self {
+        let mut errors = controller.errors(given);
+        if controller.gains[2] > 0.0 {
+            let before = held_before / controller.gains[2];
+            errors[2].iter_mut().for_each(|e| *e = e.map(|e| e + before));
+        }
+        let own = (controller.delay > 0.0).then(|| find::<f64>("actuator_delay")).flatten();
+        let own = own.map(|law| EffectInstance {
+            law,
+            joint: j,
+            p: [controller.delay, 0.0, 0.0],
+            sides: Sides::LINK,
+        });
+        let of_joint = effects.iter().filter(|e| e.law.spec().hooks.command && e.joint == j).copied();
+        let laws: Vec<EffectInstance> = own.into_iter().chain(of_joint).collect();
+        let times = |e: &EffectInstance| -> f64 {
+            let all = e.law.spec().parameters.iter().zip(&e.p);
+            all.filter(|(p, _)| p.quantity == Quantity::Time).map(|(_, value)| value).sum()
+        };
+        Self {
+            controller,
+            reference: controller.reference(given),
+            rate: controller.reference_rate(given),
+            measured: controller.prompt_torque(&errors),
+            integral: errors.into_iter().next_back().unwrap_or_default(),
+            memory: FORGOTTEN * laws.iter().map(times).sum::<f64>(),
+            laws,
+        }
+    }
+
+    /// Torques before sample `first` that the laws remember.
+    fn past(&self, t: &[f64], first: usize) -> Past {
+        let begin = t[..first].partition_point(|at| *at < t[first] - self.memory).saturating_sub(1);
+        let begin = if self.memory > 0.0 { begin } else { first };
+        Past { t: t[begin..first].to_vec(), torque: self.measured[begin..first].to_vec() }
+    }
+
+    /// What a prompt torque at `now`, held for `period`, becomes.
+    fn delivered(&self, past: &mut Past, now: f64, period: f64, torque: f64) -> InputSegment<f64> {
+        if self.laws.is_empty() {
+            return InputSegment::held(torque);
+        }
+        past.t.push(now);
+        past.torque.push(InputSegment::held(torque));
+        let begin = past.t.partition_point(|at| *at < now - self.memory).saturating_sub(1);
+        if self.memory == 0.0 {
+            (past.t, past.torque) = (vec![now], vec![InputSegment::held(torque)]);
+        }
+        let begin = begin.min(past.t.len() - 1);
+        let mut t = past.t[begin..].to_vec();
+        t.push(now + period);
+        let mut column = past.torque[begin..].to_vec();
+        for law in &self.laws {
+            law.law.command(&law.p, &t, &mut column);
+        }
+        column.last().copied().unwrap_or(InputSegment::held(torque))
+    }
+}
+
+impl<const N: usize> ClosedLoop<N> {
+    /// Predicted positions of all windows, each from its measured initial state; tracks without a reference diverge.
+    pub fn predict<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        data: &Dataset<N>,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+    ) -> Vec<f64> {
+        let mut predicted = vec![DIVERGED; data.rows * N];
+        let Some(plant) = hypothesis.plant(arm) else { return predicted };
+        let servos: Vec<Option<Vec<Servo>>> = (0..data.tracks.len())
+            .map(|log| {
+                let servo = |j: usize| {
+                    let given = Given::new(&data.tracks[log], j)?;
+                    Some(Servo::new(self.joints[j], &given, self.held_before[log][j], &hypothesis.effects, j))
+                };
+                (0..N).map(servo).collect()
+            })
+            .collect();
+        let mut rest = predicted.as_mut_slice();
+        let mut runs = Vec::with_capacity(data.windows.len());
+        for window in &data.windows {
+            let (positions, after) = rest.split_at_mut(window.rows() * N);
+            rest = after;
+            runs.push((window, positions));
+        }
+        runs.into_par_iter().for_each(|(window, positions)| {
+            if let Some(servos) = &servos[window.track] {
+                run(&plant, hypothesis, servos, &data.tracks[window.track].t, window, positions);
+            }
+        });
+        predicted
+    }
+}
+
+/// Simulates one window.
+fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    plant: &Plant<f64, A, N, P>,
+    hypothesis: &Hypothesis<P>,
+    servos: &[Servo],
+    t: &[f64],
+    window: &Window<N>,
+    positions: &mut [f64],
+) {
+    let mut state = hypothesis.initial_state(window.initial_state.q, window.initial_state.dq);
+    let mut past: Vec<Past> = servos.iter().map(|servo| servo.past(t, window.first)).collect();
+    let mut ddq = SVector::<f64, N>::zeros();
+    let mut integral: Vec<f64> = servos.iter().map(|servo| servo.integral[window.first].start).collect();
+    for (row, k) in positions.chunks_exact_mut(N).zip(window.first..) {
+        let h = t[k + 1] - t[k];
+        let count = periods(plant, servos, &state.q, h);
+        let period = h / count as f64;
+        for i in 0..count {
+            let (halfway, now) = ((i as f64 + 0.5) / count as f64, t[k] + i as f64 * period);
+            let expected = state.q + 0.5 * period * state.dq;
+            let expected = State { q: expected, dq: state.dq + 0.5 * period * ddq, ..state };
+            let torque = std::array::from_fn(|j| {
+                let servo = &servos[j];
+                let (q, dq) = shown(hypothesis, &expected, j);
+                let error = servo.reference[k].at(halfway) - q;
+                let inputs =
+                    [servo.controller.proportional(error), servo.rate[k].at(halfway) - dq, integral[j]];
+                integral[j] += period * error;
+                let asked: f64 = servo.controller.gains.iter().zip(inputs).map(|(gain, e)| gain * e).sum();
+                servo.delivered(&mut past[j], now, period, servo.controller.clipped(asked))
+            });
+            let before = state.dq;
+            advance(plant, &mut state, &Interval { t: now, h: period, torque: &torque }, 1);
+            ddq = (state.dq - before) / period;
+        }
+        if !state.is_finite() || state.q.amax() > DIVERGED {
+            break;
+        }
+        for (j, q) in row.iter_mut().enumerate() {
+            *q = hypothesis.measured(j, state.q[j]);
+        }
+    }
+}
+
+/// Position and velocity that joint `j`'s encoder shows.
+fn shown<const N: usize, const P: usize>(
+    hypothesis: &Hypothesis<P>,
+    state: &State<f64, N>,
+    j: usize,
+) -> (f64, f64) {
+    let (q, dq) = (state.q[j], state.dq[j]);
+    if hypothesis.distorts() { (hypothesis.measured(j, q), dq * hypothesis.stretch(j, q)) } else { (q, dq) }
+}
+
+/// Periods of the controllers in an interval of length `h`: short beside what they and viscous friction do to the joints.
+fn periods<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    plant: &Plant<f64, A, N, P>,
+    servos: &[Servo],
+    q: &SVector<f64, N>,
+    h: f64,
+) -> usize {
+    let joints = armgap_core::kinematics::JointState { q: (*q).into(), dq: [0.0; N] };
+    let inertia = plant.rigid().equation_terms(&joints).inertia;
+    let free = SMatrix::<f64, N, N>::from_fn(|i, j| inertia[i][j]).try_inverse();
+    let rate = |(j, servo): (usize, &Servo)| {
+        let mobility = free.as_ref().map_or(0.0, |free| free[(j, j)].max(0.0));
+        let [kp, kd, _] = servo.controller.gains.map(f64::abs);
+        (kp * mobility).sqrt() + kd * mobility
+    };
+    let servo = servos.iter().enumerate().map(rate).fold(0.0, f64::max);
+    let rate = (servo / RESOLVED).max(plant.fastest(q).max(plant.viscous_rate(q)) / 1.5);
+    ((h * rate.max(1.0 / PERIOD) - ROUNDING).ceil() as usize).clamp(1, MOST_PERIODS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::{Reference, Track};
+    use armgap_core::arm::Pendulum;
+
+    const PERIOD: f64 = 0.005;
+    const INERTIA: f64 = 0.5;
+    const VISCOUS: f64 = 0.4;
+    const SERVO: JointController = JointController {
+        gains: [200.0, 6.0, 0.0],
+        rate_of_error: false,
+        reference_delay: 0.0,
+        delay: 0.0,
+        deadband: 0.0,
+        speed_limit: f64::INFINITY,
+        torque_limit: f64::INFINITY,
+    };
+    /// Position by which periods of a servo of one millisecond and steps of 20 microseconds differ, after a step of the reference of 0.1 rad.
+    const STEPPED: f64 = 1e-4;
+
+    /// The reference steps from 0 to 0.1 rad after a fifth of a second, from rest.
+    fn target(k: usize) -> f64 {
+        if k < 40 { 0.0 } else { 0.1 }
+    }
+
+    /// A pendulum without gravity that is at rest in its log: it is predicted, and not compared.
+    fn predicted(servo: JointController, effects: Vec<EffectInstance>) -> Vec<f64> {
+        let count = 160;
+        let t: Vec<f64> = (0..count).map(|k| PERIOD * k as f64).collect();
+        let mut track = Track::<1>::new("", &t, &vec![0.0; count], &[], Some([1e-6]));
+        track.reference = Some(Reference { q: (0..count).map(|k| [target(k)]).collect(), dq: None });
+        let data = crate::gap::whole(&Dataset { tracks: vec![track], windows: Vec::new(), rows: 0 });
+        let hypothesis = Hypothesis { effects, ..Hypothesis::rigid([INERTIA, 0.0, VISCOUS, 0.0]) };
+        let closed_loop = ClosedLoop { joints: vec![servo], held_before: vec![[0.0]] };
+        closed_loop.predict(&data, &Pendulum { gravity: 0.0 }, &hypothesis)
+    }
+
+    /// The same by explicit Euler steps; `torque` makes the delivered torque of those asked for so far.
+    fn stepped(servo: &JointController, torque: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+        let steps = 250;
+        let dt = PERIOD / f64::from(steps);
+        let (mut q, mut dq, mut asked, mut positions) = (0.0, 0.0, Vec::new(), Vec::new());
+        for k in 0..159 {
+            for _ in 0..steps {
+                let [kp, kd, _] = servo.gains;
+                asked.push((kp * (target(k) - q) - kd * dq).clamp(-servo.torque_limit, servo.torque_limit));
+                dq += dt * (torque(&asked) - VISCOUS * dq) / INERTIA;
+                q += dt * dq;
+            }
+            positions.push(q);
+        }
+        positions
+    }
+
+    fn apart(a: &[f64], b: &[f64]) -> f64 {
+        assert_eq!(a.len(), b.len());
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    fn last(asked: &[f64]) -> f64 {
+        asked[asked.len() - 1]
+    }
+
+    #[test]
+    fn a_servo_answers_a_step_of_its_reference() {
+        let found = predicted(SERVO, Vec::new());
+        let off = apart(&found, &stepped(&SERVO, last));
+        assert!(off < STEPPED && (found[158] - 0.1).abs() < 0.01, "{off}");
+    }
+
+    #[test]
+    fn limits_and_delays_act_in_the_loop() {
+        let limited = JointController { torque_limit: 3.0, ..SERVO };
+        let off = apart(&predicted(limited, Vec::new()), &stepped(&limited, last));
+        assert!(off < STEPPED, "{off}");
+        // A delay of 8 ms is 400 steps, by the controller itself or by an effect of the drive.
+        let late = |asked: &[f64]| asked.len().checked_sub(401).map_or(0.0, |i| asked[i]);
+        let wanted = stepped(&SERVO, late);
+        assert!(apart(&wanted, &stepped(&SERVO, last)) > 10.0 * STEPPED);
+        let own = predicted(JointController { delay: 0.008, ..SERVO }, Vec::new());
+        assert!(apart(&own, &wanted) < STEPPED, "{}", apart(&own, &wanted));
+        let law = find::<f64>("actuator_delay").unwrap();
+        let effect = predicted(SERVO, vec![EffectInstance::new(law, 0, [0.008, 0.0, 0.0])]);
+        assert!(apart(&effect, &wanted) < STEPPED, "{}", apart(&effect, &wanted));
+    }
+
+    #[test]
+    fn a_late_reference_moves_the_answer() {
+        let late = predicted(JointController { reference_delay: 2.0 * PERIOD, ..SERVO }, Vec::new());
+        let prompt = predicted(SERVO, Vec::new());
+        let off = apart(&late[2..], &prompt[..157]);
+        assert!(off < 1e-9, "{off}");
+    }
+
+    #[test]
+    fn what_an_integral_part_held_goes_on() {
+        let servo = JointController { gains: [200.0, 6.0, 1e-6], ..SERVO };
+        let (count, held) = (160, 2.0);
+        let t: Vec<f64> = (0..count).map(|k| PERIOD * k as f64).collect();
+        let mut track = Track::<1>::new("", &t, &vec![0.0; count], &[], Some([1e-6]));
+        track.reference = Some(Reference { q: vec![[0.0]; count], dq: None });
+        let data = crate::gap::whole(&Dataset { tracks: vec![track], windows: Vec::new(), rows: 0 });
+        let closed_loop = ClosedLoop { joints: vec![servo], held_before: vec![[held]] };
+        let hypothesis = Hypothesis::rigid([INERTIA, 0.0, VISCOUS, 0.0]);
+        let found = closed_loop.predict(&data, &Pendulum { gravity: 0.0 }, &hypothesis);
+        assert!((found[158] - held / 200.0).abs() < STEPPED, "{}", found[158]);
+    }
+}
