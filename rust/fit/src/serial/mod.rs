@@ -161,6 +161,8 @@ impl Request<'_> {
             |values: &[f64]| training.equation.conditioning(&std::array::from_fn(|i| values[i])) > least;
         let mut candidates = candidates(&arm, &theta, &training.data.tracks, self.options.known_units);
         if let Some(controller) = &controller {
+            // Their torque is known as the noise of the positions leaves it, and so is no deflection.
+            candidates.retain(|group| !matches!(group[0].kind, TermKind::Transmission(_)));
             let inertia = training.equation.mean_inertia(&theta);
             let period = training.data.tracks.first().map_or(0.0, Track::period);
             candidates.extend(controller_settings(controller, &inertia, period));

@@ -21,7 +21,7 @@ use crate::report::{
 use crate::verdict::Evidence;
 use crate::window::Dataset;
 use armgap_core::chain::Chain;
-use armgap_core::effect::{Scope, Trial, catalogue};
+use armgap_core::effect::{Effect, Scope, Trial, catalogue};
 
 /// Quantile of the normal distribution for bounds at 95 %.
 const NORMAL_95: f64 = 1.645;
@@ -34,6 +34,8 @@ const HIDES: f64 = 0.01;
 
 /// Resamples of the holdout's windows for the interval of the closed share.
 const RESAMPLES: usize = 500;
+
+const NOT_TESTED: &str = "not tested on serial arms from such logs";
 
 const LOOK_ALIKE: &str = "explains the torque along these logs as well";
 
@@ -333,17 +335,21 @@ fn ruled_out(found: &Found, unexplained: &[Option<f64>], rotary: &[bool]) -> Vec
     let named = |t: &Tested| found.named.iter().any(|n| n.term.same_place(&t.term));
     let mut all: Vec<RuledOut> =
         found.tested.iter().filter(|t| !named(t)).map(|t| status(found, unexplained, t, rotary)).collect();
-    let untested = catalogue::<f64>()
-        .iter()
-        .map(|law| law.spec())
-        .filter(|spec| spec.scope == Scope::Joint && spec.trial == Trial::Disturbance);
-    for spec in untested {
-        all.extend((0..rotary.len()).map(|j| RuledOut {
-            effect: spec.name,
+    let is_tested = |name: &str, j: usize| {
+        let tested = found.tested.iter().map(|t| &t.term).chain(found.named.iter().map(|n| &n.term));
+        tested.into_iter().any(|t| t.name() == name && t.joint() == Some(j + 1))
+    };
+    let hidden_from_encoders = |law: &&&'static dyn Effect<f64>| {
+        law.has_transmission() || law.spec().scope == Scope::Joint && law.spec().trial == Trial::Disturbance
+    };
+    for law in catalogue::<f64>().iter().filter(hidden_from_encoders) {
+        let open = (0..rotary.len()).filter(|j| !is_tested(law.spec().name, *j));
+        all.extend(open.map(|j| RuledOut {
+            effect: law.spec().name,
             joint: Some(j + 1),
             status: "undecided",
             bound: None,
-            why: Some("not tested on serial arms".to_owned()),
+            why: Some(NOT_TESTED.to_owned()),
         }));
     }
     all
