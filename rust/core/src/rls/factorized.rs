@@ -127,20 +127,12 @@ impl<T: Real, const R: usize> Factorized<T, R> {
         }
         let mut gain = [T::zero(); R];
         for j in 0..r {
-            let (factor, entries) = (f[j] * inverse[j], N::entries(j, R));
-            let mut change = |i: usize| {
+            let factor = f[j] * inverse[j];
+            N::each(j, R, |i| {
                 let old = self.u[j][i];
                 self.u[j][i] = C::fused(-gain[i], factor, old);
                 gain[i] = C::fused(old, v[j], gain[i]);
-            };
-            for c in 0..entries / LANES {
-                for l in 0..LANES {
-                    change(c * LANES + l);
-                }
-            }
-            for i in lead(entries)..entries {
-                change(i);
-            }
+            });
             gain[j] = v[j];
         }
         let rate = error * last;

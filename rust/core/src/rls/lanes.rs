@@ -47,8 +47,8 @@ pub trait Count: Copy + Debug + PartialEq {
     /// The number for `room` parameters, at most `room`.
     fn of(self, room: usize) -> usize;
 
-    /// How many entries of a column whose first `n` count are worked on; the others stay zero.
-    fn entries(n: usize, room: usize) -> usize;
+    /// Calls for each of the first `n` entries of a column, and perhaps for some after them, which are zero and stay so.
+    fn each(n: usize, room: usize, call: impl FnMut(usize));
 }
 
 /// All of them, a number known to the compiler.
@@ -62,8 +62,10 @@ impl Count for All {
     }
 
     #[inline(always)]
-    fn entries(n: usize, _: usize) -> usize {
-        n
+    fn each(n: usize, _: usize, mut call: impl FnMut(usize)) {
+        for i in 0..n {
+            call(i);
+        }
     }
 }
 
@@ -85,7 +87,11 @@ impl Count for First {
     }
 
     #[inline(always)]
-    fn entries(n: usize, room: usize) -> usize {
-        ((n / LANES + 1) * LANES).min(room)
+    fn each(n: usize, room: usize, mut call: impl FnMut(usize)) {
+        for c in 0..(n / LANES + 1).min(room / LANES) {
+            for l in 0..LANES {
+                call(c * LANES + l);
+            }
+        }
     }
 }
