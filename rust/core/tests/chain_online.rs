@@ -39,8 +39,7 @@ fn joints() -> [ChainJoint<f64>; 3] {
 
 fn theta() -> [f64; P] {
     let mut theta = [0.0; P];
-    let points =
-        [[0.1, 0.02, 0.1], [0.0, 0.1, 0.2], [-0.1, 0.05, 0.0], [0.05, -0.1, 0.1], [0.0, 0.0, -0.1]];
+    let points = [[0.1, 0.02, 0.1], [0.0, 0.1, 0.2], [-0.1, 0.05, 0.0], [0.05, -0.1, 0.1], [0.0, 0.0, -0.1]];
     for k in 0..3 {
         for (i, at) in points.into_iter().enumerate() {
             let point = point_mass(2.0 / (1.0 + k as f64) + 0.1 * i as f64, at);
@@ -140,8 +139,7 @@ fn all_parameters_explain_other_motion() {
     let (data, joints, all) = (motion(), joints(), (0..P).collect::<Vec<_>>());
     for scheme in Scheme::ALL {
         let common = EstimatorSettings { p0: 1e5, ..common(scheme, Variant::Exact) };
-        let settings =
-            ChainSettings { common, joints: &joints, gravity: GRAVITY, columns: &all, known: &[] };
+        let settings = ChainSettings { common, joints: &joints, gravity: GRAVITY, columns: &all, known: &[] };
         let found = run(MediumChain::of_chain(&settings, &[]).expect("room"), &data);
         let error = off(&torques(found.theta()), &torques(&theta()));
         assert!(error < ACCURACY, "{}: {error}", scheme.name());
@@ -223,7 +221,8 @@ fn sizes_and_wrong_settings() {
         columns: &[9, 16],
         known: &known,
     };
-    let make = |settings: &ChainSettings<'_, f64>, theta0: &[f64]| MediumChain::of_chain(settings, theta0).err();
+    let make =
+        |settings: &ChainSettings<'_, f64>, theta0: &[f64]| MediumChain::of_chain(settings, theta0).err();
     assert_eq!(make(&settings, &[1.0, 2.0]), None);
     assert_eq!(make(&settings, &[1.0]), Some(OnlineError::Length { name: "theta0", expected: 2 }));
     let mut bent = joints;
@@ -235,7 +234,10 @@ fn sizes_and_wrong_settings() {
         (ChainSettings { columns: &[], ..settings }, OnlineError::Range("columns")),
         (ChainSettings { joints: &bent, ..settings }, OnlineError::Range("joints")),
         (ChainSettings { joints: &[], known: &[], ..settings }, OnlineError::Range("joints")),
-        (ChainSettings { known: &known[1..], ..settings }, OnlineError::Length { name: "known", expected: P }),
+        (
+            ChainSettings { known: &known[1..], ..settings },
+            OnlineError::Length { name: "known", expected: P },
+        ),
         (ChainSettings { gravity: [f64::NAN, 0.0, 0.0], ..settings }, OnlineError::Range("gravity")),
     ] {
         assert_eq!(make(&wrong, &[]), Some(error));

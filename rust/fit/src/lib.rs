@@ -9,6 +9,7 @@ pub mod acceptance;
 pub mod arm;
 pub mod assemble;
 pub mod attribute;
+pub mod base_parameters;
 pub mod belief;
 pub mod chain;
 mod contact_guess;

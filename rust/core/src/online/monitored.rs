@@ -2,6 +2,7 @@
 
 use super::{EstimatorSettings, OnlineError, SampleStatus, When};
 use crate::arm::Arm;
+use crate::cpu::Level;
 use crate::filter::Cutoff;
 use crate::identify::{Estimator, Outcome, Reading, Sample, Settings};
 use crate::monitor::Monitor;
@@ -117,6 +118,12 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
             parameters,
             outputs: settings.outputs(joints),
         }
+    }
+
+    /// Uses other instructions than the widest that the processor has.
+    pub fn with_level(mut self, level: Level) -> Self {
+        self.estimator = self.estimator.with_level(level);
+        self
     }
 
     /// The estimator alone.

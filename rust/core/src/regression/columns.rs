@@ -94,6 +94,7 @@ impl<T: Real, const N: usize, const P: usize, const R: usize> ChosenColumns<T, N
     /// `None` if there are too many or an index is not possible.
     pub fn new(columns: impl IntoIterator<Item = usize>, known: &[T; P]) -> Option<Self> {
         const { assert!(R < NONE as usize && P < NONE as usize, "indices are bytes") }
+        const { assert!(R.is_multiple_of(4), "whole lanes") }
         let first = P - 2 * N;
         let mut chosen = Self {
             inertial: [0; R],
