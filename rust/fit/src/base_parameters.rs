@@ -3,7 +3,7 @@
 //! The regressor of the torques over all parameters has dependent columns, so motion determines only sums of parameters. With independent
 //! columns `Y_b` that span all, `Y = Y_b [I K]`, the torques are `Y_b (theta_b + K theta_d)` (Gautier 1991, *Numerical calculation of
 //! the base inertial parameters of robots*, Journal of Robotic Systems 8, 485-506). `Y` is stacked over random states and factorized by
-//! `Q R`; a column is dependent if nothing but rounding is left of it. Columns are taken from the base outwards, and in a link in an
+//! `Q R`; a column is dependent if nothing but rounding of the arm's geometry is left of it. Columns are taken from the base outwards, and in a link in an
 //! order in which, with joints about z axes, those left over are the ones that Khalil and Dombre (2002, section 9.4) eliminate.
 
 use crate::chain::{ChainDescription, WithChain};
@@ -11,9 +11,13 @@ use crate::random::Random;
 use armgap_core::chain::{Chain, LINK_PARAMETERS, PARAMETERS_PER_JOINT};
 use armgap_core::real::sgn;
 
-/// Share of a column's length below which what is independent of it is rounding: rounding is 1e-14, and what a millimetre of an arm's
-/// geometry makes of a column is above 1e-6.
-const INDEPENDENT: f64 = 1e-9;
+/// Share of a column's length below which what is independent of it is rounding. Right angles typed as 1.5708 leave 5e-6, a millimetre of an
+/// arm's geometry 1e-3 and more.
+const INDEPENDENT: f64 = 1e-4;
+/// Share of the longest column below which a column shows nothing but rounding.
+const VISIBLE: f64 = 1e-6;
+/// Share of the largest factor of a combination below which a factor is rounding of double precision.
+const ROUNDING: f64 = 1e-12;
 /// States per parameter of one joint.
 const STATES: usize = 4;
 /// A link's parameters in the order in which columns are taken.
@@ -49,7 +53,8 @@ impl WithChain for AmongParameters<'_> {
         let mut candidates: Vec<usize> = self.0.iter().copied().filter(|c| *c < regressor.len()).collect();
         candidates.sort_by_key(|c| rank::<N>(*c));
         candidates.dedup();
-        let mut basis = Basis::default();
+        let longest = regressor.iter().map(|column| norm(column)).fold(0.0, f64::max);
+        let mut basis = Basis { least: VISIBLE * longest, ..Basis::default() };
         for column in candidates {
             basis.take(column, &regressor[column]);
         }
@@ -91,6 +96,8 @@ fn stacked<const N: usize>(chain: &Chain<f64, N>) -> Vec<Vec<f64>> {
 /// `Q R` of the columns taken so far.
 #[derive(Debug, Default)]
 struct Basis {
+    /// Length below which a column counts as zero.
+    least: f64,
     /// Orthonormal columns.
     q: Vec<Vec<f64>>,
     /// Columns of `R` of the independent parameters.
@@ -113,12 +120,14 @@ impl Basis {
             }
         }
         let left = norm(&rest);
-        if left <= INDEPENDENT * length {
+        if left <= (INDEPENDENT * length).max(self.least) {
             self.dependent.push((parameter, along));
             return;
         }
         along.push(left);
-        rest.iter_mut().for_each(|x| *x /= left);
+        for x in &mut rest {
+            *x /= left;
+        }
         self.q.push(rest);
         self.r.push((parameter, along));
     }
@@ -148,7 +157,7 @@ impl Basis {
         }
         // Rounding is not a share.
         let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        x.iter().map(|x| if x.abs() <= INDEPENDENT * largest { 0.0 } else { *x }).collect()
+        x.iter().map(|x| if x.abs() <= ROUNDING * largest.max(1.0) { 0.0 } else { *x }).collect()
     }
 }
 

@@ -138,9 +138,13 @@ impl<T: Real> EstimatorSettings<T> {
 impl<T: Real> OnlineSettings<T> {
     /// The defaults of [`EstimatorSettings`].
     pub fn new(kind: ArmKind) -> Self {
-        let EstimatorSettings { scheme, variant, form, cutoff, forgetting, p0, monitor } =
-            EstimatorSettings::default();
-        Self { kind, scheme, variant, form, asymmetry: false, cutoff, forgetting, p0, monitor }
+        Self::of(kind, false, EstimatorSettings::default())
+    }
+
+    /// These settings for a kind of arm.
+    pub fn of(kind: ArmKind, asymmetry: bool, common: EstimatorSettings<T>) -> Self {
+        let EstimatorSettings { scheme, variant, form, cutoff, forgetting, p0, monitor } = common;
+        Self { kind, scheme, variant, form, asymmetry, cutoff, forgetting, p0, monitor }
     }
 
     /// What does not depend on the kind of arm.
