@@ -16,7 +16,7 @@ from scipy.signal import lfilter
 
 import armgap
 from armgap import Arm, Estimator, Log, identify, read_model
-from armgap.base_parameters import base_parameters
+from armgap.base_columns import base_parameters
 from armgap.errors import OptionError
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -295,7 +295,7 @@ def test_the_last_estimate_is_batch_least_squares(
     off = np.abs(estimator.theta - batch).max() / np.abs(batch).max()
     assert off < ROUNDING, off
     r = np.linalg.inv(np.linalg.qr(stacked)[1])
-    np.testing.assert_allclose(estimator.variances, np.sum(r**2, axis=1), rtol=1e-6)
+    np.testing.assert_allclose(np.diag(estimator.covariance), np.sum(r**2, axis=1), rtol=1e-6)
 
 
 # From Python and the command line
@@ -338,7 +338,9 @@ def test_command_line(recorded: tuple[Arm, Log], tmp_path: Path, run: Run) -> No
     (tmp_path / "arm.toml").write_text(arm.to_toml())
     log.write(tmp_path / "run.parquet")
     words = ("identify", str(tmp_path / "run.parquet"), "--arm", str(tmp_path / "arm.toml"))
-    code, out, err = run(*words, "--scheme", "filtered-dynamic", "--fixed", "rotor", "--json", str(tmp_path / "out.json"))
+    code, out, err = run(
+        *words, "--scheme", "filtered-dynamic", "--fixed", "rotor", "--json", str(tmp_path / "out.json")
+    )
     assert code == 0, err
     (result,) = json.loads((tmp_path / "out.json").read_text())
     assert not any(name.startswith("rotor") for name in result["parameters"])

@@ -8,7 +8,8 @@ use armgap_bench::serial::{JOINTS, Sample};
 use armgap_core::chain::Chain;
 use std::ffi::{c_int, c_long};
 
-type Start = unsafe extern "C" fn(*mut f64, c_int, *const f64, *const f64, *const c_int, c_int, f64, f64, f64);
+type Start =
+    unsafe extern "C" fn(*mut f64, c_int, *const f64, *const f64, *const c_int, c_int, f64, f64, f64);
 type Run = unsafe extern "C" fn(*mut f64, *const f64, *const f64, c_long);
 
 unsafe extern "C" {

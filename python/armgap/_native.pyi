@@ -13,7 +13,6 @@ __all__ = [
     "diagnose",
     "effects",
     "fit",
-    "identify",
     "inertia",
     "refit",
     "regression_rows",
@@ -139,7 +138,7 @@ class Estimator:
     @property
     def sigma(self) -> NDArray[np.float64]: ...
     @property
-    def variances(self) -> NDArray[np.float64]: ...
+    def covariance(self) -> NDArray[np.float64]: ...
     @property
     def errors(self) -> NDArray[np.float64]: ...
     @property

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armgap import _native
 from armgap.arm import Arm, kinds
-from armgap.base_parameters import BaseParameters, base_parameters
+from armgap.base_columns import BaseParameters, base_parameters
 from armgap.errors import OptionError
 from armgap.literals import FILTERS, SCHEMES, SERIAL, Filters, Scheme
 
@@ -134,7 +134,9 @@ class Estimator:
                 raise OptionError(f"`{name}` is {count}", remedy="give a number of samples")
         fixed = tuple(fixed)
         if fixed and kind != SERIAL:
-            raise OptionError(f"`fixed` is given for an arm of kind `{kind}`", remedy="leave it out, or give a serial arm")
+            raise OptionError(
+                f"`fixed` is given for an arm of kind `{kind}`", remedy="leave it out, or give a serial arm"
+            )
         start = [] if theta0 is None else np.asarray(theta0, dtype=np.float64).ravel().tolist()
         numbers, counts = [cutoff, forgetting, p0, memory, between, floor], [settling, learning]
         paper = filters == "paper"
@@ -142,7 +144,7 @@ class Estimator:
         if not isinstance(arm, str) and arm.chain is not None:
             self._base = base_parameters(arm, fixed=fixed, asymmetry=asymmetry)
             self._n_joints, self._names, self._units = arm.n_joints, self._base.names, self._base.units
-            chain, columns, known = arm.chain.native(), self._base.columns, arm.theta.tolist()
+            chain, columns, values = arm.chain.native(), self._base.columns, self._known(arm)
         else:
             described = kinds()[kind]
             self._n_joints = int(described["n_joints"])
@@ -155,15 +157,15 @@ class Estimator:
                 self._native = _native.Estimator(kind, scheme, paper, form, asymmetry, single, numbers, counts, start)
             else:
                 self._native = _native.Estimator.of_chain(
-                    chain, columns, self._known(known), scheme, paper, form, single, numbers, counts, start
+                    chain, columns, values, scheme, paper, form, single, numbers, counts, start
                 )
         except ValueError as error:
             raise OptionError(str(error), remedy="see help(armgap.Estimator) for ranges") from None
 
-    def _known(self, theta: list[float]) -> list[float]:
+    def _known(self, arm: Arm) -> list[float]:
         """Values of fixed parameters, zero for dependent ones, which are part of combinations."""
-        assert self._base is not None
-        return [0.0 if i in self._base.dependent else value for i, value in enumerate(theta)]
+        dependent = () if self._base is None else self._base.dependent
+        return [0.0 if i in dependent else float(value) for i, value in enumerate(arm.theta)]
 
     @property
     def base(self) -> BaseParameters | None:
@@ -191,9 +193,9 @@ class Estimator:
         return self._native.sigma
 
     @property
-    def variances(self) -> NDArray[np.float64]:
-        """Diagonal of the covariance `P` for an error of unit variance, shape (n_parameters,)."""
-        return self._native.variances
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance `P` for an error of unit variance, shape (n_parameters, n_parameters)."""
+        return self._native.covariance
 
     @property
     def errors(self) -> NDArray[np.float64]:

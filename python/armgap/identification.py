@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armgap import _native
 from armgap.arm import Arm
-from armgap.base_parameters import BaseParameters
+from armgap.base_columns import BaseParameters
 from armgap.errors import ColumnError, OptionError
 from armgap.estimator import Estimator
 from armgap.literals import FILTERS, SCHEMES, VELOCITIES, Filters, Scheme, VelocityMethod
@@ -259,7 +259,7 @@ def identify(
         parameter_names=names,
         parameter_units=whole.parameter_units,
         theta=theta,
-        sigma=_sigma(run.errors, whole.variances),
+        sigma=_sigma(run.errors, whole.covariance),
         cutoff_drift=drift,
         updates=whole.updates,
         rejected=whole.rejected,
@@ -271,11 +271,11 @@ def identify(
     )
 
 
-def _sigma(errors: NDArray[np.float64], variances: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sigma(errors: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Standard deviations, with the errors of the second half as if those were white."""
     late = errors[len(errors) // 2 :]
     spread = float(np.nanmean(late**2)) if np.isfinite(late).any() else 0.0
-    return np.asarray(np.sqrt(spread * np.maximum(variances, 0.0)))
+    return np.asarray(np.sqrt(spread * np.maximum(np.diag(covariance), 0.0)))
 
 
 def _velocities(log: Log, method: str) -> NDArray[np.float64] | None:

@@ -48,7 +48,9 @@ __all__ = ["command"]
 )
 @click.option("--asymmetry", is_flag=True, help="Estimate a torque offset per joint (asymmetric Coulomb friction) too.")
 @click.option(
-    "--fixed", metavar="NAME,…", help="Parameters of a serial arm that keep the arm file's value: mass7, or rotor for all joints."
+    "--fixed",
+    metavar="NAME,…",
+    help="Parameters of a serial arm that keep the arm file's value: mass7, or rotor for all joints.",
 )
 @corrections_options
 @json_option

@@ -47,6 +47,18 @@ impl<T: Real> Running<T> {
         made.map_err(complaint)
     }
 
+    /// Covariance for an error of unit variance, row by row.
+    fn covariance(&self) -> Vec<T> {
+        let mut out = vec![T::zero(); self.estimator().theta().len().pow(2)];
+        match self {
+            Self::OfKind(online) => online.covariance(&mut out),
+            Self::Small(chain) => chain.covariance(&mut out),
+            Self::Medium(chain) => chain.covariance(&mut out),
+            Self::Large(chain) => chain.covariance(&mut out),
+        };
+        out
+    }
+
     fn estimator(&self) -> &dyn OnlineEstimator<T> {
         match self {
             Self::OfKind(online) => online.estimator(),
@@ -194,6 +206,14 @@ impl Any {
         }
     }
 
+    /// Appends the standard deviations of the estimate.
+    fn sigma(&self, to: &mut Vec<f64>) {
+        match self {
+            Self::Double(running) => to.extend(sigma_of(running.estimator())),
+            Self::Single(running) => to.extend(sigma_of(running.estimator()).into_iter().map(f64::from)),
+        }
+    }
+
     /// Appends the errors of the last sample that was used.
     fn errors(&self, to: &mut Vec<f64>) {
         match self {
@@ -201,26 +221,13 @@ impl Any {
             Self::Single(running) => to.extend(running.estimator().errors().iter().map(|x| f64::from(*x))),
         }
     }
+}
 
-    /// What `of` gives for an estimator of each precision, one number per parameter.
-    fn per_parameter(
-        &self,
-        double: fn(&dyn OnlineEstimator<f64>, &mut [f64]) -> usize,
-        single: fn(&dyn OnlineEstimator<f32>, &mut [f32]) -> usize,
-    ) -> Vec<f64> {
-        match self {
-            Self::Double(running) => {
-                let mut out = vec![0.0; running.estimator().theta().len()];
-                double(running.estimator(), &mut out);
-                out
-            }
-            Self::Single(running) => {
-                let mut out = vec![0.0; running.estimator().theta().len()];
-                single(running.estimator(), &mut out);
-                out.into_iter().map(f64::from).collect()
-            }
-        }
-    }
+/// Standard deviations of the estimate.
+fn sigma_of<T: Real>(estimator: &dyn OnlineEstimator<T>) -> Vec<T> {
+    let mut sigma = vec![T::zero(); estimator.theta().len()];
+    estimator.sigma(&mut sigma);
+    sigma
 }
 
 #[pymethods]
@@ -344,13 +351,17 @@ impl Estimator {
 
     #[getter]
     fn sigma<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.any.per_parameter(|e, out| e.sigma(out), |e, out| e.sigma(out)))
+        PyArray1::from_vec(py, self.listed(Any::sigma))
     }
 
-    /// Diagonal of the covariance for an error of unit variance.
+    /// Covariance for an error of unit variance.
     #[getter]
-    fn variances<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.any.per_parameter(|e, out| e.variances(out), |e, out| e.variances(out)))
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let entries = match &*self.any {
+            Any::Double(running) => running.covariance(),
+            Any::Single(running) => running.covariance().into_iter().map(f64::from).collect(),
+        };
+        self.table(py, entries, Any::theta)
     }
 
     #[getter]

@@ -294,6 +294,18 @@ impl<T: Real> Online<T> {
         self.estimator().sigma(out)
     }
 
+    /// Writes the covariance for an error of unit variance into `out`, row by row, and returns the number of parameters.
+    pub fn covariance(&self, out: &mut [T]) -> usize {
+        match &self.running {
+            EstimatorOfArm::Axis(x) => x.covariance(out),
+            EstimatorOfArm::AxisAsymmetric(x) => x.covariance(out),
+            EstimatorOfArm::Pendulum(x) => x.covariance(out),
+            EstimatorOfArm::PendulumAsymmetric(x) => x.covariance(out),
+            EstimatorOfArm::TwoLink(x) => x.covariance(out),
+            EstimatorOfArm::TwoLinkAsymmetric(x) => x.covariance(out),
+        }
+    }
+
     /// Share of a full excitation, from 0 to about 1.
     pub fn excitation(&self) -> T {
         self.estimator().excitation()

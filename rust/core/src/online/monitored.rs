@@ -126,6 +126,17 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         self
     }
 
+    /// Writes the covariance for an error of unit variance into `out`, row by row, and returns the number of parameters.
+    pub fn covariance(&self, out: &mut [T]) -> usize {
+        let (covariance, count) = (self.estimator.rls().covariance(), self.parameters);
+        for (column, row) in covariance.data.0.iter().zip(out.chunks_mut(count.max(1))).take(count) {
+            for (entry, value) in row.iter_mut().zip(column) {
+                *entry = *value;
+            }
+        }
+        count
+    }
+
     /// The estimator alone.
     pub fn estimator(&self) -> &Estimator<T, A, N, P, R, S> {
         &self.estimator
