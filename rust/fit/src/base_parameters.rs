@@ -15,7 +15,7 @@ use armgap_core::real::sgn;
 /// arm's geometry 1e-3 and more.
 const INDEPENDENT: f64 = 1e-4;
 /// Share of the longest column below which a column shows nothing but rounding.
-const VISIBLE: f64 = 1e-6;
+const VISIBLE: f64 = 1e-9;
 /// Share of the largest factor of a combination below which a factor is rounding of double precision.
 const ROUNDING: f64 = 1e-12;
 /// States per parameter of one joint.

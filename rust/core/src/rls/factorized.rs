@@ -147,7 +147,7 @@ impl<T: Real, const R: usize> Factorized<T, R> {
     fn dot<C: Cpu>(&self, j: usize, psi: &[T; R], r: usize) -> T {
         let column = &self.u[j];
         let mut sums = [T::zero(); LANES];
-        for c in 0..lanes_of(j, r) {
+        for c in 0..lanes_of(j, r).min(R / LANES) {
             for l in 0..LANES {
                 let i = c * LANES + l;
                 sums[l] = C::fused(column[i], psi[i], sums[l]);

@@ -100,8 +100,8 @@ impl<T: Real, const R: usize> Plain<T, R> {
                 self.add_column::<C, M>(&mut even, c, 2 * k, rows);
                 self.add_column::<C, M>(&mut odd, c, 2 * k + 1, rows);
             }
-            if r % 2 == 1 {
-                self.add_column::<C, M>(&mut even, c, r - 1, rows);
+            for j in r / 2 * 2..r {
+                self.add_column::<C, M>(&mut even, c, j, rows);
             }
             for m in 0..M {
                 for l in 0..LANES {
@@ -175,7 +175,7 @@ impl<T: Real, const R: usize> Plain<T, R> {
 
     fn forget(&mut self, forgetting: &Forgetting<T, R>, r: usize) {
         let (lift, limited) = forgetting.lift(&self.diagonal);
-        let grow = T::one() / forgetting.mu;
+        let (grow, r) = (T::one() / forgetting.mu, r.min(R));
         for j in 0..r {
             for i in 0..r {
                 self.p[j][i] *= if limited { lift[i] * lift[j] } else { grow };
