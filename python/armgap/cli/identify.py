@@ -20,7 +20,7 @@ from armgap.cli.common import (
     read_arm,
     units_option,
 )
-from armgap.cli.files import Command, InputFile
+from armgap.cli.files import Command, InputFile, Words
 from armgap.cli.progress import working
 from armgap.literals import FILTERS, SCHEMES
 from armgap.output import is_stdout, write
@@ -49,6 +49,7 @@ __all__ = ["command"]
 @click.option("--asymmetry", is_flag=True, help="Estimate a torque offset per joint (asymmetric Coulomb friction) too.")
 @click.option(
     "--fixed",
+    type=Words(),
     metavar="NAME,…",
     help="Parameters of a serial arm that keep the arm file's value: mass7, or rotor for all joints.",
 )
