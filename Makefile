@@ -72,6 +72,7 @@ bench: ## cost per sample, per step and per effect of the core
 bench-baselines: $(VENV)/.built ## the core beside plain C, numpy, padasip, filterpy, MuJoCo, Pinocchio and scipy
 	$(BIN)/python -m pip install -q --disable-pip-version-check $$($(BIN)/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']['baselines'])")
 	cargo run -q --release -p armgap-benches --bin baselines
+	cargo run -q --release -p armgap-benches --bin online_chain
 	$(BIN)/python benches/baselines/compare.py
 	$(BIN)/python benches/baselines/fit.py
 

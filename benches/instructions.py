@@ -7,6 +7,7 @@ processor runs they are counted by single steps, as in a debugger, from the firs
 from __future__ import annotations
 
 import ctypes
+import itertools
 import os
 import platform
 import re
@@ -23,6 +24,12 @@ VALGRIND_SAMPLES, STEP_SAMPLES = 600, 200
 # The first samples, in which an estimator starts, are left out.
 START = 3
 SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
+FORMS = ("plain", "factorized")
+# Arm, scheme, filters, form.
+CASES = [
+    *itertools.product(["two-link"], SCHEMES, ["paper", "exact"], FORMS),
+    *itertools.product(["serial"], SCHEMES, ["exact"], FORMS),
+]
 TRACE_ME, PEEK, PEEK_USER, POKE, POKE_USER, CONTINUE, STEP = 0, 1, 3, 4, 6, 7, 9
 # Offsets in the registers of <sys/user.h>, x86-64.
 RIP, RSP = 16 * 8, 19 * 8
@@ -67,7 +74,8 @@ def by_valgrind(program: str, *case: str) -> list[int]:
             "--dump-after=instructions::one_sample",
         ]
         out, samples = Path(folder) / "out", str(VALGRIND_SAMPLES)
-        run = [*tool, f"--callgrind-out-file={out}", program, *case, samples, "portable"]
+        *settings, arm = case
+        run = [*tool, f"--callgrind-out-file={out}", program, *settings, samples, "portable", arm]
         subprocess.run(run, check=True, capture_output=True)
         dumps = [Path(f"{out}.{number}").read_text() for number in range(1, VALGRIND_SAMPLES + 1)]
     return [int(re.findall(r"^(?:summary|totals): (\d+)", text, re.MULTILINE)[-1]) for text in dumps]
@@ -78,7 +86,8 @@ def by_steps(program: str, *case: str) -> list[int]:
     pid = os.fork()
     if pid == 0:
         ask(TRACE_ME, 0)
-        os.execv(program, [program, *case, str(STEP_SAMPLES), "best"])
+        *settings, arm = case
+        os.execv(program, [program, *settings, str(STEP_SAMPLES), "best", arm])
     try:
         wait(pid)
         with open(f"/proc/{pid}/maps") as maps:
@@ -132,19 +141,17 @@ def tools() -> dict[str, Callable[..., list[int]]]:
 
 
 def main() -> None:
-    print("| code | scheme | filters | form | median | least | most | within 10 % |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("| code | arm | scheme | filters | form | median | least | most | within 10 % |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     steady = True
     for code, counted in tools().items():
-        for scheme in SCHEMES:
-            for filters in ("paper", "exact"):
-                for form in ("plain", "factorized"):
-                    n = counted(sys.argv[1], scheme, filters, form)[START:]
-                    middle = statistics.median(n)
-                    within = sum(abs(x / middle - 1) <= 0.1 for x in n) / len(n)
-                    steady &= within == 1
-                    cells = (code, scheme, filters, form, f"{middle:.0f}", min(n), max(n), f"{within:.1%}")
-                    print("| " + " | ".join(map(str, cells)) + " |", flush=True)
+        for arm, scheme, filters, form in CASES:
+            n = counted(sys.argv[1], scheme, filters, form, arm)[START:]
+            middle = statistics.median(n)
+            within = sum(abs(x / middle - 1) <= 0.1 for x in n) / len(n)
+            steady &= within == 1
+            cells = (code, arm, scheme, filters, form, f"{middle:.0f}", min(n), max(n), f"{within:.1%}")
+            print("| " + " | ".join(map(str, cells)) + " |", flush=True)
     sys.exit(not steady)
 
 

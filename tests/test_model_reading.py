@@ -726,7 +726,6 @@ def test_a_log_that_does_not_fit(
 @pytest.mark.parametrize(
     "words",
     [
-        ("identify", "log.csv", "--arm", "arm.toml"),
         ("diagnose", "log.csv", "--arm", "three.urdf"),
         ("replay", "log.csv", "--arm", "arm.toml", "-o", "out.rrd"),
         ("simulate", "--arm", "arm.toml", "--torque", "seed", "-o", "out.csv"),
@@ -738,14 +737,13 @@ def test_commands_that_take_no_serial_arms(words: tuple[str, ...], three: Path, 
     _refused(run(*words), ())
 
 
-def test_functions_that_take_no_serial_arms(three: Path) -> None:
-    from armgap import Estimator, fit
+def test_a_function_that_takes_no_serial_arms(three: Path) -> None:
+    from armgap import fit
 
     arm = Arm.read(three / "arm.toml")
     log = Log.from_frame(_log(), arm=arm)
-    for call in (lambda: fit(log, arm), lambda: Estimator(arm)):
-        with pytest.raises(ArmgapError, match="serial"):
-            call()
+    with pytest.raises(ArmgapError, match="serial"):
+        fit(log, arm)
 
 
 def test_a_serial_arm_shows_itself(three: Path) -> None:

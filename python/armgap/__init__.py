@@ -9,6 +9,7 @@ from armgap._native import __version__
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
+    from armgap.base_columns import BaseParameters, base_parameters
     from armgap.check import CheckName, Severity
     from armgap.custom_effect import CustomEffect
     from armgap.diagnosis import Diagnosis, diagnose
@@ -29,6 +30,7 @@ __all__ = [
     "Arm",
     "ArmFit",
     "ArmgapError",
+    "BaseParameters",
     "CheckName",
     "Corrected",
     "CustomEffect",
@@ -46,6 +48,7 @@ __all__ = [
     "Status",
     "Verdict",
     "__version__",
+    "base_parameters",
     "correct",
     "diagnose",
     "effects",
@@ -62,6 +65,8 @@ __all__ = [
 _HOMES = {
     "Arm": "armgap.arm",
     "ArmgapError": "armgap.errors",
+    "BaseParameters": "armgap.base_columns",
+    "base_parameters": "armgap.base_columns",
     "CheckName": "armgap.check",
     "Severity": "armgap.check",
     "Filters": "armgap.literals",

@@ -13,7 +13,6 @@ __all__ = [
     "diagnose",
     "effects",
     "fit",
-    "identify",
     "inertia",
     "refit",
     "regression_rows",
@@ -84,22 +83,6 @@ def fit(
     tau: NDArray[np.float64],
     horizon: float,
 ) -> dict[str, Any] | None: ...
-def identify(
-    kind: str,
-    gravity: float,
-    link_length: Sequence[float] | None,
-    theta: Sequence[float],
-    scheme: str,
-    paper: bool,
-    cutoff: float,
-    forgetting: float,
-    p0: float,
-    theta0: Sequence[float],
-    t: NDArray[np.float64],
-    q: NDArray[np.float64],
-    tau: NDArray[np.float64],
-    dq: NDArray[np.float64] | None,
-) -> dict[str, Any]: ...
 def velocity(
     t: NDArray[np.float64], q: NDArray[np.float64], method: str, half_width: int = 3
 ) -> NDArray[np.float64]: ...
@@ -121,6 +104,19 @@ class Estimator:
         counts: Sequence[int],
         theta0: Sequence[float],
     ) -> Estimator: ...
+    @staticmethod
+    def of_chain(
+        chain: Chain,
+        columns: Sequence[int],
+        known: Sequence[float],
+        scheme: str,
+        paper: bool,
+        form: str | None,
+        single: bool,
+        numbers: Sequence[float],
+        counts: Sequence[int],
+        theta0: Sequence[float],
+    ) -> Estimator: ...
     def update(
         self,
         when: float,
@@ -136,12 +132,14 @@ class Estimator:
         q: NDArray[np.float64],
         dq: NDArray[np.float64] | None,
         tau: NDArray[np.float64],
-    ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8]]: ...
     def copy(self) -> Estimator: ...
     @property
     def theta(self) -> NDArray[np.float64]: ...
     @property
     def sigma(self) -> NDArray[np.float64]: ...
+    @property
+    def covariance(self) -> NDArray[np.float64]: ...
     @property
     def errors(self) -> NDArray[np.float64]: ...
     @property
@@ -165,6 +163,7 @@ class Chain:
     def parameter_names(self) -> list[str]: ...
     @property
     def parameter_units(self) -> list[str]: ...
+    def base_parameters(self, candidates: Sequence[int]) -> tuple[list[int], list[int], _Floats]: ...
     def inertia(self, theta: Sequence[float] | _Floats, q: _Floats) -> _Floats: ...
     def bias(self, theta: Sequence[float] | _Floats, q: _Floats, dq: _Floats) -> _Floats: ...
     def inverse_dynamics(self, theta: Sequence[float] | _Floats, q: _Floats, dq: _Floats, ddq: _Floats) -> _Floats: ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from armgap import _native
 from armgap.arm import Arm, kinds
+from armgap.base_columns import BaseParameters, base_parameters
 from armgap.errors import OptionError
-from armgap.literals import FILTERS, SCHEMES, Filters, Scheme
+from armgap.literals import FILTERS, SCHEMES, SERIAL, Filters, Scheme
 
 __all__ = ["OUTCOMES", "Estimator", "Run"]
 
@@ -29,11 +31,14 @@ class Run:
     ----------
     theta : ndarray, shape (n_samples, n_parameters)
         Estimate after each sample.
+    errors : ndarray, shape (n_samples, n_joints) or (n_samples, 1)
+        Prediction errors of each sample; NaN where it was not used.
     outcome : ndarray of uint8, shape (n_samples,)
         What became of each sample, as an index into `OUTCOMES`.
     """
 
     theta: NDArray[np.float64]
+    errors: NDArray[np.float64]
     outcome: NDArray[np.uint8]
 
 
@@ -45,7 +50,8 @@ class Estimator:
     Parameters
     ----------
     arm : Arm or str
-        The arm, or its kind: ``"axis"``, ``"pendulum"`` or ``"two-link"``. Of an arm only the kind is used.
+        The arm, or its kind: ``"axis"``, ``"pendulum"`` or ``"two-link"``. Of an arm only the kind is used; of a serial arm its chain, and
+        the values of fixed parameters. The base parameters of a serial arm are estimated, see `base_parameters`.
     scheme : {"filtered-power", "filtered-dynamic", "supplied-energy"}
         Regression model: equations (30), (24) and (28) of the paper.
     filters : {"exact", "paper"}
@@ -60,6 +66,8 @@ class Estimator:
         ``theta(0)``, zero by default.
     asymmetry : bool, default False
         Estimate a constant resisting torque per joint too.
+    fixed : iterable of str, optional
+        Parameters of a serial arm that keep the arm's value, by name (``"mass7"``) or, for all joints, by its beginning (``"rotor"``).
     form : {"plain", "factorized"}, optional
         How the covariance is kept: equation (21) as printed, or U D U'. By default plain in double precision with `p0` up to 1e6, factorized
         otherwise.
@@ -103,6 +111,7 @@ class Estimator:
         p0: float = 1000.0,
         theta0: ArrayLike | None = None,
         asymmetry: bool = False,
+        fixed: Iterable[str] = (),
         form: Literal["plain", "factorized"] | None = None,
         single: bool = False,
         memory: float = 400.0,
@@ -113,7 +122,7 @@ class Estimator:
     ) -> None:
         kind = arm if isinstance(arm, str) else arm.kind
         for name, value, known in (
-            ("arm", kind, tuple(kinds())),
+            ("arm", kind, (*kinds(), *([] if isinstance(arm, str) else [SERIAL]))),
             ("scheme", scheme, SCHEMES),
             ("filters", filters, FILTERS),
             ("form", form or _FORMS[0], _FORMS),
@@ -123,19 +132,50 @@ class Estimator:
         for name, count in (("settling", settling), ("learning", learning)):
             if not 0 <= count < 2**32:
                 raise OptionError(f"`{name}` is {count}", remedy="give a number of samples")
-        described = kinds()[kind]
-        self._n_joints = int(described["n_joints"])
-        self._names = tuple(described["parameter_names"])
-        if asymmetry:
-            self._names += tuple(f"asymmetry{j + 1}" for j in range(self._n_joints))
-        start = [] if theta0 is None else np.asarray(theta0, dtype=np.float64).ravel().tolist()
-        numbers = [cutoff, forgetting, p0, memory, between, floor]
-        try:
-            self._native = _native.Estimator(
-                kind, scheme, filters == "paper", form, asymmetry, single, numbers, [settling, learning], start
+        fixed = tuple(fixed)
+        if fixed and kind != SERIAL:
+            raise OptionError(
+                f"`fixed` is given for an arm of kind `{kind}`", remedy="leave it out, or give a serial arm"
             )
+        start = [] if theta0 is None else np.asarray(theta0, dtype=np.float64).ravel().tolist()
+        numbers, counts = [cutoff, forgetting, p0, memory, between, floor], [settling, learning]
+        paper = filters == "paper"
+        self._base = None
+        if not isinstance(arm, str) and arm.chain is not None:
+            self._base = base_parameters(arm, fixed=fixed, asymmetry=asymmetry)
+            self._n_joints, self._names, self._units = arm.n_joints, self._base.names, self._base.units
+            chain, columns, values = arm.chain.native(), self._base.columns, self._known(arm)
+        else:
+            described = kinds()[kind]
+            self._n_joints = int(described["n_joints"])
+            self._names, self._units = tuple(described["parameter_names"]), tuple(described["parameter_units"])
+            if asymmetry:
+                self._names += tuple(f"asymmetry{j + 1}" for j in range(self._n_joints))
+                self._units += ("N m" if described["rotary"] else "N",) * self._n_joints
+        try:
+            if self._base is None:
+                self._native = _native.Estimator(kind, scheme, paper, form, asymmetry, single, numbers, counts, start)
+            else:
+                self._native = _native.Estimator.of_chain(
+                    chain, columns, values, scheme, paper, form, single, numbers, counts, start
+                )
         except ValueError as error:
             raise OptionError(str(error), remedy="see help(armgap.Estimator) for ranges") from None
+
+    def _known(self, arm: Arm) -> list[float]:
+        """Values of fixed parameters, zero for dependent ones, which are part of combinations."""
+        dependent = () if self._base is None else self._base.dependent
+        return [0.0 if i in dependent else float(value) for i, value in enumerate(arm.theta)]
+
+    @property
+    def base(self) -> BaseParameters | None:
+        """What the entries of `theta` stand for, of a serial arm."""
+        return self._base
+
+    @property
+    def parameter_units(self) -> tuple[str, ...]:
+        """SI units of the entries of `theta`."""
+        return self._units
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -151,6 +191,11 @@ class Estimator:
     def sigma(self) -> NDArray[np.float64]:
         """Standard deviations of the estimate, as if errors were white, shape (n_parameters,)."""
         return self._native.sigma
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance `P` for an error of unit variance, shape (n_parameters, n_parameters)."""
+        return self._native.covariance
 
     @property
     def errors(self) -> NDArray[np.float64]:
@@ -261,7 +306,8 @@ class Estimator:
     def copy(self) -> Estimator:
         """Return an independent estimator in the same state: a checkpoint."""
         twin = object.__new__(Estimator)
-        twin._n_joints, twin._names, twin._native = self._n_joints, self._names, self._native.copy()
+        twin.__dict__.update(self.__dict__)
+        twin._native = self._native.copy()
         return twin
 
     def _vector(self, name: str, x: ArrayLike) -> NDArray[np.float64]:

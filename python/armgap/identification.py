@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -10,8 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armgap import _native
-from armgap.arm import Arm, only_planar
+from armgap.arm import Arm
+from armgap.base_columns import BaseParameters
 from armgap.errors import ColumnError, OptionError
+from armgap.estimator import Estimator
 from armgap.literals import FILTERS, SCHEMES, VELOCITIES, Filters, Scheme, VelocityMethod
 from armgap.log import Log
 from armgap.progress import report_progress
@@ -40,6 +43,10 @@ class Identification:
         Estimate after the last sample.
     sigma : ndarray, shape (n_parameters,)
         Standard deviations, from the last covariance and the prediction errors of the second half of the log, as if those were white.
+    nominal : ndarray, shape (n_parameters,)
+        The arm's values of the same parameters; NaN where it has none.
+    base : BaseParameters, optional
+        Of a serial arm, which sums of its parameters the entries of `theta` stand for.
     t : ndarray, shape (n_samples,)
         Sample times [s].
     history : ndarray, shape (n_samples, n_parameters)
@@ -65,6 +72,8 @@ class Identification:
     cutoff_drift: NDArray[np.float64] | None
     updates: int
     rejected: int
+    nominal: NDArray[np.float64] = field(repr=False)
+    base: BaseParameters | None = field(repr=False)
     t: NDArray[np.float64] = field(repr=False)
     history: NDArray[np.float64] = field(repr=False)
     errors: NDArray[np.float64] = field(repr=False)
@@ -86,10 +95,13 @@ class Identification:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result without its time series, ready for JSON."""
-        parameters = {
+        parameters: dict[str, dict[str, Any]] = {
             name: {"value": float(v), "sigma": float(s), "unit": unit}
             for name, v, s, unit in zip(self.parameter_names, self.theta, self.sigma, self.parameter_units, strict=True)
         }
+        if self.base is not None:
+            for name, text in zip(self.parameter_names, self.base.texts, strict=True):
+                parameters[name]["combination"] = text
         return {
             "schema": "armgap.identification/1",
             "log": self.log,
@@ -158,6 +170,7 @@ def identify(
     p0: float = 1000.0,
     theta0: ArrayLike | None = None,
     asymmetry: bool = False,
+    fixed: Iterable[str] = (),
     velocity: VelocityMethod | None = None,
 ) -> Identification:
     """Estimate the parameters of an arm from a log.
@@ -167,7 +180,8 @@ def identify(
     log : Log
         The log.
     arm : Arm
-        The arm; its values are not used, only its kind, gravity and lengths.
+        The arm; its values are not used but those of fixed parameters. Of a serial arm base parameters are estimated: sums of the arm's
+        parameters, see `base_parameters`.
     scheme : {"filtered-power", "filtered-dynamic", "supplied-energy"}
         Regression model: equations (30), (24) and (28) of the paper.
     filters : {"exact", "paper"}
@@ -182,6 +196,8 @@ def identify(
         ``theta(0)``, zero by default.
     asymmetry : bool, default False
         Estimate a constant resisting torque per joint too, which is what Coulomb friction of different levels adds in motion.
+    fixed : iterable of str, optional
+        Parameters of a serial arm that keep the arm's value, by name (``"mass7"``) or, for all joints, by its beginning (``"rotor"``).
     velocity : {"backward", "central", "local-cubic", "sensor", "midpoint"}, optional
         Where velocities come from. ``"midpoint"`` takes the difference of two positions as the velocity half-way between them and aligns
         everything else with that, as the online estimator does. By default backward for the paper's filters, central for the exact ones.
@@ -201,56 +217,57 @@ def identify(
     ----------
     F. Reyes and R. Kelly, Robotica 15 (1997) 563-571, equations (20)-(30).
     """
-    only_planar(arm, "identify")
     velocity = velocity or ("backward" if filters == "paper" else "central")
     _check(scheme, filters, cutoff, forgetting, p0, velocity)
-    names, units = list(arm.parameter_names), list(arm.parameter_units)
-    if asymmetry:
-        names += [f"asymmetry{j + 1}" for j in range(arm.n_joints)]
-        units += ["N m" if arm.rotary else "N"] * arm.n_joints
-    start = np.zeros(len(names)) if theta0 is None else np.asarray(theta0, dtype=np.float64)
-    if start.shape != (len(names),) or not np.isfinite(start).all():
-        raise OptionError(f"`theta0` has shape {start.shape}", remedy=f"give {len(names)} finite values")
+    fixed = tuple(fixed)
+    t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.with_torques("identification").tau))
     dq = _velocities(log, velocity)
 
-    def estimates(cutoff: float) -> dict[str, Any]:
-        return _estimates(log, arm, dq, start, (scheme, filters == "paper", cutoff, forgetting, p0))
+    def estimator(cutoff: float) -> Estimator:
+        return Estimator(
+            arm,
+            scheme=scheme,
+            filters=filters,
+            cutoff=cutoff,
+            forgetting=forgetting,
+            p0=p0,
+            theta0=theta0,
+            asymmetry=asymmetry,
+            fixed=fixed,
+        )
 
     report_progress(scheme, 0.0)
-    whole = estimates(cutoff)
+    whole = estimator(cutoff)
+    run = whole.run(q, tau, dq, t=t)
     report_progress(scheme, 0.5)
-    theta = whole["theta"][-1].copy()
+    names, base, theta = whole.parameter_names, whole.base, whole.theta
+    drift = None
+    if scheme != "supplied-energy":
+        half = estimator(cutoff / 2)
+        half.run(q, tau, dq, t=t)
+        drift = theta - half.theta
+    nominal = np.full(len(names), np.nan)
+    own = arm.theta if base is None else base.of(arm.theta)
+    nominal[: len(own)] = own
+    nominal[[name.startswith("asymmetry") for name in names]] = np.nan
     return Identification(
         log=log.name,
         scheme=scheme,
         filters=filters,
         velocity=velocity,
         cutoff=cutoff,
-        parameter_names=tuple(names),
-        parameter_units=tuple(units),
+        parameter_names=names,
+        parameter_units=whole.parameter_units,
         theta=theta,
-        sigma=_sigma(whole["errors"], whole["covariance"]),
-        cutoff_drift=None if scheme == "supplied-energy" else theta - estimates(cutoff / 2)["theta"][-1],
-        updates=whole["updates"],
-        rejected=whole["rejected"],
+        sigma=_sigma(run.errors, whole.covariance),
+        cutoff_drift=drift,
+        updates=whole.updates,
+        rejected=whole.rejected,
+        nominal=nominal,
+        base=base,
         t=log.t,
-        history=whole["theta"],
-        errors=whole["errors"],
-    )
-
-
-def _estimates(
-    log: Log,
-    arm: Arm,
-    dq: NDArray[np.float64] | None,
-    start: NDArray[np.float64],
-    settings: tuple[str, bool, float, float, float],
-) -> dict[str, Any]:
-    """The online estimator over the whole log, from `start`."""
-    lengths = None if arm.link_length is None else arm.link_length.tolist()
-    t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.with_torques("identification").tau))
-    return _native.identify(
-        arm.kind, arm.gravity, lengths, arm.theta.tolist(), *settings, start.tolist(), t, q, tau, dq
+        history=run.theta,
+        errors=run.errors,
     )
 
 

@@ -1,7 +1,7 @@
 //! Time of a chain's acceleration and torque regressor per state, for six and seven revolute joints: one state at a time with the
 //! instructions of any processor, and several side by side with those this one has.
 
-use armgap_core::chain::{Chain, ChainJoint, JointKind, point_mass};
+use armgap_bench::serial::arm;
 use armgap_core::cpu::{Cpu, Kernel, Level};
 use armgap_core::lanes::Lanes;
 use armgap_core::number::Number;
@@ -11,31 +11,6 @@ use std::time::Instant;
 /// States per measurement, and measurements of which the shortest counts.
 const STATES: usize = 4096;
 const REPEATS: usize = 30;
-
-/// A chain like a six- or seven-axis arm: axes in turn across and along, links of a third of a metre.
-fn arm<const N: usize>() -> (Chain<f64, N>, [[f64; 10]; N]) {
-    let joints = std::array::from_fn(|j| {
-        let across = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
-        let back = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]];
-        ChainJoint {
-            kind: JointKind::Revolute,
-            rotation: if j % 2 == 0 { across } else { back },
-            translation: [0.02, 0.03, 0.3],
-            axis: [0.0, 0.0, 1.0],
-        }
-    });
-    let link = std::array::from_fn(|j| {
-        let mut link = [0.0; 10];
-        for at in [[0.1, 0.0, 0.0], [0.0, 0.05, 0.2], [-0.05, 0.1, 0.1], [0.0, -0.1, 0.05]] {
-            let point = point_mass(2.0 / (1.0 + j as f64), at);
-            for (sum, x) in link.iter_mut().zip(point) {
-                *sum += x;
-            }
-        }
-        link
-    });
-    (Chain::new(joints, [0.0, 0.0, -9.81]), link)
-}
 
 /// Shortest time per pass of a body, ns. A macro: a closure would not be compiled for the instructions of its surroundings.
 macro_rules! shortest {

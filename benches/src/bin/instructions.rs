@@ -1,32 +1,53 @@
 //! One call of `one_sample` per sample, for a tool that counts instructions: `instructions SCHEME paper|exact plain|factorized SAMPLES
-//! best|portable`.
+//! best|portable two-link|serial`. The serial arm has seven joints and consistent filters.
 
-use armgap_bench::cost::{Online, fresh, readings};
+use armgap_bench::cost::{fresh, readings};
 use armgap_bench::run::PERIOD;
+use armgap_bench::serial;
+use armgap_core::chain::PARAMETERS_PER_JOINT;
 use armgap_core::cpu::Level;
-use armgap_core::identify::Reading;
+use armgap_core::online::{OnlineEstimator, When};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::Form;
+use armgap_fit::base_parameters::AmongParameters;
+use armgap_fit::chain::ChainDescription;
 use std::hint::black_box;
 
 /// What is counted.
 #[inline(never)]
-fn one_sample(estimator: &mut Online<f64>, reading: &Reading<f64, 2>) {
-    black_box(estimator.update_after(PERIOD, reading));
+fn one_sample(take: &mut dyn FnMut(usize), k: usize) {
+    take(k);
 }
 
 fn main() {
     let words: Vec<String> = std::env::args().collect();
     let word = |i: usize| words.get(i).map_or("", String::as_str);
     let (Some(scheme), Ok(count)) = (Scheme::from_name(word(1)), word(4).parse::<usize>()) else {
-        eprintln!("usage: instructions SCHEME paper|exact plain|factorized SAMPLES best|portable");
+        eprintln!(
+            "usage: instructions SCHEME paper|exact plain|factorized SAMPLES best|portable two-link|serial"
+        );
         std::process::exit(2);
     };
     let variant = if word(2) == "paper" { Variant::Paper } else { Variant::Exact };
     let form = if word(3) == "plain" { Form::Plain } else { Form::Factorized };
     let level = if word(5) == "portable" { Level::PORTABLE } else { Level::detect() };
-    let mut estimator = fresh::<f64>(scheme, variant, form).with_level(level);
-    for reading in readings::<f64>().iter().take(count) {
-        one_sample(&mut estimator, reading);
+    if word(6) == "serial" {
+        let (chain, _) = serial::arm::<{ serial::JOINTS }>();
+        let arm = ChainDescription { joints: chain.joints().to_vec(), gravity: *chain.gravity_vector() };
+        let all: Vec<usize> = (0..PARAMETERS_PER_JOINT * serial::JOINTS).collect();
+        let base = AmongParameters(&all).of(&arm).expect("seven joints").columns;
+        let mut estimator = serial::fresh(scheme, form, &base).with_level(level);
+        let data = serial::samples(count);
+        let mut take = |k: usize| {
+            let _ = black_box(estimator.update(When::After(PERIOD), &data[k].0, None, &data[k].1));
+        };
+        (0..count).for_each(|k| one_sample(&mut take, k));
+    } else {
+        let mut estimator = fresh::<f64>(scheme, variant, form).with_level(level);
+        let data = readings::<f64>();
+        let mut take = |k: usize| {
+            black_box(estimator.update_after(PERIOD, &data[k]));
+        };
+        (0..count.min(data.len())).for_each(|k| one_sample(&mut take, k));
     }
 }

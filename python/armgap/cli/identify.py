@@ -20,7 +20,7 @@ from armgap.cli.common import (
     read_arm,
     units_option,
 )
-from armgap.cli.files import Command, InputFile
+from armgap.cli.files import Command, InputFile, Words
 from armgap.cli.progress import working
 from armgap.literals import FILTERS, SCHEMES
 from armgap.output import is_stdout, write
@@ -47,6 +47,12 @@ __all__ = ["command"]
     help="Velocity estimate; backward for the paper's filters, central for the exact ones. midpoint: as online.",
 )
 @click.option("--asymmetry", is_flag=True, help="Estimate a torque offset per joint (asymmetric Coulomb friction) too.")
+@click.option(
+    "--fixed",
+    type=Words(),
+    metavar="NAME,…",
+    help="Parameters of a serial arm that keep the arm file's value: mass7, or rotor for all joints.",
+)
 @corrections_options
 @json_option
 @columns_option
@@ -60,6 +66,7 @@ def command(
     cutoff: float,
     velocity: str | None,
     asymmetry: bool,
+    fixed: str | None,
     json_file: str | None,
     columns: str | None,
     units: str | None,
@@ -79,6 +86,7 @@ def command(
     with working("reading", quiet=quiet):
         read = gather(logs, arm, columns=parse_columns(columns), units=parse_units(units))
         settings: dict[str, Any] = {"filters": filters, "cutoff": cutoff, "velocity": velocity, "asymmetry": asymmetry}
+        settings["fixed"] = [name.strip() for name in fixed.split(",")] if fixed else []
         results = interruptible(lambda: _identified(read, arm, schemes, settings))
     if json_file is not None:
         write(json_file, json.dumps([r.to_dict() for r in results], indent=2))
@@ -96,10 +104,14 @@ def command(
             table.add_column(r.scheme, justify="right")
         table.add_column("unit")
         for i, name in enumerate(mine[0].parameter_names):
-            nominal = f"{arm.theta[i]:.4g}" if i < len(arm.theta) else ""
+            nominal = "" if mine[0].nominal[i] != mine[0].nominal[i] else f"{mine[0].nominal[i]:.4g}"
             cells = [f"{r.theta[i]:.4g} ± {r.sigma[i]:.2g}" for r in mine]
             table.add_row(name, nominal, *cells, mine[0].parameter_units[i])
         console().print(table)
+        if mine[0].base is not None:
+            console().print("Base parameters are sums of the arm's parameters:", highlight=False)
+            for text in mine[0].base.texts:
+                console().print(f"  {text}", highlight=False, markup=False)
         for r in mine:
             for note in r.notes:
                 console().print(f"[bold]{r.scheme}:[/bold] {note}.")

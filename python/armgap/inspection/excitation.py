@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from armgap import _native
 from armgap._renamed import old_names
 from armgap.arm import Arm
+from armgap.estimator import Estimator
 from armgap.log import Log
 from armgap.log.stretches import choose
 
@@ -110,12 +111,9 @@ def excitation(log: Log, arm: Arm) -> Excitation:
 def _information(log: Log, arm: Arm) -> NDArray[np.float64]:
     """Return ``sum psi' psi`` over a log."""
     t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.tau))
-    lengths = None if arm.link_length is None else arm.link_length.tolist()
-    zero = [0.0] * len(arm.theta)
-    settings = ("filtered-dynamic", False, _CUTOFF, 1.0, _P0)
-    dq = _native.velocity(t, q, "local-cubic", 3)
-    history = _native.identify(arm.kind, arm.gravity, lengths, arm.theta.tolist(), *settings, zero, t, q, tau, dq)
-    values, vectors = np.linalg.eigh(history["covariance"])
+    estimator = Estimator(arm, scheme="filtered-dynamic", cutoff=_CUTOFF, p0=_P0)
+    estimator.run(q, tau, _native.velocity(t, q, "local-cubic", 3), t=t)
+    values, vectors = np.linalg.eigh(estimator.covariance)
     information = np.maximum(1.0 / np.maximum(values, np.finfo(float).tiny) - 1.0 / _P0, 0.0)
     return np.asarray((vectors * information) @ vectors.T)
 

@@ -3,6 +3,7 @@
 pub mod cost;
 pub mod run;
 pub mod scaling;
+pub mod serial;
 
 // The example in Rust of the project's README is compiled and run with the documentation tests.
 #[cfg(doctest)]

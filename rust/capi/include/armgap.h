@@ -1,8 +1,8 @@
 /*
  * armgap: identification of a robot arm's parameters inside its controller.
  *
- * An estimator lives in memory of the caller's: a variable of type armgap_estimator (double precision) or armgap_estimator_f32. No
- * function allocates, locks, prints, or keeps anything of its own, so different estimators may run in different threads. Functions
+ * An estimator lives in memory of the caller's: a variable of type armgap_estimator (double precision) or armgap_estimator_f32, or for
+ * a serial arm of one to seven joints (armgap_chain_...) as many bytes as armgap_chain_size says, aligned to 8. No function allocates, locks, prints, or keeps anything of its own, so different estimators may run in different threads. Functions
  * return ARMGAP_OK (0) or another armgap_status; a failed call has changed nothing. Vectors are arrays in SI units with their
  * lengths beside them; any pointer that a function does not call optional must not be null.
  *
@@ -15,6 +15,11 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+/*
+ Version of the functions and types of serial arms.
+ */
+#define ARMGAP_CHAIN_VERSION 2
 
 /*
  What a call answers.
@@ -182,6 +187,31 @@ typedef uint32_t armgap_form;
 #endif // __cplusplus
 
 /*
+ Kinds of joint.
+ */
+enum armgap_joint_kind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   Turns about its axis: rad, N m.
+   */
+  ARMGAP_REVOLUTE = 0,
+  /*
+   Slides along its axis: m, N.
+   */
+  ARMGAP_PRISMATIC = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum armgap_joint_kind armgap_joint_kind;
+#else
+typedef uint32_t armgap_joint_kind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
  Settings; `armgap_settings_default` fills them.
  */
 typedef struct {
@@ -292,6 +322,98 @@ typedef struct {
    */
   uint64_t opaque[256];
 } armgap_estimator_f32;
+
+/*
+ Settings of an estimator of a serial arm; `armgap_chain_settings_default` fills them.
+ */
+typedef struct {
+  /*
+   `ARMGAP_CHAIN_VERSION`.
+   */
+  uint32_t version;
+  /*
+   Number of joints, 1 to 7.
+   */
+  uint32_t joints;
+  /*
+   Number of parameters that are estimated, 1 to 72.
+   */
+  uint32_t parameters;
+  /*
+   An `armgap_scheme`.
+   */
+  uint32_t scheme;
+  /*
+   An `armgap_filters`.
+   */
+  uint32_t filters;
+  /*
+   An `armgap_form`.
+   */
+  uint32_t form;
+  /*
+   Samples used before the alarm begins to learn.
+   */
+  uint32_t settling;
+  /*
+   Samples from which the alarm learns the errors' sizes, at least 2.
+   */
+  uint32_t learning;
+  /*
+   Acceleration of gravity in the frame of the base [m/s^2].
+   */
+  double gravity[3];
+  /*
+   Cut-off of the filters, rad/s.
+   */
+  double cutoff;
+  /*
+   Forgetting factor, above 0 and at most 1.
+   */
+  double forgetting;
+  /*
+   Initial covariance, times the unit matrix; forgetting lifts no variance above it.
+   */
+  double p0;
+  /*
+   Samples over which spread and excitation are averaged, at least 1.
+   */
+  double memory;
+  /*
+   Mean samples between false alarms, at least 10.
+   */
+  double between;
+  /*
+   Smallest standard deviation of an error that matters, in the error's unit.
+   */
+  double floor;
+} armgap_chain_settings;
+
+/*
+ A joint of a serial arm, in the frame of the link before it, or of the base. The link's frame is the joint's, moved by the joint.
+ */
+typedef struct {
+  /*
+   An `armgap_joint_kind`.
+   */
+  uint32_t kind;
+  /*
+   Not used; 0.
+   */
+  uint32_t reserved;
+  /*
+   Rotation matrix, row by row, from the joint's frame into that of the link before, at position 0.
+   */
+  double rotation[9];
+  /*
+   Origin of the joint's frame in that of the link before [m].
+   */
+  double translation[3];
+  /*
+   Unit vector along the axis, in the joint's frame.
+   */
+  double axis[3];
+} armgap_joint;
 
 #ifdef __cplusplus
 extern "C" {
@@ -433,6 +555,148 @@ armgap_status armgap_advance(uint32_t arm,
                              double *dq,
                              const double *tau,
                              size_t joints);
+
+/*
+ Fills `settings` for an arm with so many joints and estimated parameters on a level base: filtered power, exact filters at 50 rad/s, no
+ forgetting, gravity of 9.81 against z.
+ */
+armgap_status armgap_chain_settings_default(armgap_chain_settings *settings,
+                                            uint32_t joints,
+                                            uint32_t parameters);
+
+/*
+ Bytes of memory that an estimator in double precision needs, aligned to 8; 0 if there is none of so many joints and parameters.
+ */
+size_t armgap_chain_size(uint32_t joints,
+                         uint32_t parameters);
+
+/*
+ Starts an estimator in `size` bytes of the caller's memory, at least `armgap_chain_size`. `joints` has one entry per joint, `columns` one per
+ estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx,
+ xy, yy, xz, yz, zz about the origin of its frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known`
+ holds the values of the first 13 numbers per joint, of which those count that are not estimated; optional, zeros by default. `theta0`
+ holds one start value per estimated parameter; optional, zeros by default. Starting again is allowed at any time.
+ */
+armgap_status armgap_chain_start(void *memory,
+                                 size_t size,
+                                 const armgap_chain_settings *settings,
+                                 const armgap_joint *joints,
+                                 const uint32_t *columns,
+                                 const double *known,
+                                 const double *theta0);
+
+/*
+ Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, each of `joints`
+ entries. Whether velocities are given is settled by the first sample.
+ */
+armgap_status armgap_chain_update(void *memory,
+                                  double t,
+                                  const double *q,
+                                  const double *dq,
+                                  const double *tau,
+                                  size_t joints);
+
+/*
+ Takes one sample `h` seconds after the last one. Arguments as for `armgap_chain_update`.
+ */
+armgap_status armgap_chain_update_after(void *memory,
+                                        double h,
+                                        const double *q,
+                                        const double *dq,
+                                        const double *tau,
+                                        size_t joints);
+
+/*
+ Copies the estimate; `count` is the number of estimated parameters.
+ */
+armgap_status armgap_chain_theta(const void *memory, double *theta, size_t count);
+
+/*
+ Copies the diagonal of the covariance for an error of unit variance.
+ */
+armgap_status armgap_chain_variances(const void *memory, double *variances, size_t count);
+
+/*
+ Copies the standard deviations of the estimate, as if errors were white.
+ */
+armgap_status armgap_chain_sigma(const void *memory, double *sigma, size_t count);
+
+/*
+ Copies the prediction errors of the last sample that was used; `count` is the number of outputs.
+ */
+armgap_status armgap_chain_errors(const void *memory, double *errors, size_t count);
+
+/*
+ Fills `report`.
+ */
+armgap_status armgap_chain_report_of(const void *memory, armgap_report *report);
+
+/*
+ Bytes of memory that an estimator in single precision needs, aligned to 8; 0 if there is none of so many joints and parameters.
+ */
+size_t armgap_chain_size_f32(uint32_t joints,
+                             uint32_t parameters);
+
+/*
+ Starts an estimator in `size` bytes of the caller's memory, at least `armgap_chain_size_f32`. `joints` has one entry per joint, `columns` one per
+ estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx,
+ xy, yy, xz, yz, zz about the origin of its frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known`
+ holds the values of the first 13 numbers per joint, of which those count that are not estimated; optional, zeros by default. `theta0`
+ holds one start value per estimated parameter; optional, zeros by default. Starting again is allowed at any time.
+ */
+armgap_status armgap_chain_start_f32(void *memory,
+                                     size_t size,
+                                     const armgap_chain_settings *settings,
+                                     const armgap_joint *joints,
+                                     const uint32_t *columns,
+                                     const double *known,
+                                     const float *theta0);
+
+/*
+ Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, each of `joints`
+ entries. Whether velocities are given is settled by the first sample.
+ */
+armgap_status armgap_chain_update_f32(void *memory,
+                                      float t,
+                                      const float *q,
+                                      const float *dq,
+                                      const float *tau,
+                                      size_t joints);
+
+/*
+ Takes one sample `h` seconds after the last one. Arguments as for `armgap_chain_update_f32`.
+ */
+armgap_status armgap_chain_update_after_f32(void *memory,
+                                            float h,
+                                            const float *q,
+                                            const float *dq,
+                                            const float *tau,
+                                            size_t joints);
+
+/*
+ Copies the estimate; `count` is the number of estimated parameters.
+ */
+armgap_status armgap_chain_theta_f32(const void *memory, float *theta, size_t count);
+
+/*
+ Copies the diagonal of the covariance for an error of unit variance.
+ */
+armgap_status armgap_chain_variances_f32(const void *memory, float *variances, size_t count);
+
+/*
+ Copies the standard deviations of the estimate, as if errors were white.
+ */
+armgap_status armgap_chain_sigma_f32(const void *memory, float *sigma, size_t count);
+
+/*
+ Copies the prediction errors of the last sample that was used; `count` is the number of outputs.
+ */
+armgap_status armgap_chain_errors_f32(const void *memory, float *errors, size_t count);
+
+/*
+ Fills `report`.
+ */
+armgap_status armgap_chain_report_of_f32(const void *memory, armgap_report *report);
 
 #ifdef __cplusplus
 }  // extern "C"

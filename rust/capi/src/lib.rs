@@ -6,12 +6,17 @@
 // Units in brackets are for the header, which is made from these comments.
 #![allow(non_camel_case_types, rustdoc::broken_intra_doc_links)]
 
+mod chain;
+mod chain_single;
+mod chain_slot;
 mod double;
 mod settings;
 mod simulate;
 mod single;
 mod slot;
 
+pub use chain::*;
+pub use chain_single::*;
 pub use double::*;
 pub use settings::*;
 pub use simulate::*;

@@ -1,7 +1,7 @@
 //! An estimator in memory of the caller's.
 
 use crate::settings::{armgap_report, armgap_settings, armgap_status, status_of};
-use armgap_core::online::{MOST_PARAMETERS, Online, SampleStatus, When};
+use armgap_core::online::{MOST_JOINTS, MOST_PARAMETERS, Online, OnlineEstimator, SampleStatus, When};
 use armgap_core::real::Real;
 use armgap_status::{
     ARMGAP_LENGTH, ARMGAP_NOT_STARTED, ARMGAP_NULL, ARMGAP_OK, ARMGAP_RANGE, ARMGAP_REJECTED,
@@ -23,7 +23,7 @@ impl<T: Real> Slot<T> {
 }
 
 /// Whether a pointer can be read or written.
-fn usable<T>(pointer: *const T) -> Result<(), armgap_status> {
+pub(crate) fn usable<T>(pointer: *const T) -> Result<(), armgap_status> {
     if pointer.is_null() {
         Err(ARMGAP_NULL)
     } else if !pointer.is_aligned() {
@@ -33,17 +33,21 @@ fn usable<T>(pointer: *const T) -> Result<(), armgap_status> {
     }
 }
 
-/// A slice of the caller's numbers.
-unsafe fn slice<'a, T>(pointer: *const T, count: usize) -> Result<&'a [T], armgap_status> {
+/// A slice of the caller's numbers, at most so many.
+pub(crate) unsafe fn slice<'a, T>(
+    pointer: *const T,
+    count: usize,
+    most: usize,
+) -> Result<&'a [T], armgap_status> {
     usable(pointer)?;
-    if count > MOST_PARAMETERS {
+    if count > most {
         return Err(ARMGAP_LENGTH);
     }
     // SAFETY: not null, aligned, and small; that it holds `count` numbers is the caller's promise.
     Ok(unsafe { core::slice::from_raw_parts(pointer, count) })
 }
 
-fn answer(done: Result<armgap_status, armgap_status>) -> armgap_status {
+pub(crate) fn answer(done: Result<armgap_status, armgap_status>) -> armgap_status {
     match done {
         Ok(status) | Err(status) => status,
     }
@@ -66,7 +70,11 @@ pub(crate) unsafe fn start<T: Real, M>(
         if size != size_of::<M>() {
             return Err(ARMGAP_VERSION);
         }
-        let theta0 = if theta0.is_null() && count == 0 { &[] } else { unsafe { slice(theta0, count)? } };
+        let theta0 = if theta0.is_null() && count == 0 {
+            &[]
+        } else {
+            unsafe { slice(theta0, count, MOST_PARAMETERS)? }
+        };
         // SAFETY: checked above.
         let online_settings = unsafe { &*settings }.online_settings::<T>().ok_or(ARMGAP_RANGE)?;
         let online = Online::new(online_settings, theta0).map_err(status_of)?;
@@ -98,20 +106,29 @@ pub(crate) unsafe fn update<T: Real, M>(
 ) -> armgap_status {
     answer((|| {
         unsafe { opened::<T, M>(memory)? };
-        let (q, tau) = unsafe { (slice(q, joints)?, slice(tau, joints)?) };
-        let dq = if dq.is_null() { None } else { Some(unsafe { slice(dq, joints)? }) };
+        let (q, tau) = unsafe { (slice(q, joints, MOST_JOINTS)?, slice(tau, joints, MOST_JOINTS)?) };
+        let dq = if dq.is_null() { None } else { Some(unsafe { slice(dq, joints, MOST_JOINTS)? }) };
         // SAFETY: opened above; nobody else holds it during this call.
         let online = unsafe { &mut (*memory.cast::<Slot<T>>()).online };
-        Ok(match online.update(when, q, dq, tau).map_err(status_of)? {
-            SampleStatus::Updated => ARMGAP_OK,
-            SampleStatus::Starting => ARMGAP_STARTING,
-            SampleStatus::Rejected => ARMGAP_REJECTED,
-        })
+        online.update(when, q, dq, tau).map(outcome).map_err(status_of)
     })())
 }
 
+/// The status code of what became of a sample.
+pub(crate) fn outcome(status: SampleStatus) -> armgap_status {
+    match status {
+        SampleStatus::Updated => ARMGAP_OK,
+        SampleStatus::Starting => ARMGAP_STARTING,
+        SampleStatus::Rejected => ARMGAP_REJECTED,
+    }
+}
+
 /// Copies numbers of the estimator to the caller, who has to have room for exactly as many.
-unsafe fn give<T: Real>(from: &[T], to: *mut T, count: usize) -> Result<armgap_status, armgap_status> {
+pub(crate) unsafe fn give<T: Real>(
+    from: &[T],
+    to: *mut T,
+    count: usize,
+) -> Result<armgap_status, armgap_status> {
     usable(to.cast_const())?;
     if count != from.len() {
         return Err(ARMGAP_LENGTH);
@@ -140,21 +157,25 @@ pub(crate) unsafe fn sigma<T: Real, M>(memory: *const M, to: *mut T, count: usiz
 }
 
 pub(crate) unsafe fn report<T: Real, M>(memory: *const M, to: *mut armgap_report) -> armgap_status {
-    answer((|| {
-        let online = unsafe { &opened::<T, M>(memory)?.online };
-        usable(to.cast_const())?;
-        let double = |x: T| x.to_subset().unwrap_or(f64::NAN);
-        let settings = online.settings();
-        let report = armgap_report {
-            updates: online.updates(),
-            rejected: online.rejected(),
-            excitation: double(online.excitation()),
-            alarm: double(online.alarm_level()),
-            parameters: u32::try_from(settings.parameters()).unwrap_or(0),
-            outputs: u32::try_from(settings.outputs()).unwrap_or(0),
-        };
-        // SAFETY: not null, aligned.
-        unsafe { to.write(report) };
-        Ok(ARMGAP_OK)
-    })())
+    answer((|| unsafe { fill_report(opened::<T, M>(memory)?.online.estimator(), to) })())
+}
+
+/// What an estimator says about itself.
+pub(crate) unsafe fn fill_report<T: Real>(
+    estimator: &dyn OnlineEstimator<T>,
+    to: *mut armgap_report,
+) -> Result<armgap_status, armgap_status> {
+    usable(to.cast_const())?;
+    let double = |x: T| x.to_subset().unwrap_or(f64::NAN);
+    let report = armgap_report {
+        updates: estimator.updates(),
+        rejected: estimator.rejected(),
+        excitation: double(estimator.excitation()),
+        alarm: double(estimator.alarm_level()),
+        parameters: u32::try_from(estimator.theta().len()).unwrap_or(0),
+        outputs: u32::try_from(estimator.errors().len()).unwrap_or(0),
+    };
+    // SAFETY: not null, aligned.
+    unsafe { to.write(report) };
+    Ok(ARMGAP_OK)
 }

@@ -60,6 +60,7 @@ fn runs(program: &mut Command) -> String {
 
 const CONTROLLER: &str = "../../examples/controller/controller.c";
 const ABI: &str = "tests/abi.c";
+const CHAIN: &str = "tests/chain.c";
 const C11: &[&str] = &["-std=c11"];
 
 fn is_accurate(printed: &str) {
@@ -95,8 +96,10 @@ fn the_example_is_cpp_too() {
 
 #[test]
 fn every_bad_call_is_answered() {
-    let (_folder, program) = built("cc", ABI, C11);
-    runs(&mut Command::new(program));
+    for source in [ABI, CHAIN] {
+        let (_folder, program) = built("cc", source, C11);
+        runs(&mut Command::new(program));
+    }
 }
 
 #[test]
@@ -110,7 +113,7 @@ fn sanitizers_find_nothing() {
         eprintln!("skipped: cc has no address and undefined-behaviour sanitizers ({line})");
         return;
     }
-    for source in [ABI, CONTROLLER] {
+    for source in [ABI, CHAIN, CONTROLLER] {
         let (_folder, program) = built("cc", source, &flags);
         runs(&mut Command::new(program));
     }
@@ -122,7 +125,7 @@ fn valgrind_finds_nothing() {
         eprintln!("skipped: valgrind is not installed");
         return;
     }
-    for source in [ABI, CONTROLLER] {
+    for source in [ABI, CHAIN, CONTROLLER] {
         let (_folder, program) = built("cc", source, C11);
         let mut command = Command::new("valgrind");
         runs(

@@ -13,6 +13,8 @@ fn the_header_is_current() {
         .with_src(folder.join("src/double.rs"))
         .with_src(folder.join("src/single.rs"))
         .with_src(folder.join("src/simulate.rs"))
+        .with_src(folder.join("src/chain.rs"))
+        .with_src(folder.join("src/chain_single.rs"))
         .generate()
         .expect("a header")
         .write(&mut made);

@@ -13,7 +13,8 @@ use crate::cpu::{Cpu, Kernel, Level};
 use crate::filter::Cutoff;
 use crate::real::{Real, lit};
 use crate::regression::{
-    FilteredDynamic, FilteredPower, SampleInterval, Scheme, Snapshot, SuppliedEnergy, Variant,
+    AllColumns, Columns, FilteredDynamic, FilteredPower, SampleInterval, Scheme, Snapshot, SuppliedEnergy,
+    Variant,
 };
 use crate::rls::{Form, Rls, Update};
 use nalgebra::SVector;
@@ -105,24 +106,34 @@ enum Seen {
     More,
 }
 
-/// A running estimator: settings, arm, and state in one value without allocation.
+/// A running estimator: settings, arm, and state in one value without allocation. `S` says which of the arm's parameters it estimates.
 #[derive(Debug, Clone, Copy)]
-pub struct Estimator<T: Real, A, const N: usize, const P: usize, const R: usize> {
+pub struct Estimator<T: Real, A, const N: usize, const P: usize, const R: usize, S = AllColumns>
+where
+    S: Columns<T, N, P, R>,
+{
     arm: A,
+    columns: S,
     settings: Settings<T, R>,
-    rls: Rls<T, R>,
+    rls: Rls<T, R, S::Count>,
     past: Past<T, N>,
     regression: Option<Regression<T, N, P>>,
     rejected: u64,
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Estimator<T, A, N, P, R> {
-    /// An estimator that has seen nothing yet.
+    /// An estimator of all parameters that has seen nothing yet.
     pub fn new(arm: A, settings: Settings<T, R>) -> Self {
-        const {
-            assert!(R == P || R == P + N, "R is the arm's parameters, or those and one asymmetry per joint");
-        }
-        let rls = Rls::new(settings.theta0, settings.p0, settings.forgetting);
+        Self::of_columns(arm, AllColumns, settings)
+    }
+}
+
+impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: usize, const R: usize>
+    Estimator<T, A, N, P, R, S>
+{
+    /// An estimator of some parameters that has seen nothing yet.
+    pub fn of_columns(arm: A, columns: S, settings: Settings<T, R>) -> Self {
+        let rls = Rls::new(settings.theta0, settings.p0, settings.forgetting).with_count(columns.count());
         let (zero, none) = (SVector::zeros(), T::zero());
         let past = Past {
             seen: Seen::Nothing,
@@ -134,7 +145,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
             inverse: none,
             tau_before: zero,
         };
-        Self { arm, settings, rls, past, regression: None, rejected: 0 }
+        Self { arm, columns, settings, rls, past, regression: None, rejected: 0 }
     }
 
     /// Keeps the covariance in another form than the default of its precision.
@@ -151,7 +162,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
 
     /// Estimate and covariance.
     #[inline]
-    pub fn rls(&self) -> &Rls<T, R> {
+    pub fn rls(&self) -> &Rls<T, R, S::Count> {
         &self.rls
     }
 
@@ -289,22 +300,22 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
         interval: &SampleInterval<T, N>,
         tau: &SVector<T, N>,
     ) -> Outcome<T, N> {
-        let (arm, variant) = (&self.arm, self.settings.variant);
+        let (arm, columns, variant) = (&self.arm, &self.columns, self.settings.variant);
         let outcome = match &mut self.regression {
             None => Outcome::Starting,
             Some(Regression::Dynamic(scheme)) => {
-                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, interval);
+                let (psi, y) = scheme.update::<C, A, S, R>(arm, columns, variant, now, interval);
                 match self.rls.learn::<C, _>(&psi, &y) {
                     Update::Used(error) => Outcome::Updated(error),
                     Update::Rejected => Outcome::Rejected,
                 }
             }
             Some(Regression::Energy(scheme)) => {
-                let (psi, y) = scheme.update::<A, R>(arm, variant, now, interval, tau);
+                let (psi, y) = scheme.update::<A, S, R>(arm, columns, variant, now, interval, tau);
                 scalar(self.rls.learn::<C, _>(&psi, &y))
             }
             Some(Regression::Power(scheme)) => {
-                let (psi, y) = scheme.update::<C, A, R>(arm, variant, now, interval, tau);
+                let (psi, y) = scheme.update::<C, A, S, R>(arm, columns, variant, now, interval, tau);
                 scalar(self.rls.learn::<C, _>(&psi, &y))
             }
         };
@@ -317,8 +328,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
 }
 
 /// One call of [`Estimator::update`].
-struct SampleKernel<'a, T: Real, A, const N: usize, const P: usize, const R: usize> {
-    estimator: &'a mut Estimator<T, A, N, P, R>,
+struct SampleKernel<'a, T: Real, A, S: Columns<T, N, P, R>, const N: usize, const P: usize, const R: usize> {
+    estimator: &'a mut Estimator<T, A, N, P, R, S>,
     t: T,
     h: T,
     q: &'a SVector<T, N>,
@@ -326,8 +337,8 @@ struct SampleKernel<'a, T: Real, A, const N: usize, const P: usize, const R: usi
     tau: &'a SVector<T, N>,
 }
 
-impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Kernel
-    for SampleKernel<'_, T, A, N, P, R>
+impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: usize, const R: usize> Kernel
+    for SampleKernel<'_, T, A, S, N, P, R>
 {
     type Output = Outcome<T, N>;
 

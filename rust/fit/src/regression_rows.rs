@@ -7,7 +7,7 @@ use crate::arm::WithArm;
 use armgap_core::arm::Arm;
 use armgap_core::cpu::Portable;
 use armgap_core::filter::Cutoff;
-use armgap_core::regression::{FilteredDynamic, SampleInterval, Snapshot, Variant};
+use armgap_core::regression::{AllColumns, FilteredDynamic, SampleInterval, Snapshot, Variant};
 use nalgebra::SVector;
 
 /// A log whose rows are wanted; rows of `q` and `tau` follow each other.
@@ -63,7 +63,8 @@ impl WithArm for RegressionRows<'_> {
                 second: row(self.tau, k - 1),
                 middle: row(self.q, k - 1),
             };
-            let (psi, y) = model.update::<Portable, A, P>(&arm, Variant::Exact, &between(k), &interval);
+            let (psi, y) =
+                model.update::<Portable, A, _, P>(&arm, &AllColumns, Variant::Exact, &between(k), &interval);
             rows.psi.extend(psi.iter().flatten());
             rows.y.extend(y);
         }

@@ -4,6 +4,7 @@ use crate::convert::{effect_instances, matrix, vector};
 use crate::progress::with_progress;
 use crate::simulate::{Inputs, Motion};
 use armgap_core::chain::{ChainJoint, JointKind, MAX_JOINTS, PARAMETERS_PER_JOINT};
+use armgap_fit::base_parameters::AmongParameters;
 use armgap_fit::chain::{ChainDescription, ChainRows, Quantity};
 use armgap_fit::simulate::Simulation;
 use numpy::{
@@ -32,6 +33,11 @@ struct Arguments<'a, 'py> {
 }
 
 impl Chain {
+    /// The chain as the crates below take it.
+    pub(crate) fn description(&self) -> &ChainDescription {
+        &self.description
+    }
+
     fn joints(&self) -> usize {
         self.description.joints.len()
     }
@@ -200,6 +206,19 @@ impl Chain {
     #[getter]
     fn parameter_units(&self) -> Vec<&'static str> {
         self.description.parameters().into_iter().map(|(_, unit)| unit).collect()
+    }
+
+    /// Base parameters among these candidates, of which `13 n + j` is a constant torque of joint `j`: estimated parameters, dependent ones,
+    /// and what each of these adds to each of those.
+    fn base_parameters<'py>(
+        &self,
+        py: Python<'py>,
+        candidates: Vec<usize>,
+    ) -> PyResult<(Vec<usize>, Vec<usize>, Bound<'py, PyArray2<f64>>)> {
+        let base = AmongParameters(&candidates).of(&self.description).ok_or_else(wrong_size)?;
+        let combination =
+            PyArray1::from_vec(py, base.combination).reshape([base.columns.len(), base.dependent.len()])?;
+        Ok((base.columns, base.dependent, combination))
     }
 
     fn inertia<'py>(

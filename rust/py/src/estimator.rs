@@ -1,42 +1,108 @@
 //! `Estimator`: the online estimator, one sample at a time or over arrays.
 
+use crate::chain::Chain;
 use crate::convert::{kind_of, matrix, vector};
+use armgap_core::chain::{ChainJoint, MAX_JOINTS};
 use armgap_core::monitor::MonitorSettings;
-use armgap_core::online::{MOST_PARAMETERS, Online, OnlineError, OnlineSettings, SampleStatus, When};
+use armgap_core::online::{
+    ChainSettings, ChainSize, EstimatorSettings, LargeChain, MediumChain, Online, OnlineError,
+    OnlineEstimator, OnlineSettings, SampleStatus, SmallChain, When,
+};
 use armgap_core::real::{Real, lit};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::Form;
+use armgap_fit::chain::ChainDescription;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+/// Estimates and errors after every sample, and what became of each.
+type Run<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<u8>>);
+
+/// An estimator of any arm.
+#[allow(clippy::large_enum_variant)] // Kept in a box.
+#[derive(Clone, Copy)]
+enum Running<T: Real> {
+    OfKind(Online<T>),
+    Small(SmallChain<T>),
+    Medium(MediumChain<T>),
+    Large(LargeChain<T>),
+}
+
+impl<T: Real> Running<T> {
+    fn of_chain(settings: &ChainSettings<'_, T>, theta0: &[T]) -> PyResult<Self> {
+        let made = match ChainSize::of(settings.joints.len(), settings.columns.len()) {
+            Some(ChainSize::Small) => SmallChain::of_chain(settings, theta0).map(Self::Small),
+            Some(ChainSize::Medium) => MediumChain::of_chain(settings, theta0).map(Self::Medium),
+            Some(ChainSize::Large) => LargeChain::of_chain(settings, theta0).map(Self::Large),
+            None => {
+                let [joints, parameters] = ChainSize::Large.room();
+                return Err(PyValueError::new_err(format!(
+                    "{} parameters of {} joints: there is room for {parameters} of {joints}",
+                    settings.columns.len(),
+                    settings.joints.len()
+                )));
+            }
+        };
+        made.map_err(complaint)
+    }
+
+    /// Covariance for an error of unit variance, row by row.
+    fn covariance(&self) -> Vec<T> {
+        let mut out = vec![T::zero(); self.estimator().theta().len().pow(2)];
+        match self {
+            Self::OfKind(online) => online.covariance(&mut out),
+            Self::Small(chain) => chain.covariance(&mut out),
+            Self::Medium(chain) => chain.covariance(&mut out),
+            Self::Large(chain) => chain.covariance(&mut out),
+        };
+        out
+    }
+
+    fn estimator(&self) -> &dyn OnlineEstimator<T> {
+        match self {
+            Self::OfKind(online) => online.estimator(),
+            Self::Small(chain) => chain,
+            Self::Medium(chain) => chain,
+            Self::Large(chain) => chain,
+        }
+    }
+
+    fn estimator_mut(&mut self) -> &mut dyn OnlineEstimator<T> {
+        match self {
+            Self::OfKind(online) => online.estimator_mut(),
+            Self::Small(chain) => chain,
+            Self::Medium(chain) => chain,
+            Self::Large(chain) => chain,
+        }
+    }
+}
 
 /// An estimator in either precision; numbers cross the boundary as float64.
 #[allow(clippy::large_enum_variant)] // Kept in a box.
 #[derive(Clone, Copy)]
 enum Any {
-    Double(Online<f64>),
-    Single(Online<f32>),
+    Double(Running<f64>),
+    Single(Running<f32>),
 }
 
 /// The online estimator.
 #[pyclass(module = "armgap._native")]
 #[derive(Clone)]
 pub struct Estimator {
-    // In a box: several kilobytes.
+    // In a box: up to a hundred kilobytes.
     any: Box<Any>,
     joints: usize,
 }
 
 /// Settings from arguments in the order of the Python class.
 fn settings<T: Real>(
-    kind: &str,
     scheme: &str,
     paper: bool,
     form: Option<&str>,
-    asymmetry: bool,
     numbers: [f64; 6],
     counts: [u32; 2],
-) -> PyResult<OnlineSettings<T>> {
+) -> PyResult<EstimatorSettings<T>> {
     let scheme = Scheme::from_name(scheme)
         .ok_or_else(|| PyValueError::new_err(format!("unknown scheme `{scheme}`")))?;
     let form = match form {
@@ -48,17 +114,43 @@ fn settings<T: Real>(
     let [cutoff, forgetting, p0, memory, between, floor] = numbers.map(lit::<T>);
     let monitor = MonitorSettings { memory, settling: counts[0], learning: counts[1], between, floor };
     let variant = if paper { Variant::Paper } else { Variant::Exact };
-    Ok(OnlineSettings {
-        kind: kind_of(kind)?,
-        scheme,
-        variant,
-        form,
-        asymmetry,
-        cutoff,
-        forgetting,
-        p0,
-        monitor,
-    })
+    Ok(EstimatorSettings { scheme, variant, form, cutoff, forgetting, p0, monitor })
+}
+
+/// The estimator of a kind of arm.
+fn of_kind<T: Real>(
+    kind: &str,
+    asymmetry: bool,
+    common: EstimatorSettings<T>,
+    theta0: &[f64],
+) -> PyResult<Running<T>> {
+    let settings = OnlineSettings::of(kind_of(kind)?, asymmetry, common);
+    Online::new(settings, &converted(theta0)).map(Running::OfKind).map_err(complaint)
+}
+
+/// The estimator of chosen parameters of a serial arm.
+fn of_chain<T: Real>(
+    chain: &ChainDescription,
+    columns: &[usize],
+    known: &[f64],
+    common: EstimatorSettings<T>,
+    theta0: &[f64],
+) -> PyResult<Running<T>> {
+    let joint = |joint: &ChainJoint<f64>| ChainJoint {
+        kind: joint.kind,
+        rotation: joint.rotation.map(|row| row.map(lit)),
+        translation: joint.translation.map(lit),
+        axis: joint.axis.map(lit),
+    };
+    let (joints, known): (Vec<_>, Vec<T>) = (chain.joints.iter().map(joint).collect(), converted(known));
+    let gravity = chain.gravity.map(lit);
+    let settings = ChainSettings { common, joints: &joints, gravity, columns, known: &known };
+    Running::of_chain(&settings, &converted(theta0))
+}
+
+/// Numbers in another precision.
+fn converted<T: Real>(x: &[f64]) -> Vec<T> {
+    x.iter().map(|x| lit(*x)).collect()
 }
 
 /// Outcomes in the order of `armgap.estimator.OUTCOMES`.
@@ -77,21 +169,21 @@ fn complaint(error: OnlineError) -> PyErr {
     })
 }
 
-/// Numbers of a slice in another precision, in fixed memory.
+/// Numbers per joint in single precision, in fixed memory.
 #[allow(clippy::cast_possible_truncation)] // That is the purpose.
-fn narrowed(x: &[f64]) -> ([f32; MOST_PARAMETERS], usize) {
-    let mut narrow = [0.0; MOST_PARAMETERS];
+fn narrowed(x: &[f64]) -> ([f32; MAX_JOINTS], usize) {
+    let mut narrow = [0.0; MAX_JOINTS];
     for (n, x) in narrow.iter_mut().zip(x) {
         *n = *x as f32;
     }
-    (narrow, x.len().min(MOST_PARAMETERS))
+    (narrow, x.len().min(MAX_JOINTS))
 }
 
 impl Any {
     fn update(&mut self, when: When<f64>, q: &[f64], dq: Option<&[f64]>, tau: &[f64]) -> SampleStatus {
         let outcome = match self {
-            Self::Double(online) => online.update(when, q, dq, tau),
-            Self::Single(online) => {
+            Self::Double(running) => running.estimator_mut().update(when, q, dq, tau),
+            Self::Single(running) => {
                 let single = |x: f64| narrowed(&[x]).0[0];
                 let when = match when {
                     When::At(t) => When::At(single(t)),
@@ -99,66 +191,43 @@ impl Any {
                 };
                 let ((q, n), (tau, _)) = (narrowed(q), narrowed(tau));
                 let dq = dq.map(|dq| narrowed(dq).0);
-                online.update(when, &q[..n], dq.as_ref().map(|dq| &dq[..n]), &tau[..n])
+                running.estimator_mut().update(when, &q[..n], dq.as_ref().map(|dq| &dq[..n]), &tau[..n])
             }
         };
         // Lengths are checked where arrays come in.
         outcome.unwrap_or(SampleStatus::Rejected)
     }
 
-    /// Calls with what both precisions have, as doubles.
-    fn with<const K: usize>(
-        &self,
-        double: impl Fn(&Online<f64>) -> [f64; K],
-        single: impl Fn(&Online<f32>) -> [f64; K],
-    ) -> [f64; K] {
+    /// Appends the estimate.
+    fn theta(&self, to: &mut Vec<f64>) {
         match self {
-            Self::Double(online) => double(online),
-            Self::Single(online) => single(online),
+            Self::Double(running) => to.extend_from_slice(running.estimator().theta()),
+            Self::Single(running) => to.extend(running.estimator().theta().iter().map(|x| f64::from(*x))),
         }
     }
 
-    fn parameters(&self) -> usize {
+    /// Appends the standard deviations of the estimate.
+    fn sigma(&self, to: &mut Vec<f64>) {
         match self {
-            Self::Double(online) => online.theta().len(),
-            Self::Single(online) => online.theta().len(),
+            Self::Double(running) => to.extend(sigma_of(running.estimator())),
+            Self::Single(running) => to.extend(sigma_of(running.estimator()).into_iter().map(f64::from)),
         }
     }
 
-    fn theta(&self) -> Vec<f64> {
-        let mut theta = Vec::with_capacity(self.parameters());
-        self.append_theta(&mut theta);
-        theta
-    }
-
-    fn append_theta(&self, to: &mut Vec<f64>) {
+    /// Appends the errors of the last sample that was used.
+    fn errors(&self, to: &mut Vec<f64>) {
         match self {
-            Self::Double(online) => to.extend_from_slice(online.theta()),
-            Self::Single(online) => to.extend(online.theta().iter().map(|x| f64::from(*x))),
+            Self::Double(running) => to.extend_from_slice(running.estimator().errors()),
+            Self::Single(running) => to.extend(running.estimator().errors().iter().map(|x| f64::from(*x))),
         }
     }
+}
 
-    fn errors(&self) -> Vec<f64> {
-        match self {
-            Self::Double(online) => online.errors().to_vec(),
-            Self::Single(online) => online.errors().iter().map(|x| f64::from(*x)).collect(),
-        }
-    }
-
-    fn sigma(&self) -> Vec<f64> {
-        match self {
-            Self::Double(online) => {
-                let mut sigma = [0.0; MOST_PARAMETERS];
-                let count = online.sigma(&mut sigma);
-                sigma[..count].to_vec()
-            }
-            Self::Single(online) => {
-                let mut sigma = [0.0_f32; MOST_PARAMETERS];
-                let count = online.sigma(&mut sigma);
-                sigma[..count].iter().map(|x| f64::from(*x)).collect()
-            }
-        }
-    }
+/// Standard deviations of the estimate.
+fn sigma_of<T: Real>(estimator: &dyn OnlineEstimator<T>) -> Vec<T> {
+    let mut sigma = vec![T::zero(); estimator.theta().len()];
+    estimator.sigma(&mut sigma);
+    sigma
 }
 
 #[pymethods]
@@ -176,20 +245,36 @@ impl Estimator {
         theta0: Vec<f64>,
     ) -> PyResult<Self> {
         let any = if single {
-            let settings = settings::<f32>(kind, scheme, paper, form, asymmetry, numbers, counts)?;
-            if theta0.len() > MOST_PARAMETERS {
-                return Err(complaint(OnlineError::Length {
-                    name: "theta0",
-                    expected: settings.parameters(),
-                }));
-            }
-            let (theta0, count) = narrowed(&theta0);
-            Any::Single(Online::new(settings, &theta0[..count]).map_err(complaint)?)
+            Any::Single(of_kind(kind, asymmetry, settings(scheme, paper, form, numbers, counts)?, &theta0)?)
         } else {
-            let settings = settings::<f64>(kind, scheme, paper, form, asymmetry, numbers, counts)?;
-            Any::Double(Online::new(settings, &theta0).map_err(complaint)?)
+            Any::Double(of_kind(kind, asymmetry, settings(scheme, paper, form, numbers, counts)?, &theta0)?)
         };
         Ok(Self { any: Box::new(any), joints: kind_of(kind)?.joints() })
+    }
+
+    /// An estimator of the parameters `columns` of a serial arm; of `known`, 13 values per joint, those of all others count.
+    #[staticmethod]
+    fn of_chain(
+        chain: &Chain,
+        columns: Vec<usize>,
+        known: Vec<f64>,
+        scheme: &str,
+        paper: bool,
+        form: Option<&str>,
+        single: bool,
+        numbers: [f64; 6],
+        counts: [u32; 2],
+        theta0: Vec<f64>,
+    ) -> PyResult<Self> {
+        let chain = chain.description();
+        let any = if single {
+            let common = settings(scheme, paper, form, numbers, counts)?;
+            Any::Single(of_chain(chain, &columns, &known, common, &theta0)?)
+        } else {
+            let common = settings(scheme, paper, form, numbers, counts)?;
+            Any::Double(of_chain(chain, &columns, &known, common, &theta0)?)
+        };
+        Ok(Self { any: Box::new(any), joints: chain.joints.len() })
     }
 
     /// Takes one sample; 0 updated, 1 starting, 2 rejected.
@@ -213,7 +298,8 @@ impl Estimator {
         Ok(code(self.any.update(when, q, dq, tau)))
     }
 
-    /// Takes many samples without the interpreter's lock; the estimates after each, and what became of each.
+    /// Takes many samples without the interpreter's lock; the estimates and errors after each, NaN where it gave none, and what became of
+    /// each.
     fn run<'py>(
         &mut self,
         py: Python<'py>,
@@ -222,27 +308,35 @@ impl Estimator {
         q: PyReadonlyArray2<'py, f64>,
         dq: Option<PyReadonlyArray2<'py, f64>>,
         tau: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<u8>>)> {
+    ) -> PyResult<Run<'py>> {
         let when = vector(&when, "t")?;
         let n = self.joints;
         let (q, tau) = (matrix(&q, "q", when.len(), n)?, matrix(&tau, "tau", when.len(), n)?);
         let dq = dq.as_ref().map(|dq| matrix(dq, "dq", when.len(), n)).transpose()?;
         let any = &mut self.any;
-        let (theta, outcomes) = py.detach(|| {
-            let (mut theta, mut outcomes) =
-                (Vec::with_capacity(when.len() * any.parameters()), Vec::with_capacity(when.len()));
+        let (theta, errors, outcomes) = py.detach(|| {
+            let (mut theta, mut errors, mut outcomes) =
+                (Vec::new(), Vec::new(), Vec::with_capacity(when.len()));
             for (k, t) in when.iter().enumerate() {
                 let row = |x: &'_ [f64]| k * n..(k * n + n).min(x.len());
                 let moment = if after { When::After(*t) } else { When::At(*t) };
                 let dq = dq.map(|dq| &dq[row(dq)]);
-                outcomes.push(code(any.update(moment, &q[row(q)], dq, &tau[row(tau)])));
-                any.append_theta(&mut theta);
+                let outcome = any.update(moment, &q[row(q)], dq, &tau[row(tau)]);
+                outcomes.push(code(outcome));
+                any.theta(&mut theta);
+                let before = errors.len();
+                any.errors(&mut errors);
+                if outcome != SampleStatus::Updated {
+                    errors[before..].fill(f64::NAN);
+                }
             }
-            (theta, outcomes)
+            (theta, errors, outcomes)
         });
-        let parameters = self.any.parameters();
-        let theta = PyArray1::from_vec(py, theta).reshape([when.len(), parameters])?;
-        Ok((theta, PyArray1::from_vec(py, outcomes)))
+        Ok((
+            self.table(py, theta, Any::theta)?,
+            self.table(py, errors, Any::errors)?,
+            PyArray1::from_vec(py, outcomes),
+        ))
     }
 
     /// A copy with the same state.
@@ -252,35 +346,68 @@ impl Estimator {
 
     #[getter]
     fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.any.theta())
+        PyArray1::from_vec(py, self.listed(Any::theta))
     }
 
     #[getter]
     fn sigma<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.any.sigma())
+        PyArray1::from_vec(py, self.listed(Any::sigma))
+    }
+
+    /// Covariance for an error of unit variance.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let entries = match &*self.any {
+            Any::Double(running) => running.covariance(),
+            Any::Single(running) => running.covariance().into_iter().map(f64::from).collect(),
+        };
+        self.table(py, entries, Any::theta)
     }
 
     #[getter]
     fn errors<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.any.errors())
+        PyArray1::from_vec(py, self.listed(Any::errors))
     }
 
     /// Excitation and alarm.
     #[getter]
     fn signals(&self) -> (f64, f64) {
-        let [excitation, alarm] = self.any.with(
-            |o| [o.excitation(), o.alarm_level()],
-            |o| [f64::from(o.excitation()), f64::from(o.alarm_level())],
-        );
-        (excitation, alarm)
+        match &*self.any {
+            Any::Double(running) => (running.estimator().excitation(), running.estimator().alarm_level()),
+            Any::Single(running) => {
+                let estimator = running.estimator();
+                (f64::from(estimator.excitation()), f64::from(estimator.alarm_level()))
+            }
+        }
     }
 
     /// Samples used and rejected.
     #[getter]
     fn counts(&self) -> (u64, u64) {
         match &*self.any {
-            Any::Double(o) => (o.updates(), o.rejected()),
-            Any::Single(o) => (o.updates(), o.rejected()),
+            Any::Double(running) => (running.estimator().updates(), running.estimator().rejected()),
+            Any::Single(running) => (running.estimator().updates(), running.estimator().rejected()),
         }
+    }
+}
+
+impl Estimator {
+    /// Numbers of the present state.
+    fn listed(&self, append: fn(&Any, &mut Vec<f64>)) -> Vec<f64> {
+        let mut list = Vec::new();
+        append(&self.any, &mut list);
+        list
+    }
+
+    /// Rows of such numbers.
+    fn table<'py>(
+        &self,
+        py: Python<'py>,
+        rows: Vec<f64>,
+        append: fn(&Any, &mut Vec<f64>),
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let width = self.listed(append).len();
+        let count = rows.len() / width;
+        PyArray1::from_vec(py, rows).reshape([count, width])
     }
 }

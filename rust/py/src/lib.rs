@@ -6,8 +6,8 @@ mod convert;
 mod diagnose;
 mod estimator;
 mod fit;
-mod identify;
 mod progress;
+mod regression;
 mod simulate;
 
 use pyo3::prelude::*;
@@ -27,7 +27,7 @@ mod _native {
     #[pymodule_export]
     use crate::fit::fit;
     #[pymodule_export]
-    use crate::identify::{identify, regression_rows, velocity};
+    use crate::regression::{regression_rows, velocity};
     #[pymodule_export]
     use crate::simulate::{inertia, simulate};
 

@@ -4,7 +4,7 @@
 //! once filtered.
 
 use super::friction::Friction;
-use super::{SampleInterval, SegmentCoefficients, Snapshot, Variant};
+use super::{Columns, SampleInterval, SegmentCoefficients, Snapshot, Variant};
 use crate::arm::Arm;
 use crate::cpu::Cpu;
 use crate::filter::Cutoff;
@@ -47,36 +47,30 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
 
     /// The rows and outputs at the next state, reached by `interval`.
     #[inline(always)]
-    pub fn update<C: Cpu, A: Arm<T, N, P>, const R: usize>(
+    pub fn update<C: Cpu, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const R: usize>(
         &mut self,
         arm: &A,
+        columns: &S,
         variant: Variant,
         now: &Snapshot<T, N>,
         interval: &SampleInterval<T, N>,
     ) -> ([[T; R]; N], [T; N]) {
         let (momentum, potential) = arm.momentum_and_potential(&now.q, &now.dq);
-        let mut psi = [[T::zero(); R]; N];
+        let mut whole = SMatrix::zeros();
         match variant {
-            Variant::Paper => self.paper::<C, A, R>(&momentum, interval, &mut psi),
-            Variant::Exact => self.exact::<C, A, R>(&momentum, &potential, now, interval, &mut psi),
-        }
-        for i in 0..N {
-            self.friction.write(A::INERTIAL, Some(i), |j, value| {
-                if j < R {
-                    psi[i][j] = value;
-                }
-            });
+            Variant::Paper => self.paper::<C, A>(&momentum, interval, &mut whole),
+            Variant::Exact => self.exact::<C, A>(&momentum, &potential, now, interval, &mut whole),
         }
         (self.last, self.last_momentum, self.last_potential) = (*now, momentum, potential);
-        (psi, self.torque.data.0[0])
+        columns.rows(&whole, A::INERTIAL, &self.friction, &self.torque)
     }
 
     #[inline(always)]
-    fn paper<C: Cpu, A: Arm<T, N, P>, const R: usize>(
+    fn paper<C: Cpu, A: Arm<T, N, P>>(
         &mut self,
         momentum: &SMatrix<T, N, P>,
         interval: &SampleInterval<T, N>,
-        psi: &mut [[T; R]; N],
+        whole: &mut SMatrix<T, N, P>,
     ) {
         let step = self.steps.whole(interval.h);
         for j in 0..A::INERTIAL {
@@ -85,7 +79,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
                 let derivative = step.paper_derivative::<C>(self.momentum[(i, j)], from, to);
                 let rest = step.held::<C>(self.potential[(i, j)], self.last_potential[(i, j)]);
                 (self.momentum[(i, j)], self.potential[(i, j)]) = (derivative, rest);
-                psi[i][j] = derivative + rest;
+                whole[(i, j)] = derivative + rest;
             }
         }
         self.friction.hold_torques::<C>(&step, &self.last.dq);
@@ -95,13 +89,13 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
     }
 
     #[inline(always)]
-    fn exact<C: Cpu, A: Arm<T, N, P>, const R: usize>(
+    fn exact<C: Cpu, A: Arm<T, N, P>>(
         &mut self,
         momentum: &SMatrix<T, N, P>,
         potential: &SMatrix<T, N, P>,
         now: &Snapshot<T, N>,
         interval: &SampleInterval<T, N>,
-        psi: &mut [[T; R]; N],
+        whole: &mut SMatrix<T, N, P>,
     ) {
         let step = self.steps.whole(interval.h);
         for j in 0..A::INERTIAL {
@@ -110,7 +104,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
                 let rest =
                     step.ramp::<C>(self.potential[(i, j)], self.last_potential[(i, j)], potential[(i, j)]);
                 (self.momentum[(i, j)], self.potential[(i, j)]) = (low, rest);
-                psi[i][j] = (momentum[(i, j)] - low) * step.lambda + rest;
+                whole[(i, j)] = (momentum[(i, j)] - low) * step.lambda + rest;
             }
         }
         self.friction.filter_torques::<C>(&step, &self.last.dq, &now.dq);

@@ -1,12 +1,12 @@
 //! Filtered power model, equations (29) and (30): `F[tau.dq] = (D[E] + F[W]) theta`, the paper's own proposal.
 
 use super::friction::Friction;
-use super::{SampleInterval, SegmentCoefficients, Snapshot, Variant};
+use super::{Columns, SampleInterval, SegmentCoefficients, Snapshot, Variant};
 use crate::arm::Arm;
 use crate::cpu::Cpu;
 use crate::filter::Cutoff;
 use crate::real::{Real, lit};
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 /// State of the scheme. Of the rows over all parameters only the inertial entries are used.
 #[derive(Debug, Clone, Copy)]
@@ -48,53 +48,49 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
 
     /// The row and output at the next state, reached by `interval`; `tau` is the torque that acts from then on.
     #[inline(always)]
-    pub fn update<C: Cpu, A: Arm<T, N, P>, const R: usize>(
+    pub fn update<C: Cpu, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const R: usize>(
         &mut self,
         arm: &A,
+        columns: &S,
         variant: Variant,
         now: &Snapshot<T, N>,
         interval: &SampleInterval<T, N>,
         tau: &SVector<T, N>,
     ) -> ([[T; R]; 1], [T; 1]) {
         let energy = arm.energy_regressor(&now.q, &now.dq);
-        let mut psi = [T::zero(); R];
+        let mut whole = SMatrix::zeros();
         match variant {
-            Variant::Paper => self.paper::<C, A, R>(&energy, interval, &mut psi),
-            Variant::Exact => self.exact::<C, A, R>(arm, &energy, now, interval, &mut psi),
+            Variant::Paper => self.paper::<C, A>(&energy, interval, &mut whole),
+            Variant::Exact => self.exact::<C, A>(arm, &energy, now, interval, &mut whole),
         }
-        self.friction.write(A::INERTIAL, None, |j, value| {
-            if j < R {
-                psi[j] = value;
-            }
-        });
         (self.last, self.last_energy, self.last_supply) = (*now, energy, tau.dot(&now.dq));
-        ([psi], [self.supply])
+        columns.rows(&whole, A::INERTIAL, &self.friction, &SVector::from([self.supply]))
     }
 
     #[inline(always)]
-    fn paper<C: Cpu, A: Arm<T, N, P>, const R: usize>(
+    fn paper<C: Cpu, A: Arm<T, N, P>>(
         &mut self,
         energy: &SVector<T, P>,
         interval: &SampleInterval<T, N>,
-        psi: &mut [T; R],
+        whole: &mut SMatrix<T, 1, P>,
     ) {
         let step = self.steps.whole(interval.h);
         for j in 0..A::INERTIAL {
             self.energy[j] = step.paper_derivative::<C>(self.energy[j], self.last_energy[j], energy[j]);
-            psi[j] = self.energy[j];
+            whole[j] = self.energy[j];
         }
         self.friction.hold_powers::<C>(&step, &self.last.dq);
         self.supply = step.held::<C>(self.supply, self.last_supply);
     }
 
     #[inline(always)]
-    fn exact<C: Cpu, A: Arm<T, N, P>, const R: usize>(
+    fn exact<C: Cpu, A: Arm<T, N, P>>(
         &mut self,
         arm: &A,
         energy: &SVector<T, P>,
         now: &Snapshot<T, N>,
         interval: &SampleInterval<T, N>,
-        psi: &mut [T; R],
+        whole: &mut SMatrix<T, 1, P>,
     ) {
         let step = self.steps.whole(interval.h);
         let half_way = self.last.half_way(now, interval.h);
@@ -102,7 +98,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
         for j in 0..A::INERTIAL {
             let height = middle[j] - (energy[j] + self.last_energy[j]) * lit(0.5);
             self.energy[j] = step.curve::<C>(self.energy[j], self.last_energy[j], energy[j], height);
-            psi[j] = (energy[j] - self.energy[j]) * step.lambda;
+            whole[j] = (energy[j] - self.energy[j]) * step.lambda;
         }
         self.friction.filter_powers::<C>(&step, &self.last.dq, &now.dq);
         self.supply = self.exact_supply::<C>(now, interval);

@@ -90,7 +90,7 @@ fn after_reversal<T: Real>(x: T, from: T, to: T) -> T {
 
 /// One entry per joint for each of viscous, Coulomb and constant friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Friction<T, const N: usize> {
+pub struct Friction<T, const N: usize> {
     pub(super) viscous: SVector<T, N>,
     pub(super) coulomb: SVector<T, N>,
     pub(super) constant: SVector<T, N>,
@@ -177,14 +177,14 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// The entries of a row over the `R` parameters of which the first `inertial` are not friction: joint `j`'s only, or all.
+    /// `put(kind, joint, value)` for viscous, Coulomb and constant friction of one joint, or of all.
     #[inline(always)]
-    pub(super) fn write(&self, inertial: usize, only: Option<usize>, mut put: impl FnMut(usize, T)) {
+    pub(super) fn write(&self, only: Option<usize>, mut put: impl FnMut(usize, usize, T)) {
         for j in 0..N {
             if only.is_none_or(|joint| joint == j) {
-                put(inertial + j, self.viscous[j]);
-                put(inertial + N + j, self.coulomb[j]);
-                put(inertial + 2 * N + j, self.constant[j]);
+                put(0, j, self.viscous[j]);
+                put(1, j, self.coulomb[j]);
+                put(2, j, self.constant[j]);
             }
         }
     }

@@ -1,8 +1,8 @@
 //! The regression models, sample by sample: what a scheme makes of positions, velocities and torques.
 //!
-//! Each scheme turns one sample into rows `psi` and outputs `y` with `y = psi theta`. `R` parameters are estimated: the arm's `P`, or
-//! with `R = P + N` also one constant torque per joint, `f_j = … + asymmetry_j`, which while the joint moves is what Coulomb friction
-//! of different levels in the two directions adds.
+//! Each scheme turns one sample into rows `psi` and outputs `y` with `y = psi theta`. Estimated are ([`Columns`]) the arm's `P` parameters,
+//! or some of them, and one constant torque per joint, `f_j = … + asymmetry_j`, which while the joint moves is what Coulomb friction of
+//! different levels in the two directions adds.
 //!
 //! Two variants differ in the filters and in when signals are taken to be valid:
 //!
@@ -12,13 +12,16 @@
 //!
 //! Adding a scheme is one file here and one line in [`Scheme::ALL`].
 
+mod columns;
 mod filtered_dynamic;
 mod filtered_power;
 mod friction;
 mod supplied_energy;
 
+pub use columns::{AllColumns, ChosenColumns, Columns};
 pub use filtered_dynamic::FilteredDynamic;
 pub use filtered_power::FilteredPower;
+pub use friction::Friction;
 pub use supplied_energy::SuppliedEnergy;
 
 use crate::filter::{CachedCoefficients, Cutoff, FilterCoefficients};

@@ -4,10 +4,10 @@
 //! as for the others. The integrals have infinite gain at zero frequency: any constant error grows without bound.
 
 use super::friction::Friction;
-use super::{SampleInterval, Snapshot, Variant};
+use super::{Columns, SampleInterval, Snapshot, Variant};
 use crate::arm::Arm;
 use crate::real::{Real, lit};
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 /// State of the scheme.
 #[derive(Debug, Clone, Copy)]
@@ -33,9 +33,10 @@ impl<T: Real, const N: usize, const P: usize> SuppliedEnergy<T, N, P> {
 
     /// The row and output at the next state, reached by `interval`; `tau` is the torque that acts from then on.
     #[inline(always)]
-    pub fn update<A: Arm<T, N, P>, const R: usize>(
+    pub fn update<A: Arm<T, N, P>, S: Columns<T, N, P, R>, const R: usize>(
         &mut self,
         arm: &A,
+        columns: &S,
         variant: Variant,
         now: &Snapshot<T, N>,
         interval: &SampleInterval<T, N>,
@@ -55,15 +56,10 @@ impl<T: Real, const N: usize, const P: usize> SuppliedEnergy<T, N, P> {
         }
         (self.last, self.last_supply) = (*now, supply);
         let energy = arm.energy_regressor(&now.q, &now.dq);
-        let mut psi = [T::zero(); R];
+        let mut whole = SMatrix::<T, 1, P>::zeros();
         for j in 0..A::INERTIAL {
-            psi[j] = energy[j] - self.first[j];
+            whole[j] = energy[j] - self.first[j];
         }
-        self.friction.write(A::INERTIAL, None, |j, value| {
-            if j < R {
-                psi[j] = value;
-            }
-        });
-        ([psi], [self.work])
+        columns.rows(&whole, A::INERTIAL, &self.friction, &SVector::from([self.work]))
     }
 }

@@ -12,7 +12,7 @@
 //! of `psi` within bounds nothing overflows: `k_i^2 <= P_ii psi' P psi`, and `u_ij^2 <= P_ii / d_j`.
 
 use super::lanes::{LANES, all_within, dot, lead};
-use super::{Forgetting, is_double, largest};
+use super::{Count, Forgetting, is_double, largest};
 use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 use nalgebra::SMatrix;
@@ -72,11 +72,12 @@ impl<T: Real, const R: usize> Factorized<T, R> {
 
     /// Learns from rows of `Psi'` and their errors; the leverage, or nothing changed because the rows are of impossible size.
     #[inline(always)]
-    pub(super) fn learn<C: Cpu, const M: usize>(
+    pub(super) fn learn<C: Cpu, N: Count, const M: usize>(
         &mut self,
         theta: &mut [T; R],
         rows: &[[T; R]; M],
         error: &[T; M],
+        count: N,
         forgetting: &Forgetting<T, R>,
     ) -> Option<T> {
         let mut within = true;
@@ -86,56 +87,56 @@ impl<T: Real, const R: usize> Factorized<T, R> {
         if !within {
             return None;
         }
-        let mut moved = [T::zero(); R];
+        let (r, mut moved) = (count.of(R), [T::zero(); R]);
         let mut leverage = T::zero();
         for m in 0..M {
             // What the rows before have already explained.
-            let left = if m == 0 { error[m] } else { error[m] - dot::<C, T, R>(&moved, &rows[m]) };
-            leverage += self.row::<C>(&mut moved, &rows[m], left, forgetting.mu);
+            let left = if m == 0 { error[m] } else { error[m] - dot::<C, T, R>(&moved, &rows[m], r) };
+            leverage += self.row::<C, N>(&mut moved, &rows[m], left, r, forgetting.mu);
         }
-        for i in 0..R {
+        for i in 0..r {
             theta[i] += moved[i];
         }
         if forgetting.mu < T::one() {
-            self.forget(forgetting);
+            self.forget(forgetting, r);
         }
         Some(leverage)
     }
 
     /// One row: moves the estimate, and returns the leverage.
     #[inline(always)]
-    fn row<C: Cpu>(&mut self, moved: &mut [T; R], psi: &[T; R], error: T, mu: T) -> T {
+    fn row<C: Cpu, N: Count>(&mut self, moved: &mut [T; R], psi: &[T; R], error: T, r: usize, mu: T) -> T {
         let mut f = [T::zero(); R];
-        for j in 0..R {
-            f[j] = self.dot::<C>(j, psi);
+        for j in 0..r {
+            f[j] = self.dot::<C>(j, psi, r);
         }
         let (mut v, mut before, mut inverse) = ([T::zero(); R], [T::zero(); R], [T::zero(); R]);
         let mut total = mu;
-        for j in 0..R {
+        for j in 0..r {
             v[j] = self.d[j] * f[j];
             before[j] = total;
             total = C::fused(f[j], v[j], total);
         }
-        for j in 0..R {
+        for j in 0..r {
             inverse[j] = T::one() / before[j];
         }
         let last = T::one() / total;
-        for j in 0..R {
-            let shrunk = self.d[j] * before[j] * if j + 1 < R { inverse[j + 1] } else { last };
+        for j in 0..r {
+            let shrunk = self.d[j] * before[j] * if j + 1 < r { inverse[j + 1] } else { last };
             self.d[j] = shrunk.max(least());
         }
         let mut gain = [T::zero(); R];
-        for j in 0..R {
+        for j in 0..r {
             let factor = f[j] * inverse[j];
-            for i in 0..j {
+            N::each(j, R, |i| {
                 let old = self.u[j][i];
                 self.u[j][i] = C::fused(-gain[i], factor, old);
                 gain[i] = C::fused(old, v[j], gain[i]);
-            }
+            });
             gain[j] = v[j];
         }
         let rate = error * last;
-        for i in 0..R {
+        for i in 0..r {
             moved[i] = C::fused(gain[i], rate, moved[i]);
         }
         T::one() - mu * last
@@ -143,33 +144,33 @@ impl<T: Real, const R: usize> Factorized<T, R> {
 
     /// Entry `j` of `U' psi`.
     #[inline(always)]
-    fn dot<C: Cpu>(&self, j: usize, psi: &[T; R]) -> T {
+    fn dot<C: Cpu>(&self, j: usize, psi: &[T; R], r: usize) -> T {
         let column = &self.u[j];
         let mut sums = [T::zero(); LANES];
-        for c in 0..lanes_of::<R>(j) {
+        for c in 0..lanes_of(j, r).min(R / LANES) {
             for l in 0..LANES {
                 let i = c * LANES + l;
                 sums[l] = C::fused(column[i], psi[i], sums[l]);
             }
         }
         let mut rest = T::zero();
-        if j >= lead::<R>() {
-            for i in lead::<R>()..R {
+        if j >= lead(r) {
+            for i in lead(r)..r {
                 rest = C::fused(column[i], psi[i], rest);
             }
         }
         (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
     }
 
-    fn forget(&mut self, forgetting: &Forgetting<T, R>) {
+    fn forget(&mut self, forgetting: &Forgetting<T, R>, r: usize) {
         let (lift, limited) = forgetting.lift(&self.diagonal());
         if !limited {
-            for d in &mut self.d {
+            for d in self.d.iter_mut().take(r) {
                 *d /= forgetting.mu;
             }
             return;
         }
-        for j in 0..R {
+        for j in 0..r {
             for i in 0..j {
                 self.u[j][i] *= lift[i] / lift[j];
             }
@@ -180,8 +181,8 @@ impl<T: Real, const R: usize> Factorized<T, R> {
 
 /// Whole lanes that hold entries `0..=j` of a column.
 #[inline(always)]
-const fn lanes_of<const R: usize>(j: usize) -> usize {
-    if j < lead::<R>() { j / LANES + 1 } else { R / LANES }
+const fn lanes_of(j: usize, r: usize) -> usize {
+    if j < lead(r) { j / LANES + 1 } else { r / LANES }
 }
 
 /// Smallest entry of `D`: a variance of no arm, which keeps `U` finite.

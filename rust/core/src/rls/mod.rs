@@ -20,6 +20,8 @@ use factorized::Factorized;
 use nalgebra::{ArrayStorage, SMatrix, SVector};
 use plain::Plain;
 
+pub use lanes::{All, Count, First};
+
 /// How `P` is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
@@ -39,10 +41,11 @@ impl Form {
     }
 }
 
-/// Estimate and covariance of `R` parameters.
+/// Estimate and covariance of `R` parameters, or of the first so many of them where `N` is chosen at run time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rls<T: Real, const R: usize> {
+pub struct Rls<T: Real, const R: usize, N: Count = All> {
     theta: SVector<T, R>,
+    count: N,
     covariance: Covariance<T, R>,
     forgetting: Forgetting<T, R>,
     level: Level,
@@ -84,6 +87,7 @@ impl<T: Real, const R: usize> Rls<T, R> {
         let limit: [T; R] = p0.diagonal().into();
         Self {
             theta: theta0,
+            count: All,
             covariance: Covariance::of(&p0, Form::default_for(&limit)),
             forgetting: Forgetting { mu: forgetting, limit },
             level: Level::detect(),
@@ -91,6 +95,14 @@ impl<T: Real, const R: usize> Rls<T, R> {
             updates: 0,
             rejected: 0,
         }
+    }
+}
+
+impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
+    /// Only the first so many parameters; rows must be zero beyond them.
+    pub fn with_count<K: Count>(self, count: K) -> Rls<T, R, K> {
+        let Self { theta, covariance, forgetting, level, leverage, updates, rejected, .. } = self;
+        Rls { theta, count, covariance, forgetting, level, leverage, updates, rejected }
     }
 
     /// Keeps `P` in another form.
@@ -183,17 +195,17 @@ impl<T: Real, const R: usize> Rls<T, R> {
     pub(crate) fn learn<C: Cpu, const M: usize>(&mut self, rows: &[[T; R]; M], y: &[T; M]) -> Update<T, M> {
         let mut error = *y;
         let mut sound = true;
-        let theta = &mut self.theta.data.0[0];
+        let (theta, count) = (&mut self.theta.data.0[0], self.count);
         for m in 0..M {
-            error[m] -= lanes::dot::<C, T, R>(&rows[m], theta);
+            error[m] -= lanes::dot::<C, T, R>(&rows[m], theta, count.of(R));
             sound &= error[m].abs() <= largest();
         }
         let leverage = match &mut self.covariance {
             _ if !sound => None,
-            Covariance::Plain(p) => p.learn::<C, M>(theta, rows, &error, &self.forgetting),
+            Covariance::Plain(p) => p.learn::<C, N, M>(theta, rows, &error, count, &self.forgetting),
             Covariance::Factorized(p) => {
                 let rows = *rows;
-                p.learn::<C, M>(theta, &rows, &error, &self.forgetting)
+                p.learn::<C, N, M>(theta, &rows, &error, count, &self.forgetting)
             }
         };
         let Some(leverage) = leverage else {
@@ -207,13 +219,13 @@ impl<T: Real, const R: usize> Rls<T, R> {
 }
 
 /// One call of [`Rls::update`].
-struct UpdateKernel<'a, T: Real, const M: usize, const R: usize> {
-    rls: &'a mut Rls<T, R>,
+struct UpdateKernel<'a, T: Real, N: Count, const M: usize, const R: usize> {
+    rls: &'a mut Rls<T, R, N>,
     rows: [[T; R]; M],
     y: [T; M],
 }
 
-impl<T: Real, const M: usize, const R: usize> Kernel for UpdateKernel<'_, T, M, R> {
+impl<T: Real, N: Count, const M: usize, const R: usize> Kernel for UpdateKernel<'_, T, N, M, R> {
     type Output = Update<T, M>;
 
     #[inline(always)]

@@ -4,8 +4,8 @@
 //! what vector instructions like. Of the rows beyond the last whole lane only the diagonal block is kept; their other entries are those
 //! of the columns.
 
-use super::Forgetting;
 use super::lanes::{LANES, dot, lead};
+use super::{Count, Forgetting};
 use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 use nalgebra::SMatrix;
@@ -35,19 +35,21 @@ impl<T: Real, const R: usize> Plain<T, R> {
 
     /// Learns from rows of `Psi'` and their errors; the leverage, or nothing changed because `P` would not stay positive definite.
     #[inline(always)]
-    pub(super) fn learn<C: Cpu, const M: usize>(
+    pub(super) fn learn<C: Cpu, N: Count, const M: usize>(
         &mut self,
         theta: &mut [T; R],
         rows: &[[T; R]; M],
         error: &[T; M],
+        count: N,
         forgetting: &Forgetting<T, R>,
     ) -> Option<T> {
-        let (mut gain, mut rate, mut inverse) = (self.times::<C, M>(rows), *error, [T::zero(); M]);
+        let r = count.of(R);
+        let (mut gain, mut rate, mut inverse) = (self.times::<C, M>(rows, r), *error, [T::zero(); M]);
         // `mu I + Psi' P Psi`, of which the upper triangle counts.
         let (mut total, mut sound) = ([[T::zero(); M]; M], true);
         for l in 0..M {
             for m in l..M {
-                total[l][m] = dot::<C, T, R>(&gain[l], &rows[m]);
+                total[l][m] = dot::<C, T, R>(&gain[l], &rows[m], r);
             }
             total[l][l] += forgetting.mu;
             // Beyond this what is left of `P` in the direction of the row would be rounding.
@@ -62,7 +64,7 @@ impl<T: Real, const R: usize> Plain<T, R> {
                 for k in n..M {
                     total[n][k] = C::fused(-share, total[m][k], total[n][k]);
                 }
-                for i in 0..R {
+                for i in 0..r {
                     gain[n][i] = C::fused(-share, gain[m][i], gain[n][i]);
                 }
                 rate[n] = C::fused(-share, rate[m], rate[n]);
@@ -70,36 +72,36 @@ impl<T: Real, const R: usize> Plain<T, R> {
             rate[m] *= inverse[m];
             leverage += T::one() - forgetting.mu * inverse[m];
         }
-        let (diagonal, positive) = self.shrunk::<C, M>(&gain, &inverse);
+        let (diagonal, positive) = self.shrunk::<C, M>(&gain, &inverse, r);
         if !(sound & positive) {
             return None;
         }
         self.diagonal = diagonal;
         for m in 0..M {
-            for i in 0..R {
+            for i in 0..r {
                 theta[i] = C::fused(gain[m][i], rate[m], theta[i]);
             }
         }
-        self.take_off::<C, M>(&gain, &inverse);
+        self.take_off::<C, M>(&gain, &inverse, r);
         if forgetting.mu < T::one() {
-            self.forget(forgetting);
+            self.forget(forgetting, r);
         }
         Some(leverage)
     }
 
     /// `P psi` for each row.
     #[inline(always)]
-    fn times<C: Cpu, const M: usize>(&self, rows: &[[T; R]; M]) -> [[T; R]; M] {
+    fn times<C: Cpu, const M: usize>(&self, rows: &[[T; R]; M], r: usize) -> [[T; R]; M] {
         let mut product = [[T::zero(); R]; M];
-        for c in 0..R / LANES {
+        for c in 0..r / LANES {
             // Two strands, so that additions need not wait for each other.
             let (mut even, mut odd) = ([[T::zero(); LANES]; M], [[T::zero(); LANES]; M]);
-            for k in 0..R / 2 {
+            for k in 0..r / 2 {
                 self.add_column::<C, M>(&mut even, c, 2 * k, rows);
                 self.add_column::<C, M>(&mut odd, c, 2 * k + 1, rows);
             }
-            if R % 2 == 1 {
-                self.add_column::<C, M>(&mut even, c, R - 1, rows);
+            for j in r / 2 * 2..r {
+                self.add_column::<C, M>(&mut even, c, j, rows);
             }
             for m in 0..M {
                 for l in 0..LANES {
@@ -107,9 +109,9 @@ impl<T: Real, const R: usize> Plain<T, R> {
                 }
             }
         }
-        for i in lead::<R>()..R {
+        for i in lead(r)..r {
             for m in 0..M {
-                product[m][i] = dot::<C, T, R>(&self.p[i], &rows[m]);
+                product[m][i] = dot::<C, T, R>(&self.p[i], &rows[m], r);
             }
         }
         product
@@ -133,14 +135,19 @@ impl<T: Real, const R: usize> Plain<T, R> {
 
     /// The new diagonal, and whether it stays positive, which no rounding short of lost definiteness would change.
     #[inline(always)]
-    fn shrunk<C: Cpu, const M: usize>(&self, gain: &[[T; R]; M], inverse: &[T; M]) -> ([T; R], bool) {
+    fn shrunk<C: Cpu, const M: usize>(
+        &self,
+        gain: &[[T; R]; M],
+        inverse: &[T; M],
+        r: usize,
+    ) -> ([T; R], bool) {
         let (mut diagonal, mut positive) = (self.diagonal, true);
         for m in 0..M {
-            for i in 0..R {
+            for i in 0..r {
                 diagonal[i] = C::fused(gain[m][i] * gain[m][i], -inverse[m], diagonal[i]);
             }
         }
-        for i in 0..R {
+        for i in 0..r {
             positive &= diagonal[i] > T::zero();
         }
         (diagonal, positive)
@@ -149,16 +156,16 @@ impl<T: Real, const R: usize> Plain<T, R> {
     /// Takes the sum of `gain gain' / total` off. The product of two gains is the same for `(i, j)` and `(j, i)`, and need not wait for the
     /// reciprocal.
     #[inline(always)]
-    fn take_off<C: Cpu, const M: usize>(&mut self, gain: &[[T; R]; M], inverse: &[T; M]) {
-        for j in 0..R {
-            for i in 0..lead::<R>() {
+    fn take_off<C: Cpu, const M: usize>(&mut self, gain: &[[T; R]; M], inverse: &[T; M], r: usize) {
+        for j in 0..r {
+            for i in 0..lead(r) {
                 for m in 0..M {
                     self.p[j][i] = C::fused(-(gain[m][i] * gain[m][j]), inverse[m], self.p[j][i]);
                 }
             }
         }
-        for j in lead::<R>()..R {
-            for i in lead::<R>()..R {
+        for j in lead(r)..r {
+            for i in lead(r)..r {
                 for m in 0..M {
                     self.p[j][i] = C::fused(-(gain[m][i] * gain[m][j]), inverse[m], self.p[j][i]);
                 }
@@ -166,11 +173,11 @@ impl<T: Real, const R: usize> Plain<T, R> {
         }
     }
 
-    fn forget(&mut self, forgetting: &Forgetting<T, R>) {
+    fn forget(&mut self, forgetting: &Forgetting<T, R>, r: usize) {
         let (lift, limited) = forgetting.lift(&self.diagonal);
-        let grow = T::one() / forgetting.mu;
-        for j in 0..R {
-            for i in 0..R {
+        let (grow, r) = (T::one() / forgetting.mu, r.min(R));
+        for j in 0..r {
+            for i in 0..r {
                 self.p[j][i] *= if limited { lift[i] * lift[j] } else { grow };
             }
             self.diagonal[j] = self.p[j][j];
