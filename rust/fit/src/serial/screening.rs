@@ -92,6 +92,11 @@ impl Search<'_> {
         let size = score.size[0];
         let information = score.gain / (size * size).max(f64::MIN_POSITIVE);
         let (p, size) = match trial {
+            // What a stop pushes back with is in proportion to stiffness and damping.
+            Trial::Whole if matches!(term.kind, TermKind::Law(effect) if effect.is_contact()) => {
+                let share = size.clamp(0.0, FARTHEST);
+                (vec![term.p[0], share * term.p[1], share * term.p[2]], share)
+            }
             // A threshold has no small version of itself.
             Trial::Whole => (term.p.clone(), 1.0),
             Trial::Ray => {
