@@ -66,8 +66,7 @@ impl Term {
             TermKind::Payload => LOAD.len(),
             TermKind::BaseTilt => TURN.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
-            TermKind::Transmission(_) => 1,
-            TermKind::Controller(_) => 1,
+            TermKind::Transmission(_) | TermKind::Controller(_) => 1,
         };
         Self { kind, p: vec![0.0; count], degrees: count as f64 }
     }
