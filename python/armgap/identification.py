@@ -247,8 +247,8 @@ def identify(
         half.run(q, tau, dq, t=t)
         drift = theta - half.theta
     nominal = np.full(len(names), np.nan)
-    own = arm.theta if base is None else base.of(arm.theta)
-    nominal[: len(own)] = own
+    given = arm.theta if base is None else base.of(arm.theta)
+    nominal[: len(given)] = given
     nominal[[name.startswith("asymmetry") for name in names]] = np.nan
     return Identification(
         log=log.name,
