@@ -1,0 +1,34 @@
+"""What a case hides: one class per effect, with its law and how its size is drawn. Laws are those of the textbooks named beside them."""
+
+from __future__ import annotations
+
+from .arm import BaseTilt, NominalLink, Payload, RotorInertia
+from .drive import ActuatorDelay, ActuatorLag, TorqueDeadZone, TorqueGain, TorqueSaturation
+from .effect import TURN, Effect, Moment, Null, Use
+from .encoder import EncoderEccentricity, EncoderOffset
+from .friction import (
+    CoulombAsymmetry,
+    FrictionWarmup,
+    LoadDependentFriction,
+    PositionDependentFriction,
+    QuadraticDrag,
+    Stribeck,
+    StribeckEverywhere,
+    ViscousAsymmetry,
+)
+from .outside import CableSpring, LoadedCogging, TorqueDrift
+from .torque import Contact, JointSpring, TorqueOffset, TorqueRipple
+from .transmission import Backlash, JointElasticity
+
+__all__ = ["EFFECTS", "TURN", "Effect", "Moment", "Null", "Use"]
+
+EFFECTS: dict[str, type[Effect]] = {
+    effect.name: effect
+    for effect in (
+        Payload, BaseTilt, NominalLink, RotorInertia, Stribeck, StribeckEverywhere, CoulombAsymmetry, ViscousAsymmetry, QuadraticDrag,
+        LoadDependentFriction, PositionDependentFriction, FrictionWarmup, TorqueOffset, TorqueRipple, JointSpring, Contact,
+        ActuatorLag, ActuatorDelay, TorqueSaturation, TorqueDeadZone, TorqueGain, EncoderOffset, EncoderEccentricity, JointElasticity, Backlash,
+        TorqueDrift, CableSpring, LoadedCogging,
+    )
+}  # fmt: skip
+"""Every effect by name; `Null` is not among them."""
