@@ -27,6 +27,7 @@ from armgap.log.units import si
 from armgap.prepared_input import PreparedInput, prepare, refused
 from armgap.progress import ProgressCallback, report_progress, use_callback
 from armgap.report.notebook import NotebookDisplay
+from armgap.serial_settings import serial_settings
 
 __all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Location", "RuledOut", "Sanity", "Value", "diagnose"]
 
@@ -41,11 +42,6 @@ MOST_BYTES = 2**28
 """Size of a diagnosis' file; the largest hold some MB."""
 MOST_CAUSES = 1000
 """More than the library can name on any arm."""
-_FILTERED_HALF_WIDTH_S = 0.4
-"""Half width of the test functions of a log that was low-passed before it was written [s]: they pass half of 1.25 Hz, less than such filters do."""
-_UNKNOWN_UNITS = (
-    "units of torques were taken from the arm file's masses, so that no load, wrong link or torque gain can be told"
-)
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
 
@@ -414,11 +410,8 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     tables = TorqueTables.of(effects, training, held)
     settings = settings | {"own": [e.joint - 1 for e in effects]}
     if arm.chain is not None:
-        noticed = {check.check for check in given.checks}
-        unit = "torque_unit" in noticed
-        settings |= {"half_width": _FILTERED_HALF_WIDTH_S} if "filtered_positions" in noticed else {}
-        settings |= {"known_units": not unit}
-        given = replace(given, notes=(*given.notes, _UNKNOWN_UNITS)) if unit else given
+        changed, notes = serial_settings(given.checks)
+        settings, given = settings | changed, replace(given, notes=(*given.notes, *notes))
     try:
         text = _native.diagnose(
             arm.to_native(),
