@@ -16,7 +16,7 @@ from .case import Inputs, NotApplicableError, toml
 from .defects import DEFECTS
 from .expected import Expected
 from .making import Kept, read
-from .true_floor import measured_again, true_floor
+from .true_floor import Starts, measured_again, true_floor
 
 Record = dict[str, Any]
 #: Of the name of a record without any defect.
@@ -87,8 +87,8 @@ def answer_floor(folder: str, defect: str, seed: int) -> Record:
     record = {**about(case), "version": build(), "defect": defect, "noise_counts": counts, **diagnosed(case.inputs)}
     if "cut" not in record:
         return record
-    cut = record.pop("cut")
-    return {**record, "true": true_floor(case, noise, rng, cut["windows"], np.array(cut["sigma"]))}
+    record["true"] = true_floor(case, record.pop("cut"))
+    return record
 
 
 def about(case: Kept) -> Record:
@@ -140,8 +140,20 @@ def _kept(found: dict[str, Any]) -> Record:
         "gap": {key: found["gap"][key] for key in ("before", "refit", "after", "floor", "closed")},
         "notes": found["notes"],
         "findings": found["log_findings"],
-        "cut": {
-            "windows": {s["log"]: [s["t"][i] for i in s["window_start"]] for s in found["series"] if s["joint"] == 1},
-            "sigma": found["noise"]["position_sigma"],
-        },
+        "cut": _starts(found["series"]),
+    }
+
+
+def _starts(series: list[dict[str, Any]]) -> dict[str, Starts]:
+    """Starts of the windows of every drawn holdout log."""
+    logs: dict[str, list[dict[str, Any]]] = {}
+    for joint in series:
+        logs.setdefault(joint["log"], []).append(joint)
+    return {
+        name: Starts(
+            [joints[0]["t"][i] for i in joints[0]["window_start"]],
+            np.column_stack([joint["initial_position"] for joint in joints]),
+            np.column_stack([joint["initial_velocity"] for joint in joints]),
+        )
+        for name, joints in logs.items()
     }

@@ -21,28 +21,25 @@ def floor_section(records: list[Record]) -> str:
     lines = [_line("all joints", answered)]
     for model in dict.fromkeys(r["model"] for r in answered):
         lines.append(_line(model, [r for r in answered if r["model"] == model]))
-    head = ["joints of", "joints", "0.7 to 1.4", "5 %", "median", "95 %", "further draws", "worst starts cut"]
+    head = ["joints of", "joints", "0.7 to 1.4", "5 %", "median", "95 %"]
     parts = [TEXT, table(head, lines), _contradictions(answered, len(records))]
     return "## Floor and verdict\n\n" + "\n\n".join(parts)
 
 
 TEXT = """\
 The true floor is what the true arm, run from the measured starts, misses the measured positions of the holdout by (`true_floor.py`);
-half of the cases have white noise of 0.5 to 10 counts beside the rounding. Claimed over true floor, joint by joint. A single bad start
-can make most of a floor, so floors differ from one measurement of a motion to the next: in the last columns the true floor is the mean
-over this and two further draws of the noise, without and with windows cut at ten times the typical one."""
+half of the cases have white noise of 0.5 to 10 counts beside the rounding. Claimed over true floor, joint by joint."""
 
 
-def ratios(records: list[Record], key: str) -> np.ndarray:
+def ratios(records: list[Record]) -> np.ndarray:
     """Claimed over true floor of every joint."""
-    pairs = [(c, t) for r in records for c, t in zip(r["gap"]["floor"], r["true"][key], strict=True)]
-    return np.array([c / t for c, t in pairs])
+    return np.array([c / t for r in records for c, t in zip(r["gap"]["floor"], r["true"]["floor"], strict=True)])
 
 
 def _line(name: str, records: list[Record]) -> list[str]:
-    own, *drawn = (ratios(records, key) for key in ("floor", "floor_drawn", "floor_cut"))
+    own = ratios(records)
     spread = [f"{x:.2f}" for x in np.quantile(own, [0.05, 0.5, 0.95])] if len(own) else ["-"] * 3
-    return [name, str(len(own)), _inside(own), *spread, *map(_inside, drawn)]
+    return [name, str(len(own)), _inside(own), *spread]
 
 
 def _inside(ratio: np.ndarray) -> str:

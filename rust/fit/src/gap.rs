@@ -394,9 +394,13 @@ pub(crate) fn window_series<const N: usize>(
                 refit: Vec::new(),
                 after: Vec::new(),
                 window_start: Vec::new(),
+                initial_position: Vec::new(),
+                initial_velocity: Vec::new(),
             };
             for window in data.windows.iter().filter(|w| w.track == index) {
                 s.window_start.push(s.t.len());
+                s.initial_position.push(window.initial_state.q[j]);
+                s.initial_velocity.push(window.initial_state.dq[j]);
                 for i in (0..window.rows()).step_by(stride) {
                     let at = (window.offset + i) * N + j;
                     s.t.push(track.t[window.first + 1 + i]);

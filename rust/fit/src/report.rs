@@ -318,6 +318,10 @@ pub struct Series {
     pub after: Vec<f64>,
     /// Indices at which a new window starts.
     pub window_start: Vec<usize>,
+    /// Measured position from which each window is predicted.
+    pub initial_position: Vec<f64>,
+    /// Measured velocity from which each window is predicted.
+    pub initial_velocity: Vec<f64>,
 }
 
 /// Measured and predicted positions in free run.
