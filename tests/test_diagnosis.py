@@ -185,6 +185,7 @@ def test_findings_of_the_logs_are_in_the_result(pendulum):
     assert any(remark.startswith("holed: 1 gap of more than 3 sample periods") for remark in result.remarks)
 
 
+@pytest.mark.slow
 def test_the_same_input_gives_the_same_answer(pendulum):
     def answer() -> dict:
         data = diagnose(swing(pendulum, 1, STRIBECK), pendulum, seed=7).to_dict()

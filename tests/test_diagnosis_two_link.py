@@ -187,6 +187,7 @@ def hidden_in(arm: Arm, *hidden: Effect, tolerance: float = 1e-9) -> Diagnosis:
     return diagnose(training, arm, holdout=holdout)
 
 
+@pytest.mark.slow
 def test_a_second_cause_that_is_small_beside_the_first_is_found(arm):
     warmup = Effect("friction_warmup", 1, {"amplitude": 6.0, "time_constant": 1.0})
     result = hidden_in(arm, warmup, Effect("torque_gain", 2, {"gain": 1.02}))
@@ -194,12 +195,14 @@ def test_a_second_cause_that_is_small_beside_the_first_is_found(arm):
     assert result.causes[1].parameters["gain"].value == pytest.approx(1.02, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_friction_that_falls_up_to_the_highest_speeds_is_sized(arm):
     result = hidden_in(arm, Effect("stribeck", 2, {"amplitude": 1.5, "velocity": 4.0}))
     assert [(c.effect, c.joint) for c in result.causes] == [("stribeck", 2)]
     assert result.causes[0].parameters["velocity"].value == pytest.approx(4.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_hard_stop_is_no_push(arm):
     stop = Effect("contact", 2, {"position": 0.1, "stiffness": 2000.0, "damping": 2.0})
     result = hidden_in(arm, stop, tolerance=1e-4)
@@ -208,6 +211,7 @@ def test_a_hard_stop_is_no_push(arm):
     assert result.causes[0].parameters["stiffness"].value == pytest.approx(2000.0, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "parameters", "kind"),
     [("quadratic_drag", {"c": 0.05}, "takes"), ("joint_spring", {"k": 4.0, "q0": 0.0}, "both")],

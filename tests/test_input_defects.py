@@ -327,6 +327,7 @@ def test_starts_beside_a_jerky_torque_are_exact():
         np.testing.assert_allclose([start[0], rate[0]], [q[row], speed[row] + 3 * t[row] ** 2], atol=1e-7)
 
 
+@pytest.mark.slow
 def test_the_true_floor_is_above_rounding_and_grows_with_the_noise(tmp_path):
     keep(make_case(8, model="pendulum", nominal="exact", duration=2.0, style="tracked"), tmp_path / "case")
     case = read(tmp_path / "case")
