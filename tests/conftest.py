@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+import three_joints
 from armgap import Arm, Log, seed_torque, simulate
 from swings import PENDULUM
 
@@ -111,3 +112,11 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     monkeypatch.chdir(folder)
     return folder
+
+
+@pytest.fixture
+def three(here: Path) -> Path:
+    """A folder with the description and the arm file of `three_joints`."""
+    (here / "three.urdf").write_text(three_joints.URDF)
+    (here / "arm.toml").write_text(three_joints.ARM)
+    return here

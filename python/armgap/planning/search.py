@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from armgap.arm import MotionLimits
 from armgap.errors import OptionError
-from armgap.planning.criterion import Outcome, PredictedMotion, Setting
+from armgap.planning.criterion import PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics, torque_with
 from armgap.planning.hypotheses import TestedQuestion
 from armgap.planning.limits import TORQUE_MARGIN, TORQUE_MOST, PlanLimits
 from armgap.planning.motion import Motion, build, count, named
+from armgap.planning.outcome import Outcome
 from armgap.progress import report_progress
 
 __all__ = ["Found", "Search", "standard"]
