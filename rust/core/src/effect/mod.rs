@@ -155,6 +155,23 @@ pub struct Spec {
     pub hooks: Hooks,
 }
 
+impl Spec {
+    /// What most effects share: they sit on one joint of any arm and are tested by their first parameter.
+    const OF_JOINT: Self = Self {
+        name: "",
+        title: "",
+        equation: "",
+        source: "",
+        excited_by: "",
+        scope: Scope::Joint,
+        least_joints: 1,
+        parameters: &[],
+        initial_guesses: &[],
+        trial: Trial::Amplitudes(1),
+        hooks: Hooks::NONE,
+    };
+}
+
 /// How an effect is tested to first order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trial {
