@@ -2,6 +2,7 @@
 
 `diagnosis`  from logs and an arm to the result
 `result`     the result, read from its JSON
+`schema`     the JSON Schema of that
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from armgap.diagnosis.result import (
     Sanity,
     Value,
 )
+from armgap.diagnosis.schema import diagnosis_schema
 
 __all__ = [
     "MOST_BYTES",
@@ -37,6 +39,7 @@ __all__ = [
     "Sanity",
     "Value",
     "diagnose",
+    "diagnosis_schema",
 ]
 
 if not TYPE_CHECKING:

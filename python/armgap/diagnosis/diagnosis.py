@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, TypedDict
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from armgap.prepared_input import PreparedInput, prepare, refused
 from armgap.progress import ProgressCallback, report_progress, use_callback
 from armgap.serial_settings import serial_settings
 
-__all__ = ["diagnose"]
+__all__ = ["InputSummary", "LogRemark", "diagnose"]
 
 #: What a part of a log is called after the log's own name.
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
@@ -35,6 +35,32 @@ _STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 MOST_CAUSES = 1000
 """More than the library can name on any arm."""
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
+
+
+class InputLog(TypedDict):
+    """A log as it was read."""
+
+    name: str
+    file: Annotated[str | None, "Its file; null for arrays."]
+    set: Literal["training", "holdout"]
+    rows: Annotated[int, "Samples that were used."]
+    columns: Annotated[dict[str, str], "The file's names of columns, by standard name."]
+    units: Annotated[dict[str, str], "Unit of each column in the file, by standard name."]
+
+
+class InputSummary(TypedDict):
+    """Which columns of which files were used."""
+
+    logs: list[InputLog]
+    units: Annotated[dict[str, str], "SI unit of each group of columns."]
+
+
+class LogRemark(TypedDict):
+    """A remark on a log."""
+
+    log: Annotated[str, "Name of the log."]
+    kind: str
+    message: str
 
 
 def diagnose(
@@ -151,22 +177,24 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
         data["plausibility"] = consistency(known, arm)
     data["input"] = _input(arm, training, held)
     data["provenance"] = given.provenance
-    data["log_findings"] = [
+    remarks: list[LogRemark] = [
         {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
         for log in (*training, *held)
         for f in log.findings
     ]
+    data["log_findings"] = remarks
     return Diagnosis.from_dict(data)
 
 
-def _input(arm: Arm, training: list[Log], held: list[Log]) -> dict[str, Any]:
+def _input(arm: Arm, training: list[Log], held: list[Log]) -> InputSummary:
     """Which columns of which files were used, in which units; stretches of one log are one entry."""
-    found: dict[tuple[str, str], dict[str, Any]] = {}
-    for use, logs in (("training", training), ("holdout", held)):
+    found: dict[tuple[str, str], InputLog] = {}
+    sets: tuple[tuple[Literal["training", "holdout"], list[Log]], ...] = (("training", training), ("holdout", held))
+    for use, logs in sets:
         for log in logs:
             name = _STRETCH.sub("", log.name)
             file = None if log.path is None else str(log.path)
-            entry = {
+            entry: InputLog = {
                 "name": name,
                 "file": file,
                 "set": use,
