@@ -50,7 +50,7 @@ TRAINED = 0.6
 #: Widths of the smoothed sign of friction that a diagnosis may choose, in RMS speeds of the motion.
 SMOOTHED = (0.01, 0.05)
 #: Steps in which a rival is fitted beyond first order.
-STEPS = 8
+_STEPS = 8
 #: Decrease of a step, as a part of what was left, below which the fit has settled.
 SETTLED = 0.02
 _MEASURED = ("encoder_offset", "encoder_eccentricity")
@@ -271,7 +271,7 @@ class PredictedMotion:
             columns.append(delayed - self.predicted(model.theta, model.effects, True))
         return columns
 
-    def outcome(self, pair: HypothesisPair, steps: int = STEPS) -> Outcome:
+    def outcome(self, pair: HypothesisPair, steps: int = _STEPS) -> Outcome:
         """What the motion tells about a pair; nothing where a model's motion cannot be computed.
 
         Parameters
@@ -284,7 +284,7 @@ class PredictedMotion:
         weight = np.array([w for w, _ in pair.alternatives])
         residuals = 0.5 * self._arm.n_joints * self._setting.horizon / self._arm.sample_period
         half = self._every * residuals
-        needs = max(MATTERS * self._setting.excess, ABOVE_FLOOR - self._setting.excess) * half
+        needs = max(MATTERS * self._setting.excess, ABOVE_FLOOR - 1.0 - self._setting.excess) * half
         spread = math.sqrt(half) / needs
         try:
             found = np.array([self._evidence(effects, pair, residuals, steps) for _, effects in pair.alternatives])

@@ -12,19 +12,19 @@ __all__ = ["Outcome", "certainty", "settled"]
 
 Array = NDArray[np.float64]
 
-#: A diagnosis explains a gap whose cost is above the floor by this part of it, with what takes this part of the excess, in windows whose
+#: A diagnosis explains a gap whose cost is this many times the floor, with what takes this part of the excess, in windows whose
 #: mean advantage is so many standard errors (`rust/fit/src/acceptance.rs`).
-ABOVE_FLOOR, MATTERS, CERTAIN = 0.25, 0.1, 3.5
+ABOVE_FLOOR, MATTERS, CERTAIN = 1.25, 0.1, 3.5
 #: Standard errors of that advantage on the part of the log that it judges on alone.
 HELD_CERTAIN = 1.0
 #: Standard deviations from its prior that a value of the arm returns by what a diagnosis names without a gap.
 TRUST_SIGMAS = 4.0
 #: Standard deviations by which evidence may exceed what a decision needs before more of it is worth nothing to the search.
-ENOUGH = 3.0
+_ENOUGH = 3.0
 #: Evidence that the search aims at, over what is enough: the effect may be smaller than thought.
 AIM = 100.0
 #: Growth of a merit over its range: the smaller, the more the least one counts.
-GROWTH = 1e4
+_GROWTH = 1e4
 
 
 class Outcome(NamedTuple):
@@ -74,11 +74,11 @@ class Outcome(NamedTuple):
         enough = _enough(threshold)
         parts = (
             self.fitted / (AIM * enough),
-            self.above / (AIM * (1.0 + ENOUGH * self.spread)),
-            self.certain / (CERTAIN + ENOUGH),
+            self.above / (AIM * (1.0 + _ENOUGH * self.spread)),
+            self.certain / (CERTAIN + _ENOUGH),
         )
         least = np.clip(np.min(parts, axis=0), 0.0, 1.0)
-        return float(self.weight @ (np.log1p(GROWTH * least) / math.log1p(GROWTH)))
+        return float(self.weight @ (np.log1p(_GROWTH * least) / math.log1p(_GROWTH)))
 
     @property
     def kept(self) -> float:
@@ -105,6 +105,6 @@ def certainty(advantage: Array, share: float) -> float:
 
 
 def _enough(threshold: float) -> float:
-    """Expected log-likelihood ratio that lies `ENOUGH` of its standard deviations above a threshold."""
-    half = ENOUGH / math.sqrt(2.0)
+    """Expected log-likelihood ratio that lies `_ENOUGH` of its standard deviations above a threshold."""
+    half = _ENOUGH / math.sqrt(2.0)
     return (half + math.sqrt(half * half + threshold)) ** 2
