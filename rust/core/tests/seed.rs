@@ -1,5 +1,7 @@
 //! The seed's run: what each scheme, filter pair and velocity makes of the arm of Table I.
 
+mod common;
+
 use armgap_core::arm::{LinkParameters, TwoLink};
 use armgap_core::effect::{Active, InputSegment, find};
 use armgap_core::filter::Cutoff;
@@ -7,6 +9,7 @@ use armgap_core::identify::{Estimator, Outcome, Sample, Settings};
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::Plant;
 use armgap_core::regression::{Scheme, Variant};
+use common::seed_torque;
 use nalgebra::{SVector, Vector2};
 
 const H: f64 = 0.0025;
