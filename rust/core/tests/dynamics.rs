@@ -53,6 +53,7 @@ fn check<A: Arm<f64, N, P>, const N: usize, const P: usize>(arm: &A, theta: [f64
         arm.energy_regressor(&q, &dq).dot(&vector)
     };
     let energy_rate = (along(STEP) - along(-STEP)) / (2.0 * STEP);
+    let lost = dq.dot(&arm.friction(&theta, &dq));
     assert!((torque.dot(&dq) - energy_rate - lost).abs() < 1e-6 * (1.0 + scale * dq.amax()));
 }
 
