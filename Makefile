@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check licences lint test-rust test-python reproduce bench bench-baselines bench-ferromotion bench-instructions header dist docs wheel wheel-check clean all tools lint-tools
+.PHONY: help setup demo test check check-lints check-tests licences lint test-rust test-python reproduce bench bench-baselines bench-ferromotion bench-instructions header dist docs wheel wheel-check clean all tools lint-tools
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
@@ -42,12 +42,17 @@ lint: setup lint-tools ## formatting, types and stubs
 	cargo fmt --check
 	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy -q --release --all-targets -p armgap-core -p armgap-fit -p armgap-capi -p armgap-bench -p armgap-benches -p armgap-py -- -D warnings
 
-check: setup lint-tools ## formatting, lints and the fast tests, in about a minute once built
+check: setup lint-tools ## formatting, lints and the fast tests side by side, in less than a minute once built
+	@$(MAKE) --no-print-directory -j2 -Otarget check-lints check-tests
+
+check-lints:
 	$(BIN)/ruff format --check python tests examples tools
 	$(BIN)/ruff check python tests examples tools
 	$(BIN)/mypy
 	cargo fmt --check
 	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy -q --release -p armgap-core -p armgap-fit -p armgap-capi -p armgap-py -- -D warnings
+
+check-tests:
 	$(BIN)/python -m pytest -m "not slow"
 
 licences: setup ## write docs/licences.md from the dependencies

@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+import three_joints
 from armgap import Arm, Log, seed_torque, simulate
 from swings import PENDULUM
 
@@ -45,6 +46,11 @@ SLOW = {
     "test_second_simulator", "test_serial_diagnosis", "test_serial_identification", "test_serial_trial", "test_trial",
     "test_trial_baselines", "test_trial_command", "test_trial_physics", "test_trial_scoring", "test_verdicts", "test_where",
 }  # fmt: skip
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave slow files unread where their tests are left out: to import what they use takes as long as many tests."""
+    return True if config.option.markexpr == "not slow" and collection_path.stem in SLOW else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -106,3 +112,11 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     monkeypatch.chdir(folder)
     return folder
+
+
+@pytest.fixture
+def three(here: Path) -> Path:
+    """A folder with the description and the arm file of `three_joints`."""
+    (here / "three.urdf").write_text(three_joints.URDF)
+    (here / "arm.toml").write_text(three_joints.ARM)
+    return here

@@ -11,7 +11,7 @@ from armgap import Arm, Log, diagnose, simulate
 from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, time_shift, torque_unit
 from armgap.check.contradiction import READINGS, Refit
 from armgap.check.equation_error import EquationError, Rows, bounds
-from armgap.diagnosis import _ambiguous_lag
+from armgap.diagnosis.diagnosis import _ambiguous_lag
 from armgap.errors import ColumnError, OptionError
 from armgap.simulation import Effect
 from swings import off, sines, swing
@@ -63,12 +63,12 @@ def test_defects_of_a_pendulum(
     ("defect", "name", "remedy"),
     [
         ({"flip": "tau1"}, "torque_sign", "--flip tau1"),
-        ({"flip": "tau2"}, "torque_sign", "--flip tau2"),
-        ({"flip": "tau1,tau2"}, "torque_sign", "--flip tau1,tau2"),
+        pytest.param({"flip": "tau2"}, "torque_sign", "--flip tau2", marks=pytest.mark.slow),
+        pytest.param({"flip": "tau1,tau2"}, "torque_sign", "--flip tau1,tau2", marks=pytest.mark.slow),
         ({"flip": "q1"}, "position_sign", "--flip q1"),
-        ({"flip": "q2"}, "position_sign", "--flip q2"),
+        pytest.param({"flip": "q2"}, "position_sign", "--flip q2", marks=pytest.mark.slow),
         ({"swap": ["q1,q2"]}, "joint_order", "--swap q1,q2"),
-        ({"swap": ["tau1,tau2"]}, "joint_order", "--swap tau1,tau2"),
+        pytest.param({"swap": ["tau1,tau2"]}, "joint_order", "--swap tau1,tau2", marks=pytest.mark.slow),
         ({"relative": "q2"}, "relative_angle", "--absolute q2"),
         ({"zero": "q2=90deg"}, "position_zero", "--zero q2=-90deg"),
     ],
@@ -162,7 +162,7 @@ def test_a_commanded_position_in_the_torque_column(pendulum: Arm) -> None:
     assert (check.check, check.severity) == ("torque_is_position", "error")
 
 
-@pytest.mark.parametrize("samples", [1, 3])
+@pytest.mark.parametrize("samples", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_torques_that_come_late_in_the_file(two_links: list[Log], arm: Arm, samples: int) -> None:
     late = [replace(log, tau=np.vstack([log.tau[:samples], log.tau[:-samples]])) for log in two_links]
     [check] = checked(late, arm)

@@ -159,11 +159,16 @@ def test_an_interrupt_ends_cleanly(arm_file, tmp_path):
     out = tmp_path / "long.parquet"
     words = ("simulate", "--arm", arm_file, "--torque", "seed", "--duration", "15000", "-o", out)
     # A shell's background job is started with interrupts ignored; a terminal's is not.
-    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    command = [sys.executable, "-c", code + "from armgap.cli import main; main()", *map(str, words)]
+    code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "import polars; import armgap.cli.simulate; print(flush=True); armgap.cli.main()"
+    )
+    command = [sys.executable, "-c", code, *map(str, words)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
-        time.sleep(2)
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(0.5)
         assert process.poll() is None, "the simulation was over before the interrupt"
         process.send_signal(signal.SIGINT)
         out_text, err = process.communicate(timeout=5)

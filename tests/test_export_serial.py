@@ -17,7 +17,7 @@ from armgap.description.edit import XmlText
 from armgap.description.xml import parse
 from armgap.errors import ArmgapError, ModelFileError
 from armgap.export import CorrectedSerial, ExportError, into_description, randomization
-from armgap.export.bodies import TOLERANCE
+from armgap.export.bodies import BODY_TOLERANCE
 from armgap.rigid_body import about_com, rotation_between, rpy_matrix, rpy_of
 from export_cases import found, make_arm
 from serial_export_cases import (
@@ -299,12 +299,12 @@ def test_links_that_no_body_has_become_bodies_with_the_same_torques(arm: Arm) ->
         model = correct(diagnosed(arm, theta), arm)
         assert isinstance(model, CorrectedSerial)
         assert all(is_body(ten) for ten in model.bodies.inertial)
-        assert worst("none", by_mujoco(model.render("mjcf"))) < TOLERANCE
+        assert worst("none", by_mujoco(model.render("mjcf"))) < BODY_TOLERANCE
         # The nominal links have these torques and are bodies: none are nearer to them.
         assert model.bodies.inertial.ravel() == pytest.approx(arm.theta[:30], abs=1e-2 * np.max(scale))
         data = json.loads(model.render("json"))
         assert data["projected"]["links"]
-        assert max(data["projected"]["torque_error"]) < TOLERANCE
+        assert max(data["projected"]["torque_error"]) < BODY_TOLERANCE
         assert any("nearest bodies" in line and "same torques" in line for line in model.remarks("mjcf"))
         assert not any("nearest bodies" in line for line in model.remarks("toml"))
 

@@ -309,6 +309,7 @@ def test_rows_of_windows_follow_from_the_times_of_their_first_samples():
     assert rows_of(t, [PERIOD, 251 * PERIOD, 491 * PERIOD]) == [(0, 250), (250, 490), (490, 1000)]
 
 
+@pytest.mark.slow
 def test_the_true_floor_is_noise_and_the_error_of_the_start(tmp_path):
     keep(make_case(8, model="pendulum", nominal="exact", duration=2.0, style="tracked"), tmp_path / "case")
     case = read(tmp_path / "case")

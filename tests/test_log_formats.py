@@ -38,6 +38,7 @@ def test_same_log(name, demo_log, demo_arm, tmp_path):
     assert log.name == "run"
 
 
+@pytest.mark.slow
 def test_same_diagnosis(demo_log, demo_arm, tmp_path):
     """A stamp in whole nanoseconds and a time in seconds give the same figures."""
     results = [

@@ -57,6 +57,7 @@ def test_several_logs_share_the_budget():
     assert len({part.name for part in parts}) == len(parts)
 
 
+@pytest.mark.slow
 def test_a_long_log_is_diagnosed_by_its_stretches(monkeypatch, tmp_path):
     from armgap.log import stretches
 

@@ -1,4 +1,4 @@
-"""URDF and MJCF as serial arms: against Pinocchio and MuJoCo, through the arm file and back, and what is broken or unusual."""
+"""URDF and MJCF as serial arms: against Pinocchio and MuJoCo, through the arm file and back, and what is unusual."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import polars as pl
 import pytest
 from numpy.typing import NDArray
 
-from armgap import Arm, Log, read_model
-from armgap.errors import ArmgapError, ModelFileError, OptionError
+from armgap import Arm, read_model
+from armgap.errors import ModelFileError, OptionError
 from armgap.rigid_body import about_com, about_origin, inconsistency, moved, symmetric
 from armgap.serial_trust import TRUSTS
+from three_joints import ARM, LINKS, URDF
 
 Array = NDArray[np.float64]
 Run = Callable[..., tuple[int, str, str]]
@@ -291,68 +291,6 @@ def test_mjcf_without_mujoco(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         read_model(path, tip="forearm")
 
 
-# What is broken or unusual
-
-URDF = """\
-<?xml version="1.0"?>
-<robot name="three" xmlns:drake="http://drake.mit.edu">
-  <link name="base"><inertial><mass value="50"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>
-  <joint name="lift" type="prismatic"><parent link="base"/><child link="column"/><origin xyz="0 0 0.3"/><axis xyz="0 0 2"/>
-    <limit lower="0" upper="0.5" velocity="0.2" effort="900"/><dynamics damping="20" friction="8"/></joint>
-  <link name="column"><inertial><origin xyz="0 0 0.1"/><mass value="6"/><inertia ixx="0.2" iyy="0.2" izz="0.05"/></inertial></link>
-  <joint name="shoulder" type="continuous"><parent link="column"/><child link="upper"/><origin xyz="0.1 0 0.2" rpy="0.1 0.2 0.3"/>
-    <axis xyz="0 1 0"/><limit velocity="3" effort="90"/><dynamics damping="0.5" friction="1.5"/></joint>
-  <link name="upper"><inertial><origin xyz="0.01 0 0.2" rpy="0.3 0 0.1"/><mass value="3"/>
-    <inertia ixx="0.03" ixy="0.001" ixz="0.002" iyy="0.04" iyz="0" izz="0.02"/></inertial></link>
-  <joint name="wrist" type="fixed"><parent link="upper"/><child link="mount"/><origin xyz="0 0 0.4" rpy="0 1.2 0"/></joint>
-  <link name="mount"/>
-  <joint name="elbow" type="revolute"><parent link="mount"/><child link="fore"/><axis xyz="0 1 0"/>
-    <limit lower="-2" upper="2" velocity="4" effort="40"/><dynamics damping="0.2" friction="0.7"/></joint>
-  <link name="fore"><inertial><origin xyz="0 0 0.1"/><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.002"/></inertial></link>
-  <joint name="flange_joint" type="fixed"><parent link="fore"/><child link="flange"/><origin xyz="0 0 0.25"/></joint>
-  <link name="flange"/>
-  <joint name="finger" type="prismatic"><parent link="flange"/><child link="jaw"/><axis xyz="1 0 0"/>
-    <limit lower="0.01" upper="0.04" velocity="1" effort="10"/></joint>
-  <link name="jaw"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4"/></inertial></link>
-  <joint name="thumb" type="prismatic"><parent link="flange"/><child link="pad"/><axis xyz="1 0 0"/><mimic joint="finger" multiplier="-1"/>
-    <limit lower="-0.04" upper="-0.01" velocity="1" effort="10"/></joint>
-  <link name="pad"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4"/></inertial></link>
-  <drake:collision_filter_group name="g"><drake:member link="fore"/></drake:collision_filter_group>
-  <vendor:thing anything="goes"/>
-</robot>
-"""
-ARM = """\
-name = "three"
-kind = "serial"
-urdf = "three.urdf"
-tip = "flange"
-sample_period = 0.002
-[friction]
-coulomb = [8.0, 1.5, 0.7]
-"""
-LINKS = """\
-kind = "serial"
-sample_period = 0.002
-[[link]]
-joint = "one"
-axis = [0, 1, 0]
-mass = 2.0
-com = [0, 0, 0.2]
-inertia = {ixx = 0.03, iyy = 0.03, izz = 0.01}
-[[link]]
-joint = "two"
-placement = {xyz = [0, 0, 0.4], rpy = [0, 0.1, 0]}
-mass = 1.0
-"""
-
-
-@pytest.fixture
-def three(here: Path) -> Path:
-    (here / "three.urdf").write_text(URDF)
-    (here / "arm.toml").write_text(ARM)
-    return here
-
-
 def test_the_unbroken_ones_pass(three: Path, run: Run) -> None:
     arm = Arm.read(three / "arm.toml")
     assert arm.chain is not None
@@ -379,122 +317,6 @@ def test_the_unbroken_ones_pass(three: Path, run: Run) -> None:
     assert (
         run("model", "three.urdf", "--tip", "flange", "-o", "-")[1] == read_model("three.urdf", tip="flange").to_toml()
     )
-
-
-ELBOW = '<joint name="elbow" type="revolute">'
-#: What is replaced in URDF by what, the words of the complaint, and further options.
-BROKEN = [
-    ("no such tip", "", "", ("`flnge`", "did you mean `flange`"), ("--tip", "flnge")),
-    ("no such base", "", "", ("`bse`", "did you mean `base`"), ("--base", "bse", "--tip", "flange")),
-    ("tip above base", "", "", ("`column`", "`fore`", "flange"), ("--base", "fore", "--tip", "column")),
-    ("several branches", "", "", ("several branches", "`flange` (3 joints), where they part", "`jaw` (4 joints)"), ()),
-    ("nothing moves", "", "", ("no joint moves", "`flange`"), ("--base", "fore", "--tip", "flange")),
-    ("no joint to freeze", "", "", ("`finge`", "did you mean `finger`"), ("--freeze", "finge=0")),
-    ("frozen at no number", "", "", ("--freeze", "finger=open"), ("--freeze", "finger=open")),
-    ("frozen twice", "", "", ("given twice",), ("--freeze", "finger=0", "--freeze", "finger=1")),
-    ("sample period in ms", "", "", ("2", "1e-05 to 0.5"), ("--tip", "flange", "--sample-period", "2")),
-    ("a mimic joint in the chain", "", "", ("`joint thumb`", "follows the joint `finger`", "freeze"), ("--tip", "pad")),
-    ("floating", ELBOW, ELBOW.replace("revolute", "floating"), ("`joint elbow`", "floating", "`fore`"), ("--tip", "flange")),
-    ("planar", ELBOW, ELBOW.replace("revolute", "planar"), ("`joint elbow`", "planar"), ("--tip", "flange")),
-    ("no type", ' type="revolute"', "", ("`joint elbow`", "no type", "continuous"), ()),
-    ("unknown type", "revolute", "hinge", ("`hinge`", "revolute"), ()),
-    ("zero axis", 'xyz="0 0 2"', 'xyz="0 0 0"', ("`joint lift`", "zero axis"), ("--tip", "flange")),
-    ("axis of two numbers", 'xyz="0 0 2"', 'xyz="0 2"', ("`axis`", "row 4", "3 finite numbers"), ()),
-    ("decimal comma", 'value="6"', 'value="6,5"', ("`mass`", "'6,5'", "row 6"), ()),
-    ("mass is nan", 'value="6"', 'value="nan"', ("'nan'", "finite"), ()),
-    ("no mass value", 'mass value="6"', "mass", ("has no `value`",), ()),
-    ("no child", '<child link="fore"/>', "", ("`joint elbow`", "no child link"), ()),
-    ("child is no link", '<child link="fore"/>', '<child link="four"/>', ("`joint elbow`", "`four`"), ()),
-    ("two parents", '<child link="pad"/>', '<child link="jaw"/>', ("`joint thumb`", "`finger`", "closed chains"), ()),
-    ("a circle", '<parent link="base"/>', '<parent link="fore"/>', ("circle",), ()),
-    ("link twice", '<link name="mount"/>', '<link name="mount"/><link name="mount"/>', ("`link mount`", "twice"), ()),
-    ("joint twice", '"wrist"', '"elbow"', ("`joint elbow`", "twice"), ()),
-    ("joint without a name", 'joint name="lift" type', "joint type", ("`joint`", "has no name"), ()),
-    ("not XML", "</robot>", "", ("not valid XML", "row"), ()),
-    ("xacro by its elements", "<vendor:thing", "<xacro:thing", ("xacro", "robot.urdf", "`xacro:thing`"), ()),
-    ("xacro by its values", 'value="6"', 'value="${m}"', ("${m}", "xacro FILE"), ()),
-    ("xacro by its names", '<link name="base">', '<link name="${prefix}base">', ("`link ${prefix}base`", "xacro FILE"), ()),
-    ("SDF", URDF, "<sdf><model/></sdf>", ("<sdf>", "convert"), ()),
-    ("a table", URDF, "t,q1\n0,1\n", ("no XML", "<robot>"), ()),
-    ("empty", URDF, "", ("no XML",), ()),
-    ("no links", URDF, "<robot name='r'/>", ("no links",), ()),
-    ("an entity", '<robot name', '<!DOCTYPE robot [<!ENTITY a "b">]><robot name', ("entity",), ()),
-    ("reduction of no number", "<vendor:thing", '<transmission name="t"><joint name="lift"/><actuator name="m"><mechanicalReduction>x'
-     "</mechanicalReduction></actuator></transmission><vendor:thing", ("mechanicalReduction", "'x'"), ()),
-    ("a kilometre too many", 'xyz="0.1 0 0.2"', 'xyz="1e300 0 0"', ("too long to compute with", "kg and m"), ("--tip", "flange")),
-    ("folder that is not there", "", "", ("folder does not exist",), ("--tip", "flange", "-o", "none/arm.toml")),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("good", "bad", "says", "options"), [c[1:] for c in BROKEN], ids=[c[0] for c in BROKEN])
-def test_a_broken_description(
-    good: str, bad: str, says: tuple[str, ...], options: tuple[str, ...], three: Path, run: Run
-) -> None:
-    assert good in URDF
-    (three / "three.urdf").write_text(URDF.replace(good, bad, 1))
-    before = sorted(three.iterdir())
-    output = () if "-o" in options else ("-o", "made.toml")
-    _refused(run("model", "three.urdf", *options, *output), says)
-    assert sorted(three.iterdir()) == before
-
-
-def _refused(answer: tuple[int, str, str], says: tuple[str, ...]) -> None:
-    status, out, err = answer
-    assert (status, out, err.count("\n")) == (2, "", 1), err
-    for words in says:
-        assert words in err
-    assert err.count(";") >= 1  # what to do about it
-
-
-#: What is replaced in ARM, or LINKS, by what, and the words of the complaint.
-BROKEN_ARMS = [
-    ("misspelt key", ARM, "tip =", "tpi =", ("`tpi`", "did you mean `tip`")),
-    ("no description", ARM, 'urdf = "three.urdf"\n', "", ("exactly one of urdf, mjcf and [[link]]",)),
-    ("two descriptions", ARM, "tip =", 'mjcf = "x.xml"\ntip =', ("`mjcf`", "stands beside `urdf`")),
-    ("not that kind of description", ARM, "urdf =", "mjcf =", ("is URDF, not MJCF",)),
-    ("no such description", ARM, "three.urdf", "thre.urdf", ("thre.urdf", "No such file")),
-    ("base parameters", ARM, "[friction]", "[inertial]\ntheta = [1]\n[friction]", ("`inertial`", "[[link]]")),
-    ("lengths", ARM, "[friction]", "[geometry]\nlink_length = [1]\n[friction]", ("`geometry`", "leave it out")),
-    ("unknown trust", ARM, "tip =", 'trust = "CAD"\ntip =', ("`trust`", "`CAD`")),
-    ("gravity of two", ARM, "tip =", "gravity = [0, -9.81]\ntip =", ("`gravity`", "3 numbers")),
-    ("gravity too strong", ARM, "tip =", "gravity = [0, 0, -9810]\ntip =", ("`gravity`", "9810")),
-    ("too few frictions", ARM, "[8.0, 1.5, 0.7]", "[8.0]", ("`friction.coulomb`", "lift, shoulder, elbow")),
-    ("friction of no joint", ARM, "[8.0, 1.5, 0.7]", "{lift = 8, shoulder = 2, elbw = 1}", ("did you mean `elbow`",)),
-    ("friction lacks a joint", ARM, "[8.0, 1.5, 0.7]", "{lift = 8, shoulder = 2}", ("lacks the joint `elbow`",)),
-    ("negative friction", ARM, "1.5", "-1.5", ("`friction.coulomb`", "-1.5")),
-    ("frozen at a word", ARM, "[friction]", '[frozen]\nfinger = "open"\n[friction]', ("`frozen.finger`", "'open'")),
-    ("limits exchanged", ARM, "[friction]", "[limits]\nposition_max = [-1, 1, 1]\n[friction]", ("`lift`", "exchange")),
-    ("payload without a mass", ARM, "[friction]", "[payload]\ncom = [0, 0, 0]\n[friction]", ("`payload.mass`",)),
-    ("payload far away", ARM, "[friction]", "[payload]\nmass = 1\ncom = [0, 0, 300]\n[friction]", ("in m",)),
-    ("controller without gains", ARM, "[friction]", "[controller]\nkp = [1, 2, 3]\n[friction]", ("`controller.kd`",)),
-    ("controller of no kind", ARM, "[friction]", '[controller]\nkind = "mpc"\n[friction]', ("'mpc'", "pd")),
-    ("gear ratios twice", ARM, "[friction]", "[drive]\ngear_ratio = [1, 2, 3]\n[transmission]\ngear_ratio = [1, 2, 3]\n[friction]",
-     ("`transmission.gear_ratio`", "`drive.gear_ratio`")),
-    ("column of no joint", ARM, "[friction]", '[columns]\nq_ref4 = "x"\n[friction]', ("`columns.q_ref4`",)),
-    ("kind of torque", ARM, "[friction]", '[columns]\ntau_kind = "guessed"\n[friction]', ("`columns.tau_kind`", "measured")),
-    ("joint twice", LINKS, '"two"', '"one"', ("`link 2.joint`", "twice")),
-    ("no joint", LINKS, 'joint = "two"\n', "", ("`link 2.joint`", "is missing")),
-    ("misspelt key of a link", LINKS, "com =", "con =", ("`link 1.con`", "did you mean `com`")),
-    ("axis of zeros", LINKS, "[0, 1, 0]", "[0, 0, 0]", ("`link 1.axis`", "zero")),
-    ("axis of words", LINKS, "[0, 1, 0]", '["y", 1, 0]', ("`link 1.axis`", "3 numbers")),
-    ("kind of joint", LINKS, "axis =", 'kind = "ball"\naxis =', ("`link 1.kind`", "`ball`", "revolute")),
-    ("no rotation", LINKS, "rpy = [0, 0.1, 0]", "rotation = [[1, 0, 0], [0, 2, 0], [0, 0, 1]]", ("is no rotation",)),
-    ("two rotations", LINKS, "rpy = [0, 0.1, 0]", "rpy = [0, 0, 0], rotation = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]", ("`rotation`",)),
-    ("massless with a centre", LINKS, "mass = 2.0\n", "", ("`link 1.mass`", "`com`")),
-    ("negative mass of a link", LINKS, "mass = 2.0", "mass = -2.0", ("`link 1.mass`", "-2")),
-    ("half an inertia", LINKS, "iyy = 0.03, ", "", ("`link 1.inertia.iyy`",)),
-    ("inertia as a list", LINKS, "{ixx = 0.03, iyy = 0.03, izz = 0.01}", "[1, 2, 3]", ("`link 1.inertia`", "ixx")),
-    ("a mass of any size", LINKS, "mass = 2.0\ncom = [0, 0, 0.2]", "mass = 1e300\ncom = [0, 0, 1e9]", ("`link`", "too heavy")),
-    ("links and a tip", LINKS, "[[link]]", 'tip = "x"\n[[link]]', ("`tip`", "[[link]]")),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("text", "good", "bad", "says"), [c[1:] for c in BROKEN_ARMS], ids=[c[0] for c in BROKEN_ARMS])
-def test_a_broken_arm_file(text: str, good: str, bad: str, says: tuple[str, ...], three: Path, run: Run) -> None:
-    assert good in text
-    (three / "arm.toml").write_text(text.replace(good, bad, 1))
-    _log().write_csv(three / "log.csv")
-    _refused(run("inspect", "log.csv", "--arm", "arm.toml"), says)
 
 
 # Unusual, and said
@@ -639,143 +461,3 @@ def test_rigid_bodies() -> None:
     assert "mass" in inconsistency(-ten)
     assert "no mass" in inconsistency(about_origin(0.0, com, np.eye(3)))
     assert "triangle" in inconsistency(about_origin(1.0, com, np.diag([1.0, 1.0, 3.0])))
-
-
-# Logs
-
-JOINTS = ("lift", "shoulder", "elbow")
-
-
-def _log(samples: int = 400) -> pl.DataFrame:
-    """A motion of the three joints, in columns named after them."""
-    t = np.arange(samples) * 0.002
-    data = {"t": t}
-    for j, joint in enumerate(JOINTS):
-        data[f"{joint}/position"] = 0.2 * (j + 1) * np.sin((5 + j) * t)
-        data[f"{joint}/velocity"] = 0.2 * (j + 1) * (5 + j) * np.cos((5 + j) * t)
-        data[f"{joint}/effort"] = (j + 1) * np.cos(7 * t)
-    return pl.DataFrame(data)
-
-
-def test_columns_are_found_by_the_names_of_joints(three: Path) -> None:
-    """In any order, beside columns of other joints."""
-    arm, frame = Arm.read(three / "arm.toml"), _log()
-    for columns in (frame.columns, frame.columns[::-1]):
-        log = Log.from_frame(frame.select(columns).with_columns(pl.lit(0.02).alias("finger/position")), arm=arm)
-        for j, joint in enumerate(JOINTS):
-            np.testing.assert_array_equal(log.q[:, j], frame[f"{joint}/position"])
-            np.testing.assert_array_equal(log.tau[:, j], frame[f"{joint}/effort"])
-            assert log.dq is not None
-            np.testing.assert_array_equal(log.dq[:, j], frame[f"{joint}/velocity"])
-        assert [log.units[f"q{j}"] for j in (1, 2, 3)] == ["m", "rad", "rad"]
-        assert [log.units[f"tau{j}"] for j in (1, 2, 3)] == ["N", "Nm", "Nm"]
-
-
-def test_explicit_columns_win(three: Path) -> None:
-    frame = _log().with_columns((2 * pl.col("elbow/effort")).alias("elbow current"))
-    (three / "arm.toml").write_text(ARM + '[columns]\ntau3 = "elbow current"\nq_ref1 = "target"\n')
-    arm = Arm.read(three / "arm.toml")
-    np.testing.assert_array_equal(Log.from_frame(frame, arm=arm).tau[:, 2], frame["elbow current"])
-    np.testing.assert_array_equal(
-        Log.from_frame(frame, arm=arm, columns={"tau3": "elbow/effort"}).tau[:, 2], frame["elbow/effort"]
-    )
-    written = Log.from_frame(frame, arm=arm).to_polars()
-    np.testing.assert_array_equal(Log.from_frame(written, arm=arm).tau[:, 2], frame["elbow current"])
-
-
-def test_angles_in_degrees_leave_lengths_alone(three: Path) -> None:
-    arm, frame = Arm.read(three / "arm.toml"), _log()
-    degrees = frame.with_columns(pl.col(f"{joint}/position") * (180 / np.pi) for joint in JOINTS[1:])
-    log = Log.from_frame(degrees, arm=arm, units={"q": "deg"})
-    np.testing.assert_allclose(log.q, Log.from_frame(frame, arm=arm).q, rtol=1e-14)
-    assert [log.units[f"q{j}"] for j in (1, 2, 3)] == ["m", "deg", "deg"]
-    recognised = Log.from_frame(degrees, arm=arm)  # by the velocities
-    np.testing.assert_allclose(recognised.q, log.q, rtol=1e-14)
-
-
-#: What is done to a log, further options, and the words of the complaint.
-BROKEN_LOGS: list[tuple[str, Callable[[pl.DataFrame], pl.DataFrame], tuple[str, ...], tuple[str, ...]]] = [
-    ("an effort is missing", lambda f: f.drop("elbow/effort"), (), ("`elbow/effort`", "mapped to tau3", "missing")),
-    ("a position is missing", lambda f: f.drop("shoulder/position"), (), ("`shoulder/position`", "mapped to q2")),
-    ("other joints", lambda f: f.rename({c: f"x_{c}" for c in f.columns if "/" in c}), (), ("`q1`", "--columns")),
-    ("a word in a column", lambda f: f.with_columns(pl.lit("x").alias("lift/effort")), (), ("`lift/effort`", "row 1")),
-    ("a length in mm", lambda f: f.with_columns(pl.col("lift/position") * 1e3), (), ("`lift/position`", "mm")),
-    ("mapped to no joint", lambda f: f, ("--columns", "q4=lift/position"), ("`q4`", "3 joints")),
-    ("mapped to what is not there", lambda f: f, ("--columns", "q1=lift_position"), ("`lift_position`", "missing")),
-    ("mapped twice", lambda f: f, ("--columns", "q1=elbow/position"), ("mapped to both", "`elbow/position`")),
-    ("two arms in one log", lambda f: f.rename({c: f"a/{c}" for c in f.columns if "/" in c}).with_columns(
-        pl.lit(1.0).alias("b/lift/position")), (), ("`lift/position`", "fits several columns")),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("change", "options", "says"), [c[1:] for c in BROKEN_LOGS], ids=[c[0] for c in BROKEN_LOGS])
-def test_a_log_that_does_not_fit(
-    change: Callable[[pl.DataFrame], pl.DataFrame],
-    options: tuple[str, ...],
-    says: tuple[str, ...],
-    three: Path,
-    run: Run,
-) -> None:
-    change(_log()).write_csv(three / "log.csv")
-    _refused(run("diagnose", "log.csv", "--arm", "arm.toml", *options), says)
-
-
-# What serial arms are not taken by
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("diagnose", "log.csv", "--arm", "three.urdf"),
-        ("replay", "log.csv", "--arm", "arm.toml", "-o", "out.rrd"),
-        ("simulate", "--arm", "arm.toml", "--torque", "seed", "-o", "out.csv"),
-    ],
-    ids=lambda words: words[0],
-)
-def test_commands_that_take_no_serial_arms(words: tuple[str, ...], three: Path, run: Run) -> None:
-    _log().write_csv(three / "log.csv")
-    _refused(run(*words), ())
-
-
-def test_a_function_that_takes_no_serial_arms(three: Path) -> None:
-    from armgap import fit
-
-    arm = Arm.read(three / "arm.toml")
-    log = Log.from_frame(_log(), arm=arm)
-    with pytest.raises(ArmgapError, match="serial"):
-        fit(log, arm)
-
-
-def test_a_serial_arm_shows_itself(three: Path) -> None:
-    text = Arm.read(three / "arm.toml")._repr_markdown_()
-    for words in ("lift, shoulder, elbow", "first moment along x of link 2", "rotor inertia at joint 3", "stand still"):
-        assert words in text
-    assert "<svg" not in Arm.read(three / "arm.toml")._repr_html_()
-
-
-def test_whatever_is_damaged_is_refused_in_one_line(three: Path) -> None:
-    """A character or a stretch of the file changed or gone: read as some arm, or refused as nothing but a complaint of ours."""
-    rng = np.random.default_rng(4)
-    refused = 0
-    for _ in range(400):
-        first = int(rng.integers(len(URDF)))
-        last = first + int(rng.choice([1, 1, 5, 40]))
-        put = "".join(rng.choice(list('<>"=/ 0.-e${}'), int(rng.integers(0, 4))))
-        (three / "three.urdf").write_text(URDF[:first] + put + URDF[last:])
-        complaint, arm = _read_or_refused(three / "three.urdf")
-        if arm is None:
-            refused += 1
-            assert "\n" not in str(complaint)
-            assert getattr(complaint, "remedy", "")
-        else:
-            assert np.isfinite(arm.theta).all()
-            assert np.isfinite(arm.sigma).all()
-            assert (arm.sigma > 0).all()
-    assert 100 < refused < 400
-
-
-def _read_or_refused(path: Path) -> tuple[ArmgapError | None, Arm | None]:
-    try:
-        return None, read_model(path, tip="flange")
-    except ArmgapError as error:
-        return error, None

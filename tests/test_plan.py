@@ -15,10 +15,11 @@ from armgap.arm import MotionLimits
 from armgap.errors import ArmFileError, ArmgapError, OptionError
 from armgap.evidence.hypothesis import EffectInstance
 from armgap.planning import criterion, search
-from armgap.planning.criterion import HypothesisPair, PredictedMotion, Setting, settled
+from armgap.planning.criterion import HypothesisPair, PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics
 from armgap.planning.limits import MARGIN, TORQUE_MARGIN, limits_of
 from armgap.planning.motion import Motion, build, count, named
+from armgap.planning.outcome import settled
 from armgap.planning.questions import asked, known_model, open_questions
 from armgap.simulation import Effect
 from conftest import TABLE_ONE

@@ -24,7 +24,7 @@ from armgap.trial.scoring.case_score import GROUPS
 from armgap.trial.scoring.closing import HISTORY, closing
 from armgap.trial.scoring.sizes import MAIN, VECTOR, bound_scores, size_scores
 from armgap.trial.simulated_arm import Trace, run
-from armgap.trial.visibility import MULTIPLE, SIGMAS, visibility
+from armgap.trial.visibility import MULTIPLE, VISIBLE_SIGMAS, visibility
 from armgap.trial.windows import Mechanism, cut, misses, refit
 
 STRIBECK = HiddenEffect("stribeck", 2, {"amplitude": 0.5, "velocity": 0.1})
@@ -192,7 +192,7 @@ def test_what_re_estimation_swallows_is_seen_by_the_parameters_only():
         assert not faint.visible
         assert clear.visible
         assert clear.above_floor < MULTIPLE
-        assert clear.moved > SIGMAS > faint.moved
+        assert clear.moved > VISIBLE_SIGMAS > faint.moved
 
 
 def test_what_re_estimation_leaves_is_seen_by_the_predictions(pendulum):

@@ -11,6 +11,7 @@ __all__ = [
     "arm_kinds",
     "bench",
     "diagnose",
+    "diagnosis_schema",
     "effects",
     "fit",
     "inertia",
@@ -66,6 +67,7 @@ def diagnose(
     options: dict[str, Any],
     progress: Callable[[str, float], object] | None = None,
 ) -> str: ...
+def diagnosis_schema() -> str: ...
 def refit(
     arm: dict[str, Any], training: Sequence[_Log], holdout: Sequence[_Log], horizon: float
 ) -> dict[str, list[float]]: ...

@@ -40,7 +40,7 @@ _TABLES: dict[str, tuple[str, ...]] = {
     "sealed": ("sha256",),
 }
 _SCALARS = ("name", "kind", "gravity", "sample_period")
-MOST_BYTES = 2**20
+_MOST_BYTES = 2**20
 """Size of an arm file: a thousand times what one needs."""
 _FORMATS = "docs/formats.md, Arm file"
 _CLOSE_KIND = 0.75
@@ -50,6 +50,7 @@ _KINDS = [*kinds(), SERIAL]
 _REMEDY_MARKUP = (
     f"make an arm file of it with armgap model, or write one of the kind {', '.join(_KINDS)}; see {_FORMATS}"
 )
+#: Standard deviations of values whose file states none, as a part of the value: a drawing is right to 10 %, friction to half.
 _INERTIAL_SIGMA = 0.1
 _FRICTION_SIGMA = 0.5
 _LISTED = 40
@@ -74,7 +75,7 @@ class ArmFile:
     def load(cls, path: Path) -> ArmFile:
         """Read the file's TOML."""
         try:
-            text = read_bounded(path, MOST_BYTES).decode("utf-8-sig")
+            text = read_bounded(path, _MOST_BYTES).decode("utf-8-sig")
         except OSError as error:
             raise ArmFileError(
                 f"cannot be read ({error.strerror or error})", remedy="give the path of an arm file", file=path

@@ -13,6 +13,7 @@ from armgap.errors import OptionError
 
 __all__ = ["BaseParameters", "base_parameters"]
 
+#: Parameters of a link and its joint: ten inertial numbers, rotor inertia, viscous and Coulomb friction.
 PER_JOINT = 13
 # Digits of the factors in texts, and the share of the largest factor below which one is left out of them.
 DIGITS, LEAST = 4, 1e-4

@@ -21,6 +21,7 @@ from armgap.serial_trust import TRUSTS
 
 __all__ = ["read_model"]
 
+#: Sample period of an arm file made from a description that tells none, s.
 _PERIOD_S = 0.002
 
 

@@ -22,11 +22,21 @@ from typing import Any, TypeAlias
 from armgap.errors import ResultError
 from armgap.reading import is_text
 
-__all__ = ["STANDARD_STREAM", "Content", "check_writable", "descriptor", "is_stdout", "write", "write_folder"]
+__all__ = [
+    "STANDARD_STREAM",
+    "Content",
+    "check_writable",
+    "descriptor",
+    "is_stdout",
+    "status_of",
+    "write",
+    "write_folder",
+]
 
 STANDARD_STREAM = "-"
 Content: TypeAlias = str | bytes | Callable[[Path], Any]
 _PLACE = "choose another place"
+#: Descriptors of the standard streams.
 _STDOUT, _STDERR = 1, 2
 _OS_ERROR = re.compile(r"\(os error ([0-9]+)\)")
 """How libraries written in Rust pass on what the system said."""
@@ -124,7 +134,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         raise ResultError("its folder does not exist", remedy="make the folder first", file=path)
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise ResultError("its folder cannot be written to", remedy=_PLACE, file=path)
-    if (old := _status(target)) is not None:
+    if (old := status_of(target)) is not None:
         _check_replaceable(target, old)
 
 
@@ -142,7 +152,7 @@ def descriptor(path: str | os.PathLike[str]) -> int | None:
         if not os.path.islink(word):
             break
         word = os.path.join(parent, os.readlink(word))
-    there = _status(word)
+    there = status_of(word)
     if there is None or not stat.S_ISREG(there.st_mode):
         return None
     return next((number for number in (_STDOUT, _STDERR) if _is_open(number, there)), None)
@@ -154,8 +164,8 @@ def is_stdout(*paths: str | os.PathLike[str] | None) -> bool:
 
 
 def _leads_to_stdout(path: str | os.PathLike[str]) -> bool:
-    there = _status(path)
-    null = _status(os.devnull)
+    there = status_of(path)
+    null = status_of(os.devnull)
     if there is None or (null is not None and os.path.samestat(there, null)):
         return False
     return _is_open(_STDOUT, there)
@@ -168,7 +178,8 @@ def _is_open(number: int, there: os.stat_result) -> bool:
         return False
 
 
-def _status(path: str | os.PathLike[str]) -> os.stat_result | None:
+def status_of(path: str | os.PathLike[str]) -> os.stat_result | None:
+    """Return what the system says of a file; None where there is none that can be reached."""
     try:
         return os.stat(path)
     except OSError:
@@ -177,7 +188,7 @@ def _status(path: str | os.PathLike[str]) -> os.stat_result | None:
 
 def _is_special(path: str | os.PathLike[str]) -> bool:
     """Whether it is a device, a pipe or a socket: what has no content that could be replaced."""
-    there = _status(path)
+    there = status_of(path)
     return there is not None and not (stat.S_ISREG(there.st_mode) or stat.S_ISDIR(there.st_mode))
 
 
@@ -193,7 +204,7 @@ def _beside(target: Path) -> Path:
 
 
 def _replace(target: Path, content: Content) -> None:
-    old = _status(target)
+    old = status_of(target)
     mode = _NEW_FILE
     if old is not None:
         _check_replaceable(target, old)

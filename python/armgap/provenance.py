@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypedDict
 
 import numpy as np
 
@@ -13,10 +13,33 @@ from armgap import _native
 from armgap.arm import Arm
 from armgap.log import Log
 
-__all__ = ["provenance"]
+__all__ = ["Provenance", "provenance"]
 
 
-def provenance(arm: Arm, logs: Mapping[str, Sequence[Log]], options: Mapping[str, Any]) -> dict[str, Any]:
+class HashedInput(TypedDict):
+    """An input and its hash."""
+
+    file: Annotated[str | None, "File it was read from; null without one."]
+    sha256: Annotated[str, "SHA-256 of the file, or of the text or columns of what came from none."]
+
+
+class HashedLog(HashedInput):
+    """A log and its hash."""
+
+    name: str
+    set: Annotated[str, "What it was used for: training or holdout."]
+
+
+class Provenance(TypedDict):
+    """What a result was made from."""
+
+    version: Annotated[str, "Version of this library."]
+    options: Annotated[dict[str, Any], "What was asked for."]
+    arm: HashedInput
+    logs: list[HashedLog]
+
+
+def provenance(arm: Arm, logs: Mapping[str, Sequence[Log]], options: Mapping[str, Any]) -> Provenance:
     """Return version, options, and the SHA-256 of every input.
 
     Parameters
@@ -29,11 +52,6 @@ def provenance(arm: Arm, logs: Mapping[str, Sequence[Log]], options: Mapping[str
         no regular file.
     options : mapping
         What was asked for.
-
-    Returns
-    -------
-    dict
-        ``version``, ``options``, ``arm`` and ``logs``; an input has ``file`` (null without one) and ``sha256``.
     """
     return {
         "version": _native.__version__,
@@ -47,14 +65,14 @@ def provenance(arm: Arm, logs: Mapping[str, Sequence[Log]], options: Mapping[str
     }
 
 
-def _arm(arm: Arm) -> dict[str, Any]:
+def _arm(arm: Arm) -> HashedInput:
     text = arm.to_toml().encode()
     if arm.chain is None:
         return _input(arm.path, text)
     return {"file": None if arm.path is None else str(arm.path), "sha256": hashlib.sha256(text).hexdigest()}
 
 
-def _input(path: Path | None, content: bytes) -> dict[str, Any]:
+def _input(path: Path | None, content: bytes) -> HashedInput:
     if path is not None and path.is_file():
         with path.open("rb") as file:
             return {"file": str(path), "sha256": hashlib.file_digest(file, "sha256").hexdigest()}

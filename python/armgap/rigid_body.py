@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 INERTIAL_NAMES: tuple[str, ...] = ("mass", "mx", "my", "mz", "ixx", "ixy", "iyy", "ixz", "iyz", "izz")
 """Names of the ten numbers; a joint's number follows."""
 INERTIAL_UNITS: tuple[str, ...] = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
+#: Rows and columns of the six independent entries of a symmetric 3 x 3 matrix, in the order of arm files.
 _ROWS, _COLUMNS = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
 # A negative eigenvalue of the pseudo-inertia that is this small beside the largest is rounding of the description.
 _CONSISTENT = 1e-9

@@ -27,6 +27,7 @@ _KEYS = (
 )  # fmt: skip
 _PLACEMENT = ("xyz", "rpy", "rotation")
 _KINDS: dict[str, JointKind] = {**{kind: kind for kind in get_args(JointKind)}, "continuous": "revolute"}
+#: Links that an arm file lists at most.
 _MOST_JOINTS = 64
 # Rows of a rotation that are typed with a few digits are made orthonormal; beyond this they are no rotation.
 _ROTATION = 1e-3

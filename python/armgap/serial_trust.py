@@ -32,13 +32,18 @@ Trust = Literal["published", "cad", "guess", "none"]
 
 TRUSTS: dict[Trust, float] = {"published": 0.1, "cad": 0.3, "guess": 1.0, "none": 1.0}
 """Standard deviation of the mass as a share of it."""
+#: Standard deviation of friction that a file states, as a part of it.
 FRICTION_SHARE = 0.5
+#: Mass per length of a link of unknown mass [kg/m]: more than any robot's.
 _UNKNOWN_KG_PER_M = 100.0
 _USUAL_KG_PER_M = 10.0
 """Mass of a link that the description gives none, where a scale of torque or inertia is wanted."""
+#: Reach of a joint at least, as a part of the arm's, and where the arm has none [m].
 _LEAST_REACH_SHARE = 0.05
 _NO_REACH_M = 0.1
+#: Coulomb friction that is unknown, as a part of the torque that the joint needs.
 _FRICTION_OF_TORQUE = 0.2
+#: Torque and inertia that a joint is scaled by at least, as a part of the largest of its kind.
 _LEAST_OF_LARGEST = 0.02
 _GRAVITY = 9.81  # m/s^2; of the scale of torque, whatever the arm's own
 _TURNING_SPEED, _SLIDING_SPEED = 1.0, 0.2  # rad/s, m/s

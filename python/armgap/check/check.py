@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, TypedDict, get_args
 
-__all__ = ["NAMES", "SEVERITIES", "Check", "CheckName", "Severity"]
+__all__ = ["NAMES", "SEVERITIES", "Check", "CheckEntry", "CheckName", "Severity"]
 
 CheckName = Literal[
     "torque_sign",
@@ -32,6 +32,19 @@ Severity = Literal["error", "repaired", "warning"]
 
 NAMES: tuple[CheckName, ...] = get_args(CheckName)
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
+
+
+class CheckEntry(TypedDict):
+    """A `Check` in a diagnosis."""
+
+    check: Annotated[CheckName, "Which defect."]
+    joint: Annotated[int | None, "1-based joint; null for the whole log or arm."]
+    log: Annotated[str | None, "Name of the log; null if it concerns all."]
+    severity: Severity
+    message: Annotated[str, "One sentence with the figures."]
+    remedy: Annotated[str, "All remedies in one line."]
+    remedies: Annotated[list[str], "What mends it; several where no log tells them apart."]
+    rows: Annotated[list[list[int]], "Ranges of rows, first and last, from 0, both included."]
 
 
 @dataclass(frozen=True)
@@ -76,7 +89,7 @@ class Check:
         remedy = f"; {self.remedy}" if self.remedy else ""
         return f"{self.severity}: {place}{self.message}{remedy}"
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> CheckEntry:
         """Return the entry of a diagnosis' ``checks``."""
         return {
             "check": self.check,

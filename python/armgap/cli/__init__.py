@@ -36,6 +36,7 @@ COMMANDS = {
 }
 """Sub-commands, the module whose ``command`` each one is, and one line about it."""
 
+#: Exit statuses: of `click` for wrong usage, and 128 with the number of SIGINT.
 UNUSABLE_INPUT = 2
 INTERRUPTED = 130
 _SIGNALLED = 128

@@ -40,7 +40,9 @@ __all__ = [
 ]
 
 Result = TypeVar("Result")
+#: Interval at which an interrupt is looked for, s: below what a user notices.
 _POLL_S = 0.05
+#: Width of tables that go to no terminal, in characters.
 _PIPE_WIDTH = 120
 
 arm_option = click.option(

@@ -17,7 +17,7 @@ from typing import Any
 import click
 
 from armgap.errors import ArmgapError, OptionError, ResultError
-from armgap.output import STANDARD_STREAM, check_writable
+from armgap.output import STANDARD_STREAM, check_writable, status_of
 
 __all__ = [
     "Command",
@@ -225,7 +225,7 @@ def _named(label: str, path: str, stream: int, *, folder: bool, holds: Callable[
         except OSError:
             return _Named(label, path, ((path, stream),), None, (), False)
         return _Named(label, path, ((there.st_dev, there.st_ino),), there.st_mode, (), False)
-    status = _status(path)
+    status = status_of(path)
     if status is not None and not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
         return _Named(label, path, ((status.st_dev, status.st_ino),), status.st_mode, (), folder)
     real = Path(os.path.realpath(path))
@@ -240,18 +240,11 @@ def _named(label: str, path: str, stream: int, *, folder: bool, holds: Callable[
 
 def _key(place: Path) -> Key:
     """Device and inode; without a file, those of its folder and its name."""
-    status = _status(place)
+    status = status_of(place)
     if status is not None:
         return status.st_dev, status.st_ino
-    parent = _status(place.parent)
+    parent = status_of(place.parent)
     return (os.fspath(place),) if parent is None else (parent.st_dev, parent.st_ino, place.name)
-
-
-def _status(path: str | os.PathLike[str]) -> os.stat_result | None:
-    try:
-        return os.stat(path)
-    except OSError:
-        return None
 
 
 def _compare(output: _Named, other: _Named, what: str, same: Callable[[_Named, _Named], bool]) -> None:
@@ -283,7 +276,7 @@ def _same_output(output: _Named, other: _Named) -> bool:
     """Two results may both be thrown away, and nothing else."""
     if output.path == other.path == STANDARD_STREAM:
         return True
-    null = _status(os.devnull)
+    null = status_of(os.devnull)
     return null is None or output.chain[0] != (null.st_dev, null.st_ino)
 
 

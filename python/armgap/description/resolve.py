@@ -20,6 +20,7 @@ __all__ = ["Carried", "Located", "locate", "resolve"]
 
 Array = NDArray[np.float64]
 
+#: Joints or links that a message lists at most.
 _LISTED = 12
 # Placements agree to this [m]: what rounding of a description's numbers leaves of them.
 _SAME_PLACE = 1e-6
@@ -161,7 +162,7 @@ class _Resolver:
             raise tree.error(None, problem, f"choose a tip below it: {', '.join(_few(self._below(base)))}")
         path = to_tip[len(to_base) :]
         for joint in path:
-            self._check(joint, base)
+            self._check(joint)
         moving = [joint for joint in path if self._moves(joint)]
         if not moving:
             raise tree.error(None, f"no joint moves between `{base}` and `{tip}`", "choose another base or tip")
@@ -251,7 +252,7 @@ class _Resolver:
         problem = f"is {joint.kind}, not one of {', '.join(MOVING)}"
         return self.tree.error(joint, problem, f"begin the chain behind it with the base `{joint.child}`")
 
-    def _check(self, joint: Joint, base: str) -> None:
+    def _check(self, joint: Joint) -> None:
         """Raise for a joint of the chain that no chain can have."""
         if joint.kind == "fixed":
             return

@@ -12,7 +12,7 @@ from armgap.reading import read_bounded
 
 __all__ = ["Element", "parse", "read_text"]
 
-MOST_BYTES = 64 * 2**20
+_MOST_BYTES = 64 * 2**20
 """Size of a description: tens of times those with collision shapes inside."""
 
 
@@ -46,7 +46,7 @@ def read_text(path: Path) -> bytes:
         If it cannot be read.
     """
     try:
-        return read_bounded(path, MOST_BYTES)
+        return read_bounded(path, _MOST_BYTES)
     except OSError as error:
         reason = error.strerror or str(error)
         raise ModelFileError(

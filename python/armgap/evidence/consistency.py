@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 
 from armgap.arm import Arm
+from armgap.evidence.plausibility import Plausibility
 from armgap.rigid_body import inconsistency
 
 __all__ = ["consistency"]
 
+#: Inertial numbers of a link: mass, first moments, inertia about the joint's frame.
 _NUMBERS = 10
 
 
-def consistency(data: dict[str, Any], arm: Arm) -> list[dict[str, Any]]:
+def consistency(data: dict[str, Any], arm: Arm) -> list[Plausibility]:
     """Return what makes the links of a serial arm's model with causes physically possible or not.
 
     A link's ten numbers are estimated one by one, as motion tells only sums of them; where the nominal values hold the rest, a single link may
@@ -29,14 +31,14 @@ def consistency(data: dict[str, Any], arm: Arm) -> list[dict[str, Any]]:
 
     Returns
     -------
-    list of dict
-        ``check`` in words, ``holds`` (bool) and ``figure`` as `plausibility` returns them; one per link.
+    list of Plausibility
+        One per link.
     """
     if arm.chain is None:
         return []
     found = data["parameters"]["with_causes"]
     values = np.array([found[name]["value"] for name in arm.parameter_names[: _NUMBERS * arm.n_joints]])
-    entries = []
+    entries: list[Plausibility] = []
     for link, ten in zip(arm.chain.link_names, values.reshape(-1, _NUMBERS), strict=True):
         problem = inconsistency(ten)
         figure = problem or f"mass {ten[0]:.3g} kg"

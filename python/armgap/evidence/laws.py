@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Annotated, Any, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +25,13 @@ from armgap.log import Log
 __all__ = ["laws"]
 
 #: Windows looked at, over all logs.
-WINDOWS = 160
+_WINDOWS = 160
 #: Half width of the cubic whose curvature is taken: samples at least, and s at least.
 HALF_SAMPLES, HALF_S = 8, 0.016
 #: Ranges of the variable, samples in each at least, samples altogether at least, and points drawn.
-BINS, FEWEST, ENOUGH, POINTS = 24, 4, 40, 400
+BINS, FEWEST, _ENOUGH, POINTS = 24, 4, 40, 400
 #: A joint slower than this part of its fast motion is taken to be at rest, where dry friction hides every torque.
-REST = 0.01
+_REST = 0.01
 #: An event is looked at for so many times its duration before and after it, and its duration taken for so many s at least.
 EVENT, EVENT_S = 4.0, 0.1
 #: Two-sided 95 % of the normal distribution.
@@ -39,6 +39,42 @@ NORMAL_95 = 1.96
 
 ON_COMMAND = ("actuator_lag", "actuator_delay", "torque_saturation", "torque_dead_zone", "torque_gain")
 ON_ENCODER = ("encoder_offset", "encoder_eccentricity")
+
+
+class LawPoints(TypedDict):
+    """Samples, a few hundred at most."""
+
+    x: Annotated[list[float], "Variable of the law."]
+    y: Annotated[list[float], "Residual torque of the model without the cause."]
+
+
+class LawBins(TypedDict):
+    """Means over ranges of the variable."""
+
+    x: Annotated[list[float], "Variable of the law."]
+    mean: Annotated[list[float], "Residual torque of the model without the cause."]
+    error: Annotated[list[float], "Half width of the 95 % interval of the mean."]
+    law: Annotated[list[float], "Torque of the fitted law."]
+
+
+class Law(TypedDict):
+    """A cause's law and the data it is drawn through; these only where enough samples remain."""
+
+    effect: str
+    joint: Annotated[int | None, "1-based joint; null for the whole arm."]
+    windows: Annotated[int, "Windows that were predicted."]
+    failed: Annotated[int, "Windows that could not be simulated."]
+    why: NotRequired[Annotated[str, "Why the first of these could not."]]
+    log: NotRequired[Annotated[str, "The log that an external disturbance belongs to."]]
+    shown_joint: NotRequired[Annotated[int, "1-based joint whose torque is drawn."]]
+    variable: NotRequired[Annotated[str, "Variable that the law depends on."]]
+    unit: NotRequired[Annotated[str, "Its unit."]]
+    torque_unit: NotRequired[str]
+    folded: NotRequired[Annotated[bool, "Whether torques are drawn along the direction of motion."]]
+    at_rest: NotRequired[Annotated[float, "Share of samples left out because the joint rests."]]
+    bins: NotRequired[LawBins]
+    explained: NotRequired[Annotated[float, "Share of the mean square of the binned data that the law explains."]]
+    points: NotRequired[LawPoints]
 
 
 @dataclass(frozen=True)
@@ -104,7 +140,7 @@ VARIABLES = {
 """The variable of each effect; others are drawn over the torque that their own law adds."""
 
 
-def laws(data: dict[str, Any], arm: Arm, training: Sequence[Log], held: Sequence[Log]) -> list[dict[str, Any]]:
+def laws(data: dict[str, Any], arm: Arm, training: Sequence[Log], held: Sequence[Log]) -> list[Law]:
     """Return, for each cause of a diagnosis, its law and the data it is drawn through.
 
     Parameters
@@ -119,10 +155,8 @@ def laws(data: dict[str, Any], arm: Arm, training: Sequence[Log], held: Sequence
 
     Returns
     -------
-    list of dict
-        One per cause: ``effect``, ``joint``, ``windows``, ``failed``, windows that could not be simulated, and ``why``; where samples
-        remain, ``shown_joint``, ``variable``, ``unit``, ``torque_unit``, ``folded``, ``at_rest`` (share of samples left out),
-        ``points`` (``x``, ``y``), ``bins`` (``x``, ``mean``, ``error`` at 95 %, ``law``) and ``explained``.
+    list of Law
+        One per cause.
     """
     model = Hypothesis.of(data, arm)
     return [_law(model, cause, _evidence_logs(cause, training, held)) for cause in model.effects]
@@ -137,10 +171,10 @@ def _is_in(log: Log, effect: EffectInstance) -> bool:
     return effect.log is None or log.name in (effect.log, f"{effect.log} (first part)", f"{effect.log} (last part)")
 
 
-def _law(model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]) -> dict[str, Any]:
+def _law(model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]) -> Law:
     effect, joint, values = cause[:3]
     points, windows, failures = _points(model, cause, logs)
-    entry: dict[str, Any] = {"effect": effect, "joint": joint, "windows": windows, "failed": len(failures)}
+    entry: Law = {"effect": effect, "joint": joint, "windows": windows, "failed": len(failures)}
     if failures:
         entry["why"] = failures[0]
     if cause.log is not None:
@@ -149,7 +183,7 @@ def _law(model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]) -> dict[
         return entry
     shown = joint - 1 if joint is not None else _most_moved(points)
     moves = _moves(points.dq[:, shown])
-    if np.count_nonzero(moves) < ENOUGH:
+    if np.count_nonzero(moves) < _ENOUGH:
         return entry  # too few samples to say anything
     variable = VARIABLES.get(effect, _LAW_TORQUE)
     if not np.any(points.law[moves, shown]):
@@ -158,24 +192,26 @@ def _law(model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]) -> dict[
     sign = np.sign(points.dq[moves, shown]) if variable.folded else np.ones(len(x))
     y, law = sign * points.residual[moves, shown], sign * points.law[moves, shown]
     rotary = model.arm.rotary
-    entry |= {
+    bins = _bins(x, y, law, points.window[moves])
+    pick = np.linspace(0, len(x) - 1, min(POINTS, len(x))).astype(int)
+    return {
+        **entry,
         "shown_joint": shown + 1,
         "variable": variable.name.format(shown + 1),
         "unit": variable.units[not rotary],
         "torque_unit": "N m" if rotary else "N",
         "folded": variable.folded,
         "at_rest": float(f"{1 - np.mean(moves):.3g}"),
-        "bins": (bins := _bins(x, y, law, points.window[moves])),
+        "bins": bins,
         "explained": _explained(bins),
+        "points": {"x": _short(x[pick]), "y": _short(y[pick])},
     }
-    pick = np.linspace(0, len(x) - 1, min(POINTS, len(x))).astype(int)
-    return entry | {"points": {"x": _short(x[pick]), "y": _short(y[pick])}}
 
 
 def _moves(dq: Array) -> NDArray[np.bool_]:
     """Samples in which a joint moves."""
     speed = np.abs(dq)
-    return np.asarray(speed > REST * np.quantile(speed, 0.99))
+    return np.asarray(speed > _REST * np.quantile(speed, 0.99))
 
 
 def _most_moved(points: EvidenceSamples) -> int:
@@ -192,7 +228,7 @@ def _points(
     failed: list[str] = []
     whole = sum(log.duration for log in logs)
     for log in logs:
-        wanted = max(1, round(WINDOWS * log.duration / whole))
+        wanted = max(1, round(_WINDOWS * log.duration / whole))
         try:
             comparison = _CauseComparison(model, cause, log)
         except ValueError as error:
@@ -289,7 +325,7 @@ def _curvature(t: Array, x: Array, at: NDArray[np.intp]) -> Array:
     return np.asarray(2.0 * np.einsum("kr,krc->kc", fit[:, 2, :], x[near]) / span**2)
 
 
-def _bins(x: Array, y: Array, law: Array, window: Array) -> dict[str, list[float]]:
+def _bins(x: Array, y: Array, law: Array, window: Array) -> LawBins:
     """Means over ranges of the variable, with the 95 % half width of each mean.
 
     The ranges lie halfway between equally wide and equally full ones; sparse ones are left out, and their samples stay
@@ -322,7 +358,7 @@ def _cluster_sigma(rest: Array, window: Array) -> float | None:
     return math.sqrt(groups / (groups - 1) * float(np.sum(sums**2))) / len(rest)
 
 
-def _explained(bins: dict[str, list[float]]) -> float:
+def _explained(bins: LawBins) -> float:
     """Share of the mean square of the binned data that the law explains."""
     mean, law = np.array(bins["mean"]), np.array(bins["law"])
     whole = float(np.sum(mean**2))

@@ -8,7 +8,7 @@ positions, another sign or another mount, not to this arm.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Annotated, Any, TypedDict
 
 import numpy as np
 
@@ -18,24 +18,26 @@ from armgap.evidence.hypothesis import Array, Hypothesis
 __all__ = ["plausibility"]
 
 #: Poses per joint at which the inertia matrix is looked at.
-POSES = 24
+_POSES = 24
 
 
-def plausibility(data: dict[str, Any], arm: Arm) -> list[dict[str, Any]]:
-    """Return what makes the model with causes physically possible or not.
+class Plausibility(TypedDict):
+    """Whether a value of the model with causes is physically possible."""
 
-    Returns
-    -------
-    list of dict
-        ``check`` in words, ``holds`` (bool) and ``figure``, the value it rests on, with its unit, in words.
-    """
+    check: Annotated[str, "What has to hold, in words."]
+    holds: bool
+    figure: Annotated[str, "The value it rests on, with its unit, in words."]
+
+
+def plausibility(data: dict[str, Any], arm: Arm) -> list[Plausibility]:
+    """Return what makes the model with causes physically possible or not."""
     model = Hypothesis.of(data, arm)
     found = data["parameters"]["with_causes"]
     friction = (_friction(name, found[name]) for name in arm.parameter_names[arm.n_inertial :])
     return [_inertia(model), *_gravity(data), *friction]
 
 
-def _inertia(model: Hypothesis) -> dict[str, Any]:
+def _inertia(model: Hypothesis) -> Plausibility:
     stiffest = _largest_compliance(model)
     unit = "kg m^2" if model.arm.rotary else "kg"
     figure = "in some pose it is not" if stiffest is None else f"smallest eigenvalue {1 / stiffest:.3g} {unit}"
@@ -46,7 +48,7 @@ def _inertia(model: Hypothesis) -> dict[str, Any]:
     }
 
 
-def _gravity(data: dict[str, Any]) -> list[dict[str, Any]]:
+def _gravity(data: dict[str, Any]) -> list[Plausibility]:
     """Parameters whose gravity has turned over; nothing where none has."""
     tables = data["parameters"]
     return [
@@ -71,12 +73,12 @@ def _largest_compliance(model: Hypothesis) -> float | None:
 
 def _poses(arm: Arm) -> Array:
     """Poses over a whole turn of every joint, shape (n_poses, n_joints)."""
-    turn = np.linspace(-np.pi, np.pi, POSES, endpoint=False)
+    turn = np.linspace(-np.pi, np.pi, _POSES, endpoint=False)
     grid = np.meshgrid(*([turn] * arm.n_joints), indexing="ij")
     return np.column_stack([g.ravel() for g in grid])
 
 
-def _friction(name: str, value: dict[str, Any]) -> dict[str, Any]:
+def _friction(name: str, value: dict[str, Any]) -> Plausibility:
     """A friction coefficient is possible unless it is negative by more than its uncertainty."""
     sigma = value["sigma"] or 0.0
     holds = value["value"] + 2.0 * sigma >= 0.0

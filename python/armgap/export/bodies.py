@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from armgap.rigid_body import inconsistency, pseudo_inertia
 
-__all__ = ["TOLERANCE", "Bodies", "nearest_bodies"]
+__all__ = ["BODY_TOLERANCE", "Bodies", "nearest_bodies"]
 
 Array = NDArray[np.float64]
 
 #: Torques that differ by less than this share of the joint's own are the same: what is left of an estimate is ten times that and more.
-TOLERANCE = 1e-3
+BODY_TOLERANCE = 1e-3
 #: A torque that differs by this share of the joint's own costs as much as a value that is one standard deviation away: where the torques can be
 #: kept, and where they cannot. There a smaller share makes links absurd (rods of many times the mass) and torques hardly better.
 _SHARES = (1e-5, 1e-3)
@@ -63,7 +63,7 @@ class Bodies:
     @property
     def same_torques(self) -> bool:
         """Whether the torques are those found."""
-        return bool(np.all(self.torque_error < TOLERANCE))
+        return bool(np.all(self.torque_error < BODY_TOLERANCE))
 
 
 def nearest_bodies(
@@ -80,7 +80,7 @@ def nearest_bodies(
     beside : ndarray, shape (n_joints, 10)
         Inertia of what hangs on each link and is to stay as it is; the rest has to be a body.
     exact : bool, default True
-        Whether torques are kept to `TOLERANCE` where that is possible; else they are weighed against the distance from the nominal values.
+        Whether torques are kept to `BODY_TOLERANCE` where that is possible; else they are weighed against the distance from the nominal values.
     """
     n = len(beside)
     links, rotors = found[: 10 * n].reshape(n, 10), found[10 * n :]
@@ -90,11 +90,11 @@ def nearest_bodies(
         return Bodies(links, rotors, (), np.zeros(n))
     size = np.sqrt(np.mean((regressor @ found) ** 2, axis=0))
     torque = regressor / np.where(size > 0, size, 1.0)[:, None]
-    sigma = np.where(sigma > 0, sigma, TOLERANCE * np.maximum(np.abs(nominal), np.median(sigma[sigma > 0])))
+    sigma = np.where(sigma > 0, sigma, BODY_TOLERANCE * np.maximum(np.abs(nominal), np.median(sigma[sigma > 0])))
     for share in _SHARES if exact else _SHARES[1:]:
         x = _minimised(found, nominal, sigma, torque.reshape(-1, 11 * n) / (share * np.sqrt(len(torque))), beside)
         error = np.sqrt(np.mean((torque @ (x - found)) ** 2, axis=0))
-        if np.all(error < TOLERANCE):
+        if np.all(error < BODY_TOLERANCE):
             break
     return Bodies(x[: 10 * n].reshape(n, 10), x[10 * n :], wrong, error)
 
@@ -178,7 +178,7 @@ def _start(nominal: Array, sigma: Array, barrier: _Barrier) -> Array:
         ball = np.array([mass, 0, 0, 0, moment, 0, moment, 0, 0, moment])
         share = 0.0
         while not np.isfinite(_Barrier(1, barrier.beside[k : k + 1], np.empty(0, dtype=np.intp)).value(_one(x, k))):
-            share = max(2.0 * share, TOLERANCE)
+            share = max(2.0 * share, BODY_TOLERANCE)
             x[10 * k : 10 * k + 10] = nominal[10 * k : 10 * k + 10] + share * ball
     return x
 

@@ -29,6 +29,7 @@ __all__ = ["Excitation", "ParameterExcitation", "excitation"]
 if not TYPE_CHECKING:
     __getattr__ = old_names(__name__)
 
+#: Variance of a parameter that nothing is known of, in squares of its unit: far above any information that a log has.
 _P0 = 1e9
 _CUTOFF = 50.0  # rad/s
 _BUDGET = 200_000  # samples

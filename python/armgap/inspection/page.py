@@ -18,6 +18,7 @@ from armgap.report.words import SummaryAnswer
 
 __all__ = ["render"]
 
+#: Points of a drawn line and bars of a histogram: more than a screen resolves.
 _POINTS = 1500
 _BINS = 60
 #: What is marked in the curves: its words, its shape, its colour.

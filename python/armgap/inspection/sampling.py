@@ -13,6 +13,7 @@ __all__ = ["Sampling", "sampling"]
 GAP_PERIODS = 3.0
 """A hole longer than this many periods is a gap."""
 
+#: Gaps that are listed at most.
 _LISTED = 5
 
 

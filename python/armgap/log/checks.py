@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["motion", "notice", "order", "unused", "without_repeats"]
 
+#: Samples of a log at least.
 _FEWEST_SAMPLES = 20
 # A hole longer than this many periods is a gap worth naming.
 _GAP_PERIODS = 3.0

@@ -66,7 +66,7 @@ def in_seconds(
     factor = raw.tick_s or scales.t or _unit(raw.t, names.t, arm, place, findings)
     if raw.t_tau is None or names.t_tau is None:
         return Arrays(_seconds(raw.t, raw.t[0], factor), raw.q, raw.tau, raw.dq, raw.q_ref, raw.dq_ref), findings
-    tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, arm, place, findings)
+    tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, findings)
     start, tau_start = raw.t[0], raw.t_tau[0]
     # Both clocks count from the same moment; the first position is that moment from here on.
     offset = _difference(tau_start, start, tau_factor, factor)
@@ -80,7 +80,7 @@ def ticks(raw: Raw, scales: Scales, names: Names, arm: Arm | None, place: Path |
     factor = raw.tick_s or scales.t or _unit(raw.t, names.t, arm, place, [])
     if raw.t_tau is None or names.t_tau is None:
         return {"t": factor}
-    tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, arm, place, [])
+    tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, [])
     return {"t": factor, "t_tau": tau_factor}
 
 
@@ -125,9 +125,7 @@ def _unit(times: Times, name: str, arm: Arm | None, place: Path | str, findings:
     raise UnitError(f"the median sample period is {period:g} s, {against}", remedy=remedy, file=place, column=name)
 
 
-def _tau_unit(
-    times: Times, factor: float, name: str, arm: Arm | None, place: Path | str, findings: list[Finding]
-) -> float:
+def _tau_unit(times: Times, factor: float, name: str, findings: list[Finding]) -> float:
     """Return the seconds per unit of the torques' times: that of the positions', unless their stamps say otherwise."""
     for unit, seconds in FACTORS["t"].items():
         if unit != "s" and _is_epoch(times, unit) and seconds != factor:

@@ -25,6 +25,7 @@ __all__ = ["Arrays", "Names", "Raw", "extract", "no_controller", "resolve", "unu
 
 _CANONICAL = re.compile(r"^(t|t_tau|(q|tau|dq|q_ref|dq_ref)(?P<joint>[1-9][0-9]*))$")
 _TIMES = ("t", "t_tau")
+#: Columns that a message lists at most.
 _LISTED = 24
 _TICKS_S = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}
 

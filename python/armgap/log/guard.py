@@ -20,8 +20,10 @@ from armgap.log.recording import Source
 
 __all__ = ["call"]
 
+#: Time that a reader in a process of its own is given, s, and a rate below every disk's, bytes/s, that prolongs it with the file.
 _PATIENCE_S = 60.0
 _SLOWEST_BYTES_PER_S = 5e6
+#: Bytes of the number before each message that says how long it is.
 _LENGTH = 8
 
 

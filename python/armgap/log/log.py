@@ -27,6 +27,7 @@ __all__ = ["SIGNALS", "Log"]
 SIGNALS = ("q", "tau", "dq", "moment", "q_ref", "dq_ref")
 """Arrays of a log with one row per sample, beside its times."""
 
+#: Times are kept to nanoseconds: parts of a second.
 _NS = 1e9
 
 

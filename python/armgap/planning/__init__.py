@@ -9,6 +9,8 @@ file         what
 `sizes`      values that an effect could have
 `questions`  what a diagnosis left open
 `criterion`  expected evidence of a motion for one model against another
+`outcome`    that evidence beside what a decision of a diagnosis needs
+`columns`    the least squares in it
 `search`     the motion with the most evidence for all questions
 `planning`   `plan` and its result
 `page`       the report and the terminal's summary

@@ -14,7 +14,7 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,12 @@ from numpy.typing import NDArray
 from armgap import _native
 from armgap.arm import Arm
 from armgap.evidence.hypothesis import EffectInstance, Hypothesis, true_positions
+from armgap.planning.columns import Columns
 from armgap.planning.dynamics import LATENT, inverse_dynamics
 from armgap.planning.motion import Motion
+from armgap.planning.outcome import ABOVE_FLOOR, CERTAIN, HELD_CERTAIN, MATTERS, Outcome, certainty
 
-__all__ = ["HypothesisPair", "Outcome", "PredictedMotion", "Setting", "settled"]
+__all__ = ["HypothesisPair", "PredictedMotion", "Setting"]
 
 Array = NDArray[np.float64]
 
@@ -45,25 +47,12 @@ ACCURACY = 0.1
 STEP_SIGMA, STEP_PART = 0.2, 0.02
 #: Part of a log that a diagnosis fits to, its beginning; it judges on the rest.
 TRAINED = 0.6
-#: A diagnosis explains a gap whose cost is above the floor by this part of it, with what takes this part of the excess, in windows whose
-#: mean advantage is so many standard errors (`rust/fit/src/acceptance.rs`).
-ABOVE_FLOOR, MATTERS, CERTAIN = 0.25, 0.1, 3.5
-#: Standard deviations from its prior that a value of the arm returns by what a diagnosis names without a gap.
-TRUST_SIGMAS = 4.0
-#: The same on the part of the log that it judges on alone.
-HELD_CERTAIN = 1.0
-#: Standard deviations by which evidence may exceed what a decision needs before more of it is worth nothing to the search.
-ENOUGH = 3.0
-#: Evidence that the search aims at, over what is enough: the effect may be smaller than thought.
-AIM = 100.0
 #: Widths of the smoothed sign of friction that a diagnosis may choose, in RMS speeds of the motion.
 SMOOTHED = (0.01, 0.05)
 #: Steps in which a rival is fitted beyond first order.
-STEPS = 8
+_STEPS = 8
 #: Decrease of a step, as a part of what was left, below which the fit has settled.
 SETTLED = 0.02
-#: Growth of a merit over its range: the smaller, the more the least one counts.
-GROWTH = 1e4
 _MEASURED = ("encoder_offset", "encoder_eccentricity")
 
 
@@ -135,89 +124,6 @@ class HypothesisPair:
     alternatives: tuple[tuple[float, tuple[EffectInstance, ...]], ...]
     rival: tuple[EffectInstance, ...]
     free: EffectInstance | None = None
-
-
-class Outcome(NamedTuple):
-    """What a motion tells about a pair, one entry per size of the effect.
-
-    Attributes
-    ----------
-    fitted, plain : ndarray
-        Expected log-likelihood ratio over the windows that a diagnosis fits to, with the rival fitted, and over all windows without.
-    above : ndarray
-        Cost that the fitted rival leaves above the noise, over what a diagnosis needs to explain it; the lesser of what it fits to and what
-        it judges on.
-    certain : ndarray
-        Mean advantage of a window, in standard errors; less where what is judged on has less than its part.
-    prior : ndarray
-        Part of `fitted` that is the prior's: the rival needs values of the arm that are not trusted.
-    weight : ndarray
-        Weights of the sizes, one together.
-    spread : float
-        Standard deviation of `above` from the noise alone.
-    """
-
-    fitted: Array
-    plain: Array
-    above: Array
-    certain: Array
-    prior: Array
-    weight: Array
-    spread: float
-
-    @property
-    def expected(self) -> float:
-        """Expected log-likelihood ratio, mean over the sizes."""
-        return float(self.weight @ self.fitted)
-
-    def settled(self, threshold: float) -> float:
-        """Probability of a decision, mean over the sizes."""
-        likely = [settled(x, threshold) for x in self.fitted]
-        high = [_normal((x - 1.0) / self.spread) for x in self.above]
-        common = [_normal(x - CERTAIN) for x in self.certain]
-        by_motion = np.min([likely, high, common], axis=0)
-        by_prior = np.minimum(likely, [_normal(math.sqrt(2.0 * x) - TRUST_SIGMAS) for x in self.prior])
-        return float(self.weight @ np.maximum(by_motion, by_prior))
-
-    def merit(self, threshold: float) -> float:
-        """How near all that a decision by the motion needs is, from 0 to 1, mean over the sizes; it grows with the logarithm."""
-        enough = _enough(threshold)
-        parts = (
-            self.fitted / (AIM * enough),
-            self.above / (AIM * (1.0 + ENOUGH * self.spread)),
-            self.certain / (CERTAIN + ENOUGH),
-        )
-        least = np.clip(np.min(parts, axis=0), 0.0, 1.0)
-        return float(self.weight @ (np.log1p(GROWTH * least) / math.log1p(GROWTH)))
-
-    @property
-    def kept(self) -> float:
-        """Part of the difference that fitting the rival leaves."""
-        plain = float(self.weight @ self.plain)
-        return self.expected / plain if plain > 0 else 0.0
-
-
-def settled(expected: float, threshold: float) -> float:
-    """Probability that a log-likelihood ratio exceeds a threshold: normal, its variance twice its expectation."""
-    return _normal((expected - threshold) / math.sqrt(2.0 * expected)) if expected > 0 else 0.0
-
-
-def _normal(x: float) -> float:
-    """Standard normal distribution function."""
-    return 0.5 * math.erfc(-x / math.sqrt(2.0))
-
-
-def _certainty(advantage: Array, share: float) -> float:
-    """Mean advantage of windows, each of which stands for `share` of them, in standard errors."""
-    mean = float(np.mean(advantage)) if len(advantage) else 0.0
-    scatter = float(np.var(advantage)) + 2.0 * mean if mean > 0 else 0.0
-    return math.sqrt(share * len(advantage) / scatter) * mean if scatter > 0 else 0.0
-
-
-def _enough(threshold: float) -> float:
-    """Expected log-likelihood ratio that lies `ENOUGH` of its standard deviations above a threshold."""
-    half = ENOUGH / math.sqrt(2.0)
-    return (half + math.sqrt(half * half + threshold)) ** 2
 
 
 class PredictedMotion:
@@ -365,12 +271,7 @@ class PredictedMotion:
             columns.append(delayed - self.predicted(model.theta, model.effects, True))
         return columns
 
-    @property
-    def n_parameters(self) -> int:
-        """Number of the arm's parameters."""
-        return len(self._arm.sigma)
-
-    def outcome(self, pair: HypothesisPair, steps: int = STEPS) -> Outcome:
+    def outcome(self, pair: HypothesisPair, steps: int = _STEPS) -> Outcome:
         """What the motion tells about a pair; nothing where a model's motion cannot be computed.
 
         Parameters
@@ -383,7 +284,7 @@ class PredictedMotion:
         weight = np.array([w for w, _ in pair.alternatives])
         residuals = 0.5 * self._arm.n_joints * self._setting.horizon / self._arm.sample_period
         half = self._every * residuals
-        needs = max(MATTERS * self._setting.excess, ABOVE_FLOOR - self._setting.excess) * half
+        needs = max(MATTERS * self._setting.excess, ABOVE_FLOOR - 1.0 - self._setting.excess) * half
         spread = math.sqrt(half) / needs
         try:
             found = np.array([self._evidence(effects, pair, residuals, steps) for _, effects in pair.alternatives])
@@ -410,7 +311,7 @@ class PredictedMotion:
     def left_of(self, delta: Array, column: Array | None = None) -> tuple[float, float]:
         """Square of what the arm's own values leave of a difference, and the factor of a further column that is fitted with them."""
         free = np.empty((len(delta), 0)) if column is None else column[:, None]
-        found = Columns(self.sensitivities(), free, (), self.n_parameters).fitted(delta, self._whole)
+        found = Columns(self.sensitivities(), free, (), len(self._arm.sigma)).fitted(delta, self._whole)
         return found.square, 0.0 if column is None else float(found.values[-1])
 
     def _difference(self, effects: tuple[EffectInstance, ...], pair: HypothesisPair) -> tuple[Array, bool]:
@@ -425,7 +326,8 @@ class PredictedMotion:
         lead = latent((*effects, *pair.rival))
         truth = self.predicted(theta, effects, lead)
         delta = truth - self.predicted(theta, pair.rival, lead)
-        columns = Columns.of(self, pair, lead)
+        names, free = self._of_rival(pair, lead)
+        columns = Columns(self.sensitivities(), free, names, len(self._arm.sigma))
         best = columns.fitted(delta, self._whole)
         plain = 0.5 * float(np.sum((delta * self._whole) ** 2))
         for _ in range(steps):
@@ -450,7 +352,7 @@ class PredictedMotion:
         above = share * min(float(np.sum(windows[first])) / TRAINED, float(np.sum(windows[~first])) / (1.0 - TRAINED))
         # Robust weights let a window's cost grow with the logarithm only.
         advantage = residuals * np.log1p(windows / residuals)
-        certain = min(_certainty(advantage, share), CERTAIN / HELD_CERTAIN * _certainty(advantage[~first], share))
+        certain = min(certainty(advantage, share), CERTAIN / HELD_CERTAIN * certainty(advantage[~first], share))
         return share * float(np.sum(left[first])) + prior, plain, above, certain, prior
 
     def _moved(
@@ -470,7 +372,7 @@ class PredictedMotion:
         moved = pair.free._replace(parameters=parameters)
         return tuple(kept.tolist()), tuple(moved if e == pair.free else e for e in pair.rival)
 
-    def of_rival(self, pair: HypothesisPair, lead: bool) -> tuple[tuple[str, ...], Array]:
+    def _of_rival(self, pair: HypothesisPair, lead: bool) -> tuple[tuple[str, ...], Array]:
         """Values of the rival's effect that are fitted, and derivatives of its predictions by them."""
         theta, free = self._setting.model.theta, pair.free
         if free is None:
@@ -490,63 +392,6 @@ class PredictedMotion:
 
 #: Values of an effect that say where it sits, not how large it is.
 _FIXED = ("riding", "encoder_at_motor", "friction_at_motor", "rotor_rides")
-
-
-class Fitted(NamedTuple):
-    """Values fitted to a difference, what is left of it in standard deviations, and its square with that of the prior."""
-
-    values: Array
-    left: Array
-    square: float
-
-
-@dataclass(frozen=True)
-class Columns:
-    """Columns that are fitted to a difference of predictions.
-
-    Attributes
-    ----------
-    common : ndarray, shape (n_numbers, n_common)
-        Of what every model fits, in standard deviations of the prior.
-    free : ndarray, shape (n_numbers, n_free)
-        Of the rival's own values, without a prior.
-    names : tuple of str
-        Those values.
-    simulated : int
-        Leading columns of `common` that are parameters of the arm.
-    """
-
-    common: Array
-    free: Array
-    names: tuple[str, ...]
-    simulated: int
-
-    @classmethod
-    def of(cls, played: PredictedMotion, pair: HypothesisPair, lead: bool) -> Columns:
-        """Return the columns of a pair's rival."""
-        names, free = played.of_rival(pair, lead)
-        return cls(played.sensitivities(), free, names, played.n_parameters)
-
-    def product(self, values: Array, *, simulated: bool) -> Array:
-        """Change of the predictions by some values; `simulated` leaves out what no simulation has: the nuisances."""
-        common = values[: self.common.shape[1]].copy()
-        if simulated:
-            common[self.simulated :] = 0.0
-        return np.asarray(self.common @ common + self.free @ values[self.common.shape[1] :], dtype=np.float64)
-
-    def fitted(self, delta: Array, weight: Array) -> Fitted:
-        """Fit the columns to a difference, each number of which has a weight."""
-        n, k = self.common.shape[1], self.free.shape[1]
-        columns = np.hstack([self.common, self.free]) * weight[:, None]
-        # Values without a prior in units of what they do, so that they are as well scaled as the rest.
-        unit = np.append(np.ones(n), np.maximum(np.linalg.norm(columns[:, n:], axis=0), 1e-300))
-        prior = np.hstack([np.eye(n), np.zeros((n, k))])
-        rows = np.vstack([columns / unit, prior])
-        right = np.concatenate([delta * weight, np.zeros(n)])
-        solution = np.linalg.lstsq(rows, right, rcond=1e-12)[0]
-        left = right - rows @ solution
-        # The prior's part counts: values that the rival would need and that are not trusted speak against it.
-        return Fitted(solution / unit, left[: len(delta)], float(left @ left))
 
 
 def latent(effects: Sequence[EffectInstance]) -> bool:

@@ -24,7 +24,7 @@ Data = dict[str, Any]
 #: An effect matters from so many noise floors on.
 SEVERAL = 3.0
 #: Sizes are looked at from the one that matters up to so many times it, where no bound is known; a bound is followed down as far.
-REACH = 10.0
+_REACH = 10.0
 #: Sizes that are looked at.
 SIZES = 5
 #: Nodes and weights of the mean over a normal distribution (Gauss-Hermite, three points).
@@ -137,10 +137,10 @@ class HypothesisBuilder:
         effect = EffectInstance(*question.place, shape.at(shape.typical))
         floors = self._usual.floors(HypothesisPair(((1.0, (*without, effect)),), without), 0, self._floor)
         matters = shape.typical * (SEVERAL / floors if floors > 0 else 1.0)
-        matters = min(max(matters, shape.typical / 1e4), shape.typical * REACH)
+        matters = min(max(matters, shape.typical / 1e4), shape.typical * _REACH)
         if question.bound is None or shape.inverse:
-            return np.geomspace(matters, REACH * matters, SIZES)
-        return np.geomspace(max(min(matters, question.bound), question.bound / REACH), question.bound, SIZES)
+            return np.geomspace(matters, _REACH * matters, SIZES)
+        return np.geomspace(max(min(matters, question.bound), question.bound / _REACH), question.bound, SIZES)
 
     def _rival(self, question: Question, rough: HypothesisPair) -> EffectInstance:
         """The rival with the values that the diagnosis has, or with those that follow the effect best over the usual motion."""

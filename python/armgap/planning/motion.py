@@ -21,11 +21,12 @@ __all__ = ["PER_JOINT", "Motion", "build", "count", "named"]
 
 Array = NDArray[np.float64]
 
+#: Parts of a motion that have an amplitude and a speed of their own, and sines of each joint in them.
 PHASES, SINES = 2, 2
 #: Numbers per joint: pose, and amplitude and frequency of every oscillation, in both phases.
 PER_JOINT = PHASES * (1 + 2 * SINES)
 #: Time at rest at either end, s.
-REST = 0.2
+_REST = 0.2
 #: Shortest move between two poses, s.
 SHORTEST_MOVE = 0.2
 #: Largest speed and acceleration of a fifth-order move over a unit distance in unit time (Siciliano 2009).
@@ -124,14 +125,14 @@ def build(numbers: Array, home: Array, limits: MotionLimits, duration: float, pe
     share = 0.2 + 0.6 * float(numbers[0])
     table = numbers[1:].reshape(n, PHASES, 1 + 2 * SINES).transpose(1, 0, 2)
     centres = low + table[:, :, 0] * (high - low)
-    available = duration - 2 * REST
+    available = duration - 2 * _REST
     moves = _moves(home, centres, limits)
     while sum(moves) > 0.5 * available and np.max(np.abs(centres - home)) > 1e-6:
         centres = home + 0.8 * (centres - home)
         moves = _moves(home, centres, limits)
     left = available - sum(moves)
     lengths = (share * left, (1 - share) * left)
-    instants = REST + np.cumsum([0.0, moves[0], lengths[0], moves[1], lengths[1], moves[2]])
+    instants = _REST + np.cumsum([0.0, moves[0], lengths[0], moves[1], lengths[1], moves[2]])
     lowest = np.array([[1.0 / length] for length in lengths])[:, :, None]
     frequency = lowest * (highest_frequency(limits, period)[None, :, None] / lowest) ** table[:, :, 2::2]
     frequency = np.maximum(frequency, lowest)
@@ -202,6 +203,7 @@ def _blend(x: Array) -> tuple[Array, Array, Array]:
     return x**3 * (10 - 15 * x + 6 * x * x), 30 * x * x * (1 - x) ** 2, 60 * x * (1 - x) * (1 - 2 * x)
 
 
+#: Amplitudes and speeds of the motions a search begins with, as parts of the range of each.
 _SLOW, _SMALL = 0.15, 0.4
 _PATTERNS: dict[str, tuple[tuple[float, float, float, float], tuple[float, float, float, float]]] = {
     "slow reversals": ((_SMALL, 0.35, 0.5, 0.5), (0.7, _SLOW, _SMALL, 0.4)),

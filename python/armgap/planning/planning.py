@@ -19,11 +19,12 @@ from armgap.arm import Arm, only_planar
 from armgap.diagnosis import Diagnosis
 from armgap.errors import OptionError, ResultError
 from armgap.output import STANDARD_STREAM, write
-from armgap.planning.criterion import Outcome, PredictedMotion, Setting
+from armgap.planning.criterion import PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics
 from armgap.planning.hypotheses import HypothesisBuilder, TestedQuestion
 from armgap.planning.limits import TORQUE_MARGIN, PlanLimits, limits_of
 from armgap.planning.motion import Motion
+from armgap.planning.outcome import Outcome
 from armgap.planning.questions import NONE, Question, asked, known_model, open_questions, rank, spelt
 from armgap.planning.search import Search, standard
 from armgap.planning.sizes import Scales

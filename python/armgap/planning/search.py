@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from armgap.arm import MotionLimits
 from armgap.errors import OptionError
-from armgap.planning.criterion import Outcome, PredictedMotion, Setting
+from armgap.planning.criterion import PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics, torque_with
 from armgap.planning.hypotheses import TestedQuestion
 from armgap.planning.limits import TORQUE_MARGIN, TORQUE_MOST, PlanLimits
 from armgap.planning.motion import Motion, build, count, named
+from armgap.planning.outcome import Outcome
 from armgap.progress import report_progress
 
 __all__ = ["Found", "Search", "standard"]
@@ -25,13 +26,13 @@ Array = NDArray[np.float64]
 #: Size of the population, and generations after the first.
 POPULATION, GENERATIONS = 16, 9
 #: Windows by which motions are compared, and motions of which the best is taken by all windows.
-WINDOWS, FINALISTS = 20, 4
+_WINDOWS, FINALISTS = 20, 4
 #: Steps in which a motion is scaled down until its torques suffice.
-SHRINKS = 12
+_SHRINKS = 12
 #: Every so many steps of prediction torques are looked at while a motion is scaled down.
 COARSE = 4
 #: Poses per joint at which the torque left for accelerations is looked at; at least this part of the limit counts as left.
-POSES, LEFT = 5, 0.1
+_POSES_PER_JOINT, LEFT = 5, 0.1
 #: Part of the torque left that a joint's own acceleration takes; the rest is for the other joints' accelerations.
 COUPLED = 0.6
 _SEEDS = ("slow, then fast", "large travel", "fast multisine", "slow reversals")
@@ -99,7 +100,9 @@ class Search:
         if self._limits.torque is None:
             return inner
         arm, model = self._setting.arm, self._setting.model
-        ends = [np.linspace(a, b, POSES) for a, b in zip(inner.position_min, inner.position_max, strict=True)]
+        ends = [
+            np.linspace(a, b, _POSES_PER_JOINT) for a, b in zip(inner.position_min, inner.position_max, strict=True)
+        ]
         poses = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, arm.n_joints)
         rest = np.zeros_like(poses)
         carried = np.abs(inverse_dynamics(model, poses, rest, rest)).max(axis=0)
@@ -122,7 +125,7 @@ class Search:
             return motion
         h = self._setting.step * COARSE
         t = np.arange(0.0, motion.duration, h)
-        for _ in range(SHRINKS):
+        for _ in range(_SHRINKS):
             states = motion.at(t)
             tau = inverse_dynamics(self._setting.model, *states)
             if effects:
@@ -153,7 +156,7 @@ class Search:
 
         def cost(numbers: Array) -> float:
             motion = self.motion(numbers)
-            played = PredictedMotion(self._setting, motion, WINDOWS)
+            played = PredictedMotion(self._setting, motion, _WINDOWS)
             outcomes = [played.outcome(p.quick, steps=0) for p in tested]
             state.count += 1
             state.most = np.maximum(state.most, [x.expected for x in outcomes])

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["RerunMissingError", "models", "poses", "predicted", "write_replay"]
 
 #: Half width of the cubic that start velocities are read from, in samples.
-HALF_WIDTH = 8
+_HALF_WIDTH = 8
 #: Arms stand this many reaches apart.
 APART = 2.4
 #: Thickness of a drawn link, as a part of the arm's reach.
@@ -62,7 +62,7 @@ def predicted(model: Hypothesis, log: Log, horizon: float) -> Array:
         remedy = f"give at least the sample period of {log.sample_period:g} s"
         raise OptionError(f"the horizon is {horizon:g} s", remedy=remedy)
     q, t = np.ascontiguousarray(log.q), np.ascontiguousarray(log.t)
-    dq = _native.velocity(t, q, "local-cubic", HALF_WIDTH)
+    dq = _native.velocity(t, q, "local-cubic", _HALF_WIDTH)
     starts = np.searchsorted(t, np.arange(t[0], t[-1], horizon))
     found = np.array(q)
     for first, last in zip(starts, [*starts[1:], len(t)], strict=True):

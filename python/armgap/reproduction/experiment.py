@@ -20,11 +20,17 @@ from armgap.simulation import Effect, seed_torque, simulate
 
 __all__ = ["LADDER", "PAPER_ESTIMATES", "PAPER_MEASURED", "Reproduction", "reproduce", "seed_arm", "seed_run"]
 
+#: Gravity of the experiment of Reyes and Kelly (1997) [m/s^2].
 GRAVITY = 9.81
+#: Its sample period, s.
 SAMPLE_PERIOD_S = 0.0025
+#: Its duration, s.
 DURATION_S = 10.0
+#: Cutoff of its filters [rad/s].
 CUTOFF_RAD_S = 50.0
+#: Coulomb friction of joint 1 in either direction, Table I [N m].
 COULOMB_FORWARD, COULOMB_BACKWARD = 7.17, 8.049
+#: Its encoders and torque limits, section 5 [counts per revolution, N m].
 COUNTS_PER_REV = (1024000.0, 655360.0)
 TORQUE_LIMIT = (200.0, 15.0)
 

@@ -147,6 +147,7 @@ AXIS = TrialArm(
 )
 
 MODELS = {"direct-drive": DIRECT_DRIVE, "geared": GEARED, "pendulum": PENDULUM, "axis": AXIS}
+#: Sample periods that cases are drawn from, s.
 SAMPLE_PERIODS = (0.001, 0.002, 0.0025, 0.004, 0.005)
 
 

@@ -26,11 +26,11 @@ from armgap.trial.visibility import Visibility, visibility
 #: Motions drawn before a case is given up.
 ATTEMPTS = 30
 #: An effect that cannot be seen is made larger this often, by this much each time.
-GROWTHS, GROWTH = 8, 0.15
+GROWTHS, _GROWTH = 8, 0.15
 #: One effect in this many is made as small as can still be seen, in at most so many steps of that size.
-SHRUNK_ONE_IN, SHRINKS, SHRINK = 5, 6, 0.4
+SHRUNK_ONE_IN, _SHRINKS, SHRINK = 5, 6, 0.4
 #: An arm that goes farther or faster with its effects has run away, rad and rad/s (m and m/s).
-REACH, SPEED = 10.0, 30.0
+_REACH, SPEED = 10.0, 30.0
 #: Controllers tried on an altered arm, each half as stiff as the one before.
 DETUNINGS = 6
 
@@ -239,10 +239,10 @@ def _fit_size(
     for growth in range(1, GROWTHS):
         if best is None or best[2].visible:
             break
-        best = at(size + GROWTH * growth) or best
+        best = at(size + _GROWTH * growth) or best
     if best is None or not best[2].visible or not may_shrink or number % SHRUNK_ONE_IN:
         return best
-    for _ in range(SHRINKS):
+    for _ in range(_SHRINKS):
         smaller = at(best[1] - SHRINK)
         if smaller is None or not smaller[2].visible:
             break
@@ -304,7 +304,7 @@ def _log(arm: TrialArm, hidden: Sequence[HiddenEffect], name: str, motion: Excit
 
 def _sane(logs: dict[str, Trace]) -> bool:
     """Whether no log runs away."""
-    return all(bool(np.max(np.abs(x.q)) < REACH and np.max(np.abs(x.dq_true)) < SPEED) for x in logs.values())
+    return all(bool(np.max(np.abs(x.q)) < _REACH and np.max(np.abs(x.dq_true)) < SPEED) for x in logs.values())
 
 
 def _styles(motions: dict[str, tuple[str, Excitation]]) -> dict[str, str]:

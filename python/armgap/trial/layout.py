@@ -9,6 +9,7 @@ __all__ = ["ANSWERS", "ARM_FILE", "MANIFEST", "MOST_CASES", "belongs", "case_fol
 MANIFEST = "trial.json"
 ANSWERS = "answers"
 ARM_FILE = "arm.toml"
+#: Cases of a trial at most.
 MOST_CASES = 100_000
 _CASE = "case-"
 

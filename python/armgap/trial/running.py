@@ -21,10 +21,10 @@ from armgap.trial.methods import Method, methods
 from armgap.trial.sealed import SealedCase, case_folders
 from armgap.workers import one_thread
 
-__all__ = ["ANSWERS", "LIMIT_S", "answer_cases", "answer_file", "open_cases"]
+__all__ = ["ANSWERS", "answer_cases", "answer_file", "open_cases"]
 
 #: Longest time for one case, s.
-LIMIT_S = 300.0
+_LIMIT_S = 300.0
 
 
 def answer_file(case: Path, method: str) -> Path:
@@ -38,7 +38,7 @@ def open_cases(folder: str | Path, method: Method, again: bool = False) -> list[
 
 
 def answer_cases(
-    cases: list[Path], method: Method, *, workers: int = 1, limit_s: float = LIMIT_S
+    cases: list[Path], method: Method, *, workers: int = 1, limit_s: float = _LIMIT_S
 ) -> Iterator[tuple[Path, Answer]]:
     """Let a method answer cases, in processes of one thread each; every answer is written as soon as it is there.
 

@@ -21,14 +21,14 @@ from armgap.trial.arms import TrialArm
 from armgap.trial.simulated_arm import Array, Trace
 from armgap.trial.windows import Mechanism, Window, cut, misses, refit
 
-__all__ = ["MULTIPLE", "SIGMAS", "Visibility", "visibility"]
+__all__ = ["MULTIPLE", "VISIBLE_SIGMAS", "Visibility", "visibility"]
 
 #: Visible: the predictions' error is at least this multiple of the floor ...
 MULTIPLE = 2.0
 #: ... or the parameters move by at least this many of the arm file's sigmas.
-SIGMAS = 5.0
+VISIBLE_SIGMAS = 5.0
 #: Errors are taken over this share of the windows, those that miss most: contacts and pushes are rare.
-SHARE = 0.1
+_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Visibility:
     @property
     def visible(self) -> bool:
         """Whether it can be found."""
-        return self.above_floor >= MULTIPLE or self.moved >= SIGMAS
+        return self.above_floor >= MULTIPLE or self.moved >= VISIBLE_SIGMAS
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
@@ -90,5 +90,5 @@ def _windows(logs: dict[str, Trace], part: str) -> list[Window]:
 def _worst(error: Array) -> Array:
     """RMS per joint over the windows that miss most."""
     squares = np.sort(np.mean(error**2, axis=1), axis=0)[::-1]
-    rms: Array = np.sqrt(np.mean(squares[: max(1, round(SHARE * len(squares)))], axis=0))
+    rms: Array = np.sqrt(np.mean(squares[: max(1, round(_SHARE * len(squares)))], axis=0))
     return rms

@@ -23,7 +23,7 @@ WINDOW = 0.2
 AROUND, FEWEST = 0.012, 4
 #: Tolerances of the simulation, rad (m), the next where one is not reached.
 TOLERANCES = (1e-8, 1e-6, 1e-4)
-STEPS, STEP = 8, 1e-4
+_STEPS, _STEP = 8, 1e-4
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def refit(
     ndarray, shape (n_parameters,)
     """
     best, cost = theta, _cost(m, theta, theta, sigma, windows, noise, effects)
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         step = _newton(m, best, theta, sigma, windows, noise, effects)
         for shrink in (1.0, 0.3, 0.1):
             trial = best + shrink * step
@@ -164,8 +164,8 @@ def _newton(
     columns = []
     for i, s in enumerate(sigma):
         moved = theta.copy()
-        moved[i] += STEP * s
-        columns.append(((now - misses(m, moved, windows, effects)) / noise).ravel() / STEP)
+        moved[i] += _STEP * s
+        columns.append(((now - misses(m, moved, windows, effects)) / noise).ravel() / _STEP)
     jacobian = np.vstack([np.column_stack(columns), np.eye(len(theta))])
     target = np.concatenate([(now / noise).ravel(), (prior - theta) / sigma])
     step: Array = sigma * np.linalg.lstsq(jacobian, target, rcond=None)[0]

@@ -1,5 +1,7 @@
 //! Chains as mechanics: identities of every chain, and the two-link arm as a chain.
 
+mod common;
+
 use armgap_core::arm::{Arm, EquationTerms, LinkParameters, TwoLink};
 use armgap_core::chain::{Chain, ChainJoint, JointKind, parameter};
 use armgap_core::cpu::Portable;
@@ -9,6 +11,7 @@ use armgap_core::kinematics::JointState;
 use armgap_core::lanes::Lanes;
 use armgap_core::plant::{Accelerations, Mode, Plant};
 use armgap_core::trig::SinCos;
+use common::seed_torque;
 use nalgebra::{Rotation3, SMatrix, SVector, Unit, Vector3};
 
 /// Finite-difference step of directional derivatives.
@@ -104,7 +107,7 @@ fn check<const N: usize, const P: usize>(numbers: &mut Numbers) {
     let (momentum, potential): (SMatrix<f64, N, P>, SMatrix<f64, N, P>) =
         chain.momentum_and_potential(&q, &dq);
     near(&(momentum * vector), &(m * dq));
-    let kinetic = Arm::<f64, N, P>::kinetic_energy(&chain, &theta, &q, &dq);
+    let kinetic = 0.5 * dq.dot(&(m * dq));
     let energy_row =
         |q: &SVector<f64, N>, dq: &SVector<f64, N>| -> SVector<f64, P> { chain.energy_regressor(q, dq) };
     let energy = |q: &SVector<f64, N>, dq: &SVector<f64, N>| energy_row(q, dq).dot(&vector);
@@ -266,14 +269,6 @@ fn a_two_link_arm_is_a_chain_too() {
             assert!((y.column(column) - expected).amax() < 1e-13 * scale, "column {column}");
         }
     }
-}
-
-/// The torques (31) and (32) of the seed.
-fn seed_torque(t: f64) -> [f64; 2] {
-    [
-        (1.0 - (-0.8 * t).exp()) * 29.0 + 68.0 * (16.0 * t + 0.1).sin() + 9.0 * (20.0 * t + 0.15).sin(),
-        (1.0 - (-1.8 * t).exp()) * 1.2 + 8.0 * (26.0 * t + 0.08).sin() + 2.0 * (12.0 * t + 0.34).sin(),
-    ]
 }
 
 /// Positions after every sample of 2 s under the seed's torques, which reverse every joint some thirty times.

@@ -1,11 +1,14 @@
 //! The integrator against what mechanics demands of it.
 
+mod common;
+
 use armgap_core::arm::{Arm, TwoLink};
 use armgap_core::effect::{Active, InputSegment, Trial, find};
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::kinematics::JointState;
 use armgap_core::plant::{Mode, Plant};
 use armgap_core::transmission::LatentState;
+use common::seed_torque;
 use nalgebra::{SVector, Vector2};
 
 const THETA: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6, 1.734];
@@ -15,14 +18,6 @@ type Seed = Plant<f64, TwoLink<f64>, 2, 9>;
 
 fn seed(theta: [f64; 9]) -> Seed {
     Plant::new(TwoLink::new(9.81, Some(0.45), &theta), theta)
-}
-
-/// The torques (31) and (32).
-fn seed_torque(t: f64) -> [f64; 2] {
-    [
-        (1.0 - (-0.8 * t).exp()) * 29.0 + 68.0 * (16.0 * t + 0.1).sin() + 9.0 * (20.0 * t + 0.15).sin(),
-        (1.0 - (-1.8 * t).exp()) * 1.2 + 8.0 * (26.0 * t + 0.08).sin() + 2.0 * (12.0 * t + 0.34).sin(),
-    ]
 }
 
 fn run(

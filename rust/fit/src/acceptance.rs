@@ -45,7 +45,7 @@ pub const ALIKE_TRUST: f64 = 6.0;
 pub const UNEXPLAINED: f64 = 4.0;
 
 /// Error relative to the motion within a window below which a gap is of no consequence, whatever the encoders resolve.
-pub const CONSEQUENCE: f64 = 1e-3;
+pub const CONSEQUENTIAL_ERROR: f64 = 1e-3;
 
 /// Improvement relative to the motion within a window below which an effect is of no consequence.
 pub const RELEVANT: f64 = 1e-4;
@@ -87,7 +87,7 @@ const LOOK_ALIKE: f64 = 0.03;
 /// Minimum relevance of a cause: improvement relative to the motion below which it is not named, given the first gap. What is of
 /// consequence by itself is always named.
 pub fn min_relevance(first_gap: f64) -> f64 {
-    (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENCE)
+    (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENTIAL_ERROR)
 }
 
 impl<const N: usize, const P: usize> SearchNode<N, P> {
@@ -203,7 +203,7 @@ pub fn moves<const N: usize, const P: usize>(
 ) -> bool {
     let (matters, certain) = match node.relative_error() {
         _ if min_relevance <= FAINTEST => (MATTERS_IF_FAINT, CERTAIN_IF_FAINT),
-        error if error > CONSEQUENCE => (MATTERS, CERTAIN),
+        error if error > CONSEQUENTIAL_ERROR => (MATTERS, CERTAIN),
         _ => (MATTERS_IN_SMALL, CERTAIN),
     };
     node.excess() > ABOVE_FLOOR

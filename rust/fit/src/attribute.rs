@@ -1,6 +1,6 @@
 //! Which effect: screening, full fits of what passes, and the holdout's decision, one cause after another.
 
-use crate::acceptance::{ABOVE_FLOOR, CONSEQUENCE, UNEXPLAINED};
+use crate::acceptance::{ABOVE_FLOOR, CONSEQUENTIAL_ERROR, UNEXPLAINED};
 use crate::context::{DiagnosisContext, SplitWeighting};
 use crate::model::{EffectInstance, Hypothesis};
 use crate::progress::Phase;
@@ -151,12 +151,12 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
 
     /// Whether the current model leaves a gap of consequence above the floor.
     pub fn is_open(&self) -> bool {
-        self.relative_error() > CONSEQUENCE && self.excess() > ABOVE_FLOOR
+        self.relative_error() > CONSEQUENTIAL_ERROR && self.excess() > ABOVE_FLOOR
     }
 
     /// Whether the current model leaves a gap of consequence that is more than noise.
     pub fn is_unexplained(&self) -> bool {
-        self.relative_error() > CONSEQUENCE && self.excess() > UNEXPLAINED
+        self.relative_error() > CONSEQUENTIAL_ERROR && self.excess() > UNEXPLAINED
     }
 
     /// Whether the current model leaves a gap above the floor in which an improvement of `min_relevance` size can lie.
@@ -403,6 +403,17 @@ fn without_worst(mut costs: Vec<f64>) -> f64 {
     costs.iter().take(kept).sum()
 }
 
+/// The model with another law at the candidate's values of the arm; none if it has that law there.
+fn with_law<const P: usize>(
+    model: &Hypothesis<P>,
+    candidate: &Candidate<P>,
+    law: EffectInstance,
+) -> Option<Hypothesis<P>> {
+    let taken = |e: &EffectInstance| e.law.spec().name == law.law.spec().name && e.joint == law.joint;
+    let theta = candidate.fit.hypothesis.theta;
+    (!model.effects.iter().any(taken)).then(|| Hypothesis { theta, ..model.with(law) })
+}
+
 /// The model with what is left of a candidate's effect when its first parameter vanishes, if that is an effect of its own.
 fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> Option<Hypothesis<P>> {
     let effect = candidate.effect?;
@@ -413,9 +424,7 @@ fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> O
     for (slot, parameter) in p.iter_mut().zip(law.spec().parameters) {
         *slot = value(parameter.name)?;
     }
-    let taken = model.effects.iter().any(|e| e.law.spec().name == law.spec().name && e.joint == effect.joint);
-    let theta = candidate.fit.hypothesis.theta;
-    (!taken).then(|| Hypothesis { theta, ..model.with(EffectInstance::new(law, effect.joint, p)) })
+    with_law(model, candidate, EffectInstance::new(law, effect.joint, p))
 }
 
 /// The model with the law of which a candidate's effect is the simplest case, with a small value of the parameter that the simple one does not have.
@@ -435,7 +444,5 @@ fn richer<const N: usize, const P: usize>(
             None => LITTLE * scales.size(parameter.quantity, effect.joint),
         };
     }
-    let taken = model.effects.iter().any(|e| e.law.spec().name == law.spec().name && e.joint == effect.joint);
-    let theta = candidate.fit.hypothesis.theta;
-    (!taken).then(|| Hypothesis { theta, ..model.with(EffectInstance::new(law, effect.joint, p)) })
+    with_law(model, candidate, EffectInstance::new(law, effect.joint, p))
 }

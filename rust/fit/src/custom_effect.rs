@@ -9,22 +9,13 @@ use armgap_core::effect::{
 };
 
 /// Most custom effects in one diagnosis.
-pub const MOST: usize = 4;
-
-/// Name of a custom effect, and the joint it acts on.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct CustomEffect {
-    /// Name in results.
-    pub name: String,
-    /// 0-based joint.
-    pub joint: usize,
-}
+pub const MAX_CUSTOM_EFFECTS: usize = 4;
 
 /// The law of custom effect `index`; its torques lie in the logs' tables.
 #[derive(Debug)]
 struct Tabulated(usize);
 
-static LAWS: [Tabulated; MOST] = [Tabulated(0), Tabulated(1), Tabulated(2), Tabulated(3)];
+static LAWS: [Tabulated; MAX_CUSTOM_EFFECTS] = [Tabulated(0), Tabulated(1), Tabulated(2), Tabulated(3)];
 
 static PARAMETERS: [EffectParameter; 1] = [EffectParameter::signed("size", Quantity::Torque)];
 static STARTS: [[f64; MAX_PARAMETERS]; 1] = [[0.05, 0.0, 0.0]];
@@ -45,7 +36,7 @@ const fn spec(name: &'static str) -> Spec {
     }
 }
 
-static SPECS: [Spec; MOST] =
+static SPECS: [Spec; MAX_CUSTOM_EFFECTS] =
     [spec("user_effect_1"), spec("user_effect_2"), spec("user_effect_3"), spec("user_effect_4")];
 
 impl Effect<f64> for Tabulated {

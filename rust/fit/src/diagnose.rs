@@ -121,7 +121,7 @@ impl std::fmt::Display for DiagnoseError {
             Self::CustomEffects => write!(
                 f,
                 "effects of your own do not fit the logs; give at most {}, each on a joint of the arm, with one torque per sample of every log",
-                custom_effect::MOST
+                custom_effect::MAX_CUSTOM_EFFECTS
             ),
             Self::NoTorque(name) => {
                 write!(
@@ -187,7 +187,7 @@ pub(crate) fn validate(
         let fits = log.tables.len() == options.custom_effects.len()
             && log.tables.iter().all(|x| x.len() == log.t.len());
         if !fits
-            || options.custom_effects.len() > custom_effect::MOST
+            || options.custom_effects.len() > custom_effect::MAX_CUSTOM_EFFECTS
             || options.custom_effects.iter().any(|j| *j >= joints)
         {
             return Err(DiagnoseError::CustomEffects);

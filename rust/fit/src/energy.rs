@@ -6,15 +6,29 @@
 //! random: it makes the balance smaller in size and leaves its sign.
 
 use crate::locate::{ResidualTorque, ResidualTorques};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A balance beyond this is that of a torque that on the whole takes, or gives.
 const ONE_WAY: f64 = 0.5;
 
+/// Which way the energy of a residual torque goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EnergyKind {
+    /// It leaves the arm, as with friction that the model lacks.
+    Takes,
+    /// It comes into the arm.
+    Gives,
+    /// What is taken is given back, as by a spring.
+    Both,
+}
+
 /// Energy that the residual torque of one joint takes and gives.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Energy {
     /// 1-based joint.
+    #[schemars(range(min = 1))]
     pub joint: usize,
     /// The model it belongs to: `before` (the arm file as it is), `refit` or `after`.
     pub model: &'static str,
@@ -26,8 +40,8 @@ pub struct Energy {
     pub commanded: f64,
     /// `power / exchanged`, from -1 (it only takes) to 1 (it only gives).
     pub balance: f64,
-    /// `takes`, `gives` or `both`.
-    pub kind: &'static str,
+    /// Which way the energy goes.
+    pub kind: EnergyKind,
 }
 
 /// The balance of every joint under every model.
@@ -45,9 +59,9 @@ fn of_model<const N: usize>(model: &'static str, residuals: &[ResidualTorque<N>]
         let exchanged = mean(&|x| (x.residual[j] * x.dq[j]).abs());
         let balance = if exchanged > 0.0 { power / exchanged } else { 0.0 };
         let kind = match balance {
-            b if b < -ONE_WAY => "takes",
-            b if b > ONE_WAY => "gives",
-            _ => "both",
+            b if b < -ONE_WAY => EnergyKind::Takes,
+            b if b > ONE_WAY => EnergyKind::Gives,
+            _ => EnergyKind::Both,
         };
         Energy {
             joint: j + 1,
@@ -93,11 +107,15 @@ mod tests {
                 .remove(0)
         };
         let friction = of(|_, dq| -0.3 * dq.signum());
-        assert!((friction.balance + 1.0).abs() < 1e-12 && friction.kind == "takes" && friction.power < 0.0);
+        assert!(
+            (friction.balance + 1.0).abs() < 1e-12
+                && friction.kind == EnergyKind::Takes
+                && friction.power < 0.0
+        );
         assert!((friction.exchanged / friction.commanded - 0.15).abs() < 1e-12);
-        assert_eq!(of(|_, dq| 0.1 * dq).kind, "gives");
+        assert_eq!(of(|_, dq| 0.1 * dq).kind, EnergyKind::Gives);
         let spring = of(|q, _| -5.0 * q);
-        assert!(spring.balance.abs() < 0.1 && spring.kind == "both" && spring.exchanged > 1.0);
+        assert!(spring.balance.abs() < 0.1 && spring.kind == EnergyKind::Both && spring.exchanged > 1.0);
         assert_eq!(of(|_, _| 0.0).balance, 0.0);
     }
 }

@@ -13,6 +13,7 @@ use crate::model_search::Attribution;
 use crate::solve::{Effort, Fit, neutral};
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Scatter of a size between logs, relative to it, that other missing effects make beside its standard deviation.
@@ -22,7 +23,7 @@ const SAME: f64 = 0.15;
 const OTHER: [f64; 2] = [0.7, 0.8];
 
 /// What a cause rests on.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, JsonSchema, Serialize)]
 pub struct Evidence {
     /// How often it has the lowest cost of all candidates when the windows are drawn again, at the node where it was added.
     pub selected: f64,

@@ -1,6 +1,6 @@
 //! Initial guesses of full fits: which candidates are worth one, and from which values.
 
-use crate::acceptance::CONSEQUENCE;
+use crate::acceptance::CONSEQUENTIAL_ERROR;
 use crate::attribute::is_plausible;
 use crate::contact_guess::contact_guesses;
 use crate::context::{DiagnosisContext, SplitWeighting};
@@ -44,7 +44,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
         let (all, screened) = self.screened(fit, weights);
         let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
-        let trace = if size < CONSEQUENCE { TRACE_IN_SMALL } else { TRACE };
+        let trace = if size < CONSEQUENTIAL_ERROR { TRACE_IN_SMALL } else { TRACE };
         let least = if gap { trace * training } else { f64::INFINITY };
         let more = promising(&screened, least).into_iter().map(|found| {
             let effect = found.effect;

@@ -10,6 +10,7 @@ use crate::window::{Dataset, InitialStateOffset};
 use armgap_core::arm::Arm;
 use nalgebra::SVector;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Half width, in samples, of the cubic whose curvature is the residual acceleration.
@@ -102,9 +103,10 @@ fn reverses(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> bool {
 }
 
 /// RMS residual torque of one joint over bins of one variable.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Regime {
     /// 1-based joint.
+    #[schemars(range(min = 1))]
     pub joint: usize,
     /// The variable, for example `abs(dq1)`.
     pub variable: String,
@@ -125,11 +127,13 @@ pub struct Regime {
 }
 
 /// Where most of a joint's gap lies.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Location {
     /// 1-based joint.
+    #[schemars(range(min = 1))]
     pub joint: usize,
     /// Share of the whole gap that this joint bears.
+    #[schemars(range(min = 0, max = 1))]
     pub share: f64,
     /// Name of the regime.
     pub regime: String,
@@ -141,7 +145,7 @@ pub struct Location {
 }
 
 /// A range of a variable.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct VariableRange {
     /// The variable.
     pub variable: String,

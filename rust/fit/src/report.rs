@@ -5,6 +5,8 @@ use crate::locate::{Location, Regime};
 use crate::sanity::Sanity;
 use crate::verdict::Verdict;
 use armgap_core::transmission::Sides;
+use schemars::generate::SchemaSettings;
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -12,7 +14,7 @@ use std::collections::BTreeMap;
 pub type Named<T> = BTreeMap<String, T>;
 
 /// A number with its uncertainty.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Value {
     /// Value, SI.
     pub value: f64,
@@ -22,10 +24,16 @@ pub struct Value {
     pub unit: &'static str,
 }
 
+/// JSON Schema (draft 2020-12) of what the core says of a diagnosis.
+pub fn schema() -> Schema {
+    SchemaSettings::draft2020_12().for_serialize().into_generator().into_root_schema_for::<Diagnosis>()
+}
+
 /// A diagnosis.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Diagnosis {
     /// Name of this schema.
+    #[schemars(extend("const" = "armgap.diagnosis/1"))]
     pub schema: &'static str,
     /// What it comes to.
     pub verdict: Verdict,
@@ -75,27 +83,34 @@ pub struct Diagnosis {
 }
 
 /// How far predictions miss on the holdout, RMS per joint.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Gap {
     /// Prediction horizon, s.
     pub horizon_s: f64,
     /// Unit of the position errors; of an arm with joints of both kinds that of its first joint (see `arm.joint_unit`).
     pub unit: &'static str,
     /// Arm file as it is.
+    #[schemars(inner(range(min = 0)))]
     pub before: Vec<f64>,
     /// Parameters re-estimated.
+    #[schemars(inner(range(min = 0)))]
     pub refit: Vec<f64>,
     /// The named causes added.
+    #[schemars(inner(range(min = 0)))]
     pub after: Vec<f64>,
     /// What measurement noise alone leaves.
+    #[schemars(inner(range(min = 0)))]
     pub floor: Vec<f64>,
     /// RMS displacement of the arm over the horizon.
+    #[schemars(inner(range(min = 0)))]
     pub motion: Vec<f64>,
     /// Share of the gap above the floor that is closed.
+    #[schemars(range(max = 1))]
     pub closed: f64,
     /// 95 % interval of it.
     pub closed_ci: [f64; 2],
     /// Share of the gap above the floor with parameters re-estimated that the named causes leave.
+    #[schemars(range(min = 0, max = 1))]
     pub unexplained: f64,
     /// RMS errors at other prediction horizons.
     pub horizons: Vec<AtHorizon>,
@@ -104,39 +119,47 @@ pub struct Gap {
 }
 
 /// RMS errors at one prediction horizon, per joint.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct AtHorizon {
     /// Prediction horizon, s.
     pub horizon_s: f64,
     /// Arm file as it is.
+    #[schemars(inner(range(min = 0)))]
     pub before: Vec<f64>,
     /// Parameters re-estimated.
+    #[schemars(inner(range(min = 0)))]
     pub refit: Vec<f64>,
     /// Causes added.
+    #[schemars(inner(range(min = 0)))]
     pub after: Vec<f64>,
     /// What measurement noise alone leaves.
+    #[schemars(inner(range(min = 0)))]
     pub floor: Vec<f64>,
 }
 
 /// RMS errors in free run.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct FreeRun {
     /// Arm file as it is.
+    #[schemars(inner(range(min = 0)))]
     pub before: Vec<f64>,
     /// Causes added.
+    #[schemars(inner(range(min = 0)))]
     pub after: Vec<f64>,
 }
 
 /// One cause.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Cause {
     /// Effect.
     pub effect: &'static str,
     /// Name for people.
     pub title: &'static str,
     /// 1-based joint.
+    #[schemars(range(min = 1))]
     pub joint: Option<usize>,
     /// Probability.
+    #[schemars(range(min = 0, max = 1))]
     pub probability: f64,
     /// Its parameters.
     pub parameters: Named<Value>,
@@ -156,7 +179,7 @@ pub struct Cause {
 }
 
 /// Sides of a transmission: `motor` or `link`.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, JsonSchema, Serialize)]
 pub struct SidesSummary {
     /// Side that the encoder measures.
     pub encoder: &'static str,
@@ -176,7 +199,7 @@ impl SidesSummary {
 }
 
 /// A cause that is not named.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Candidate {
     /// The cause.
     #[serde(flatten)]
@@ -186,25 +209,40 @@ pub struct Candidate {
 }
 
 /// A look-alike.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct EquivalentSummary {
     /// Effect.
     pub effect: &'static str,
     /// 1-based joint.
+    #[schemars(range(min = 1))]
     pub joint: Option<usize>,
     /// Why.
     pub why: String,
 }
 
+/// What is known of a candidate that is not a cause, the surest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, JsonSchema, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// These logs would show it if it were larger than its bound.
+    Absent,
+    /// These logs neither show it nor rule it out.
+    Undecided,
+    /// The motion of these logs leaves no trace of it.
+    #[serde(rename = "not excited")]
+    NotExcited,
+}
+
 /// A candidate that is not a cause.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct RuledOut {
     /// Effect.
     pub effect: &'static str,
     /// 1-based joint.
+    #[schemars(range(min = 1))]
     pub joint: Option<usize>,
-    /// `absent`, `not excited` or `undecided`.
-    pub status: &'static str,
+    /// What is known of it.
+    pub status: Status,
     /// Upper bound of its size.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound: Option<Bound>,
@@ -214,7 +252,7 @@ pub struct RuledOut {
 }
 
 /// An upper bound.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Bound {
     /// Parameter.
     pub parameter: &'static str,
@@ -227,7 +265,7 @@ pub struct Bound {
 }
 
 /// The arm's parameters before, re-estimated, and with the causes.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Parameters {
     /// Arm file.
     pub nominal: Named<Value>,
@@ -238,7 +276,7 @@ pub struct Parameters {
 }
 
 /// The arm in brief.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct ArmSummary {
     /// Kind.
     pub kind: &'static str,
@@ -253,7 +291,7 @@ pub struct ArmSummary {
 }
 
 /// A log in brief.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct LogSummary {
     /// Name.
     pub name: String,
@@ -266,13 +304,14 @@ pub struct LogSummary {
 }
 
 /// A fitted candidate.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Ranked {
     /// Effect.
     pub effect: &'static str,
     /// Name for people.
     pub title: &'static str,
     /// 1-based joint.
+    #[schemars(range(min = 1))]
     pub joint: Option<usize>,
     /// Share of the holdout's gap above the floor it removes.
     pub closed: f64,
@@ -285,7 +324,7 @@ pub struct Ranked {
 }
 
 /// One step of the model search.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct StageSummary {
     /// What the step added.
     pub added: Option<EquivalentSummary>,
@@ -300,11 +339,12 @@ pub struct StageSummary {
 }
 
 /// Measured and predicted positions of one joint.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Series {
     /// Log.
     pub log: String,
     /// 1-based joint.
+    #[schemars(range(min = 1))]
     pub joint: usize,
     /// Times, s.
     pub t: Vec<f64>,
@@ -325,11 +365,12 @@ pub struct Series {
 }
 
 /// Measured and predicted positions in free run.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct FreeRunSeries {
     /// Log.
     pub log: String,
     /// 1-based joint.
+    #[schemars(range(min = 1))]
     pub joint: usize,
     /// Times, s.
     pub t: Vec<f64>,
@@ -342,7 +383,7 @@ pub struct FreeRunSeries {
 }
 
 /// Measurement noise.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Noise {
     /// Standard deviation of the positions per joint.
     pub position_sigma: Vec<f64>,
@@ -351,7 +392,7 @@ pub struct Noise {
 }
 
 /// Settings of a diagnosis.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct OptionSummary {
     /// Horizon, s.
     pub horizon_s: f64,

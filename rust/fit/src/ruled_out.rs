@@ -5,7 +5,7 @@ use crate::context::DiagnosisContext;
 use crate::covariance::NORMAL_95;
 use crate::model::EffectInstance;
 use crate::model_search::Attribution;
-use crate::report::{Bound, RuledOut};
+use crate::report::{Bound, RuledOut, Status};
 use crate::screen::{ScoreTest, screen};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Spec, Trial, catalogue};
@@ -62,11 +62,11 @@ fn never_fitted<const N: usize>() -> Vec<RuledOut> {
     let entry = |spec: &Spec, joint: Option<usize>| {
         let (status, why) = if spec.trial == Trial::Disturbance {
             (
-                "absent",
+                Status::Absent,
                 "no push stands out of what the model lacks in any of these logs; a joint at rest shows none below its friction",
             )
         } else {
-            ("undecided", "another effect and other parameters of the arm give the same motion, always")
+            (Status::Undecided, "another effect and other parameters of the arm give the same motion, always")
         };
         RuledOut { effect: spec.name, joint, status, bound: None, why: Some(why.to_owned()) }
     };
@@ -77,9 +77,8 @@ fn never_fitted<const N: usize>() -> Vec<RuledOut> {
 }
 
 fn weaker(a: &RuledOut, b: &RuledOut) -> bool {
-    let rank = |s: &str| ["absent", "undecided", "not excited"].iter().position(|x| *x == s).unwrap_or(0);
     let size = |r: &RuledOut| r.bound.as_ref().map_or(f64::INFINITY, |b| b.value);
-    (rank(a.status), size(a)) > (rank(b.status), size(b))
+    (a.status, size(a)) > (b.status, size(b))
 }
 
 fn status<A, const N: usize, const P: usize>(
@@ -98,7 +97,7 @@ fn status<A, const N: usize, const P: usize>(
     let pinned = sigma < PINNED * typical;
     if !pinned {
         let why = format!("these logs do not pin it down; it needs {}", spec.excited_by);
-        return RuledOut { effect, joint, status: "not excited", bound: None, why: Some(why) };
+        return RuledOut { effect, joint, status: Status::NotExcited, bound: None, why: Some(why) };
     }
     let value = test.estimate.abs() + NORMAL_95 * sigma;
     let bound =
@@ -107,7 +106,7 @@ fn status<A, const N: usize, const P: usize>(
     RuledOut {
         effect,
         joint,
-        status: if traced { "undecided" } else { "absent" },
+        status: if traced { Status::Undecided } else { Status::Absent },
         bound: Some(bound),
         why: traced.then(|| {
             "it leaves a trace in the training logs, but does not reduce the gap on the holdout".to_owned()
@@ -134,8 +133,8 @@ fn rivalled<const N: usize, const P: usize>(
 
 /// What would do nearly as well in place of a named cause is absent only if that is right.
 fn leave_open(entry: &mut RuledOut, instead: &EffectInstance) {
-    if entry.status == "absent" {
-        (entry.status, entry.bound) = ("undecided", None);
+    if entry.status == Status::Absent {
+        (entry.status, entry.bound) = (Status::Undecided, None);
         let joint = instead.joint_number().map_or(String::new(), |j| format!(", joint {j}"));
         entry.why = Some(format!(
             "beside the named causes there is none of it, but in place of {}{joint} it would do nearly as well",
@@ -148,8 +147,8 @@ fn leave_open(entry: &mut RuledOut, instead: &EffectInstance) {
 fn doubt(entry: &mut RuledOut, test: &ScoreTest, remains: f64) {
     let most = entry.bound.as_ref().map_or(test.gain, |bound| (bound.value / test.information_sigma).powi(2));
     let share = (most / remains).min(1.0);
-    if entry.status == "absent" && share > COULD_BE {
-        entry.status = "undecided";
+    if entry.status == Status::Absent && share > COULD_BE {
+        entry.status = Status::Undecided;
         let percent = 100.0 * share;
         entry.why = Some(format!("a gap remains, and up to {percent:.0} % of it could be its doing"));
     }
@@ -165,6 +164,6 @@ fn threshold_status(test: &ScoreTest) -> RuledOut {
     } else {
         format!("these logs never reach it; it needs {}", spec.excited_by)
     };
-    let status = if reached { "absent" } else { "not excited" };
+    let status = if reached { Status::Absent } else { Status::NotExcited };
     RuledOut { effect, joint, status, bound: None, why: Some(why) }
 }

@@ -1,6 +1,7 @@
 //! Whether re-estimated parameters are such as this arm can have, and the standard deviations that an arm file may ask for.
 
 use armgap_core::arm::{ArmKind, Parameter};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A value this many standard deviations of the arm file away is none that the arm file allows: by chance, one in a million.
@@ -24,7 +25,7 @@ const STUCK: &str = "beside so large a gap the logs say less about the parameter
 const WIDEST: f64 = 10.0;
 
 /// What is wrong with a re-estimated value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// Gravity has turned over.
@@ -38,7 +39,7 @@ pub enum Kind {
 }
 
 /// A re-estimated parameter that is not to be believed as it stands.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Sanity {
     /// Parameter.
     pub parameter: &'static str,

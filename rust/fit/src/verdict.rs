@@ -1,6 +1,7 @@
 //! The verdict, as a function of plain evidence: what the table of the gap shows and whether a cause is named.
 
-use crate::acceptance::CONSEQUENCE;
+use crate::acceptance::CONSEQUENTIAL_ERROR;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A prediction error beyond this many floors is no noise: the floor itself is known to a factor of about 1.4 either way, and RMS errors
@@ -14,7 +15,7 @@ const IMPROVEMENT: f64 = 0.2;
 const IMPROVABLE: f64 = 2.0;
 
 /// What a diagnosis comes to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// The gap is within noise, or of no consequence.
@@ -58,7 +59,7 @@ impl Evidence<'_> {
         error
             .iter()
             .zip(limits)
-            .any(|(e, (floor, motion))| *e > ABOVE_NOISE * floor && *e > CONSEQUENCE * motion)
+            .any(|(e, (floor, motion))| *e > ABOVE_NOISE * floor && *e > CONSEQUENTIAL_ERROR * motion)
     }
 
     /// Whether re-estimated parameters bring some joint's error down.

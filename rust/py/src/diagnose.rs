@@ -5,6 +5,7 @@ use crate::progress::with_progress;
 use armgap_fit::arm::ArmDescription;
 use armgap_fit::diagnose::{LogData, Options, diagnose as run};
 use armgap_fit::refit::refit as rigid_fit;
+use armgap_fit::report::schema;
 use armgap_fit::serial::{SerialArm, diagnose as run_serial};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -63,6 +64,12 @@ pub fn refit<'py>(
     result.set_item("refit", found.refit)?;
     result.set_item("motion", found.motion)?;
     Ok(result)
+}
+
+/// JSON Schema of what [`diagnose`] returns.
+#[pyfunction]
+pub fn diagnosis_schema() -> PyResult<String> {
+    serde_json::to_string(&schema()).map_err(|e| PyValueError::new_err(e.to_string()))
 }
 
 /// The diagnosis of training and holdout logs, as JSON; `progress(title, fraction)` is called now and then.

@@ -21,7 +21,7 @@ mod _native {
     #[pymodule_export]
     use crate::convert::{arm_kinds, effects, theta_from_links};
     #[pymodule_export]
-    use crate::diagnose::{diagnose, refit};
+    use crate::diagnose::{diagnose, diagnosis_schema, refit};
     #[pymodule_export]
     use crate::estimator::Estimator;
     #[pymodule_export]

@@ -24,6 +24,7 @@ FORMATS: tuple[Format, ...] = (
 )
 """Formats, in the order in which they are asked whether a file is theirs."""
 
+#: Bytes from the beginning of a file that tell its format.
 _HEAD = 1024
 
 

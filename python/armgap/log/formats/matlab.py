@@ -16,6 +16,7 @@ from armgap.log.recording import Recording, Source
 
 __all__ = ["FORMAT"]
 
+#: Levels of structures within structures that are followed.
 _DEEPEST = 8
 
 

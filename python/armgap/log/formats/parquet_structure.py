@@ -66,11 +66,7 @@ class _Thrift:
         return (value >> 1) ^ -(value & 1)
 
     def binary(self) -> bytes:
-        size = self.varint()
-        if size > len(self.data) - self.at:
-            raise _BrokenError("ends too early")
-        self.at += size
-        return self.data[self.at - size : self.at]
+        return self.fixed(self.varint())
 
     def fixed(self, size: int) -> bytes:
         if size > len(self.data) - self.at:

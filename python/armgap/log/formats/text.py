@@ -144,7 +144,7 @@ def _dialect(
     if decimal_comma:
         findings.append(Finding("format", "numbers are read with decimal commas"))
     dialect = _Dialect(separator, blanks, names, units, decimal_comma)
-    return _ends(dialect, cells, sample, path), chain(sample, rows), findings
+    return _ends(dialect, cells, sample), chain(sample, rows), findings
 
 
 def _decimal_commas(sample: list[str]) -> bool:
@@ -188,7 +188,7 @@ def _names(cells: list[str], below: list[str], path: Path) -> tuple[tuple[str, .
     return tuple(names), units
 
 
-def _ends(dialect: _Dialect, cells: list[str], sample: list[str], path: Path) -> _Dialect:
+def _ends(dialect: _Dialect, cells: list[str], sample: list[str]) -> _Dialect:
     """Settle whether a separator at the end of header or rows is more than that."""
     if not sample or dialect.blanks:
         return dialect

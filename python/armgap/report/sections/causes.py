@@ -12,6 +12,7 @@ from armgap.report.words import error_text, figure, joint_text, named, percent, 
 
 __all__ = ["candidates", "evidence", "look_alikes", "ranking"]
 
+#: Shares below this are shown as this.
 _WORST_SHARE = -9.99
 #: Share explained from which on it is called all.
 ALL = 0.995

@@ -15,7 +15,7 @@ __all__ = ["free_run", "horizons", "predictions"]
 
 _ARROW = " \N{RIGHTWARDS ARROW} "
 #: How far beyond the measured positions a free run is drawn, in their range.
-REACH = 1.0
+_REACH = 1.0
 
 
 def predictions(data: Data) -> Section | None:
@@ -106,8 +106,8 @@ def _whole_run(s: Data, last: str) -> Any:
     low, high = min(s["measured"]), max(s["measured"])
     reach = (high - low) or 1.0
     chart = charts.lines("", "time [s]", "", s["t"], curves)
-    chart.y_range.bounds = (low - REACH * reach, high + REACH * reach)
+    chart.y_range.bounds = (low - _REACH * reach, high + _REACH * reach)
     values = [v for key in ("before", "after") for v in s[key] if v is not None]
-    if min(values) < low - REACH * reach or max(values) > high + REACH * reach:
+    if min(values) < low - _REACH * reach or max(values) > high + _REACH * reach:
         chart.y_range.start, chart.y_range.end = chart.y_range.bounds
     return chart

@@ -17,7 +17,7 @@ from armgap.trial.engine import mujoco
 __all__ = ["build_spec", "set_coulomb", "set_inertial"]
 
 #: Longest internal step, s. Friction is as stiff as the step allows, as in the making of the logs.
-STEP, IMPEDANCE = 2.5e-3, 0.9999
+_STEP, IMPEDANCE = 2.5e-3, 0.9999
 TINY = 1e-9
 
 
@@ -25,7 +25,7 @@ def build_spec(arm: Arm) -> Any:
     """A model of the arm: joints ``joint0``, ..., one actuator and one position sensor each."""
     mj = mujoco()
     spec = mj.MjSpec()
-    spec.option.timestep = arm.sample_period / np.ceil(arm.sample_period / STEP - TINY)
+    spec.option.timestep = arm.sample_period / np.ceil(arm.sample_period / _STEP - TINY)
     spec.option.integrator = mj.mjtIntegrator.mjINT_RK4
     spec.option.disableflags |= mj.mjtDisableBit.mjDSBL_CONTACT
     spec.compiler.degree = False

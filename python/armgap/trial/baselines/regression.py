@@ -28,11 +28,11 @@ __all__ = ["Motion", "RegressionData", "motion", "regression_data", "regressor"]
 
 Array = NDArray[np.float64]
 #: Half the width of the smoothing cubic, and the length of a block, s.
-HALF_WIDTH, BLOCK = 0.015, 0.010
+_HALF_WIDTH, BLOCK = 0.015, 0.010
 #: Slow is below this share of a joint's usual top speed.
 SLOW = 0.02
 #: Torques are not trusted below this share of a joint's own.
-TRUST = 0.005
+_TRUST = 0.005
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class RegressionData:
 def motion(log: Log) -> Motion:
     """Smooth a log."""
     h = float(np.median(np.diff(log.t)))
-    half = max(3, round(HALF_WIDTH / h))
+    half = max(3, round(_HALF_WIDTH / h))
     # The command at a sample is held to the next one; at the sample itself it is half the old and half the new.
     held = 0.5 * (log.tau + np.vstack([log.tau[:1], log.tau[:-1]]))
     q, dq, ddq = (_savgol(log.q, half, order, h) for order in range(3))
@@ -123,7 +123,7 @@ def regression_data(case: SealedCase, scale: Array | None = None, held_out: bool
     if scale is None:
         error = tau - base @ np.linalg.lstsq(base[keep], tau[keep], rcond=None)[0]
         rows = [keep & (joint == j) for j in range(one.size)]
-        scale = np.array([max(float(np.std(error[r])), TRUST * float(np.std(tau[r])), 1e-12) for r in rows])
+        scale = np.array([max(float(np.std(error[r])), _TRUST * float(np.std(tau[r])), 1e-12) for r in rows])
     weight = scale[joint]
     return RegressionData(motions, scale, keep, (base / weight[:, None])[keep], (tau / weight)[keep])
 

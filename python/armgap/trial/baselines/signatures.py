@@ -16,7 +16,7 @@ __all__ = ["Signature", "signatures"]
 POSITION_STEP = 1e-5
 DELAYS = (0.001, 0.002, 0.004, 0.008, 0.016)  # s
 LEVELS = (0.5, 0.65, 0.8, 0.9)
-ORDERS = 12
+_ORDERS = 12
 
 #: Columns (n, k) on the joint's own row, or (n, n_joints, k), for each shape.
 Shapes = Iterator[Array]
@@ -177,7 +177,7 @@ def _dead_zone(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
 
 def _ripple(arm: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
     travel = max(float(np.ptp(ref.q[:, j])), 1e-6)
-    for cycles in np.geomspace(1.5, 9.0, ORDERS):
+    for cycles in np.geomspace(1.5, 9.0, _ORDERS):
         n = 2 * np.pi * cycles / travel
         n = float(round(n)) if arm.rotary else n
         yield _one(np.sin(n * x.q[:, j]), np.cos(n * x.q[:, j]))

@@ -26,6 +26,7 @@ from armgap.trial.sealed import SealedCase
 
 __all__ = ["STEPWISE"]
 
+#: Causes at most, as the diagnosis; decrease of the BIC that a cause has to bring; factor on the holdout's error that it has to stay below.
 MAX_CAUSES, EVIDENCE, HELD_OUT = 4, 10.0, 0.98
 EVENTS = ("external_pulse",)
 

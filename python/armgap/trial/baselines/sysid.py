@@ -35,7 +35,7 @@ from armgap.trial.windows import Window, cut
 __all__ = ["SYSID"]
 
 #: Windows it is fitted to, iterations at most, causes named at most, and trust in the arm file, in sigmas, as bounds.
-WINDOWS, ITERATIONS, MAX_CAUSES, TRUST = 10, 10, 4, 4.0
+_WINDOWS, ITERATIONS, MAX_CAUSES, _TRUST = 10, 10, 4, 4.0
 #: Effects among its parameters, and their equivalents.
 EXPRESSED = frozenset(
     {
@@ -136,7 +136,7 @@ def _at_bounds(insights: Any) -> list[str]:
 
 def _windows(case: SealedCase) -> list[Window]:
     windows = [w for log in case.training for w in cut(log.t - log.t[0], log.q, log.tau, HORIZON)]
-    chosen = np.unique(np.linspace(0, len(windows) - 1, WINDOWS).round().astype(int))
+    chosen = np.unique(np.linspace(0, len(windows) - 1, _WINDOWS).round().astype(int))
     return [windows[i] for i in chosen]
 
 
@@ -207,9 +207,9 @@ def _lagged(u: Array, t: Array, constant: float) -> Array:
 
 def _parameters(sysid: Any, arm: Arm, effect_parameters: list[EffectParameter]) -> Any:
     params = sysid.ParameterDict()
-    n, b, low = arm.n_joints, arm.n_inertial, np.maximum(arm.theta - TRUST * arm.sigma, 0.05 * arm.theta)
-    low = np.where(arm.theta > 0, low, -TRUST * arm.sigma)
-    high = arm.theta + TRUST * arm.sigma
+    n, b, low = arm.n_joints, arm.n_inertial, np.maximum(arm.theta - _TRUST * arm.sigma, 0.05 * arm.theta)
+    low = np.where(arm.theta > 0, low, -_TRUST * arm.sigma)
+    high = arm.theta + _TRUST * arm.sigma
 
     def inertial(spec: Any, p: Any) -> None:
         set_inertial(spec, arm, p.value)

@@ -23,6 +23,7 @@ __all__ = [
 ]
 
 Item = TypeVar("Item")
+#: Processes at most.
 MOST_WORKERS = 1024
 
 folder_argument = click.argument("folder", metavar="DIR", type=InputFolder(belongs, exists=True))

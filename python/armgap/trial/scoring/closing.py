@@ -29,7 +29,7 @@ __all__ = ["HISTORY", "Closing", "closing", "model_error"]
 HISTORY = frozenset({"actuator_lag", "actuator_delay", "presliding", "joint_elasticity", "backlash"})
 #: Effects of one log.
 EVENTS = frozenset({"external_pulse"})
-STEPS = 20
+_STEPS = 20
 
 
 @dataclass(frozen=True)
@@ -102,6 +102,6 @@ def _read(w: Window, placed: Sequence[NativeEffect]) -> Window:
 def _inverse(shown: float, a: float, b: float) -> float:
     """Solve ``q + a sin q + b cos q = shown`` by iteration; a and b are small."""
     q = shown
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         q = shown - a * math.sin(q) - b * math.cos(q)
     return q

@@ -10,7 +10,7 @@ from armgap.trial.methods import methods
 from armgap.trial.scoring.case_score import GROUPS
 from armgap.trial.scoring.figures import CONFIDENT, Figures, Share, share
 from armgap.trial.trial import DEVELOPMENT_SEEDS
-from armgap.trial.visibility import MULTIPLE, SIGMAS
+from armgap.trial.visibility import MULTIPLE, VISIBLE_SIGMAS
 
 __all__ = ["page"]
 
@@ -140,7 +140,7 @@ def _groups(all_figures: Sequence[Figures]) -> str:
         f"*unexplained* in {unexplained} of {len(outside)}, and names a cause with a probability over 0.5 in {believed}. "
         f"{located}"
         f"*Not visible*: after re-estimating the parameters, predictions miss by less than {MULTIPLE:g} times what they miss by "
-        f"without the effect, and the parameters move by less than {SIGMAS:g} of the arm file's sigmas."
+        f"without the effect, and the parameters move by less than {VISIBLE_SIGMAS:g} of the arm file's sigmas."
     )
 
 

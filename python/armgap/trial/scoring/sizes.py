@@ -11,6 +11,7 @@ from armgap.trial.verdict import equivalent
 
 __all__ = ["BoundScore", "SizeScore", "bound_scores", "size_scores"]
 
+#: Two-sided 95 % of the normal distribution.
 Z_95 = 1.96
 
 #: The number that stands for an effect's size, from its parameters; where one parameter is it, that parameter.

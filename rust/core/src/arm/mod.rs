@@ -173,17 +173,6 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
         f
     }
 
-    /// Regressor of dissipated power: `W . theta = dq' f(dq)`, entries `dq_j^2` and `|dq_j|`.
-    #[inline]
-    fn dissipation_regressor(&self, dq: &SVector<T, N>) -> SVector<T, P> {
-        let mut w = SVector::zeros();
-        for j in 0..N {
-            w[Self::INERTIAL + j] = dq[j] * dq[j];
-            w[Self::INERTIAL + N + j] = dq[j].abs();
-        }
-        w
-    }
-
     /// Viscous coefficients within `theta`.
     #[inline]
     fn viscous(&self, theta: &[T; P]) -> SVector<T, N> {
@@ -199,16 +188,5 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Friction torque `f(dq)`, equation (4), with `sgn(0) = 0`.
     fn friction(&self, theta: &[T; P], dq: &SVector<T, N>) -> SVector<T, N> {
         self.friction_regressor(dq) * SVector::from(*theta)
-    }
-
-    /// Kinetic energy `dq' M(q) dq / 2`.
-    fn kinetic_energy(&self, theta: &[T; P], q: &SVector<T, N>, dq: &SVector<T, N>) -> T {
-        let half: T = crate::real::lit(0.5);
-        (dq.transpose() * self.inertia(theta, q) * dq)[0] * half
-    }
-
-    /// Potential energy above `q = 0`.
-    fn potential_energy(&self, theta: &[T; P], q: &SVector<T, N>) -> T {
-        self.energy_regressor(q, &SVector::zeros()).dot(&SVector::from(*theta))
     }
 }

@@ -3,7 +3,7 @@
 //! A delay that is no whole number of samples puts a step of the held command inside an interval; the interval then
 //! carries its exact mean and first moment. Before the log begins, the first command is taken to have been held.
 
-use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::{Real, lit};
 
 /// Transport delay of the command.
@@ -16,12 +16,10 @@ static SPEC: Spec = Spec {
     equation: "tau_joint(t) = tau(t - delay)",
     source: "bus and firmware latency",
     excited_by: "torque that changes from sample to sample",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::bounded("delay", Quantity::Time, 0.0, 1.0)],
     initial_guesses: &[[0.5, 0.0, 0.0], [3.0, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::COMMAND,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for ActuatorDelay {

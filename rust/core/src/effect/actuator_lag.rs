@@ -3,7 +3,7 @@
 //! With the command held over an interval of length `h`, the torque goes exponentially from its old value to the
 //! command. Its mean over the interval and its first moment are exact for every time constant down to zero.
 
-use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::{Real, lit};
 
 /// First-order actuator.
@@ -16,12 +16,10 @@ static SPEC: Spec = Spec {
     equation: "time_constant dtau_joint/dt + tau_joint = tau",
     source: "current-loop bandwidth; filtered actuator of common simulators",
     excited_by: "torque that changes within a few time constants",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::bounded("time_constant", Quantity::Time, 0.0, 2.0)],
     initial_guesses: &[[0.5, 0.0, 0.0], [4.0, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::COMMAND,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for ActuatorLag {

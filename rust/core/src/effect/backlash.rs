@@ -5,7 +5,7 @@
 //! first joint it has no influence. The flanks are rigid ([`crate::drivetrain`]); the stiffness and damping below hold a motor to a link
 //! whose motion is measured, not simulated.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::{Real, lit};
 use crate::transmission::Transmission;
 
@@ -25,8 +25,6 @@ static SPEC: Spec = Spec {
     equation: "rotor d2(q + riding q_before + twist)/dt2 = tau - T, T = 0 while |twist| < gap/2",
     source: "Nordin and Gutman 2002",
     excited_by: "a transmitted torque that changes sign",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::bounded("gap", Quantity::Position, 0.0, f64::INFINITY),
         EffectParameter::shape("rotor_share", Quantity::Ratio, 0.005, 0.35),
@@ -42,6 +40,7 @@ static SPEC: Spec = Spec {
     ],
     trial: Trial::Whole,
     hooks: Hooks::NONE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for Backlash {

@@ -1,6 +1,6 @@
 //! The base stands at an angle: gravity is turned by `angle` in the plane of motion, for all joints alike.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec};
 use crate::real::Real;
 
 /// Base turned against gravity.
@@ -14,11 +14,10 @@ static SPEC: Spec = Spec {
     source: "mounting error; Khalil and Dombre 2002, section 11",
     excited_by: "gravity torque at any pose",
     scope: Scope::Arm,
-    least_joints: 1,
     parameters: &[EffectParameter::bounded("angle", Quantity::Angle, -1.6, 1.6)],
     initial_guesses: &[[0.02, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::NONE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for BaseTilt {

@@ -1,6 +1,6 @@
 //! A joint limit: beyond a position, on the side away from zero, a spring and damper push back and never pull.
 
-use super::{Edge, Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Edge, Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
 /// Contact with a joint limit.
@@ -13,8 +13,6 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = tau - max(stiffness depth + damping speed, 0) beyond position",
     source: "soft limits of common simulators",
     excited_by: "motion up to the stop",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::threshold("position", Quantity::Reach, f64::NEG_INFINITY),
         EffectParameter::bounded("stiffness", Quantity::ContactStiffness, 0.0, f64::INFINITY),
@@ -35,6 +33,7 @@ static SPEC: Spec = Spec {
     ],
     trial: Trial::Whole,
     hooks: Hooks::FORCE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for Contact {

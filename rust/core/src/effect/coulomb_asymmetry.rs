@@ -3,7 +3,7 @@
 //! While the joint moves this is the same function of time as a constant torque `-delta`; only at rest, where friction
 //! holds and a torque does not, do the two differ.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Coulomb friction that differs by direction.
@@ -16,12 +16,10 @@ static SPEC: Spec = Spec {
     equation: "f = (fc + delta sgn dq) sgn dq",
     source: "Elhami and Brookfield 1996; Reyes and Kelly 1997, Table I",
     excited_by: "motion in both directions",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::signed("delta", Quantity::Torque)],
     initial_guesses: &[[0.05, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::COULOMB,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for CoulombAsymmetry {

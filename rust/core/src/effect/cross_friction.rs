@@ -2,7 +2,7 @@
 //!
 //! The other joint is the next one along the arm; the last joint's is the first.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Friction by the other joint's direction.
@@ -15,12 +15,11 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = tau - level sgn(dq_other)",
     source: "coupled joints 5 and 6 of a six-axis arm, Janot et al. 2014",
     excited_by: "both joints moving, in all four combinations of directions",
-    scope: Scope::Joint,
     least_joints: 2,
     parameters: &[EffectParameter::signed("level", Quantity::Torque)],
     initial_guesses: &[[0.05, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::FORCE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for CrossFriction {

@@ -1,6 +1,6 @@
 //! Drag that grows with the cube of speed: `-c3 dq^3` (lubricant under shear, the next term of a polynomial load curve).
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Drag cubic in speed.
@@ -13,12 +13,10 @@ static SPEC: Spec = Spec {
     equation: "f = c3 dq^3",
     source: "polynomial damping of common simulators",
     excited_by: "a wide range of speeds",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::signed("c3", Quantity::CubicDrag)],
     initial_guesses: &[[0.05, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::FORCE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for CubicDrag {

@@ -1,6 +1,6 @@
 //! An encoder disc off its centre: it shows `q + a sin q + b cos q`.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
 /// Encoder eccentricity.
@@ -13,8 +13,6 @@ static SPEC: Spec = Spec {
     equation: "q_measured = q + a sin q + b cos q",
     source: "Gawronski 2008, angle encoder errors",
     excited_by: "fast motion over a good part of a turn",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::bounded("a", Quantity::Angle, -0.5, 0.5),
         EffectParameter::bounded("b", Quantity::Angle, -0.5, 0.5),
@@ -22,6 +20,7 @@ static SPEC: Spec = Spec {
     initial_guesses: &[[0.01, 0.0, 0.0], [0.0, 0.01, 0.0]],
     trial: Trial::Amplitudes(2),
     hooks: Hooks::MEASURED,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for EncoderEccentricity {

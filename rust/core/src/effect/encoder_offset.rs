@@ -1,6 +1,6 @@
 //! The encoder's zero is off: it shows `q + offset`.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Encoder offset.
@@ -13,12 +13,10 @@ static SPEC: Spec = Spec {
     equation: "q_measured = q + offset",
     source: "zeroing error",
     excited_by: "gravity or coupling that depends on the position",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::signed("offset", Quantity::Position)],
     initial_guesses: &[[0.02, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::MEASURED,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for EncoderOffset {

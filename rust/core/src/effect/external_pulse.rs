@@ -3,7 +3,7 @@
 //! Each interval carries the exact mean and first moment of the torque over it, so a mass gains the exact speed and distance whatever
 //! the sample times.
 
-use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::{Real, lit};
 
 /// External disturbance at one time.
@@ -16,8 +16,6 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = tau + impulse / duration while |t - time| < duration / 2",
     source: "collision detection by momentum observers, De Luca and Mattone 2003",
     excited_by: "a push during the log",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::signed("impulse", Quantity::Impulse),
         EffectParameter::shape("time", Quantity::Duration, f64::NEG_INFINITY, f64::INFINITY),
@@ -26,6 +24,7 @@ static SPEC: Spec = Spec {
     initial_guesses: &[],
     trial: Trial::Disturbance,
     hooks: Hooks::COMMAND,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for ExternalPulse {

@@ -1,6 +1,6 @@
 //! Friction that is higher, or lower, when the log begins and settles with a time constant: times `1 + amplitude exp(-t/time_constant)`.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::{Real, lit};
 
 /// Friction that changes while the arm warms up.
@@ -13,15 +13,13 @@ static SPEC: Spec = Spec {
     equation: "f (1 + amplitude exp(-t/time_constant))",
     source: "Bittencourt and Gunnarsson 2012; Simoni et al. 2017",
     excited_by: "motion over more than the time constant",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::bounded("amplitude", Quantity::Ratio, -0.95, 20.0),
         EffectParameter::shape("time_constant", Quantity::Duration, 0.05, 5000.0),
     ],
     initial_guesses: &[[0.05, 1.0, 0.0], [0.05, 3.0, 0.0], [0.05, 10.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::COULOMB,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for FrictionWarmup {

@@ -2,7 +2,7 @@
 //!
 //! The loss opposes the motion, so it is a part of the Coulomb level wherever the motor pushes in the direction of motion.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Loss of a gear while the motor drives.
@@ -15,12 +15,10 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = (1 - loss) tau while tau dq > 0, tau otherwise",
     source: "Gautier and Khalil 2002; load- and direction-dependent friction, Hamon et al. 2010",
     excited_by: "motion both driven and braked by the motor",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::bounded("loss", Quantity::Ratio, 0.0, 0.9)],
     initial_guesses: &[[0.1, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::COULOMB,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for GearEfficiency {

@@ -1,6 +1,6 @@
 //! A spring that stiffens with its deflection, as cables and hoses do: `k (q - q0) + cubic (q - q0)^3`.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
 /// Spring with a cubic part.
@@ -13,8 +13,6 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = tau - k (q - q0) - cubic (q - q0)^3",
     source: "Duffing 1918; cable forces of arms",
     excited_by: "wide travel",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::signed("cubic", Quantity::Hardening),
         EffectParameter::signed("k", Quantity::Stiffness),
@@ -23,6 +21,7 @@ static SPEC: Spec = Spec {
     initial_guesses: &[[0.1, 0.0, 0.0], [0.1, 0.0, 1.0], [0.1, 0.0, -1.0]],
     trial: Trial::Amplitudes(2),
     hooks: Hooks::FORCE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for HardeningSpring {

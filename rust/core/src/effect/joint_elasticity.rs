@@ -10,7 +10,7 @@
 //! ([`crate::transmission::Sides`]). A shaft of infinite stiffness is a
 //! rigid joint whose rotor is part of the arm's own inertia.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, NEVER, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, NEVER, Quantity, Spec, Trial};
 use crate::real::{Real, lit};
 use crate::transmission::Transmission;
 
@@ -24,8 +24,6 @@ static SPEC: Spec = Spec {
     equation: "rotor_inertia d2(q + twist)/dt2 = tau - T, tau_joint = T = stiffness twist + damping dtwist",
     source: "Spong 1987",
     excited_by: "torque that changes within the period of the motor's oscillation",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::threshold("stiffness", Quantity::ShaftStiffness, 0.0),
         EffectParameter::bounded("damping", Quantity::ShaftDamping, 0.0, f64::INFINITY),
@@ -45,6 +43,7 @@ static SPEC: Spec = Spec {
     ],
     trial: Trial::Whole,
     hooks: Hooks::NONE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for JointElasticity {

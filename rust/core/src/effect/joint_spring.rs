@@ -1,6 +1,6 @@
 //! A spring at the joint: `-k (q - q0)`, a cable, a hose or a counterbalance.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Joint spring.
@@ -13,8 +13,6 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = tau - k (q - q0)",
     source: "cable forces; `stiffness` of common simulators",
     excited_by: "a wide range of positions",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::signed("k", Quantity::Stiffness),
         EffectParameter::shape("q0", Quantity::Rest, f64::NEG_INFINITY, f64::INFINITY),
@@ -26,8 +24,8 @@ static SPEC: Spec = Spec {
         [0.02, 6.0, 0.0],
         [0.02, -6.0, 0.0],
     ],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::FORCE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for JointSpring {

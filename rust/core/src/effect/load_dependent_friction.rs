@@ -1,6 +1,6 @@
 //! Friction that grows with the load on the joint: `mu |load| sgn dq`, the load being the torque `C dq + g` that the links put on it.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Friction that grows with load.
@@ -13,12 +13,10 @@ static SPEC: Spec = Spec {
     equation: "f = mu |C dq + g| sgn dq",
     source: "Hamon, Gautier and Garrec 2010",
     excited_by: "motion in both directions under different loads",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::signed("mu", Quantity::Ratio)],
     initial_guesses: &[[0.05, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::COULOMB,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for LoadDependentFriction {

@@ -36,7 +36,13 @@ mod torque_ripple;
 mod torque_saturation;
 mod viscous_asymmetry;
 
-use crate::real::{Real, lit};
+mod input_segment;
+mod parameter;
+
+pub use input_segment::{InputSegment, interval};
+pub use parameter::{EffectParameter, NEVER, Quantity};
+
+use crate::real::Real;
 use crate::transmission::Transmission;
 
 /// Most parameters an effect may have.
@@ -90,126 +96,6 @@ pub enum Scope {
     Joint,
     /// On the arm as a whole.
     Arm,
-}
-
-/// What a parameter measures; it decides the unit and the scale of a first trial value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// Joint torque (force on a linear joint).
-    Torque,
-    /// Joint inertia (mass on a linear joint).
-    Inertia,
-    /// Torque per squared speed.
-    Drag,
-    /// Torque per cubed speed.
-    CubicDrag,
-    /// Torque per position.
-    Stiffness,
-    /// Torque per deflection of a shaft.
-    ShaftStiffness,
-    /// Torque per deflection rate of a shaft.
-    ShaftDamping,
-    /// Torque per depth behind a joint limit.
-    ContactStiffness,
-    /// Torque per speed behind a joint limit.
-    ContactDamping,
-    /// Torque per cubed position.
-    Hardening,
-    /// Torque times time.
-    Impulse,
-    /// Torque per speed.
-    Damping,
-    /// Joint speed.
-    Speed,
-    /// Joint position.
-    Position,
-    /// Joint position where something rests, measured from the middle of the joint's travel.
-    Rest,
-    /// Joint position, measured in the farthest position reached on either side of zero.
-    Reach,
-    /// Cycles per revolution (per metre on a linear joint, times 2 pi), measured in cycles over the joint's travel.
-    Cycles,
-    /// Phase or direction, always an angle.
-    Angle,
-    /// Cycles per revolution, or any other count.
-    Count,
-    /// A ratio to one.
-    Ratio,
-    /// Time.
-    Time,
-    /// Mass.
-    Mass,
-    /// Length.
-    Length,
-    /// Time, on the scale of seconds.
-    Duration,
-}
-
-impl Quantity {
-    /// SI unit on a rotary or a linear joint.
-    pub const fn unit(self, rotary: bool) -> &'static str {
-        match (self, rotary) {
-            (Self::Torque, true) => "N m",
-            (Self::Torque, false) => "N",
-            (Self::Inertia, true) => "kg m^2",
-            (Self::Inertia, false) | (Self::Mass, _) => "kg",
-            (Self::Drag, true) => "N m s^2/rad^2",
-            (Self::Drag, false) => "N s^2/m^2",
-            (Self::Stiffness | Self::ShaftStiffness | Self::ContactStiffness, true) => "N m/rad",
-            (Self::Stiffness | Self::ShaftStiffness | Self::ContactStiffness, false) => "N/m",
-            (Self::Damping | Self::ShaftDamping | Self::ContactDamping, true) => "N m s/rad",
-            (Self::Damping | Self::ShaftDamping | Self::ContactDamping, false) => "N s/m",
-            (Self::CubicDrag, true) => "N m s^3/rad^3",
-            (Self::CubicDrag, false) => "N s^3/m^3",
-            (Self::Impulse, true) => "N m s",
-            (Self::Impulse, false) => "N s",
-            (Self::Hardening, true) => "N m/rad^3",
-            (Self::Hardening, false) => "N/m^3",
-            (Self::Speed, true) => "rad/s",
-            (Self::Speed, false) => "m/s",
-            (Self::Position | Self::Rest | Self::Reach, true) | (Self::Angle, _) => "rad",
-            (Self::Position | Self::Rest | Self::Reach, false) | (Self::Length, _) => "m",
-            (Self::Count | Self::Cycles | Self::Ratio, _) => "1",
-            (Self::Time | Self::Duration, _) => "s",
-        }
-    }
-}
-
-/// One parameter of an effect.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EffectParameter {
-    /// Name in results and on the command line.
-    pub name: &'static str,
-    /// What it measures.
-    pub quantity: Quantity,
-    /// Smallest admissible value, SI.
-    pub lower: f64,
-    /// Largest admissible value, SI.
-    pub upper: f64,
-    /// Value at which the effect vanishes (for the first parameter; others have none of their own).
-    pub neutral: f64,
-}
-
-impl EffectParameter {
-    /// A parameter that is neutral at [`NEVER`].
-    pub const fn threshold(name: &'static str, quantity: Quantity, lower: f64) -> Self {
-        Self { name, quantity, lower, upper: f64::INFINITY, neutral: NEVER }
-    }
-
-    /// A shape: it may take any value and switches nothing off.
-    pub const fn shape(name: &'static str, quantity: Quantity, lower: f64, upper: f64) -> Self {
-        Self { name, quantity, lower, upper, neutral: 0.0 }
-    }
-
-    /// A parameter that may take any value and vanishes at zero.
-    pub const fn signed(name: &'static str, quantity: Quantity) -> Self {
-        Self { name, quantity, lower: f64::NEG_INFINITY, upper: f64::INFINITY, neutral: 0.0 }
-    }
-
-    /// A parameter between bounds that vanishes at zero.
-    pub const fn bounded(name: &'static str, quantity: Quantity, lower: f64, upper: f64) -> Self {
-        Self { name, quantity, lower, upper, neutral: 0.0 }
-    }
 }
 
 /// Which hooks an effect uses, so that the integrator calls no other.
@@ -269,6 +155,23 @@ pub struct Spec {
     pub hooks: Hooks,
 }
 
+impl Spec {
+    /// What most effects share: they sit on one joint of any arm and are tested by their first parameter.
+    const OF_JOINT: Self = Self {
+        name: "",
+        title: "",
+        equation: "",
+        source: "",
+        excited_by: "",
+        scope: Scope::Joint,
+        least_joints: 1,
+        parameters: &[],
+        initial_guesses: &[],
+        trial: Trial::Amplitudes(1),
+        hooks: Hooks::NONE,
+    };
+}
+
 /// How an effect is tested to first order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trial {
@@ -281,9 +184,6 @@ pub enum Trial {
     /// By the whole difference it makes at a trial value: a threshold has no derivative where it is never reached.
     Whole,
 }
-
-/// A threshold so far away that it is never reached: the neutral value of effects that begin beyond one.
-pub const NEVER: f64 = 1e9;
 
 /// A joint at one instant, as a torque law sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -419,66 +319,6 @@ pub trait Effect<T: Real>: Sync {
     }
 }
 
-/// Torque over one sample interval: its values at the start, the middle and the end.
-///
-/// Between them it is quadratic, so Simpson's rule gives its mean. Laws that smear or shift a step choose the three values such that the
-/// mean and the first moment, and with them the speed and the distance a mass gains, are exact however fast they are.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct InputSegment<T> {
-    /// At the sample.
-    pub start: T,
-    /// Half-way to the next sample.
-    pub middle: T,
-    /// Just before the next sample.
-    pub end: T,
-}
-
-impl<T: Real> InputSegment<T> {
-    /// A torque held constant over the interval.
-    #[inline]
-    pub fn held(tau: T) -> Self {
-        Self { start: tau, middle: tau, end: tau }
-    }
-
-    /// The straight line with the given mean and first moment about the middle of an interval of length `h`: what moves a mass by the
-    /// same speed and the same distance as the torque that has them.
-    pub fn with_moment(mean: T, moment: T, h: T) -> Self {
-        let rise = if h > T::zero() { lit::<T>(6.0) * moment / (h * h) } else { T::zero() };
-        Self { start: mean - rise, middle: mean, end: mean + rise }
-    }
-
-    /// Mean over the interval (Simpson's rule, exact here).
-    #[inline]
-    pub fn mean(&self) -> T {
-        let (four, six) = (lit::<T>(4.0), lit::<T>(6.0));
-        (self.start + four * self.middle + self.end) / six
-    }
-
-    /// Value at the fraction `s` of the interval, from 0 to 1.
-    #[inline]
-    pub fn at(&self, s: T) -> T {
-        let two = lit::<T>(2.0);
-        let one = T::one();
-        let (l0, l1, l2) = ((two * s - one) * (s - one), two * two * s * (one - s), s * (two * s - one));
-        l0 * self.start + l1 * self.middle + l2 * self.end
-    }
-
-    /// Sum of both torques.
-    #[inline]
-    pub fn plus(self, other: Self) -> Self {
-        Self {
-            start: self.start + other.start,
-            middle: self.middle + other.middle,
-            end: self.end + other.end,
-        }
-    }
-
-    /// Applies `f` to each of the three values.
-    pub fn map(self, f: impl Fn(T) -> T) -> Self {
-        Self { start: f(self.start), middle: f(self.middle), end: f(self.end) }
-    }
-}
-
 /// An effect on a joint of an arm, with its parameters' values.
 #[derive(Clone, Copy)]
 pub struct Active<T: Real> {
@@ -488,14 +328,4 @@ pub struct Active<T: Real> {
     pub joint: usize,
     /// Parameter values, SI, padded with zeros.
     pub p: [T; MAX_PARAMETERS],
-}
-
-/// Length of the interval after sample `k`; the last one is as long as the one before it.
-#[inline]
-pub fn interval<T: Real>(t: &[T], k: usize) -> T {
-    match (t.get(k), t.get(k + 1)) {
-        (Some(&a), Some(&b)) => b - a,
-        (Some(&b), None) if k > 0 => t.get(k - 1).map_or_else(T::zero, |&a| b - a),
-        _ => T::zero(),
-    }
 }

@@ -3,7 +3,7 @@
 //! It moves the inertial base parameters along a known curve, so re-estimated parameters absorb it without a trace: it
 //! can be told only against values of the arm file that are trusted.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec};
 use crate::real::Real;
 
 /// Unknown load.
@@ -17,14 +17,13 @@ static SPEC: Spec = Spec {
     source: "Swevers et al. 2002; Gautier and Briot 2014",
     excited_by: "any motion; seen only against trusted parameters",
     scope: Scope::Arm,
-    least_joints: 1,
     parameters: &[
         EffectParameter::bounded("mass", Quantity::Mass, 0.0, f64::INFINITY),
         EffectParameter::bounded("distance", Quantity::Length, 0.0, f64::INFINITY),
     ],
     initial_guesses: &[[0.05, 0.5, 0.0], [0.05, 1.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::NONE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for Payload {

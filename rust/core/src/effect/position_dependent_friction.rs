@@ -1,6 +1,6 @@
 //! Dry friction whose level varies with the joint's position, once per turn: `(a cos q + b sin q) sgn dq`.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 use crate::trig::sin_cos;
 
@@ -14,8 +14,6 @@ static SPEC: Spec = Spec {
     equation: "f = (a cos q + b sin q) sgn dq",
     source: "Bittencourt and Gunnarsson 2012",
     excited_by: "motion in both directions through different positions",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::signed("a", Quantity::Torque),
         EffectParameter::signed("b", Quantity::Torque),
@@ -23,6 +21,7 @@ static SPEC: Spec = Spec {
     initial_guesses: &[[0.05, 0.0, 0.0], [0.0, 0.05, 0.0]],
     trial: Trial::Amplitudes(2),
     hooks: Hooks::COULOMB,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for PositionDependentFriction {

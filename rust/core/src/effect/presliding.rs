@@ -7,7 +7,7 @@
 //!
 //! It depends on the path alone, so between reversals `z` has a closed form in the distance travelled.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
 /// Dahl's hysteresis beside the Coulomb friction.
@@ -20,8 +20,6 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = tau - z, dz/dq = stiffness (1 - sgn(dq) z / amplitude)",
     source: "Dahl 1968; Canudas de Wit et al. 1995 (LuGre)",
     excited_by: "many reversals, with little travel between some of them",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::bounded("amplitude", Quantity::Torque, 0.0, f64::INFINITY),
         EffectParameter::bounded("stiffness", Quantity::Stiffness, 0.0, f64::INFINITY),
@@ -30,6 +28,7 @@ static SPEC: Spec = Spec {
     initial_guesses: &[[0.1, 30.0, 0.0], [0.1, 10.0, 0.0], [0.1, 3.0, 0.0], [0.1, 1.0, 0.0]],
     trial: Trial::Ray,
     hooks: Hooks { force: true, memory: true, ..Hooks::NONE },
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for Presliding {

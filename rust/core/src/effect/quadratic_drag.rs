@@ -1,6 +1,6 @@
 //! Drag that grows with the square of speed: `-c dq |dq|` (air, churning lubricant, a fan-like load).
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Drag quadratic in speed.
@@ -13,12 +13,10 @@ static SPEC: Spec = Spec {
     equation: "f = c dq |dq|",
     source: "Bittencourt and Gunnarsson 2012; polynomial damping of common simulators",
     excited_by: "a wide range of speeds",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::signed("c", Quantity::Drag)],
     initial_guesses: &[[0.05, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::FORCE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for QuadraticDrag {

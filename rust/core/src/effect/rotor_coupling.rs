@@ -2,7 +2,7 @@
 //!
 //! Its share of `M_22` is the effect of `rotor_inertia` on joint 2; the two together are the whole rotor.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec};
 use crate::real::Real;
 
 /// Inertia between the first two joints.
@@ -20,8 +20,8 @@ static SPEC: Spec = Spec {
     parameters: &[EffectParameter::signed("inertia", Quantity::Inertia)],
     // Never searched for: the same motion as the opposite rotor_inertia of joint 2 with theta3 moved by as much.
     initial_guesses: &[],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::NONE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for RotorCoupling {

@@ -3,7 +3,7 @@
 //! A motor that drives joint `j` from the previous link adds its inertia times the gear ratio squared to `M_jj` and to
 //! nothing else, unlike a link inertia, which also couples the joints.
 
-use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Reflected rotor inertia (armature).
@@ -16,12 +16,10 @@ static SPEC: Spec = Spec {
     equation: "M_jj + inertia",
     source: "Featherstone 2008, section 9.6; `armature` of common simulators",
     excited_by: "acceleration of the joint",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::bounded("inertia", Quantity::Inertia, 0.0, f64::INFINITY)],
     initial_guesses: &[[0.05, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::NONE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for RotorInertia {

@@ -2,7 +2,7 @@
 //!
 //! The level at rest is the break-away torque `fc + amplitude`; the surplus fades within about twice `velocity`.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::{Real, lit};
 
 /// Extra friction at low speed.
@@ -15,8 +15,6 @@ static SPEC: Spec = Spec {
     equation: "f = amplitude exp(-(dq/velocity)^2) sgn dq",
     source: "Armstrong-Helouvry, Dupont and Canudas de Wit 1994, eq. (4)",
     excited_by: "reversals and slow motion, below twice the Stribeck velocity",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::bounded("amplitude", Quantity::Torque, 0.0, f64::INFINITY),
         EffectParameter::bounded("velocity", Quantity::Speed, 1e-3, f64::INFINITY),
@@ -28,8 +26,8 @@ static SPEC: Spec = Spec {
         [0.05, 0.8, 0.0],
         [0.05, 2.0, 0.0],
     ],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::COULOMB,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for Stribeck {

@@ -1,6 +1,6 @@
 //! Commands below a level give no torque; above it the excess acts: `sgn(tau) max(|tau| - level, 0)`.
 
-use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Torque dead zone.
@@ -13,12 +13,10 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = sgn(tau) max(|tau| - level, 0)",
     source: "valves and amplifiers with overlap",
     excited_by: "torque that changes sign",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::bounded("level", Quantity::Torque, 0.0, f64::INFINITY)],
     initial_guesses: &[[0.05, 0.0, 0.0], [0.3, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::COMMAND,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for TorqueDeadZone {

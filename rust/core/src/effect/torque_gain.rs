@@ -1,6 +1,6 @@
 //! The joint receives `gain` times the commanded torque: a wrong torque constant, gear ratio or amplifier gain.
 
-use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Wrong gain from command to torque.
@@ -13,8 +13,6 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = gain tau",
     source: "Gautier and Briot 2014, drive gains",
     excited_by: "any torque; seen only against trusted parameters or the other joints",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter {
         name: "gain",
         quantity: Quantity::Ratio,
@@ -23,8 +21,8 @@ static SPEC: Spec = Spec {
         neutral: 1.0,
     }],
     initial_guesses: &[[1.05, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::COMMAND,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for TorqueGain {

@@ -1,6 +1,6 @@
 //! A constant torque: amplifier or current-sensor bias, `tau + offset`.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Constant torque added to the command.
@@ -13,12 +13,10 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = tau + offset",
     source: "amplifier and current-sensor bias; Swevers et al. 2007",
     excited_by: "any motion",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::signed("offset", Quantity::Torque)],
     initial_guesses: &[[0.05, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::FORCE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for TorqueOffset {

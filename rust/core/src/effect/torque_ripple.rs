@@ -1,6 +1,6 @@
 //! Torque ripple (cogging): `amplitude sin(n q + phase)`, a fixed number of cycles per turn.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 use crate::trig::sin_cos;
 
@@ -14,8 +14,6 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = tau + amplitude sin(n q + phase)",
     source: "Holtz and Springob 1996; `cogging` of common simulators",
     excited_by: "motion over several cycles of the ripple",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[
         EffectParameter::signed("amplitude", Quantity::Torque),
         EffectParameter::shape("n", Quantity::Cycles, 0.2, f64::INFINITY),
@@ -36,8 +34,8 @@ static SPEC: Spec = Spec {
         [0.05, 3.0, 0.0],
         [0.05, 3.0, 1.571],
     ],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::FORCE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for TorqueRipple {

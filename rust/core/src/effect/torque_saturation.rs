@@ -1,6 +1,6 @@
 //! The torque never exceeds a level, whatever is commanded.
 
-use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
 /// Torque saturation.
@@ -13,12 +13,11 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = clip(tau, -level, level)",
     source: "current limits; `forcerange` of common simulators",
     excited_by: "torque above the level",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::threshold("level", Quantity::Torque, 0.0)],
     initial_guesses: &[[2.2, 0.0, 0.0], [1.7, 0.0, 0.0], [1.3, 0.0, 0.0], [0.9, 0.0, 0.0], [0.6, 0.0, 0.0]],
     trial: Trial::Whole,
     hooks: Hooks::COMMAND,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for TorqueSaturation {

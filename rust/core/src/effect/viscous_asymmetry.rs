@@ -1,6 +1,6 @@
 //! Viscous friction that differs by direction: `b + delta` forward, `b - delta` backward.
 
-use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Scope, Spec, Trial};
+use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
 /// Direction-dependent viscous friction.
@@ -13,12 +13,10 @@ static SPEC: Spec = Spec {
     equation: "tau_joint = tau - delta |dq|",
     source: "asymmetric viscous coefficients of identification toolboxes for geared arms",
     excited_by: "both directions at several speeds",
-    scope: Scope::Joint,
-    least_joints: 1,
     parameters: &[EffectParameter::signed("delta", Quantity::Damping)],
     initial_guesses: &[[0.05, 0.0, 0.0]],
-    trial: Trial::Amplitudes(1),
     hooks: Hooks::FORCE,
+    ..Spec::OF_JOINT
 };
 
 impl<T: Real> Effect<T> for ViscousAsymmetry {

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! `P` is kept in one of two forms ([`Form`]), with the same result up to rounding. With forgetting, what is not excited grows by
-//! `1/mu` per sample, which ends in numbers without meaning while the arm rests; so no variance grows beyond a limit, at first that of
+//! `1/mu` per sample, which ends in numbers without meaning while the arm rests; so no variance grows beyond that of
 //! `P(0)`: rows and columns are divided by `sqrt(mu)` or by less, which keeps `P` positive definite.
 
 mod factorized;
@@ -108,12 +108,6 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
     /// Keeps `P` in another form.
     pub fn with_form(mut self, form: Form) -> Self {
         self.covariance = Covariance::of(&self.covariance(), form);
-        self
-    }
-
-    /// Sets the variances beyond which forgetting increases none.
-    pub fn with_limit(mut self, limit: SVector<T, R>) -> Self {
-        self.forgetting.limit = limit.into();
         self
     }
 

@@ -28,7 +28,7 @@ use nalgebra::DMatrix;
 use own::Own;
 use rayon::prelude::*;
 use residual::Residual;
-use search::{MOST, search};
+use search::{MAX_PUSHES, search};
 
 /// Shortest push that is reported, s.
 const SHORTEST: f64 = 0.005;
@@ -188,7 +188,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             disturbances.retain(|e| !self.meets_an_end(e, &all));
         }
         // So many are no rare events, but something that the arm does again and again.
-        if disturbances.len() < MOST { disturbances } else { Vec::new() }
+        if disturbances.len() < MAX_PUSHES { disturbances } else { Vec::new() }
     }
 
     /// Pushes that stand out of the torque that a recording lacks.

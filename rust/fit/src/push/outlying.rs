@@ -5,7 +5,7 @@
 //! noise, those few are looked into: the push that would explain most of a window, to first order, is where its fit starts.
 
 use super::own::Own;
-use super::{Disturbance, MOST, Place, PushState};
+use super::{Disturbance, MAX_PUSHES, Place, PushState};
 use crate::context::{DiagnosisContext, WindowSet};
 use crate::model::EffectInstance;
 use crate::weighting::Weighting;
@@ -41,7 +41,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         disturbances: &mut Vec<Disturbance>,
     ) {
         let state = &PushState { min_relevance: state.faintest, ..*state };
-        while disturbances.len() < MOST {
+        while disturbances.len() < MAX_PUSHES {
             let rough = self.in_worst_window(place, state, disturbances);
             let sized = rough.and_then(|rough| self.sized(rough, state, own, disturbances));
             let Some(disturbance) =

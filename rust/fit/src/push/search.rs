@@ -34,7 +34,7 @@ const STANDS_OUT: f64 = 3.6;
 const ABOVE_FRICTION: f64 = 1.2;
 
 /// Pushes that are looked for in one log; as many are no rare events.
-pub const MOST: usize = 8;
+pub const MAX_PUSHES: usize = 8;
 
 /// A joint that moves for less than this, s, is not judged.
 const MOVES: f64 = 0.5;
@@ -87,7 +87,7 @@ impl<const N: usize> Search<'_, N> {
             }
             bells = self.refine(bells)?;
             let Some(next) = largest.filter(|b| b.z > TRIED) else { return Some(bells) };
-            if bells.len() == MOST {
+            if bells.len() == MAX_PUSHES {
                 return Some(bells);
             }
             bells.push(next);

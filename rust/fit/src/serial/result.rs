@@ -16,7 +16,7 @@ use crate::progress::{Phase, ProgressReporter};
 use crate::random::Random;
 use crate::report::{
     ArmSummary, AtHorizon, Bound, Candidate, Cause, Diagnosis, EquivalentSummary, FreeRun, FreeRunSeries,
-    Gap, LogSummary, Named, Noise, OptionSummary, Parameters, RuledOut, Value,
+    Gap, LogSummary, Named, Noise, OptionSummary, Parameters, RuledOut, Status, Value,
 };
 use crate::verdict::Evidence;
 use crate::window::Dataset;
@@ -347,7 +347,7 @@ fn ruled_out(found: &Found, unexplained: &[Option<f64>], rotary: &[bool]) -> Vec
         all.extend(open.map(|j| RuledOut {
             effect: law.spec().name,
             joint: Some(j + 1),
-            status: "undecided",
+            status: Status::Undecided,
             bound: None,
             why: Some(NOT_TESTED.to_owned()),
         }));
@@ -363,18 +363,18 @@ fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &
     if let Some(cause) = alike {
         let place = cause.term.joint().map_or_else(String::new, |j| format!(" of joint {j}"));
         let why = format!("looks like {}{place} in these logs", cause.term.name());
-        return entry("undecided", None, Some(why));
+        return entry(Status::Undecided, None, Some(why));
     }
     let [size, sigma] = tested.size;
     let known = sigma * tested.consequence;
     if !known.is_finite() || known > NOT_EXCITED || tested.consequence == 0.0 {
-        return entry("not excited", None, Some("these logs do not pin its size down".to_owned()));
+        return entry(Status::NotExcited, None, Some("these logs do not pin its size down".to_owned()));
     }
     let statistic = (size / sigma.max(f64::MIN_POSITIVE)).powi(2);
     let largest = size.abs() + NORMAL_95 * sigma;
     if statistic > SIGNIFICANT - NOTICED && largest * tested.consequence > 10.0 * CONSEQUENCE {
         let why = "explains a part of what remains, and too little of it to be named".to_owned();
-        return entry("undecided", None, Some(why));
+        return entry(Status::Undecided, None, Some(why));
     }
     if let TermKind::Transmission(law) = term.kind
         && let Some(left) = unexplained[law.joint].filter(|left| *left > HIDES)
@@ -383,7 +383,7 @@ fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &
             "its test is to first order, and {:.1} % of the joint's torque is unexplained",
             100.0 * left
         );
-        return entry("undecided", None, Some(why));
+        return entry(Status::Undecided, None, Some(why));
     }
     let parameters = term.parameters(rotary_of(term, rotary));
     let bound = (term.amplitudes() > 0 && !matches!(term.kind, TermKind::NominalLink(_)))
@@ -393,7 +393,7 @@ fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &
             value.is_finite().then_some(Bound { parameter: p.name, value, unit: p.unit, level: 0.95 })
         })
         .flatten();
-    entry("absent", bound, None)
+    entry(Status::Absent, bound, None)
 }
 
 fn values(description: &SerialArm, theta: &[f64], sigma: &[f64]) -> Named<Value> {

@@ -1,48 +1,31 @@
-"""The diagnosis: where the gap lies, which effect causes it, how far it shrinks."""
+"""The result of a diagnosis, as frozen types that its JSON is read into."""
 
 from __future__ import annotations
 
 import json
-import os
-import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar
 
-import numpy as np
-
-from armgap import _native, options
-from armgap._renamed import old_names
-from armgap.arm import Arm
-from armgap.check import Check, Corrections, torque_unit
-from armgap.check.time_shift import causal
-from armgap.custom_effect import CustomEffect, TorqueTables, check_effects
-from armgap.errors import OptionError
-from armgap.evidence import consistency, laws, plausibility
+from armgap.check import Check
 from armgap.literals import Status, Verdict
-from armgap.log import Log
 from armgap.log.findings import remarks
-from armgap.log.units import si
-from armgap.prepared_input import PreparedInput, prepare, refused
-from armgap.progress import ProgressCallback, report_progress, use_callback
 from armgap.report.notebook import NotebookDisplay
-from armgap.serial_settings import serial_settings
 
-__all__ = ["Bound", "Cause", "Diagnosis", "Equivalent", "Gap", "Location", "RuledOut", "Sanity", "Value", "diagnose"]
+__all__ = [
+    "Bound",
+    "Cause",
+    "Diagnosis",
+    "Equivalent",
+    "Gap",
+    "GapAtHorizon",
+    "Location",
+    "RuledOut",
+    "Sanity",
+    "Value",
+]
 
-if not TYPE_CHECKING:
-    __getattr__ = old_names(__name__)
-
-#: What a part of a log is called after the log's own name.
-_WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
-#: What a stretch of a log is called after the log's own name.
-_STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 MOST_BYTES = 2**28
 """Size of a diagnosis' file; the largest hold some MB."""
-MOST_CAUSES = 1000
-"""More than the library can name on any arm."""
-LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
 
 @dataclass(frozen=True)
@@ -328,180 +311,3 @@ def _ruled_out(data: dict[str, Any]) -> RuledOut:
     return RuledOut(
         data["effect"], data["joint"], data["status"], _take(Bound, bound) if bound else None, data.get("why")
     )
-
-
-def diagnose(
-    logs: LogLike | Sequence[LogLike],
-    arm: Arm | str | os.PathLike[str],
-    *,
-    holdout: LogLike | Sequence[LogLike] | None = None,
-    horizon: float = 0.25,
-    max_causes: int = 4,
-    seed: int = 1,
-    effects: Sequence[CustomEffect] = (),
-    repair: bool = True,
-    corrections: Corrections | None = None,
-    progress: ProgressCallback | None = None,
-) -> Diagnosis:
-    """Diagnose the gap between an arm's nominal model and its logs.
-
-    Candidate effects are fitted together with the arm's parameters by output error over short windows of the training
-    logs, and judged on windows of the holdout logs, whose motion should be another.
-
-    Parameters
-    ----------
-    logs : Log, path, pattern, table, or sequence of these
-        Training logs: anything that `Log.read` or `Log.from_frame` takes, and patterns such as ``"logs/*.parquet"``.
-    arm : Arm or path
-        Nominal model.
-    holdout : Log, path, pattern, table, or sequence of these, optional
-        Logs to judge on. Without it the last 40 % of every training log are held out.
-    horizon : float, default 0.25
-        Prediction horizon [s].
-    max_causes : int, default 4
-        Causes named at most.
-    seed : int, default 1
-        Seed of the resampling behind probabilities and intervals.
-    effects : sequence of CustomEffect, default none
-        Custom effects that take part in the ranking, four at most.
-    repair : bool, default True
-        Whether defects of the input are repaired that leave nothing to guess (see `armgap.check`); without it they are only said.
-    corrections : Corrections, optional
-        How columns are to be read otherwise than they stand, on top of what the arm file says.
-    progress : callable, optional
-        ``progress(work, fraction)`` is called now and then with what is being done and an estimate of how much of it is done, from 0
-        to 1.
-
-    Returns
-    -------
-    Diagnosis
-
-    Raises
-    ------
-    ArmgapError
-        A leaf of it, if a log, the arm or an option cannot be used.
-    KeyboardInterrupt
-        On an interrupt, within a fifth of a second.
-    """
-    settings = {
-        "horizon": options.positive(horizon, "horizon"),
-        "max_causes": options.whole(max_causes, "number of causes", 0, MOST_CAUSES),
-        "seed": options.seed(seed),
-    }
-    check_effects(effects)
-    arm = arm if isinstance(arm, Arm) else Arm.read(Path(arm))
-    if arm.chain is not None and effects:
-        raise OptionError(
-            "a serial arm's diagnosis takes no effects of your own",
-            remedy="leave them out, or use a planar kind of arm",
-        )
-    with use_callback(progress):
-        given = prepare(logs, holdout, arm, corrections or Corrections(), settings, repair=repair)
-        return _diagnose(given, settings, effects)
-
-
-def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[CustomEffect]) -> Diagnosis:
-    """Hand over to the core, and add what is known on this side."""
-    training, held, arm = given.training, given.holdout, given.arm
-    contradictory = any(check.severity == "error" for check in given.checks)
-    if contradictory:
-        # No effect is asked to explain a contradiction: the figures are those of the arm's own parameters.
-        settings = settings | {"max_causes": 0}
-    tables = TorqueTables.of(effects, training, held)
-    settings = settings | {"own": [e.joint - 1 for e in effects]}
-    if arm.chain is not None:
-        changed, notes = serial_settings(given.checks)
-        settings, given = settings | changed, replace(given, notes=(*given.notes, *notes))
-    try:
-        text = _native.diagnose(
-            arm.to_native(),
-            [log.to_native(tables.by_log[log.name]) for log in training],
-            [log.to_native(tables.by_log[log.name]) for log in held],
-            settings,
-            report_progress,
-        )
-    except ValueError as error:
-        raise refused(str(error), training, held) from None
-    data = tables.named(json.loads(text))
-    if factors := torque_unit.refined(given.factors, data["causes"], arm.n_joints):
-        return _diagnose(replace(given.with_factors(factors), factors={}), settings, effects)
-    if contradictory:
-        data = _contradicted(data)
-    data["arm"]["name"] = arm.name
-    for cause in (*data["causes"], *data["candidates"]):
-        if "log" in cause:
-            cause["log"] = _WHOLE.sub("", cause["log"])
-    data["notes"] = [*given.notes, *data["notes"]]
-    checks = [*given.checks, *_ambiguous_delay(data, training, arm)]
-    _ambiguous_lag(data, given.checks)
-    data["checks"] = [check.to_dict() for check in checks]
-    known, corrected_logs = tables.applied(data, (*training, *held))
-    count = len(training)
-    if arm.chain is None:
-        data["laws"] = laws(known, arm, corrected_logs[:count], corrected_logs[count:])
-        data["plausibility"] = plausibility(known, arm)
-    else:
-        data["plausibility"] = consistency(known, arm)
-    data["input"] = _input(arm, training, held)
-    data["provenance"] = given.provenance
-    data["log_findings"] = [
-        {"log": _STRETCH.sub("", log.name), "kind": f.kind, "message": f.message}
-        for log in (*training, *held)
-        for f in log.findings
-    ]
-    return Diagnosis.from_dict(data)
-
-
-def _input(arm: Arm, training: list[Log], held: list[Log]) -> dict[str, Any]:
-    """Which columns of which files were used, in which units; stretches of one log are one entry."""
-    found: dict[tuple[str, str], dict[str, Any]] = {}
-    for use, logs in (("training", training), ("holdout", held)):
-        for log in logs:
-            name = _STRETCH.sub("", log.name)
-            file = None if log.path is None else str(log.path)
-            entry = {
-                "name": name,
-                "file": file,
-                "set": use,
-                "rows": 0,
-                "columns": dict(log.columns),
-                "units": dict(log.units),
-            }
-            found.setdefault((use, name), entry)["rows"] += len(log)
-    return {"logs": list(found.values()), "units": si(_rotary(arm))}
-
-
-def _rotary(arm: Arm) -> bool | None:
-    """Whether all joints turn, or none does; None where some do."""
-    turning = set(arm.rotary_joints)
-    return turning.pop() if len(turning) == 1 else None
-
-
-def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> list[Check]:
-    """List the shift of the file among the equivalents of delays that are equal on all joints, and warn of it."""
-    period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
-    check = causal(data["causes"], arm.n_joints, period)
-    if check is None:
-        return []
-    for cause in data["causes"]:
-        if cause["effect"] == "actuator_delay":
-            cause["equivalents"].append(
-                {"effect": "time_shift", "joint": None, "why": "torques early in the file by as much"}
-            )
-    return [check]
-
-
-def _ambiguous_lag(data: dict[str, Any], checks: Sequence[Check]) -> None:
-    """List a low-pass of the positions among the equivalents of what delays a joint's torque; as long as nobody knows, each has half."""
-    joints = {check.joint for check in checks if check.check == "filtered_positions"}
-    for cause in data["causes"]:
-        if cause["joint"] in joints and cause["effect"] in ("actuator_lag", "actuator_delay"):
-            cause["probability"] *= 0.5
-            why = f"q{cause['joint']} is smoother than its encoder: a low-pass before logging delays positions as much"
-            cause["equivalents"].append({"effect": "filtered_positions", "joint": cause["joint"], "why": why})
-
-
-def _contradicted(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the result of logs and arm file that contradict each other: figures with the remedy applied, no causes."""
-    gap = data["gap"] | {"after": data["gap"]["refit"]}
-    return data | {"verdict": "input", "causes": [], "candidates": [], "gap": gap}

@@ -1,0 +1,46 @@
+"""The diagnosis: where the gap lies, which effect causes it, how far it shrinks.
+
+`diagnosis`  from logs and an arm to the result
+`result`     the result, read from its JSON
+`schema`     the JSON Schema of that
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from armgap._renamed import old_names
+from armgap.diagnosis.diagnosis import diagnose
+from armgap.diagnosis.result import (
+    MOST_BYTES,
+    Bound,
+    Cause,
+    Diagnosis,
+    Equivalent,
+    Gap,
+    GapAtHorizon,
+    Location,
+    RuledOut,
+    Sanity,
+    Value,
+)
+from armgap.diagnosis.schema import diagnosis_schema
+
+__all__ = [
+    "MOST_BYTES",
+    "Bound",
+    "Cause",
+    "Diagnosis",
+    "Equivalent",
+    "Gap",
+    "GapAtHorizon",
+    "Location",
+    "RuledOut",
+    "Sanity",
+    "Value",
+    "diagnose",
+    "diagnosis_schema",
+]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)
