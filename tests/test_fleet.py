@@ -18,10 +18,11 @@ import pytest
 from armgap import Arm
 from armgap.errors import OptionError
 from armgap.fleet import Entry, Fleet, read_manifest, run_fleet
-from armgap.fleet.drift import drifts, odd_ones
 from armgap.fleet.manifest import ManifestError
-from armgap.fleet.page import fleet_document, moving, odd
+from armgap.fleet.page import fleet_document
+from armgap.fleet.series import moving, odd
 from armgap.fleet.tables import PARAMETERS, SUMMARY
+from fleets import fleet_of
 from swings import off, swing
 
 
@@ -171,43 +172,6 @@ def test_what_is_no_manifest(tmp_path: Path) -> None:
         read_manifest(tmp_path / "m.csv")
 
 
-def fleet_of(rng: np.random.Generator, robot: int | None, robots: int = 20, visits: int = 30) -> np.ndarray:
-    """Friction of a fleet with a scatter of 10 %; that of one robot rises by 3 % per visit from visit 10."""
-    values = np.exp(0.1 * rng.standard_normal((robots, visits)) + 0.1 * rng.standard_normal(visits))
-    if robot is not None:
-        values[robot, 10:] *= 1.03 ** np.arange(1, visits - 9)
-    return values
-
-
-def test_friction_that_rises_is_found_and_nothing_else() -> None:
-    rng = np.random.default_rng(2)
-    found, false = 0, 0
-    for _ in range(50):
-        robot = int(rng.integers(20))
-        named = [d.robot for d in drifts(fleet_of(rng, robot))]
-        found += robot in named
-        false += any(r != robot for r in named) or bool(drifts(fleet_of(rng, None)))
-    assert found >= 45
-    assert false <= 2
-
-
-def test_a_drift_says_since_when_and_how_fast() -> None:
-    [drift] = drifts(fleet_of(np.random.default_rng(5), 7))
-    assert drift.robot == 7
-    assert abs(drift.onset - 10) <= 4
-    assert drift.rate == pytest.approx(0.03, rel=0.4)
-
-
-def test_a_robot_far_from_the_others_is_odd() -> None:
-    values = fleet_of(np.random.default_rng(3), None)
-    assert odd_ones(values) == []
-    values[4] *= 2.0
-    [(robot, apart)] = odd_ones(values)
-    assert robot == 4
-    assert apart > 5
-    assert odd_ones(values[:3]) == []
-
-
 def test_the_page_says_what_moves() -> None:
     values = fleet_of(np.random.default_rng(5), 7)
     values[3] *= 3.0
@@ -217,8 +181,9 @@ def test_the_page_says_what_moves() -> None:
         for k, v in enumerate(row)
     ]
     parameters = pl.DataFrame(rows, schema=PARAMETERS, orient="row")
-    assert [(robot, name) for robot, _, name, _, _ in moving(parameters)] == [("robot 7", "coulomb1")]
-    assert next(odd(parameters))[:3] == ("robot 3", "arm", "coulomb1")
+    assert [(move.robot, move.name) for move in moving(parameters)] == [("robot 7", "coulomb1")]
+    first = next(odd(parameters))
+    assert (first.robot, first.of, first.name) == ("robot 3", "arm", "coulomb1")
     row = ("robot 7", None, "none", None, None, None, 0.0, 0.0, 0.1, None)
     document = fleet_document(Fleet(Path(), pl.DataFrame([row], schema=SUMMARY, orient="row"), parameters, 0))
     assert "robot 7" in document.answers[0].headline
