@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -53,7 +54,7 @@ def command(manifest: str, folder: Path, engine: str, quiet: bool, **options: An
     A run that was interrupted goes on where it stopped.
     """
     from armgap.fleet import read_manifest, run_fleet
-    from armgap.fleet.page import moved
+    from armgap.fleet.page import moved, plain_time
     from armgap.fleet.series import moving
 
     def progress(done: int, total: int) -> None:
@@ -65,14 +66,13 @@ def command(manifest: str, folder: Path, engine: str, quiet: bool, **options: An
         fleet = run_fleet(entries, folder, settings, engine=engine, progress=progress, **options)
     if quiet:
         return
-    say = console()
+    say = partial(console().print, highlight=False, markup=False, soft_wrap=True)
     stood = len(entries) - fleet.answered
-    say.print(
-        f"{len(entries)} entries: {fleet.answered} diagnosed now, {stood} stood there, {fleet.failed.height} without a diagnosis",
-        highlight=False,
+    say(
+        f"{len(entries)} entries: {fleet.answered} computed now, {stood} stood there; {fleet.failed.height} without a diagnosis"
     )
     for row in fleet.failed.to_dicts():
-        say.print(f"{row['robot']} {row['time'] or ''}: {row['error']}", highlight=False, markup=False)
+        say(f"{row['robot']} {plain_time(row['time'])}: {row['error']}")
     for move in islice(moving(fleet.parameters), _DRIFTS):
-        say.print(f"drifts: {moved(move)}", highlight=False, markup=False)
-    say.print(f"tables and page: {fleet.folder}", highlight=False, markup=False)
+        say(f"drifts: {moved(move)}")
+    say(f"tables and page: {fleet.folder}")

@@ -16,7 +16,7 @@ from armgap.report.words import SummaryAnswer, figure, joint_text, title
 if TYPE_CHECKING:
     from armgap.fleet.folder import Fleet
 
-__all__ = ["fleet_document", "moved"]
+__all__ = ["fleet_document", "moved", "plain_time"]
 
 # Charts and rows that are shown; the tables hold all of them.
 _CHARTS, _ROWS = 6, 40
@@ -42,15 +42,16 @@ def fleet_document(fleet: Fleet) -> Document:
 
 def moved(move: Move) -> str:
     """Return a drift as a sentence without its full stop."""
-    return f"{move.robot}: {_named(move.of, move.name)} by {_rate(move)} per visit since {_since(move)}"
+    return f"{move.robot}: {_named(move.of, move.name)} by {_rate(move)} per visit since {plain_time(move.since)}"
 
 
 def _rate(move: Move) -> str:
     return f"{100 * move.drift.rate:+.1f} %"
 
 
-def _since(move: Move) -> str:
-    return move.since.removesuffix(_MIDNIGHT)
+def plain_time(time: str | None) -> str:
+    """Return a time for people: a midnight is a day, an unknown one a dash."""
+    return (time or _EMPTY).removesuffix(_MIDNIGHT)
 
 
 def _odd_one(found: Odd) -> str:
@@ -119,7 +120,14 @@ def _moving(parameters: pl.DataFrame, moves: list[Move]) -> Section:
     )
     header = ("robot", "parameter", "since", "per visit", "standard deviations", "needed")
     rows = [
-        (m.robot, _named(m.of, m.name), _since(m), _rate(m), f"{m.drift.evidence:.1f}", f"{m.drift.threshold:.1f}")
+        (
+            m.robot,
+            _named(m.of, m.name),
+            plain_time(m.since),
+            _rate(m),
+            f"{m.drift.evidence:.1f}",
+            f"{m.drift.threshold:.1f}",
+        )
         for m in moves[:_ROWS]
     ]
     tables = [Table(header, rows)] if rows else []
@@ -152,9 +160,7 @@ def _odd(found: list[Odd]) -> Section:
 def _failures(failed: pl.DataFrame) -> Section | None:
     if not failed.height:
         return None
-    rows: list[tuple[str, ...]] = [
-        (r["robot"], (r["time"] or _EMPTY).removesuffix(_MIDNIGHT), r["error"]) for r in failed.to_dicts()
-    ]
+    rows: list[tuple[str, ...]] = [(r["robot"], plain_time(r["time"]), r["error"]) for r in failed.to_dicts()]
     tables = [Table(("robot", "time", "why"), rows[:_ROWS])]
     if rows[_ROWS:]:
         tables.append(Table(("robot", "time", "why"), rows[_ROWS:], fold=f"{len(rows) - _ROWS} more"))
