@@ -198,17 +198,18 @@ def test_a_drift_says_when_or_at_which_visit() -> None:
     values = fleet_of(np.random.default_rng(5), 7)
     [dated] = moving(rows_of(values))
     assert dated.since.startswith("2026-01-")
+    assert int(dated.since[8:10]) == dated.visit
     [counted] = moving(rows_of(values).with_columns(time=pl.lit(None, pl.String)))
-    assert counted.since.startswith("visit ")
-    assert int(counted.since.split()[1]) == int(dated.since[8:10])
+    assert (counted.since, counted.visit) == ("", dated.visit)
 
 
 def test_a_robot_far_from_the_others_is_odd() -> None:
     values = fleet_of(np.random.default_rng(3), None)
     assert odd_ones(values) == []
     values[4] *= 2.0
-    [(robot, apart)] = odd_ones(values)
+    [(robot, usual, fleet, apart)] = odd_ones(values)
     assert robot == 4
+    assert usual == pytest.approx(2.0 * fleet, rel=0.2)
     assert apart > 5
     assert odd_ones(values[:3]) == []
 

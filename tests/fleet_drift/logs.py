@@ -33,6 +33,8 @@ def study(seed: int, model: str, robots: int, duration: float, workers: int, fol
     truth = draw(rng, design, 2 * arms[0].n_joints)
     manifest = _make(rng, arms, truth, design, duration, folder)
     fleet = run_fleet(read_manifest(manifest), folder / "fleet", {"max_causes": 0}, workers=workers)
+    if fleet.failed.height > 0.1 * len(fleet.summary):
+        raise RuntimeError(f"{fleet.failed.height} entries without a diagnosis, the first: {fleet.failed['error'][0]}")
     rows = fleet.parameters.with_columns(
         visit=pl.col("time")
         .str.slice(0, 10)

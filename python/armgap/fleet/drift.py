@@ -264,21 +264,27 @@ def _without_one(row: Array, weight: Array, onset: int) -> float:
     return float(np.min(np.sign(part.sum()) * part / np.sqrt(square)))
 
 
-def odd_ones(values: Array) -> list[tuple[int, float]]:
-    """Return robots whose usual value lies far from the others', and by how many robust standard deviations.
+def odd_ones(values: Array) -> list[tuple[int, float, float, float]]:
+    """Return robots whose usual value lies far from the others', the farthest first.
 
     Parameters
     ----------
     values : ndarray, shape (n_robots, n_visits)
         One parameter; NaN where it was not estimated.
+
+    Returns
+    -------
+    list of (robot, usual, fleet, apart)
+        Row, median of its visits, median of all robots' medians, and the robust standard deviations between them.
     """
     usual = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in values])
     known = np.isfinite(usual)
     if np.count_nonzero(known) < _FEWEST_ROBOTS:
         return []
-    middle = float(np.median(usual[known]))
-    spread = _MAD * float(np.median(np.abs(usual[known] - middle)))
+    fleet = float(np.median(usual[known]))
+    spread = _MAD * float(np.median(np.abs(usual[known] - fleet)))
     if spread <= 0:
         return []
-    apart = (usual - middle) / spread
-    return [(int(i), float(apart[i])) for i in np.argsort(-np.abs(apart)) if known[i] and abs(apart[i]) > _ODD]
+    apart = (usual - fleet) / spread
+    far = (int(i) for i in np.argsort(-np.abs(apart)) if known[i] and abs(apart[i]) > _ODD)
+    return [(i, float(usual[i]), fleet, float(apart[i])) for i in far]

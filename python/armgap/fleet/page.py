@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
+from armgap.fleet.drift import FALSE_ALARMS
 from armgap.fleet.series import Move, Odd, moving, odd
 from armgap.report import charts
 from armgap.report.document import Document
 from armgap.report.page import Bar, Drawing, Section, Table
-from armgap.report.words import SummaryAnswer, figure, joint_text, title
+from armgap.report.words import SummaryAnswer, figure, joint_text, parameter_text, title
 
 if TYPE_CHECKING:
     from armgap.fleet.folder import Fleet
@@ -42,11 +43,15 @@ def fleet_document(fleet: Fleet) -> Document:
 
 def moved(move: Move) -> str:
     """Return a drift as a sentence without its full stop."""
-    return f"{move.robot}: {_named(move.of, move.name)} by {_rate(move)} per visit since {plain_time(move.since)}"
+    return f"{move.robot}: {_named(move.of, move.name)} by {_rate(move)} per visit since {_since(move)}"
 
 
 def _rate(move: Move) -> str:
     return f"{100 * move.drift.rate:+.1f} %"
+
+
+def _since(move: Move) -> str:
+    return plain_time(move.since) if move.since else f"visit {move.visit}"
 
 
 def plain_time(time: str | None) -> str:
@@ -55,12 +60,15 @@ def plain_time(time: str | None) -> str:
 
 
 def _odd_one(found: Odd) -> str:
-    return f"{found.robot}: {_named(found.of, found.name)}, {found.apart:+.0f} robust standard deviations"
+    return f"{found.robot}: {_named(found.of, found.name)} is {figure(found.usual)}, the fleet's {figure(found.fleet)}"
 
 
 def _named(of: str, name: str) -> str:
+    if of == "arm":
+        meaning = parameter_text("", name)
+        return f"{meaning} ({name})" if meaning else name
     effect, _, joint = of.partition(":")
-    return name if of == "arm" else f"{name} of {title(effect)}, {joint_text(int(joint) if joint else None)}"
+    return f"{name} of {title(effect)}, {joint_text(int(joint) if joint else None)}"
 
 
 def _listed(found: list[str], none: str, of: str) -> tuple[str, str]:
@@ -78,7 +86,10 @@ def _commonest(summary: pl.DataFrame) -> tuple[str, str]:
     first = counts.sort(["robots", "effect", "joint"], descending=[True, False, False], nulls_last=True).row(
         0, named=True
     )
-    return f"{title(first['effect'])}, {joint_text(first['joint'])}", f"on {first['robots']} robots"
+    return (
+        f"{title(first['effect'])}, {joint_text(first['joint'])}",
+        f"on {first['robots']} {'robot' if first['robots'] == 1 else 'robots'}",
+    )
 
 
 def _causes(summary: pl.DataFrame) -> Section:
@@ -115,15 +126,17 @@ def _cause(what: str, joint: int | None) -> str:
 
 def _moving(parameters: pl.DataFrame, moves: list[Move]) -> Section:
     text = (
-        "A parameter drifts if its logarithm, less what all robots did that day, follows a ramp that noise would show once in a thousand visits of "
-        "the whole fleet. A robot needs six visits before anything is said of it, and scatter from one visit to the next has to be independent."
+        "A parameter drifts if its logarithm, less what all robots did that day, follows a ramp from some visit to the last. "
+        "Noise that is independent from visit to visit shows one at most once in "
+        f"{1 / FALSE_ALARMS:.0f} visits of the whole fleet, all parameters together. "
+        "A robot needs six visits before anything is said of it."
     )
     header = ("robot", "parameter", "since", "per visit", "standard deviations", "needed")
     rows = [
         (
             m.robot,
             _named(m.of, m.name),
-            plain_time(m.since),
+            _since(m),
             _rate(m),
             f"{m.drift.evidence:.1f}",
             f"{m.drift.threshold:.1f}",
@@ -143,17 +156,22 @@ def _course(parameters: pl.DataFrame, move: Move) -> Drawing:
     value, sigma = rows["value"].to_numpy(), rows["sigma"].fill_null(0.0).to_numpy()
     visits = np.arange(1.0, len(value) + 1)
     unit = rows["unit"][0] or ""
-    chart = charts.figure(f"{robot}: {_named(of, name)}", "visit", f"{name} [{unit}]")
+    chart = charts.figure(f"{robot}: {_named(of, name)}", "visit", f"{name} [{unit}]" if unit else name)
     chart.varea(visits, value - 1.96 * sigma, value + 1.96 * sigma, color=charts.MEASURED, alpha=0.25)
+    chart.vspan(x=[move.visit], color=charts.BEFORE, line_dash="dashed")
     chart.line(visits, value, color=charts.AFTER, line_width=2)
     chart.scatter(visits, value, color=charts.AFTER, size=5)
-    return Drawing(f"{name} of {robot} over its visits, with 95 % intervals.", chart)
+    return Drawing(
+        f"{name} of {robot} over its visits, with 95 % intervals; dashed the visit since which it drifts.", chart
+    )
 
 
 def _odd(found: list[Odd]) -> Section:
     text = "A robot is odd if its usual value (median over its visits) lies more than five robust standard deviations from the fleet's median."
-    rows = [(o.robot, _named(o.of, o.name), f"{o.apart:+.1f}") for o in found[:_ROWS]]
-    tables = [Table(("robot", "parameter", "robust standard deviations"), rows)] if rows else []
+    rows = [(o.robot, _named(o.of, o.name), figure(o.usual), figure(o.fleet), f"{o.apart:+.1f}") for o in found[:_ROWS]]
+    tables = (
+        [Table(("robot", "parameter", "its median", "the fleet's", "robust standard deviations"), rows)] if rows else []
+    )
     return Section("Odd ones", text=[text], points=[] if rows else ["No robot is far from the others."], tables=tables)
 
 

@@ -43,22 +43,37 @@ class Series:
 
 @dataclass(frozen=True)
 class Move:
-    """A parameter of one robot that drifts, `since` a time or, where that is unknown, the number of a visit."""
+    """A parameter of one robot that drifts.
+
+    Attributes
+    ----------
+    robot, of, name : str
+        Which parameter of which robot.
+    visit : int
+        From which of the robot's visits it changes, counted from 1 among those that have a value.
+    since : str
+        Time of that visit; empty where it is unknown.
+    drift : Drift
+        How fast, and by how much evidence.
+    """
 
     robot: str
     of: str
     name: str
+    visit: int
     since: str
     drift: Drift
 
 
 @dataclass(frozen=True)
 class Odd:
-    """A parameter of one robot that lies `apart` from the other robots' by so many robust standard deviations."""
+    """A parameter of one robot whose `usual` value lies `apart` from the `fleet`'s by so many robust standard deviations; medians, in its unit."""
 
     robot: str
     of: str
     name: str
+    usual: float
+    fleet: float
     apart: float
 
 
@@ -104,9 +119,9 @@ def moving(parameters: pl.DataFrame) -> Iterator[Move]:
     tests = sum(len(series.robots) for series in found)
     for series in found:
         for drift in drifts(series.values, series.sigma, tests=tests):
-            visit = np.count_nonzero(np.isfinite(series.values[drift.robot, : drift.onset + 1]))
-            since = series.times[drift.robot][drift.onset] or f"visit {visit}"
-            yield Move(series.robots[drift.robot], series.of, series.name, since, drift)
+            visit = int(np.count_nonzero(np.isfinite(series.values[drift.robot, : drift.onset + 1])))
+            since = series.times[drift.robot][drift.onset]
+            yield Move(series.robots[drift.robot], series.of, series.name, visit, since, drift)
 
 
 def odd(parameters: pl.DataFrame) -> Iterator[Odd]:
@@ -118,5 +133,5 @@ def odd(parameters: pl.DataFrame) -> Iterator[Odd]:
         As ``parameters.parquet``.
     """
     for series in series_of(parameters):
-        for robot, apart in odd_ones(series.values):
-            yield Odd(series.robots[robot], series.of, series.name, apart)
+        for robot, usual, fleet, apart in odd_ones(series.values):
+            yield Odd(series.robots[robot], series.of, series.name, usual, fleet, apart)
