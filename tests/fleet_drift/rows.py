@@ -8,17 +8,17 @@ import polars as pl
 from .truth import Design, Truth, day, robot_name
 
 #: Parameters of a two-link arm: name, whether it is friction, median of the relative standard error and spread of its logarithm, and
-#: RMS of errors over stated standard errors. Measured by ``python -m tests.fleet_drift logs --seed 2 --model geared``.
+#: RMS of errors over stated standard errors. Measured by ``python -m tests.fleet_drift logs --seed 2 --model geared --robots 4``.
 PARAMETERS: tuple[tuple[str, bool, float, float, float], ...] = (
-    ("theta1", False, 5e-4, 0.7, 1.0),
-    ("theta2", False, 8e-4, 0.7, 1.0),
-    ("theta3", False, 6e-4, 0.7, 1.0),
-    ("theta4", False, 4e-4, 0.7, 1.0),
-    ("theta5", False, 3e-4, 0.7, 1.0),
-    ("viscous1", True, 1e-2, 0.7, 1.0),
-    ("viscous2", True, 1e-2, 0.7, 1.0),
-    ("coulomb1", True, 2e-3, 0.7, 1.0),
-    ("coulomb2", True, 2e-3, 0.7, 1.0),
+    ("theta1", False, 0.00036, 0.7, 0.5),
+    ("theta2", False, 0.00045, 0.8, 0.5),
+    ("theta3", False, 0.0003, 0.8, 0.6),
+    ("theta4", False, 0.0002, 0.8, 0.5),
+    ("theta5", False, 0.00025, 1.0, 0.5),
+    ("viscous1", True, 0.0071, 1.1, 0.4),
+    ("viscous2", True, 0.0042, 0.8, 0.5),
+    ("coulomb1", True, 0.00046, 0.7, 0.5),
+    ("coulomb2", True, 0.00039, 0.7, 0.5),
 )
 FRICTION = [name for name, friction, *_ in PARAMETERS if friction]
 
