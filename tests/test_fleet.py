@@ -22,6 +22,7 @@ from armgap.fleet.manifest import ManifestError
 from armgap.fleet.page import fleet_document
 from armgap.fleet.series import moving, odd
 from armgap.fleet.tables import PARAMETERS, SUMMARY
+from armgap.fleet.work import answer_within
 from fleets import fleet_of
 from swings import off, swing
 
@@ -98,6 +99,15 @@ def test_an_entry_that_takes_too_long_is_lost_and_tried_again(place: Path) -> No
     assert run_fleet(entries, place / "slow").failed.height == 0
 
 
+def test_an_entry_is_stopped_within_its_own_process(place: Path) -> None:
+    """As on a Ray cluster, where nothing outside of the process stops it."""
+    [entry] = read_manifest(place / "manifest.csv")[:1]
+    late = answer_within(entry, {}, 0.01)
+    assert "took longer than 0.01 s" in late["lost"]
+    assert "diagnosis" in answer_within(entry, {}, 600.0)
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
 def test_a_run_that_was_killed_goes_on(place: Path) -> None:
     words = [
         sys.executable,
@@ -129,6 +139,15 @@ def test_the_command(fleet: Fleet, place: Path, run: Callable[..., tuple[int, st
     assert status == 0
     assert "6 entries" in out
     assert "broken.csv" in out
+    # Each entry that failed has one line, however long.
+    assert [line.split(":")[0] for line in out.splitlines() if line.startswith("west")] == ["west 2026-01-01", "west -"]
+    (place / "one.csv").write_text("".join((place / "manifest.csv").read_text(encoding="utf-8").splitlines(True)[:2]))
+    status, out, _ = run(
+        "fleet", str(place / "one.csv"), "-o", str(place / "few"), "--max-causes", "0", "--workers", "1"
+    )
+    assert (status, "1 computed now" in out) == (0, True)
+    [diagnosis] = (place / "few" / "diagnoses").iterdir()
+    assert json.loads(diagnosis.read_text(encoding="utf-8"))["options"]["max_causes"] == 0
     status, _, err = run(
         "fleet", str(place / "manifest.csv"), "-o", str(place / "out"), "--address", "here:1", "--again"
     )

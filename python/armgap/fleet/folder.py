@@ -83,7 +83,7 @@ def run_fleet(
     workers : int, default 1
         Processes.
     limit_s : float, default 600
-        Longest time for one entry on this machine [s].
+        Longest time for one entry [s].
     address : str, optional
         Of a Ray cluster that runs already.
     again : bool, default False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import signal
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -15,10 +16,10 @@ from armgap import __version__
 from armgap.errors import ArmgapError
 from armgap.fleet.manifest import Entry, is_url
 
-__all__ = ["Outcome", "answer", "content_key"]
+__all__ = ["Outcome", "answer", "answer_within", "content_key", "took_too_long"]
 
 Outcome = dict[str, Any]
-"""``diagnosis``, the JSON text, or ``error``, one line; and ``seconds``."""
+"""``diagnosis``, the JSON text, or ``error``, one line, or ``lost``, why there is neither; and ``seconds``."""
 _READERS: dict[str, Callable[[str], pl.DataFrame]] = {".parquet": pl.read_parquet, ".csv": pl.read_csv}
 
 
@@ -65,6 +66,44 @@ def answer(entry: Entry, settings: Mapping[str, Any]) -> Outcome:
     except Exception as error:  # one entry must not end the others; what it was stands in its row
         outcome = {"error": f"{type(error).__name__}: {' '.join(str(error).split())}"}
     return {**outcome, "seconds": time.perf_counter() - start}
+
+
+def took_too_long(limit_s: float) -> Outcome:
+    """Return the outcome of an entry that was stopped after its time [s]; the next run tries it again."""
+    return {"lost": f"took longer than {limit_s:g} s", "seconds": limit_s}
+
+
+class _TimeIsUp(BaseException):
+    """Raised by the alarm; no `Exception`, so that nothing on the way takes it for a defect of the entry."""
+
+
+def answer_within(entry: Entry, settings: Mapping[str, Any], limit_s: float) -> Outcome:
+    """Diagnose an entry in the main thread of a process, for so long at most [s]; without limit where there is no ``SIGALRM`` (Windows).
+
+    Parameters
+    ----------
+    entry, settings
+        As for `answer`.
+    limit_s : float
+        Above 0.
+    """
+    if not hasattr(signal, "SIGALRM"):
+        return answer(entry, settings)
+
+    def stop(*_: object) -> None:
+        raise _TimeIsUp
+
+    before = signal.signal(signal.SIGALRM, stop)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, limit_s)
+        try:
+            return answer(entry, settings)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+    except _TimeIsUp:
+        return took_too_long(limit_s)
+    finally:
+        signal.signal(signal.SIGALRM, before)
 
 
 def _source(place: str) -> Any:
