@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from armgap.fleet.drift import FALSE_ALARMS, drifts, fleet_scatter, odd_ones, relative, threshold
+from armgap.fleet.drift import FALSE_ALARMS, drifts, fleet_memory, fleet_scatter, odd_ones, relative, threshold
 from armgap.fleet.series import moving, series_of
 from armgap.fleet.tables import PARAMETERS
 from fleet_drift.judging import ask, report
@@ -115,6 +115,26 @@ def test_standard_errors_count_as_scatter() -> None:
     values[3, 26:] = 3.0
     sigma = np.where(values > 2.0, 2.0, 0.01)
     assert drifts(values, sigma) == []
+
+
+def lasting(rng: np.random.Generator, correlation: float, robots: int = 20, visits: int = 30) -> np.ndarray:
+    """Logarithms that scatter by one and follow a first-order autoregression."""
+    logs = rng.standard_normal((robots, visits))
+    for k in range(1, visits):
+        logs[:, k] = correlation * logs[:, k - 1] + np.sqrt(1.0 - correlation**2) * logs[:, k]
+    return logs
+
+
+def test_scatter_that_lasts_until_the_next_visit_is_no_drift() -> None:
+    rng = np.random.default_rng(16)
+    assert fleet_memory(lasting(rng, 0.0, visits=200)) == pytest.approx(0.0, abs=0.03)
+    assert fleet_memory(lasting(rng, 0.5, visits=200)) == pytest.approx(0.5, abs=0.05)
+    false = sum(bool(drifts(np.exp(0.1 * lasting(rng, 0.5)))) for _ in range(30))
+    assert false <= 2
+    # Nor does it hide one: friction that rises by 6 % per visit.
+    values = np.exp(0.1 * lasting(rng, 0.5))
+    values[7, 10:] *= 1.06 ** np.arange(1, 21)
+    assert drifts(values)[0].robot == 7
 
 
 def test_one_wild_visit_is_no_drift() -> None:

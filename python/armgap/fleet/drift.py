@@ -12,6 +12,9 @@ differences between neighbouring visits, which a ramp hardly changes, are what t
 et al. 1941). A robot's own dispersion about it is drawn towards the fleet's by as much as the robots agree (Smyth 2004), so that a
 robot that scatters more than the others is judged by its own scatter.
 
+**Memory.** What a visit scatters by may last until the next: a first-order autocorrelation common to the fleet, from differences between
+neighbours and between visits two apart, as far as it is more than chance. Equations are whitened by it (Prais and Winsten 1954).
+
 **Threshold.** With normal errors and a variance of ``nu`` degrees of freedom, the largest statistic of a family of ramps that is a curve of length
 ``kappa`` on the sphere exceeds ``b`` with a probability of at most ``(1 + kappa/pi) (1 + b^2/nu)^(-nu/2)`` (Knowles and Siegmund 1989, with
 ``2 Phi(-b) <= exp(-b^2/2)`` for the curve's ends). This is set to the false alarms allowed per visit over the number of series.
@@ -24,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FALSE_ALARMS", "Drift", "drifts", "fleet_scatter", "odd_ones", "relative", "threshold"]
+__all__ = ["FALSE_ALARMS", "Drift", "drifts", "fleet_memory", "fleet_scatter", "odd_ones", "relative", "threshold"]
 
 Array = NDArray[np.float64]
 FALSE_ALARMS = 2e-3
@@ -42,6 +45,8 @@ _STAYS = 0.5
 _VAGUE = 0.3
 # Degrees of freedom that count as a known scatter.
 _KNOWN = 1e6
+# Largest autocorrelation: beyond it scatter is a random walk, which no test tells from a drift.
+_MOST_MEMORY = 0.9
 # Squared logarithm that counts as no change at all, and relative accuracy of the scatter.
 _NOTHING, _CLOSE = 1e-30, 1e-6
 # A robot is odd from this many robust standard deviations on.
@@ -93,12 +98,17 @@ def drifts(values: Array, sigma: Array | None = None, *, tests: int | None = Non
     if not long.any():
         return []
     scatter, dispersion, freedom = fleet_scatter(series, error)
+    memory = fleet_memory(series)
     allowed = FALSE_ALARMS / max(tests or len(series), 1)
     found = []
     for robot in np.flatnonzero(long):
         visits = np.flatnonzero(np.isfinite(series[robot]))
-        weight = 1.0 / (dispersion[robot] * (scatter**2 + error[robot, visits] ** 2) + _NOTHING)
-        found.append(_ramp(series[robot, visits], weight, visits, int(robot), float(freedom[robot]), allowed))
+        square = error[robot, visits] ** 2
+        before = memory**2 * np.roll(square, 1)
+        before[0] = -(memory**2) * square[0]
+        weight = 1.0 / (dispersion[robot] * (scatter**2 * (1.0 + memory) + square + before) + _NOTHING)
+        equations = _Equations(series[robot, visits], weight, memory)
+        found.append(_drift(equations, visits, int(robot), float(freedom[robot]), allowed))
     return sorted((drift for drift in found if drift is not None), key=lambda drift: -drift.evidence)
 
 
@@ -173,6 +183,28 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
     return high, dispersion, np.minimum(own + prior, own.sum())
 
 
+def fleet_memory(series: Array) -> float:
+    """Return the first-order autocorrelation of what visits scatter by, 0 where it is no more than chance.
+
+    ``1 + rho`` is the mean square of differences between visits two apart over that between neighbours, both relative to the robot's own
+    scatter; neither knows the level or, to first order, a drift. In white noise its variance is ``2/n`` for ``n`` visits, and one standard
+    deviation of it counts as chance.
+
+    Parameters
+    ----------
+    series : ndarray, shape (n_robots, n_visits)
+        Logarithms, NaN where unknown.
+    """
+    rows = [row[np.isfinite(row)] for row in series]
+    long = [row for row in rows if len(row) >= _FEWEST_BEFORE + _FEWEST_ON and np.ptp(row) > 0]
+    if not long:
+        return 0.0
+    apart = np.array([[np.mean((row[k:] - row[:-k]) ** 2) for k in (1, 2)] for row in long])
+    neighbours, two_apart = np.mean(apart / apart.sum(axis=1, keepdims=True), axis=0)
+    chance = np.sqrt(2.0 / sum(len(row) for row in long))
+    return float(np.clip(two_apart / neighbours - 1.0 - chance, 0.0, _MOST_MEMORY))
+
+
 def _steps(series: Array, error: Array) -> tuple[Array, Array]:
     """Squared differences between neighbouring known visits, NaN after the last, and what the estimates' errors add to them."""
     square, errors = np.full(series.shape, np.nan), np.zeros(series.shape)
@@ -226,42 +258,68 @@ def threshold(allowed: float, length: float, freedom: float) -> float:
     return float(np.sqrt(freedom * np.expm1(2.0 / freedom * np.log((1.0 + length / np.pi) / allowed))))
 
 
-def _ramp(
-    row: Array, weight: Array, visits: NDArray[np.intp], robot: int, freedom: float, allowed: float
-) -> Drift | None:
-    slopes, deviations, length = _slopes(row, weight)
+@dataclass(frozen=True)
+class _Equations:
+    """A series as a level and a ramp from every onset on, whitened: one equation per visit.
+
+    Attributes
+    ----------
+    row, weight : ndarray, shape (n_visits,)
+        Logarithms, and the inverse variance of each equation.
+    memory : float
+        First-order autocorrelation.
+    """
+
+    row: Array
+    weight: Array
+    memory: float
+
+    def whitened(self, x: Array) -> Array:
+        """Columns less what the visit before lets expect of them (Prais and Winsten 1954)."""
+        white = x.astype(np.float64)
+        white[..., 1:] -= self.memory * x[..., :-1]
+        white[..., 0] *= np.sqrt(1.0 - self.memory**2)
+        return white
+
+    def ramps(self) -> Array:
+        """Ramps of slope 1 from every onset on, shape (n_onsets, n_visits)."""
+        onsets = np.arange(_FEWEST_BEFORE, len(self.row) - _FEWEST_ON + 1)
+        return self.whitened(np.maximum(np.arange(len(self.row)) - onsets[:, None] + 1.0, 0.0))
+
+    def beside(self, x: Array, y: Array) -> Array:
+        """Rows of `x` less their weighted projection on those of `y`, shapes (n, n_visits) or (n_visits,)."""
+        part = np.sum(x * self.weight * y, axis=-1) / np.sum(self.weight * y**2, axis=-1)
+        return np.asarray(x - part[..., None] * y)
+
+    def level(self) -> Array:
+        """Whitened column of the unknown level, shape (n_visits,)."""
+        return self.whitened(np.ones(len(self.row)))
+
+    def slopes(self) -> tuple[Array, Array, float]:
+        """Slopes for all onsets, their standard deviations, and the length of the curve of normed ramps [rad]."""
+        ramps = self.beside(self.ramps(), self.level())
+        square = (ramps**2) @ self.weight
+        normed = ramps * np.sqrt(self.weight) / np.sqrt(square)[:, None]
+        turned = np.arccos(np.clip(np.sum(normed[1:] * normed[:-1], axis=1), -1.0, 1.0))
+        return (ramps * self.weight) @ self.whitened(self.row) / square, 1.0 / np.sqrt(square), float(turned.sum())
+
+    def without_one(self, onset: int) -> float:
+        """Least evidence for a ramp with any one visit left out, which is to give it a parameter of its own."""
+        visit = self.whitened(np.eye(len(self.row)))
+        ramps = self.beside(self.beside(self.ramps()[onset], visit), self.beside(self.level(), visit))
+        part, square = (ramps * self.weight) @ self.whitened(self.row), (ramps**2) @ self.weight
+        return float(np.min(np.sign(part.sum()) * part / np.sqrt(square)))
+
+
+def _drift(equations: _Equations, visits: NDArray[np.intp], robot: int, freedom: float, allowed: float) -> Drift | None:
+    slopes, deviations, length = equations.slopes()
     evidence = np.abs(slopes) / deviations
     best = int(np.argmax(evidence))
     needed = threshold(allowed, length, freedom)
-    if evidence[best] <= needed or _without_one(row, weight, best) < _STAYS * evidence[best]:
+    if evidence[best] <= needed or equations.without_one(best) < _STAYS * evidence[best]:
         return None
     onset = int(visits[best + _FEWEST_BEFORE])
     return Drift(robot, onset, float(np.expm1(slopes[best])), float(evidence[best]), needed)
-
-
-def _ramps(visits: int) -> Array:
-    """Ramps of slope 1 from every onset on, shape (n_onsets, n_visits)."""
-    onsets = np.arange(_FEWEST_BEFORE, visits - _FEWEST_ON + 1)
-    return np.asarray(np.maximum(np.arange(visits) - onsets[:, None] + 1.0, 0.0))
-
-
-def _slopes(row: Array, weight: Array) -> tuple[Array, Array, float]:
-    """Slopes for all onsets beside an unknown level, their standard deviations, and the length of the curve of normed ramps [rad]."""
-    ramps = _ramps(len(row))
-    ramps = ramps - (ramps @ weight / weight.sum())[:, None]
-    square = (ramps**2) @ weight
-    normed = ramps * np.sqrt(weight) / np.sqrt(square)[:, None]
-    turned = np.arccos(np.clip(np.sum(normed[1:] * normed[:-1], axis=1), -1.0, 1.0))
-    return (ramps * weight) @ row / square, 1.0 / np.sqrt(square), float(turned.sum())
-
-
-def _without_one(row: Array, weight: Array, onset: int) -> float:
-    """Least evidence for a ramp from an onset on with any one visit left out."""
-    ramp = _ramps(len(row))[onset]
-    kept = weight * (1.0 - np.eye(len(row)))
-    centred = ramp - (kept @ ramp / kept.sum(axis=1))[:, None]
-    part, square = (kept * centred) @ row, np.sum(kept * centred**2, axis=1)
-    return float(np.min(np.sign(part.sum()) * part / np.sqrt(square)))
 
 
 def odd_ones(values: Array) -> list[tuple[int, float, float, float]]:

@@ -127,7 +127,7 @@ def _cause(what: str, joint: int | None) -> str:
 def _moving(parameters: pl.DataFrame, moves: list[Move]) -> Section:
     text = (
         "A parameter drifts if its logarithm, less what all robots did that day, follows a ramp from some visit to the last. "
-        "Noise that is independent from visit to visit shows one at most once in "
+        "Noise shows one at most once in "
         f"{1 / FALSE_ALARMS:.0f} visits of the whole fleet, all parameters together. "
         "A robot needs six visits before anything is said of it."
     )
