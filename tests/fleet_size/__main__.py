@@ -9,6 +9,9 @@ import click
 
 #: What decides how many threads a process takes; each process has one.
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
+CAUSES = click.option(
+    "--max-causes", type=click.IntRange(0), help="Causes named at most; those of a diagnosis by default."
+)
 FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 
 
@@ -32,15 +35,20 @@ def entries(cases: Path, broken: int, seconds: float, output: Path) -> None:
     click.echo(write_entries(cases, broken, seconds, output))
 
 
+def _options(max_causes: int | None) -> list[str]:
+    return [] if max_causes is None else ["--max-causes", str(max_causes)]
+
+
 @main.command()
 @click.argument("folder", type=FOLDER)
 @click.option("--kill-after", type=click.IntRange(1), default=150, help="Results that stand when the run is killed.")
 @click.option("--workers", type=click.IntRange(1), default=1, help="Processes.")
-def restart(folder: Path, kill_after: int, workers: int) -> None:
+@CAUSES
+def restart(folder: Path, kill_after: int, workers: int, max_causes: int | None) -> None:
     """Run the manifest, killed once and started again."""
     from .running import killed_and_restarted
 
-    click.echo(killed_and_restarted(folder, kill_after, workers))
+    click.echo(killed_and_restarted(folder, kill_after, workers, _options(max_causes)))
 
 
 @main.command()
@@ -49,22 +57,24 @@ def restart(folder: Path, kill_after: int, workers: int) -> None:
 @click.option(
     "--entries", "most", type=click.IntRange(2), help="First entries of the manifest, an even number; all by default."
 )
-def ray(folder: Path, nodes: int, most: int | None) -> None:
+@CAUSES
+def ray(folder: Path, nodes: int, most: int | None, max_causes: int | None) -> None:
     """Run the manifest on a Ray cluster and compare its tables with those of the other run."""
     from .running import on_ray
 
-    click.echo(on_ray(folder, nodes, most))
+    click.echo(on_ray(folder, nodes, most, _options(max_causes)))
 
 
 @main.command()
 @click.argument("folder", type=FOLDER)
 @click.option("--entries", "count", type=click.IntRange(2), default=30, help="Entries per run.")
+@CAUSES
 @click.option("--pairs", type=click.IntRange(1), default=3, help="Rounds of one run with one worker and one with two.")
-def scaling(folder: Path, count: int, pairs: int) -> None:
+def scaling(folder: Path, count: int, pairs: int, max_causes: int | None) -> None:
     """Compare one worker with two."""
     from .scaling import scaling as table
 
-    click.echo(table(folder, count, pairs))
+    click.echo(table(folder, count, pairs, {} if max_causes is None else {"max_causes": max_causes}))
 
 
 if __name__ == "__main__":

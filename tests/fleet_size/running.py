@@ -17,9 +17,9 @@ COMMAND = [sys.executable, "-c", "from armgap.cli import main; main()", "fleet"]
 LOCAL, ON_RAY = "local", "ray"
 
 
-def killed_and_restarted(folder: Path, kill_after: int, workers: int) -> str:
+def killed_and_restarted(folder: Path, kill_after: int, workers: int, options: list[str]) -> str:
     """Start the command, kill it once so many entries stand, start it again; say what was repeated."""
-    words = [*COMMAND, str(folder / "manifest.csv"), "-o", str(folder / LOCAL), "--workers", str(workers)]
+    words = [*COMMAND, str(folder / "manifest.csv"), "-o", str(folder / LOCAL), "--workers", str(workers), *options]
     diagnoses = folder / LOCAL / "diagnoses"
     began = time.perf_counter()
     running = subprocess.Popen(words, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -42,13 +42,23 @@ def _standing(diagnoses: Path) -> dict[str, int]:
     return {p.name: p.stat().st_mtime_ns for p in diagnoses.glob("*.json")} if diagnoses.is_dir() else {}
 
 
-def on_ray(folder: Path, nodes: int, most: int | None) -> str:
+def on_ray(folder: Path, nodes: int, most: int | None, options: list[str]) -> str:
     """Run the manifest, or its first entries, on a cluster of so many nodes, and compare its tables with the local ones."""
     lines = (folder / "manifest.csv").read_text(encoding="utf-8").splitlines()
     (folder / "ray.csv").write_text("\n".join(lines[: None if most is None else most + 1]) + "\n", encoding="utf-8")
     with _cluster(nodes) as address:
         began = time.perf_counter()
-        words = [*COMMAND, str(folder / "ray.csv"), "-o", str(folder / ON_RAY), "--engine", "ray", "--address", address]
+        words = [
+            *COMMAND,
+            str(folder / "ray.csv"),
+            "-o",
+            str(folder / ON_RAY),
+            "--engine",
+            "ray",
+            "--address",
+            address,
+            *options,
+        ]
         done = subprocess.run(words, capture_output=True, text=True, check=True).stdout
         seconds = time.perf_counter() - began
     return f"{done}{nodes} nodes, {seconds:.0f} s\n{compared(folder / LOCAL, folder / ON_RAY)}"

@@ -12,11 +12,15 @@ import shutil
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from armgap.fleet import Entry, read_manifest, run_fleet
 from armgap.fleet.work import answer
+
+
+Settings = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class Cost:
     entries_s: float
 
 
-def scaling(folder: Path, entries: int, pairs: int) -> str:
+def scaling(folder: Path, entries: int, pairs: int, settings: Settings) -> str:
     """Return the table of the rounds."""
     chosen = read_manifest(folder / "manifest.csv")
     sound = [entry for entry in chosen if all(Path(place).is_file() for place in entry.files)][:entries]
@@ -39,9 +43,9 @@ def scaling(folder: Path, entries: int, pairs: int) -> str:
     ]
     ratios, busy, cpu, overheads = [], [], [], []
     for number in range(pairs):
-        one, two = (_run(sound, place, workers) for workers in (1, 2))
-        plain = _plain(sound)
-        start = _run([_failing(i) for i in range(2)], place, 1).cpu_s
+        one, two = (_run(sound, place, workers, settings) for workers in (1, 2))
+        plain = _plain(sound, settings)
+        start = _run([_failing(i) for i in range(2)], place, 1, settings).cpu_s
         ratios.append(one.wall_s / two.wall_s)
         busy.append(two.entries_s / (2.0 * two.wall_s))
         cpu.append(two.cpu_s / one.cpu_s)
@@ -68,19 +72,19 @@ def _cpu() -> float:
     )
 
 
-def _run(entries: list[Entry], place: Path, workers: int) -> Cost:
+def _run(entries: list[Entry], place: Path, workers: int, settings: Settings) -> Cost:
     shutil.rmtree(place, ignore_errors=True)
     cpu, wall = _cpu(), time.perf_counter()
-    fleet = run_fleet(entries, place, workers=workers)
+    fleet = run_fleet(entries, place, settings, workers=workers)
     cost = time.perf_counter() - wall, _cpu() - cpu
     seconds = fleet.summary.unique(["robot", "time"])["seconds"].sum()
     shutil.rmtree(place, ignore_errors=True)
     return Cost(*cost, float(seconds))
 
 
-def _plain(entries: list[Entry]) -> float:
+def _plain(entries: list[Entry], settings: Settings) -> float:
     """Processor time of the diagnoses alone [s]."""
     cpu = time.process_time()
     for entry in entries:
-        answer(entry, {})
+        answer(entry, settings)
     return time.process_time() - cpu
