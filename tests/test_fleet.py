@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -22,7 +23,8 @@ from armgap.fleet.manifest import ManifestError
 from armgap.fleet.page import fleet_document
 from armgap.fleet.series import moving, odd
 from armgap.fleet.tables import PARAMETERS, SUMMARY
-from armgap.fleet.work import answer_within
+from armgap.fleet.work import answer, answer_within
+from fleet_size.broken import WAYS
 from fleets import fleet_of
 from swings import off, swing
 
@@ -99,11 +101,26 @@ def test_an_entry_that_takes_too_long_is_lost_and_tried_again(place: Path) -> No
     assert run_fleet(entries, place / "slow").failed.height == 0
 
 
+def test_each_way_of_being_broken_has_its_own_line(place: Path, tmp_path: Path) -> None:
+    said = set()
+    for way in WAYS:
+        arm, log = tmp_path / f"{way.__name__}.toml", tmp_path / f"{way.__name__}.parquet"
+        shutil.copyfile(place / "arm.toml", arm)
+        shutil.copyfile(place / "run-1.parquet", log)
+        way(arm, log)
+        outcome = answer(Entry("r", str(arm), (str(log),), (), "", 1), {})
+        assert f"{tmp_path}/{way.__name__}." in outcome["error"]
+        assert "\n" not in outcome["error"]
+        said.add(outcome["error"].split(": ", 1)[1])
+    assert len(said) == len(WAYS)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_an_entry_is_stopped_within_its_own_process(place: Path) -> None:
     """As on a Ray cluster, where nothing outside of the process stops it."""
     [entry] = read_manifest(place / "manifest.csv")[:1]
-    late = answer_within(entry, {}, 0.01)
-    assert "took longer than 0.01 s" in late["lost"]
+    late = answer_within(entry, {}, 0.05)
+    assert "took longer than 0.05 s" in late["lost"]
     assert "diagnosis" in answer_within(entry, {}, 600.0)
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 

@@ -19,7 +19,6 @@ import numpy as np
 from armgap.fleet import Entry, read_manifest, run_fleet
 from armgap.fleet.work import answer
 
-
 Settings = dict[str, Any]
 
 
