@@ -218,9 +218,12 @@ def test_the_page_says_what_moves() -> None:
     ]
     parameters = pl.DataFrame(rows, schema=PARAMETERS, orient="row")
     assert [(move.robot, move.name) for move in moving(parameters)] == [("robot 7", "coulomb1")]
-    first = next(odd(parameters))
+    first = odd(parameters)[0]
     assert (first.robot, first.of, first.name) == ("robot 3", "arm", "coulomb1")
     row = ("robot 7", None, "none", None, None, None, 0.0, 0.0, 0.1, None)
     document = fleet_document(Fleet(Path(), pl.DataFrame([row], schema=SUMMARY, orient="row"), parameters, 0))
     assert "robot 7" in document.answers[0].headline
     assert "robot 3" in document.answers[1].headline
+    assert document.answers[2].headline == "nothing is named"
+    only_parameters = Fleet(Path(), pl.DataFrame([row], schema=SUMMARY, orient="row"), parameters, 0, {"max_causes": 0})
+    assert fleet_document(only_parameters).answers[2].headline == "not asked"

@@ -232,6 +232,9 @@ def test_a_robot_far_from_the_others_is_odd() -> None:
     assert usual == pytest.approx(2.0 * fleet, rel=0.2)
     assert apart > 5
     assert odd_ones(values[:3]) == []
+    # A third of the robots are not odd but another model.
+    values[8:15] *= 2.0
+    assert odd_ones(values) == []
 
 
 def test_the_study_judges_answers() -> None:

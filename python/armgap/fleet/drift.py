@@ -51,6 +51,8 @@ _MOST_MEMORY = 0.9
 _NOTHING, _CLOSE = 1e-30, 1e-6
 # A robot is odd from this many robust standard deviations on.
 _ODD = 5.0
+# Share of the robots from which on they are not odd but of several models.
+_SEVERAL_MODELS = 0.2
 # Standard deviation of normal numbers over the median of their absolute values.
 _MAD = 1.4826
 
@@ -323,7 +325,7 @@ def _drift(equations: _Equations, visits: NDArray[np.intp], robot: int, freedom:
 
 
 def odd_ones(values: Array) -> list[tuple[int, float, float, float]]:
-    """Return robots whose usual value lies far from the others', the farthest first.
+    """Return robots whose usual value lies far from the others', the farthest first; none where many do, as in a fleet of several models.
 
     Parameters
     ----------
@@ -344,5 +346,7 @@ def odd_ones(values: Array) -> list[tuple[int, float, float, float]]:
     if spread <= 0:
         return []
     apart = (usual - fleet) / spread
-    far = (int(i) for i in np.argsort(-np.abs(apart)) if known[i] and abs(apart[i]) > _ODD)
+    far = [int(i) for i in np.argsort(-np.abs(apart)) if known[i] and abs(apart[i]) > _ODD]
+    if len(far) > max(1.0, _SEVERAL_MODELS * np.count_nonzero(known)):
+        return []
     return [(i, float(usual[i]), fleet, float(apart[i])) for i in far]

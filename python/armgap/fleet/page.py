@@ -28,14 +28,14 @@ _MIDNIGHT = "T00:00:00"
 def fleet_document(fleet: Fleet) -> Document:
     """Return the page of a fleet."""
     robots = fleet.summary["robot"].n_unique()
-    moves, odd_ones = list(moving(fleet.parameters)), list(odd(fleet.parameters))
+    moves, odd_ones = list(moving(fleet.parameters)), odd(fleet.parameters)
     failed, done = fleet.failed.height, fleet.summary.filter(pl.col("error").is_null())
     diagnoses = done.unique(["robot", "time", "seconds"]).height
     lead = f"{diagnoses} diagnoses of {robots} robots; entries without one: {failed}."
     answers = [
         SummaryAnswer("What drifts?", *_listed([moved(m) for m in moves], "nothing", "parameters that grow or fall steadily")),
         SummaryAnswer("Which robot is the odd one?", *_listed([_odd_one(o) for o in odd_ones], "none", "values far from the other robots'")),
-        SummaryAnswer("What is most often the cause?", *_commonest(fleet.summary)),
+        SummaryAnswer("What is most often the cause?", *_commonest(fleet)),
     ]  # fmt: skip
     sections = [_causes(fleet.summary), _moving(fleet.parameters, moves), _odd(odd_ones), _failures(fleet.failed)]
     return Document("Fleet", lead, answers, [section for section in sections if section is not None])
@@ -78,8 +78,10 @@ def _listed(found: list[str], none: str, of: str) -> tuple[str, str]:
     return found[0], f"{of}{more}"
 
 
-def _commonest(summary: pl.DataFrame) -> tuple[str, str]:
-    named = summary.filter(pl.col("effect").is_not_null())
+def _commonest(fleet: Fleet) -> tuple[str, str]:
+    if fleet.settings.get("max_causes") == 0:
+        return "not asked", "no cause was to be named, parameters only were estimated"
+    named = fleet.summary.filter(pl.col("effect").is_not_null())
     if not named.height:
         return "nothing is named", "no diagnosis names an effect"
     counts = named.group_by(["effect", "joint"]).agg(pl.col("robot").n_unique().alias("robots"))
@@ -167,7 +169,10 @@ def _course(parameters: pl.DataFrame, move: Move) -> Drawing:
 
 
 def _odd(found: list[Odd]) -> Section:
-    text = "A robot is odd if its usual value (median over its visits) lies more than five robust standard deviations from the fleet's median."
+    text = (
+        "A robot is odd if its usual value (median over its visits) lies more than five robust standard deviations from the fleet's median. "
+        "Where more than a fifth of the robots do, they are taken for arms of several models, and nothing is said."
+    )
     rows = [(o.robot, _named(o.of, o.name), figure(o.usual), figure(o.fleet), f"{o.apart:+.1f}") for o in found[:_ROWS]]
     tables = (
         [Table(("robot", "parameter", "its median", "the fleet's", "robust standard deviations"), rows)] if rows else []

@@ -124,14 +124,17 @@ def moving(parameters: pl.DataFrame) -> Iterator[Move]:
             yield Move(series.robots[drift.robot], series.of, series.name, visit, since, drift)
 
 
-def odd(parameters: pl.DataFrame) -> Iterator[Odd]:
-    """Yield robots whose parameters lie far from the others'.
+def odd(parameters: pl.DataFrame) -> list[Odd]:
+    """Return robots whose parameters lie far from the others', the farthest first.
 
     Parameters
     ----------
     parameters : polars.DataFrame
         As ``parameters.parquet``.
     """
-    for series in series_of(parameters):
-        for robot, usual, fleet, apart in odd_ones(series.values):
-            yield Odd(series.robots[robot], series.of, series.name, usual, fleet, apart)
+    found = [
+        Odd(series.robots[robot], series.of, series.name, usual, fleet, apart)
+        for series in series_of(parameters)
+        for robot, usual, fleet, apart in odd_ones(series.values)
+    ]
+    return sorted(found, key=lambda one: -abs(one.apart))
