@@ -17,5 +17,6 @@ file         what
 from armgap.fleet.engines import ENGINES
 from armgap.fleet.folder import Fleet, run_fleet
 from armgap.fleet.manifest import Entry, read_manifest
+from armgap.fleet.series import Move, moving
 
-__all__ = ["ENGINES", "Entry", "Fleet", "read_manifest", "run_fleet"]
+__all__ = ["ENGINES", "Entry", "Fleet", "Move", "moving", "read_manifest", "run_fleet"]

@@ -47,7 +47,7 @@ _VAGUE = 0.3
 _KNOWN = 1e6
 # Largest autocorrelation: beyond it scatter is a random walk, which no test tells from a drift.
 _MOST_MEMORY = 0.9
-# Squared logarithm that counts as no change at all, and relative accuracy of the scatter.
+# Squared logarithm that counts as no change at all, and accuracy of the scatter, relative to the largest step.
 _NOTHING, _CLOSE = 1e-30, 1e-6
 # A robot is odd from this many robust standard deviations on.
 _ODD = 5.0
@@ -175,8 +175,9 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
     def excess(scatter: float) -> float:
         return float(np.median(dispersions(scatter)[seen] / _median_of_mean_square(own[seen]))) - 1.0
 
-    low, high = 0.0, float(np.sqrt(np.nanmax(square)))
-    while high - low > _CLOSE * high:
+    largest = float(np.sqrt(np.nanmax(square)))
+    low, high = 0.0, largest
+    while high - low > _CLOSE * largest:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if excess(middle) > 0 else (low, middle)
     raw = dispersions(high)
