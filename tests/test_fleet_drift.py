@@ -9,7 +9,7 @@ import pytest
 from armgap.fleet.drift import FALSE_ALARMS, drifts, fleet_memory, fleet_scatter, odd_ones, relative, threshold
 from armgap.fleet.series import moving, series_of
 from armgap.fleet.tables import PARAMETERS
-from fleet_drift.judging import ask, report
+from fleet_drift.judging import ask, in_time, report
 from fleet_drift.rows import FRICTION, table
 from fleet_drift.truth import Design, draw, robot_name
 from fleets import fleet_of
@@ -245,11 +245,14 @@ def test_the_study_judges_answers() -> None:
     name = (robot_name(truth.rising[1]), FRICTION[truth.rising[0]])
     rows = table(np.random.default_rng(2), design, truth)
     late = ask(rows, design, name, lambda seen: [name] if seen.height >= 12 * 9 * 4 else [])
-    assert (late.found, late.false, late.in_time) == (2, frozenset(), True)
+    assert (late.found, late.false, in_time(late.found, late.known)) == (2, frozenset(), True)
     assert late.known is not None
     assert 2 <= late.known <= 4
     never = ask(rows, design, name, lambda seen: [])
-    assert (never.found, never.in_time) == (None, False)
+    assert (never.found, in_time(never.found, never.known)) == (None, False)
     always = ask(rows, design, name, lambda seen: [name])
     assert (always.found, always.false) == (1, frozenset({name}))
-    assert "found in time: 2; with something else named: 1" in report([late, never, always], [])
+    told = report([late, never, always], [never, always])
+    assert "with a drift: 3; with something else named: 1" in told
+    assert "robot and parameter too: 2" in told
+    assert "without a drift: 2; with something named: 1" in told
