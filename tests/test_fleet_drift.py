@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from armgap.fleet.drift import FALSE_ALARMS, drifts, fleet_memory, fleet_scatter, odd_ones, relative, threshold
+from armgap.fleet.drift import FALSE_ALARMS, drifts, fleet_autocorrelation, fleet_scatter, odd_ones, relative, threshold
 from armgap.fleet.series import moving, series_of
 from armgap.fleet.tables import PARAMETERS
 from fleet_drift.judging import ask, in_time, report
@@ -127,8 +127,8 @@ def lasting(rng: np.random.Generator, correlation: float, robots: int = 20, visi
 
 def test_scatter_that_lasts_until_the_next_visit_is_no_drift() -> None:
     rng = np.random.default_rng(16)
-    assert fleet_memory(lasting(rng, 0.0, visits=200)) == pytest.approx(0.0, abs=0.03)
-    assert fleet_memory(lasting(rng, 0.5, visits=200)) == pytest.approx(0.5, abs=0.05)
+    assert fleet_autocorrelation(lasting(rng, 0.0, visits=200)) == pytest.approx(0.0, abs=0.03)
+    assert fleet_autocorrelation(lasting(rng, 0.5, visits=200)) == pytest.approx(0.5, abs=0.05)
     false = sum(bool(drifts(np.exp(0.1 * lasting(rng, 0.5)))) for _ in range(30))
     assert false <= 2
     # Nor does it hide one: friction that rises by 6 % per visit.

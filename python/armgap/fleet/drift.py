@@ -12,7 +12,7 @@ differences between neighbouring visits, which a ramp hardly changes, are what t
 et al. 1941). A robot's own dispersion about it is drawn towards the fleet's by as much as the robots agree (Smyth 2004), so that a
 robot that scatters more than the others is judged by its own scatter.
 
-**Memory.** What a visit scatters by may last until the next: a first-order autocorrelation common to the fleet, from differences between
+**Autocorrelation.** What a visit scatters by may last until the next: a first-order autocorrelation common to the fleet, from differences between
 neighbours and between visits two apart, as far as it is more than chance. Equations are whitened by it (Prais and Winsten 1954).
 
 **Threshold.** With normal errors and a variance of ``nu`` degrees of freedom, the largest statistic of a family of ramps that is a curve of length
@@ -27,7 +27,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FALSE_ALARMS", "Drift", "drifts", "fleet_memory", "fleet_scatter", "odd_ones", "relative", "threshold"]
+__all__ = [
+    "FALSE_ALARMS",
+    "Drift",
+    "drifts",
+    "fleet_autocorrelation",
+    "fleet_scatter",
+    "odd_ones",
+    "relative",
+    "threshold",
+]
 
 Array = NDArray[np.float64]
 FALSE_ALARMS = 2e-3
@@ -46,7 +55,7 @@ _VAGUE = 0.3
 # Degrees of freedom that count as a known scatter.
 _KNOWN = 1e6
 # Largest autocorrelation: beyond it scatter is a random walk, which no test tells from a drift.
-_MOST_MEMORY = 0.9
+_MOST_CORRELATION = 0.9
 # Squared logarithm that counts as no change at all, and accuracy of the scatter, relative to the largest step.
 _NOTHING, _CLOSE = 1e-30, 1e-6
 # A robot is odd from this many robust standard deviations on.
@@ -100,16 +109,16 @@ def drifts(values: Array, sigma: Array | None = None, *, tests: int | None = Non
     if not long.any():
         return []
     scatter, dispersion, freedom = fleet_scatter(series, error)
-    memory = fleet_memory(series)
+    correlation = fleet_autocorrelation(series)
     allowed = FALSE_ALARMS / max(tests or len(series), 1)
     found = []
     for robot in np.flatnonzero(long):
         visits = np.flatnonzero(np.isfinite(series[robot]))
         square = error[robot, visits] ** 2
-        before = memory**2 * np.roll(square, 1)
-        before[0] = -(memory**2) * square[0]
-        weight = 1.0 / (dispersion[robot] * (scatter**2 * (1.0 + memory) + square + before) + _NOTHING)
-        equations = _Equations(series[robot, visits], weight, memory)
+        before = correlation**2 * np.roll(square, 1)
+        before[0] = -(correlation**2) * square[0]
+        weight = 1.0 / (dispersion[robot] * (scatter**2 * (1.0 + correlation) + square + before) + _NOTHING)
+        equations = _Equations(series[robot, visits], weight, correlation)
         found.append(_drift(equations, visits, int(robot), float(freedom[robot]), allowed))
     return sorted((drift for drift in found if drift is not None), key=lambda drift: -drift.evidence)
 
@@ -164,7 +173,7 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
     """
     square, errors = _steps(series, error)
     steps = np.count_nonzero(np.isfinite(square), axis=1)
-    own, seen = _freedom(steps), steps > 0
+    each, seen = _freedom(steps), steps > 0
     if not seen.any():
         return 0.0, np.ones(len(series)), np.full(len(series), _KNOWN)
 
@@ -173,7 +182,7 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
         return np.asarray(np.nansum(share, axis=1) / np.maximum(steps, 1))
 
     def excess(scatter: float) -> float:
-        return float(np.median(dispersions(scatter)[seen] / _median_of_mean_square(own[seen]))) - 1.0
+        return float(np.median(dispersions(scatter)[seen] / _median_of_mean_square(each[seen]))) - 1.0
 
     largest = float(np.sqrt(np.nanmax(square)))
     low, high = 0.0, largest
@@ -181,12 +190,12 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if excess(middle) > 0 else (low, middle)
     raw = dispersions(high)
-    prior = _prior_freedom(raw[seen], own[seen])
-    dispersion = np.where(seen, (prior + own * raw) / (prior + own), 1.0)
-    return high, dispersion, np.minimum(own + prior, own.sum())
+    prior = _prior_freedom(raw[seen], each[seen])
+    dispersion = np.where(seen, (prior + each * raw) / (prior + each), 1.0)
+    return high, dispersion, np.minimum(each + prior, each.sum())
 
 
-def fleet_memory(series: Array) -> float:
+def fleet_autocorrelation(series: Array) -> float:
     """Return the first-order autocorrelation of what visits scatter by, 0 where it is no more than chance.
 
     ``1 + rho`` is the mean square of differences between visits two apart over that between neighbours, both relative to the robot's own
@@ -205,7 +214,7 @@ def fleet_memory(series: Array) -> float:
     apart = np.array([[np.mean((row[k:] - row[:-k]) ** 2) for k in (1, 2)] for row in long])
     neighbours, two_apart = np.mean(apart / apart.sum(axis=1, keepdims=True), axis=0)
     chance = np.sqrt(2.0 / sum(len(row) for row in long))
-    return float(np.clip(two_apart / neighbours - 1.0 - chance, 0.0, _MOST_MEMORY))
+    return float(np.clip(two_apart / neighbours - 1.0 - chance, 0.0, _MOST_CORRELATION))
 
 
 def _steps(series: Array, error: Array) -> tuple[Array, Array]:
@@ -269,19 +278,19 @@ class _Equations:
     ----------
     row, weight : ndarray, shape (n_visits,)
         Logarithms, and the inverse variance of each equation.
-    memory : float
+    correlation : float
         First-order autocorrelation.
     """
 
     row: Array
     weight: Array
-    memory: float
+    correlation: float
 
     def whitened(self, x: Array) -> Array:
         """Columns less what the visit before lets expect of them (Prais and Winsten 1954)."""
         white = x.astype(np.float64)
-        white[..., 1:] -= self.memory * x[..., :-1]
-        white[..., 0] *= np.sqrt(1.0 - self.memory**2)
+        white[..., 1:] -= self.correlation * x[..., :-1]
+        white[..., 0] *= np.sqrt(1.0 - self.correlation**2)
         return white
 
     def ramps(self) -> Array:
