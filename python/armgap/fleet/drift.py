@@ -41,7 +41,7 @@ __all__ = [
 Array = NDArray[np.float64]
 FALSE_ALARMS = 2e-3
 """False alarms of a fleet per visit of all its robots, over all parameters: at most one in 500 visits. The bound is wide, and a visit shares its
-evidence with those before: with normal scatter it is one in about 1700. Twice as many find a drift of 3 % per visit in a scatter of 10 % half a
+evidence with those before: with normal scatter it is one in about 1500. Twice as many find a drift of 3 % per visit in a scatter of 10 % a fifth of a
 visit sooner."""
 # Visits before a ramp that say where it started from, and fewest visits on it.
 _FEWEST_BEFORE, _FEWEST_ON = 3, 3
@@ -116,7 +116,7 @@ def drifts(values: Array, sigma: Array | None = None, *, tests: int | None = Non
         visits = np.flatnonzero(np.isfinite(series[robot]))
         square = error[robot, visits] ** 2
         before = correlation**2 * np.roll(square, 1)
-        before[0] = -(correlation**2) * square[0]
+        before[0] = -(correlation**2) * square[0]  # the first equation is scaled by sqrt(1 - rho^2)
         weight = 1.0 / (dispersion[robot] * (scatter**2 * (1.0 + correlation) + square + before) + _NOTHING)
         equations = _Equations(series[robot, visits], weight, correlation)
         found.append(_drift(equations, visits, int(robot), float(freedom[robot]), allowed))
