@@ -8,6 +8,7 @@ that the first was trained on. Some are broken, each in another way (`broken`). 
     python -m tests.fleet_size restart FLEET --kill-after 150
     python -m tests.fleet_size ray FLEET --nodes 2
     python -m tests.fleet_size scaling FLEET --entries 30 --pairs 3
+    python -m tests.fleet_size overhead FLEET
 
 ==============  ==============================================================================================
 file            what

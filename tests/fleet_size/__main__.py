@@ -77,5 +77,17 @@ def scaling(folder: Path, count: int, pairs: int, max_causes: int | None) -> Non
     click.echo(table(folder, count, pairs, {} if max_causes is None else {"max_causes": max_causes}))
 
 
+@main.command()
+@click.argument("folder", type=FOLDER)
+@click.option("--failing", type=click.IntRange(3), default=200, help="Entries that fail at once.")
+@click.option("--rounds", type=click.IntRange(1), default=5, help="Rounds.")
+@CAUSES
+def overhead(folder: Path, failing: int, rounds: int, max_causes: int | None) -> None:
+    """Say what a fleet costs per entry beside its diagnosis; after `restart`."""
+    from .scaling import overhead as figures
+
+    click.echo(figures(folder, failing, rounds, {} if max_causes is None else {"max_causes": max_causes}))
+
+
 if __name__ == "__main__":
     main()

@@ -1,8 +1,8 @@
 """One worker and two, in turns on the same entries; and what the fleet itself costs per entry.
 
-The machine may be shared: speeds are compared within one round, and the median of the rounds counts. Costs are processor time: of this
-process and its workers, less that of the same entries diagnosed here without a fleet, less that of starting a worker (a fleet of entries
-that fail at once).
+The machine may be shared: speeds are compared within one round, and the median of the rounds counts. What the fleet itself costs is processor
+time: of entries that fail at once, less that of starting a worker, and of a run over a folder in which all results stand, which hashes the
+files, reads the diagnoses and writes tables and page.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from armgap.fleet import Entry, read_manifest, run_fleet
-from armgap.fleet.work import answer
+
+from .running import LOCAL
 
 Settings = dict[str, Any]
 
@@ -40,25 +41,38 @@ def scaling(folder: Path, entries: int, pairs: int, settings: Settings) -> str:
         f"{len(sound)} entries; seconds",
         f"{'round':>6} {'1 worker':>9} {'2 workers':>10} {'ratio':>6} {'busy':>6} {'CPU of 2 over 1':>16}",
     ]
-    ratios, busy, cpu, overheads = [], [], [], []
+    ratios, busy, cpu = [], [], []
     for number in range(pairs):
         one, two = (_run(sound, place, workers, settings) for workers in (1, 2))
-        plain = _plain(sound, settings)
-        start = _run([_failing(i) for i in range(2)], place, 1, settings).cpu_s
         ratios.append(one.wall_s / two.wall_s)
         busy.append(two.entries_s / (2.0 * two.wall_s))
         cpu.append(two.cpu_s / one.cpu_s)
-        overheads.append(1e3 * (one.cpu_s - start - plain) / len(sound))
         lines.append(
             f"{number + 1:6d} {one.wall_s:9.1f} {two.wall_s:10.1f} {ratios[-1]:6.2f} {busy[-1]:6.2f} {cpu[-1]:16.2f}"
         )
     lines += [
         f"two workers are {np.median(ratios):.2f} times as fast as one (median; {min(ratios):.2f} to {max(ratios):.2f})",
         f"and busy {100 * np.median(busy):.0f} % of the time",
-        f"the fleet costs {np.median(overheads):.0f} ms of processor time per entry (median; {min(overheads):.0f} to {max(overheads):.0f}), "
-        f"of {1e3 * plain / len(sound):.0f} ms, and {start:.1f} s to start",
     ]
     return "\n".join(lines)
+
+
+def overhead(folder: Path, failing: int, rounds: int, settings: Settings) -> str:
+    """Return what the fleet costs per entry; the entries of the folder have been diagnosed with these settings."""
+    entries = read_manifest(folder / "manifest.csv")
+    place = folder / "scaling"
+    handing, standing = [], []
+    for _ in range(rounds):
+        few, many = (_run([_failing(i) for i in range(count)], place, 1, settings).cpu_s for count in (2, failing))
+        handing.append(1e3 * (many - few) / (failing - 2))
+        cpu = _cpu()
+        if run_fleet(entries, folder / LOCAL, settings).answered:
+            raise RuntimeError("the folder does not hold all results for these settings")
+        standing.append(1e3 * (_cpu() - cpu) / len(entries))
+    return "\n".join(
+        f"{what}: {np.median(found):.1f} ms of processor time per entry (median of {rounds}; {min(found):.1f} to {max(found):.1f})"
+        for what, found in (("handing out and keeping", handing), ("hashes, tables and page", standing))
+    )
 
 
 def _failing(number: int) -> Entry:
@@ -79,11 +93,3 @@ def _run(entries: list[Entry], place: Path, workers: int, settings: Settings) ->
     seconds = fleet.summary.unique(["robot", "time"])["seconds"].sum()
     shutil.rmtree(place, ignore_errors=True)
     return Cost(*cost, float(seconds))
-
-
-def _plain(entries: list[Entry], settings: Settings) -> float:
-    """Processor time of the diagnoses alone [s]."""
-    cpu = time.process_time()
-    for entry in entries:
-        answer(entry, settings)
-    return time.process_time() - cpu
