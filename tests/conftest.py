@@ -41,10 +41,11 @@ torque_limit = [200.0, 15.0]
 #: Files that take more than a few seconds (`pytest --durations=0`); `make check` leaves them out.
 SLOW = {
     "test_back_into_simulator", "test_commanded", "test_crosswise", "test_custom_effects", "test_demo", "test_docs", "test_docs_blocks",
-    "test_docs_site", "test_export_serial", "test_fleet", "test_hidden_states", "test_log_damaged", "test_odd_input", "test_output", "test_plan",
-    "test_progress", "test_pushes", "test_report", "test_report_browser", "test_reproduce", "test_rivals", "test_rounded_friction",
-    "test_second_simulator", "test_serial_diagnosis", "test_serial_identification", "test_serial_trial", "test_trial",
-    "test_trial_baselines", "test_trial_command", "test_trial_physics", "test_trial_scoring", "test_verdicts", "test_where",
+    "test_docs_site", "test_export_serial", "test_fleet", "test_fleet_drift", "test_hidden_states", "test_log_damaged",
+    "test_odd_input", "test_output", "test_plan", "test_progress", "test_pushes", "test_report", "test_report_browser", "test_reproduce",
+    "test_rivals", "test_rounded_friction", "test_second_simulator", "test_serial_diagnosis", "test_serial_identification",
+    "test_serial_trial", "test_trial", "test_trial_baselines", "test_trial_command", "test_trial_physics",
+    "test_trial_scoring", "test_verdicts", "test_where",
 }  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,10 +19,13 @@ import pytest
 from armgap import Arm
 from armgap.errors import OptionError
 from armgap.fleet import Entry, Fleet, read_manifest, run_fleet
-from armgap.fleet.drift import drifts, odd_ones
 from armgap.fleet.manifest import ManifestError
-from armgap.fleet.page import fleet_document, moving, odd
+from armgap.fleet.page import fleet_document
+from armgap.fleet.series import moving, odd
 from armgap.fleet.tables import PARAMETERS, SUMMARY
+from armgap.fleet.work import answer, answer_within
+from fleet_size.broken import WAYS
+from fleets import fleet_of
 from swings import off, swing
 
 
@@ -97,6 +101,30 @@ def test_an_entry_that_takes_too_long_is_lost_and_tried_again(place: Path) -> No
     assert run_fleet(entries, place / "slow").failed.height == 0
 
 
+def test_each_way_of_being_broken_has_its_own_line(place: Path, tmp_path: Path) -> None:
+    said = set()
+    for way in WAYS:
+        arm, log = tmp_path / f"{way.__name__}.toml", tmp_path / f"{way.__name__}.parquet"
+        shutil.copyfile(place / "arm.toml", arm)
+        shutil.copyfile(place / "run-1.parquet", log)
+        way(arm, log)
+        outcome = answer(Entry("r", str(arm), (str(log),), (), "", 1), {})
+        assert f"{tmp_path}/{way.__name__}." in outcome["error"]
+        assert "\n" not in outcome["error"]
+        said.add(outcome["error"].split(": ", 1)[1])
+    assert len(said) == len(WAYS)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_an_entry_is_stopped_within_its_own_process(place: Path) -> None:
+    """As on a Ray cluster, where nothing outside of the process stops it."""
+    [entry] = read_manifest(place / "manifest.csv")[:1]
+    late = answer_within(entry, {}, 0.05)
+    assert "took longer than 0.05 s" in late["lost"]
+    assert "diagnosis" in answer_within(entry, {}, 600.0)
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
 def test_a_run_that_was_killed_goes_on(place: Path) -> None:
     words = [
         sys.executable,
@@ -128,6 +156,15 @@ def test_the_command(fleet: Fleet, place: Path, run: Callable[..., tuple[int, st
     assert status == 0
     assert "6 entries" in out
     assert "broken.csv" in out
+    # Each entry that failed has one line, however long.
+    assert [line.split(":")[0] for line in out.splitlines() if line.startswith("west")] == ["west 2026-01-01", "west -"]
+    (place / "one.csv").write_text("".join((place / "manifest.csv").read_text(encoding="utf-8").splitlines(True)[:2]))
+    status, out, _ = run(
+        "fleet", str(place / "one.csv"), "-o", str(place / "few"), "--max-causes", "0", "--workers", "1"
+    )
+    assert (status, "1 computed now" in out) == (0, True)
+    [diagnosis] = (place / "few" / "diagnoses").iterdir()
+    assert json.loads(diagnosis.read_text(encoding="utf-8"))["options"]["max_causes"] == 0
     status, _, err = run(
         "fleet", str(place / "manifest.csv"), "-o", str(place / "out"), "--address", "here:1", "--again"
     )
@@ -171,43 +208,6 @@ def test_what_is_no_manifest(tmp_path: Path) -> None:
         read_manifest(tmp_path / "m.csv")
 
 
-def fleet_of(rng: np.random.Generator, robot: int | None, robots: int = 20, visits: int = 30) -> np.ndarray:
-    """Friction of a fleet with a scatter of 10 %; that of one robot rises by 3 % per visit from visit 10."""
-    values = np.exp(0.1 * rng.standard_normal((robots, visits)) + 0.1 * rng.standard_normal(visits))
-    if robot is not None:
-        values[robot, 10:] *= 1.03 ** np.arange(1, visits - 9)
-    return values
-
-
-def test_friction_that_rises_is_found_and_nothing_else() -> None:
-    rng = np.random.default_rng(2)
-    found, false = 0, 0
-    for _ in range(50):
-        robot = int(rng.integers(20))
-        named = [d.robot for d in drifts(fleet_of(rng, robot))]
-        found += robot in named
-        false += any(r != robot for r in named) or bool(drifts(fleet_of(rng, None)))
-    assert found >= 45
-    assert false <= 2
-
-
-def test_a_drift_says_since_when_and_how_fast() -> None:
-    [drift] = drifts(fleet_of(np.random.default_rng(5), 7))
-    assert drift.robot == 7
-    assert abs(drift.onset - 10) <= 4
-    assert drift.rate == pytest.approx(0.03, rel=0.4)
-
-
-def test_a_robot_far_from_the_others_is_odd() -> None:
-    values = fleet_of(np.random.default_rng(3), None)
-    assert odd_ones(values) == []
-    values[4] *= 2.0
-    [(robot, apart)] = odd_ones(values)
-    assert robot == 4
-    assert apart > 5
-    assert odd_ones(values[:3]) == []
-
-
 def test_the_page_says_what_moves() -> None:
     values = fleet_of(np.random.default_rng(5), 7)
     values[3] *= 3.0
@@ -217,9 +217,13 @@ def test_the_page_says_what_moves() -> None:
         for k, v in enumerate(row)
     ]
     parameters = pl.DataFrame(rows, schema=PARAMETERS, orient="row")
-    assert [(robot, name) for robot, _, name, _, _ in moving(parameters)] == [("robot 7", "coulomb1")]
-    assert next(odd(parameters))[:3] == ("robot 3", "arm", "coulomb1")
+    assert [(move.robot, move.name) for move in moving(parameters)] == [("robot 7", "coulomb1")]
+    first = odd(parameters)[0]
+    assert (first.robot, first.of, first.name) == ("robot 3", "arm", "coulomb1")
     row = ("robot 7", None, "none", None, None, None, 0.0, 0.0, 0.1, None)
     document = fleet_document(Fleet(Path(), pl.DataFrame([row], schema=SUMMARY, orient="row"), parameters, 0))
     assert "robot 7" in document.answers[0].headline
     assert "robot 3" in document.answers[1].headline
+    assert document.answers[2].headline == "nothing is named"
+    only_parameters = Fleet(Path(), pl.DataFrame([row], schema=SUMMARY, orient="row"), parameters, 0, {"max_causes": 0})
+    assert fleet_document(only_parameters).answers[2].headline == "not asked"

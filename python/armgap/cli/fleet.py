@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,11 @@ from armgap.progress import report_progress
 
 __all__ = ["command"]
 
+# Options that are handed on to each diagnosis.
+_SETTINGS = ("horizon", "max_causes")
+# Drifts that are listed; the page holds more.
+_DRIFTS = 10
+
 
 @click.command("fleet", cls=Command)
 @click.argument("manifest", type=InputFile(), metavar="MANIFEST")
@@ -29,6 +36,7 @@ __all__ = ["command"]
     "--workers", type=click.IntRange(min=1), default=os.cpu_count() or 1, show_default="all cores", help="Processes."
 )
 @click.option("--horizon", type=click.FloatRange(min=0, min_open=True), help="Prediction horizon [s].")
+@click.option("--max-causes", type=click.IntRange(min=0), help="Causes named at most; 0 estimates parameters only.")
 @click.option(
     "--limit",
     "limit_s",
@@ -39,29 +47,32 @@ __all__ = ["command"]
 )
 @click.option("--again", is_flag=True, help="Diagnose also what stands in the folder.")
 @quiet_option
-def command(manifest: str, folder: Path, engine: str, horizon: float | None, quiet: bool, **options: Any) -> None:
+def command(manifest: str, folder: Path, engine: str, quiet: bool, **options: Any) -> None:
     """Diagnose every entry of a manifest: who has what, what drifts, which robot is the odd one.
 
     The MANIFEST is CSV, Parquet or TOML with the columns robot, arm, logs, holdout, time; several logs are separated by ;.
     A run that was interrupted goes on where it stopped.
     """
     from armgap.fleet import read_manifest, run_fleet
+    from armgap.fleet.page import moved, plain_time
+    from armgap.fleet.series import moving
 
     def progress(done: int, total: int) -> None:
         report_progress(f"{done} of {total} entries", done / max(total, 1))
 
     entries = read_manifest(manifest)
-    settings = {} if horizon is None else {"horizon": horizon}
+    settings = {name: given for name in _SETTINGS if (given := options.pop(name)) is not None}
     with working("reading the manifest", quiet=quiet):
         fleet = run_fleet(entries, folder, settings, engine=engine, progress=progress, **options)
     if quiet:
         return
-    say = console()
+    say = partial(console().print, highlight=False, markup=False, soft_wrap=True)
     stood = len(entries) - fleet.answered
-    say.print(
-        f"{len(entries)} entries: {fleet.answered} diagnosed now, {stood} stood there, {fleet.failed.height} without a diagnosis",
-        highlight=False,
+    say(
+        f"{len(entries)} entries: {fleet.answered} computed now, {stood} stood there; {fleet.failed.height} without a diagnosis"
     )
     for row in fleet.failed.to_dicts():
-        say.print(f"{row['robot']} {row['time'] or ''}: {row['error']}", highlight=False, markup=False)
-    say.print(f"tables and page: {fleet.folder}", highlight=False, markup=False)
+        say(f"{row['robot']} {plain_time(row['time'])}: {row['error']}")
+    for move in islice(moving(fleet.parameters), _DRIFTS):
+        say(f"drifts: {moved(move)}")
+    say(f"tables and page: {fleet.folder}")

@@ -1,9 +1,23 @@
 """Parameters that grow from some visit on, and robots that differ from the others.
 
-A series is taken relative to the first visits, in logarithms, and less the median of all robots of its visit: what a day does to all is no
-drift. A ramp from an unknown visit on is looked for by the generalised likelihood ratio (Basseville and Nikiforov 1993, section 2.4.3): for
-every onset the slope by least squares, its square over its variance, the largest of all. The scatter is that of differences between
-neighbouring visits, which a ramp hardly changes, pooled over the fleet.
+**Series.** Logarithms of a parameter's estimates, less the robot's own median and less the median of all robots of the same day, as far as that
+varies by more than chance: what a day does to all is no drift.
+
+**Test.** A ramp from an unknown visit on is looked for by the generalised likelihood ratio (Basseville and Nikiforov 1993, section 2.4.3; for a
+changing mean Siegmund and Venkatraman 1995): for every onset the slope by weighted least squares beside an unknown level, over its standard
+deviation; the largest of all counts.
+
+**Scatter.** A visit's variance is that of its estimate plus a scatter from visit to visit, which is the fleet's: chosen so that the squared
+differences between neighbouring visits, which a ramp hardly changes, are what they have to be on the median robot (Paule and Mandel 1982; von Neumann
+et al. 1941). A robot's own dispersion about it is drawn towards the fleet's by as much as the robots agree (Smyth 2004), so that a
+robot that scatters more than the others is judged by its own scatter.
+
+**Autocorrelation.** What a visit scatters by may last until the next: a first-order autocorrelation common to the fleet, from differences between
+neighbours and between visits two apart, as far as it is more than chance. Equations are whitened by it (Prais and Winsten 1954).
+
+**Threshold.** With normal errors and a variance of ``nu`` degrees of freedom, the largest statistic of a family of ramps that is a curve of length
+``kappa`` on the sphere exceeds ``b`` with a probability of at most ``(1 + kappa/pi) (1 + b^2/nu)^(-nu/2)`` (Knowles and Siegmund 1989, with
+``2 Phi(-b) <= exp(-b^2/2)`` for the curve's ends). This is set to the false alarms allowed per visit over the number of series.
 """
 
 from __future__ import annotations
@@ -13,18 +27,41 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Drift", "drifts", "odd_ones"]
+__all__ = [
+    "FALSE_ALARMS",
+    "Drift",
+    "drifts",
+    "fleet_autocorrelation",
+    "fleet_scatter",
+    "odd_ones",
+    "relative",
+    "threshold",
+]
 
 Array = NDArray[np.float64]
-# A ramp counts from this many standard deviations of its slope on. With 20 robots, 30 visits and ten parameters, looked at after every visit,
-# noise alone gets there in one fleet of a hundred.
-_DRIFTS = 5.0
+FALSE_ALARMS = 2e-3
+"""False alarms of a fleet per visit of all its robots, over all parameters: at most one in 500 visits. The bound is wide, and a visit shares its
+evidence with those before: with normal scatter it is one in about 1500. Twice as many find a drift of 3 % per visit in a scatter of 10 % a fifth of a
+visit sooner."""
 # Visits before a ramp that say where it started from, and fewest visits on it.
 _FEWEST_BEFORE, _FEWEST_ON = 3, 3
-# Robots without which there is no fleet to compare with.
+# Robots without which there is no fleet to compare with: the median of three is often one of them.
 _FEWEST_ROBOTS = 4
+# Share of the evidence that stays with any one visit left out. A ramp over three visits keeps 0.6 of it without the last; one wild visit keeps
+# nothing.
+_STAYS = 0.5
+# Relative standard error from which on an estimate says nothing about its logarithm.
+_VAGUE = 0.3
+# Degrees of freedom that count as a known scatter.
+_KNOWN = 1e6
+# Largest autocorrelation: beyond it scatter is a random walk, which no test tells from a drift.
+_MOST_CORRELATION = 0.9
+# Squared logarithm that counts as no change at all, and accuracy of the scatter, relative to the largest step.
+_NOTHING, _CLOSE = 1e-30, 1e-6
 # A robot is odd from this many robust standard deviations on.
 _ODD = 5.0
+# Share of the robots from which on they are not odd but of several models.
+_SEVERAL_MODELS = 0.2
 # Standard deviation of normal numbers over the median of their absolute values.
 _MAD = 1.4826
 
@@ -38,88 +75,288 @@ class Drift:
     robot : int
         Row of the table.
     onset : int
-        Visit from which it changes.
+        Column from which it changes.
     rate : float
-        Relative change per visit.
+        Relative change per visit of the robot.
     evidence : float
         Standard deviations by which the rate differs from zero.
+    threshold : float
+        Standard deviations from which on it counts.
     """
 
     robot: int
     onset: int
     rate: float
     evidence: float
+    threshold: float
 
 
-def drifts(values: Array) -> list[Drift]:
+def drifts(values: Array, sigma: Array | None = None, *, tests: int | None = None) -> list[Drift]:
     """Return the series that hold a ramp up to their last visit, the surest first.
 
     Parameters
     ----------
     values : ndarray, shape (n_robots, n_visits)
-        One parameter; NaN where it was not estimated. Series with values of both signs are left out.
+        One parameter; NaN where it was not estimated. Columns are visits of the same day. Series with values of both signs are left out, and so are
+        robots of fewer than six visits.
+    sigma : ndarray, shape (n_robots, n_visits), optional
+        Standard errors of the values; unknown (NaN) ones count as zero, and so do all by default.
+    tests : int, optional
+        Series that are looked at, this parameter's and all others'; by default the robots of this one.
     """
-    series = relative(values)
-    scatter = _scatter(series)
-    if not np.isfinite(scatter) or scatter <= 0:
+    series, error = relative(values, sigma)
+    long = np.count_nonzero(np.isfinite(series), axis=1) >= _FEWEST_BEFORE + _FEWEST_ON
+    if not long.any():
         return []
-    found = (_ramp(row, scatter, robot) for robot, row in enumerate(series))
+    scatter, dispersion, freedom = fleet_scatter(series, error)
+    correlation = fleet_autocorrelation(series)
+    allowed = FALSE_ALARMS / max(tests or len(series), 1)
+    found = []
+    for robot in np.flatnonzero(long):
+        visits = np.flatnonzero(np.isfinite(series[robot]))
+        square = error[robot, visits] ** 2
+        before = correlation**2 * np.roll(square, 1)
+        before[0] = -(correlation**2) * square[0]  # the first equation is scaled by sqrt(1 - rho^2)
+        weight = 1.0 / (dispersion[robot] * (scatter**2 * (1.0 + correlation) + square + before) + _NOTHING)
+        equations = _Equations(series[robot, visits], weight, correlation)
+        found.append(_drift(equations, visits, int(robot), float(freedom[robot]), allowed))
     return sorted((drift for drift in found if drift is not None), key=lambda drift: -drift.evidence)
 
 
-def relative(values: Array) -> Array:
-    """Return logarithms of sizes, less the fleet's median of each visit and the robot's own level."""
+def relative(values: Array, sigma: Array | None = None) -> tuple[Array, Array]:
+    """Return logarithms of sizes, less the robot's own level and the fleet's median of each day, and their standard errors.
+
+    Parameters
+    ----------
+    values, sigma : ndarray, shape (n_robots, n_visits)
+        As for `drifts`.
+    """
     values = np.asarray(values, dtype=np.float64)
-    one_sign = np.nanmin(np.where(np.isnan(values), 1.0, np.sign(values)), axis=1) > 0
-    one_sign |= np.nanmax(np.where(np.isnan(values), -1.0, np.sign(values)), axis=1) < 0
+    error = np.zeros_like(values) if sigma is None else np.nan_to_num(np.abs(np.asarray(sigma, dtype=np.float64)))
     with np.errstate(divide="ignore", invalid="ignore"):
-        series = np.where(one_sign[:, None], np.log(np.abs(values)), np.nan)
-    series = series - _median(series, axis=1)[:, None]
-    if np.count_nonzero(one_sign) >= _FEWEST_ROBOTS:
-        series = series - _median(series, axis=0)[None, :]
-    return np.asarray(series)
+        error = error / np.abs(values)
+        known = np.isfinite(values) & (error < _VAGUE) & (values != 0)
+        one_sign = ~((known & (values > 0)).any(axis=1) & (known & (values < 0)).any(axis=1))
+        series = np.where(known & one_sign[:, None], np.log(np.abs(values)), np.nan)
+    series = series - _median(series, axis=1)
+    return series - _day(series), np.where(known, error, 0.0)
+
+
+def _day(series: Array) -> Array:
+    """What each day does to all robots, shape (n_visits,): their median, drawn to zero by as much as it is chance (James and Stein 1961)."""
+    robots = np.count_nonzero(np.isfinite(series), axis=0)
+    many = robots >= _FEWEST_ROBOTS
+    if not many.any():
+        return np.zeros(len(robots))
+    middle = _median(series, axis=0)[0]
+    apart = np.abs(series - middle)[:, many]
+    within = (_MAD * float(np.nanmedian(apart))) ** 2
+    # Variance of the median of normal numbers: pi/2 that of their mean.
+    chance = float(np.mean(0.5 * np.pi * within / robots[many]))
+    varies = float(np.mean(middle[many] ** 2))
+    share = max(0.0, 1.0 - chance / varies) if varies > 0 else 0.0
+    return np.where(many, share * middle, 0.0)
 
 
 def _median(x: Array, axis: int) -> Array:
     known = np.isfinite(x).any(axis=axis, keepdims=True)
-    return np.asarray(np.nanmedian(np.where(known, x, 0.0), axis=axis))
+    return np.asarray(np.nanmedian(np.where(known, x, 0.0), axis=axis, keepdims=True))
 
 
-def _scatter(series: Array) -> float:
-    steps = np.diff(series, axis=1)
-    steps = steps[np.isfinite(steps)]
-    return float(_MAD * np.median(np.abs(steps)) / np.sqrt(2.0)) if len(steps) else float("nan")
+def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
+    """Return the fleet's scatter from visit to visit, each robot's dispersion about it, and the degrees of freedom behind that.
+
+    Parameters
+    ----------
+    series, error : ndarray, shape (n_robots, n_visits)
+        Logarithms, NaN where unknown, and their standard errors.
+    """
+    square, errors = _steps(series, error)
+    steps = np.count_nonzero(np.isfinite(square), axis=1)
+    each, seen = _freedom(steps), steps > 0
+    if not seen.any():
+        return 0.0, np.ones(len(series)), np.full(len(series), _KNOWN)
+
+    def dispersions(scatter: float) -> Array:
+        share = square / (2.0 * scatter**2 + errors + _NOTHING)
+        return np.asarray(np.nansum(share, axis=1) / np.maximum(steps, 1))
+
+    def excess(scatter: float) -> float:
+        return float(np.median(dispersions(scatter)[seen] / _median_of_mean_square(each[seen]))) - 1.0
+
+    largest = float(np.sqrt(np.nanmax(square)))
+    low, high = 0.0, largest
+    while high - low > _CLOSE * largest:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if excess(middle) > 0 else (low, middle)
+    raw = dispersions(high)
+    prior = _prior_freedom(raw[seen], each[seen])
+    dispersion = np.where(seen, (prior + each * raw) / (prior + each), 1.0)
+    return high, dispersion, np.minimum(each + prior, each.sum())
 
 
-def _ramp(row: Array, scatter: float, robot: int) -> Drift | None:
-    visits = np.flatnonzero(np.isfinite(row))
-    best: Drift | None = None
-    for onset in visits[_FEWEST_BEFORE : len(visits) - _FEWEST_ON + 1]:
-        ramp = np.maximum(visits - onset + 1, 0).astype(np.float64)
-        ramp -= ramp.mean()
-        square = float(ramp @ ramp)
-        slope = float(ramp @ row[visits]) / square
-        evidence = abs(slope) * np.sqrt(square) / scatter
-        if evidence > _DRIFTS and (best is None or evidence > best.evidence):
-            best = Drift(robot, int(onset), float(np.expm1(slope)), float(evidence))
-    return best
+def fleet_autocorrelation(series: Array) -> float:
+    """Return the first-order autocorrelation of what visits scatter by, 0 where it is no more than chance.
+
+    ``1 + rho`` is the mean square of differences between visits two apart over that between neighbours, both relative to the robot's own
+    scatter; neither knows the level or, to first order, a drift. In white noise its variance is ``2/n`` for ``n`` visits, and one standard
+    deviation of it counts as chance.
+
+    Parameters
+    ----------
+    series : ndarray, shape (n_robots, n_visits)
+        Logarithms, NaN where unknown.
+    """
+    rows = [row[np.isfinite(row)] for row in series]
+    long = [row for row in rows if len(row) >= _FEWEST_BEFORE + _FEWEST_ON and np.ptp(row) > 0]
+    if not long:
+        return 0.0
+    apart = np.array([[np.mean((row[k:] - row[:-k]) ** 2) for k in (1, 2)] for row in long])
+    neighbours, two_apart = np.mean(apart / apart.sum(axis=1, keepdims=True), axis=0)
+    chance = np.sqrt(2.0 / sum(len(row) for row in long))
+    return float(np.clip(two_apart / neighbours - 1.0 - chance, 0.0, _MOST_CORRELATION))
 
 
-def odd_ones(values: Array) -> list[tuple[int, float]]:
-    """Return robots whose usual value lies far from the others', and by how many robust standard deviations.
+def _steps(series: Array, error: Array) -> tuple[Array, Array]:
+    """Squared differences between neighbouring known visits, NaN after the last, and what the estimates' errors add to them."""
+    square, errors = np.full(series.shape, np.nan), np.zeros(series.shape)
+    for robot, row in enumerate(series):
+        known = np.flatnonzero(np.isfinite(row))
+        if len(known) > 1:
+            square[robot, : len(known) - 1] = np.diff(row[known]) ** 2
+            errors[robot, : len(known) - 1] = error[robot, known[1:]] ** 2 + error[robot, known[:-1]] ** 2
+    return square, errors
+
+
+def _freedom(steps: NDArray[np.int64]) -> Array:
+    """Degrees of freedom of the mean square successive difference of ``n = steps + 1`` values (von Neumann et al. 1941: 2 (n-1)^2/(3n-4))."""
+    return np.asarray(2.0 * steps**2 / np.maximum(3.0 * steps - 1.0, 1.0))
+
+
+def _median_of_mean_square(freedom: Array) -> Array:
+    """Median of a chi-squared variable over its degrees of freedom (Wilson and Hilferty 1931)."""
+    return np.asarray((1.0 - 2.0 / (9.0 * freedom)) ** 3)
+
+
+def _prior_freedom(dispersion: Array, freedom: Array) -> float:
+    """Degrees of freedom that the fleet's scatter is worth beside a robot's own (Smyth 2004).
+
+    They follow from what the robots' logarithms vary by beyond chance and one standard error of it:
+    ``var log s^2 = psi'(d/2) + psi'(d0/2)``; robust over the robots, with ``psi'(x) = 1/x + 1/(2 x^2) + 1/(6 x^3)`` and its inverse ``1/2 + 1/y``.
+    """
+    if len(dispersion) < _FEWEST_ROBOTS:
+        return _KNOWN
+    logs = np.log(np.maximum(dispersion, _NOTHING))
+    half = freedom / 2.0
+    chance = float(np.median(1.0 / half + 1.0 / (2.0 * half**2) + 1.0 / (6.0 * half**3)))
+    spread = (_MAD * float(np.median(np.abs(logs - np.median(logs))))) ** 2
+    # Relative standard error of a squared median of absolute values, of a normal sample (Huber 1981, section 5.1).
+    beyond = spread - chance * (1.0 + 2.33 / np.sqrt(len(logs)))
+    return 1.0 + 2.0 / beyond if beyond > 2.0 / _KNOWN else _KNOWN
+
+
+def threshold(allowed: float, length: float, freedom: float) -> float:
+    """Return the standard deviations that noise exceeds with a probability of at most `allowed`.
+
+    Parameters
+    ----------
+    allowed : float
+        Probability, above 0 and below 1.
+    length : float
+        Of the curve that the normed ramps are [rad].
+    freedom : float
+        Degrees of freedom behind the scatter.
+    """
+    return float(np.sqrt(freedom * np.expm1(2.0 / freedom * np.log((1.0 + length / np.pi) / allowed))))
+
+
+@dataclass(frozen=True)
+class _Equations:
+    """A series as a level and a ramp from every onset on, whitened: one equation per visit.
+
+    Attributes
+    ----------
+    row, weight : ndarray, shape (n_visits,)
+        Logarithms, and the inverse variance of each equation.
+    correlation : float
+        First-order autocorrelation.
+    """
+
+    row: Array
+    weight: Array
+    correlation: float
+
+    def whitened(self, x: Array) -> Array:
+        """Columns less what the visit before lets expect of them (Prais and Winsten 1954)."""
+        white = x.astype(np.float64)
+        white[..., 1:] -= self.correlation * x[..., :-1]
+        white[..., 0] *= np.sqrt(1.0 - self.correlation**2)
+        return white
+
+    def ramps(self) -> Array:
+        """Ramps of slope 1 from every onset on, shape (n_onsets, n_visits)."""
+        onsets = np.arange(_FEWEST_BEFORE, len(self.row) - _FEWEST_ON + 1)
+        return self.whitened(np.maximum(np.arange(len(self.row)) - onsets[:, None] + 1.0, 0.0))
+
+    def beside(self, x: Array, y: Array) -> Array:
+        """Rows of `x` less their weighted projection on those of `y`, shapes (n, n_visits) or (n_visits,)."""
+        part = np.sum(x * self.weight * y, axis=-1) / np.sum(self.weight * y**2, axis=-1)
+        return np.asarray(x - part[..., None] * y)
+
+    def level(self) -> Array:
+        """Whitened column of the unknown level, shape (n_visits,)."""
+        return self.whitened(np.ones(len(self.row)))
+
+    def slopes(self) -> tuple[Array, Array, float]:
+        """Slopes for all onsets, their standard deviations, and the length of the curve of normed ramps [rad]."""
+        ramps = self.beside(self.ramps(), self.level())
+        square = (ramps**2) @ self.weight
+        normed = ramps * np.sqrt(self.weight) / np.sqrt(square)[:, None]
+        turned = np.arccos(np.clip(np.sum(normed[1:] * normed[:-1], axis=1), -1.0, 1.0))
+        return (ramps * self.weight) @ self.whitened(self.row) / square, 1.0 / np.sqrt(square), float(turned.sum())
+
+    def without_one(self, onset: int) -> float:
+        """Least evidence for a ramp with any one visit left out, which is to give it a parameter of its own."""
+        visit = self.whitened(np.eye(len(self.row)))
+        ramps = self.beside(self.beside(self.ramps()[onset], visit), self.beside(self.level(), visit))
+        part, square = (ramps * self.weight) @ self.whitened(self.row), (ramps**2) @ self.weight
+        return float(np.min(np.sign(part.sum()) * part / np.sqrt(square)))
+
+
+def _drift(equations: _Equations, visits: NDArray[np.intp], robot: int, freedom: float, allowed: float) -> Drift | None:
+    slopes, deviations, length = equations.slopes()
+    evidence = np.abs(slopes) / deviations
+    best = int(np.argmax(evidence))
+    needed = threshold(allowed, length, freedom)
+    if evidence[best] <= needed or equations.without_one(best) < _STAYS * evidence[best]:
+        return None
+    onset = int(visits[best + _FEWEST_BEFORE])
+    return Drift(robot, onset, float(np.expm1(slopes[best])), float(evidence[best]), needed)
+
+
+def odd_ones(values: Array) -> list[tuple[int, float, float, float]]:
+    """Return robots whose usual value lies far from the others', the farthest first; none where many do, as in a fleet of several models.
 
     Parameters
     ----------
     values : ndarray, shape (n_robots, n_visits)
         One parameter; NaN where it was not estimated.
+
+    Returns
+    -------
+    list of (robot, usual, fleet, apart)
+        Row, median of its visits, median of all robots' medians, and the robust standard deviations between them.
     """
     usual = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in values])
     known = np.isfinite(usual)
     if np.count_nonzero(known) < _FEWEST_ROBOTS:
         return []
-    middle = float(np.median(usual[known]))
-    spread = _MAD * float(np.median(np.abs(usual[known] - middle)))
+    fleet = float(np.median(usual[known]))
+    spread = _MAD * float(np.median(np.abs(usual[known] - fleet)))
     if spread <= 0:
         return []
-    apart = (usual - middle) / spread
-    return [(int(i), float(apart[i])) for i in np.argsort(-np.abs(apart)) if known[i] and abs(apart[i]) > _ODD]
+    apart = (usual - fleet) / spread
+    far = [int(i) for i in np.argsort(-np.abs(apart)) if known[i] and abs(apart[i]) > _ODD]
+    if len(far) > max(1.0, _SEVERAL_MODELS * np.count_nonzero(known)):
+        return []
+    return [(i, float(usual[i]), fleet, float(apart[i])) for i in far]

@@ -14,7 +14,7 @@ import pebble
 
 from armgap.errors import ArmgapError, OptionError
 from armgap.fleet.manifest import Entry
-from armgap.fleet.work import Outcome, answer
+from armgap.fleet.work import Outcome, answer, answer_within, took_too_long
 from armgap.workers import THREADS, one_thread
 
 __all__ = ["ENGINES", "Engine", "EngineMissingError"]
@@ -48,7 +48,7 @@ def local(
             try:
                 return future.result()
             except TookTooLong:
-                return {"lost": f"took longer than {limit_s:g} s", "seconds": limit_s}
+                return took_too_long(limit_s)
             except pebble.ProcessExpired as end:
                 return {"lost": f"its process ended with status {end.exitcode}", "seconds": 0.0}
 
@@ -72,7 +72,7 @@ def ray(
         runtime_env={"env_vars": threads},
         logging_level="ERROR",
     )
-    remote = cluster.remote(num_cpus=1, max_retries=0)(answer)
+    remote = cluster.remote(num_cpus=1, max_retries=0)(answer_within)
 
     def result(reference: Any) -> Outcome:
         try:
@@ -86,7 +86,9 @@ def ray(
 
     try:
         most = workers if address is None else max(workers, int(cluster.cluster_resources().get("CPU", workers)))
-        yield from _as_they_come(entries, most, lambda entry: remote.remote(entry, dict(settings)), result, first)
+        yield from _as_they_come(
+            entries, most, lambda entry: remote.remote(entry, dict(settings), limit_s), result, first
+        )
     finally:
         cluster.shutdown()
 

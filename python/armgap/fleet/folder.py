@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -41,13 +41,16 @@ class Fleet:
     summary, parameters : polars.DataFrame
         The tables, see docs/formats.md.
     answered : int
-        Entries diagnosed by this run; the others stood in the folder.
+        Entries computed by this run; the others stood in the folder.
+    settings : mapping
+        Keyword arguments that each diagnosis had.
     """
 
     folder: Path
     summary: pl.DataFrame
     parameters: pl.DataFrame
     answered: int
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def failed(self) -> pl.DataFrame:
@@ -83,7 +86,7 @@ def run_fleet(
     workers : int, default 1
         Processes.
     limit_s : float, default 600
-        Longest time for one entry on this machine [s].
+        Longest time for one entry [s].
     address : str, optional
         Of a Ray cluster that runs already.
     again : bool, default False
@@ -128,7 +131,7 @@ def run_fleet(
             else:
                 _keep(place, keys[entry], outcome)
             say(count, len(open_entries))
-    return _written(folder, keys, lost, len(open_entries))
+    return _written(folder, keys, lost, len(open_entries), settings)
 
 
 def _file(place: Path, key: str, *, failed: bool = False) -> Path:
@@ -148,7 +151,9 @@ def _keep(place: Path, key: str, outcome: Outcome) -> None:
         _file(place, key).unlink(missing_ok=True)
 
 
-def _written(folder: Path, keys: Mapping[Entry, str], lost: Mapping[str, Outcome], answered: int) -> Fleet:
+def _written(
+    folder: Path, keys: Mapping[Entry, str], lost: Mapping[str, Outcome], answered: int, settings: Mapping[str, Any]
+) -> Fleet:
     """Make tables and page of what stands in the folder, one diagnosis in memory at a time."""
     from armgap.fleet.page import fleet_document
     from armgap.report.output import render_report
@@ -168,6 +173,6 @@ def _written(folder: Path, keys: Mapping[Entry, str], lost: Mapping[str, Outcome
     tables = pl.DataFrame(summary, schema=SUMMARY), pl.DataFrame(parameters, schema=PARAMETERS)
     for name, table in zip((_SUMMARY, _PARAMETERS), tables, strict=True):
         write(folder / name, table.write_parquet)
-    fleet = Fleet(folder, *tables, answered)
+    fleet = Fleet(folder, *tables, answered, settings)
     write(folder / _PAGE, render_report(fleet_document(fleet), {}, _PAGE))
     return fleet

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
 
-from armgap.fleet.drift import Drift, drifts, odd_ones
+from armgap.fleet.drift import FALSE_ALARMS
+from armgap.fleet.series import Move, Odd, moving, odd
 from armgap.report import charts
 from armgap.report.document import Document
 from armgap.report.page import Bar, Drawing, Section, Table
-from armgap.report.words import SummaryAnswer, figure, joint_text, title
+from armgap.report.words import SummaryAnswer, figure, joint_text, parameter_text, title
 
 if TYPE_CHECKING:
     from armgap.fleet.folder import Fleet
 
-__all__ = ["fleet_document", "moving", "odd"]
+__all__ = ["fleet_document", "moved", "plain_time"]
 
 # Charts and rows that are shown; the tables hold all of them.
 _CHARTS, _ROWS = 6, 40
@@ -28,71 +28,47 @@ _MIDNIGHT = "T00:00:00"
 def fleet_document(fleet: Fleet) -> Document:
     """Return the page of a fleet."""
     robots = fleet.summary["robot"].n_unique()
-    moves, strangers = list(moving(fleet.parameters)), list(odd(fleet.parameters))
+    moves, odd_ones = list(moving(fleet.parameters)), odd(fleet.parameters)
     failed, done = fleet.failed.height, fleet.summary.filter(pl.col("error").is_null())
     diagnoses = done.unique(["robot", "time", "seconds"]).height
     lead = f"{diagnoses} diagnoses of {robots} robots; entries without one: {failed}."
     answers = [
-        SummaryAnswer("What drifts?", *_listed([_moved(m) for m in moves], "nothing", "parameters that grow or fall steadily")),
-        SummaryAnswer("Which robot is the odd one?", *_listed([_stranger(s) for s in strangers], "none", "values far from the other robots'")),
-        SummaryAnswer("What is most often the cause?", *_commonest(fleet.summary)),
+        SummaryAnswer("What drifts?", *_listed([moved(m) for m in moves], "nothing", "parameters that grow or fall steadily")),
+        SummaryAnswer("Which robot is the odd one?", *_listed([_odd_one(o) for o in odd_ones], "none", "values far from the other robots'")),
+        SummaryAnswer("What is most often the cause?", *_commonest(fleet)),
     ]  # fmt: skip
-    sections = [_causes(fleet.summary), _moving(fleet.parameters, moves), _odd(strangers), _failures(fleet.failed)]
+    sections = [_causes(fleet.summary), _moving(fleet.parameters, moves), _odd(odd_ones), _failures(fleet.failed)]
     return Document("Fleet", lead, answers, [section for section in sections if section is not None])
 
 
-Move = tuple[str, str, str, list[str], Drift]
-"""Robot, what the parameter is of, its name, the visits, and the drift."""
+def moved(move: Move) -> str:
+    """Return a drift as a sentence without its full stop."""
+    return f"{move.robot}: {_named(move.of, move.name)} by {_rate(move)} per visit since {_since(move)}"
 
 
-def moving(parameters: pl.DataFrame) -> Iterator[Move]:
-    """Yield what drifts: parameters of arms and of causes, by name, the surest of each first."""
-    for (of, name), table in _by_parameter(parameters):
-        robots, visits, values = _visits(table)
-        for drift in drifts(values):
-            yield robots[drift.robot], of, name, visits[drift.robot], drift
+def _rate(move: Move) -> str:
+    return f"{100 * move.drift.rate:+.1f} %"
 
 
-def odd(parameters: pl.DataFrame) -> Iterator[tuple[str, str, str, float]]:
-    """Yield robots whose parameters lie far from the others': robot, what it is of, name, robust standard deviations."""
-    for (of, name), table in _by_parameter(parameters):
-        robots, _, values = _visits(table)
-        for robot, apart in odd_ones(values):
-            yield robots[robot], of, name, apart
+def _since(move: Move) -> str:
+    return plain_time(move.since) if move.since else f"visit {move.visit}"
 
 
-def _by_parameter(parameters: pl.DataFrame) -> Iterator[tuple[tuple[str, str], pl.DataFrame]]:
-    for (of, name), table in parameters.sort("time", nulls_last=False).group_by(["of", "name"], maintain_order=True):
-        yield (str(of), str(name)), table
+def plain_time(time: str | None) -> str:
+    """Return a time for people: a midnight is a day, an unknown one a dash."""
+    return (time or _EMPTY).removesuffix(_MIDNIGHT)
 
 
-def _visits(table: pl.DataFrame) -> tuple[list[str], list[list[str]], np.ndarray]:
-    """Robots, the times of their visits, and values of shape (n_robots, n_visits), NaN beyond a robot's last visit."""
-    groups = {str(robot): rows for (robot,), rows in table.group_by(["robot"], maintain_order=True)}
-    most = max(rows.height for rows in groups.values())
-    values = np.full((len(groups), most), np.nan)
-    for row, rows in zip(values, groups.values(), strict=True):
-        row[: rows.height] = rows["value"].to_numpy()
-    return list(groups), [[str(t or "") for t in rows["time"]] for rows in groups.values()], values
-
-
-def _moved(move: Move) -> str:
-    robot, of, name, visits, drift = move
-    return f"{robot}: {_named(of, name)} by {100 * drift.rate:+.1f} % per visit since {_since(visits, drift)}"
-
-
-def _since(visits: list[str], drift: Drift) -> str:
-    return visits[drift.onset].removesuffix(_MIDNIGHT) or f"visit {drift.onset + 1}"
-
-
-def _stranger(found: tuple[str, str, str, float]) -> str:
-    robot, of, name, apart = found
-    return f"{robot}: {_named(of, name)}, {apart:+.0f} robust standard deviations"
+def _odd_one(found: Odd) -> str:
+    return f"{found.robot}: {_named(found.of, found.name)} is {figure(found.usual)}, the fleet's {figure(found.fleet)}"
 
 
 def _named(of: str, name: str) -> str:
+    if of == "arm":
+        meaning = parameter_text("", name)
+        return f"{meaning} ({name})" if meaning else name
     effect, _, joint = of.partition(":")
-    return name if of == "arm" else f"{name} of {title(effect)}, {joint_text(int(joint) if joint else None)}"
+    return f"{name} of {title(effect)}, {joint_text(int(joint) if joint else None)}"
 
 
 def _listed(found: list[str], none: str, of: str) -> tuple[str, str]:
@@ -102,15 +78,20 @@ def _listed(found: list[str], none: str, of: str) -> tuple[str, str]:
     return found[0], f"{of}{more}"
 
 
-def _commonest(summary: pl.DataFrame) -> tuple[str, str]:
-    named = summary.filter(pl.col("effect").is_not_null())
+def _commonest(fleet: Fleet) -> tuple[str, str]:
+    if fleet.settings.get("max_causes") == 0:
+        return "not asked", "no cause was to be named, parameters only were estimated"
+    named = fleet.summary.filter(pl.col("effect").is_not_null())
     if not named.height:
         return "nothing is named", "no diagnosis names an effect"
     counts = named.group_by(["effect", "joint"]).agg(pl.col("robot").n_unique().alias("robots"))
     first = counts.sort(["robots", "effect", "joint"], descending=[True, False, False], nulls_last=True).row(
         0, named=True
     )
-    return f"{title(first['effect'])}, {joint_text(first['joint'])}", f"on {first['robots']} robots"
+    return (
+        f"{title(first['effect'])}, {joint_text(first['joint'])}",
+        f"on {first['robots']} {'robot' if first['robots'] == 1 else 'robots'}",
+    )
 
 
 def _causes(summary: pl.DataFrame) -> Section:
@@ -147,19 +128,22 @@ def _cause(what: str, joint: int | None) -> str:
 
 def _moving(parameters: pl.DataFrame, moves: list[Move]) -> Section:
     text = (
-        "A parameter drifts if its logarithm, less what all robots did at that visit, follows a ramp by more than five standard deviations of the "
-        "ramp's slope; the scatter is that of the fleet."
+        "A parameter drifts if its logarithm, less what all robots did that day, follows a ramp from some visit to the last. "
+        "Noise shows one at most once in "
+        f"{1 / FALSE_ALARMS:.0f} visits of the whole fleet, all parameters together. "
+        "A robot needs six visits before anything is said of it."
     )
-    header = ("robot", "parameter", "since", "per visit", "standard deviations")
+    header = ("robot", "parameter", "since", "per visit", "standard deviations", "needed")
     rows = [
         (
-            robot,
-            _named(of, name),
-            _since(visits, d),
-            f"{100 * d.rate:+.1f} %",
-            f"{d.evidence:.1f}",
+            m.robot,
+            _named(m.of, m.name),
+            _since(m),
+            _rate(m),
+            f"{m.drift.evidence:.1f}",
+            f"{m.drift.threshold:.1f}",
         )
-        for robot, of, name, visits, d in moves[:_ROWS]
+        for m in moves[:_ROWS]
     ]
     tables = [Table(header, rows)] if rows else []
     points = [] if rows else ["Nothing drifts that these visits can tell."]
@@ -169,31 +153,37 @@ def _moving(parameters: pl.DataFrame, moves: list[Move]) -> Section:
 
 def _course(parameters: pl.DataFrame, move: Move) -> Drawing:
     """The parameter of one robot over its visits, with its interval."""
-    robot, of, name, _, _ = move
+    robot, of, name = move.robot, move.of, move.name
     rows = parameters.filter((pl.col("robot") == robot) & (pl.col("of") == of) & (pl.col("name") == name)).sort("time")
     value, sigma = rows["value"].to_numpy(), rows["sigma"].fill_null(0.0).to_numpy()
     visits = np.arange(1.0, len(value) + 1)
     unit = rows["unit"][0] or ""
-    chart = charts.figure(f"{robot}: {_named(of, name)}", "visit", f"{name} [{unit}]")
+    chart = charts.figure(f"{robot}: {_named(of, name)}", "visit", f"{name} [{unit}]" if unit else name)
     chart.varea(visits, value - 1.96 * sigma, value + 1.96 * sigma, color=charts.MEASURED, alpha=0.25)
+    chart.vspan(x=[move.visit], color=charts.BEFORE, line_dash="dashed")
     chart.line(visits, value, color=charts.AFTER, line_width=2)
     chart.scatter(visits, value, color=charts.AFTER, size=5)
-    return Drawing(f"{name} of {robot} over its visits, with 95 % intervals.", chart)
+    return Drawing(
+        f"{name} of {robot} over its visits, with 95 % intervals; dashed the visit since which it drifts.", chart
+    )
 
 
-def _odd(strangers: list[tuple[str, str, str, float]]) -> Section:
-    text = "A robot is odd if its usual value (median over its visits) lies more than five robust standard deviations from the fleet's median."
-    rows = [(robot, _named(of, name), f"{apart:+.1f}") for robot, of, name, apart in strangers[:_ROWS]]
-    tables = [Table(("robot", "parameter", "robust standard deviations"), rows)] if rows else []
+def _odd(found: list[Odd]) -> Section:
+    text = (
+        "A robot is odd if its usual value (median over its visits) lies more than five robust standard deviations from the fleet's median. "
+        "Where more than a fifth of the robots do, they are taken for arms of several models, and nothing is said."
+    )
+    rows = [(o.robot, _named(o.of, o.name), figure(o.usual), figure(o.fleet), f"{o.apart:+.1f}") for o in found[:_ROWS]]
+    tables = (
+        [Table(("robot", "parameter", "its median", "the fleet's", "robust standard deviations"), rows)] if rows else []
+    )
     return Section("Odd ones", text=[text], points=[] if rows else ["No robot is far from the others."], tables=tables)
 
 
 def _failures(failed: pl.DataFrame) -> Section | None:
     if not failed.height:
         return None
-    rows: list[tuple[str, ...]] = [
-        (r["robot"], (r["time"] or _EMPTY).removesuffix(_MIDNIGHT), r["error"]) for r in failed.to_dicts()
-    ]
+    rows: list[tuple[str, ...]] = [(r["robot"], plain_time(r["time"]), r["error"]) for r in failed.to_dicts()]
     tables = [Table(("robot", "time", "why"), rows[:_ROWS])]
     if rows[_ROWS:]:
         tables.append(Table(("robot", "time", "why"), rows[_ROWS:], fold=f"{len(rows) - _ROWS} more"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import signal
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -15,10 +16,11 @@ from armgap import __version__
 from armgap.errors import ArmgapError
 from armgap.fleet.manifest import Entry, is_url
 
-__all__ = ["Outcome", "answer", "content_key"]
+__all__ = ["Outcome", "answer", "answer_within", "content_key", "took_too_long"]
 
 Outcome = dict[str, Any]
-"""``diagnosis``, the JSON text, or ``error``, one line; and ``seconds``."""
+"""``diagnosis``, the JSON text, or ``error``, one line, or ``lost``, why there is neither; and ``seconds``."""
+_ALARM_AGAIN_S = 0.5
 _READERS: dict[str, Callable[[str], pl.DataFrame]] = {".parquet": pl.read_parquet, ".csv": pl.read_csv}
 
 
@@ -65,6 +67,43 @@ def answer(entry: Entry, settings: Mapping[str, Any]) -> Outcome:
     except Exception as error:  # one entry must not end the others; what it was stands in its row
         outcome = {"error": f"{type(error).__name__}: {' '.join(str(error).split())}"}
     return {**outcome, "seconds": time.perf_counter() - start}
+
+
+def took_too_long(limit_s: float) -> Outcome:
+    """Return the outcome of an entry that was stopped after its time [s]; the next run tries it again."""
+    return {"lost": f"took longer than {limit_s:g} s", "seconds": limit_s}
+
+
+class _TimeIsUp(BaseException):
+    """Raised by the alarm; no `Exception`, so that nothing on the way takes it for a defect of the entry."""
+
+
+def answer_within(entry: Entry, settings: Mapping[str, Any], limit_s: float) -> Outcome:
+    """Diagnose an entry in the main thread of a process, for so long at most [s]; without limit where there is no ``SIGALRM`` (Windows).
+
+    Parameters
+    ----------
+    entry, settings
+        As for `answer`.
+    limit_s : float
+        Above 0.
+    """
+    if not hasattr(signal, "SIGALRM"):
+        return answer(entry, settings)
+
+    def stop(*_: object) -> None:
+        raise _TimeIsUp
+
+    before = signal.signal(signal.SIGALRM, stop)
+    try:
+        # Once more every half second: an exception that is raised inside a destructor or a callback of another library is swallowed there.
+        signal.setitimer(signal.ITIMER_REAL, limit_s, _ALARM_AGAIN_S)
+        return answer(entry, settings)
+    except _TimeIsUp:
+        return took_too_long(limit_s)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def _source(place: str) -> Any:
