@@ -20,6 +20,7 @@ __all__ = ["Outcome", "answer", "answer_within", "content_key", "took_too_long"]
 
 Outcome = dict[str, Any]
 """``diagnosis``, the JSON text, or ``error``, one line, or ``lost``, why there is neither; and ``seconds``."""
+#: Time between alarms [s]: an exception raised inside a destructor or a callback of another library is swallowed there.
 _ALARM_AGAIN_S = 0.5
 _READERS: dict[str, Callable[[str], pl.DataFrame]] = {".parquet": pl.read_parquet, ".csv": pl.read_csv}
 
@@ -96,7 +97,6 @@ def answer_within(entry: Entry, settings: Mapping[str, Any], limit_s: float) -> 
 
     before = signal.signal(signal.SIGALRM, stop)
     try:
-        # Once more every half second: an exception that is raised inside a destructor or a callback of another library is swallowed there.
         signal.setitimer(signal.ITIMER_REAL, limit_s, _ALARM_AGAIN_S)
         return answer(entry, settings)
     except _TimeIsUp:
