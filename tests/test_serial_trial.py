@@ -25,6 +25,7 @@ from serial_trial.effects import EFFECTS, Effect, Moment, Null  # noqa: E402
 from serial_trial.motion import SERVOS, Controller, Reference, Run, draw_controller, draw_reference, simulate, use_of  # noqa: E402
 from serial_trial.run import OUTCOMES, ask, outcome, report  # noqa: E402
 from serial_trial.servo import COMMANDED  # noqa: E402
+from serial_trial.visibility import MULTIPLE, SIGMAS, links, visibility  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 #: MuJoCo keeps inertias as principal moments and orientations as quaternions; relative to the largest torque of a joint.
@@ -281,6 +282,35 @@ def test_an_effect_moves_the_arm_as_armgap_says(robot, clean, name) -> None:
     doing = missed(bare, run, [])
     assert doing > 1e-3, "the effect does nothing here"
     assert missed(bare, run, [(name, 2, VALUES[name](hidden))]) < OTHERWISE.get(name, AGREE) * doing
+
+
+@pytest.mark.parametrize("family", list(FAMILIES))
+def test_the_regressor_of_the_visibility_is_the_inverse_dynamics_of_the_engine(family) -> None:
+    random = np.random.default_rng(3)
+    arm = draw_robot(random, family)
+    q, dq, ddq = random.normal(size=(3, 4, arm.n))
+    torque = links(arm, q, dq, ddq) @ arm.theta[: 10 * arm.n] + arm.rotor * ddq
+    model = arm.model(friction=False)
+    data = mujoco.MjData(model)
+    for k in range(len(q)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], dq[k], ddq[k]
+        mujoco.mj_inverse(model, data)
+        assert np.allclose(torque[k], data.qfrc_inverse, atol=SAME * np.abs(data.qfrc_inverse).max())
+
+
+def test_what_parameters_absorb_is_not_visible(robot) -> None:
+    # Viscous friction is a parameter, trusted to half of it; a last link of three times its mass is far outside the trust.
+    sigma = sigma_of(robot, "published")
+
+    def logs(truth: SerialRobot) -> list[Run]:
+        return [moved(robot, seed, truth=truth) for seed in (1, 2, 3)]
+
+    plain = logs(robot)
+    absorbed = visibility(robot, sigma, plain, logs(replace(robot, viscous=1.3 * robot.viscous)))
+    assert absorbed.above_floor < MULTIPLE
+    assert absorbed.moved < SIGMAS
+    heavy = robot.with_link(robot.n - 1, robot.links[-1].scaled(3.0))
+    assert visibility(robot, sigma, plain, logs(heavy)).moved > SIGMAS
 
 
 def test_a_case_is_what_its_seed_and_number_say() -> None:

@@ -119,15 +119,16 @@ def _missed(case: Kept, name: str, windows: list[tuple[int, int]], starts: Start
 
 
 def displaced(plant: Plant, rig: SimulatedArm, error_q: Array, error_dq: Array, tau: Array) -> Array:
-    """Positions after a displaced start, with everything that the arm remembers as it is."""
+    """Positions after a displaced start, with everything that the arm remembers, and motors behind a shaft or play, as they are.
+
+    A motor's state is no measurement of the window's start: predictions carry it along the log.
+    """
     rig = copy.deepcopy(rig)
     twin: Any = Plant(rig.config)
     mujoco().mj_copyData(twin.data, twin.model, plant.data)
     twin._slope = list(plant._slope)
-    for j in range(twin.n):
-        for dof in {twin.dof[j], twin.motor[j]}:
-            twin.data.qpos[dof] += error_q[j]
-            twin.data.qvel[dof] += error_dq[j]
+    twin.data.qpos[twin.dof] += error_q
+    twin.data.qvel[twin.dof] += error_dq
     return run_commands(twin, rig, tau)
 
 

@@ -29,6 +29,7 @@ from .motion import (
     use_of,
 )
 from .servo import COMMANDED
+from .visibility import visibility
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,8 @@ class Case:
         Logs.
     key : dict
         What is hidden: ``effect``, ``joint`` (from 1; None for the whole arm), ``values``, ``outside`` (whether armgap's library has no such
-        effect), ``change`` (RMS of the joint's torque with and without it, as a share); and how the case was made.
+        effect), ``change`` (RMS of the joint's torque with and without it, as a share), ``above_floor``, ``moved`` and ``visible``
+        (`visibility.Visibility`; not of null cases, nor of logs of references); and how the case was made.
     """
 
     arm: armgap.Arm
@@ -192,7 +194,7 @@ def _draw(
     if not isinstance(hidden, Null) and not (np.isfinite(change[at]) and change[at] >= LEAST):
         return None
 
-    runs = []
+    runs, plain = [], []
     for reference, own in zip(references, seeds, strict=True):
         random = np.random.default_rng(own)
         disturbance = coloured(noise * use.torque, times, samples, period, random)
@@ -207,6 +209,8 @@ def _draw(
         if not run.sane(robot, reference, follows=controlled in ("pd", "computed_torque", *SERVOS)):
             return None
         runs.append(run)
+        if not isinstance(hidden, Null):
+            plain.append(simulate(clean, robot, Null(None), reference, by, disturbance, period))
     arm = arm_of(robot, period, trust, following if commanded else None)
     logs = [
         armgap.Log.from_arrays(
@@ -220,6 +224,8 @@ def _draw(
         "kinds": "".join(kind[0].upper() for kind in robot.kinds), "period": period, "noise": noise, "controller": controlled,
         "theta": truth.theta.tolist(),
     }  # fmt: skip
+    if plain and not commanded:
+        key |= visibility(robot, sigma_of(robot, trust), plain, runs).to_dict()
     return Case(arm, logs[:-1], logs[-1:], key)
 
 

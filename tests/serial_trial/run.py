@@ -23,6 +23,7 @@ _VALUE = 0.2
 #: Entries of a key that an answer takes along.
 _TOLD = (
     "seed", "number", "draw", "effect", "joint", "values", "outside", "change", "family", "joints", "kinds", "period", "noise", "controller",
+    "above_floor", "moved", "visible",
 )  # fmt: skip
 
 
@@ -35,7 +36,7 @@ def ask(case: Case) -> Record:
     kept = ("effect", "joint", "probability", "closed", "equivalents", "why", "parameters")
     causes, candidates = ([{k: c[k] for k in kept if k in c} for c in data[part]] for part in ("causes", "candidates"))
     record = {
-        **{name: case.key[name] for name in _TOLD},
+        **{name: case.key[name] for name in _TOLD if name in case.key},
         "verdict": found.verdict, "causes": causes, "candidates": candidates, "gap": data["gap"], "seconds": seconds,
         "parameters": {name: value.value for name, value in found.parameters["refit"].items()},
         "theta": case.key["theta"], "notes": data["notes"],
@@ -95,6 +96,8 @@ def report(records: list[Record]) -> str:
     lines = [f"{len(answers)} answers, {len(failed)} failed", ""]
     lines += _table("effect", hidden, lambda r: r["effect"])
     lines += _table("joints", hidden, lambda r: r["joints"])
+    seen = [r for r in hidden if "visible" in r]
+    lines += _table("visible", seen, lambda r: "yes" if r["visible"] else "no") if seen else []
     for label, of in (("no effect", nulls), ("effects outside the library", outside)):
         if of:
             named = [r for r in of if r["causes"]]
@@ -135,9 +138,10 @@ def _line(r: Record) -> str:
         return f"{c['effect']}:{c['joint'] or ''} {c['probability']:.2f}{f' ~{alike}' if alike else ''}"
 
     values = ", ".join(f"{k} {_short(v)}" for k, v in r["values"].items())
+    seen = f", {r['above_floor']:.1f} floors, {r['moved']:.1f} sigmas" if "visible" in r else ""
     made = f"{r['family']} {r['kinds']}, {1e3 * r['period']:g} ms, {r['controller']}, noise {100 * r['noise']:g} %"
     said = f"{r['verdict']} [{'; '.join(map(name, r['causes']))}] ({'; '.join(map(name, r['candidates']))})"
-    return f"case {r['number']}: {r['effect']}:{r['joint'] or ''} ({values}; {100 * r['change']:.0f} %; {made}) -> {r['outcome']}: {said}"
+    return f"case {r['number']}: {r['effect']}:{r['joint'] or ''} ({values}; {100 * r['change']:.0f} %{seen}; {made}) -> {r['outcome']}: {said}"
 
 
 def _short(value: Any) -> str:

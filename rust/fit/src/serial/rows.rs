@@ -280,8 +280,14 @@ impl<'a> Regression<'a> {
     /// small.
     pub fn score(&self, at: &Estimate, columns: &[Signal], ridge: &[f64]) -> Option<Score> {
         let k = columns.len();
-        let system = self.system(&self.fixed())?;
-        let along: Vec<DVector<f64>> = columns.iter().map(|c| self.along(c)).collect();
+        let fixed = self.fixed();
+        let system = self.system(&fixed)?;
+        // Values that are not estimated imitate nothing.
+        let estimated = |mut along: DVector<f64>| {
+            along.iter_mut().zip(&fixed).filter(|(_, fixed)| **fixed).for_each(|(x, _)| *x = 0.0);
+            along
+        };
+        let along: Vec<DVector<f64>> = columns.iter().map(|c| estimated(self.along(c))).collect();
         let solved: Vec<DVector<f64>> = along.iter().map(|b| system.solve(b)).collect();
         let residual: Signal = at.residual.iter().cloned().map(Some).collect();
         let slope = DVector::from_fn(k, |i, _| self.product(&columns[i], &residual));
@@ -420,6 +426,16 @@ mod tests {
         let scaled: Signal = vec![extra[0].as_ref().map(|x| x.iter().map(|x| score.size[0] * x).collect())];
         let after = regression.estimate(&scaled);
         assert!((before.cost - after.cost - score.gain).abs() < 1e-6 * score.gain);
+    }
+
+    #[test]
+    fn a_value_that_is_not_estimated_does_not_hide_a_term_of_its_kind() {
+        let (rows, none) = (rows(0.0, 1e-3).0, vec![None]);
+        let lacking = prior([1.0, 0.0], [10.0, 0.0]);
+        let regression = Regression::reweighted(&rows, &lacking, &none);
+        let term: Signal = vec![Some(rows.joints[0].psi.iter().skip(1).step_by(2).copied().collect())];
+        let score = regression.score(&regression.estimate(&none), &[term], &[0.0]).unwrap();
+        assert!((score.size[0] - 0.5).abs() < 0.01, "{}", score.size[0]);
     }
 
     #[test]
