@@ -431,8 +431,8 @@ mod tests {
     #[test]
     fn a_value_that_is_not_estimated_does_not_hide_a_term_of_its_kind() {
         let (rows, none) = (rows(0.0, 1e-3).0, vec![None]);
-        let lacking = prior([1.0, 0.0], [10.0, 0.0]);
-        let regression = Regression::reweighted(&rows, &lacking, &none);
+        let half = prior([1.0, 0.0], [10.0, 0.0]);
+        let regression = Regression::reweighted(&rows, &half, &none);
         let term: Signal = vec![Some(rows.joints[0].psi.iter().skip(1).step_by(2).copied().collect())];
         let score = regression.score(&regression.estimate(&none), &[term], &[0.0]).unwrap();
         assert!((score.size[0] - 0.5).abs() < 0.01, "{}", score.size[0]);
