@@ -10,9 +10,10 @@ import pytest
 pytest.importorskip("mujoco", reason="MuJoCo is missing: pip install 'armgap[trial]'")
 
 from armgap import effects
+from armgap.diagnosis.result import GapAtHorizon
 from armgap.errors import OptionError
 from armgap.trial import make_case
-from armgap.trial.answers import AbsentEffect, Answer, NamedCause, PredictionErrors, Size, read_answer
+from armgap.trial.answers import AbsentEffect, Answer, NamedCause, Size, read_answer
 from armgap.trial.arms import AXIS, PENDULUM, TrialArm
 from armgap.trial.case import simulated_arm_of
 from armgap.trial.effects import REGISTRY
@@ -144,7 +145,7 @@ def test_answer_reads_back_and_a_damaged_one_is_refused(tmp_path):
         "effect",
         (NamedCause("payload", None, 0.5, {"mass": Size(1.0)}, (("torque_gain", 1),)),),
         (AbsentEffect("backlash", 1, "gap", 1e-3),),
-        PredictionErrors(0.25, (1.0,), (0.5,), (0.1,), (0.05,)),
+        GapAtHorizon(0.25, (1.0,), (0.5,), (0.1,), (0.05,)),
         (1.0, 2.0),
     )
     path = tmp_path / "case-0000.json"

@@ -47,6 +47,12 @@ class GapAtHorizon:
     after: tuple[float, ...]
     floor: tuple[float, ...]
 
+    @classmethod
+    def read(cls, data: dict[str, Any]) -> GapAtHorizon:
+        """Return it from its JSON entries."""
+        before, refit, after, floor = (tuple(data[key]) for key in ("before", "refit", "after", "floor"))
+        return cls(data["horizon_s"], before, refit, after, floor)
+
 
 @dataclass(frozen=True)
 class Gap:
@@ -237,7 +243,7 @@ class Diagnosis(NotebookDisplay):
                 (gap["closed_ci"][0], gap["closed_ci"][1]),
                 tuple(gap["free_run"]["before"]),
                 tuple(gap["free_run"]["after"]),
-                tuple(_at_horizon(h) for h in gap.get("horizons", ())),
+                tuple(GapAtHorizon.read(h) for h in gap.get("horizons", ())),
                 tuple(gap.get("motion", ())),
                 gap.get("unexplained", 0.0),
             ),
@@ -276,11 +282,6 @@ class Diagnosis(NotebookDisplay):
 def _take(kind: type[_Record], data: dict[str, Any]) -> _Record:
     """Build a record from the entries it knows."""
     return kind(**{f.name: data[f.name] for f in fields(kind) if f.name in data})
-
-
-def _at_horizon(data: dict[str, Any]) -> GapAtHorizon:
-    errors = (tuple(data[key]) for key in ("before", "refit", "after", "floor"))
-    return GapAtHorizon(data["horizon_s"], *errors)
 
 
 def _location(data: dict[str, Any]) -> Location:

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from armgap.diagnosis.result import GapAtHorizon
 from armgap.errors import OptionError
 
 SCHEMA = "armgap.answer/1"
@@ -64,17 +65,6 @@ class AbsentEffect:
 
 
 @dataclass(frozen=True)
-class PredictionErrors:
-    """RMS position errors per joint on the holdout, rad (m): as the arm file has it, re-estimated, with causes, floor."""
-
-    horizon_s: float
-    before: tuple[float, ...]
-    refit: tuple[float, ...]
-    after: tuple[float, ...]
-    floor: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class Answer:
     """A method's answer to one case.
 
@@ -88,7 +78,7 @@ class Answer:
         First the one the method believes most.
     limits : tuple of AbsentEffect
         Effects called absent, with bounds.
-    reach : PredictionErrors, optional
+    reach : GapAtHorizon, optional
         How far predictions miss, where the method predicts.
     theta : tuple of float
         The arm's parameters beside the causes, in the arm file's order, where the method gives them.
@@ -108,7 +98,7 @@ class Answer:
     verdict: str
     causes: tuple[NamedCause, ...] = ()
     limits: tuple[AbsentEffect, ...] = ()
-    reach: PredictionErrors | None = None
+    reach: GapAtHorizon | None = None
     theta: tuple[float, ...] = ()
     place: int | None = None
     error: str | None = None
@@ -140,7 +130,7 @@ class Answer:
         try:
             data["causes"] = tuple(_named(c) for c in data["causes"])
             data["limits"] = tuple(AbsentEffect(**x) for x in data["limits"])
-            data["reach"] = _reach(data["reach"])
+            data["reach"] = GapAtHorizon.read(data["reach"]) if data["reach"] else None
             data["theta"] = tuple(data["theta"])
             return cls(**data)
         except (KeyError, TypeError) as error:
@@ -167,9 +157,3 @@ def _named(data: dict[str, Any]) -> NamedCause:
     sizes = {key: Size(**value) for key, value in data["sizes"].items()}
     alike = tuple((effect, joint) for effect, joint in data["look_alikes"])
     return NamedCause(data["effect"], data["joint"], data["probability"], sizes, alike)
-
-
-def _reach(data: dict[str, Any] | None) -> PredictionErrors | None:
-    if data is None:
-        return None
-    return PredictionErrors(data["horizon_s"], *(tuple(data[key]) for key in ("before", "refit", "after", "floor")))

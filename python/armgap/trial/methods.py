@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import armgap
 from armgap import _native
-from armgap.trial.answers import AbsentEffect, Answer, NamedCause, PredictionErrors, Size
+from armgap.diagnosis.result import GapAtHorizon
+from armgap.trial.answers import AbsentEffect, Answer, NamedCause, Size
 
 if TYPE_CHECKING:
     from armgap.diagnosis import Cause, Diagnosis
@@ -83,7 +84,7 @@ def from_diagnosis(result: Diagnosis, names: Sequence[str]) -> Answer:
         verdict=result.verdict,
         causes=tuple(_named(c) for c in result.causes) if result.verdict == "effect" else (),
         limits=tuple(AbsentEffect(r.effect, r.joint, r.bound.parameter, r.bound.value) for r in absent if r.bound),
-        reach=PredictionErrors(gap.horizon_s, gap.before, gap.refit, gap.after, gap.floor),
+        reach=GapAtHorizon(gap.horizon_s, gap.before, gap.refit, gap.after, gap.floor),
         theta=tuple(final[name].value for name in names),
         place=result.where[0].joint if result.where else None,
         remark=_first_ranks(result),
