@@ -256,3 +256,12 @@ def test_the_study_judges_answers() -> None:
     assert "with a drift: 3; with something else named: 1" in told
     assert "robot and parameter too: 2" in told
     assert "without a drift: 2; with something named: 1" in told
+
+
+def test_robots_of_unlike_scatter_are_no_drift() -> None:
+    """Six fleets, asked after every visit."""
+    rng = np.random.default_rng(5)
+    for _ in range(6):
+        own = 0.1 * np.exp(0.5 * rng.standard_normal(20))
+        values = np.exp(own[:, None] * rng.standard_normal((20, 30)))
+        assert [drifts(values[:, :visits], tests=180) for visits in range(6, 31)] == [[]] * 25

@@ -9,8 +9,9 @@ deviation; the largest of all counts.
 
 **Scatter.** A visit's variance is that of its estimate plus a scatter from visit to visit, which is the fleet's: chosen so that the squared
 differences between neighbouring visits, which a ramp hardly changes, are what they have to be on the median robot (Paule and Mandel 1982; von Neumann
-et al. 1941). A robot's own dispersion about it is drawn towards the fleet's by as much as the robots agree (Smyth 2004), so that a
-robot that scatters more than the others is judged by its own scatter.
+et al. 1941). A robot's own dispersion about it is drawn towards the fleet's by as much as the robots agree (Smyth 2004), and the less, the less
+likely so large a dispersion is under that agreement (Phipson et al. 2016), so that a robot that scatters more than the others is judged by
+its own scatter.
 
 **Autocorrelation.** What a visit scatters by may last until the next: a first-order autocorrelation common to the fleet, from differences between
 neighbours and between visits two apart, as far as it is more than chance. Equations are whitened by it (Prais and Winsten 1954).
@@ -22,6 +23,7 @@ neighbours and between visits two apart, as far as it is more than chance. Equat
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -190,8 +192,11 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if excess(middle) > 0 else (low, middle)
     raw = dispersions(high)
-    prior = _prior_freedom(raw[seen], each[seen])
-    dispersion = np.where(seen, (prior + each * raw) / (prior + each), 1.0)
+    # Robots cannot agree by more than they all tell.
+    agreed = min(_prior_freedom(raw[seen], each[seen]), float(each.sum()))
+    prior = np.full(len(series), agreed)
+    prior[seen] *= np.minimum(1.0, np.count_nonzero(seen) * _exceedance(raw[seen], each[seen], agreed))
+    dispersion = np.where(seen, (prior + each * raw) / np.maximum(prior + each, _NOTHING), 1.0)
     return high, dispersion, np.minimum(each + prior, each.sum())
 
 
@@ -253,6 +258,13 @@ def _prior_freedom(dispersion: Array, freedom: Array) -> float:
     # Relative standard error of a squared median of absolute values, of a normal sample (Huber 1981, section 5.1).
     beyond = spread - chance * (1.0 + 2.33 / np.sqrt(len(logs)))
     return 1.0 + 2.0 / beyond if beyond > 2.0 / _KNOWN else _KNOWN
+
+
+def _exceedance(ratio: Array, freedom: Array, prior: float) -> Array:
+    """Probability that a ratio of mean squares, of these degrees of freedom each, is as large (Paulson 1942), shape of `ratio`."""
+    own, fleet, root = 2.0 / (9.0 * freedom), 2.0 / (9.0 * prior), np.cbrt(ratio)
+    normal = ((1.0 - fleet) * root - (1.0 - own)) / np.sqrt(own + fleet * root**2)
+    return np.array([0.5 * math.erfc(x / math.sqrt(2.0)) for x in normal])
 
 
 def threshold(allowed: float, length: float, freedom: float) -> float:
