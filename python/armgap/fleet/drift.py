@@ -173,29 +173,28 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
     series, error : ndarray, shape (n_robots, n_visits)
         Logarithms, NaN where unknown, and their standard errors.
     """
-    square, errors = _steps(series, error)
-    steps = np.count_nonzero(np.isfinite(square), axis=1)
-    each, seen = _freedom(steps), steps > 0
+    steps = _steps(series, error)
+    count = np.count_nonzero(np.isfinite(steps[0]), axis=1)
+    each, seen = _freedom(count), count > 0
     if not seen.any():
         return 0.0, np.ones(len(series)), np.full(len(series), _KNOWN)
 
-    def dispersions(scatter: float) -> Array:
-        share = square / (2.0 * scatter**2 + errors + _NOTHING)
-        return np.asarray(np.nansum(share, axis=1) / np.maximum(steps, 1))
-
     def excess(scatter: float) -> float:
-        return float(np.median(dispersions(scatter)[seen] / _median_of_mean_square(each[seen]))) - 1.0
+        return float(np.median(_dispersions(steps, scatter)[seen] / _median_of_mean_square(each[seen]))) - 1.0
 
-    largest = float(np.sqrt(np.nanmax(square)))
+    largest = float(np.sqrt(np.nanmax(steps[0])))
     low, high = 0.0, largest
     while high - low > _CLOSE * largest:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if excess(middle) > 0 else (low, middle)
-    raw = dispersions(high)
+    raw = _dispersions(steps, high)
     # Robots cannot agree by more than they all tell.
     agreed = min(_prior_freedom(raw[seen], each[seen]), float(each.sum()))
     prior = np.full(len(series), agreed)
-    prior[seen] *= np.minimum(1.0, np.count_nonzero(seen) * _exceedance(raw[seen], each[seen], agreed))
+    # Beside its likeliest ramp: a steep drift is no scatter.
+    beside = _dispersions(_steps(np.array([_without_ramp(row) for row in series]), error), high)[seen]
+    free = np.maximum(each[seen] - 2.0, 1.0)
+    prior[seen] *= np.minimum(1.0, np.count_nonzero(seen) * _exceedance(beside * each[seen] / free, free, agreed))
     dispersion = np.where(seen, (prior + each * raw) / np.maximum(prior + each, _NOTHING), 1.0)
     return high, dispersion, np.minimum(each + prior, each.sum())
 
@@ -233,6 +232,13 @@ def _steps(series: Array, error: Array) -> tuple[Array, Array]:
     return square, errors
 
 
+def _dispersions(steps: tuple[Array, Array], scatter: float) -> Array:
+    """Mean square differences of each robot over what a scatter and the estimates' errors make of them."""
+    square, errors = steps
+    share = square / (2.0 * scatter**2 + errors + _NOTHING)
+    return np.asarray(np.nansum(share, axis=1) / np.maximum(np.count_nonzero(np.isfinite(square), axis=1), 1))
+
+
 def _freedom(steps: NDArray[np.int64]) -> Array:
     """Degrees of freedom of the mean square successive difference of ``n = steps + 1`` values (von Neumann et al. 1941: 2 (n-1)^2/(3n-4))."""
     return np.asarray(2.0 * steps**2 / np.maximum(3.0 * steps - 1.0, 1.0))
@@ -260,10 +266,25 @@ def _prior_freedom(dispersion: Array, freedom: Array) -> float:
     return 1.0 + 2.0 / beyond if beyond > 2.0 / _KNOWN else _KNOWN
 
 
+def _without_ramp(row: Array) -> Array:
+    """Logarithms of one robot less the level and the ramp, of any onset, that leave least of them by least squares, NaN where unknown."""
+    known = np.flatnonzero(np.isfinite(row))
+    rest = row.copy()
+    if len(known) < _FEWEST_BEFORE + _FEWEST_ON:
+        return rest
+    equations = _Equations(row[known], np.ones(len(known)), 0.0)
+    ramps = equations.beside(equations.ramps(), equations.level())
+    level = equations.row - np.mean(equations.row)
+    slope = ramps @ level / np.sum(ramps**2, axis=1)
+    best = int(np.argmax(np.abs(slope) * np.linalg.norm(ramps, axis=1)))
+    rest[known] = level - slope[best] * ramps[best]
+    return rest
+
+
 def _exceedance(ratio: Array, freedom: Array, prior: float) -> Array:
     """Probability that a ratio of mean squares, of these degrees of freedom each, is as large (Paulson 1942), shape of `ratio`."""
-    own, fleet, root = 2.0 / (9.0 * freedom), 2.0 / (9.0 * prior), np.cbrt(ratio)
-    normal = ((1.0 - fleet) * root - (1.0 - own)) / np.sqrt(own + fleet * root**2)
+    a, b, root = 2.0 / (9.0 * freedom), 2.0 / (9.0 * prior), np.cbrt(ratio)
+    normal = ((1.0 - b) * root - (1.0 - a)) / np.sqrt(a + b * root**2)
     return np.array([0.5 * math.erfc(x / math.sqrt(2.0)) for x in normal])
 
 
