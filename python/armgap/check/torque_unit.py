@@ -74,8 +74,10 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
 
 
 def limited(logs: Sequence[Log], arm: Arm, joint: int) -> Fit:
-    """Return the best fit to torques of which those of a joint are limited in size or in rate: far below what was commanded either looks like
-    a small factor, or like columns of another arm."""
+    """Return the best fit to torques of which those of a joint are limited in size or in rate.
+
+    Far below what was commanded the first looks like a small factor, the second like columns of another arm.
+    """
     tau = [log.tau[:, joint] for log in logs]
     sizes = np.quantile(np.abs(np.concatenate(tau)), _LEVELS)
     rates = max(float(np.ptp(x)) for x in tau) / np.array(_SLEW_TIMES)
