@@ -14,26 +14,36 @@ pub(super) fn with_settings(mut joints: Vec<JointController>, terms: &[Term]) ->
     joints
 }
 
-/// What no log of references and positions tells from a cause.
-pub(super) fn behind_controller(cause: &Cause, controller: &PositionController) -> Option<EquivalentSummary> {
-    let joint = cause.joint?;
+/// Transmissions that give way: no candidates in logs without torques, and they change how the loop is damped as well.
+const NOT_TESTED: [(&str, &str); 2] = [("joint_elasticity", "a shaft that twists"), ("backlash", "backlash")];
+
+/// What no log of references and positions tells from a cause, and what was not tested beside it.
+pub(super) fn behind_controller(cause: &Cause, controller: &PositionController) -> Vec<EquivalentSummary> {
+    let Some(joint) = cause.joint else { return Vec::new() };
     let of = &controller.joints[joint - 1];
     let why = |effect, why: String| EquivalentSummary { effect, joint: cause.joint, why };
     match cause.effect {
         "torque_offset" if of.gains[0] > 0.0 => {
-            let offset = cause.parameters.get("offset")?;
+            let Some(offset) = cause.parameters.get("offset") else { return Vec::new() };
             let unit = if offset.unit == "N" { "m" } else { "rad" };
             let off = figure(offset.value / of.gains[0]);
-            Some(why(
+            vec![why(
                 "reference_offset",
                 format!("a reference that is off by {off} {unit} gives the same torque"),
-            ))
+            )]
         }
-        "controller_damping" if !of.rate_of_error => Some(why(
-            "viscous_friction",
-            "on the measured velocity the derivative gain acts as viscous friction does".to_owned(),
-        )),
-        _ => None,
+        "controller_damping" => {
+            let friction = why(
+                "viscous_friction",
+                "on the measured velocity the derivative gain acts as viscous friction does".to_owned(),
+            );
+            let transmissions = NOT_TESTED.map(|(effect, what)| {
+                why(effect, format!("{what} changes the damping of the loop, and is not tested without torques"))
+            });
+            let on_velocity = (!of.rate_of_error).then_some(friction);
+            on_velocity.into_iter().chain(transmissions).collect()
+        }
+        _ => Vec::new(),
     }
 }
 
@@ -57,4 +67,48 @@ pub(super) fn gains_note(
 fn figure(x: f64) -> String {
     let digits = if x == 0.0 { 0.0 } else { (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) };
     format!("{x:.*}", digits as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::{Named, Value};
+    use crate::serial::controller::tests::SERVO;
+
+    fn alike(effect: &'static str, rate_of_error: bool) -> Vec<&'static str> {
+        let joints = vec![JointController { rate_of_error, ..SERVO }; 2];
+        let controller = PositionController { joints, sigma: [vec![], vec![], vec![]] };
+        let offset = ("offset".to_owned(), Value { value: 2.0, sigma: 0.1, unit: "N m" });
+        let parameters: Named<Value> = std::iter::once(offset).collect();
+        let cause = Cause {
+            effect,
+            title: effect,
+            joint: Some(2),
+            probability: 1.0,
+            parameters,
+            closed: 0.5,
+            equivalents: Vec::new(),
+            evidence: None,
+            sides: None,
+            log: None,
+        };
+        let found = behind_controller(&cause, &controller);
+        assert!(found.iter().all(|e| e.joint == Some(2)));
+        found.iter().map(|e| e.effect).collect()
+    }
+
+    #[test]
+    fn another_damping_may_be_friction_or_a_transmission_that_gives_way() {
+        assert_eq!(
+            alike("controller_damping", false),
+            ["viscous_friction", "joint_elasticity", "backlash"]
+        );
+        assert_eq!(alike("controller_damping", true), ["joint_elasticity", "backlash"]);
+    }
+
+    #[test]
+    fn an_offset_may_be_one_of_the_reference() {
+        assert_eq!(alike("torque_offset", false), ["reference_offset"]);
+        assert!(alike("stribeck", false).is_empty());
+    }
 }

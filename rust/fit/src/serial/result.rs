@@ -170,8 +170,8 @@ fn cause(named: &super::search::Named, rotary: &[bool], controller: Option<&Posi
         sides: None,
         log: None,
     };
-    let behind = controller.and_then(|controller| behind_controller(&cause, controller));
-    cause.equivalents.extend(behind);
+    let behind = controller.map(|controller| behind_controller(&cause, controller));
+    cause.equivalents.extend(behind.into_iter().flatten());
     cause
 }
 
