@@ -11,6 +11,7 @@ from armgap import Arm, Log, diagnose, simulate
 from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, time_shift, torque_unit
 from armgap.check.contradiction import READINGS, Refit, screen
 from armgap.check.equation_error import EquationError, Rows, bounds
+from armgap.prepared_input import prepare
 from armgap.diagnosis.diagnosis import _ambiguous_lag
 from armgap.errors import ColumnError, OptionError
 from armgap.simulation import Effect
@@ -188,6 +189,24 @@ def test_a_commanded_position_in_the_torque_column(pendulum: Arm) -> None:
         logs.append(Log(f"servo {seed}", t, late[:, None] + draw.normal(0, 2e-4, (len(t), 1)), reference[:, None]))
     [check] = checked(logs, pendulum)
     assert (check.check, check.severity) == ("torque_is_position", "error")
+
+
+def test_a_shift_that_delays_of_all_joints_undo_was_none(two_links: list[Log], arm: Arm) -> None:
+    def delays(*values: float) -> list[dict[str, object]]:
+        named = enumerate(values, start=1)
+        return [{"effect": "actuator_delay", "joint": j, "parameters": {"delay": {"value": v}}} for j, v in named]
+
+    assert time_shift.taken_back(delays(0.0061, 0.0059), 2, -0.006)
+    assert not time_shift.taken_back(delays(0.0061), 2, -0.006), "a delay of one drive is an effect"
+    assert not time_shift.taken_back(delays(0.001, 0.001), 2, -0.006), "what is left of a sample"
+    assert not time_shift.taken_back(delays(0.006, 0.006), 2, 0.0), "nothing was shifted"
+    as_read = prepare(two_links[:1], two_links[1:], arm, Corrections(), {"horizon": 0.25}, repair=True)
+    late = Corrections(shift={"tau": -2 * arm.sample_period})
+    shifted = replace(as_read, training=[late.on_log(log) for log in as_read.training], shift=late.shift["tau"])
+    [again] = shifted.without_shift().training
+    rows = np.searchsorted(as_read.training[0].t, again.t - 1e-9)
+    np.testing.assert_array_equal(again.tau, as_read.training[0].tau[rows])
+    assert len(again) > len(as_read.training[0]) - 10
 
 
 @pytest.mark.parametrize("samples", [pytest.param(1, marks=pytest.mark.slow), 3])

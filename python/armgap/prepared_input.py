@@ -34,6 +34,7 @@ class PreparedInput:
     notes: tuple[str, ...]
     checks: tuple[Check, ...]
     factors: Mapping[str, float] = field(default_factory=dict)
+    shift: float = 0.0
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def with_factors(self, factors: Mapping[str, float]) -> PreparedInput:
@@ -50,6 +51,17 @@ class PreparedInput:
             holdout=[replace(ratio.on_log(log), findings=log.findings) for log in self.holdout],
             checks=(*torque_unit.said(factors), *checks),
             factors=factors,
+        )
+
+    def without_shift(self) -> PreparedInput:
+        """Return the input with torques at the times at which they stand in the file."""
+        back = Corrections(shift={"tau": -self.shift})
+        return replace(
+            self,
+            training=[replace(back.on_log(log), findings=log.findings) for log in self.training],
+            holdout=[replace(back.on_log(log), findings=log.findings) for log in self.holdout],
+            checks=tuple(c for c in self.checks if c.check != "time_shift"),
+            shift=0.0,
         )
 
 
@@ -124,6 +136,7 @@ def _examined(given: PreparedInput, horizon: float, *, repair: bool) -> Prepared
         arm=found.arm,
         checks=checks,
         factors=found.corrections.factor,
+        shift=found.corrections.shift.get("tau", 0.0),
     )
 
 

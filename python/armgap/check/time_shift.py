@@ -21,7 +21,7 @@ from armgap.check.corrections import Corrections
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.log import Log
 
-__all__ = ["acausal", "causal", "confirmed"]
+__all__ = ["acausal", "causal", "confirmed", "taken_back"]
 
 # Shifts that are tried [samples].
 _LARGEST = 8
@@ -45,6 +45,9 @@ _FEWEST = 200
 # Delays of all joints are one shift of the file if they differ by less than this part of a sample, or by this many of their deviations.
 _EQUAL = 0.5
 _EQUAL_SIGMAS = 3.0
+# Delays of all joints that make up this part of a repaired shift take it back. Where hysteresis had passed for late torques they made up all of it
+# (0.99 and 1.00, two cases); a shift that is there leaves at most the fraction of a sample that it was rounded by.
+_TAKEN_BACK = 0.7
 
 
 def acausal(logs: Sequence[Log], arm: Arm) -> int | None:
@@ -114,6 +117,12 @@ def confirmed(
     if samples <= 1 and error(best) > _CLEARLY * error(best + 1):
         return None
     return Corrections(shift={"tau": float(f"{-best * period:.6g}")})
+
+
+def taken_back(causes: Sequence[Mapping[str, Any]], n_joints: int, shift: float) -> bool:
+    """Return whether named delays on all joints undo a shift [s] of the torques that was repaired before: then none was there."""
+    delays = {c["joint"]: c["parameters"]["delay"]["value"] for c in causes if c["effect"] == "actuator_delay"}
+    return shift < 0.0 and len(delays) == n_joints and min(delays.values()) > -_TAKEN_BACK * shift
 
 
 def causal(causes: Sequence[Mapping[str, Any]], n_joints: int, period: float) -> Check | None:

@@ -15,7 +15,7 @@ import numpy as np
 from armgap import _native, options
 from armgap.arm import Arm
 from armgap.check import Check, Corrections, torque_unit
-from armgap.check.time_shift import causal
+from armgap.check.time_shift import causal, taken_back
 from armgap.custom_effect import CustomEffect, TorqueTables, check_effects
 from armgap.diagnosis.result import Diagnosis
 from armgap.errors import OptionError
@@ -158,6 +158,8 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     data = tables.named(json.loads(text))
     if factors := torque_unit.refined(given.factors, data["causes"], arm.n_joints):
         return _diagnose(replace(given.with_factors(factors), factors={}), settings, effects)
+    if taken_back(data["causes"], arm.n_joints, given.shift):
+        return _diagnose(given.without_shift(), settings, effects)
     if contradictory:
         data = _contradicted(data)
     data["arm"]["name"] = arm.name

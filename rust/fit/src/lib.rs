@@ -57,6 +57,7 @@ pub mod smooth;
 pub mod solve;
 mod together;
 pub mod track;
+pub mod unnamed;
 pub mod velocity;
 pub mod verdict;
 pub mod weighting;

@@ -3,6 +3,7 @@
 use crate::energy::Energy;
 use crate::locate::{Location, Regime};
 use crate::sanity::Sanity;
+use crate::unnamed::Dependence;
 use crate::verdict::Verdict;
 use armgap_core::transmission::Sides;
 use schemars::generate::SchemaSettings;
@@ -66,6 +67,8 @@ pub struct Diagnosis {
     pub stages: Vec<StageSummary>,
     /// The gap by joint and regime.
     pub regimes: Vec<Regime>,
+    /// What the residual torque that the final model leaves depends on, strongest first.
+    pub unnamed: Vec<Dependence>,
     /// Predictions on the holdout, window by window.
     pub series: Vec<Series>,
     /// Predictions of the whole holdout from its first sample.

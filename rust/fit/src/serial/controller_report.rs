@@ -38,7 +38,10 @@ pub(super) fn behind_controller(cause: &Cause, controller: &PositionController) 
                 "on the measured velocity the derivative gain acts as viscous friction does".to_owned(),
             );
             let transmissions = NOT_TESTED.map(|(effect, what)| {
-                why(effect, format!("{what} changes the damping of the loop, and is not tested without torques"))
+                why(
+                    effect,
+                    format!("{what} changes the damping of the loop, and is not tested without torques"),
+                )
             });
             let on_velocity = (!of.rate_of_error).then_some(friction);
             on_velocity.into_iter().chain(transmissions).collect()
@@ -99,10 +102,7 @@ mod tests {
 
     #[test]
     fn another_damping_may_be_friction_or_a_transmission_that_gives_way() {
-        assert_eq!(
-            alike("controller_damping", false),
-            ["viscous_friction", "joint_elasticity", "backlash"]
-        );
+        assert_eq!(alike("controller_damping", false), ["viscous_friction", "joint_elasticity", "backlash"]);
         assert_eq!(alike("controller_damping", true), ["joint_elasticity", "backlash"]);
     }
 

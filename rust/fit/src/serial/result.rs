@@ -117,6 +117,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         ranking: Vec::new(),
         stages: Vec::new(),
         regimes: Vec::new(),
+        unnamed: Vec::new(),
         series: window_series(data, &compared.measured, compared.predicted.each_ref().map(Vec::as_slice)),
         free_run_series,
         noise: Noise {
