@@ -11,9 +11,9 @@ from armgap import Arm, Log, diagnose, simulate
 from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, time_shift, torque_unit
 from armgap.check.contradiction import READINGS, Refit, screen
 from armgap.check.equation_error import EquationError, Rows, bounds
-from armgap.prepared_input import prepare
 from armgap.diagnosis.diagnosis import _ambiguous_lag
 from armgap.errors import ColumnError, OptionError
+from armgap.prepared_input import prepare
 from armgap.simulation import Effect
 from swings import off, sines, swing
 

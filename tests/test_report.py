@@ -254,6 +254,19 @@ def test_candidates_stand_below_the_causes_with_their_reason() -> None:
     assert "no arm has a gain of 20" in diagnosis_report(Diagnosis.from_dict(data), "x.md")
 
 
+def test_what_the_rest_depends_on_is_drawn_and_read_back() -> None:
+    data = copy.deepcopy(cases.named().to_dict())
+    assert "What the rest depends on" not in render_html(data)
+    law = {"x": [-0.4, 0.1, 0.6], "torque": [-1.25, 0.5, 0.75], "sigma": [0.1, 0.2, 0.3]}
+    data["unnamed"] = [{"joint": 1, "variable": "ddq1", "unit": "rad/s^2", "share": 0.6, "law": law}]
+    [found] = Diagnosis.from_dict(data).unnamed
+    assert (found.joint, found.variable, found.share, found.law.torque) == (1, "ddq1", 0.6, (-1.25, 0.5, 0.75))
+    page = render_html(data)
+    assert page.index("The evidence") < page.index("What the rest depends on</h2>")
+    assert "acceleration of joint 1" in page
+    assert "1.25" in diagnosis_report(Diagnosis.from_dict(data), "x.md")
+
+
 def test_the_place_of_the_gap_is_given_in_the_joints_own_range() -> None:
     data = copy.deepcopy(cases.named().to_dict())
     data["regimes"][0] |= {"variable": "abs(dq1)", "unit": "rad/s", "edges": [0.0, 0.021, 0.532, 4.06]}

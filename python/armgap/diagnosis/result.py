@@ -14,6 +14,8 @@ from armgap.report.notebook import NotebookDisplay
 __all__ = [
     "Bound",
     "Cause",
+    "Dependence",
+    "DependenceLaw",
     "Diagnosis",
     "Equivalent",
     "Gap",
@@ -176,6 +178,46 @@ class Sanity:
     message: str
 
 
+@dataclass(frozen=True)
+class DependenceLaw:
+    """A torque as a table over a variable.
+
+    Attributes
+    ----------
+    x : tuple of float
+        Mean of the variable in each class, rising.
+    torque, sigma : tuple of float
+        Torque there, beside its mean, and its standard deviation [N m or N].
+    """
+
+    x: tuple[float, ...]
+    torque: tuple[float, ...]
+    sigma: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """What the residual torque of a joint depends on that no named effect explains.
+
+    Attributes
+    ----------
+    joint : int
+        Joint that the torque acts on, from 1.
+    variable, unit : str
+        ``"q1"``, ``"dq1"``, ``"ddq1"``, ``"tau1"`` and so on, or ``"t"``, the time since the log began, and its unit.
+    share : float
+        Share of the residual torque's variance beyond noise that the law predicts in logs that it was not fitted to, 0 to 1.
+    law : DependenceLaw
+        The law. It has no name: another arm, load or motion may have another.
+    """
+
+    joint: int
+    variable: str
+    unit: str
+    share: float
+    law: DependenceLaw
+
+
 _Record = TypeVar("_Record", Value, Equivalent, Bound, Sanity)
 
 
@@ -204,6 +246,8 @@ class Diagnosis(NotebookDisplay):
         What was found and is not fit to be named, each with its `why`; not part of the model with causes.
     sanity : tuple of Sanity
         Re-estimated parameters of the model with causes that are not to be believed as they stand.
+    unnamed : tuple of Dependence
+        What the residual torque that stays depends on, strongest first; empty where the rest is within noise.
     extra : dict
         What a report draws besides: curves, ranking, options.
     """
@@ -217,6 +261,7 @@ class Diagnosis(NotebookDisplay):
     checks: tuple[Check, ...] = ()
     candidates: tuple[Cause, ...] = ()
     sanity: tuple[Sanity, ...] = ()
+    unnamed: tuple[Dependence, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict, repr=False)
     _data: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
@@ -225,6 +270,7 @@ class Diagnosis(NotebookDisplay):
         """Build a diagnosis from its JSON object."""
         known = {
             "schema", "verdict", "gap", "where", "causes", "candidates", "ruled_out", "parameters", "sanity", "checks",
+            "unnamed",
         }  # fmt: skip
         gap = data["gap"]
         parameters = {
@@ -254,6 +300,7 @@ class Diagnosis(NotebookDisplay):
             checks=tuple(Check.from_dict(c) for c in data.get("checks", ())),
             candidates=tuple(_cause(c) for c in data.get("candidates", ())),
             sanity=tuple(_take(Sanity, s) for s in data.get("sanity", ())),
+            unnamed=tuple(_dependence(d) for d in data.get("unnamed", ())),
             extra={key: value for key, value in data.items() if key not in known},
             _data=data,
         )
@@ -305,6 +352,11 @@ def _cause(data: dict[str, Any]) -> Cause:
         data.get("why"),
         data.get("sides"),
     )
+
+
+def _dependence(data: dict[str, Any]) -> Dependence:
+    law = {key: tuple(data["law"][key]) for key in ("x", "torque", "sigma")}
+    return Dependence(data["joint"], data["variable"], data["unit"], data["share"], DependenceLaw(**law))
 
 
 def _ruled_out(data: dict[str, Any]) -> RuledOut:

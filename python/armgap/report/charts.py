@@ -204,6 +204,29 @@ def law(entry: dict[str, Any]) -> Any:
     return f
 
 
+def dependence(entry: dict[str, Any]) -> Any:
+    """A law without a name: the table with the 95 % interval of each of its values.
+
+    Parameters
+    ----------
+    entry : dict
+        One entry of a diagnosis' ``unnamed``.
+    """
+    from bokeh.models import ColumnDataSource, Whisker
+
+    law = entry["law"]
+    f = figure("", f"{symbol_text(entry['variable'])} [{unit_text(entry['unit'])}]", "", height=300)
+    ends = {
+        "x": law["x"],
+        "low": [y - 1.96 * s for y, s in zip(law["torque"], law["sigma"], strict=True)],
+        "high": [y + 1.96 * s for y, s in zip(law["torque"], law["sigma"], strict=True)],
+    }
+    f.add_layout(Whisker(base="x", lower="low", upper="high", source=ColumnDataSource(ends), line_color=BEFORE))
+    f.line(law["x"], law["torque"], color=AFTER, line_width=2.5)
+    f.scatter(law["x"], law["torque"], size=8, color=BEFORE, fill_color=None, line_width=2)
+    return f
+
+
 def _reach(f: Any, values: Sequence[float]) -> None:
     """Show the means and the law, and so much of the cloud as twice their span holds."""
     low, high = min(values), max(values)

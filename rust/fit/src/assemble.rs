@@ -116,7 +116,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         ranking,
         stages: nodes(context, attribution),
         regimes,
-        unnamed: dependences,
+        unnamed: if remains { dependences } else { Vec::new() },
         series,
         free_run_series,
         noise: noise(context),

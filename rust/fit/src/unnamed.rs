@@ -27,7 +27,7 @@ const CERTAIN: f64 = 2.5;
 /// Share of the residual torque's variance beyond noise below which a law does not matter.
 const MATTERS: f64 = 0.15;
 
-/// Laws of one joint at most.
+/// Laws of one joint at most. There are none where what stays is no more than twice what the noise of positions makes.
 const MOST: usize = 3;
 
 /// Fewest blocks in which a law is judged.
@@ -263,7 +263,7 @@ fn of_joint(joint: usize, rest: &Rest) -> Vec<Dependence> {
     let Some(plain) = rest.regression(Vec::new()).left_out() else { return found };
     let whole = squares(&plain) - rest.noise;
     let mut before = plain;
-    while found.len() < MOST && whole > 0.0 {
+    while found.len() < MOST && whole > rest.noise {
         let with = |i: usize| -> Vec<&[usize]> {
             taken.iter().chain(std::iter::once(&i)).map(|law| classes[*law].as_slice()).collect()
         };

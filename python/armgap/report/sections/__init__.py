@@ -7,7 +7,7 @@ from collections.abc import Callable
 from armgap.report.page import Section
 from armgap.report.sections.about import data_quality, method
 from armgap.report.sections.advice import what_next
-from armgap.report.sections.causes import candidates, evidence, look_alikes, ranking
+from armgap.report.sections.causes import candidates, evidence, look_alikes, ranking, unnamed
 from armgap.report.sections.checks import checks, input_checks
 from armgap.report.sections.gap import first_picture, gap_map
 from armgap.report.sections.input import conventions
@@ -23,6 +23,7 @@ SECTIONS: tuple[Callable[[Data], Section | None], ...] = (
     conventions,
     checks,
     evidence,
+    unnamed,
     predictions,
     gap_map,
     ranking,

@@ -7,10 +7,10 @@ from typing import Any
 
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
-from armgap.report.sections.model_labels import Data, load_text, small_unit
+from armgap.report.sections.model_labels import Data, load_text, small_unit, torque_unit
 from armgap.report.words import error_text, figure, joint_text, named, percent, sizes, symbol_text, title
 
-__all__ = ["candidates", "evidence", "look_alikes", "ranking"]
+__all__ = ["candidates", "evidence", "look_alikes", "ranking", "unnamed"]
 
 #: Shares below this are shown as this.
 _WORST_SHARE = -9.99
@@ -57,6 +57,40 @@ def _verdict(law: Data) -> str:
     if share <= 0:
         return f"the law explains none of what the ranges' means show{failed}."
     return f"the law explains {percent(share)} of what the ranges' means show (mean square){failed}."
+
+
+def unnamed(data: Data) -> Section | None:
+    """What the rest depends on, as tables without a name."""
+    found = data.get("unnamed") or []
+    if not found:
+        return None
+    unit = torque_unit(data)
+    text = (
+        f"The {load_text(data)} that stays depends on these variables, in logs that each table was not fitted to. No effect of the library is "
+        "behind them: they are tables, and another load or motion may have others. Each is drawn beside its mean, with 95 % intervals."
+    )
+    header = (
+        "joint",
+        "depends on",
+        f"share of what stays, of joint's {load_text(data)} (variance)",
+        f"largest [{unit}]",
+    )
+    rows = [
+        (
+            str(d["joint"]),
+            symbol_text(d["variable"]),
+            Bar(d["share"], percent(d["share"]), charts.MEASURED),
+            figure(max(abs(y) for y in d["law"]["torque"])),
+        )
+        for d in found
+    ]
+    drawn = [
+        Drawing(
+            f"Joint {d['joint']}: {load_text(data)} [{unit}] over {symbol_text(d['variable'])}", charts.dependence(d)
+        )
+        for d in found
+    ]
+    return Section("What the rest depends on", text=[text], tables=[Table(header, rows)], figures=drawn, columns=2)
 
 
 def ranking(data: Data) -> Section | None:
