@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
 from armgap.check import Check
-from armgap.literals import Status, Verdict
+from armgap.literals import ChainStage, Status, Verdict
 from armgap.log.findings import remarks
 from armgap.report.notebook import NotebookDisplay
 
 __all__ = [
     "Bound",
     "Cause",
+    "ChainPart",
     "Diagnosis",
     "Equivalent",
     "Gap",
@@ -176,6 +177,31 @@ class Sanity:
     message: str
 
 
+@dataclass(frozen=True)
+class ChainPart:
+    """What a stage of the chain from command to measured position adds to the gap at one joint.
+
+    Attributes
+    ----------
+    stage : {"drive", "transmission", "mechanics", "sensor"}
+        Between command and measured torque, first and second encoder, measured torque and position, position and sensor.
+    joint : int
+        Joint, from 1.
+    share : float
+        Share of the squared gap with parameters re-estimated, from 0 to 1; see `armgap.drive_chain`.
+    parameters : dict
+        Of a drive: ``delay``, ``gain``, ``offset``, ``viscous`` and ``inertia``, see `armgap.drive`.
+    detail : str
+        The same in words, with the figures.
+    """
+
+    stage: ChainStage
+    joint: int
+    share: float
+    parameters: dict[str, Value]
+    detail: str
+
+
 _Record = TypeVar("_Record", Value, Equivalent, Bound, Sanity)
 
 
@@ -204,6 +230,9 @@ class Diagnosis(NotebookDisplay):
         What was found and is not fit to be named, each with its `why`; not part of the model with causes.
     sanity : tuple of Sanity
         Re-estimated parameters of the model with causes that are not to be believed as they stand.
+    chain : tuple of ChainPart
+        How much of the gap arises between command and position at which stage, largest share first; empty where the logs hold neither measured
+        torques nor second encoders.
     extra : dict
         What a report draws besides: curves, ranking, options.
     """
@@ -217,6 +246,7 @@ class Diagnosis(NotebookDisplay):
     checks: tuple[Check, ...] = ()
     candidates: tuple[Cause, ...] = ()
     sanity: tuple[Sanity, ...] = ()
+    chain: tuple[ChainPart, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict, repr=False)
     _data: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
@@ -224,7 +254,7 @@ class Diagnosis(NotebookDisplay):
     def from_dict(cls, data: dict[str, Any]) -> Diagnosis:
         """Build a diagnosis from its JSON object."""
         known = {
-            "schema", "verdict", "gap", "where", "causes", "candidates", "ruled_out", "parameters", "sanity", "checks",
+            "schema", "verdict", "gap", "where", "causes", "candidates", "ruled_out", "parameters", "sanity", "checks", "chain",
         }  # fmt: skip
         gap = data["gap"]
         parameters = {
@@ -254,6 +284,7 @@ class Diagnosis(NotebookDisplay):
             checks=tuple(Check.from_dict(c) for c in data.get("checks", ())),
             candidates=tuple(_cause(c) for c in data.get("candidates", ())),
             sanity=tuple(_take(Sanity, s) for s in data.get("sanity", ())),
+            chain=tuple(_chain_part(p) for p in data.get("chain", ())),
             extra={key: value for key, value in data.items() if key not in known},
             _data=data,
         )
@@ -305,6 +336,11 @@ def _cause(data: dict[str, Any]) -> Cause:
         data.get("why"),
         data.get("sides"),
     )
+
+
+def _chain_part(data: dict[str, Any]) -> ChainPart:
+    parameters = {name: _take(Value, value) for name, value in data.get("parameters", {}).items()}
+    return ChainPart(data["stage"], data["joint"], data["share"], parameters, data["detail"])
 
 
 def _ruled_out(data: dict[str, Any]) -> RuledOut:
