@@ -226,7 +226,7 @@ def _detail(case: _Case, stage: ChainStage, joint: int, used: bool) -> str:
         case "transmission":
             return f"with the position of joint {joint + 1} on the link's side in place of the first {what} miss by that much less"
         case "mechanics":
-            return f"what {what} still miss at joint {joint + 1}, with the stages before and after taken out as far as they are measured"
+            return f"what {what} still miss at joint {joint + 1} with the measured signals in use"
         case "sensor":
             return f"what noise of the sensors alone makes {what} miss at joint {joint + 1}"
 
@@ -245,6 +245,6 @@ def _follows(drive: Drive, case: _Case, rotary: bool) -> str:
     if abs(delay) < _AT_ONCE * case.training[0].sample_period:
         late = "within the period of a sample"
     return (
-        f"the measured torque follows the commanded one {late}, {gain:.3g} times as large, with a part of {-inertia:.2g} {unit} times acceleration; "
+        f"the measured torque follows the commanded one {late}, with a gain of {gain:.3g} and a part of {-inertia:.2g} {unit} times acceleration; "
         f"on the holdout that explains {100 * max(worth, 0.0):.0f} % of the squared difference between the two"
     )

@@ -177,8 +177,9 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
     else:
         data["plausibility"] = consistency(known, arm)
     gap = data["gap"]
-    if chain := [] if contradictory else drive_chain(arm, training, held, horizon=gap["horizon_s"], floor=gap["floor"]):
-        data["chain"] = chain
+    data["chain"] = (
+        [] if contradictory else drive_chain(arm, training, held, horizon=gap["horizon_s"], floor=gap["floor"])
+    )
     data["input"] = _input(arm, training, held)
     data["provenance"] = given.provenance
     remarks: list[LogRemark] = [

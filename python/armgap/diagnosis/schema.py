@@ -20,7 +20,7 @@ _NAME: Any = Annotated[str, "Name of the arm, from its file."]
 _ADDED = {
     "chain": Annotated[
         list[ChainEntry],
-        "How much of the gap arises where between command and position; only of logs with measured torques or second encoders.",
+        "How much of the gap arises where between command and position; empty without measured torques and second encoders.",
     ],
     "checks": Annotated[list[CheckEntry], "Defects of the input, errors first."],
     "input": Annotated[InputSummary, "What was read."],
@@ -29,7 +29,7 @@ _ADDED = {
     "plausibility": Annotated[list[Plausibility], "Whether the model with causes is physically possible."],
     "provenance": Annotated[Provenance, "What the result was made from."],
 }
-_OPTIONAL = {"chain", "laws"}
+_OPTIONAL = {"laws"}
 
 
 def diagnosis_schema() -> dict[str, Any]:
