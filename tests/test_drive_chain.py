@@ -203,6 +203,35 @@ def test_a_soft_transmission_shows_in_the_second_encoder() -> None:
     assert "parameters" not in entries[0]
 
 
+def test_a_serial_arm_is_judged_by_its_torques(tmp_path: Path) -> None:
+    """One link that stands up: torques that its motion needs are measured, those that were commanded lack a part."""
+    path = tmp_path / "arm.toml"
+    path.write_text(
+        'kind = "serial"\nsample_period = 0.004\n[[link]]\njoint = "one"\naxis = [0, 1, 0]\nmass = 2.0\ncom = [0, 0, 0.2]\n'
+        "inertia = {ixx = 0.03, iyy = 0.03, izz = 0.01}\n"
+    )
+    arm = Arm.read(path)
+
+    def needed(seed: int) -> Log:
+        rng = np.random.default_rng(seed)
+        t = np.arange(2000) * 0.004
+        size, rate, phase = rng.uniform(0.1, 0.3, 4), rng.uniform(1.0, 6.0, 4), rng.uniform(0, 6, 4)
+        angle = t[:, None] * rate + phase
+        q, dq, ddq = (
+            np.sum(part, axis=1)
+            for part in (size * np.sin(angle), size * rate * np.cos(angle), -size * rate**2 * np.sin(angle))
+        )
+        tau = (0.03 + 2.0 * 0.2**2) * ddq - 2.0 * 9.81 * 0.2 * np.sin(q) + 0.1 * dq + 0.2 * np.tanh(dq / 0.01)
+        lacking = 1.5 * np.sin(9.0 * q)
+        return Log.from_arrays(
+            t, q + 1e-5 * rng.normal(size=2000), tau - lacking, tau_meas=tau, arm=arm, name=f"{seed}"
+        )
+
+    entries = drive_chain(arm, [needed(1)], [needed(2)], horizon=0.25, floor=[1e-3])
+    assert (entries[0]["stage"], entries[0]["joint"]) == ("drive", 1)
+    assert entries[0]["share"] > 0.9
+
+
 def test_without_further_columns_there_is_no_chain() -> None:
     log = run(1, drive=False)
     bare = replace(log, tau_meas=None)
@@ -285,6 +314,13 @@ def test_measured_torques_of_some_joints_are_not_used_and_said() -> None:
     assert any("`tau_meas2` not used: measured torques of other joints are missing" in f.message for f in log.findings)
     with pytest.raises(ColumnError, match="tau_meas1"):
         Log.from_frame(table(i2=COLUMN), columns={"tau_meas2": "i2"})
+
+
+def test_a_measured_torque_can_stand_for_the_commanded_one() -> None:
+    log = Log.from_frame(table(tau_meas1=COLUMN, tau_meas2=-COLUMN), columns={"tau1": "tau_meas1", "tau2": "tau_meas2"})
+    assert np.array_equal(log.tau[:, 0], COLUMN)
+    assert log.tau_meas is None
+    assert not any("not used" in f.message for f in log.findings)
 
 
 def test_units_of_measured_columns_are_converted() -> None:

@@ -27,8 +27,8 @@ Array = NDArray[np.float64]
 PARAMETERS = ("delay", "gain", "offset", "viscous", "inertia")
 """Parameters of a drive, in the order of `Drive.values`."""
 
-# Standard deviation of the kernel [s]: its cut-off of 7 Hz is above the motion of arms. On a real arm inertias of single logs scattered by 40 %
-# with 5 ms and by 13 % with 20 ms, where ripple of the current and encoder steps are gone.
+# Standard deviation of the kernel [s]: its cut-off of 7 Hz is above the motion of arms. On a real arm inertias of single logs scattered by 23 %
+# with 5 ms and by 10 to 12 % with 10 to 40 ms, where ripple of the current and encoder steps are gone.
 _KERNEL_S = 0.02
 # The kernel's standard deviation at least, in sample periods: narrower ones have no second derivative on the samples.
 _KERNEL_PERIODS = 2.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -160,22 +160,32 @@ def _pick_all(index: Index, names: Mapping[str, str], mapping: Mapping[str, str]
         t_tau = _torque_clock(index, names, t, tau)
         _one_clock(index, t_tau or t, tau, "torques")
         q_ref, dq_ref = (), None
-    dq, tau_meas, q_link = (_if_all(index, names, mapping, prefix, n, t) for prefix in ("dq", "tau_meas", "q_link"))
+    used = (*q, *tau, *q_ref)
+    dq, tau_meas, q_link = (
+        _if_all(index, names, mapping, prefix, n, t, used) for prefix in ("dq", "tau_meas", "q_link")
+    )
     found = Names(t, q, tau, dq, t_tau, q_ref, dq_ref, tau_meas, q_link)
     _check_once(index, found)
     return replace(found, units={c: unit for _, c in found.pairs if (unit := index.unit(c)) is not None})
 
 
 def _if_all(
-    index: Index, names: Mapping[str, str], mapping: Mapping[str, str], prefix: str, n: int, t: str
+    index: Index,
+    names: Mapping[str, str],
+    mapping: Mapping[str, str],
+    prefix: str,
+    n: int,
+    t: str,
+    used: Sequence[str] = (),
 ) -> tuple[str, ...] | None:
-    """Return columns that are used only where all joints have one, on the clock of `t`; those that are asked for must be."""
+    """Return columns that are used only where all joints have one, on the clock of `t` and not `used` already; those that are asked for must be."""
     wanted = [f"{prefix}{j}" for j in range(1, n + 1)]
     needed = any(key in mapping for key in wanted)
     found = None
     if needed or all(index.find(names.get(key, key), key, within=t) for key in wanted):
         found = tuple(_pick(index, names, key, t) for key in wanted)
-    if found is not None and (needed or all(c in index.recording.stream_of(t).columns for c in found)):
+    free = found is not None and all(c in index.recording.stream_of(t).columns and c not in used for c in found)
+    if found is not None and (needed or free):
         _one_clock(index, t, found, OPTIONAL[prefix])
         return found
     return None
@@ -279,7 +289,8 @@ def left_out(recording: Recording, names: Names, prefix: str) -> list[str]:
     """Return the columns of a group in `OPTIONAL` that are left out because others are missing."""
     if getattr(names, prefix) is not None:
         return []
-    return [name for name in recording.columns if re.fullmatch(rf"{prefix}[1-9][0-9]*", name)]
+    used = [column for _, column in names.pairs]
+    return [name for name in recording.columns if re.fullmatch(rf"{prefix}[1-9][0-9]*", name) and name not in used]
 
 
 def _from_arm(index: Index, arm: Arm | None) -> dict[str, str]:
