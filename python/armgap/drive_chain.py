@@ -109,15 +109,17 @@ class _Case:
         training, holdout = ([_with(log, signals) for log in logs] for logs in (self.training, self.holdout))
         if self.arm.chain is None:
             error = Refit.of(self.arm, training, holdout, self.horizon).error
-            return np.asarray(error**2)
+            return np.nan_to_num(error**2, nan=np.inf, posinf=np.inf)
         found = serial.fit([*training, *holdout], self.arm)
         return np.zeros(self.arm.n_joints) if found is None else np.nan_to_num(np.maximum(found.share, 0.0))
 
     def signals(self) -> Iterator[_Signal]:
-        """Return the signals that all logs hold beside what the model is given."""
+        """Return the signals that all logs hold beside what the model is given; none behind position controllers."""
         logs = [*self.training, *self.holdout]
+        if not all(log.has_torques for log in logs):
+            return
         for j in range(self.arm.n_joints):
-            if all(log.tau_meas is not None and log.has_torques for log in logs) and any(
+            if all(log.tau_meas is not None for log in logs) and any(
                 not np.array_equal(log.tau[:, j], log.tau_meas[:, j]) for log in logs if log.tau_meas is not None
             ):
                 yield from (_Signal("drive", j, held) for held in (False, True))
@@ -155,7 +157,7 @@ def drive_chain(
     -------
     list of ChainEntry
         Stages with at least `LEAST_SHARE` of the gap, and every drive that could be identified, the largest share first; empty where the logs hold
-        neither measured torques nor positions on the link's side for every joint.
+        neither measured torques nor positions on the link's side for every joint, or predictions diverge.
     """
     case = _Case(arm, training, holdout, horizon)
     signals = list(case.signals())
@@ -163,6 +165,8 @@ def drive_chain(
         return []
     drives = {s.joint: Drive.identify(training, s.joint) for s in signals if s.stage == "drive"}
     gains, left, whole = _replaced(case, signals)
+    if not np.isfinite(whole):
+        return []  # predictions that diverge are no measure
     noise = np.minimum(np.zeros(arm.n_joints) if arm.chain is not None else np.square(floor), left)
     shares = {
         **{(s.stage, s.joint): 0.0 for s in signals},
