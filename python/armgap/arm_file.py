@@ -249,7 +249,7 @@ class ArmFile:
 
     def _column_keys(self, n: int) -> list[str]:
         """Return the columns of a log that can be mapped."""
-        return ["t", *(f"{kind}{j}" for kind in ("q", "tau", "dq") for j in range(1, n + 1))]
+        return ["t", *(f"{kind}{j}" for kind in ("q", "tau", "dq", "tau_meas", "q_link") for j in range(1, n + 1))]
 
     def _limits(self, n: int) -> MotionLimits | None:
         if "limits" not in self.data:

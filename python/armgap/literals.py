@@ -6,6 +6,7 @@ from typing import Literal, get_args
 
 __all__ = [
     "CAUSE_STATUSES",
+    "CHAIN_STAGES",
     "FILTERS",
     "GAP_OUTCOMES",
     "SCHEMES",
@@ -14,6 +15,7 @@ __all__ = [
     "VELOCITIES",
     "VERDICTS",
     "CauseStatus",
+    "ChainStage",
     "Filters",
     "GapOutcome",
     "Scheme",
@@ -33,6 +35,7 @@ Side = Literal["motor", "link", "unknown"]
 TauKind = Literal["command", "measured"]
 CauseStatus = Literal["gone", "unseen", "undecided", "new", "smaller", "larger", "unchanged", "renamed"]
 GapOutcome = Literal["smaller", "larger", "unchanged", "none"]
+ChainStage = Literal["drive", "transmission", "mechanics", "sensor"]
 
 SERIAL = "serial"
 """The kind of an arm that has a chain."""
@@ -50,3 +53,5 @@ CAUSE_STATUSES: tuple[CauseStatus, ...] = get_args(CauseStatus)
 """What can become of a cause between two diagnoses."""
 GAP_OUTCOMES: tuple[GapOutcome, ...] = get_args(GapOutcome)
 """What can become of the gap between two diagnoses."""
+CHAIN_STAGES: tuple[ChainStage, ...] = get_args(ChainStage)
+"""Stages from command to measured position."""

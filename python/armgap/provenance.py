@@ -82,5 +82,6 @@ def _input(path: Path | None, content: bytes) -> HashedInput:
 def _columns(log: Log) -> bytes:
     if log.path is not None and log.path.is_file():
         return b""
-    arrays = [log.t, log.q, log.tau, *(x for x in (log.dq, log.q_ref, log.dq_ref) if x is not None)]
+    optional = (log.dq, log.q_ref, log.dq_ref, log.tau_meas, log.q_link)
+    arrays = [log.t, log.q, log.tau, *(x for x in optional if x is not None)]
     return b"".join(np.ascontiguousarray(x).tobytes() for x in arrays)

@@ -268,7 +268,7 @@ class SerialArmFile(ArmFile):
         return float(value)
 
     def _column_keys(self, n: int) -> list[str]:
-        further = ("q_ref", "dq_ref", "tau_ff", "tau_meas", "q_link", "temp")
+        further = ("q_ref", "dq_ref", "tau_ff", "temp")
         return [*super()._column_keys(n), *(f"{kind}{j}" for kind in further for j in range(1, n + 1)), "tau_kind"]
 
     def _columns(self, n: int) -> dict[str, str]:

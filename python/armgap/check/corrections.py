@@ -24,15 +24,26 @@ __all__ = ["CORRECTIONS", "Corrections", "GravityCorrection", "PositionUnit"]
 GravityCorrection = Literal["reversed", "compensated"]
 PositionUnit = Literal["deg", "turns"]
 
-_COLUMN = re.compile(r"(q|dq|tau)([1-9]\d*)")
+_COLUMN = re.compile(r"(q|dq|tau|q_link|tau_meas)([1-9]\d*)")
 _POSITION = re.compile(r"q([1-9]\d*)")
+_ZERO = re.compile(r"(q|q_link)([1-9]\d*)")
 _TORQUE = re.compile(r"tau([1-9]\d*)?")
+_FACTOR = re.compile(r"(tau|tau_meas)([1-9]\d*)?")
 # A shift this near to a whole number of sample periods is one.
 _WHOLE = 0.05
-# Arrays of a log that a column of each kind stands for.
-_TOGETHER = {"q": ("q", "dq", "q_ref", "dq_ref"), "dq": ("dq",), "tau": ("tau", "moment")}
-# Of these, those that a zero or a unit of the positions is about.
-_POSITIONS = ("q", "q_ref")
+# Arrays of a log that a column of each kind stands for where signs and joints are concerned: what is measured at a joint counts its way.
+_TOGETHER = {
+    "q": ("q", "dq", "q_ref", "dq_ref", "q_link"),
+    "dq": ("dq",),
+    "tau": ("tau", "moment", "tau_meas"),
+    "q_link": ("q_link",),
+    "tau_meas": ("tau_meas",),
+}
+# Those that a zero or a unit of the positions is about, and those that a factor on torques is: a measured torque has a unit of its own.
+_POSITIONS = {"q": ("q", "q_ref", "q_link"), "q_link": ("q_link",)}
+_FACTORS = {"tau": ("tau", "moment"), "tau_meas": ("tau_meas",)}
+# Those whose times a shift of the torques is about: what is measured is measured beside the positions.
+_SHIFTED = ("tau", "moment")
 _ANGLE = re.compile(r"(?P<number>[-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|m|turns)?")
 _ANGLE_UNITS = {"deg": math.pi / 180, "rad": 1.0, "m": 1.0, "turns": 2 * math.pi, None: 1.0}
 _SPAN = re.compile(r"(?:(?P<log>.+):)?(?P<first>[\d.]+)-(?P<last>[\d.]+)")
@@ -45,7 +56,8 @@ class Corrections:
     """How the columns of the logs differ from what the arm file means.
 
     They are applied in this order: `unit`, `swap`, `flip`, `zero`, `absolute` and `relative`, `factor`, `skip`, `shift`; `gravity` is about
-    the arm.
+    the arm. What is said of a position column holds for its second encoder ``q_link`` too; sign and joint of a torque column hold for the
+    measured torque ``tau_meas`` too, its factor and shift do not. Either can be named alone where signs, joints, zeros or factors are meant.
 
     Attributes
     ----------
@@ -119,12 +131,12 @@ class Corrections:
             raise OptionError(f"positions cannot be in `{unit}`", remedy="write deg or turns")
         return cls(
             flip=tuple(_column("flip", word) for word in _words(given.get("flip", ()))),
-            zero={k: _angle(v) for k, v in _pairs("zero", given.get("zero", ()), _POSITION, "q1=180deg")},
+            zero={k: _angle(v) for k, v in _pairs("zero", given.get("zero", ()), _ZERO, "q1=180deg")},
             swap=_exchanges(given.get("swap", ())),
             absolute=tuple(_position("absolute", word) for word in _words(given.get("absolute", ()))),
             relative=tuple(_position("relative", word) for word in _words(given.get("relative", ()))),
             factor={
-                k: _number("factor", v) for k, v in _pairs("factor", given.get("factor", ()), _TORQUE, "tau1=12.5")
+                k: _number("factor", v) for k, v in _pairs("factor", given.get("factor", ()), _FACTOR, "tau1=12.5")
             },
             shift={k: _seconds(v) for k, v in _pairs("shift", given.get("shift", ()), _TORQUE, "tau=-0.005")},
             gravity=gravity,
@@ -199,8 +211,10 @@ class Corrections:
         }
         self._positions(columns)
         for column, value in self.factor.items():
-            for values in _of(columns, _TOGETHER["tau"]):
-                values[:, _torques(column)] *= value
+            match = _FACTOR.fullmatch(column)
+            assert match is not None
+            for values in _of(columns, _FACTORS[match[1]]):
+                values[:, slice(None) if match[2] is None else int(match[2]) - 1] *= value
         if self.skip:
             keep = ~self._skipped(log)
             if not keep.any():
@@ -208,7 +222,7 @@ class Corrections:
             columns = {name: None if x is None else x[keep] for name, x in columns.items()}
         if self.shift:
             keep, held = _shifted(columns["t"], log.sample_period, self.shift.get("tau", 0.0))
-            rows = {name: held if name in _TOGETHER["tau"] else keep for name in columns}
+            rows = {name: held if name in _SHIFTED else keep for name in columns}
             columns = {name: None if x is None else x[rows[name]] for name, x in columns.items()}
         said = Finding("corrected", f"read with {' '.join(about_log.options())}")
         return replace(log, **columns, findings=(*log.findings, said))
@@ -216,7 +230,7 @@ class Corrections:
     def _positions(self, columns: dict[str, Any]) -> None:
         """Correct unit, order, signs, zeros and reference of the columns in place."""
         if self.unit is not None:
-            for values in _of(columns, _POSITIONS):
+            for values in _of(columns, _POSITIONS["q"]):
                 values *= _ANGLE_UNITS[self.unit]
         for a, b in self.swap:
             (kind, i), (_, j) = _split(a), _split(b)
@@ -227,8 +241,9 @@ class Corrections:
             for values in _of(columns, _TOGETHER[kind]):
                 values[:, j] *= -1.0
         for column, value in self.zero.items():
-            for values in _of(columns, _POSITIONS):
-                values[:, _split(column)[1]] += value
+            kind, j = _split(column)
+            for values in _of(columns, _POSITIONS[kind]):
+                values[:, j] += value
         for names, sign in ((self.absolute, -1.0), (self.relative, 1.0)):
             for column in names:
                 _, j = _split(column)
@@ -263,7 +278,7 @@ class Corrections:
 
     def _check_joints(self, log: Log) -> None:
         columns = [*self.flip, *self.zero, *(c for pair in self.swap for c in pair), *self.absolute, *self.relative]
-        columns += [column for column in self.factor if column != "tau"]
+        columns += [column for column in self.factor if column not in _FACTORS]
         for column in columns:
             if _split(column)[1] >= log.n_joints:
                 raise ColumnError(
@@ -308,12 +323,6 @@ def _split(column: str) -> tuple[str, int]:
     match = _COLUMN.fullmatch(column)
     assert match is not None
     return match[1], int(match[2]) - 1
-
-
-def _torques(column: str) -> Any:
-    match = _TORQUE.fullmatch(column)
-    assert match is not None
-    return slice(None) if match[1] is None else int(match[1]) - 1
 
 
 def _words(value: str | Iterable[str]) -> list[str]:

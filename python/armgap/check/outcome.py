@@ -92,7 +92,8 @@ def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None 
     for row, j in np.argwhere(empty):
         tau[row, j] = tau[row - 1, j] if row else 0.0
     arrays: dict[str, Any] = {
-        name: None if (x := getattr(log, name)) is None else x[kept] for name in ("t", "q", "dq", "dq_ref")
+        name: None if (x := getattr(log, name)) is None else x[kept]
+        for name in ("t", "q", "dq", "dq_ref", "tau_meas", "q_link")
     }
     q_ref = None
     if log.q_ref is not None:

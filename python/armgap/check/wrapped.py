@@ -20,15 +20,19 @@ def look(log: Log, arm: Arm | None) -> Outcome:
     if arm is not None and not arm.rotary:
         return NOTHING
     found = []
-    q = log.q.copy()
+    q, q_link = log.q.copy(), None if log.q_link is None else log.q_link.copy()
     for j in range(log.n_joints):
         at = np.flatnonzero(turn_jumps(log.q[:, j])) + 1
         if not len(at):
             continue
         q[:, j] = unwrapped(log.q[:, j])
+        if q_link is not None:
+            q_link[:, j] = unwrapped(q_link[:, j])
         times = "once" if len(at) == 1 else f"{len(at)} times"
         said = (
             f"q{j + 1} jumps by a whole turn {times}, first at {seconds(log.t[at[0]])}, and goes on smoothly without it"
         )
         found.append(Check("wrapped_positions", "repaired", said, (), j + 1, log.name, ranges(at)))
-    return Outcome(tuple(found), replace(log, q=q), None, "the turns were taken out") if found else NOTHING
+    return (
+        Outcome(tuple(found), replace(log, q=q, q_link=q_link), None, "the turns were taken out") if found else NOTHING
+    )

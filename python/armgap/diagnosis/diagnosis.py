@@ -18,6 +18,7 @@ from armgap.check import Check, Corrections, torque_unit
 from armgap.check.time_shift import causal, taken_back
 from armgap.custom_effect import CustomEffect, TorqueTables, check_effects
 from armgap.diagnosis.result import Diagnosis
+from armgap.drive_chain import drive_chain
 from armgap.errors import OptionError
 from armgap.evidence import consistency, laws, plausibility
 from armgap.log import Log
@@ -177,6 +178,10 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
         data["plausibility"] = plausibility(known, arm)
     else:
         data["plausibility"] = consistency(known, arm)
+    gap = data["gap"]
+    data["chain"] = (
+        [] if contradictory else drive_chain(arm, training, held, horizon=gap["horizon_s"], floor=gap["floor"])
+    )
     data["input"] = _input(arm, training, held)
     data["provenance"] = given.provenance
     remarks: list[LogRemark] = [

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
 from armgap.check import Check
-from armgap.literals import Status, Verdict
+from armgap.literals import ChainStage, Status, Verdict
 from armgap.log.findings import remarks
 from armgap.report.notebook import NotebookDisplay
 
 __all__ = [
     "Bound",
     "Cause",
+    "ChainPart",
     "Dependence",
     "DependenceLaw",
     "Diagnosis",
@@ -218,6 +219,31 @@ class Dependence:
     law: DependenceLaw
 
 
+@dataclass(frozen=True)
+class ChainPart:
+    """What a stage of the chain from command to measured position adds to the gap at one joint.
+
+    Attributes
+    ----------
+    stage : {"drive", "transmission", "mechanics", "sensor"}
+        Between command and measured torque, first and second encoder, measured torque and position, position and sensor.
+    joint : int
+        Joint, from 1.
+    share : float
+        Share of the squared gap with parameters re-estimated, from 0 to 1; see `armgap.drive_chain`.
+    parameters : dict
+        Of a drive: ``delay``, ``gain``, ``offset``, ``viscous`` and ``inertia``, see `armgap.drive`.
+    detail : str
+        The same in words, with the figures.
+    """
+
+    stage: ChainStage
+    joint: int
+    share: float
+    parameters: dict[str, Value]
+    detail: str
+
+
 _Record = TypeVar("_Record", Value, Equivalent, Bound, Sanity)
 
 
@@ -248,6 +274,9 @@ class Diagnosis(NotebookDisplay):
         Re-estimated parameters of the model with causes that are not to be believed as they stand.
     unnamed : tuple of Dependence
         What the residual torque that stays depends on, strongest first; empty where the rest is within noise.
+    chain : tuple of ChainPart
+        How much of the gap arises between command and position at which stage, largest share first; empty where the logs hold neither measured
+        torques nor second encoders.
     extra : dict
         What a report draws besides: curves, ranking, options.
     """
@@ -262,6 +291,7 @@ class Diagnosis(NotebookDisplay):
     candidates: tuple[Cause, ...] = ()
     sanity: tuple[Sanity, ...] = ()
     unnamed: tuple[Dependence, ...] = ()
+    chain: tuple[ChainPart, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict, repr=False)
     _data: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
@@ -271,6 +301,7 @@ class Diagnosis(NotebookDisplay):
         known = {
             "schema", "verdict", "gap", "where", "causes", "candidates", "ruled_out", "parameters", "sanity", "checks",
             "unnamed",
+            "chain",
         }  # fmt: skip
         gap = data["gap"]
         parameters = {
@@ -301,6 +332,7 @@ class Diagnosis(NotebookDisplay):
             candidates=tuple(_cause(c) for c in data.get("candidates", ())),
             sanity=tuple(_take(Sanity, s) for s in data.get("sanity", ())),
             unnamed=tuple(_dependence(d) for d in data.get("unnamed", ())),
+            chain=tuple(_chain_part(p) for p in data.get("chain", ())),
             extra={key: value for key, value in data.items() if key not in known},
             _data=data,
         )
@@ -357,6 +389,11 @@ def _cause(data: dict[str, Any]) -> Cause:
 def _dependence(data: dict[str, Any]) -> Dependence:
     law = {key: tuple(data["law"][key]) for key in ("x", "torque", "sigma")}
     return Dependence(data["joint"], data["variable"], data["unit"], data["share"], DependenceLaw(**law))
+
+
+def _chain_part(data: dict[str, Any]) -> ChainPart:
+    parameters = {name: _take(Value, value) for name, value in data.get("parameters", {}).items()}
+    return ChainPart(data["stage"], data["joint"], data["share"], parameters, data["detail"])
 
 
 def _ruled_out(data: dict[str, Any]) -> RuledOut:

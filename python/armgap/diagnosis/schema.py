@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from armgap import _native
 from armgap.check.check import CheckEntry
 from armgap.diagnosis.diagnosis import InputSummary, LogRemark
+from armgap.drive_chain import ChainEntry
 from armgap.evidence.laws import Law
 from armgap.evidence.plausibility import Plausibility
 from armgap.json_schema import schema_of
@@ -17,6 +18,10 @@ __all__ = ["diagnosis_schema"]
 
 _NAME: Any = Annotated[str, "Name of the arm, from its file."]
 _ADDED = {
+    "chain": Annotated[
+        list[ChainEntry],
+        "How much of the gap arises where between command and position; empty without measured torques and second encoders.",
+    ],
     "checks": Annotated[list[CheckEntry], "Defects of the input, errors first."],
     "input": Annotated[InputSummary, "What was read."],
     "laws": Annotated[list[Law], "Each cause's law and the data it is drawn through; not of serial arms."],

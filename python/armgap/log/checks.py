@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.errors import LogShapeError, TimeError
-from armgap.log.columns import Arrays, Names, unused_velocities
+from armgap.log.columns import OPTIONAL, Arrays, Names, left_out
 from armgap.log.findings import Finding, counted
 from armgap.log.recording import Recording
 
@@ -72,7 +72,9 @@ def without_repeats(arrays: Arrays) -> tuple[Arrays, list[Finding]]:
 def _repeat(arrays: Arrays, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Whether the row after each of `rows` is the same in every value."""
     same: NDArray[np.bool_] = arrays.t[rows + 1] == arrays.t[rows]
-    for values in (arrays.q, arrays.tau, arrays.dq, arrays.q_ref, arrays.dq_ref):
+    for values in (
+        arrays.q, arrays.tau, arrays.dq, arrays.tau_meas, arrays.q_link, arrays.q_ref, arrays.dq_ref,
+    ):  # fmt: skip
         if values is not None:
             same &= np.all(values[rows + 1] == values[rows], axis=1)
     return same
@@ -107,10 +109,13 @@ def notice(arrays: Arrays, names: Names, arm: Arm | None) -> list[Finding]:
 
 
 def unused(recording: Recording, names: Names) -> list[Finding]:
-    """Say which velocity columns are left out."""
-    left_out = unused_velocities(recording, names)
-    listed = f"`{'`, `'.join(left_out)}` not used: velocities of other joints are missing, or on another clock"
-    return [Finding("columns", listed)] if left_out else []
+    """Say which columns of velocities, measured torques and positions on the link's side are left out."""
+    said = []
+    for prefix in ("dq", "tau_meas", "q_link"):
+        if columns := left_out(recording, names, prefix):
+            why = f"{OPTIONAL[prefix]} of other joints are missing, or on another clock"
+            said.append(Finding("columns", f"`{'`, `'.join(columns)}` not used: {why}"))
+    return said
 
 
 def _sampling(arrays: Arrays, arm: Arm | None) -> list[tuple[str, str]]:

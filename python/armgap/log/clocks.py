@@ -65,14 +65,15 @@ def in_seconds(
     findings: list[Finding] = []
     factor = raw.tick_s or scales.t or _unit(raw.t, names.t, arm, place, findings)
     if raw.t_tau is None or names.t_tau is None:
-        return Arrays(_seconds(raw.t, raw.t[0], factor), raw.q, raw.tau, raw.dq, raw.q_ref, raw.dq_ref), findings
+        t = _seconds(raw.t, raw.t[0], factor)
+        return Arrays(t, raw.q, raw.tau, raw.dq, raw.q_ref, raw.dq_ref, raw.tau_meas, raw.q_link), findings
     tau_factor = raw.tau_tick_s or scales.t_tau or _tau_unit(raw.t_tau, factor, names.t_tau, findings)
     start, tau_start = raw.t[0], raw.t_tau[0]
     # Both clocks count from the same moment; the first position is that moment from here on.
     offset = _difference(tau_start, start, tau_factor, factor)
-    t = _Clock(_seconds(raw.t, start, factor), names.t)
+    t_q = _Clock(_seconds(raw.t, start, factor), names.t)
     t_tau = _Clock(_seconds(raw.t_tau, tau_start, tau_factor) + offset, names.t_tau)
-    return _hold(raw, t, t_tau, place, findings), findings
+    return _hold(raw, t_q, t_tau, place, findings), findings
 
 
 def ticks(raw: Raw, scales: Scales, names: Names, arm: Arm | None, place: Path | str) -> dict[str, float]:
@@ -175,8 +176,8 @@ def _hold(raw: Raw, t: _Clock, t_tau: _Clock, place: Path | str, findings: list[
             column=t_tau.name,
         )
     _report(t, t_tau, held, keep, period, findings)
-    dq = None if raw.dq is None else raw.dq[keep]
-    return Arrays(t.t[keep], raw.q[keep], raw.tau[held[keep]], dq)
+    dq, tau_meas, q_link = (None if x is None else x[keep] for x in (raw.dq, raw.tau_meas, raw.q_link))
+    return Arrays(t.t[keep], raw.q[keep], raw.tau[held[keep]], dq, tau_meas=tau_meas, q_link=q_link)
 
 
 def _report(

@@ -1,9 +1,9 @@
-"""From a recording's own columns to ``t, q, tau, dq``, or ``q_ref, dq_ref`` in place of torques."""
+"""From a recording's own columns to ``t, q, tau, dq, tau_meas, q_link``, or ``q_ref, dq_ref`` in place of torques."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,10 +21,17 @@ from armgap.progress import report_progress
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["Arrays", "Names", "Raw", "extract", "no_controller", "resolve", "unused_velocities"]
+__all__ = ["OPTIONAL", "Arrays", "Names", "Raw", "extract", "left_out", "no_controller", "resolve"]
 
-_CANONICAL = re.compile(r"^(t|t_tau|(q|tau|dq|q_ref|dq_ref)(?P<joint>[1-9][0-9]*))$")
+_CANONICAL = re.compile(r"^(t|t_tau|(q|tau|dq|tau_meas|q_link|q_ref|dq_ref)(?P<joint>[1-9][0-9]*))$")
 _TIMES = ("t", "t_tau")
+OPTIONAL = {
+    "dq": "velocities",
+    "tau_meas": "measured torques",
+    "q_link": "positions on the link's side",
+    "dq_ref": "velocities",
+}
+"""Groups of columns that are used only where every joint has one, and what a message calls them."""
 #: Columns that a message lists at most.
 _LISTED = 24
 _TICKS_S = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}
@@ -41,13 +48,16 @@ class Names:
     t_tau: str | None = None
     q_ref: tuple[str, ...] = ()
     dq_ref: tuple[str, ...] | None = None
+    tau_meas: tuple[str, ...] | None = None
+    q_link: tuple[str, ...] | None = None
     units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
         """Standard name and column of everything in use."""
         groups = (
-            ("q", self.q), ("tau", self.tau), ("dq", self.dq or ()), ("q_ref", self.q_ref), ("dq_ref", self.dq_ref or ()),
+            ("q", self.q), ("tau", self.tau), ("dq", self.dq or ()), ("tau_meas", self.tau_meas or ()), ("q_link", self.q_link or ()),
+            ("q_ref", self.q_ref), ("dq_ref", self.dq_ref or ()),
         )  # fmt: skip
         joints = [(f"{prefix}{j}", name) for prefix, group in groups for j, name in enumerate(group, start=1)]
         return [("t", self.t), *joints, *([("t_tau", self.t_tau)] if self.t_tau else [])]
@@ -73,10 +83,12 @@ class Arrays:
     dq: NDArray[np.float64] | None
     q_ref: NDArray[np.float64] | None = None
     dq_ref: NDArray[np.float64] | None = None
+    tau_meas: NDArray[np.float64] | None = None
+    q_link: NDArray[np.float64] | None = None
 
     def rows(self, kept: NDArray[Any]) -> Arrays:
         """Return some of the rows, by index or mask."""
-        parts = (self.t, self.q, self.tau, self.dq, self.q_ref, self.dq_ref)
+        parts = (self.t, self.q, self.tau, self.dq, self.q_ref, self.dq_ref, self.tau_meas, self.q_link)
         return Arrays(*(None if x is None else x[kept] for x in parts))  # type: ignore[arg-type]
 
 
@@ -99,6 +111,8 @@ class Raw:
     tau_tick_s: float | None
     q_ref: NDArray[np.float64] | None = None
     dq_ref: NDArray[np.float64] | None = None
+    tau_meas: NDArray[np.float64] | None = None
+    q_link: NDArray[np.float64] | None = None
 
 
 def resolve(
@@ -132,7 +146,6 @@ def resolve(
 
 def _pick_all(index: Index, names: Mapping[str, str], mapping: Mapping[str, str], n: int, arm: Arm | None) -> Names:
     first = index.find(names.get("q1", "q1"), "q1")
-    wanted = [f"dq{j}" for j in range(1, n + 1)]
     t = _time(index, names, first)
     q = tuple(_pick(index, names, f"q{j}", t) for j in range(1, n + 1))
     _one_clock(index, t, q, "positions")
@@ -141,27 +154,39 @@ def _pick_all(index: Index, names: Mapping[str, str], mapping: Mapping[str, str]
         t_tau = None
         q_ref: tuple[str, ...] = tuple(_pick(index, names, f"q_ref{j}", t) for j in range(1, n + 1))
         _one_clock(index, t, q_ref, "references and positions")
-        dq_ref = _if_all(index, names, mapping, [f"dq_ref{j}" for j in range(1, n + 1)], t)
+        dq_ref = _if_all(index, names, mapping, "dq_ref", n, t)
     else:
         tau = tuple(_pick(index, names, f"tau{j}", t) for j in range(1, n + 1))
         t_tau = _torque_clock(index, names, t, tau)
         _one_clock(index, t_tau or t, tau, "torques")
         q_ref, dq_ref = (), None
-    found = Names(t, q, tau, _if_all(index, names, mapping, wanted, t), t_tau, q_ref, dq_ref)
+    used = (*q, *tau, *q_ref)
+    dq, tau_meas, q_link = (
+        _if_all(index, names, mapping, prefix, n, t, used) for prefix in ("dq", "tau_meas", "q_link")
+    )
+    found = Names(t, q, tau, dq, t_tau, q_ref, dq_ref, tau_meas, q_link)
     _check_once(index, found)
     return replace(found, units={c: unit for _, c in found.pairs if (unit := index.unit(c)) is not None})
 
 
 def _if_all(
-    index: Index, names: Mapping[str, str], mapping: Mapping[str, str], wanted: list[str], t: str
+    index: Index,
+    names: Mapping[str, str],
+    mapping: Mapping[str, str],
+    prefix: str,
+    n: int,
+    t: str,
+    used: Sequence[str] = (),
 ) -> tuple[str, ...] | None:
-    """Return columns that are used only where all of them are there, on the clock of `t`; those that are asked for must be."""
+    """Return columns that are used only where all joints have one, on the clock of `t` and not `used` already; those that are asked for must be."""
+    wanted = [f"{prefix}{j}" for j in range(1, n + 1)]
     needed = any(key in mapping for key in wanted)
     found = None
     if needed or all(index.find(names.get(key, key), key, within=t) for key in wanted):
         found = tuple(_pick(index, names, key, t) for key in wanted)
-    if found is not None and (needed or all(c in index.recording.stream_of(t).columns for c in found)):
-        _one_clock(index, t, found, "velocities")
+    free = found is not None and all(c in index.recording.stream_of(t).columns and c not in used for c in found)
+    if found is not None and (needed or free):
+        _one_clock(index, t, found, OPTIONAL[prefix])
         return found
     return None
 
@@ -173,7 +198,11 @@ def _commanded(index: Index, names: Mapping[str, str], t: str, n: int, arm: Arm 
         keys = [f"{prefix}{j}" for j in range(1, n + 1)]
         return any(index.find(names.get(key, key), key, within=t) is not None for key in keys)
 
-    if there("tau") or any(key.startswith("tau") for key in names) or (arm is not None and arm.chain is None):
+    if (
+        there("tau")
+        or any(re.fullmatch(r"tau[1-9][0-9]*", key) for key in names)
+        or (arm is not None and arm.chain is None)
+    ):
         return False
     if arm is not None and not there("q_ref"):
         raise ColumnError(
@@ -256,11 +285,12 @@ def _one_clock(index: Index, t: str, columns: tuple[str, ...], what: str) -> Non
             )
 
 
-def unused_velocities(recording: Recording, names: Names) -> list[str]:
-    """Return the velocity columns that are left out because others are missing."""
-    if names.dq is not None:
+def left_out(recording: Recording, names: Names, prefix: str) -> list[str]:
+    """Return the columns of a group in `OPTIONAL` that are left out because others are missing."""
+    if getattr(names, prefix) is not None:
         return []
-    return [name for name in recording.columns if re.fullmatch(r"dq[1-9][0-9]*", name)]
+    used = [column for _, column in names.pairs]
+    return [name for name in recording.columns if re.fullmatch(rf"{prefix}[1-9][0-9]*", name) and name not in used]
 
 
 def _from_arm(index: Index, arm: Arm | None) -> dict[str, str]:
@@ -293,7 +323,7 @@ def _check_mapping(names: Mapping[str, str], place: Path | str, n: int) -> None:
         if match is None:
             raise ColumnError(
                 f"`{key}` is not a column of a log",
-                remedy="map t, q1 ..., tau1 ..., dq1 ..., q_ref1 ... or dq_ref1 ... to the file's names",
+                remedy="map t, q1 ..., tau1 ..., dq1 ..., tau_meas1 ..., q_link1 ..., q_ref1 ... or dq_ref1 ... to the file's names",
                 file=place,
                 column=key,
             )
@@ -348,9 +378,10 @@ def extract(recording: Recording, place: Path | str, names: Names) -> Raw:
     if len(t) == 0:
         raise LogShapeError("holds no samples", remedy="give a log with samples", file=place)
     t_tau, tau_tick_s = (None, None) if names.t_tau is None else _times(recording, place, names.t_tau)
-    dq, dq_ref = (None if group is None else several(group) for group in (names.dq, names.dq_ref))
+    optional = (names.dq, names.dq_ref, names.tau_meas, names.q_link)
+    dq, dq_ref, tau_meas, q_link = (None if group is None else several(group) for group in optional)
     q_ref = several(names.q_ref) if names.q_ref else None
-    return Raw(t, several(names.q), several(names.tau), dq, t_tau, tick_s, tau_tick_s, q_ref, dq_ref)
+    return Raw(t, several(names.q), several(names.tau), dq, t_tau, tick_s, tau_tick_s, q_ref, dq_ref, tau_meas, q_link)
 
 
 def _times(

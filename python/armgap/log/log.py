@@ -22,10 +22,13 @@ from armgap.output import write
 if TYPE_CHECKING:
     from armgap.arm import Arm
 
-__all__ = ["SIGNALS", "Log"]
+__all__ = ["COLUMNS", "SIGNALS", "Log"]
 
-SIGNALS = ("q", "tau", "dq", "moment", "q_ref", "dq_ref")
+SIGNALS = ("q", "tau", "dq", "moment", "q_ref", "dq_ref", "tau_meas", "q_link")
 """Arrays of a log with one row per sample, beside its times."""
+
+COLUMNS = tuple(name for name in SIGNALS if name != "moment")
+"""Those of them that stand in files, a column per joint."""
 
 #: Times are kept to nanoseconds: parts of a second.
 _NS = 1e9
@@ -64,6 +67,10 @@ class Log:
     q_ref, dq_ref : ndarray, shape (n_samples, n_joints), optional
         Positions [rad or m] that a position controller was given at `t` and held until the next sample, of a log without torques, and velocities
         [rad/s or m/s] where they are logged.
+    tau_meas : ndarray, shape (n_samples, n_joints), optional
+        Torques as measured at `t`, from the motors' currents as a rule, beside the commanded ones [N m or N].
+    q_link : ndarray, shape (n_samples, n_joints), optional
+        Positions from second encoders on the link's side of the transmissions [rad or m].
     """
 
     name: str
@@ -80,6 +87,8 @@ class Log:
     units: Mapping[str, str] = field(default_factory=dict)
     q_ref: NDArray[np.float64] | None = None
     dq_ref: NDArray[np.float64] | None = None
+    tau_meas: NDArray[np.float64] | None = None
+    q_link: NDArray[np.float64] | None = None
 
     @classmethod
     def read(
@@ -151,6 +160,8 @@ class Log:
         *,
         q_ref: ArrayLike | None = None,
         dq_ref: ArrayLike | None = None,
+        tau_meas: ArrayLike | None = None,
+        q_link: ArrayLike | None = None,
         name: str = "log",
         arm: Arm | None = None,
     ) -> Log:
@@ -164,6 +175,8 @@ class Log:
             Positions [rad or m], torques [N m or N], velocities [rad/s or m/s]; `tau` is None where references stand in its place.
         q_ref, dq_ref : array_like, as `q` and `dq`, optional
             References of a position controller, which count where `tau` is None.
+        tau_meas, q_link : array_like, as `tau` and `q`, optional
+            Torques as measured, and positions on the link's side of the transmissions.
         name : str
             Name of the log in results and errors.
         arm : Arm, optional
@@ -175,7 +188,10 @@ class Log:
             If the shapes do not fit; otherwise as `read`.
         """
         data: dict[str, NDArray[np.float64]] = {"t": np.asarray(t, dtype=np.float64)}
-        for prefix, values in (("q", q), ("tau", tau), ("dq", dq), ("q_ref", q_ref), ("dq_ref", dq_ref)):
+        given = {
+            "q": q, "tau": tau, "dq": dq, "q_ref": q_ref, "dq_ref": dq_ref, "tau_meas": tau_meas, "q_link": q_link,
+        }  # fmt: skip
+        for prefix, values in given.items():
             if values is None:
                 continue
             array = np.asarray(values, dtype=np.float64)
@@ -221,7 +237,7 @@ class Log:
         arrays.t.__isub__(arrays.t[0])
         log = cls(
             name, arrays.t, arrays.q, arrays.tau, arrays.dq, tuple(noticed), source, names.by_key, units=there,
-            q_ref=arrays.q_ref, dq_ref=arrays.dq_ref,
+            q_ref=arrays.q_ref, dq_ref=arrays.dq_ref, tau_meas=arrays.tau_meas, q_link=arrays.q_link,
         )  # fmt: skip
         return log if arm is None or arm.corrections is None else arm.corrections.on_log(log)
 
@@ -324,9 +340,9 @@ class Log:
         return (self.name, fix(self.t), fix(self.q), fix(self.tau), list(tables), moment, reference)
 
     def to_polars(self) -> pl.DataFrame:
-        """Return the log as a table with the columns ``t, q1 …, tau1 …`` and, where there are any, ``dq1 …, q_ref1 …, dq_ref1 …``."""
+        """Return the log as a table with the columns ``t, q1 …, tau1 …`` and those of the other groups that there are, such as ``dq1 …``."""
         data = {"t": self.t}
-        for prefix in ("q", "tau", "dq", "q_ref", "dq_ref"):
+        for prefix in COLUMNS:
             values = getattr(self, prefix)
             if values is not None:
                 data |= {f"{prefix}{j + 1}": values[:, j] for j in range(values.shape[1])}

@@ -26,7 +26,7 @@ _SPELLINGS = {
 }
 _UNITS = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings}
 _BRACKET = re.compile(r"^(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]+)\]|\((?P<round>[^()]+)\))$")
-_SUFFIX = re.compile(r"^(?P<name>t|t_tau|(?:q|tau|dq)[1-9][0-9]*)_(?P<unit>[A-Za-z_]+)$")
+_SUFFIX = re.compile(r"^(?P<name>t|t_tau|(?:q|tau|dq|tau_meas|q_link)[1-9][0-9]*)_(?P<unit>[A-Za-z_]+)$")
 
 
 def unit_of(text: str) -> str | None:

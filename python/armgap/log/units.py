@@ -59,8 +59,9 @@ class Scales:
     ----------
     t, t_tau : float, optional
         Of the times; None where nothing says it.
-    q, tau, dq, q_ref, dq_ref : ndarray, shape (n_joints,)
-        Of each column; references are in the units of positions and velocities unless the file says otherwise.
+    q, tau, dq, q_ref, dq_ref, tau_meas, q_link : ndarray, shape (n_joints,)
+        Of each column; references, measured torques and positions on the link's side are in the units of positions, velocities and torques
+        unless the file says otherwise.
     settled : frozenset of str
         Groups whose unit is stated by the user or by the file.
     """
@@ -72,6 +73,8 @@ class Scales:
     dq: NDArray[np.float64] | None
     q_ref: NDArray[np.float64]
     dq_ref: NDArray[np.float64] | None
+    tau_meas: NDArray[np.float64] | None
+    q_link: NDArray[np.float64] | None
     settled: frozenset[str]
     findings: tuple[Finding, ...]
 
@@ -96,7 +99,7 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
             return np.where([_suits(group, declared[group], arm, j) for j in range(len(columns))], by_user[group], 1.0)
         factors = [_by_file(group, column, names.units.get(column), arm, place, j) for j, column in enumerate(columns)]
         units = {unit for column in columns if (unit := names.units.get(column)) is not None}
-        if columns and all(column in names.units for column in columns):
+        if columns and columns is groups[group] and all(column in names.units for column in columns):
             settled.add(group)
         if any(factor != 1.0 for factor in factors):
             findings.append(
@@ -106,6 +109,7 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
 
     q, tau, dq, t = (of(group, groups[group]) for group in ("q", "tau", "dq", "t"))
     q_ref, dq_ref = of("q", names.q_ref), of("dq", names.dq_ref or ())
+    tau_meas, q_link = of("tau", names.tau_meas or ()), of("q", names.q_link or ())
     t_tau = names.units.get(names.t_tau or "")
     return Scales(
         t=float(t[0]) if "t" in settled else None,
@@ -115,13 +119,15 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
         dq=dq if names.dq is not None else None,
         q_ref=q_ref,
         dq_ref=dq_ref if names.dq_ref is not None else None,
+        tau_meas=tau_meas if names.tau_meas is not None else None,
+        q_link=q_link if names.q_link is not None else None,
         settled=frozenset(settled),
         findings=tuple(findings),
     )
 
 
 def scaled(arrays: Arrays, scales: Scales) -> Arrays:
-    """Return positions, torques, velocities and references in SI units."""
+    """Return all columns but times in SI units."""
 
     def by(values: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
         return values if np.all(factors == 1.0) else values * factors
@@ -136,6 +142,8 @@ def scaled(arrays: Arrays, scales: Scales) -> Arrays:
         dq=if_there(arrays.dq, scales.dq),
         q_ref=if_there(arrays.q_ref, scales.q_ref),
         dq_ref=if_there(arrays.dq_ref, scales.dq_ref),
+        tau_meas=if_there(arrays.tau_meas, scales.tau_meas),
+        q_link=if_there(arrays.q_link, scales.q_link),
     )
 
 
@@ -178,8 +186,8 @@ def recognised(arrays: Arrays, names: Names, arm: Arm | None, settled: frozenset
     findings: list[Finding] = []
     turned = np.array([1.0 if _slides(arm, j) else _DEGREE for j in range(arrays.q.shape[1])])
     if "q" not in settled and not np.all(turned == 1.0) and (why := _degrees(arrays, names, arm)):
-        q_ref = None if arrays.q_ref is None else arrays.q_ref * turned
-        arrays = replace(arrays, q=arrays.q * turned, q_ref=q_ref)
+        q_ref, q_link = (None if x is None else x * turned for x in (arrays.q_ref, arrays.q_link))
+        arrays = replace(arrays, q=arrays.q * turned, q_ref=q_ref, q_link=q_link)
         findings.append(Finding("units", f"positions are in degrees: {why}; converted"))
     if "dq" not in settled and arrays.dq is not None and names.dq is not None and not np.all(turned == 1.0):
         ratios = [0.0 if _slides(arm, j) else _speed_ratio(arrays, arm, j) for j in range(arrays.q.shape[1])]
@@ -244,6 +252,8 @@ def in_file(
         "dq": np.empty(0) if scales.dq is None else scales.dq * dq,
         "q_ref": scales.q_ref * (q if len(scales.q_ref) else 1.0),
         "dq_ref": np.empty(0) if scales.dq_ref is None else scales.dq_ref * dq,
+        "tau_meas": np.empty(0) if scales.tau_meas is None else scales.tau_meas,
+        "q_link": np.empty(0) if scales.q_link is None else scales.q_link * q,
     }
     for key, column in names.pairs:
         group = key.rstrip("0123456789")

@@ -61,10 +61,12 @@ _QUANTITIES = {
     "q": "position of joint {}",
     "tau": "torque of joint {}",
     "dq": "velocity of joint {}",
+    "tau_meas": "measured torque of joint {}",
+    "q_link": "position of joint {} on the link's side",
 }
-_FORCE = {"tau": "force of joint {}"}
+_FORCE = {"tau": "force of joint {}", "tau_meas": "measured force of joint {}"}
 _FOLD = "Columns of the logs, and their units"
-_KEY = re.compile(r"(t_tau|t|q|tau|dq)([0-9]*)")
+_KEY = re.compile(r"(t_tau|t|q|tau|dq|tau_meas|q_link)([0-9]*)")
 _SHOWN = {"Nm": "N m", "mNm": "mN m"}
 
 
@@ -121,7 +123,8 @@ def _row(kind: str, key: str, name: str, unit: str, si: Data) -> tuple[str, ...]
     match = _KEY.fullmatch(key)
     group, joint = match.groups() if match else (key, "")
     words = _QUANTITIES | (_FORCE if kind == "axis" else {})
-    used = str(si.get("t" if group == "t_tau" else group, ""))
-    factor = FACTORS.get("t" if group == "t_tau" else group, {}).get(unit, 1.0)
+    of_group = group.partition("_")[0]
+    used = str(si.get(of_group, ""))
+    factor = FACTORS.get(of_group, {}).get(unit, 1.0)
     converted = used if factor == 1.0 else f"{used}, times {factor:.4g}"
     return key, words.get(group, "").format(joint), name, _SHOWN.get(unit, unit), converted

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from armgap.log.log import COLUMNS
 from armgap.log.units import si
 from armgap.report.conventions import brief
 from armgap.report.markdown import escape
@@ -96,12 +97,18 @@ def log_facts(log: Log) -> Facts:
     rotary = {"rad": True, "deg": True, "m": False, "mm": False}.get(log.units.get("q1", ""))
     units = si(rotary)
     rows = [("t", log.columns.get("t", ""), f"{figure(log.t[0])} to {figure(log.t[-1], 5)}", units["t"])]
-    units |= {"q_ref": units["q"], "dq_ref": units["dq"]}
-    for group in ("q", "tau", "dq", "q_ref", "dq_ref"):
+    for group in COLUMNS:
         values = getattr(log, group)
         for j in range(0 if values is None else values.shape[1]):
             span = f"{figure(values[:, j].min())} to {figure(values[:, j].max())}"
-            rows.append((f"{group}{j + 1}", log.columns.get(f"{group}{j + 1}", ""), span, unit_text(units[group])))
+            rows.append(
+                (
+                    f"{group}{j + 1}",
+                    log.columns.get(f"{group}{j + 1}", ""),
+                    span,
+                    unit_text(units[group.partition("_")[0]]),
+                )
+            )
     rate = f", {figure(1 / log.sample_period, 4)} Hz" if len(log) > 1 else ""
     lead = f"{len(log)} samples over {figure(log.duration, 4)} s{rate}"
     return Facts(

@@ -8,6 +8,7 @@ from armgap.report.page import Section
 from armgap.report.sections.about import data_quality, method
 from armgap.report.sections.advice import what_next
 from armgap.report.sections.causes import candidates, evidence, look_alikes, ranking, unnamed
+from armgap.report.sections.chain import along_the_chain
 from armgap.report.sections.checks import checks, input_checks
 from armgap.report.sections.gap import first_picture, gap_map
 from armgap.report.sections.input import conventions
@@ -26,6 +27,7 @@ SECTIONS: tuple[Callable[[Data], Section | None], ...] = (
     unnamed,
     predictions,
     gap_map,
+    along_the_chain,
     ranking,
     candidates,
     look_alikes,
