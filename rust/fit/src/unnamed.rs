@@ -21,10 +21,11 @@ const BLOCK_S: f64 = 1.0;
 /// Samples of the residual torque that count as one, as their errors are correlated: the curvature of an error is taken over seventeen of them.
 const CORRELATED: f64 = 10.0;
 
-/// Gain in predicting logs that were left out, in its standard deviations, from which a law is believed.
-const CERTAIN: f64 = 2.5;
+/// Gain in predicting logs that were left out, in its standard deviations, from which a law is believed. By chance a law predicts worse than none. On 16
+/// development cases the right variable led in 13, eleven of them from here on, and wrong ones that matter stayed below 2.0; with 2.5 ten are found.
+const CERTAIN: f64 = 2.0;
 
-/// Share of the residual torque's variance beyond noise below which a law does not matter.
+/// Share of the residual torque's variance beyond noise below which a law does not matter: wrong variables reached 0.12, beside another one that was right 0.19.
 const MATTERS: f64 = 0.15;
 
 /// Laws of one joint at most. There are none where what stays is no more than twice what the noise of positions makes.
