@@ -6,6 +6,7 @@ The motions are sines, their torques inverse dynamics written down here, so that
 from __future__ import annotations
 
 import copy
+import json
 import math
 from functools import cache
 
@@ -18,6 +19,7 @@ from armgap.trial.arms import random_arm
 from armgap.trial.case import simulated_arm_of
 from armgap.trial.key import HiddenEffect
 from armgap.trial.plant import Plant
+from input_defects.answering import WHOLE, answer, answer_floor
 from input_defects.case import Inputs, Table, Truth, toml
 from input_defects.defect import ANY
 from input_defects.defects import DEFECTS, REPAIRED, chosen
@@ -328,6 +330,14 @@ def test_the_true_floor_is_noise_and_the_error_of_the_start(tmp_path):
     assert floors[0] == pytest.approx(rounding, rel=0.05)
     assert floors[1] == pytest.approx(math.hypot(4.0 * step, rounding), rel=0.05)
     assert floors[2] > 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ask", [answer, answer_floor])
+def test_records_can_be_written(ask, tmp_path):
+    keep(make_case(8, model="pendulum", nominal="exact", duration=2.0, style="tracked"), tmp_path / "case")
+    record = ask(str(tmp_path / "case"), WHOLE, 1)
+    assert json.loads(json.dumps(record))["verdict"] in ("none", "parameters")
 
 
 def test_an_arm_that_remembers_goes_on_as_it_was():

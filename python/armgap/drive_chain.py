@@ -38,6 +38,8 @@ Array = NDArray[np.float64]
 LEAST_SHARE = 0.05
 """Share of the gap from which a stage is listed, and a signal used: ideal drives on 12 sets of simulated logs take up to 0.04 by chance."""
 
+# Weight of the sample after an interval in the torque over it: held, straight, and measured where the interval ends.
+_HELD, _STRAIGHT, _ENDED = 0.0, 0.5, 1.0
 # A delay below this part of a sample period is none: samples do not tell when between them a measured torque changes.
 _AT_ONCE = 0.6
 # A second encoder whose position differs from the first one's by less than this part of the motion tells nothing of a transmission.
@@ -69,13 +71,14 @@ class ChainEntry(TypedDict):
 class _Signal:
     """A signal that can take the place of another one: at the end of the drive or of the transmission of a joint, from 0.
 
-    A measured torque is known at its samples only: between them it is `held`, as a command is, or goes straight. Half a sample period lies between
-    the two, which is more than many drives are late.
+    A measured torque is known at its samples only. From one to the next it may be that of the first, as a command is held, go straight, or be that of
+    the last, as a current is that was measured before the new command: `after` is the weight of the last, 0, 0.5 or 1. A sample period lies
+    between these, which is more than many drives are late.
     """
 
     stage: ChainStage
     joint: int
-    held: bool = False
+    after: float = 0.5
 
     def into(self, log: Log) -> Log:
         """Return the log with this signal in use."""
@@ -88,10 +91,10 @@ class _Signal:
         assert log.tau_meas is not None
         tau, moment = log.tau.copy(), np.zeros_like(log.tau) if log.moment is None else log.moment.copy()
         sample = log.tau_meas[:, self.joint]
-        after = sample if self.held else np.append(sample[1:], sample[-1])
+        later = np.append(sample[1:], sample[-1])
         interval = np.append(np.diff(log.t), log.sample_period)
-        tau[:, self.joint] = 0.5 * (sample + after)
-        moment[:, self.joint] = (after - sample) * interval**2 / 12.0
+        tau[:, self.joint] = (1.0 - self.after) * sample + self.after * later
+        moment[:, self.joint] = (later - sample) * interval**2 / 12.0 if self.after == _STRAIGHT else 0.0
         return replace(log, tau=tau, moment=moment)
 
 
@@ -122,7 +125,7 @@ class _Case:
             if all(log.tau_meas is not None for log in logs) and any(
                 not np.array_equal(log.tau[:, j], log.tau_meas[:, j]) for log in logs if log.tau_meas is not None
             ):
-                yield from (_Signal("drive", j, held) for held in (False, True))
+                yield from (_Signal("drive", j, after) for after in (_HELD, _STRAIGHT, _ENDED))
             if all(log.q_link is not None for log in logs) and any(
                 np.ptp(log.q_link[:, j] - log.q[:, j]) > _APART * np.ptp(log.q[:, j])
                 for log in logs

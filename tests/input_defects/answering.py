@@ -41,12 +41,12 @@ def answer(folder: str, defect: str, seed: int) -> Record:
     case = read(Path(folder))
     record: Record = {**about(case), "version": build(), "defect": defect}
     if defect == WHOLE:
-        return {**record, **diagnosed(case.inputs)}
+        return {**record, **diagnosed(case.inputs)[0]}
     try:
         inputs, expected = spoilt(case, defect, seed)
     except NotApplicableError as reason:
         return {**record, "skipped": str(reason)}
-    return {**record, "expected": expected.to_dict(), **diagnosed(inputs)}
+    return {**record, "expected": expected.to_dict(), **diagnosed(inputs)[0]}
 
 
 def spoilt(case: Kept, defect: str, seed: int) -> tuple[Inputs, Expected]:
@@ -84,8 +84,8 @@ def answer_floor(folder: str, defect: str, seed: int) -> Record:
     counts = float(np.exp(rng.uniform(*np.log(NOISE)))) if rng.uniform() < 0.5 else 0.0
     noise = counts * case.truth.step
     case = measured_again(case, noise, rng)
-    record = {**about(case), "version": build(), "defect": defect, "noise_counts": counts, **diagnosed(case.inputs)}
-    cut = record.pop("cut", {})
+    answered, cut = diagnosed(case.inputs)
+    record = {**about(case), "version": build(), "defect": defect, "noise_counts": counts, **answered}
     # A log that is cut crosswise has another holdout, of which the true arm is not run.
     if cut.keys() == case.inputs.holdout.keys():
         record["true"] = true_floor(case, cut)
@@ -106,8 +106,8 @@ def about(case: Kept) -> Record:
     }
 
 
-def diagnosed(inputs: Inputs) -> Record:
-    """Write the inputs, diagnose them, and record the answer or the refusal."""
+def diagnosed(inputs: Inputs) -> tuple[Record, dict[str, Starts]]:
+    """Write the inputs, diagnose them, and record the answer or the refusal; and where the windows of the holdout start."""
     import armgap
 
     with tempfile.TemporaryDirectory() as place:
@@ -117,8 +117,8 @@ def diagnosed(inputs: Inputs) -> Record:
             found = armgap.diagnose(groups[0], arm, holdout=groups[1]).to_dict()
         except armgap.ArmgapError as error:
             refused = {"type": type(error).__name__, "message": str(error).replace(place, "")}
-            return {"verdict": "refused", "refused": refused, "seconds": time.perf_counter() - start}
-        return {**_kept(found), "seconds": time.perf_counter() - start}
+            return {"verdict": "refused", "refused": refused, "seconds": time.perf_counter() - start}, {}
+        return {**_kept(found), "seconds": time.perf_counter() - start}, _starts(found["series"])
 
 
 def _write(inputs: Inputs, place: Path) -> tuple[Path, tuple[list[Path], list[Path]]]:
@@ -141,7 +141,6 @@ def _kept(found: dict[str, Any]) -> Record:
         "gap": {key: found["gap"][key] for key in ("before", "refit", "after", "floor", "closed")},
         "notes": found["notes"],
         "findings": found["log_findings"],
-        "cut": _starts(found["series"]),
     }
 
 

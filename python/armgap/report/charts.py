@@ -224,11 +224,12 @@ def dependence(entry: dict[str, Any]) -> Any:
     f.add_layout(Whisker(base="x", lower="low", upper="high", source=ColumnDataSource(ends), line_color=BEFORE))
     f.line(law["x"], law["torque"], color=AFTER, line_width=2.5)
     f.scatter(law["x"], law["torque"], size=8, color=BEFORE, fill_color=None, line_width=2)
+    _reach(f, [*ends["low"], *ends["high"]], margin=0.05)
     return f
 
 
-def _reach(f: Any, values: Sequence[float]) -> None:
-    """Show the means and the law, and so much of the cloud as twice their span holds."""
+def _reach(f: Any, values: Sequence[float], margin: float = 0.5) -> None:
+    """Show these values, with a margin in parts of their span: half of it holds so much of a cloud as twice the span."""
     low, high = min(values), max(values)
-    margin = 0.5 * (high - low or 1.0)
-    f.y_range.start, f.y_range.end = low - margin, high + margin
+    beside = margin * (high - low or 1.0)
+    f.y_range.start, f.y_range.end = low - beside, high + beside

@@ -72,7 +72,7 @@ def unnamed(data: Data) -> Section | None:
     header = (
         "joint",
         "depends on",
-        f"share of what stays, of joint's {load_text(data)} (variance)",
+        f"share of the {load_text(data)} that stays (variance)",
         f"largest [{unit}]",
     )
     rows = [
