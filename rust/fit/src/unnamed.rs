@@ -355,7 +355,7 @@ mod tests {
                 })
                 .collect()
         };
-        vec![vec![log(0, &mut random), log(1, &mut random)].concat(), log(0, &mut random)]
+        vec![[log(0, &mut random), log(1, &mut random)].concat(), log(0, &mut random)]
     }
 
     #[test]
