@@ -29,6 +29,9 @@ _FEWEST_ROWS = 100
 # Columns do not belong together if this share of a joint's torque stays unexplained. Effects of the library leave less than a tenth on
 # simulated logs, and less than a quarter on logs of a real arm.
 _UNRELATED = 0.5
+# A limit of the drive counts in their place if it leaves less than this of every joint's torque. Drives that are limited leave 0.03 at most, torques
+# played backwards 0.31 and more at their best limit of size or rate (four development cases each).
+_LIMITED = 0.2
 # Turns of a fit beside elastic torques. One that takes most of a torque is found in the first; after five no share changed by more than 0.02 on
 # nine development cases (columns of another arm 0.5 to 1.1, a spring 0.7 before and 0.09 after).
 _TURNS = 5
@@ -126,7 +129,7 @@ def _strangers(elastic: Fit, now: Examined, horizon: float) -> list[Check]:
     share = elastic.share
     worst = int(np.argmax(share))
     logs = [*now.training, *now.holdout]
-    if share[worst] < _UNRELATED or torque_unit.limited(logs, now.arm, worst).share.max() < _UNRELATED:
+    if share[worst] < _UNRELATED or torque_unit.limited(logs, now.arm, worst).share.max() < _LIMITED:
         return []
     if _predicted(Corrections(), now, horizon).relative < EXPLAINS:
         return []
