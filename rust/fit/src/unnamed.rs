@@ -48,12 +48,12 @@ pub struct Dependence {
     #[schemars(range(min = 0, max = 1))]
     pub share: f64,
     /// The law.
-    pub law: Law,
+    pub law: DependenceLaw,
 }
 
 /// A torque as a table over a variable, beside the mean of the residual torque and the laws before it.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
-pub struct Law {
+pub struct DependenceLaw {
     /// Mean of the variable in each class, rising.
     pub x: Vec<f64>,
     /// Torque there, N m or N.
@@ -217,7 +217,7 @@ impl Regression<'_> {
     }
 
     /// The last law, of all logs: its torque by class and its standard deviation from the scatter of the blocks' scores (sandwich).
-    fn last_law(&self, x: &[f64]) -> Option<Law> {
+    fn last_law(&self, x: &[f64]) -> Option<DependenceLaw> {
         let (matrix, right) = self.system(|_| true);
         let system = matrix.cholesky()?;
         let values = system.solve(&right);
@@ -240,7 +240,7 @@ impl Regression<'_> {
         }
         let all: f64 = count.iter().sum();
         let mean: f64 = (0..CLASSES).map(|c| count[c] * values[first + c]).sum::<f64>() / all;
-        let mut law = Law { x: Vec::new(), torque: Vec::new(), sigma: Vec::new() };
+        let mut law = DependenceLaw { x: Vec::new(), torque: Vec::new(), sigma: Vec::new() };
         for c in (0..CLASSES).filter(|c| count[*c] > 0.0) {
             // Of the difference from the mean, as the torque is one.
             let weight = DVector::from_fn(CLASSES, |i, _| f64::from(u8::from(i == c)) - count[i] / all);
