@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, NotRequired, TypedDict
 
 import pytest
 
-from armgap import Arm, diagnose
-from armgap.diagnosis import diagnosis_schema
+from armgap import Arm, _native, diagnose
+from armgap.diagnosis import diagnosis_schema, schema
 from armgap.json_schema import schema_of
 from armgap.literals import STATUSES, VERDICTS
 from diagnosis_schema.checking import losses, misfits
@@ -32,6 +32,14 @@ def test_words_of_the_core_are_those_of_the_package() -> None:
     definitions = diagnosis_schema()["$defs"]
     for name, words in (("Verdict", VERDICTS), ("Status", STATUSES)):
         assert {choice["const"] for choice in definitions[name]["oneOf"]} == set(words)
+
+
+def test_no_type_of_the_package_has_the_name_of_one_of_the_core() -> None:
+    core = json.loads(_native.diagnosis_schema())["$defs"]
+    package: dict[str, Any] = {}
+    for kind in schema._ADDED.values():
+        schema_of(kind, package)
+    assert core.keys() & package.keys() == set()
 
 
 def test_every_key_and_every_type_is_described() -> None:
