@@ -6,6 +6,7 @@ import argparse
 import json
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ import numpy as np
 import armgap
 
 from .cases import CASES, LIMITS, Case, Reference, expected, log_of, multisine, play, poor, write_arm
+from .obtained import obtained
+from .sealed import draw
+from .summary import is_settled, summary
 
 
 def named(diagnosis: armgap.Diagnosis, case: Case) -> tuple[str, float]:
@@ -41,12 +45,14 @@ def used(trace: Any, model: str, limit: tuple[float, ...]) -> dict[str, float]:
     }
 
 
-def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any]:
-    """Poor log, diagnosis, plan, both motions played, both diagnosed."""
+def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any] | None:
+    """Poor log, diagnosis, plan, both motions played, both diagnosed; none where the first log of a sealed case settles it."""
     with tempfile.TemporaryDirectory() as name:
         arm, arm_file = write_arm(case, seed, Path(name))
         first = log_of(play(case, arm, poor(arm, case.arm)), "first")
         before = armgap.diagnose(first, arm_file)
+        if case.machine is not None and is_settled(named(before, case)):
+            return None
         began = time.perf_counter()
         wanted = [case.asked] if ask else []
         open_plan = armgap.plan(before, arm_file, questions=wanted, duration=duration, seed=seed)
@@ -62,13 +68,39 @@ def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any]:
             for q in open_plan.questions
         ]
         for key, reference in (("planned", planned), ("multisine", usual)):
-            result[f"{key} expected"] = expected(case, before, arm_file, reference, open_plan.threshold)
+            with suppress(ValueError, KeyError):  # what the library has no values for, or cannot simulate
+                result[f"{key} expected"] = expected(case, before, arm_file, reference, open_plan.threshold)
             trace = play(case, arm, reference)
+            result[f"{key} obtained"] = obtained(case.effect, arm_file, arm, trace, before.gap.horizon_s)
             after = armgap.diagnose([first, log_of(trace, key)], arm_file)
             result[key] = named(after, case)
             result[f"{key} used"] = used(trace, case.arm, arm.torque_limit)
             result[f"{key} causes"] = [(c.effect, c.joint) for c in after.causes]
     return result
+
+
+def sealed(options: argparse.Namespace) -> None:
+    """Run cases drawn at random whose first log leaves the effect open, and print how many questions were settled."""
+    records: list[dict[str, Any]] = []
+    settled, number = 0, options.first
+    while len(records) < options.sealed:
+        case = draw(options.seed, number)
+        number += options.every
+        if case is None:
+            continue
+        try:
+            record = one(case, options.seed, options.duration, ask=True)
+        except armgap.ArmgapError as error:
+            record = {"case": case.name, "error": str(error)}
+        settled += record is None
+        if record is None:
+            continue
+        records.append({"number": number - options.every, **record})
+        print(json.dumps(records[-1], default=float), flush=True)
+        if options.json:
+            options.json.write_text(json.dumps(records, indent=1, default=float), encoding="utf-8")
+    print(f"{settled} draws were left out, as their first log settles them")
+    print(summary(records))
 
 
 def main() -> None:
@@ -82,8 +114,14 @@ def main() -> None:
         action="store_true",
         help="ask for the hidden effect; without it, for what the first diagnosis leaves open",
     )
+    parser.add_argument("--sealed", type=int, help="this many cases drawn at random in place of the list")
+    parser.add_argument("--first", type=int, default=0, help="number of the first draw")
+    parser.add_argument("--every", type=int, default=1, help="take one draw in this many: several runs share the draws")
     parser.add_argument("--json", type=Path, help="write the records")
     options = parser.parse_args()
+    if options.sealed:
+        sealed(options)
+        return
     records = []
     head = (
         "case", "first log", "promised", "at its size", "planned motion", "at its size", "multisine", "position", "speed", "torque", "s",
@@ -94,6 +132,7 @@ def main() -> None:
         if options.only not in case.name:
             continue
         r = one(case, options.seed, options.duration, options.ask)
+        assert r is not None
         records.append(r)
         took = r["planned used"]
         shown = [f"{r[k][0]}{f' {r[k][1]:.2f}' if r[k][1] else ''}" for k in ("before", "planned", "multisine")]

@@ -59,6 +59,7 @@ class Case:
     effect: str
     joint: int | None
     parameters: dict[str, float]
+    machine: TrialArm | None = None
 
     @property
     def name(self) -> str:
@@ -151,7 +152,7 @@ def limits_toml(model: str) -> str:
 
 def write_arm(case: Case, seed: int, folder: Path) -> tuple[TrialArm, Path]:
     """The true arm, and an arm file whose values are off by draws from their standard deviations."""
-    arm = ARMS[case.arm]
+    arm = case.machine or ARMS[case.arm]
     nominal = draw_nominal(np.random.default_rng([seed, 7]), arm, exact=False)
     text = arm_toml(arm, nominal, case.name, "0" * 64) + limits_toml(case.arm)
     path = folder / "arm.toml"
@@ -159,11 +160,11 @@ def write_arm(case: Case, seed: int, folder: Path) -> tuple[TrialArm, Path]:
     return arm, path
 
 
-def play(case: Case, arm: TrialArm, reference: Reference) -> Trace:
-    """Play a reference on the arm with the hidden effect."""
-    hidden = [HiddenEffect(case.effect, case.joint, case.parameters, None, "library")]
+def play(case: Case, arm: TrialArm, reference: Reference, *, hidden: bool = True) -> Trace:
+    """Play a reference on the arm, with the hidden effect or without."""
+    effects = [HiddenEffect(case.effect, case.joint, case.parameters, None, "library")] if hidden else []
     duration = (len(reference.q) - 1) * arm.sample_period
-    return run(simulated_arm_of(arm, hidden, "log"), reference.source(arm), duration)
+    return run(simulated_arm_of(arm, effects, "log"), reference.source(arm), duration)
 
 
 def poor(arm: TrialArm, model: str) -> Reference:

@@ -1,0 +1,61 @@
+"""Evidence that a played motion gave: the log-likelihood ratio of the truth against the arm without the effect, all its values fitted.
+
+The truth is known here: what it leaves is the encoder's noise. The arm without the effect is fitted by scipy to windows from their true first
+states, under the arm file's standard deviations; constants and slopes, which an error of the first state would make, do not count.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+import armgap
+from armgap import _native
+from armgap.trial.arms import TrialArm
+from armgap.trial.simulated_arm import Trace
+
+Array = NDArray[np.float64]
+
+#: Degrees of the polynomials by which a window's positions count.
+DEGREES = 12
+#: Steps of the fit at most.
+STEPS = 12
+#: Effects that no true position shows.
+MEASURED = ("encoder_offset", "encoder_eccentricity")
+
+
+def obtained(effect: str, arm_file: Path, arm: TrialArm, trace: Trace, horizon: float) -> float:
+    """Return the log-likelihood ratio of the truth against the best arm without the effect."""
+    stated = armgap.Arm.read(arm_file)
+    s = max(round(horizon / arm.sample_period), DEGREES + 2)
+    windows = (len(trace.t) - 1) // s
+    orthogonal, _ = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, s + 1), DEGREES))
+    weight = np.array(arm.step) / np.sqrt(12.0)
+
+    def factors(positions: Array) -> Array:
+        return np.asarray(np.einsum("wsj,sk->wkj", positions, orthogonal[:, 2:]) / weight).ravel()
+
+    def of(column: Array) -> Array:
+        return np.stack([column[w * s : w * s + s + 1] for w in range(windows)])
+
+    measured = factors(of(trace.q))
+    lengths = None if stated.link_length is None else stated.link_length.tolist()
+
+    def left(u: Array) -> Array:
+        theta = stated.theta + stated.sigma * u
+        theta = np.where(stated.theta > 0, np.maximum(theta, 1e-3 * stated.theta), theta)
+        predicted = np.empty((windows, s + 1, arm.n_joints))
+        for w in range(windows):
+            rows = slice(w * s, w * s + s + 1)
+            predicted[w], _ = _native.simulate(
+                stated.kind, stated.gravity, lengths, theta.tolist(), trace.t[rows], trace.tau[rows], trace.q_true[w * s],
+                trace.dq_true[w * s], [], 0.1 * float(weight.min()), 0.0,
+            )  # fmt: skip
+        return np.concatenate([measured - factors(predicted), u])
+
+    found = least_squares(left, np.zeros(len(stated.theta)), diff_step=0.02, max_nfev=STEPS)
+    noise = len(measured) if effect in MEASURED else float(np.sum(factors(of(trace.q - trace.q_true)) ** 2))
+    return float(found.cost - 0.5 * noise)

@@ -1,0 +1,42 @@
+"""Cases drawn at random: machine, arm, effect, joint and size follow from a seed, and nothing of them is looked at before the scores."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from armgap.planning.sizes import PLANNED
+from armgap.trial.arms import random_arm
+from armgap.trial.case import possible
+from armgap.trial.effects import REGISTRY, Draw, NoTravelError, usage
+
+from .cases import ARMS, Case, multisine, play, write_arm
+
+#: Length of the motion that sizes are stated against, s.
+STATED_S = 10.0
+
+
+def draw(seed: int, number: int) -> Case | None:
+    """Draw a case: an arm around one of the machines, with one of its effects; none where the draw has no size.
+
+    Sizes are stated against a large motion, so most of them hardly show in a small one.
+    """
+    rng = np.random.default_rng([seed, number])
+    model = sorted(ARMS)[int(rng.integers(len(ARMS)))]
+    arm = replace(random_arm(rng, model), step=ARMS[model].step)
+    choices = [(name, joint) for name, joint in possible(arm.kind, arm.n_joints) if name in PLANNED]
+    name, joint = choices[int(rng.integers(len(choices)))]
+    plain = Case(model, name, joint, {}, arm)
+    with tempfile.TemporaryDirectory() as folder:
+        _, arm_file = write_arm(plain, seed, Path(folder))
+        motion = multisine(arm_file, model, STATED_S, int(rng.integers(2**31)))
+    trace = play(plain, arm, motion, hidden=False)
+    index = (joint or 1) - 1
+    try:
+        drawn = REGISTRY[name].draw(Draw(rng, float(rng.uniform()), arm, index, usage([trace], index)))
+    except NoTravelError:
+        return None
+    return replace(plain, parameters=drawn)
