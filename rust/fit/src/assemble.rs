@@ -3,13 +3,13 @@
 use crate::arm::ArmDescription;
 use crate::attribute::Candidate;
 use crate::belief::left_over;
-use crate::context::{DiagnosisContext, SplitWeighting, WindowSet};
+use crate::context::{DiagnosisContext, WindowSet};
 use crate::diagnose::Options;
 use crate::disturbance::shares;
 use crate::energy::energy;
 use crate::gap::{Errors, FreeRuns, gap, rms};
 use crate::headline::Headline;
-use crate::locate::{self, ResidualTorque, ResidualTorques, places, regimes};
+use crate::locate::{self, ResidualTorques, places, regimes};
 use crate::model::{EffectInstance, Hypothesis};
 use crate::model_search::Attribution;
 use crate::push::Disturbance;
@@ -20,7 +20,6 @@ use crate::report::{
 use crate::ruled_out::ruled_out;
 use crate::sanity::{Estimate, Sanity, bounded_sigma, sanity};
 use crate::solve::Fit;
-use crate::unnamed::dependences;
 use crate::verdict::{Evidence, Verdict};
 use crate::weighting::Weighting;
 use armgap_core::arm::Arm;
@@ -61,12 +60,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let residual = || {
         let residuals = residual_torques(context, &compared, &headline.weights.holdout);
         let regimes = regimes(&residuals, rotary);
-        let dependences = dependences(
-            &context.arm,
-            &context.prior.sigma,
-            &left_over_torques(context, &compared, &headline.weights),
-            rotary,
-        );
+        let dependences = context.laws_beside(&headline.model, &headline.weights, rotary);
         (residuals, regimes, dependences)
     };
     let candidates = || (ruled_out(context, attribution, rotary), ranking(context, attribution, rotary));
@@ -142,20 +136,6 @@ fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let hypotheses = [&compared.before, &compared.refit, &compared.after];
     let [before, refit, after] = locate::residual_torques(&context.arm, data, &weights.offsets, hypotheses);
     ResidualTorques { before, refit, after }
-}
-
-/// Residual torques that the final model leaves in the training and in the holdout logs.
-fn left_over_torques<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    context: &DiagnosisContext<A, N, P>,
-    compared: &Compared<P>,
-    weights: &SplitWeighting<N>,
-) -> Vec<Vec<ResidualTorque<N>>> {
-    let of = |sample: &WindowSet<N>, weights: &Weighting<N>| {
-        let [left] =
-            locate::residual_torques(&context.arm, &sample.data, &weights.offsets, [&compared.after]);
-        left
-    };
-    vec![of(&context.training, &weights.training), of(&context.holdout, &weights.holdout)]
 }
 
 /// Each joint's share of the gap: what causes explain lies on their joints, weighted by their probability; the rest by residual torque.

@@ -11,11 +11,15 @@ use armgap_core::effect::{
 /// Most custom effects in one diagnosis.
 pub const MAX_CUSTOM_EFFECTS: usize = 4;
 
+/// Index of the table of a law without a name, after those of the user.
+pub const UNNAMED: usize = MAX_CUSTOM_EFFECTS;
+
 /// The law of custom effect `index`; its torques lie in the logs' tables.
 #[derive(Debug)]
 struct Tabulated(usize);
 
-static LAWS: [Tabulated; MAX_CUSTOM_EFFECTS] = [Tabulated(0), Tabulated(1), Tabulated(2), Tabulated(3)];
+static LAWS: [Tabulated; UNNAMED + 1] =
+    [Tabulated(0), Tabulated(1), Tabulated(2), Tabulated(3), Tabulated(UNNAMED)];
 
 static PARAMETERS: [EffectParameter; 1] = [EffectParameter::signed("size", Quantity::Torque)];
 static STARTS: [[f64; MAX_PARAMETERS]; 1] = [[0.05, 0.0, 0.0]];
@@ -36,8 +40,13 @@ const fn spec(name: &'static str) -> Spec {
     }
 }
 
-static SPECS: [Spec; MAX_CUSTOM_EFFECTS] =
-    [spec("user_effect_1"), spec("user_effect_2"), spec("user_effect_3"), spec("user_effect_4")];
+static SPECS: [Spec; UNNAMED + 1] = [
+    spec("user_effect_1"),
+    spec("user_effect_2"),
+    spec("user_effect_3"),
+    spec("user_effect_4"),
+    spec("unnamed_law"),
+];
 
 impl Effect<f64> for Tabulated {
     fn spec(&self) -> &'static Spec {
@@ -45,7 +54,7 @@ impl Effect<f64> for Tabulated {
     }
 }
 
-/// The law of custom effect `index`.
+/// The law of custom effect `index`, or that of the law without a name.
 pub fn law(index: usize) -> &'static dyn Effect<f64> {
     &LAWS[index]
 }

@@ -93,8 +93,6 @@ mod tests {
                     q: Vector1::new(q),
                     dq: Vector1::new(dq),
                     tau: Vector1::new(2.0),
-                    ddq: Vector1::zeros(),
-                    noise: Vector1::zeros(),
                     reversal: [false],
                     residual: Vector1::new(residual(q, dq)),
                 }

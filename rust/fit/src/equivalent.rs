@@ -63,14 +63,23 @@ pub fn are(a: &EffectInstance, b: &EffectInstance, joints: usize) -> bool {
     a.same_place(b) || among(a, b) || among(b, a)
 }
 
+/// Whether one effect is another where its further values are zero.
+fn contains(whole: &str, part: &str) -> bool {
+    (whole, part) == ("hardening_spring", "joint_spring")
+}
+
 /// The known equivalents and the look-alikes found in the data, none twice.
 pub fn all(effect: &EffectInstance, look_alikes: &[EffectInstance], joints: usize) -> Vec<Equivalent> {
     let mut list = known(effect, joints);
     for other in look_alikes {
         let (name, joint) = (other.law.spec().name, other.joint_number());
         if !list.iter().any(|e| e.effect == name && e.joint == joint) {
-            let why = "explains these logs about as well; other motions may separate them".to_owned();
-            list.push(Equivalent { effect: name, joint, why });
+            let why = if contains(name, effect.law.spec().name) {
+                "contains it: the same law where its further values are zero"
+            } else {
+                "explains these logs about as well; other motions may separate them"
+            };
+            list.push(Equivalent { effect: name, joint, why: why.to_owned() });
         }
     }
     list
@@ -96,6 +105,9 @@ mod tests {
             assert!(!are(&placed(a, i), &placed(b, j), 2), "{a} {b}");
         }
         assert!(are(&placed("torque_gain", 0), &placed("torque_gain", 1), 2));
+        let list =
+            all(&placed("joint_spring", 0), &[placed("hardening_spring", 0), placed("torque_ripple", 0)], 2);
+        assert!(list[0].why.starts_with("contains it") && list[1].why.contains("other motions"), "{list:?}");
         assert!(are(&placed("payload", 0), &placed("payload", 0), 2));
     }
 }

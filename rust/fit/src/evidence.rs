@@ -30,6 +30,10 @@ pub struct Evidence {
     /// By how much the cost of the holdout rises without it, everything else fitted again, relative to the cost above the floor with it; none
     /// where no more than noise stays.
     pub gain: Option<f64>,
+    /// The same for a law without a name in its place: by how much the cost falls with the table over one variable that predicts best what the
+    /// arm leaves without the cause; none where no table does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rival_gain: Option<f64>,
     /// Size that the holdout asks for, relative to that of the training logs; none where a size has no direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio: Option<f64>,
@@ -42,8 +46,14 @@ impl Evidence {
     /// Probability that the effect is in the arm. A cause that takes off as much as what stays is as likely there as not, unless sizes say more.
     pub fn probability(&self) -> f64 {
         let Some(gain) = self.gain else { return self.selected };
-        let odds = gain.max(0.0) * self.agreement();
+        let odds = gain.max(0.0) * self.agreement() * self.left_by_rival();
         self.selected * odds / (1.0 + odds)
+    }
+
+    /// What a law without a name in the cause's place leaves, relative to what the cause leaves: 0 to 1.
+    fn left_by_rival(&self) -> f64 {
+        let (Some(gain), Some(rival)) = (self.gain, self.rival_gain) else { return 1.0 };
+        (1.0 + gain - rival).clamp(0.0, 1.0)
     }
 
     /// How much more likely the two sizes are for an effect that is there than for one that is not.
@@ -74,12 +84,16 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             else {
                 continue;
             };
-            cause.evidence.gain = rest.map(|rest| {
-                let mut without = model.hypothesis.clone();
-                without.effects.remove(place);
-                let without = self.problem(&last.weights.training).solve(&without, Effort::FULL);
-                (cost(&without) - full) / rest
-            });
+            if let Some(rest) = rest {
+                let mut taken_out = model.hypothesis.clone();
+                taken_out.effects.remove(place);
+                let bare = cost(&self.problem(&last.weights.training).solve(&taken_out, Effort::FULL));
+                cause.evidence.gain = Some((bare - full) / rest);
+                let rival = self.with_rival_law(&taken_out, &last.weights);
+                cause.evidence.rival_gain = rival.map(|(beside, fit)| {
+                    (bare - beside.judged_on_holdout(&last.weights, &fit).0.iter().sum::<f64>()) / rest
+                });
+            }
             if let Some((ratio, sigma)) = size_ratio(place, model, on_holdout) {
                 (cause.evidence.size_ratio, cause.evidence.size_ratio_sigma) = (Some(ratio), Some(sigma));
             }
@@ -121,7 +135,13 @@ mod tests {
     use super::*;
 
     fn evidence(gain: f64, ratio: Option<f64>) -> Evidence {
-        Evidence { selected: 1.0, gain: Some(gain), size_ratio: ratio, size_ratio_sigma: ratio.map(|_| 0.05) }
+        Evidence {
+            selected: 1.0,
+            gain: Some(gain),
+            rival_gain: None,
+            size_ratio: ratio,
+            size_ratio_sigma: ratio.map(|_| 0.05),
+        }
     }
 
     #[test]
@@ -136,6 +156,15 @@ mod tests {
         assert!(evidence(9.0, None).probability() > 0.89);
         assert!(evidence(0.1, None).probability() < 0.1);
         assert_eq!(evidence(-1.0, None).probability(), 0.0);
+    }
+
+    #[test]
+    fn a_law_without_a_name_takes_odds_from_a_cause_only_where_it_explains_more() {
+        let beside = |rival: f64| Evidence { rival_gain: Some(rival), ..evidence(1.0, None) }.probability();
+        let alone = evidence(1.0, None).probability();
+        assert_eq!((beside(-0.3), beside(0.5), beside(1.0)), (alone, alone, alone));
+        assert!((beside(1.5) - 1.0 / 3.0).abs() < 1e-12);
+        assert_eq!(beside(2.5), 0.0);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::model_search::{Attribution, refresh};
 use crate::push::{Conclusion, Disturbance};
 use crate::solve::Fit;
 use armgap_core::arm::Arm;
-use armgap_core::effect::NEVER;
+use armgap_core::effect::{NEVER, Trial};
 
 /// Probability below which nothing is named.
 const NAMEABLE: f64 = 0.3;
@@ -71,7 +71,8 @@ fn impossible(effect: &EffectInstance, probability: f64) -> Option<String> {
     }
 }
 
-/// A size that is not told from nothing.
+/// A size that is not told from nothing. A standard deviation says so only of what grows from nothing in proportion to its size: that of a threshold or of
+/// a transmission is along its other values as well, and the search has compared the whole effect with its absence.
 fn uncertain(effect: &EffectInstance, sigma: &[f64]) -> Option<String> {
     let spec = effect.law.spec();
     let amplitudes = spec.parameters.iter().zip(effect.p).zip(sigma).take(effect.amplitudes());
@@ -80,7 +81,8 @@ fn uncertain(effect: &EffectInstance, sigma: &[f64]) -> Option<String> {
         ((value - neutral).abs(), *sigma)
     });
     let (size, sigma) = deviations.max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
-    (sigma >= size).then(|| {
+    let largest = if spec.trial == Trial::Whole { f64::INFINITY } else { size };
+    (sigma >= largest).then(|| {
         format!("its {} is not told from none: its standard deviation is as large", spec.parameters[0].name)
     })
 }

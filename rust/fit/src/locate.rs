@@ -4,7 +4,7 @@
 //! is the residual acceleration, and `M(q)` times that the residual torque.
 
 use crate::model::Hypothesis;
-use crate::smooth::{Local, local_cubic};
+use crate::smooth::local_cubic;
 use crate::track::Track;
 use crate::window::{Dataset, InitialStateOffset};
 use armgap_core::arm::Arm;
@@ -15,9 +15,6 @@ use serde::Serialize;
 
 /// Half width, in samples, of the cubic whose curvature is the residual acceleration.
 const HALF_WIDTH: usize = 8;
-
-/// Half width, in samples, of the cubic that velocities and accelerations are taken from.
-const MOTION_HALF_WIDTH: usize = 6;
 
 /// A joint is near a reversal if its velocity changes sign within this time, s.
 const REVERSAL_S: f64 = 0.05;
@@ -39,16 +36,12 @@ pub struct ResidualTorque<const N: usize> {
     pub q: SVector<f64, N>,
     /// Velocities.
     pub dq: SVector<f64, N>,
-    /// Accelerations.
-    pub ddq: SVector<f64, N>,
     /// Commanded torques.
     pub tau: SVector<f64, N>,
     /// Whether each joint is near a reversal.
     pub reversal: [bool; N],
     /// Residual torques.
     pub residual: SVector<f64, N>,
-    /// Variances that the noise of positions puts into these.
-    pub noise: SVector<f64, N>,
 }
 
 /// Residual torque at every other sample of all windows under each of several hypotheses.
@@ -69,21 +62,15 @@ pub fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize, const
             let residual = |i: usize, h: usize| {
                 let k = window.first + 1 + i;
                 let rows = &predicted[h][window.range()];
-                let error: [Local; N] = std::array::from_fn(|j| {
+                let curvature = SVector::<f64, N>::from_fn(|j, _| {
                     let error = |r: usize| track.q[window.first + 1 + r][j] - rows[r * N + j];
-                    local_cubic(times, error, i, HALF_WIDTH)
+                    local_cubic(times, error, i, HALF_WIDTH).ddq
                 });
-                let curvature = SVector::<f64, N>::from_fn(|j, _| error[j].ddq);
-                let noise = SVector::<f64, N>::from_fn(|j, _| track.noise[j].powi(2) * error[j].ddq_variance);
-                let inertia = arm.inertia(&hypotheses[h].theta, &track.q[k]);
-                (inertia * curvature, inertia.map(|x| x * x) * noise)
+                arm.inertia(&hypotheses[h].theta, &track.q[k]) * curvature
             };
             let under_all = |i: usize| {
                 let measured_state = measured_state(track, window.track, window.first + 1 + i);
-                std::array::from_fn(|h| {
-                    let (residual, noise) = residual(i, h);
-                    ResidualTorque { residual, noise, ..measured_state }
-                })
+                std::array::from_fn(|h| ResidualTorque { residual: residual(i, h), ..measured_state })
             };
             rows.step_by(2).map(under_all).collect()
         })
@@ -93,19 +80,19 @@ pub fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize, const
 
 /// Measured state at sample `k` of a log, with zero residual torque.
 fn measured_state<const N: usize>(track: &Track<N>, index: usize, k: usize) -> ResidualTorque<N> {
-    let motion: [Local; N] =
-        std::array::from_fn(|j| local_cubic(&track.t, |s| track.q[s][j], k, MOTION_HALF_WIDTH));
     ResidualTorque {
         track: index,
         t: track.t[k] - track.t[0],
         q: track.q[k],
-        dq: SVector::from_fn(|j, _| motion[j].dq),
-        ddq: SVector::from_fn(|j, _| motion[j].ddq),
+        dq: SVector::from_fn(|j, _| velocity(&track.t, |s| track.q[s][j], k)),
         tau: SVector::from_fn(|j, _| track.held[k][j].start),
         reversal: std::array::from_fn(|j| reverses(&track.t, |s| track.q[s][j], k)),
         residual: SVector::zeros(),
-        noise: SVector::zeros(),
     }
+}
+
+fn velocity(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> f64 {
+    local_cubic(t, q, k, 6).dq
 }
 
 /// Whether the direction of motion differs between the two halves of the reversal time around `k`.

@@ -1,9 +1,9 @@
 //! The diagnosis as data: the schema `armgap.diagnosis/1` and what a report draws besides.
 
+use crate::dependence::Dependence;
 use crate::energy::Energy;
 use crate::locate::{Location, Regime};
 use crate::sanity::Sanity;
-use crate::unnamed::Dependence;
 use crate::verdict::Verdict;
 use armgap_core::transmission::Sides;
 use schemars::generate::SchemaSettings;

@@ -4,10 +4,11 @@
 //! it, goes through the same low-pass, so that neither a lag nor the noise of the acceleration enters one of them alone. A push is
 //! what no combination of the columns explains: it does not come back with the state.
 
+use crate::low_pass::{LowPass, slope};
 use crate::model::Hypothesis;
-use crate::products::product;
-use crate::residual_torque::{InverseDynamicsResidual, inverse_dynamics_residuals};
-use crate::smooth::local_cubic;
+use crate::residual_torque::{
+    InverseDynamicsResidual, SLOW, half_width, inverse_dynamics_residuals, rms, rms_speeds, slow_speeds,
+};
 use crate::solve::Prior;
 use crate::track::Track;
 use armgap_core::arm::Arm;
@@ -19,14 +20,6 @@ pub const LOW_PASS: f64 = 0.045;
 /// Distance of grid points, s, and in sample periods at least.
 const GRID: f64 = 0.01;
 const GRID_SAMPLES: f64 = 2.0;
-
-/// Half width of the local cubic that accelerations are taken from, s, and in samples at least.
-const CUBIC: f64 = 0.014;
-const CUBIC_SAMPLES: usize = 3;
-
-/// A joint slower than this part of its RMS speed, or than the noise of its velocity times the other, may be at rest.
-const SLOW: f64 = 0.05;
-const SLOW_NOISE: f64 = 4.0;
 
 /// How much of the dry friction the friction of a joint at rest may reach: static friction exceeds that of sliding.
 const STATIC: f64 = 1.1;
@@ -108,7 +101,7 @@ impl<const N: usize> Residual<N> {
             return None;
         }
         let step = GRID.max(GRID_SAMPLES * track.period());
-        let low = LowPass::new(&t, step);
+        let low = LowPass::new(&t, step, LOW_PASS);
         let columns = rows.first()?.columns.len();
         let joint = |j: usize| {
             let typical = rms(rows.iter().map(|r| r.needed[j]));
@@ -236,84 +229,10 @@ fn activity<const N: usize>(rows: &[Row<N>], low: &LowPass) -> Vec<Vec<f64>> {
     all
 }
 
-/// A Gaussian low-pass from uneven samples onto a regular grid.
-struct LowPass {
-    grid: Vec<f64>,
-    step: f64,
-    /// For every grid point, the first sample that counts and the weights from there on.
-    kernels: Vec<(usize, Vec<f64>)>,
-}
-
-impl LowPass {
-    fn new(t: &[f64], step: f64) -> Self {
-        let (first, last) = (t[0], t[t.len() - 1]);
-        let count = ((last - first) / step).floor() as usize;
-        let grid: Vec<f64> = (0..=count).map(|i| first + i as f64 * step).collect();
-        let kernels = grid.iter().map(|at| kernel(t, *at, step)).collect();
-        Self { grid, step, kernels }
-    }
-
-    /// Means around every grid point.
-    fn apply(&self, x: &[f64]) -> Vec<f64> {
-        self.kernels.iter().map(|(first, weights)| product(weights, &x[*first..])).collect()
-    }
-}
-
-/// Weights of the samples around one instant, from the first that counts; they count by the time they stand for.
-fn kernel(t: &[f64], at: f64, step: f64) -> (usize, Vec<f64>) {
-    let reach = 4.0 * LOW_PASS;
-    let (a, b) = (t.partition_point(|&t| t < at - reach), t.partition_point(|&t| t <= at + reach));
-    let weight = |k: usize| {
-        let before = if k > 0 { t[k] - t[k - 1] } else { step };
-        before.min(LOW_PASS) * (-0.5 * ((t[k] - at) / LOW_PASS).powi(2)).exp()
-    };
-    let mut weights: Vec<f64> = (a..b).map(weight).collect();
-    let sum: f64 = weights.iter().sum();
-    if sum > 0.0 {
-        for weight in &mut weights {
-            *weight /= sum;
-        }
-    }
-    (a, weights)
-}
-
-/// Central differences.
-fn slope(x: &[f64], step: f64) -> Vec<f64> {
-    let at = |i: usize| {
-        let (a, b) = (i.saturating_sub(1), (i + 1).min(x.len() - 1));
-        (x[b] - x[a]) / ((b - a).max(1) as f64 * step)
-    };
-    (0..x.len()).map(at).collect()
-}
-
 fn moving_mean(x: &[f64], half: usize) -> Vec<f64> {
     let mean = |i: usize| {
         let part = &x[i.saturating_sub(half)..(i + half + 1).min(x.len())];
         part.iter().sum::<f64>() / part.len() as f64
     };
     (0..x.len()).map(mean).collect()
-}
-
-fn half_width<const N: usize>(track: &Track<N>) -> usize {
-    ((CUBIC / track.period().max(1e-9)).round() as usize).max(CUBIC_SAMPLES)
-}
-
-fn rms_speeds<const N: usize>(track: &Track<N>) -> [f64; N] {
-    let half = half_width(track);
-    let places = || (0..track.len()).step_by((track.len() / 1000).max(1));
-    std::array::from_fn(|j| rms(places().map(|k| local_cubic(&track.t, |i| track.q[i][j], k, half).dq)))
-}
-
-/// Speeds below which a joint may be at rest for all that its encoder says.
-fn slow_speeds<const N: usize>(track: &Track<N>, speed: &[f64; N]) -> [f64; N] {
-    std::array::from_fn(|j| {
-        let middle = local_cubic(&track.t, |i| track.q[i][j], track.len() / 2, half_width(track));
-        let noise = track.noise[j] * middle.covariance[2].sqrt();
-        (SLOW * speed[j]).max(SLOW_NOISE * noise).max(1e-9)
-    })
-}
-
-fn rms(x: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = x.fold((0.0, 0.0), |(s, n), x| (s + x * x, n + 1.0));
-    if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 }
 }

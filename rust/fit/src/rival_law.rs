@@ -1,0 +1,94 @@
+//! The rival of every name: a torque without a name, as a table over the variable that predicts best what the arm lacks without the cause.
+//!
+//! An effect that is not in the arm is named where it imitates what is there better than the other effects do. A table has no form of its own to
+//! imitate with: where it explains much more of the holdout than the named effect, the form of the named effect is wrong.
+
+use crate::acceptance::MATTERS;
+use crate::context::{DiagnosisContext, SplitWeighting, WindowSet};
+use crate::custom_effect::{self, UNNAMED};
+use crate::dependence::Dependence;
+use crate::model::{EffectInstance, Hypothesis};
+use crate::residual_torque::measured_motion;
+use crate::solve::{Effort, Fit};
+use crate::unnamed::{LogResidual, MOST, Wanted, dependences};
+use crate::window::Dataset;
+use armgap_core::arm::Arm;
+use nalgebra::SVector;
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// What the torques that a model lacks depend on, strongest first: tables of the training logs that predict the holdout, each beside the model
+    /// with everything fitted again.
+    pub(crate) fn laws_beside(
+        &self,
+        model: &Fit<P>,
+        weights: &SplitWeighting<N>,
+        rotary: bool,
+    ) -> Vec<Dependence> {
+        let cost =
+            |context: &Self, fit: &Fit<P>| context.judged_on_holdout(weights, fit).0.iter().sum::<f64>();
+        let full = cost(self, model);
+        let rest = full - self.floor(weights);
+        let predicts = |law: &Dependence| {
+            let (beside, fit) = self.with_law(&model.hypothesis, law, weights);
+            full - cost(&beside, &fit) > MATTERS * rest
+        };
+        let mut laws = self.dependences(&model.hypothesis, Wanted { most: MOST, rotary });
+        laws.retain(predicts);
+        laws
+    }
+
+    /// What the torques that a model lacks depend on by inverse dynamics, strongest first; tables are taken from the training logs.
+    fn dependences(&self, model: &Hypothesis<P>, wanted: Wanted) -> Vec<Dependence> {
+        let of = |set: &WindowSet<N>, teaches| -> Vec<LogResidual<N>> {
+            let tracks = &set.data.tracks;
+            tracks.iter().filter_map(|track| LogResidual::new(&self.arm, track, model, teaches)).collect()
+        };
+        let mut logs = of(&self.training, true);
+        logs.extend(of(&self.holdout, false));
+        dependences(&self.arm, &model.theta, &self.prior.sigma, &logs, wanted)
+    }
+
+    /// The best law without a name beside a model, taken from the training logs, with everything fitted again: the logs with the torques of
+    /// that law, and the fit; none where no law predicts what the model lacks.
+    pub(crate) fn with_rival_law(
+        &self,
+        model: &Hypothesis<P>,
+        weights: &SplitWeighting<N>,
+    ) -> Option<(Self, Fit<P>)> {
+        let rival = self.dependences(model, Wanted { most: 1, rotary: true }).into_iter().next()?;
+        Some(self.with_law(model, &rival, weights))
+    }
+
+    /// The logs with the torques of a law, and the model with that law, everything fitted again.
+    fn with_law(
+        &self,
+        model: &Hypothesis<P>,
+        law: &Dependence,
+        weights: &SplitWeighting<N>,
+    ) -> (Self, Fit<P>) {
+        let beside = Self {
+            training: WindowSet::new(with_torques(&self.training.data, law)),
+            holdout: WindowSet::new(with_torques(&self.holdout.data, law)),
+            ..self.on_windows(Dataset::new(Vec::new(), 1.0))
+        };
+        let effect = EffectInstance::new(custom_effect::law(UNNAMED), law.joint - 1, [1.0, 0.0, 0.0]);
+        let fit = beside.problem(&weights.training).solve(&model.with(effect), Effort::FULL);
+        (beside, fit)
+    }
+}
+
+/// The same windows, with the torques of a law along the measured motion as a table of their logs.
+fn with_torques<const N: usize>(data: &Dataset<N>, law: &Dependence) -> Dataset<N> {
+    let mut data = data.clone();
+    for track in &mut data.tracks {
+        let torque = |k: usize| {
+            let motion = measured_motion(track, k);
+            let tau = SVector::from_fn(|j, _| track.held[k][j].mean());
+            law.law.at(law.depends_on.of(&motion, &tau, track.t[k] - track.t[0]))
+        };
+        let torques = (0..track.len()).map(torque).collect();
+        track.tables.resize(UNNAMED, Vec::new());
+        track.tables.push(torques);
+    }
+    data
+}
