@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from armgap.literals import SERIAL, Side, TauKind
 if TYPE_CHECKING:
     from armgap.check.corrections import Corrections
     from armgap.controller import Controller
+    from armgap.free_space import FreeSpace
     from armgap.serial_chain import SerialChain
 
 __all__ = ["Arm", "MotionLimits", "kinds", "listed", "only_planar", "quoted"]
@@ -33,12 +34,24 @@ class MotionLimits:
         Range of positions [rad or m].
     speed, acceleration : ndarray, shape (n_joints,)
         Largest speed [rad/s or m/s] and acceleration [rad/s^2 or m/s^2].
+    space : FreeSpace, optional
+        What the links must not touch.
     """
 
     position_min: NDArray[np.float64]
     position_max: NDArray[np.float64]
     speed: NDArray[np.float64]
     acceleration: NDArray[np.float64]
+    space: FreeSpace | None = None
+
+    def toml_lines(self) -> list[str]:
+        """Return the table of an arm file, without the links' lengths."""
+        names = ("position_min", "position_max", "speed", "acceleration")
+        lines = [f"{name} = {listed(getattr(self, name))}" for name in names]
+        if self.space is not None:
+            boxes = ", ".join(listed(box) for box in self.space.boxes)
+            lines += [f"link_radius = {listed(self.space.link_radius)}", f"boxes = [{boxes}]"]
+        return ["[limits]", *lines]
 
 
 @dataclass(frozen=True)
@@ -284,11 +297,7 @@ class Arm:
                 opened = f"[{table}]" in lines
                 lines += [*(() if opened else ("", f"[{table}]")), f"{key} = {listed(value)}"]
         if self.limits is not None:
-            lines += [
-                "",
-                "[limits]",
-                *(f"{f.name} = {listed(getattr(self.limits, f.name))}" for f in fields(self.limits)),
-            ]
+            lines += ["", *self.limits.toml_lines()]
         if self.controller is not None:
             kind = [f"kind = {quoted(self.controller.kind)}", f"kd_on = {quoted(self.controller.kd_on)}"]
             gains = [f"{name} = {listed(values)}" for name, values in self.controller.vectors]

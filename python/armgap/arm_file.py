@@ -17,6 +17,7 @@ from armgap import _native
 from armgap.arm import MotionLimits, kinds
 from armgap.controller import Controller, DerivativeOn
 from armgap.errors import ArmFileError, OptionError
+from armgap.free_space import FreeSpace
 from armgap.literals import SERIAL, Side
 from armgap.reading import printable, read_bounded
 
@@ -33,7 +34,7 @@ _TABLES: dict[str, tuple[str, ...]] = {
     "transmission": ("friction_side", "gear_ratio"),
     "actuator": ("torque_limit",),
     "geometry": ("link_length", "link_mass"),
-    "limits": ("position_min", "position_max", "speed", "acceleration"),
+    "limits": ("position_min", "position_max", "speed", "acceleration", "link_radius", "boxes"),
     "controller": ("kind", "kp", "kd", "kd_on"),
     "columns": (),
     "corrections": (),
@@ -261,7 +262,31 @@ class ArmFile:
                 problem = f"entry {i + 1} is {most:g}, not above position_min, {least:g}"
                 raise self.error("limits.position_max", problem, "correct one of them")
         speed, acceleration = (self._vector(table, f"limits.{key}", n, above=0.0) for key in ("speed", "acceleration"))
-        return MotionLimits(low, high, speed, acceleration)
+        return MotionLimits(low, high, speed, acceleration, self._space(table, n))
+
+    def _space(self, table: dict[str, Any], n: int) -> FreeSpace | None:
+        if "link_radius" not in table:
+            if "boxes" in table:
+                raise self.error("limits.link_radius", "is missing", "give the radius of every link [m] beside `boxes`")
+            return None
+        if self.data.get("kind") == "axis":
+            raise self.error(
+                "limits.link_radius", "is for links that turn", "leave it out; position_min and _max do the same"
+            )
+        radius = self._vector(table, "limits.link_radius", n, above=0.0)
+        lengths = self._lengths(n)
+        if lengths is None or not np.all(lengths > 0):
+            raise self.error(
+                "geometry.link_length", "is missing", f"give the lengths of all {n} links [m] for `link_radius`"
+            )
+        boxes = table.get("boxes", [])
+        if not isinstance(boxes, list):
+            raise self.error("limits.boxes", f"is {boxes!r}", "give a list of [x_min, y_min, x_max, y_max]")
+        rows = [self._vector({"boxes": box}, "limits.boxes", 4) for box in boxes]
+        for i, (x, y, right, top) in enumerate(rows):
+            if not (x < right and y < top):
+                raise self.error("limits.boxes", f"box {i + 1} has no inside", "give [x_min, y_min, x_max, y_max]")
+        return FreeSpace(lengths, radius, np.array(rows, dtype=np.float64).reshape(-1, 4))
 
     def _controller(self, n: int) -> Controller | None:
         if "controller" not in self.data:

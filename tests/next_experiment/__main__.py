@@ -14,19 +14,29 @@ import numpy as np
 
 import armgap
 
-from .cases import CASES, LIMITS, Case, Reference, expected, log_of, multisine, play, poor, write_arm
+from .cases import CASES, Case, Reference, expected, log_of, multisine, play, poor, write_arm
+from .hypotheses_played import is_followed, played, used
 from .obtained import obtained
 from .sealed import draw
 from .summary import is_settled, summary
 
+#: What a diagnosis says of look-alikes that are not the same whatever the motion.
+SEPARABLE = "other motions may separate them"
+
 
 def named(diagnosis: armgap.Diagnosis, case: Case) -> tuple[str, float]:
-    """What became of the hidden effect: named alone, named with look-alikes, a candidate, or not named; and its probability."""
+    """What became of the hidden effect: named alone, named with look-alikes, a candidate, or not named; and its probability.
+
+    What is the same whatever the motion is no look-alike: each may be named, and no experiment settles which it is.
+    """
+    hidden = (case.effect, case.joint)
     for cause in diagnosis.causes:
-        if (cause.effect, cause.joint) == (case.effect, case.joint):
-            return ("named, look-alikes" if cause.equivalents else "named"), cause.probability
+        alike = [(e.effect, e.joint) for e in cause.equivalents if SEPARABLE in (e.why or "")]
+        same = [(cause.effect, cause.joint), *((e.effect, e.joint) for e in cause.equivalents)]
+        if hidden in same and hidden not in alike:
+            return ("named, look-alikes" if alike else "named"), cause.probability
     for cause in diagnosis.causes:
-        if any((e.effect, e.joint) == (case.effect, case.joint) for e in cause.equivalents):
+        if any((e.effect, e.joint) == hidden for e in cause.equivalents):
             return "look-alike", cause.probability
     if any((c.effect, c.joint) == (case.effect, case.joint) for c in diagnosis.candidates):
         return "candidate", 0.0
@@ -34,22 +44,17 @@ def named(diagnosis: armgap.Diagnosis, case: Case) -> tuple[str, float]:
     return (status[0] if status else "not named"), 0.0
 
 
-def used(trace: Any, model: str, limit: tuple[float, ...]) -> dict[str, float]:
-    """Largest part of each limit that the played motion took."""
-    low, high, speed, _ = (np.array(x) for x in LIMITS[model])
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    return {
-        "position": float(np.max(np.abs(trace.q_true - middle) / half)),
-        "speed": float(np.max(np.abs(trace.dq_true) / speed)),
-        "torque": float(np.max(np.abs(trace.tau) / np.array(limit))),
-    }
-
-
 def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any] | None:
-    """Poor log, diagnosis, plan, both motions played, both diagnosed; none where the first log of a sealed case settles it."""
+    """Poor log, diagnosis, plan, both motions played, both diagnosed.
+
+    None where the first log of a sealed case settles it, or where the arm does not follow even that motion: its controller is not stable.
+    """
     with tempfile.TemporaryDirectory() as name:
         arm, arm_file = write_arm(case, seed, Path(name))
-        first = log_of(play(case, arm, poor(arm, case.arm)), "first")
+        small = play(case, arm, poor(arm, case.arm))
+        if case.machine is not None and not is_followed(used(small, case.arm, arm.torque_limit)):
+            return None
+        first = log_of(small, "first")
         before = armgap.diagnose(first, arm_file)
         if case.machine is not None and is_settled(named(before, case)):
             return None
@@ -67,6 +72,10 @@ def one(case: Case, seed: int, duration: float, ask: bool) -> dict[str, Any] | N
             (q.effect, q.joint, q.against, round(q.settled, 3), round(q.expected_log_likelihood_ratio, 1))
             for q in open_plan.questions
         ]
+        if case.machine is not None:
+            result["hypotheses"] = list(played(case, arm, open_plan, seed))
+            ends = np.abs(np.concatenate([planned.dq[[0, -1]], planned.q[[0]] - planned.q[[-1]]]))
+            result["rest"] = float(ends.max())
         for key, reference in (("planned", planned), ("multisine", usual)):
             with suppress(ValueError, KeyError):  # what the library has no values for, or cannot simulate
                 result[f"{key} expected"] = expected(case, before, arm_file, reference, open_plan.threshold)
@@ -99,7 +108,7 @@ def sealed(options: argparse.Namespace) -> None:
         print(json.dumps(records[-1], default=float), flush=True)
         if options.json:
             options.json.write_text(json.dumps(records, indent=1, default=float), encoding="utf-8")
-    print(f"{settled} draws were left out, as their first log settles them")
+    print(f"{settled} draws were left out, as their first log settles them or the arm does not follow it")
     print(summary(records))
 
 

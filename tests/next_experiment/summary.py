@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest, spearmanr
 
+from .hypotheses_played import EXCESS, is_followed
+
 #: Promise that counts as one.
 PROMISED = 0.95
 #: Probability from which a name without look-alikes settles a question.
@@ -43,4 +45,17 @@ def summary(records: list[dict[str, Any]]) -> str:
             )
     used = [max(r["planned used"][limit] for r in sound) for limit in ("position", "speed", "torque")]
     lines.append("largest part of the limits used by plans: position {:.2f}, speed {:.2f}, torque {:.2f}".format(*used))
+    others = [h for r in sound for h in r.get("hypotheses", [])]
+    if others:
+        used = [max(h[limit] for h in others) for limit in ("position", "speed", "torque")]
+        lines.append(
+            "played on {} arms with an open hypothesis each: position {:.2f}, speed {:.2f}, torque {:.2f}".format(
+                len(others), *used
+            )
+        )
+        over = [h for h in others if not is_followed(h) or h["torque"] > 1.0]
+        lines.append(f"over the limits by more than {EXCESS:.0%}, or over the torque limit: {len(over)}")
+        lines.append(
+            f"largest speed, and largest distance of the ends, of a reference's ends: {max(r['rest'] for r in sound):.1e}"
+        )
     return "\n".join(lines)

@@ -328,7 +328,10 @@ class PredictedMotion:
         delta = truth - self.predicted(theta, pair.rival, lead)
         names, free = self._of_rival(pair, lead)
         columns = Columns(self.sensitivities(), free, names, len(self._arm.sigma))
-        best = columns.fitted(delta, self._whole)
+        # A diagnosis fits the rival to the first windows and judges it on the others.
+        first = self._windows < TRAINED * self._every
+        trained = np.repeat(first, len(delta) // self._count)
+        best = columns.fitted(delta, self._whole * trained)
         plain = 0.5 * float(np.sum((delta * self._whole) ** 2))
         for _ in range(steps):
             # Gauss-Newton: the rival predicts with the fitted values, and what is left is fitted again.
@@ -338,7 +341,7 @@ class PredictedMotion:
             except ValueError:
                 break
             linear = columns.product(best.values, simulated=True)
-            again = columns.fitted(missed + linear, self._whole)
+            again = columns.fitted(missed + linear, self._whole * trained)
             gain = best.square - again.square
             if gain > 0:
                 delta, best = missed + linear, again
@@ -346,8 +349,9 @@ class PredictedMotion:
                 break
         left = 0.5 * np.sum(best.left.reshape(self._count, -1) ** 2, axis=1)
         prior = max(0.5 * best.square - float(np.sum(left)), 0.0)
-        windows = 0.5 * np.sum(columns.fitted(delta, self._white).left.reshape(self._count, -1) ** 2, axis=1)
-        first = self._windows < TRAINED * self._every
+        by_noise = columns.fitted(delta, self._white * trained)
+        beyond = (delta - columns.product(by_noise.values, simulated=False)) * self._white
+        windows = 0.5 * np.sum(beyond.reshape(self._count, -1) ** 2, axis=1)
         share = self._share
         above = share * min(float(np.sum(windows[first])) / TRAINED, float(np.sum(windows[~first])) / (1.0 - TRAINED))
         # Robust weights let a window's cost grow with the logarithm only.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from armgap import _native
 from armgap.evidence.hypothesis import EffectInstance, at_motor
 from armgap.planning.criterion import HypothesisPair, PredictedMotion
 from armgap.planning.questions import NONE, Question
-from armgap.planning.sizes import Scales, Shape, levels, shapes
+from armgap.planning.sizes import PLANNED, Scales, Shape, levels, shapes
 
 __all__ = ["HypothesisBuilder", "TestedQuestion"]
 
@@ -31,6 +31,8 @@ SIZES = 5
 NODES, WEIGHTS = (-math.sqrt(3.0), 0.0, math.sqrt(3.0)), (1 / 6, 2 / 3, 1 / 6)
 #: A stiffness is no better known than by this factor's logarithm.
 SPREAD = 1.0
+#: An effect may imitate another where, before its shape is fitted, it leaves less than this part of the other's evidence in a usual motion.
+IMITATES = 0.5
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,7 @@ class HypothesisBuilder:
         self._scales = scales
         self._base = base
         self._specs = {entry["name"]: entry["parameters"] for entry in _native.effects()}
+        self._scopes = {entry["name"]: entry["scope"] for entry in _native.effects()}
         self._floor = np.array(data["gap"]["floor"], dtype=np.float64)
 
     def pose(self, question: Question) -> TestedQuestion | None:
@@ -95,6 +98,31 @@ class HypothesisBuilder:
         pair = HypothesisPair(tuple(every), rival, free)
         quick = HypothesisPair(_few(every), rival, free)
         return TestedQuestion(question, pair, quick, size, self._range(question, [e for _, e in groups]))
+
+    def look_alikes(self, tested: TestedQuestion) -> list[Question]:
+        """Return an effect's questions against those that may imitate it, of its joint or of the whole arm, the likest first."""
+        effect, joint = tested.question.place
+        middle = tested.pair.alternatives[len(tested.pair.alternatives) // 2]
+        pair = HypothesisPair(((1.0, middle[1]),), tested.pair.rival)
+        target = self._usual.difference(pair)
+        whole, _ = self._usual.left_of(target)
+        found = []
+        for other in PLANNED:
+            place = (other, None if self._scopes[other] == "arm" else joint or 1)
+            if other == effect or place in {(e.effect, e.joint) for e in tested.pair.rival}:
+                continue
+            left = [self._left_by(e, tested.pair.rival, target) for e in self._tried(place, tested.pair.rival, target)]
+            if left and min(left) < IMITATES * whole:
+                found.append((min(left), replace(tested.question, against=place[0], against_joint=place[1])))
+        return [question for _, question in sorted(found, key=lambda x: x[0])]
+
+    def _left_by(self, effect: EffectInstance, without: tuple[EffectInstance, ...], target: Array) -> float:
+        """What is left of a difference beside an effect and the arm's own values; infinite where it cannot be computed."""
+        try:
+            made = self._usual.difference(HypothesisPair(((1.0, (*without, effect)),), without))
+        except ValueError:
+            return math.inf
+        return self._usual.left_of(target - made)[0]
 
     def _alternatives(
         self, question: Question, without: tuple[EffectInstance, ...]
@@ -151,8 +179,7 @@ class HypothesisBuilder:
         target = self._usual.difference(HypothesisPair((middle,), rough.rival))
         best: tuple[float, EffectInstance] | None = None
         for effect in self._tried(question.rival, rough.rival, target):
-            made = self._usual.difference(HypothesisPair(((1.0, (*rough.rival, effect)),), rough.rival))
-            left, _ = self._usual.left_of(target - made)
+            left = self._left_by(effect, rough.rival, target)
             if best is None or left < best[0]:
                 best = left, effect
         assert best is not None
@@ -166,7 +193,10 @@ class HypothesisBuilder:
         for shape in shapes(*place, self._scales):
             typical = EffectInstance(*place, shape.at(shape.typical))
             yield typical
-            made = self._usual.difference(HypothesisPair(((1.0, (*without, typical)),), without))
+            try:
+                made = self._usual.difference(HypothesisPair(((1.0, (*without, typical)),), without))
+            except ValueError:
+                continue
             _, factor = self._usual.left_of(target, made)
             size = factor * shape.typical
             if shape.inverse and size <= 0:

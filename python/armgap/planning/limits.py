@@ -16,8 +16,8 @@ __all__ = ["PlanLimits", "limits_of"]
 
 Array = NDArray[np.float64]
 
-#: Part of a limit that a reference may use: what follows it overshoots.
-MARGIN = 0.95
+#: Part of a limit that a reference may use: what follows it overshoots, an arm with a slow drive by a tenth.
+MARGIN = 0.92
 #: Part of the torque limit that the feed-forward may use under the best model; the rest is the controller's.
 TORQUE_MARGIN = 0.8
 #: Part of the torque limit that the feed-forward may use under every model in question.
@@ -36,7 +36,7 @@ class PlanLimits:
     Attributes
     ----------
     motion : MotionLimits
-        Range of positions, largest speeds and accelerations.
+        Range of positions, largest speeds and accelerations, and what must not be touched.
     torque : ndarray of shape (n_joints,), optional
         Largest torque [N m or N]; None where the arm file names none.
     source : {"arm file", "logs"}
@@ -60,12 +60,15 @@ class PlanLimits:
     def to_dict(self) -> dict[str, Any]:
         """Return the limits as a JSON object."""
         m = self.motion
+        space = m.space
         return {
             "position_min": m.position_min.tolist(),
             "position_max": m.position_max.tolist(),
             "speed": m.speed.tolist(),
             "acceleration": m.acceleration.tolist(),
             "torque": None if self.torque is None else self.torque.tolist(),
+            "link_radius": None if space is None else space.link_radius.tolist(),
+            "boxes": None if space is None else space.boxes.tolist(),
             "source": self.source,
         }
 

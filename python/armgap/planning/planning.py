@@ -47,6 +47,10 @@ SHORTEST, LONGEST = 2.0, 120.0
 NEXT_TO_NOTHING = 1.0
 #: Part of a difference that is left after the rival was fitted, below which the two are one.
 SAME = 1e-3
+#: The same, of two effects that are one where their values are fitted: what rounding and the last step of the fit leave.
+IDENTICAL = 1e-5
+#: Effects that may imitate one in question of which it is looked at how well they do.
+_TRIED = 8
 SCHEMA = "armgap.plan/1"
 
 
@@ -323,6 +327,8 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
     if not named:
         tested.sort(key=_urgency)
     chosen = tested if named else tested[:MOST_QUESTIONS]
+    if len(chosen) < MOST_QUESTIONS:
+        chosen += _against_look_alikes(builder, chosen, usual, remarks)
     settling = {p.question.text for p in chosen}
     left = (
         [q for q in (p.question for p in tested) if q.text not in settling]
@@ -352,8 +358,24 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
         limits,
         threshold,
         found.evaluations,
-        (*_limit_notes(limits), *notes, *remarks),
+        (*_limit_notes(limits, arm), *notes, *remarks),
     )
+
+
+def _against_look_alikes(
+    builder: HypothesisBuilder, chosen: Sequence[TestedQuestion], usual: PredictedMotion, remarks: list[str]
+) -> list[TestedQuestion]:
+    """Pose the questions that come up once an effect that was not seen so far shows: which of those that imitate it it is."""
+    known = {frozenset((p.question.place, p.question.rival)) for p in chosen}
+    unseen = [p for p in chosen if p.question.against == NONE]
+    likely = [q for p in unseen for q in builder.look_alikes(p)[:_TRIED]]
+    posed = [builder.pose(q) for q in likely if frozenset((q.place, q.rival)) not in known]
+    weighed = [(usual.outcome(p.quick), p) for p in posed if p is not None]
+    remarks += [
+        f"{p.question.text}: no motion within these limits tells them apart" for x, p in weighed if x.kept < IDENTICAL
+    ]
+    doubtful = sorted(((x.expected, p) for x, p in weighed if x.kept >= IDENTICAL), key=lambda x: x[0])
+    return [p for _, p in doubtful][: MOST_QUESTIONS - len(chosen)]
 
 
 def _urgency(tested: TestedQuestion) -> tuple[int, float]:
@@ -416,11 +438,15 @@ def _obstacle(question: Question, outcome: Outcome, most: float) -> str:
     )
 
 
-def _limit_notes(limits: PlanLimits) -> list[str]:
+def _limit_notes(limits: PlanLimits, arm: Arm) -> list[str]:
     notes = []
     if limits.source == "logs":
         notes.append(
             "the arm file has no [limits]; the motion keeps to the positions, speeds and accelerations of the diagnosed logs"
+        )
+    if limits.motion.space is None and arm.link_length is not None:
+        notes.append(
+            "the arm file gives no link_radius and boxes; only the joints' limits keep the arm from itself and from what is around it"
         )
     if limits.torque is None:
         notes.append("the arm file has no torque_limit; torques are not limited")

@@ -139,7 +139,11 @@ def asked(texts: Sequence[str], data: Data, arm: Arm) -> list[Question]:
     found = []
     for text in (texts,) if isinstance(texts, str) else texts:
         effect, joint = _parse(text, arm)
-        found += [q for q in open_questions(data)[0] if q.place == (effect, joint) and q.against != NONE]
+        pairs = [q for q in open_questions(data)[0] if q.against != NONE]
+        found += [q for q in pairs if q.place == (effect, joint)]
+        found += [
+            Question(effect, joint, q.effect, q.joint, q.origin, why=q.why) for q in pairs if q.rival == (effect, joint)
+        ]
         found.append(_against_absence(effect, joint, data))
     return _once(found)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -15,7 +16,7 @@ from armgap.planning.criterion import PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics, torque_with
 from armgap.planning.hypotheses import TestedQuestion
 from armgap.planning.limits import TORQUE_MARGIN, TORQUE_MOST, PlanLimits
-from armgap.planning.motion import Motion, build, count, named
+from armgap.planning.motion import LOOK_HZ, Motion, build, count, named
 from armgap.planning.outcome import Outcome
 from armgap.progress import report_progress
 
@@ -29,6 +30,8 @@ POPULATION, GENERATIONS = 16, 9
 _WINDOWS, FINALISTS = 20, 4
 #: Steps in which a motion is scaled down until its torques suffice.
 _SHRINKS = 12
+#: Factor by which a motion that touches something is scaled down, until it does not.
+_SHRINK = 0.8
 #: Every so many steps of prediction torques are looked at while a motion is scaled down.
 COARSE = 4
 #: Poses per joint at which the torque left for accelerations is looked at; at least this part of the limit counts as left.
@@ -84,7 +87,13 @@ class Search:
         self._inner = self._reachable(limits.inner())
 
     def _check_home(self) -> None:
-        """Raise if the arm cannot be held where the motion begins."""
+        """Raise if the arm cannot be held where the motion begins, or touches something there."""
+        space = self._limits.motion.space
+        if space is not None and (pair := space.touched(self._limits.home)) is not None:
+            raise OptionError(
+                f"{pair} touch where the motion begins",
+                remedy="correct boxes and link_radius, or choose limits that contain a pose in which they do not",
+            )
         if self._limits.torque is None:
             return
         rest = np.zeros((1, len(self._limits.home)))
@@ -113,10 +122,31 @@ class Search:
         return replace(inner, acceleration=np.minimum(inner.acceleration, COUPLED * left / inertia))
 
     def motion(self, numbers: Array) -> Motion:
-        """Return the motion of some numbers from 0 to 1, within limits of position, speed, acceleration and torque."""
+        """Return the motion of some numbers from 0 to 1, within limits of position, speed, acceleration, torque and free space."""
         period = self._setting.arm.sample_period
         motion = build(numbers, self._limits.home, self._inner, self._duration, period)
-        return self._within(motion, (), TORQUE_MARGIN)
+        return self._allowed(motion, (), TORQUE_MARGIN)
+
+    def _allowed(self, motion: Motion, effects: Sequence[Any], part: float) -> Motion:
+        """Scale a motion down until its torques are within a part of the limit and the arm touches nothing."""
+        for _ in range(_SHRINKS):
+            smaller = self._clear(self._within(motion, effects, part))
+            if smaller is motion:
+                return motion
+            motion = smaller
+        return motion.scaled(0.0)
+
+    def _clear(self, motion: Motion) -> Motion:
+        """Scale a motion down until the arm touches nothing."""
+        space = self._limits.motion.space
+        if space is None:
+            return motion
+        t = np.linspace(0.0, motion.duration, math.ceil(motion.duration * LOOK_HZ) + 1)
+        for _ in range(_SHRINKS):
+            if space.is_free(motion.at(t)[0]):
+                return motion
+            motion = motion.scaled(_SHRINK)
+        return motion.scaled(0.0)
 
     def _within(self, motion: Motion, effects: Sequence[Any], part: float) -> Motion:
         """Scale a motion down until its torques, under the best model with some effects added, are within a part of the limit."""
@@ -137,10 +167,10 @@ class Search:
         return motion.scaled(0.0)
 
     def kept(self, motion: Motion, tested: Sequence[TestedQuestion]) -> Motion:
-        """Scale a motion down until its torques suffice under every model in question."""
+        """Scale a motion down until its torques suffice under every model in question, and the arm touches nothing."""
         for p in tested:
             largest = p.pair.alternatives[-1][1][-1]
-            motion = self._within(motion, (largest,), TORQUE_MOST)
+            motion = self._allowed(motion, (largest,), TORQUE_MOST)
         return motion
 
     def play(self, motion: Motion) -> PredictedMotion:

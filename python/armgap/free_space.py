@@ -1,0 +1,107 @@
+"""What an arm in a plane must not touch: links as capsules, what stands in the way as boxes, and the arm itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FreeSpace"]
+
+Array = NDArray[np.float64]
+
+#: Distance of the points by which a link's axis is followed, as a part of its radius and of its length.
+_STEP, _FEWEST = 0.5, 1 / 50
+#: Part of the last link, from the joint that joins it to the one before, that is not held against that one: there they always touch.
+JOINED = 0.5
+
+
+@dataclass(frozen=True)
+class FreeSpace:
+    """Shapes of links and of what stands in their way, in the plane of motion: x to the right, y upwards, from the first joint [m].
+
+    Attributes
+    ----------
+    link_length, link_radius : ndarray, shape (n_joints,)
+        Length of every link, and radius of the capsule around its axis [m].
+    boxes : ndarray, shape (n_boxes, 4)
+        ``x_min, y_min, x_max, y_max`` of everything that stands in the way [m].
+    """
+
+    link_length: Array
+    link_radius: Array
+    boxes: Array
+
+    def clearance(self, q: Array) -> tuple[Array, list[str]]:
+        """Return the distance that is left in some poses to everything that must not be touched, and what each column is.
+
+        Links are followed from point to point; half the distance of two points is taken off, so that nothing slips between them.
+
+        Parameters
+        ----------
+        q : ndarray, shape (n_poses, n_joints)
+            Positions [rad].
+
+        Returns
+        -------
+        ndarray, shape (n_poses, n_pairs)
+            Distances [m]; negative where shapes overlap.
+        list of str
+            Pairs, such as ``"link 2 and box 1"``.
+        """
+        axes = self._axes(q)
+        columns, names = [], []
+        for k, (points, step) in enumerate(axes):
+            for i, box in enumerate(self.boxes):
+                away = np.maximum(np.maximum(box[:2] - points, points - box[2:]), 0.0)
+                columns.append(np.hypot(away[..., 0], away[..., 1]).min(axis=1) - self.link_radius[k] - 0.5 * step)
+                names.append(f"link {k + 1} and box {i + 1}")
+        if len(axes) == 2:
+            (first, _), (second, step) = axes
+            outer = second[:, math.ceil(JOINED * (second.shape[1] - 1)) :]
+            columns.append(_to_segment(outer, first[:, -1]).min(axis=1) - self.link_radius.sum() - 0.5 * step)
+            names.append("links 1 and 2")
+        return np.stack(columns, axis=1), names
+
+    def is_free(self, q: Array) -> bool:
+        """Return whether the arm touches nothing in consecutive poses of a motion, nor on straight ways between them.
+
+        Parameters
+        ----------
+        q : ndarray, shape (n_poses, n_joints)
+            Positions [rad].
+        """
+        reach = np.cumsum(self.link_length[::-1])[::-1]
+        way = np.zeros(len(q))
+        steps = np.abs(np.diff(q, axis=0)) @ reach
+        way[1:] = steps
+        way[:-1] = np.maximum(way[:-1], steps)
+        return bool(np.all(self.clearance(q)[0] > 0.5 * way[:, None]))
+
+    def touched(self, q: Array) -> str | None:
+        """Return what overlaps in a pose `q`, shape (n_joints,); None where nothing does."""
+        distances, names = self.clearance(q[None])
+        worst = int(np.argmin(distances[0]))
+        return names[worst] if distances[0, worst] <= 0 else None
+
+    def _axes(self, q: Array) -> list[tuple[Array, float]]:
+        """Points along the axis of every link, shape (n_poses, n_points, 2), and their distance."""
+        begin, found = np.zeros((len(q), 2)), []
+        for length, radius, angle in zip(self.link_length, self.link_radius, np.cumsum(q, axis=1).T, strict=True):
+            count = math.ceil(length / max(_STEP * radius, _FEWEST * length)) + 1
+            along = np.linspace(0.0, length, count)
+            # Zero hangs straight down, angles grow towards +x.
+            way = np.stack([np.sin(angle), -np.cos(angle)], axis=1)
+            found.append((begin[:, None] + along[:, None] * way[:, None], length / (count - 1)))
+            begin = begin + length * way
+        return found
+
+
+def _to_segment(points: Array, end: Array) -> Array:
+    """Distances of points (n_poses, n_points, 2) from the segments from the origin to the ends (n_poses, 2)."""
+    part = np.einsum("pnk,pk->pn", points, end) / np.maximum(np.sum(end * end, axis=1), 1e-300)[:, None]
+    nearest = np.clip(part, 0.0, 1.0)[..., None] * end[:, None]
+    apart = points - nearest
+    return np.asarray(np.hypot(apart[..., 0], apart[..., 1]))

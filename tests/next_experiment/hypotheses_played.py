@@ -1,0 +1,72 @@
+"""A planned motion played on arms that have each of the effects in question in turn: what it takes of the limits.
+
+The effects' values are the trial generator's, not the planner's: drawn for the planned motion, and no larger than the planner thinks possible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+import armgap
+from armgap.trial.arms import TrialArm
+from armgap.trial.effects import REGISTRY, Draw, NoTravelError, usage
+from armgap.trial.simulated_arm import Trace
+
+from .cases import LIMITS, Case, Reference, play, poor
+
+#: Part of a range by which a played motion may exceed it.
+EXCESS = 0.02
+
+
+def used(trace: Trace, model: str, limit: tuple[float, ...]) -> dict[str, float]:
+    """Largest part of each limit that the played motion took."""
+    low, high, speed, _ = (np.array(x) for x in LIMITS[model])
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    return {
+        "position": float(np.max(np.abs(trace.q_true - middle) / half)),
+        "speed": float(np.max(np.abs(trace.dq_true) / speed)),
+        "torque": float(np.max(np.abs(trace.tau) / np.array(limit))),
+    }
+
+
+def is_followed(part: dict[str, float]) -> bool:
+    """Whether a motion was played within the limits of position and speed."""
+    return max(part["position"], part["speed"]) <= 1.0 + EXCESS
+
+
+def hypotheses(plan: armgap.Plan) -> list[tuple[str, int | None, tuple[str, float] | None]]:
+    """Every effect that a plan's questions are about, with the largest value thought possible of a parameter where one is known."""
+    found: dict[tuple[str, int | None], tuple[str, float] | None] = {}
+    for q in plan.questions:
+        found[q.effect, q.joint] = None if q.sizes is None else (q.sizes[0], max(np.abs(q.sizes[1:])))
+        if q.against != "none":
+            found.setdefault((q.against, q.against_joint), None)
+    return [(*place, largest) for place, largest in found.items() if place[0] in REGISTRY]
+
+
+def played(case: Case, arm: TrialArm, plan: armgap.Plan, seed: int) -> Iterator[dict[str, object]]:
+    """Play the planned motion with every open hypothesis in the arm, the hidden effect in its own turn.
+
+    An arm that would not even have followed the first, small motion is no hypothesis: the first log would look otherwise.
+    """
+    reference = Reference(plan.q_ref, plan.dq_ref, plan.tau_ff)
+    bare = play(case, arm, reference, hidden=False)
+    for number, (effect, joint, largest) in enumerate(hypotheses(plan)):
+        rng = np.random.default_rng([seed, number])
+        index = (joint or 1) - 1
+        with suppress(NoTravelError):
+            values = REGISTRY[effect].draw(Draw(rng, float(rng.uniform()), arm, index, usage([bare], index)))
+            if largest is not None and abs(values.get(largest[0], 0.0)) > largest[1]:
+                values[largest[0]] = float(np.copysign(largest[1], values[largest[0]]))
+            other = replace(case, effect=effect, joint=joint, parameters=values)
+            if not is_followed(used(play(other, arm, poor(arm, case.arm)), case.arm, arm.torque_limit)):
+                continue
+            yield {
+                "hypothesis": other.asked,
+                "values": values,
+                **used(play(other, arm, reference), case.arm, arm.torque_limit),
+            }
