@@ -386,6 +386,29 @@ def test_what_is_asked_comes_against_absence(limited, diagnosis):
     assert [q.text for q in questions] == ["backlash:2 against none"]
 
 
+@pytest.mark.usefixtures("brief")
+def test_an_effect_that_no_log_has_shown_is_asked_about_against_its_imitators(limited, pendulum):
+    made = plan(armgap.diagnose([slow_log(limited)], limited), limited, questions=["actuator_lag:1"], duration=DURATION)
+    against = {(q.against, q.against_joint) for q in made.questions}
+    told = [note for note in made.notes if "actuator_lag:1 against actuator_delay:1" in note]
+    assert ("none", None) in against
+    assert ("actuator_delay", 1) in against or told
+    one = replace(pendulum, limits=MotionLimits(*(np.array([x]) for x in (-1.5, 1.5, 5.0, 40.0))))
+    single = plan(armgap.diagnose([slow_log(one)], one), one, questions=["torque_dead_zone:1"], duration=DURATION)
+    assert all(q.against not in ("cross_friction", "rotor_coupling") for q in single.questions)
+
+
+def test_an_effect_that_is_listed_as_anothers_equivalent_is_asked_about_against_that(limited):
+    cause = {"effect": "torque_offset", "joint": 1, "parameters": {}, "title": "offset"}
+    alike = {"effect": "joint_spring", "joint": 1, "why": "other motions may separate them"}
+    data = {"causes": [{**cause, "equivalents": [alike]}], "candidates": [], "ruled_out": []}
+    found = asked(["joint_spring:1"], data, limited)
+    assert [(q.place, q.rival) for q in found] == [
+        (("joint_spring", 1), ("torque_offset", 1)),
+        (("joint_spring", 1), ("none", None)),
+    ]
+
+
 def test_home_is_the_pose_nearest_to_zero(limited, diagnosis):
     assert limited.limits is not None
     away = replace(limited.limits, position_min=np.array([0.3, -2.0]))

@@ -81,7 +81,6 @@ class HypothesisBuilder:
         self._scales = scales
         self._base = base
         self._specs = {entry["name"]: entry["parameters"] for entry in _native.effects()}
-        self._scopes = {entry["name"]: entry["scope"] for entry in _native.effects()}
         self._floor = np.array(data["gap"]["floor"], dtype=np.float64)
 
     def pose(self, question: Question) -> TestedQuestion | None:
@@ -100,16 +99,20 @@ class HypothesisBuilder:
         return TestedQuestion(question, pair, quick, size, self._range(question, [e for _, e in groups]))
 
     def look_alikes(self, tested: TestedQuestion) -> list[Question]:
-        """Return an effect's questions against those that may imitate it, of its joint or of the whole arm, the likest first."""
+        """Return an effect's questions against those that may imitate it, the likest first.
+
+        They are of its joint or of the whole arm, and among those that the diagnosis looked for and did not find.
+        """
         effect, joint = tested.question.place
         middle = tested.pair.alternatives[len(tested.pair.alternatives) // 2]
         pair = HypothesisPair(((1.0, middle[1]),), tested.pair.rival)
         target = self._usual.difference(pair)
         whole, _ = self._usual.left_of(target)
+        modelled = {(e.effect, e.joint) for e in tested.pair.rival}
         found = []
-        for other in PLANNED:
-            place = (other, None if self._scopes[other] == "arm" else joint or 1)
-            if other == effect or place in {(e.effect, e.joint) for e in tested.pair.rival}:
+        for entry in self._data["ruled_out"]:
+            place = (entry["effect"], entry["joint"])
+            if place in modelled or place[0] not in PLANNED or place[0] == effect or place[1] not in (None, joint or 1):
                 continue
             left = [self._left_by(e, tested.pair.rival, target) for e in self._tried(place, tested.pair.rival, target)]
             if left and min(left) < IMITATES * whole:
