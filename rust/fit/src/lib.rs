@@ -61,6 +61,7 @@ pub mod solve;
 mod together;
 pub mod track;
 pub mod unnamed;
+pub mod variable_classes;
 pub mod velocity;
 pub mod verdict;
 pub mod weighting;

@@ -1,6 +1,7 @@
 //! Typical sizes on a given arm and log, by quantity: what "small" and "large" mean for an effect's parameter.
 
 use crate::model::EffectInstance;
+use crate::residual_torque::rms;
 use crate::track::Track;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{EffectParameter, NEVER, Quantity};
@@ -145,11 +146,6 @@ impl<const N: usize> Scales<N> {
 
 fn speeds<const N: usize>(track: &Track<N>, j: usize) -> Vec<f64> {
     (0..track.len()).step_by(5).map(|k| track.local(j, k).dq).collect()
-}
-
-fn rms(x: impl Iterator<Item = f64>) -> f64 {
-    let (sum, n) = x.fold((0.0, 0.0), |(sum, n), x| (sum + x * x, n + 1.0));
-    if n > 0.0 { (sum / n).sqrt() } else { 0.0 }
 }
 
 fn standard_deviation(x: Vec<f64>) -> f64 {

@@ -14,11 +14,9 @@ use crate::residual_torque::{
     InverseDynamicsResidual, half_width, inverse_dynamics_residuals, rms_speeds, slow_speeds,
 };
 use crate::track::Track;
+use crate::variable_classes::{CLASSES, Classes};
 use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
-
-/// Classes of a variable: a law that turns twice over the travel still shows, and each holds some hundred samples of a log of ten seconds.
-const CLASSES: usize = 16;
 
 /// Standard deviation of the low-pass, s: its cut-off of 7 Hz is above the motion of arms, and the noise of most encoders' second differences below.
 const LOW_PASS_S: f64 = 0.02;
@@ -49,7 +47,8 @@ const FEWEST_BLOCKS: usize = 6;
 
 /// The torque that one log lacks under a model, sample by sample.
 pub struct LogResidual<const N: usize> {
-    samples: Vec<InverseDynamicsResidual<N>>,
+    /// Samples but those at either end.
+    pub samples: Vec<InverseDynamicsResidual<N>>,
     /// Sample period, s.
     period: f64,
     /// Standard deviation of the position measurement.
@@ -103,16 +102,6 @@ struct Rest {
     teaches: Vec<bool>,
     /// Block of a log that each point belongs to, counted through all logs.
     block: Vec<usize>,
-}
-
-/// A variable cut into classes.
-#[derive(Debug, Clone)]
-struct Classes {
-    variable: MotionVariable,
-    /// Mean of the variable in each class; none of an empty one.
-    mean: [Option<f64>; CLASSES],
-    /// Share of the time around each point that each class takes.
-    share: Vec<[f64; CLASSES]>,
 }
 
 /// Which laws are wanted.
@@ -252,42 +241,6 @@ impl Rest {
     }
 }
 
-impl Classes {
-    /// The classes of a variable over all logs, and their shares around the points that count.
-    fn new<const N: usize>(
-        variable: MotionVariable,
-        logs: &[LogResidual<N>],
-        lows: &[LowPass],
-        kept: &[Vec<usize>],
-    ) -> Self {
-        let value = |log: &LogResidual<N>, x: &InverseDynamicsResidual<N>| {
-            variable.of(&x.motion, &x.tau, x.t - log.samples[0].t)
-        };
-        let values: Vec<Vec<f64>> =
-            logs.iter().map(|log| log.samples.iter().map(|x| value(log, x)).collect()).collect();
-        let edges = edges(values.concat());
-        let class = |x: f64| edges.partition_point(|edge| *edge <= x);
-        let (mut sum, mut count) = ([0.0; CLASSES], [0.0; CLASSES]);
-        for x in values.iter().flatten() {
-            sum[class(*x)] += x;
-            count[class(*x)] += 1.0;
-        }
-        let mut share = Vec::new();
-        for ((low, points), values) in lows.iter().zip(kept).zip(&values) {
-            let classes: Vec<usize> = values.iter().map(|x| class(*x)).collect();
-            for (first, weights) in points.iter().map(|i| &low.kernels[*i]) {
-                let mut around = [0.0; CLASSES];
-                for (weight, class) in weights.iter().zip(&classes[*first..]) {
-                    around[*class] += weight;
-                }
-                share.push(around);
-            }
-        }
-        let mean = std::array::from_fn(|c| (count[c] > 0.0).then(|| sum[c] / count[c]));
-        Self { variable, mean, share }
-    }
-}
-
 /// Torque of parameter `i` per unit; the sign of friction is smoothed around rest.
 fn column<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
@@ -384,14 +337,6 @@ impl Regression<'_> {
 
 fn squares(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
-}
-
-/// Edges between the classes of values: quantiles, equal values in one class.
-fn edges(mut values: Vec<f64>) -> Vec<f64> {
-    values.sort_by(f64::total_cmp);
-    let mut edges: Vec<f64> = (1..CLASSES).map(|k| values[k * values.len() / CLASSES]).collect();
-    edges.dedup();
-    edges
 }
 
 /// By how much the squares fall from one list to the other, in standard deviations from the scatter over the blocks.
