@@ -65,6 +65,13 @@ def test_what_lies_between_two_samples_is_not_missed():
     assert thin.is_free(np.repeat(sides[:1], 2, axis=0))
 
 
+def test_one_link_without_boxes_touches_nothing():
+    alone = FreeSpace(LENGTHS[:1], RADII[:1], np.empty((0, 4)))
+    poses = np.array([[0.0], [3.0]])
+    assert alone.is_free(poses)
+    assert alone.touched(poses[0]) is None
+
+
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory):
     path = tmp_path_factory.mktemp("walled") / "arm.toml"

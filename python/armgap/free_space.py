@@ -63,7 +63,7 @@ class FreeSpace:
             outer = second[:, math.ceil(JOINED * (second.shape[1] - 1)) :]
             columns.append(_to_segment(outer, first[:, -1]).min(axis=1) - self.link_radius.sum() - 0.5 * step)
             names.append("links 1 and 2")
-        return np.stack(columns, axis=1), names
+        return np.array(columns).reshape(len(columns), len(q)).T, names
 
     def is_free(self, q: Array) -> bool:
         """Return whether the arm touches nothing in consecutive poses of a motion, nor on straight ways between them.
@@ -83,6 +83,8 @@ class FreeSpace:
     def touched(self, q: Array) -> str | None:
         """Return what overlaps in a pose `q`, shape (n_joints,); None where nothing does."""
         distances, names = self.clearance(q[None])
+        if not names:
+            return None
         worst = int(np.argmin(distances[0]))
         return names[worst] if distances[0, worst] <= 0 else None
 
