@@ -60,11 +60,10 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let residual = || {
         let residuals = residual_torques(context, &compared, &headline.weights.holdout);
         let regimes = regimes(&residuals, rotary);
-        let dependences = context.laws_beside(&headline.model, &headline.weights, rotary);
-        (residuals, regimes, dependences)
+        (residuals, regimes)
     };
     let candidates = || (ruled_out(context, attribution, rotary), ranking(context, attribution, rotary));
-    let ((absent, ranking), ((gap, series, free_run_series), (residuals, regimes, dependences))) =
+    let ((absent, ranking), ((gap, series, free_run_series), (residuals, regimes))) =
         rayon::join(candidates, || rayon::join(figures, residual));
     let evidence = Evidence {
         named: !headline.causes.is_empty() || !disturbances.is_empty(),
@@ -76,6 +75,8 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         motion: &gap.motion,
     };
     let (verdict, remains) = (evidence.verdict(), evidence.remains());
+    let laws =
+        if remains { context.laws_beside(&headline.model, &headline.weights, rotary) } else { Vec::new() };
     let sanity = sanity(description.kind, &estimates(&headline.model, description), remains);
     Diagnosis {
         schema: "armgap.diagnosis/1",
@@ -110,7 +111,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         ranking,
         stages: nodes(context, attribution),
         regimes,
-        unnamed: if remains { dependences } else { Vec::new() },
+        unnamed: laws,
         series,
         free_run_series,
         noise: noise(context),

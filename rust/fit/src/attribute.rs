@@ -283,6 +283,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (raw.iter().map(|cost| weights.holdout.student_t_cost(*cost)).collect(), without_worst(raw))
     }
 
+    /// Cost of predictions of the holdout.
+    pub fn holdout_cost(&self, weights: &SplitWeighting<N>, fit: &Fit<P>) -> f64 {
+        self.judged_on_holdout(weights, fit).0.iter().sum()
+    }
+
     /// Re-weights by the best candidate's residual and fits the finalists and the current model again.
     fn final_round(
         &self,

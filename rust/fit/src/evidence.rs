@@ -76,7 +76,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             return;
         }
         let (model, on_holdout) = (&attribution.model, &attribution.on_holdout);
-        let cost = |fit: &Fit<P>| self.judged_on_holdout(&last.weights, fit).0.iter().sum::<f64>();
+        let cost = |fit: &Fit<P>| self.holdout_cost(&last.weights, fit);
         let full = cost(model);
         let rest = is_more_than_noise(last).then_some(full - last.floor).filter(|rest| *rest > 0.0);
         for cause in &mut attribution.causes {
@@ -89,10 +89,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 taken_out.effects.remove(place);
                 let bare = cost(&self.problem(&last.weights.training).solve(&taken_out, Effort::FULL));
                 cause.evidence.gain = Some((bare - full) / rest);
-                let rival = self.with_rival_law(&taken_out, &last.weights);
-                cause.evidence.rival_gain = rival.map(|(beside, fit)| {
-                    (bare - beside.judged_on_holdout(&last.weights, &fit).0.iter().sum::<f64>()) / rest
-                });
+                let rival = self.rival_cost(&taken_out, &last.weights);
+                cause.evidence.rival_gain = rival.map(|rival| (bare - rival) / rest);
             }
             if let Some((ratio, sigma)) = size_ratio(place, model, on_holdout) {
                 (cause.evidence.size_ratio, cause.evidence.size_ratio_sigma) = (Some(ratio), Some(sigma));

@@ -24,14 +24,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weights: &SplitWeighting<N>,
         rotary: bool,
     ) -> Vec<Dependence> {
-        let cost =
-            |context: &Self, fit: &Fit<P>| context.judged_on_holdout(weights, fit).0.iter().sum::<f64>();
-        let full = cost(self, model);
+        let full = self.holdout_cost(weights, model);
         let rest = full - self.floor(weights);
-        let predicts = |law: &Dependence| {
-            let (beside, fit) = self.with_law(&model.hypothesis, law, weights);
-            full - cost(&beside, &fit) > MATTERS * rest
-        };
+        let predicts =
+            |law: &Dependence| full - self.cost_beside(&model.hypothesis, law, weights) > MATTERS * rest;
         let mut laws = self.dependences(&model.hypothesis, Wanted { most: MOST, rotary });
         laws.retain(predicts);
         laws
@@ -48,24 +44,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         dependences(&self.arm, &model.theta, &self.prior.sigma, &logs, wanted)
     }
 
-    /// The best law without a name beside a model, taken from the training logs, with everything fitted again: the logs with the torques of
-    /// that law, and the fit; none where no law predicts what the model lacks.
-    pub(crate) fn with_rival_law(
-        &self,
-        model: &Hypothesis<P>,
-        weights: &SplitWeighting<N>,
-    ) -> Option<(Self, Fit<P>)> {
+    /// Cost of predictions of the holdout by a model with the best law without a name; none where no law predicts what the model lacks.
+    pub(crate) fn rival_cost(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Option<f64> {
         let rival = self.dependences(model, Wanted { most: 1, rotary: true }).into_iter().next()?;
-        Some(self.with_law(model, &rival, weights))
+        Some(self.cost_beside(model, &rival, weights))
     }
 
-    /// The logs with the torques of a law, and the model with that law, everything fitted again.
-    fn with_law(
-        &self,
-        model: &Hypothesis<P>,
-        law: &Dependence,
-        weights: &SplitWeighting<N>,
-    ) -> (Self, Fit<P>) {
+    /// Cost of predictions of the holdout by a model with the torques of a law, everything fitted again to the training logs.
+    fn cost_beside(&self, model: &Hypothesis<P>, law: &Dependence, weights: &SplitWeighting<N>) -> f64 {
         let beside = Self {
             training: WindowSet::new(with_torques(&self.training.data, law)),
             holdout: WindowSet::new(with_torques(&self.holdout.data, law)),
@@ -73,7 +59,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         };
         let effect = EffectInstance::new(custom_effect::law(UNNAMED), law.joint - 1, [1.0, 0.0, 0.0]);
         let fit = beside.problem(&weights.training).solve(&model.with(effect), Effort::FULL);
-        (beside, fit)
+        beside.holdout_cost(weights, &fit)
     }
 }
 

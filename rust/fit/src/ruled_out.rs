@@ -147,8 +147,9 @@ fn leave_open(entry: &mut RuledOut, instead: &EffectInstance) {
 fn doubt(entry: &mut RuledOut, test: &ScoreTest, remains: f64) {
     let most = entry.bound.as_ref().map_or(test.gain, |bound| (bound.value / test.information_sigma).powi(2));
     let share = (most / remains).min(1.0);
-    if entry.status == Status::Absent && test.effect.law.spec().trial == Trial::Whole {
-        // Its trial values lie where the training logs went, and what remains may lie where only the holdout did.
+    let law = test.effect.law;
+    if entry.status == Status::Absent && law.spec().trial == Trial::Whole && !law.has_transmission() {
+        // A stop or a limit: its trial values lie where the training logs went, and what remains may lie where only the holdout did.
         entry.status = Status::Undecided;
         entry.why = Some(
             "a gap remains, and it may begin beyond where the training logs went; let them reach what the holdout reaches".to_owned(),
