@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import armgap
 from armgap import Arm, plan
 from armgap.errors import ArmFileError, OptionError
 from armgap.free_space import JOINED, FreeSpace
@@ -78,8 +80,6 @@ def diagnosed(tmp_path_factory):
     wall = "link_radius = [0.06, 0.04]\nboxes = [[0.35, -0.9, 0.9, 0.0]]\n"
     path.write_text(TABLE_ONE + LIMITS + wall + CONTROLLER)
     arm = Arm.read(path)
-    import armgap
-
     return arm, armgap.diagnose([slow_log(arm)], arm)
 
 
@@ -96,8 +96,6 @@ def test_a_plan_touches_nothing(diagnosed, monkeypatch):
 
 
 def test_without_shapes_it_is_said(diagnosed, monkeypatch):
-    from dataclasses import replace
-
     monkeypatch.setattr(search, "POPULATION", 6)
     monkeypatch.setattr(search, "GENERATIONS", 1)
     arm, diagnosis = diagnosed
@@ -107,8 +105,6 @@ def test_without_shapes_it_is_said(diagnosed, monkeypatch):
 
 
 def test_a_home_in_a_box_is_refused(diagnosed):
-    from dataclasses import replace
-
     arm, diagnosis = diagnosed
     boxed = FreeSpace(arm.link_length, RADII, np.array([[-0.1, -0.9, 0.1, -0.5]]))
     with pytest.raises(OptionError, match="link 2 and box 1 touch where the motion begins"):

@@ -365,7 +365,7 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
 def _against_look_alikes(
     builder: HypothesisBuilder, chosen: Sequence[TestedQuestion], usual: PredictedMotion, remarks: list[str]
 ) -> list[TestedQuestion]:
-    """Pose the questions that come up once an effect that was not seen so far shows: which of those that imitate it it is."""
+    """Pose the questions that come up once an effect is told from its absence: whether it is it or an effect that imitates it."""
     known = {frozenset((p.question.place, p.question.rival)) for p in chosen}
     unseen = [p for p in chosen if p.question.against == NONE]
     likely = [q for p in unseen for q in builder.look_alikes(p)[:_TRIED]]

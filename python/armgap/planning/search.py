@@ -130,10 +130,10 @@ class Search:
     def _allowed(self, motion: Motion, effects: Sequence[Any], part: float) -> Motion:
         """Scale a motion down until its torques are within a part of the limit and the arm touches nothing."""
         for _ in range(_SHRINKS):
-            smaller = self._clear(self._within(motion, effects, part))
-            if smaller is motion:
+            within = self._within(motion, effects, part)
+            motion = self._clear(within)
+            if motion is within:
                 return motion
-            motion = smaller
         return motion.scaled(0.0)
 
     def _clear(self, motion: Motion) -> Motion:
