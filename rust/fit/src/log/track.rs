@@ -351,8 +351,8 @@ pub fn median(mut x: Vec<f64>) -> f64 {
     if x.is_empty() {
         return 0.0;
     }
-    x.sort_by(f64::total_cmp);
-    x[x.len() / 2]
+    let middle = x.len() / 2;
+    *x.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Smallest non-zero difference that repeats throughout a column, if the column sits on such a grid.

@@ -71,6 +71,9 @@ const AT_BOUND: f64 = 0.98;
 /// Resamples of the windows.
 pub const RESAMPLES: usize = 400;
 
+/// Look-alikes that are listed with a cause at most: what a reader takes in.
+pub const LOOK_ALIKES: usize = 3;
+
 /// A candidate with fewer parameters is preferred if it reaches this part of the best one's advantage.
 pub const ALMOST: f64 = 0.95;
 

@@ -3,7 +3,7 @@
 use crate::model::hypothesis::EffectInstance;
 use crate::numeric::random::Random;
 use crate::search::acceptance::{
-    ABOVE_FLOOR, ALIKE_TRUST, Ground, REMAINDER_POWER, RESAMPLES, UNEXPLAINED, restores,
+    ABOVE_FLOOR, ALIKE_TRUST, Ground, LOOK_ALIKES, REMAINDER_POWER, RESAMPLES, UNEXPLAINED, restores,
 };
 use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::equivalent;
@@ -48,18 +48,18 @@ pub fn name<const N: usize, const P: usize>(
     seed: u64,
 ) -> Cause {
     let best = &node.candidates[choice];
-    let alike = |c: &&Candidate<P>| match ground {
+    let alike = |c: &Candidate<P>| match ground {
         Ground::Motion => node.is_alike(best, c),
         Ground::Trust => restores(node, c) && c.fit.prior_cost - best.fit.prior_cost < ALIKE_TRUST,
     };
-    let others = node.candidates.iter().enumerate().filter(|(i, c)| *i != choice && c.effect.is_some());
-    let look_alikes: Vec<EffectInstance> =
-        others.map(|(_, c)| c).filter(alike).filter_map(|c| c.effect).take(3).collect();
+    let others = (0..node.candidates.len()).filter(|i| *i != choice && node.candidates[*i].effect.is_some());
+    let listed: Vec<usize> = others.filter(|i| alike(&node.candidates[*i])).take(LOOK_ALIKES).collect();
     let effect = best.effect.unwrap_or_else(|| unreachable!("only effects are named"));
     let probability = match ground {
-        Ground::Motion => probability(node, choice, seed),
+        Ground::Motion => probability(node, choice, &listed, seed),
         Ground::Trust => trust_probability(node, choice),
     };
+    let look_alikes = listed.iter().filter_map(|i| node.candidates[*i].effect).collect();
     Cause {
         effect,
         sigma: Vec::new(),
@@ -72,15 +72,21 @@ pub fn name<const N: usize, const P: usize>(
     }
 }
 
-/// How often the chosen candidate, or one that no motion tells from it, has the lowest cost when the windows are drawn again.
-fn probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize, seed: u64) -> f64 {
+/// How often the chosen candidate, one that is listed as its look-alike, or one that no motion tells from it, has the lowest cost when the
+/// windows are drawn again.
+fn probability<const N: usize, const P: usize>(
+    node: &SearchNode<N, P>,
+    choice: usize,
+    listed: &[usize],
+    seed: u64,
+) -> f64 {
     let advantages: Vec<Vec<f64>> = node.candidates.iter().map(|c| c.advantages(&node.base)).collect();
     let own: Vec<f64> = node.candidates.iter().map(|c| node.base.fit.prior_cost - c.fit.prior_cost).collect();
     // A law with more values that does no better is no evidence against one with fewer.
     let size = |i: usize| node.candidates[i].effect.as_ref().map_or(0, EffectInstance::len);
     let richer =
         |i: usize| size(i) > size(choice) && node.is_alike(&node.candidates[choice], &node.candidates[i]);
-    let ours = |i: usize| i == choice || node.are_equivalent(i, choice) || richer(i);
+    let ours = |i: usize| i == choice || listed.contains(&i) || node.are_equivalent(i, choice) || richer(i);
     let windows = advantages[choice].len();
     let mut random = Random(seed);
     let mut wins = 0;
