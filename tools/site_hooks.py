@@ -163,7 +163,8 @@ def figures() -> str:
 
 def thresholds() -> str:
     """Constants of the decision with what their comments say."""
-    source = (ROOT / "rust" / "fit" / "src" / "acceptance.rs").read_text(encoding="utf-8")
+    files = ("search/acceptance.rs", "likelihood/holdout.rs")
+    source = "\n".join((ROOT / "rust" / "fit" / "src" / file).read_text(encoding="utf-8") for file in files)
     found = re.findall(r"^/// ([^\n]+)\n(?:pub )?const (\w+): \w+ = ([^;]+);", source, re.MULTILINE)
     return "\n".join(
         ["| constant | value | what |", "| --- | --- | --- |", *(f"| `{n}` | {v} | {text} |" for text, n, v in found)]

@@ -3,10 +3,10 @@
 
 use armgap_bench::run::{PERIOD, SAMPLES, THETA, rollout, torque};
 use armgap_core::arm::ArmKind;
-use armgap_fit::arm::ArmDescription;
-use armgap_fit::output_error::{Estimate, OutputError};
-use armgap_fit::track::Track;
-use armgap_fit::window::Dataset;
+use armgap_fit::identify::output_error::{Estimate, OutputError};
+use armgap_fit::log::track::Track;
+use armgap_fit::model::arm::ArmDescription;
+use armgap_fit::predict::window::Dataset;
 use std::fmt::Write as _;
 use std::io::Write;
 use std::time::Instant;

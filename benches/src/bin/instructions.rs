@@ -9,8 +9,8 @@ use armgap_core::cpu::Level;
 use armgap_core::online::{OnlineEstimator, When};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::Form;
-use armgap_fit::base_parameters::AmongParameters;
-use armgap_fit::chain::ChainDescription;
+use armgap_fit::identify::base_parameters::AmongParameters;
+use armgap_fit::model::chain::ChainDescription;
 use std::hint::black_box;
 
 /// What is counted.

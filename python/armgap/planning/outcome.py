@@ -13,7 +13,7 @@ __all__ = ["Outcome", "certainty", "settled"]
 Array = NDArray[np.float64]
 
 #: A diagnosis explains a gap whose cost is this many times the floor, with what takes this part of the excess, in windows whose
-#: mean advantage is so many standard errors (`rust/fit/src/acceptance.rs`).
+#: mean advantage is so many standard errors (`rust/fit/src/search/acceptance.rs`).
 ABOVE_FLOOR, MATTERS, CERTAIN = 1.25, 0.1, 3.5
 #: Standard errors of that advantage on the part of the log that it judges on alone.
 HELD_CERTAIN = 1.0

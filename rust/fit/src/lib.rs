@@ -1,68 +1,37 @@
 //! armgap-fit: from logs and a nominal arm to a diagnosis.
 //!
-//! The way of the data: `track` (log) -> `window` (short rollouts) -> `weighting` (weights of residuals) -> `solve` (output error)
-//! -> `attribute` (which effect) and `locate` (where) -> `report` (the result as data).
+//! The folders are in the order of the data; each may use those before it and none after it. [`numeric`] and [`model`] (what all others
+//! use) -> [`log`] -> [`predict`] (rollouts of short windows) -> [`likelihood`] (weighted residuals, and what fits them best) ->
+//! [`locate`] (where the gap lies) -> [`candidates`] (which effects are worth a fit) -> [`search`] (which of them are causes) ->
+//! [`disturbance`] (torques from outside) -> [`result`] (the diagnosis as data). [`diagnose`] runs them for arms of a closed form, [`serial`]
+//! for any chain of joints. [`identify`] estimates parameters without a diagnosis.
 
 #![forbid(unsafe_code)]
 
-pub mod acceptance;
-pub mod arm;
-pub mod assemble;
-pub mod attribute;
-pub mod base_parameters;
-pub mod belief;
-pub mod chain;
-mod contact_guess;
-pub mod context;
-pub mod covariance;
-mod crosswise;
-pub mod custom_effect;
-mod cut;
-pub mod dependence;
-pub mod diagnose;
-mod dispersion;
-mod disturbance;
-mod duel;
-pub mod energy;
-pub mod equivalent;
-pub mod evidence;
-mod friction_regularisation;
-mod gap;
-mod headline;
-mod initial_guess;
-mod jacobian;
-mod latent_states;
-pub mod locate;
-mod low_pass;
-mod minimum;
-pub mod model;
-pub mod model_search;
-mod noise;
-pub mod output_error;
-mod periodogram;
-mod products;
 pub mod progress;
-pub mod push;
-mod random;
-mod reconsider;
-pub mod refit;
-pub mod regression_rows;
-pub mod report;
-mod residual_torque;
-mod rival_law;
-mod ruled_out;
-mod sanity;
-pub mod scale;
-pub mod screen;
+
+pub mod numeric;
+
+pub mod model;
+
+pub mod log;
+
+pub mod predict;
+
+pub mod likelihood;
+
+pub mod locate;
+
+pub mod candidates;
+
+pub mod search;
+
+pub mod disturbance;
+
+pub mod result;
+
 pub mod serial;
-pub mod simulate;
-pub mod smooth;
-pub mod solve;
-mod together;
-pub mod track;
-pub mod unnamed;
-pub mod variable_classes;
-pub mod velocity;
-pub mod verdict;
-pub mod weighting;
-pub mod window;
+
+pub mod diagnose;
+
+pub mod identify;

@@ -4,9 +4,9 @@ use crate::convert::{effect_instances, matrix, vector};
 use crate::progress::with_progress;
 use crate::simulate::{Inputs, Motion};
 use armgap_core::chain::{ChainJoint, JointKind, MAX_JOINTS, PARAMETERS_PER_JOINT};
-use armgap_fit::base_parameters::AmongParameters;
-use armgap_fit::chain::{ChainDescription, ChainRows, Quantity};
-use armgap_fit::simulate::Simulation;
+use armgap_fit::identify::base_parameters::AmongParameters;
+use armgap_fit::model::chain::{ChainDescription, ChainRows, Quantity};
+use armgap_fit::predict::simulate::Simulation;
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
 };

@@ -2,10 +2,11 @@
 
 use crate::convert::{description, matrix, serial_arm, vector};
 use crate::progress::with_progress;
-use armgap_fit::arm::ArmDescription;
-use armgap_fit::diagnose::{LogData, Options, diagnose as run};
-use armgap_fit::refit::refit as rigid_fit;
-use armgap_fit::report::schema;
+use armgap_fit::diagnose::diagnose as run;
+use armgap_fit::identify::refit::refit as rigid_fit;
+use armgap_fit::log::input::{LogData, Options};
+use armgap_fit::model::arm::ArmDescription;
+use armgap_fit::result::report::schema;
 use armgap_fit::serial::{SerialArm, diagnose as run_serial};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;

@@ -11,7 +11,7 @@ use armgap_core::online::{
 use armgap_core::real::{Real, lit};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::Form;
-use armgap_fit::chain::ChainDescription;
+use armgap_fit::model::chain::ChainDescription;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

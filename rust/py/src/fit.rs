@@ -1,7 +1,7 @@
 //! `fit`.
 
 use crate::convert::{description, matrix, vector};
-use armgap_fit::output_error::OutputError;
+use armgap_fit::identify::output_error::OutputError;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

@@ -1,8 +1,8 @@
 //! `regression_rows` and `velocity`.
 
 use crate::convert::{description, matrix, vector};
-use armgap_fit::regression_rows::RegressionRows;
-use armgap_fit::velocity::Velocity;
+use armgap_fit::identify::regression_rows::RegressionRows;
+use armgap_fit::log::velocity::Velocity;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

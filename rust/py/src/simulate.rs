@@ -2,10 +2,10 @@
 
 use crate::convert::{effect_instances, kind_of, matrix, vector};
 use crate::progress::with_progress;
-use armgap_fit::arm::ArmDescription;
-use armgap_fit::model::EffectInstance;
+use armgap_fit::model::arm::ArmDescription;
+use armgap_fit::model::hypothesis::EffectInstance;
+use armgap_fit::predict::simulate::{InertiaMatrices, Simulation, SimulationError, Trajectory};
 use armgap_fit::progress::{Observer, ProgressReporter, guarded};
-use armgap_fit::simulate::{InertiaMatrices, Simulation, SimulationError, Trajectory};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

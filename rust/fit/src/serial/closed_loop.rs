@@ -5,8 +5,8 @@
 //! command becomes are given the torques of the last periods, before a window's start those along the measured path.
 
 use super::controller::{Given, JointController};
-use crate::model::{EffectInstance, Hypothesis};
-use crate::window::{DIVERGED, Dataset, Window};
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::predict::window::{DIVERGED, Dataset, Window};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{InputSegment, Quantity, find};
 use armgap_core::integrate::{Interval, State, advance};
@@ -238,7 +238,7 @@ fn periods<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::{Reference, Track};
+    use crate::log::track::{Reference, Track};
     use armgap_core::arm::Pendulum;
 
     const PERIOD: f64 = 0.005;
@@ -267,7 +267,7 @@ mod tests {
         let t: Vec<f64> = (0..count).map(|k| PERIOD * k as f64).collect();
         let mut track = Track::<1>::new("", &t, &vec![0.0; count], &[], Some([1e-6]));
         track.reference = Some(Reference { q: (0..count).map(|k| [target(k)]).collect(), dq: None });
-        let data = crate::gap::whole(&Dataset { tracks: vec![track], windows: Vec::new(), rows: 0 });
+        let data = crate::result::gap::whole(&Dataset { tracks: vec![track], windows: Vec::new(), rows: 0 });
         let hypothesis = Hypothesis { effects, ..Hypothesis::rigid([INERTIA, 0.0, VISCOUS, 0.0]) };
         let closed_loop = ClosedLoop { joints: vec![servo], held_before: vec![[0.0]] };
         closed_loop.predict(&data, &Pendulum { gravity: 0.0 }, &hypothesis)
@@ -337,7 +337,7 @@ mod tests {
         let t: Vec<f64> = (0..count).map(|k| PERIOD * k as f64).collect();
         let mut track = Track::<1>::new("", &t, &vec![0.0; count], &[], Some([1e-6]));
         track.reference = Some(Reference { q: vec![[0.0]; count], dq: None });
-        let data = crate::gap::whole(&Dataset { tracks: vec![track], windows: Vec::new(), rows: 0 });
+        let data = crate::result::gap::whole(&Dataset { tracks: vec![track], windows: Vec::new(), rows: 0 });
         let closed_loop = ClosedLoop { joints: vec![servo], held_before: vec![[held]] };
         let hypothesis = Hypothesis::rigid([INERTIA, 0.0, VISCOUS, 0.0]);
         let found = closed_loop.predict(&data, &Pendulum { gravity: 0.0 }, &hypothesis);

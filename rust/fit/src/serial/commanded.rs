@@ -10,7 +10,7 @@ use super::controller_term::ControllerTerm;
 use super::equation::{Equation, Torques};
 use super::rows::{Signal, sum};
 use super::term::Term;
-use crate::track::Track;
+use crate::log::track::Track;
 use armgap_core::effect::InputSegment;
 
 /// Position controllers along logs.
@@ -195,10 +195,10 @@ impl<const N: usize, const P: usize> Equation<N, P> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::track::Reference;
     use crate::serial::controller::tests::SERVO;
     use crate::serial::controller_term::Setting;
     use crate::serial::intervals::HALF_WIDTH_S;
-    use crate::track::Reference;
     use armgap_core::chain::{Chain, ChainJoint, JointKind};
 
     const PERIOD: f64 = 0.004;

@@ -8,7 +8,7 @@
 //! velocity are continuous. So a sample interval has a torque at its start, its middle and its end, with positions and velocities from local
 //! cubics, and the middle from the cubic between the samples (Hermite). What is late is late by the library's delay.
 
-use crate::track::Track;
+use crate::log::track::Track;
 use armgap_core::effect::{InputSegment, find, interval};
 
 /// A PD or PID controller of every joint; lists by joint, SI.
@@ -225,7 +225,7 @@ fn late(t: &[f64], delay: f64, column: &mut [InputSegment<f64>]) {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::track::Reference;
+    use crate::log::track::Reference;
 
     const PERIOD: f64 = 0.004;
     const COUNT: usize = 500;

@@ -2,7 +2,7 @@
 
 use super::controller::{JointController, PositionController};
 use super::term::{Term, TermKind};
-use crate::report::{Cause, EquivalentSummary};
+use crate::result::report::{Cause, EquivalentSummary};
 
 /// Controllers with the settings that terms say.
 pub(super) fn with_settings(mut joints: Vec<JointController>, terms: &[Term]) -> Vec<JointController> {
@@ -75,7 +75,7 @@ fn figure(x: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{Named, Value};
+    use crate::result::report::{Named, Value};
     use crate::serial::controller::tests::SERVO;
 
     fn alike(effect: &'static str, rate_of_error: bool) -> Vec<&'static str> {

@@ -6,7 +6,7 @@ use super::constants::{
 use super::fitting::Fitted;
 use super::rows::{JointRows, Regression, Rows, Signal};
 use super::search::Search;
-use crate::random::Random;
+use crate::numeric::random::Random;
 
 /// What speaks for a term: the model with it against the model without.
 #[derive(Debug, Clone, Copy)]
@@ -175,7 +175,7 @@ pub(super) fn trust(without: &Fitted, with: &Fitted, evidence: &Evidence, floor:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use crate::numeric::random::Random;
     use crate::serial::rows::Estimate;
 
     const ROWS: usize = 240;

@@ -10,7 +10,7 @@
 //! the first-order one. Velocities in the momentum are differences of positions over the interval, whose mean they are exactly; friction and
 //! whatever depends on the sign of a velocity take it from local cubics.
 
-use crate::track::Track;
+use crate::log::track::Track;
 use std::f64::consts::PI;
 
 /// Half width of a test function, s: its transfer function falls to one half at 0.5 / `HALF_WIDTH_S`, here 10 Hz. Friction torques of a
@@ -95,7 +95,7 @@ impl<const N: usize> Intervals<N> {
 
     /// Test functions over this log, of this half width, s, or wider where the log has few samples.
     pub fn test_functions(&self, log: usize, half_width: f64) -> Vec<TestFunction> {
-        let period = crate::track::median(self.middles.iter().map(|m| m.h).collect());
+        let period = crate::log::track::median(self.middles.iter().map(|m| m.h).collect());
         let half = half_width.max(FEWEST_PERIODS * period);
         let mut found = Vec::new();
         let mut first = 0;

@@ -25,15 +25,15 @@ mod search;
 mod term;
 mod transmission;
 
-use crate::chain::ChainDescription;
-use crate::diagnose::{DiagnoseError, FEWEST_WINDOWS, LogData, Options};
-use crate::model::EffectInstance;
+use crate::candidates::screen::effect_instances;
+use crate::likelihood::scale::Scales;
+use crate::log::input::{DiagnoseError, FEWEST_WINDOWS, LogData, Options, validate};
+use crate::log::track::{Reference, Track};
+use crate::model::chain::ChainDescription;
+use crate::model::hypothesis::EffectInstance;
+use crate::predict::window::Dataset;
 use crate::progress::{Observer, ProgressReporter, guarded};
-use crate::report::Diagnosis;
-use crate::scale::Scales;
-use crate::screen::effect_instances;
-use crate::track::{Reference, Track};
-use crate::window::Dataset;
+use crate::result::report::Diagnosis;
 use armgap_core::chain::{Chain, ChainJoint, JointKind, PARAMETERS_PER_JOINT};
 use armgap_core::effect::{Quantity, Scope, Trial};
 use controller::PositionController;
@@ -89,7 +89,7 @@ pub fn diagnose(
     options: &Options,
     observer: &Observer,
 ) -> Result<Diagnosis, DiagnoseError> {
-    crate::diagnose::validate(arm.chain.joints.len(), training, holdout, options)?;
+    validate(arm.chain.joints.len(), training, holdout, options)?;
     let request = Request { arm, training, holdout, options, observer };
     guarded(|| by_size(&request)).ok_or(DiagnoseError::Stopped)?
 }

@@ -2,8 +2,8 @@
 
 use super::closed_loop::ClosedLoop;
 use super::term::{Term, TermKind, of_load};
-use crate::model::Hypothesis;
-use crate::window::{Dataset, Window};
+use crate::model::hypothesis::Hypothesis;
+use crate::predict::window::{Dataset, Window};
 use armgap_core::arm::Arm;
 use armgap_core::chain::Chain;
 use nalgebra::SVector;

@@ -9,17 +9,17 @@ use super::predict::{Model, floor};
 use super::search::{Found, Tested};
 use super::term::{Term, TermKind};
 use super::{SerialArm, Set};
-use crate::diagnose::Options;
-use crate::gap::{HORIZONS, closed, free_run_series, limited, rms, whole, window_series};
-use crate::locate::Location;
+use crate::locate::regimes::Location;
+use crate::log::input::Options;
+use crate::numeric::random::Random;
+use crate::predict::window::Dataset;
 use crate::progress::{Phase, ProgressReporter};
-use crate::random::Random;
-use crate::report::{
+use crate::result::gap::{HORIZONS, closed, free_run_series, limited, rms, whole, window_series};
+use crate::result::report::{
     ArmSummary, AtHorizon, Bound, Candidate, Cause, Diagnosis, EquivalentSummary, FreeRun, FreeRunSeries,
     Gap, LogSummary, Named, Noise, OptionSummary, Parameters, RuledOut, Status, Value,
 };
-use crate::verdict::Evidence;
-use crate::window::Dataset;
+use crate::result::verdict::Evidence;
 use armgap_core::chain::Chain;
 use armgap_core::effect::{Effect, Scope, Trial, catalogue};
 
@@ -69,7 +69,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
     let reported = &found.reported;
     let models = models(description, arm, holdout, found);
     let noise: [f64; N] = std::array::from_fn(|j| {
-        crate::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
+        crate::log::track::median(training.data.tracks.iter().map(|t| t.noise[j]).collect())
     });
     let data = &holdout.data;
     let predicted = [0, 1, 2].map(|i| {
@@ -281,7 +281,7 @@ fn closed_interval<const N: usize, const P: usize>(
 ) -> [f64; 2] {
     let table = |predicted: &[f64]| -> Vec<[f64; N]> {
         let predicted = limited(&compared.measured, predicted);
-        let of = |w: &crate::window::Window<N>| {
+        let of = |w: &crate::predict::window::Window<N>| {
             let (a, b) = (&compared.measured[w.range()], &predicted[w.range()]);
             std::array::from_fn(|j| a.iter().zip(b).skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum())
         };
@@ -417,7 +417,7 @@ fn summary(description: &SerialArm) -> ArmSummary {
 }
 
 fn logs<const N: usize>(data: &Dataset<N>) -> Vec<LogSummary> {
-    let of = |(i, track): (usize, &crate::track::Track<N>)| LogSummary {
+    let of = |(i, track): (usize, &crate::log::track::Track<N>)| LogSummary {
         name: track.name.clone(),
         samples: track.len(),
         duration_s: track.t[track.len() - 1] - track.t[0],

@@ -294,7 +294,7 @@ impl<'a> Regression<'a> {
         let own = DMatrix::from_fn(k, k, |i, j| self.product(&columns[i], &columns[j]));
         let information = DMatrix::from_fn(k, k, |i, j| own[(i, j)] - along[i].dot(&solved[j]));
         let held = DMatrix::from_fn(k, k, |i, j| information[(i, j)] + if i == j { ridge[i] } else { 0.0 });
-        let inverse = crate::solve::scaled_inverse(&held)?;
+        let inverse = crate::likelihood::solve::scaled_inverse(&held)?;
         let size = &inverse * &slope;
         let gain = slope.dot(&size);
         Some(Score { size: size.iter().copied().collect(), gain, information, inverse, solved })
@@ -368,7 +368,7 @@ pub struct Score {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use crate::numeric::random::Random;
 
     const ROWS: usize = 400;
 

@@ -326,9 +326,9 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::EffectInstance;
+    use crate::model::hypothesis::EffectInstance;
+    use crate::numeric::random::Random;
     use crate::progress::{Control, Observer};
-    use crate::random::Random;
     use crate::serial::rows::JointRows;
     use armgap_core::effect::find;
 

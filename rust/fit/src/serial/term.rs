@@ -2,7 +2,7 @@
 
 use super::controller_term::{ControllerTerm, Setting};
 use super::transmission::TransmissionLaw;
-use crate::model::EffectInstance;
+use crate::model::hypothesis::EffectInstance;
 use armgap_core::chain::LINK_NAMES;
 use armgap_core::effect::{JointPoint, Quantity, Scope, Trial};
 

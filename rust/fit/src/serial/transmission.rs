@@ -9,7 +9,7 @@ use super::equation::Equation;
 use super::intervals::Middle;
 use super::rows::Signal;
 use super::term::TermParameter;
-use crate::model::EffectInstance;
+use crate::model::hypothesis::EffectInstance;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Effect, find};
 use armgap_core::kinematics::JointState;

@@ -1,0 +1,128 @@
+//! Initial guesses of contacts from the data: where a joint hits a joint limit, and how stiff that is.
+//!
+//! Beyond a joint limit the residual torque is a hinge: it grows with depth and with speed and pushes back. The position is found by a
+//! line search, stiffness and damping at each position by least squares.
+
+use crate::log::track::Track;
+use crate::model::hypothesis::Hypothesis;
+use crate::predict::residual_torque::{InverseDynamicsResidual, inverse_dynamics_residuals};
+use armgap_core::arm::Arm;
+
+/// Half width, in samples, of the local cubic that accelerations are taken from: an impact is short.
+const HALF_WIDTH: usize = 3;
+
+/// Fewest samples beyond a joint limit.
+const FEWEST: usize = 5;
+
+/// Growth of the number of samples beyond, from one position that is tried to the next.
+const GROWTH: f64 = 1.15;
+
+/// Largest part of the samples beyond a joint limit.
+const MOST: f64 = 0.8;
+
+/// A hinge explains at least this part of the residual torque beyond it.
+const EXPLAINS: f64 = 0.3;
+
+/// Speed below which friction is regularised, relative to the joint's RMS speed.
+const SLOW: f64 = 0.02;
+
+/// A contact: position, stiffness and damping.
+pub type ContactGuess = [f64; 3];
+
+/// Residual torque of a joint at one sample.
+#[derive(Debug, Clone, Copy)]
+struct ContactSample {
+    q: f64,
+    dq: f64,
+    residual: f64,
+}
+
+/// How much stiffer a second guess is: an impact that is over before the cubic has passed it seems softer than it is.
+const HARDER: f64 = 8.0;
+
+/// Contacts of every joint that logs show under a model, at most one on either side, each as it seems and stiffer.
+pub fn contact_guesses<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    tracks: &[Track<N>],
+    arm: &A,
+    model: &Hypothesis<P>,
+    speed: &[f64; N],
+) -> [Vec<ContactGuess>; N] {
+    let slow = SLOW * speed.iter().copied().fold(f64::INFINITY, f64::min);
+    let rows: Vec<InverseDynamicsResidual<N>> = tracks
+        .iter()
+        .filter_map(|track| inverse_dynamics_residuals(arm, track, model, &track.pushes, HALF_WIDTH, slow))
+        .flatten()
+        .collect();
+    let of = |j: usize| {
+        rows.iter().map(move |r| ContactSample {
+            q: r.motion[0][j],
+            dq: r.motion[1][j],
+            residual: r.residual[j],
+        })
+    };
+    std::array::from_fn(|j| {
+        let mut samples: Vec<ContactSample> = of(j).collect();
+        [1.0, -1.0].into_iter().flat_map(|side| both(&mut samples, side)).collect()
+    })
+}
+
+/// The contact on one side of zero as it seems, and a stiffer one that an impact enters less deeply.
+fn both(samples: &mut [ContactSample], side: f64) -> Vec<ContactGuess> {
+    let Some(guess) = hinge(samples, side) else { return Vec::new() };
+    let [position, stiffness, damping] = guess;
+    let depth = samples[0].q - position;
+    let shallower = depth / HARDER.sqrt();
+    vec![guess, [position + depth - shallower, HARDER * stiffness, HARDER.sqrt() * damping]]
+}
+
+/// The hinge on one side of zero that explains most.
+fn hinge(samples: &mut [ContactSample], side: f64) -> Option<ContactGuess> {
+    samples.sort_by(|a, b| (side * b.q).total_cmp(&(side * a.q)));
+    let most = (MOST * samples.len() as f64) as usize;
+    let counts = std::iter::successors(Some(FEWEST), |n| Some(((*n as f64 * GROWTH) as usize).max(n + 1)));
+    let tried = counts.take_while(|n| *n < most).filter_map(|n| {
+        let position = samples.get(n).map(|s| s.q).filter(|q| q * side > 0.0)?;
+        let (beyond, _) = samples.split_at(n);
+        let ([stiffness, damping], gain) = spring(beyond, position, side)?;
+        Some(([position, stiffness, damping], gain))
+    });
+    tried.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(guess, _)| guess)
+}
+
+/// Stiffness and damping of a contact that all these samples lie beyond, and the squared torque that it explains.
+fn spring(beyond: &[ContactSample], position: f64, side: f64) -> Option<([f64; 2], f64)> {
+    let [mut dd, mut dv, mut vv, mut dy, mut vy, mut yy] = [0.0; 6];
+    for sample in beyond {
+        let (d, v, y) = (side * (sample.q - position), side * sample.dq, -side * sample.residual);
+        (dd, dv, vv) = (dd + d * d, dv + d * v, vv + v * v);
+        (dy, vy, yy) = (dy + d * y, vy + v * y, yy + y * y);
+    }
+    let determinant = dd * vv - dv * dv;
+    let both = [(dy * vv - vy * dv) / determinant, (vy * dd - dy * dv) / determinant];
+    let [stiffness, damping] = if both[1] > 0.0 { both } else { [dy / dd, 0.0] };
+    let gain = stiffness * dy + damping * vy;
+    (stiffness > 0.0 && gain > EXPLAINS * yy).then_some(([stiffness, damping], gain))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hinge_is_found_where_it_begins() {
+        let (position, stiffness, damping) = (-0.4, 120.0, 3.0);
+        let sample = |i: usize| {
+            let t = 0.004 * i as f64;
+            let (q, dq) = (-0.5 * t.sin(), -0.5 * t.cos());
+            let depth = (position - q).max(0.0);
+            let push = if depth > 0.0 { (stiffness * depth - damping * dq).max(0.0) } else { 0.0 };
+            ContactSample { q, dq, residual: push }
+        };
+        let mut samples: Vec<ContactSample> = (0..4000).map(sample).collect();
+        assert_eq!(hinge(&mut samples, 1.0), None);
+        let found = hinge(&mut samples, -1.0).expect("the stop");
+        for (value, true_value) in found.iter().zip([position, stiffness, damping]) {
+            assert!((value / true_value - 1.0).abs() < 0.1, "{found:?}");
+        }
+    }
+}

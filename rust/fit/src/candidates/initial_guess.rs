@@ -1,0 +1,224 @@
+//! Initial guesses of full fits: which candidates are worth one, and from which values.
+
+use crate::candidates::contact_guess::contact_guesses;
+use crate::candidates::periodogram::periodogram_peaks;
+use crate::candidates::screen::{ScoreTest, effect_instances, screen};
+use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
+use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
+use crate::likelihood::holdout::is_plausible;
+use crate::likelihood::solve::Fit;
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::progress::Phase;
+use armgap_core::arm::Arm;
+use armgap_core::effect::Trial;
+
+/// Candidates that get a full fit at each search node.
+const FULL_FITS: usize = 18;
+
+/// A candidate that leaves less than this part of its trace unexplained by the arm's own parameters shows only against the prior.
+const ABSORBED: f64 = 0.03;
+
+/// A candidate that leaves less than this part is imitated as exactly as derivatives can tell.
+const IMITATED: f64 = 1e-4;
+
+/// A candidate that to first order removes less than this part of the cost is not fitted.
+const TRACE: f64 = 0.01;
+
+/// A candidate that to first order removes less than this part of a gap of no consequence is not fitted: only an effect that explains most
+/// of it would be named.
+const TRACE_IN_SMALL: f64 = 0.1;
+
+/// A wider regularisation is fitted only if it does not raise the cost by more than this factor before the fit.
+const WORTH_SMOOTHING: f64 = 2.0;
+
+/// Widths that compete with the candidates of every search node, relative to the slowest joint's RMS speed.
+const SMOOTHING: [f64; 2] = [0.03, 0.1];
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// Hypotheses that are worth a full fit: one candidate more than the fitted model, or friction regularisation. And the score
+    /// tests of all candidates, the open ones first, where they were made.
+    pub(crate) fn initial_guesses(
+        &self,
+        fit: &Fit<P>,
+        weights: &SplitWeighting<N>,
+        min_relevance: f64,
+    ) -> (Vec<Hypothesis<P>>, Vec<ScoreTest>) {
+        let size = self.relative_gap(weights, fit);
+        let gap = size > min_relevance;
+        if !gap && is_plausible::<P>(fit.prior_cost) {
+            return (Vec::new(), Vec::new());
+        }
+        let (all, screened) = self.screened(fit, weights);
+        let training: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
+        let trace = if size < CONSEQUENTIAL_ERROR { TRACE_IN_SMALL } else { TRACE };
+        let least = if gap { trace * training } else { f64::INFINITY };
+        let more = promising(&screened, least).into_iter().map(|found| {
+            let effect = found.effect;
+            self.payload_guess(&fit.hypothesis, effect)
+                .unwrap_or_else(|| self.compensated(&fit.hypothesis, found))
+        });
+        let mut initial_guesses: Vec<Hypothesis<P>> = more.collect();
+        if !is_plausible::<P>(fit.prior_cost) {
+            // A contact that always carries a part of the load has spoilt the values that are fitted without it.
+            let trusted = Hypothesis { theta: self.prior.theta, ..fit.hypothesis.clone() };
+            initial_guesses
+                .extend(self.contact_guesses(&all, &trusted).into_iter().map(|stop| trusted.with(stop)));
+        }
+        if gap {
+            initial_guesses.extend(self.regularisation_guesses(&fit.hypothesis, weights, training));
+        }
+        (initial_guesses, screened)
+    }
+
+    /// The model with wider friction regularisation, or with exact friction if it is regularised now, where that is not plainly worse.
+    pub fn regularisation_guesses(
+        &self,
+        model: &Hypothesis<P>,
+        weights: &SplitWeighting<N>,
+        cost: f64,
+    ) -> Vec<Hypothesis<P>> {
+        let widths = SMOOTHING.iter().map(|w| w * self.scales.slowest()).chain([0.0]);
+        let other = widths.filter(|w| *w != model.smoothing);
+        let problem = self.problem(&weights.training);
+        other
+            .map(|smoothing| Hypothesis { smoothing, ..model.clone() })
+            .filter(|h| problem.window_costs(h).iter().sum::<f64>() < WORTH_SMOOTHING * cost)
+            .collect()
+    }
+
+    /// Part of the training windows' cost above the floor that any one candidate removes to first order.
+    pub(crate) fn largest_gain(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> f64 {
+        let (_, screened) = self.screened(fit, weights);
+        let gains = screened.into_iter().map(|test| test.gain);
+        let cost: f64 = self.problem(&weights.training).window_costs(&fit.hypothesis).iter().sum();
+        let rows = self.training.data.rows as f64 / self.holdout.data.rows as f64;
+        gains.fold(0.0, f64::max) / (cost - rows * self.floor(weights)).max(1e-9 * cost)
+    }
+
+    /// All candidates at their initial guesses, the open ones first, and their score tests.
+    fn screened(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> (Vec<EffectInstance>, Vec<ScoreTest>) {
+        let mut all = self.open_candidates(&fit.hypothesis);
+        all.extend(self.ripple_guesses(&all, weights, fit));
+        all.extend(self.contact_guesses(&all, &fit.hypothesis));
+        self.progress.begin(Phase::Screen, all.len());
+        let screened = screen(&self.problem(&weights.training), &fit.hypothesis, &all);
+        (all, screened)
+    }
+
+    /// Candidates not yet in the model.
+    pub fn open_candidates(&self, model: &Hypothesis<P>) -> Vec<EffectInstance> {
+        let taken = |c: &EffectInstance| model.effects.iter().any(|e| e.same_place(c));
+        let known = effect_instances(&self.scales, &self.sides, model.effects.is_empty()).into_iter();
+        known.chain(self.custom_effects.iter().copied()).filter(|c| !taken(c)).collect()
+    }
+
+    /// Further initial guesses of candidates that are periodic in position, from the periodogram of the residual.
+    fn ripple_guesses(
+        &self,
+        all: &[EffectInstance],
+        weights: &SplitWeighting<N>,
+        fit: &Fit<P>,
+    ) -> Vec<EffectInstance> {
+        let mut open: Vec<EffectInstance> = all.iter().filter(|c| c.is_periodic()).copied().collect();
+        open.dedup_by(|a, b| a.same_place(b));
+        let problem = self.problem(&weights.training);
+        let initial_guesses = |effect: &EffectInstance| {
+            let found = periodogram_peaks(&problem, &fit.hypothesis, effect.joint);
+            found
+                .into_iter()
+                .map(|r| EffectInstance { p: [r.amplitude, r.cycles, r.phase], ..*effect })
+                .collect::<Vec<_>>()
+        };
+        open.iter().flat_map(initial_guesses).collect()
+    }
+
+    /// Further initial guesses of contacts, which act beyond a position, from the residual torque.
+    fn contact_guesses(&self, all: &[EffectInstance], model: &Hypothesis<P>) -> Vec<EffectInstance> {
+        let mut open: Vec<EffectInstance> = all.iter().filter(|c| c.is_contact()).copied().collect();
+        open.sort_by_key(|c| c.joint);
+        open.dedup_by(|a, b| a.same_place(b));
+        if open.is_empty() {
+            return Vec::new();
+        }
+        let found = contact_guesses(&self.training.data.tracks, &self.arm, model, &self.scales.speed);
+        let initial_guesses = |effect: &EffectInstance| {
+            let effect = *effect;
+            found[effect.joint]
+                .iter()
+                .map(move |stop| EffectInstance { p: *stop, ..effect })
+                .collect::<Vec<_>>()
+        };
+        open.iter().flat_map(initial_guesses).collect()
+    }
+
+    /// The model with the payload that brings its parameters closest to their prior values, the motion staying the same; none for effects
+    /// that are no payloads.
+    ///
+    /// For a given distance the parameters' shift is linear in the mass, so one line of candidates over the distance suffices.
+    fn payload_guess(&self, model: &Hypothesis<P>, effect: EffectInstance) -> Option<Hypothesis<P>> {
+        effect.law.payload(&effect.p)?;
+        let off: Vec<f64> =
+            (0..P).map(|i| (model.theta[i] - self.prior.theta[i]) / self.prior.sigma[i]).collect();
+        let attempt = |step: usize| {
+            let distance = self.scales.length * 0.02 * step as f64;
+            let unit = self.arm.payload(&model.theta, 1.0, distance);
+            let shift: Vec<f64> = (0..P).map(|i| unit[i] / self.prior.sigma[i]).collect();
+            let along: f64 = shift.iter().map(|s| s * s).sum();
+            let mass = (off.iter().zip(&shift).map(|(o, s)| o * s).sum::<f64>() / along).max(0.0);
+            let left: f64 = off.iter().zip(&shift).map(|(o, s)| (o - mass * s).powi(2)).sum();
+            (left, mass, distance, unit)
+        };
+        let best = (1..=150).map(attempt).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (_, mass, distance, unit) = best;
+        let mut initial_guess = model.with(EffectInstance { p: [mass, distance, 0.0], ..effect });
+        for (value, shift) in initial_guess.theta.iter_mut().zip(unit) {
+            *value -= mass * shift;
+        }
+        Some(initial_guess)
+    }
+
+    /// The model with a candidate; where the arm's parameters can imitate it, they make room for it at once, and where they imitate it
+    /// to rounding, so that motion says nothing of its size, it gets the size that brings them closest to their prior values.
+    fn compensated(&self, model: &Hypothesis<P>, found: &ScoreTest) -> Hypothesis<P> {
+        if found.distinct >= ABSORBED {
+            return model.with(found.effect);
+        }
+        let (effect, size) =
+            if found.distinct < IMITATED { self.trusted(model, found) } else { (found.effect, found.size) };
+        let values = model.values();
+        let room: Vec<f64> = values.iter().zip(&found.imitation).map(|(value, d)| value + d * size).collect();
+        model.with_values(&room).with(effect)
+    }
+
+    /// A candidate at the size that brings the arm's parameters closest to their prior values, and that size.
+    fn trusted(&self, model: &Hypothesis<P>, found: &ScoreTest) -> (EffectInstance, f64) {
+        let parameter = &found.effect.law.spec().parameters[found.tested];
+        let (mut along, mut off) = (0.0, 0.0);
+        for i in 0..P {
+            let shift = found.imitation[i] / self.prior.sigma[i];
+            along += shift * shift;
+            off += shift * (self.prior.theta[i] - model.theta[i]) / self.prior.sigma[i];
+        }
+        let mut effect = found.effect;
+        let size = if along > 0.0 { off / along } else { 0.0 };
+        effect.p[found.tested] = (parameter.neutral + size).clamp(parameter.lower, parameter.upper);
+        (effect, effect.p[found.tested] - parameter.neutral)
+    }
+}
+
+/// The best initial guess of each of the best-scoring candidates, and of those that only the prior can reveal.
+fn promising(screened: &[ScoreTest], least: f64) -> Vec<&ScoreTest> {
+    let mut order: Vec<&ScoreTest> = screened.iter().filter(|s| s.gain > 0.0).collect();
+    order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut chosen: Vec<&ScoreTest> = Vec::new();
+    for scored in order {
+        let wanted = (chosen.len() < FULL_FITS && scored.gain > least) || scored.distinct < ABSORBED;
+        // A test at a trial value says little about the best initial guess, so two of them are taken; so are two peaks of a periodogram.
+        let several = scored.effect.law.spec().trial == Trial::Whole || scored.effect.is_periodic();
+        let initial_guesses = if several { 2 } else { 1 };
+        if wanted && chosen.iter().filter(|c| c.effect.same_place(&scored.effect)).count() < initial_guesses {
+            chosen.push(scored);
+        }
+    }
+    chosen
+}

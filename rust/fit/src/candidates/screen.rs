@@ -1,0 +1,228 @@
+//! Score tests: how much each candidate would reduce the cost, to first order, from one shared Jacobian.
+//!
+//! With `H` the inner products of the sensitivities of the free values (their prior precision included) and `s` their products with the
+//! residual, a further parameter with sensitivity `c` reduces the cost by `(s_c - H_c H^-1 s)^2 / (H_cc - H_c H^-1 H_c')` (Rao 1948).
+
+use crate::likelihood::scale::Scales;
+use crate::likelihood::solve::{FitProblem, inverse_of_seen, neutral};
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use armgap_core::arm::Arm;
+use armgap_core::effect::{Scope, Trial, catalogue};
+use armgap_core::transmission::Sides;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Size of the trial displacement of a candidate's first parameter, relative to its initial guess.
+const TRIAL: f64 = 1e-3;
+
+/// With encoder or friction at the motor the state behind a window takes as long to find as the window itself: beside other effects one of so
+/// many initial guesses is tried.
+const MOTOR_GUESSES: usize = 3;
+
+/// Score test of a candidate at one initial guess.
+#[derive(Debug, Clone)]
+pub struct ScoreTest {
+    /// The effect, its first parameter at the value the test suggests.
+    pub effect: EffectInstance,
+    /// Expected decrease of the cost.
+    pub gain: f64,
+    /// Estimated deviation of the first parameter from neutral.
+    pub estimate: f64,
+    /// Its standard deviation, from the windows' scatter.
+    pub sigma: f64,
+    /// Standard deviation if the residual were white with the weighting's scale: what the log determines at best.
+    pub information_sigma: f64,
+    /// Changes of the model's own values that make room for the candidate, per unit of its size, to first order.
+    pub imitation: Vec<f64>,
+    /// Deviation from neutral that the test suggests.
+    pub size: f64,
+    /// Which of its parameters was tested.
+    pub tested: usize,
+    /// Share of the candidate's trace that the arm's own parameters cannot imitate.
+    pub distinct: f64,
+}
+
+/// Every effect on every joint it can act on, at each of its initial guesses; a transmission with encoder and friction both on the link's side and
+/// both on the motor's, where they may be.
+pub fn effect_instances<const N: usize>(
+    scales: &Scales<N>,
+    sides: &[Vec<Sides>; N],
+    all_guesses: bool,
+) -> Vec<EffectInstance> {
+    let mut all = Vec::new();
+    for law in catalogue::<f64>().iter().filter(|law| law.spec().least_joints <= N) {
+        let spec = law.spec();
+        let joints = if spec.scope == Scope::Joint { N } else { 1 };
+        for joint in 0..joints {
+            for (guess, initial_guess) in spec.initial_guesses.iter().enumerate() {
+                let mut effect = EffectInstance::new(*law, joint, *initial_guess);
+                let mut reached = true;
+                for (value, parameter) in effect.p.iter_mut().zip(spec.parameters) {
+                    match scales.initial_guess(parameter.quantity, joint, *value) {
+                        Some(initial_guess) => *value = initial_guess.clamp(parameter.lower, parameter.upper),
+                        None => reached = false,
+                    }
+                }
+                if !reached {
+                    continue;
+                }
+                if !law.has_transmission() {
+                    all.push(effect);
+                    continue;
+                }
+                for sides in whole(&sides[joint]) {
+                    if all_guesses || *sides == Sides::LINK || guess % MOTOR_GUESSES == MOTOR_GUESSES / 2 {
+                        all.push(effect.with_sides(*sides));
+                    }
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Of the sides that encoder and friction may be on, those with both on one side and a geared rotor; all where there are none.
+fn whole(sides: &[Sides]) -> Vec<&Sides> {
+    let both = |s: &&Sides| s.encoder_at_motor == s.friction_at_motor && !s.rotor_rides;
+    let found: Vec<&Sides> = sides.iter().filter(both).collect();
+    if found.is_empty() { sides.iter().collect() } else { found }
+}
+
+/// Scores all candidates around a fitted hypothesis.
+pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    problem: &FitProblem<A, N, P>,
+    base: &Hypothesis<P>,
+    candidates: &[EffectInstance],
+) -> Vec<ScoreTest> {
+    let residual = problem.residual(base);
+    let free: Vec<usize> = (0..base.values().len()).collect();
+    let mut columns = problem.sensitivities(base, &residual, &free);
+    let k = columns.len();
+    let before: f64 = student_t_total(problem, &residual);
+    let traced: Vec<(Vec<f64>, Option<f64>)> =
+        candidates.par_iter().map(|c| trace(problem, base, &residual, before, c)).collect();
+    let (traces, direct): (Vec<Vec<f64>>, Vec<Option<f64>>) = traced.into_iter().unzip();
+    columns.extend(traces);
+    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let gram = problem.weighting.gram_with(k, problem.data, &columns, &residual);
+    let last = gram.total.nrows() - 1;
+    let mut own = gram.total.view((0, 0), (k, k)).into_owned();
+    let mut own_score = gram.total.column(last).rows(0, k).into_owned();
+    for i in 0..P {
+        let precision = 1.0 / problem.prior.sigma[i].powi(2);
+        own[(i, i)] += precision;
+        own_score[i] += precision * (problem.prior.theta[i] - base.theta[i]);
+    }
+    let inverse = inverse_of_seen(&own).unwrap_or_else(|| DMatrix::zeros(k, k));
+    let score = |(i, effect): (usize, &EffectInstance)| {
+        let c = k + i;
+        let cross: DVector<f64> = gram.total.column(c).rows(0, k).into_owned();
+        let weights = &inverse * &cross;
+        let raw = gram.total[(c, c)];
+        let information = (raw - weights.dot(&cross)).max(1e-12 * raw);
+        let slope = gram.total[(c, last)] - weights.dot(&own_score);
+        let scatter: f64 = gram.scores.iter().map(|s| (s[c] - weights.dot(&s.rows(0, k))).powi(2)).sum();
+        let mut test = scored(effect, raw, information, slope, scatter);
+        test.imitation = weights.iter().map(|w| -w).collect();
+        test.size = test.admissible(effect);
+        if let Some(direct) = direct[i] {
+            test.gain = test.gain.max(direct);
+        }
+        test
+    };
+    candidates.iter().enumerate().map(score).collect()
+}
+
+/// What the test moves: the first amplitude whose trial value is not neutral.
+fn tested(candidate: &EffectInstance) -> usize {
+    let off = neutral(candidate);
+    (0..candidate.len()).find(|&i| candidate.p[i] != off.p[i]).unwrap_or(0)
+}
+
+/// Sensitivity of the whitened prediction to the tested parameter at neutral, or the whole difference that the effect makes.
+fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    problem: &FitProblem<A, N, P>,
+    base: &Hypothesis<P>,
+    residual: &[f64],
+    before: f64,
+    candidate: &EffectInstance,
+) -> (Vec<f64>, Option<f64>) {
+    let i = tested(candidate);
+    let (moved, step) = match candidate.law.spec().trial {
+        Trial::Amplitudes(_) => {
+            let mut moved = neutral(candidate);
+            let step = TRIAL * (candidate.p[i] - moved.p[i]);
+            moved.p[i] += step;
+            (moved, step)
+        }
+        Trial::Ray => (EffectInstance { p: candidate.p.map(|x| TRIAL * x), ..*candidate }, TRIAL),
+        Trial::Whole | Trial::Disturbance => (*candidate, 1.0),
+    };
+    let there = problem.residual(&base.with(moved));
+    problem.progress.unit();
+    // What begins beyond a threshold may show in few windows, which weigh next to nothing until it explains them.
+    let direct =
+        (candidate.law.spec().trial == Trial::Whole).then(|| before - student_t_total(problem, &there));
+    (residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect(), direct)
+}
+
+/// Student-t cost of a residual, summed over the windows.
+fn student_t_total<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    problem: &FitProblem<A, N, P>,
+    residual: &[f64],
+) -> f64 {
+    problem
+        .weighting
+        .costs(problem.data, residual)
+        .into_iter()
+        .map(|c| problem.weighting.student_t_cost(c))
+        .sum()
+}
+
+/// The test of one candidate; a parameter that would have to cross its bound has nothing to gain.
+fn scored(effect: &EffectInstance, raw: f64, information: f64, slope: f64, scatter: f64) -> ScoreTest {
+    let estimate = slope / information;
+    let mut suggested = *effect;
+    let admissible = match effect.law.spec().trial {
+        Trial::Amplitudes(_) => {
+            let i = tested(effect);
+            let parameter = &effect.law.spec().parameters[i];
+            let initial_guess = (effect.p[i] - parameter.neutral).abs();
+            let most =
+                (parameter.neutral + estimate).clamp(parameter.lower, parameter.upper) - parameter.neutral;
+            suggested.p[i] = parameter.neutral + most.clamp(-20.0 * initial_guess, 20.0 * initial_guess);
+            most
+        }
+        Trial::Ray => {
+            let share = estimate.clamp(0.0, 20.0);
+            suggested.p = effect.p.map(|x| x * share);
+            share
+        }
+        // A share of the whole difference, from none to all of it.
+        Trial::Whole | Trial::Disturbance => estimate.clamp(0.0, 1.0),
+    };
+    let gain = if raw > 0.0 { (2.0 * slope - information * admissible) * admissible } else { 0.0 };
+    ScoreTest {
+        effect: suggested,
+        gain: if gain.is_finite() { gain.max(0.0) } else { 0.0 },
+        estimate,
+        sigma: scatter.sqrt() / information,
+        information_sigma: 1.0 / information.sqrt(),
+        imitation: Vec::new(),
+        size: 0.0,
+        tested: tested(effect),
+        distinct: if raw > 0.0 { information / raw } else { 0.0 },
+    }
+}
+
+impl ScoreTest {
+    /// By how much the tested parameter of the suggestion differs from neutral, in the units of the test.
+    fn admissible(&self, candidate: &EffectInstance) -> f64 {
+        let i = tested(candidate);
+        match candidate.law.spec().trial {
+            Trial::Amplitudes(_) => self.effect.p[i] - candidate.law.spec().parameters[i].neutral,
+            Trial::Ray => self.effect.p[i] / candidate.p[i],
+            Trial::Whole | Trial::Disturbance => 1.0,
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! Sizes of a push by output error over the windows it touches: the push under which their predictions miss least.
+
+use super::own::Own;
+use super::push::{Disturbance, Place, PushState, SHORTEST};
+use crate::likelihood::context::{DiagnosisContext, WindowSet};
+use crate::likelihood::solve::scaled_inverse;
+use crate::likelihood::weighting::Weighting;
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::predict::window::{Dataset, InitialStateOffset};
+use armgap_core::arm::Arm;
+use nalgebra::{DMatrix, DVector, Vector3};
+
+/// Windows this far from a push are left out, s.
+const AROUND: f64 = 0.25;
+
+/// Longest push, s.
+const LONGEST: f64 = 2.5;
+
+/// A push that lowers the cost of the windows it touches by less than this share is not seen there.
+const HELPS: f64 = 0.01;
+
+/// Beside a remainder, a push that lowers the cost of the windows it touches by less than this share is not seen there; the model fitted to
+/// the recording with the push is compared to that fitted without it.
+const HELPS_OWN: f64 = 0.02;
+
+/// Least share of the cost of the windows it touches that a push must explain before its size by output error is believed.
+const EXPLAINS: f64 = 0.5;
+
+/// How far, in its own durations and at least s, output error may move a push, and by what factor change its impulse.
+const MOVED: f64 = 0.3;
+const MOVED_LEAST: f64 = 0.1;
+const CHANGED: f64 = 1.5;
+
+/// Steps of the fit, attempts at each, and the relative decrease of the cost that ends it.
+const ITERATIONS: usize = 12;
+const ATTEMPTS: usize = 6;
+const SETTLED: f64 = 1e-4;
+
+/// Durations that the search starts from beside the one seen, s.
+const LONGER: [f64; 2] = [0.04, 0.12];
+
+/// Times that the windows' starts and weights are made anew around the push.
+const ROUNDS: usize = 2;
+
+/// Part of a standard deviation by which a model's values are displaced for sensitivities.
+const AXIS_STEP: f64 = 0.01;
+
+/// The windows that a push touches, and the residual they have under any push.
+struct Touched<'a, A, const N: usize, const P: usize> {
+    arm: &'a A,
+    model: &'a Hypothesis<P>,
+    sample: WindowSet<N>,
+    weighting: Weighting<N>,
+    known: &'a [EffectInstance],
+    push: EffectInstance,
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// Whether a log misses by so much that a push in it could be of consequence. Beside a remainder that is no condition.
+    pub(super) fn could_hold_a_push(&self, (set, track): Place, state: &PushState<'_, N, P>) -> bool {
+        if state.remainder {
+            return true;
+        }
+        let whole = [&self.training, &self.holdout][set];
+        let data = whole.data.of_track(track, |_| true).without_pushes();
+        let (weighting, predicted) = self.at_measured_starts(&data, state);
+        let residual = weighting.residual(&data.measured(), &predicted);
+        weighting.costs(&data, &residual).iter().sum::<f64>() > least_gain(whole, state)
+    }
+
+    /// Weights around the model, every window from its measured start, and what it predicts.
+    fn at_measured_starts(&self, data: &Dataset<N>, state: &PushState<'_, N, P>) -> (Weighting<N>, Vec<f64>) {
+        let offsets = vec![InitialStateOffset::none(); data.windows.len()];
+        let predicted = data.predict(&self.arm, state.model, &offsets);
+        (Weighting::new(data, &self.arm, state.model, state.scale, offsets, &predicted), predicted)
+    }
+
+    /// The push with the values that output error gives it, and what it explains.
+    ///
+    /// What it explains is counted from what the model misses, or the model fitted to its recording alone, if that misses less. Beside a
+    /// remainder it stays as it was where output error explains too little to be believed, if it helps at all, or helps that model;
+    /// without one, it then is none. `known` are the recording's other pushes.
+    pub(super) fn sized(
+        &self,
+        rough: Disturbance,
+        state: &PushState<'_, N, P>,
+        own: &Own<'_, A, N, P>,
+        known: &[Disturbance],
+    ) -> Option<Disturbance> {
+        let whole = if rough.holdout { &self.holdout } else { &self.training };
+        let sample = WindowSet { data: whole.data.without_pushes(), measured: whole.measured.clone() };
+        let data = around(&sample, &rough);
+        if data.windows.is_empty() {
+            return state.remainder.then_some(rough);
+        }
+        let least = least_gain(&sample, state);
+        let usual = self.weighting(&sample, state.model, state.scale).typical * data.windows.len() as f64;
+        let (weighting, _) = self.at_measured_starts(&data, state);
+        let sample = WindowSet::new(data);
+        let here: Vec<EffectInstance> =
+            known.iter().filter(|e| e.place() == rough.place()).map(|e| e.push).collect();
+        let mut touched =
+            Touched { arm: &self.arm, model: state.model, sample, weighting, known: &here, push: rough.push };
+        let p = Vector3::from(rough.push.p);
+        let none = Vector3::new(0.0, p[1], p[2]);
+        let mut bare = touched.cost(&touched.residual_of(&none));
+        if !state.remainder {
+            bare = touched.cost_under(self, own.bare(), &none).min(bare);
+        }
+        let seen = touched.cost(&touched.residual_of(&p));
+        // Beside a remainder a search from elsewhere would take the remainder for the push.
+        let (mut fitted, left) = if state.remainder { touched.minimise(p) } else { touched.least(p) };
+        let share = |left: f64| (bare - left) / (bare - usual.min(0.5 * bare)).max(1e-300);
+        let believed = share(left) > EXPLAINS && bare - left > least;
+        if believed && close(&fitted, &p, state.remainder) {
+            for _ in 0..ROUNDS {
+                touched.sample.data.tracks[0].pushes = touched.with(&fitted);
+                touched.weighting = self.weighting(&touched.sample, state.model, state.scale);
+                (fitted, _) = touched.minimise(fitted);
+            }
+            let push = EffectInstance { p: fitted.into(), ..rough.push };
+            let sigma = touched.sigma(&fitted, state.covariance)?;
+            return Some(Disturbance { push, sigma, share: share(left), ..rough });
+        }
+        if !state.remainder {
+            return None;
+        }
+        if share(seen) > HELPS {
+            return Some(Disturbance { share: share(seen), ..rough });
+        }
+        let others: Vec<&Disturbance> = known.iter().collect();
+        let with: Vec<&Disturbance> = known.iter().chain([&rough]).collect();
+        let without = touched.cost_under(self, &own.beside(&others), &none);
+        let share = 1.0 - touched.cost_under(self, &own.beside(&with), &p) / without;
+        (share > HELPS_OWN).then_some(Disturbance { share, ..rough })
+    }
+}
+
+/// What a push of consequence lowers the cost of its windows by, at least.
+fn least_gain<const N: usize, const P: usize>(sample: &WindowSet<N>, state: &PushState<'_, N, P>) -> f64 {
+    state.min_relevance.powi(2) * sample.motion(&state.scale)
+}
+
+/// Whether output error has found the same push; beside a remainder also its size must be much the same, for the remainder may have
+/// gone into it.
+fn close(fitted: &Vector3<f64>, seen: &Vector3<f64>, remainder: bool) -> bool {
+    let ratio = fitted[0] / seen[0];
+    let near = (fitted[1] - seen[1]).abs() < (MOVED * seen[2]).max(MOVED_LEAST);
+    near && if remainder { ratio > 1.0 / CHANGED && ratio < CHANGED } else { ratio > 0.0 }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
+    /// The known pushes and one of these values.
+    fn with(&self, p: &Vector3<f64>) -> Vec<EffectInstance> {
+        self.known.iter().copied().chain([EffectInstance { p: (*p).into(), ..self.push }]).collect()
+    }
+
+    /// Whitened residual under a push of these values.
+    fn residual_of(&self, p: &Vector3<f64>) -> Vec<f64> {
+        self.residual_under(self.model, p)
+    }
+
+    /// Whitened residual under another model and a push of these values.
+    fn residual_under(&self, model: &Hypothesis<P>, p: &Vector3<f64>) -> Vec<f64> {
+        let mut data = self.sample.data.clone();
+        data.tracks[0].pushes = self.with(p);
+        let predicted = data.predict(self.arm, model, &self.weighting.offsets);
+        self.weighting.residual(&self.sample.measured, &predicted)
+    }
+
+    /// Cost of a push under another model, whose starts are fitted to it.
+    fn cost_under(&self, context: &DiagnosisContext<A, N, P>, own: &Hypothesis<P>, p: &Vector3<f64>) -> f64 {
+        let mut data = self.sample.data.clone();
+        data.tracks[0].pushes = self.with(p);
+        let sample = WindowSet { data, measured: self.sample.measured.clone() };
+        let weighting = context.weighting(&sample, own, self.weighting.scale);
+        let there =
+            Touched { arm: self.arm, model: own, sample, weighting, known: self.known, push: self.push };
+        let residual = there.residual_of(p);
+        there.weighting.costs(&there.sample.data, &residual).iter().sum()
+    }
+
+    fn cost(&self, r: &[f64]) -> f64 {
+        self.weighting.total(&self.weighting.costs(&self.sample.data, r))
+    }
+
+    /// The best of the minima that are reached from a first guess and from longer pushes around the same time.
+    fn least(&self, p: Vector3<f64>) -> (Vector3<f64>, f64) {
+        LONGER.iter().fold(self.minimise(p), |best, duration| {
+            let other = self.minimise(Vector3::new(p[0], p[1], *duration));
+            if other.1 < best.1 { other } else { best }
+        })
+    }
+
+    /// Levenberg and Marquardt's method from a first guess: values and cost.
+    fn minimise(&self, p: Vector3<f64>) -> (Vector3<f64>, f64) {
+        let (mut p, mut r) = (p, self.residual_of(&p));
+        let (mut cost, mut damping) = (self.cost(&r), 1e-2);
+        for _ in 0..ITERATIONS {
+            let jacobian = self.jacobian(&p, &r);
+            let gram =
+                self.weighting.gram(&self.sample.data, &jacobian.each_ref().map(Vec::as_slice), &r).total;
+            let before = cost;
+            for _ in 0..ATTEMPTS {
+                let Some(next) = damped_step(&p, &gram, damping) else { return (p, cost) };
+                let there = self.residual_of(&next);
+                let lower = self.cost(&there);
+                if lower < cost {
+                    (p, r, cost) = (next, there, lower);
+                    damping = f64::max(damping * 0.2, 1e-9);
+                    break;
+                }
+                damping *= 8.0;
+            }
+            if before - cost <= SETTLED * before {
+                break;
+            }
+        }
+        (p, cost)
+    }
+
+    /// Standard deviations of a push's values, for noise as large as what is left and a model known up to `covariance`.
+    fn sigma(&self, p: &Vector3<f64>, covariance: &DMatrix<f64>) -> Option<[f64; 3]> {
+        let r = self.residual_of(p);
+        let noise = (self.cost(&r) / (self.sample.data.rows * N) as f64).max(1.0);
+        let doubts = self.doubts(p, &r, covariance);
+        let own = self.jacobian(p, &r);
+        let columns: Vec<&[f64]> = own.iter().chain(&doubts).map(Vec::as_slice).collect();
+        let k = columns.len();
+        let gram = self.weighting.gram(&self.sample.data, &columns, &r).total;
+        let mut normal = gram.view((0, 0), (k, k)).into_owned() / noise;
+        for i in 3..k {
+            normal[(i, i)] += 1.0;
+        }
+        let inverse = scaled_inverse(&normal)?;
+        Some(std::array::from_fn(|i| inverse[(i, i)].sqrt()))
+    }
+
+    /// How predictions change along the principal axes of what is not known of the model, each by its standard deviation.
+    fn doubts(&self, p: &Vector3<f64>, r: &[f64], covariance: &DMatrix<f64>) -> Vec<Vec<f64>> {
+        let values = self.model.values();
+        let scale = covariance.diagonal().map(|v| if v > 0.0 && v.is_finite() { v.sqrt() } else { 0.0 });
+        let known = |i: usize| if scale[i] > 0.0 { 1.0 / scale[i] } else { 0.0 };
+        let correlation = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
+            if scale[i] > 0.0 && scale[j] > 0.0 { covariance[(i, j)] * known(i) * known(j) } else { 0.0 }
+        });
+        let axes = correlation.symmetric_eigen();
+        let column = |k: usize| {
+            let along = AXIS_STEP * axes.eigenvalues[k].max(0.0).sqrt();
+            let moved: Vec<f64> = values
+                .iter()
+                .enumerate()
+                .map(|(i, v)| v + along * scale[i] * axes.eigenvectors[(i, k)])
+                .collect();
+            let there = self.residual_under(&self.model.with_values(&moved), p);
+            r.iter().zip(&there).map(|(a, b)| (a - b) / AXIS_STEP).collect()
+        };
+        (0..scale.len()).filter(|k| axes.eigenvalues[*k] > 1e-9).map(column).collect()
+    }
+
+    /// Derivatives of the prediction by impulse, time and duration.
+    fn jacobian(&self, p: &Vector3<f64>, r: &[f64]) -> [Vec<f64>; 3] {
+        let steps = [1e-4 * p[0].abs().max(1e-12), 1e-5, 1e-5];
+        let slope = |i: usize| {
+            let mut moved = *p;
+            moved[i] += steps[i];
+            r.iter().zip(&self.residual_of(&moved)).map(|(a, b)| (a - b) / steps[i]).collect()
+        };
+        std::array::from_fn(slope)
+    }
+}
+
+/// One damped step.
+fn damped_step(p: &Vector3<f64>, gram: &DMatrix<f64>, damping: f64) -> Option<Vector3<f64>> {
+    let mut normal = gram.view((0, 0), (3, 3)).into_owned();
+    for i in 0..3 {
+        normal[(i, i)] *= 1.0 + damping;
+    }
+    let inverse = scaled_inverse(&normal)?;
+    let change = &inverse * DVector::from_fn(3, |i, _| gram[(i, 3)]);
+    let duration = (p[2] + change[2]).clamp(SHORTEST, LONGEST);
+    Some(Vector3::new(p[0] + change[0], p[1] + change[1], duration))
+}
+
+/// Windows of a push's log that it touches, as a dataset of that log alone.
+fn around<const N: usize>(sample: &WindowSet<N>, disturbance: &Disturbance) -> Dataset<N> {
+    let track = &sample.data.tracks[disturbance.track];
+    let [_, time, duration] = disturbance.push.p;
+    let reach = 0.75 * duration + AROUND;
+    sample
+        .data
+        .of_track(disturbance.track, |w| track.t[w.first] < time + reach && track.t[w.last] > time - reach)
+}

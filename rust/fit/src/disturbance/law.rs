@@ -1,0 +1,297 @@
+//! Laws in the place of pushes. A drive that does not give all the torque it is asked for lacks it at a few instants, and a joint that reaches
+//! a stop is driven back a few times: either looks as if something pushed.
+//!
+//! A cause shows in the typical window; a limit or a stop that one log reaches once or twice does not, and where the training logs do not
+//! reach it at all no fit to them knows where it is. So the pushes of a joint are compared with a law that could have made them, on the same
+//! footing: the model is fitted beside either to all windows of all logs, both are judged by the same Student-t likelihood, and both pay for
+//! their free values (Bayesian information criterion, Schwarz 1978). A push has three of them, and a law as many as it has however often it acts.
+
+use super::push::Disturbance;
+use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::solve::{Effort, Fit};
+use crate::likelihood::weighting::Weighting;
+use crate::log::track::Track;
+use crate::model::hypothesis::EffectInstance;
+use crate::search::acceptance::Ground;
+use crate::search::belief::Cause;
+use crate::search::evidence::Evidence;
+use crate::search::model_search::Attribution;
+use armgap_core::arm::Arm;
+use armgap_core::effect::{MAX_PARAMETERS, find};
+use rayon::prelude::*;
+
+/// Laws that act as pushes do, each on one joint.
+const LAWS: [LawGuess; 2] = [
+    LawGuess { name: "torque_saturation", from_push: limit_guess },
+    LawGuess { name: "contact", from_push: stop_guess },
+];
+
+/// Halvings that find the level of one push.
+const HALVINGS: usize = 40;
+
+/// Times that starts and weights of the windows are made anew around the model with a law.
+const ROUNDS: usize = 2;
+
+/// A contact's half sine of torque lasts this much longer than the constant torque that fits it best, and its peak is this much higher.
+const HALF_SINE: f64 = 1.3;
+
+/// First damping of a stop, as its torque at the push's mean speed relative to the mean torque.
+const DAMPED: f64 = 0.1;
+
+/// A law that a push can be the sign of.
+struct LawGuess {
+    name: &'static str,
+    /// Values of the law that acts at the push's time as the push does; none if the law cannot.
+    from_push: fn(&PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]>,
+}
+
+/// What a joint does while it is pushed.
+struct PushedMotion<'a> {
+    /// Impulse, time and duration of the push.
+    push: [f64; 3],
+    /// Sample times from about one duration before to one after it.
+    t: &'a [f64],
+    /// The joint's positions then.
+    q: &'a [f64],
+    /// Mean command from each of those samples to the next.
+    torque: &'a [f64],
+}
+
+/// A law on a joint that may stand in the place of some of the pushes.
+struct Trial {
+    /// Its first guesses, one of each of those pushes.
+    guesses: Vec<EffectInstance>,
+    /// Those pushes.
+    theirs: Vec<Disturbance>,
+    /// The other pushes.
+    others: Vec<Disturbance>,
+}
+
+/// A model beside some of the pushes, fitted to all windows of all logs, and its likelihood.
+struct Explanation<const N: usize, const P: usize> {
+    fit: Fit<P>,
+    /// Twice the negative logarithm of the likelihood, up to what all have in common: Student-t costs and prior cost.
+    cost: f64,
+    /// Sum of the windows' costs as they are.
+    raw: f64,
+    weighting: Weighting<N>,
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// The law that explains what pushes of a joint explain, with fewer values or no worse with as many, if there is one.
+    pub(super) fn law_in_place(
+        &mut self,
+        alone: &Attribution<N, P>,
+        disturbances: &[Disturbance],
+    ) -> Option<Cause> {
+        let scale = alone.nodes.last()?.weights.training.scale;
+        let effects = &alone.model.hypothesis.effects;
+        let taken = |e: &EffectInstance| effects.iter().any(|known| known.same_place(e));
+        let tried: Vec<Trial> = (0..N)
+            .flat_map(|joint| LAWS.iter().map(move |law| (joint, law)))
+            .flat_map(|(joint, law)| self.trials(joint, law, disturbances))
+            .filter(|trial| !trial.guesses.iter().any(taken))
+            .collect();
+        if tried.is_empty() {
+            return None;
+        }
+        self.set_pushes(disturbances);
+        let (settled, weights) = self.of_all_windows().settle(&alone.model.hypothesis, scale);
+        let pushed = self.of_all_windows().explanation(settled, &weights.training, ROUNDS);
+        let found = tried.into_iter().filter_map(|trial| {
+            self.set_pushes(&trial.others);
+            self.law_of(&trial, &pushed)
+        });
+        let best = found.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, law)| law);
+        self.set_pushes(&[]);
+        best
+    }
+
+    /// A law on a joint in the place of the pushes that could be its signs; of each side of zero by itself, as a stop has only one.
+    fn trials(&self, joint: usize, law: &LawGuess, disturbances: &[Disturbance]) -> Vec<Trial> {
+        let Some(effect) = find::<f64>(law.name) else { return Vec::new() };
+        let guess = |e: &Disturbance| {
+            let here = (e.push.joint == joint).then(|| pushed_motion(self.track(e.place()), &e.push))?;
+            let [t, q, torque] = &here;
+            let values = (law.from_push)(&PushedMotion { push: e.push.p, t, q, torque })?;
+            Some(EffectInstance::new(effect, joint, values))
+        };
+        let guessed: Vec<Option<EffectInstance>> = disturbances.iter().map(guess).collect();
+        let of_side = |side: f64| {
+            let ours = |e: &Option<EffectInstance>| e.is_some_and(|e| e.p[0] * side > 0.0);
+            let guesses: Vec<EffectInstance> =
+                guessed.iter().filter(|e| ours(e)).flatten().copied().collect();
+            let pushes = disturbances.iter().cloned().zip(&guessed);
+            let (theirs, others): (Vec<_>, Vec<_>) = pushes.partition(|(_, guess)| ours(guess));
+            let only = |pairs: Vec<(Disturbance, _)>| pairs.into_iter().map(|(e, _)| e).collect();
+            Trial { guesses, theirs: only(theirs), others: only(others) }
+        };
+        [1.0, -1.0].map(of_side).into_iter().filter(|trial| !trial.guesses.is_empty()).collect()
+    }
+
+    /// The law of a trial, if it explains what its pushes explain, and by how much its information criterion is the lower; the others are in
+    /// the logs.
+    fn law_of(&self, trial: &Trial, pushed: &Explanation<N, P>) -> Option<(f64, Cause)> {
+        let all = self.of_all_windows();
+        let model = &pushed.fit.hypothesis;
+        let bare = all.explanation(pushed.fit.clone(), &pushed.weighting, 0).raw;
+        // Windows weigh as the pushes leave them: under a model with neither they would count as outliers.
+        let problem = all.problem(&pushed.weighting);
+        let fitted: Vec<Fit<P>> =
+            trial.guesses.par_iter().map(|guess| problem.solve(&model.with(*guess), Effort::ROUGH)).collect();
+        let score = |fit: &Fit<P>| pushed.weighting.total(&fit.costs) + fit.prior_cost;
+        let rough = fitted.into_iter().min_by(|a, b| score(a).total_cmp(&score(b)))?;
+        let found = all.explanation(rough, &pushed.weighting, ROUNDS);
+        let effect = *found.fit.hypothesis.effects.last()?;
+        let windows = all.training.data.windows.len() as f64;
+        let free = |values: usize| values as f64 * windows.ln();
+        let of_pushes: usize = trial.theirs.iter().map(|e| e.push.len()).sum();
+        let advantage = pushed.cost + free(of_pushes) - found.cost - free(effect.len());
+        if advantage < 0.0 {
+            return None;
+        }
+        let first = found.fit.hypothesis.values().len() - effect.len();
+        let sigma = (first..first + effect.len()).map(|i| found.fit.sigma(i)).collect();
+        let likely = trial.theirs.iter().map(|e| e.probability).fold(0.0, f64::max);
+        let probability = likely / (1.0 + (-0.5 * advantage).exp());
+        let cause = Cause {
+            effect,
+            sigma,
+            probability,
+            share: (1.0 - found.raw / bare).clamp(0.0, 1.0),
+            relevance: 0.0,
+            look_alikes: Vec::new(),
+            evidence: Evidence { selected: probability, ..Evidence::default() },
+            ground: Ground::Motion,
+        };
+        Some((advantage, cause))
+    }
+
+    /// This context with the windows of all logs to learn from and to judge on, as their pushes are now.
+    fn of_all_windows(&self) -> Self {
+        self.on_windows(self.training.data.clone().and(self.holdout.data.clone()))
+    }
+
+    /// A model fitted to the training windows, and its cost; starts and weights are made anew around it so many times, with `given` scales and the
+    /// given cost of a typical window.
+    fn explanation(&self, fit: Fit<P>, given: &Weighting<N>, rounds: usize) -> Explanation<N, P> {
+        let mut fit = fit;
+        for _ in 0..rounds {
+            let around = self.weighting(&self.training, &fit.hypothesis, given.scale);
+            fit = self.problem(&around).solve(&fit.hypothesis, Effort::FULL);
+        }
+        let mut weighting = self.weighting(&self.training, &fit.hypothesis, given.scale);
+        weighting.typical = given.typical;
+        let costs = self.problem(&weighting).raw_costs(&fit.hypothesis);
+        let cost = costs.iter().map(|c| weighting.student_t_cost(*c)).sum::<f64>() + fit.prior_cost;
+        Explanation { fit, cost, raw: costs.iter().sum(), weighting }
+    }
+}
+
+/// Times, positions and mean commands of a pushed joint, from one duration before the push to one after it.
+fn pushed_motion<const N: usize>(track: &Track<N>, push: &EffectInstance) -> [Vec<f64>; 3] {
+    let [_, time, duration] = push.p;
+    let first = track.t.partition_point(|t| *t < time - duration);
+    let last = track.t.partition_point(|t| *t <= time + duration).min(track.len());
+    let samples = || first..last;
+    [
+        samples().map(|k| track.t[k]).collect(),
+        samples().map(|k| track.q[k][push.joint]).collect(),
+        samples().map(|k| track.held[k.min(track.held.len() - 1)][push.joint].mean()).collect(),
+    ]
+}
+
+/// Level beyond which the command around a push against it amounts to the push's impulse.
+fn limit_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
+    let impulse = motion.push[0];
+    let against = |torque: &f64| -impulse.signum() * torque;
+    let beyond = |level: f64| -> f64 {
+        let steps = motion.t.windows(2).map(|pair| pair[1] - pair[0]);
+        motion.torque.iter().zip(steps).map(|(torque, step)| (against(torque) - level).max(0.0) * step).sum()
+    };
+    let (mut low, mut high) = (0.0, motion.torque.iter().map(against).fold(0.0, f64::max));
+    if beyond(low) < impulse.abs() {
+        return None;
+    }
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if beyond(middle) > impulse.abs() { low = middle } else { high = middle }
+    }
+    Some([low, 0.0, 0.0])
+}
+
+/// Stop that a push away from it, towards zero, would come from: entered when the push begins, left when it ends, and as stiff as the greatest
+/// depth asks for.
+fn stop_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
+    let [impulse, time, duration] = motion.push;
+    let side = -impulse.signum();
+    let half = 0.5 * HALF_SINE * duration;
+    let at = |t: f64| side * motion.q[motion.t.partition_point(|x| *x < t).min(motion.q.len() - 1)];
+    if motion.q.is_empty() {
+        return None;
+    }
+    let inside = motion.t.iter().zip(motion.q).filter(|(t, _)| (*t - time).abs() <= half);
+    let deepest = inside.map(|(_, q)| side * q).fold(f64::NEG_INFINITY, f64::max);
+    let position = 0.5 * (at(time - half) + at(time + half));
+    let depth = deepest - position;
+    if !(position > 0.0 && depth > 0.0) {
+        return None;
+    }
+    let torque = impulse.abs() / duration;
+    Some([side * position, HALF_SINE * torque / depth, DAMPED * torque * half / depth])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    const STEP: f64 = 1e-3;
+    const TIME: f64 = 0.2;
+
+    fn times() -> Vec<f64> {
+        (0..400).map(|k| STEP * f64::from(k)).collect()
+    }
+
+    #[test]
+    fn a_limit_cuts_off_the_impulse_of_the_push() {
+        let t = times();
+        let torque: Vec<f64> = t.iter().map(|t| 10.0 - 200.0 * (t - TIME).powi(2)).collect();
+        let level = 9.5;
+        let cut: f64 = torque.iter().map(|x| (x - level).max(0.0) * STEP).sum();
+        let q = vec![0.0; t.len()];
+        let found = |impulse| {
+            limit_guess(&PushedMotion { push: [impulse, TIME, 0.1], t: &t, q: &q, torque: &torque })
+        };
+        assert!((found(-cut).unwrap()[0] / level - 1.0).abs() < 1e-6);
+        assert!(found(cut).is_none(), "a push along the command");
+    }
+
+    #[test]
+    fn a_stop_stands_where_the_push_begins_and_ends() {
+        let (rate, speed, position) = (40.0, 2.0, 0.5);
+        let lasts = PI / rate;
+        let t = times();
+        let outward: Vec<f64> = t
+            .iter()
+            .map(|t| match (t - TIME) / lasts {
+                x if x.abs() < 0.5 => position + speed / rate * (PI * x).cos(),
+                x => position - speed * lasts * (x.abs() - 0.5),
+            })
+            .collect();
+        let torque = vec![0.0; t.len()];
+        for side in [1.0, -1.0] {
+            let q: Vec<f64> = outward.iter().map(|q| side * q).collect();
+            let found = |impulse: f64| {
+                let push = [impulse, TIME, lasts / HALF_SINE];
+                stop_guess(&PushedMotion { push, t: &t, q: &q, torque: &torque })
+            };
+            // A unit mass: it leaves as fast as it came, and oscillates at the root of the stiffness.
+            let [at, stiffness, damping] = found(-side * 2.0 * speed).unwrap();
+            assert!((at / (side * position) - 1.0).abs() < 0.02, "{at}");
+            assert!((stiffness / rate.powi(2) - 1.0).abs() < 0.2, "{stiffness}");
+            assert!(damping > 0.0);
+            assert!(found(side * 2.0 * speed).is_none(), "a push outwards");
+        }
+    }
+}

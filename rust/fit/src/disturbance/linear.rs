@@ -1,0 +1,177 @@
+//! All that a model could be wrong by and some bells, fitted together to the torque that one log lacks.
+
+use super::bell::Bell;
+use super::residual::{Joint, Residual};
+use super::scatter::scatter;
+use crate::likelihood::solve::scaled_inverse;
+use crate::numeric::products::{cross, product};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Correlation time of what a model lacks, s, where its columns are fitted and where pushes are judged.
+const MODEL_TIME: f64 = 0.25;
+const JUDGED_TIME: f64 = 0.06;
+
+/// Scatter relative to the typical torque below which the columns are not fitted more closely: a joint that is hardly driven could
+/// otherwise be explained by parameters of next to nothing.
+const MODEL_SCATTER: f64 = 0.05;
+
+/// A bell of which less is left by the other columns cannot be told from them.
+const DISTINCT: f64 = 0.15;
+
+/// First guess of the scatter relative to the typical torque, and rounds until it follows the residual.
+const FIRST_SCATTER: f64 = 0.15;
+const ROUNDS: usize = 4;
+
+/// Largest amplitude of a push relative to the typical torque of its joint.
+const LARGEST: f64 = 20.0;
+
+/// A linear fit of all columns and of some bells.
+pub struct Fitted {
+    /// What is left, per joint.
+    left: Vec<Vec<f64>>,
+    /// Inverse of the normal matrix.
+    inverse: DMatrix<f64>,
+    /// Bells in the fit.
+    pub bells: Vec<Bell>,
+    /// Weights per joint and point: those that bells are judged with, and those that the columns are fitted with.
+    weights: Vec<[Vec<f64>; 2]>,
+}
+
+/// The fit's data and the scatter that weighs them.
+pub struct Linear<'a, const N: usize> {
+    /// What the log lacks.
+    pub residual: &'a Residual<N>,
+    /// Share of the time that each joint moves at each point.
+    pub moving: Vec<Vec<f64>>,
+    /// Standard deviation per joint and point.
+    scatter: Vec<Vec<f64>>,
+}
+
+impl<'a, const N: usize> Linear<'a, N> {
+    /// With a first guess of the scatter.
+    pub fn new(residual: &'a Residual<N>) -> Self {
+        let moving = |x: &Joint| x.rest.iter().map(|r| (1.0 - r).clamp(0.0, 1.0)).collect();
+        let first = |x: &Joint| vec![FIRST_SCATTER * x.typical.max(1e-9); residual.t.len()];
+        Self {
+            residual,
+            moving: residual.joints.iter().map(moving).collect(),
+            scatter: residual.joints.iter().map(first).collect(),
+        }
+    }
+
+    /// All columns and bells fitted, with the scatter that follows from what is left.
+    pub fn settle(&mut self, bells: &[Bell]) -> Option<Fitted> {
+        let mut fitted = self.fit(bells)?;
+        for _ in 0..ROUNDS {
+            self.scatter =
+                (0..N).into_par_iter().map(|j| scatter(self.residual, j, &fitted.left[j])).collect();
+            fitted = self.fit(bells)?;
+        }
+        Some(fitted)
+    }
+
+    pub fn fit(&self, bells: &[Bell]) -> Option<Fitted> {
+        let residual = self.residual;
+        let (c, k) = (residual.prior.len(), residual.prior.len() + bells.len());
+        let (mut normal, mut right) = (DMatrix::<f64>::zeros(k, k), DVector::<f64>::zeros(k));
+        for (i, (expected, sigma)) in residual.prior.iter().enumerate() {
+            let precision = sigma.powi(-2).min(1e24);
+            normal[(i, i)] += precision;
+            right[i] += precision * expected;
+        }
+        for (i, bell) in bells.iter().enumerate() {
+            normal[(c + i, c + i)] += (LARGEST * residual.joints[bell.joint].typical.max(1e-9)).powi(-2);
+        }
+        let rows: Vec<DMatrix<f64>> = (0..N).map(|j| self.rows(j, bells)).collect();
+        let weights: Vec<[Vec<f64>; 2]> = (0..N).map(|j| self.weights(j)).collect();
+        for j in 0..N {
+            let count = residual.t.len();
+            let columns: Vec<&[f64]> = rows[j].as_slice().chunks_exact(count).collect();
+            let mut weighted = rows[j].clone();
+            for column in weighted.as_mut_slice().chunks_exact_mut(count) {
+                column.iter_mut().zip(&weights[j][1]).for_each(|(x, weight)| *x *= weight);
+            }
+            let weighted: Vec<&[f64]> = weighted.as_slice().chunks_exact(count).collect();
+            normal += DMatrix::from_column_slice(k, k, &cross(&weighted, &columns));
+            right -= DVector::from_column_slice(&cross(&weighted, &[&residual.joints[j].lack]));
+        }
+        let inverse = scaled_inverse(&normal)?;
+        let values = &inverse * right;
+        let left = (0..N).map(|j| {
+            let joint = &residual.joints[j];
+            let change = &rows[j] * &values;
+            let held = joint.rest.iter().map(|rest| joint.holding * rest);
+            let lack = joint.lack.iter().zip(change.iter()).map(|(r, d)| r + d);
+            lack.zip(held).map(|(r, held)| r.signum() * (r.abs() - held).max(0.0)).collect()
+        });
+        let left = left.collect();
+        Some(Fitted { left, inverse, bells: bells.to_vec(), weights })
+    }
+
+    /// Weights of joint `j`'s points where bells are judged, and where the columns are fitted.
+    fn weights(&self, j: usize) -> [Vec<f64>; 2] {
+        let tempering = self.residual.step / MODEL_TIME;
+        let least = MODEL_SCATTER * self.residual.joints[j].typical;
+        [0.0, least].map(|least| {
+            let points = self.moving[j].iter().zip(&self.scatter[j]);
+            points.map(|(moving, scatter)| tempering * moving / scatter.max(least).powi(2)).collect()
+        })
+    }
+
+    /// Torque of joint `j` per unit of every column, then of every bell, which the model does not have.
+    fn rows(&self, j: usize, bells: &[Bell]) -> DMatrix<f64> {
+        let joint = &self.residual.joints[j];
+        let c = joint.columns.len();
+        DMatrix::from_fn(self.residual.t.len(), c + bells.len(), |i, k| match k.checked_sub(c) {
+            None => joint.columns[k][i],
+            Some(b) if bells[b].joint == j => -bells[b].at(self.residual.t[i]),
+            Some(_) => 0.0,
+        })
+    }
+
+    /// Size of a bell beside those of a fit, in standard deviations of a calm log, with its best height; zero where it is not distinct.
+    pub fn weigh(&self, fitted: &Fitted, bell: &Bell) -> Bell {
+        let (residual, j) = (self.residual, bell.joint);
+        let (first, last) = self.reach(bell);
+        let shape = bell.over(&residual.t[first..last], residual.step);
+        let weighted = |weights: &Vec<f64>| -> Vec<f64> {
+            shape.iter().zip(&weights[first..last]).map(|(shape, weight)| shape * weight).collect()
+        };
+        let [judged, heeded] = [0, 1].map(|w| weighted(&fitted.weights[j][w]));
+        let columns = &residual.joints[j].columns;
+        let parts: Vec<&[f64]> = columns.iter().chain([&fitted.left[j]]).map(|x| &x[first..last]).collect();
+        let (c, k) = (columns.len(), columns.len() + fitted.bells.len());
+        // What the bell shares with the columns, by the weights it is judged with and by those they are fitted with.
+        let products = cross(&[&judged, &heeded], &parts);
+        let mut shared = DMatrix::<f64>::zeros(k, 2);
+        for (s, weighted) in [&judged, &heeded].into_iter().enumerate() {
+            shared.column_mut(s).rows_mut(0, c).copy_from_slice(&products[s * (c + 1)..][..c]);
+            for (b, other) in fitted.bells.iter().enumerate().filter(|(_, b)| b.joint == j) {
+                let times = residual.t[first..last].iter();
+                shared[(c + b, s)] = -times.zip(weighted).map(|(t, w)| w * other.at(*t)).sum::<f64>();
+            }
+        }
+        let (along, full) = (products[c], product(&judged, &shape));
+        let imitated = shared.column(0).dot(&(&fitted.inverse * shared.column(1)));
+        let own = (full - imitated).max(0.02 * full).max(1e-300);
+        let size = along / own.sqrt() * (MODEL_TIME / JUDGED_TIME).sqrt();
+        let distinct = own > DISTINCT * full;
+        let sigma = (JUDGED_TIME / MODEL_TIME / own).sqrt();
+        Bell { height: along / own, sigma, z: if distinct { size.abs() } else { 0.0 }, ..*bell }
+    }
+
+    /// Times at which a bell lies within the log.
+    pub fn span(&self, width: f64) -> (f64, f64) {
+        let t = &self.residual.t;
+        (t[0] + 2.0 * width, t[t.len() - 1] - 2.0 * width)
+    }
+
+    /// Grid points that a bell reaches.
+    fn reach(&self, bell: &Bell) -> (usize, usize) {
+        let t = &self.residual.t;
+        let from = bell.time - 4.0 * bell.width;
+        let to = bell.time + 4.0 * bell.width;
+        (t.partition_point(|t| *t < from), t.partition_point(|t| *t <= to))
+    }
+}

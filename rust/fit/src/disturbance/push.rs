@@ -1,0 +1,301 @@
+//! Pushes from outside: torques that no log shows, at one time of one log, judged inside that log.
+//!
+//! [`residual`](super::residual) is the torque that a log lacks under a model, beside everything the model could be wrong by; [`search`](super::search) finds in it what
+//! comes once and does not follow from the state; [`outlying`](super::outlying) finds what is too light for that; [`fit`](super::fit) sizes it by output error, where
+//! the model is good enough for that; [`law`](super::law) tells it from what a limit of the drive or a stop does.
+
+use super::bell::Bell;
+use super::own::Own;
+use super::residual::Residual;
+use super::search::{MAX_PUSHES, search};
+use crate::likelihood::context::DiagnosisContext;
+use crate::log::track::Track;
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::progress::Phase;
+use crate::search::acceptance::{FAINTEST, min_relevance};
+use crate::search::belief::{belief_beside, left_beside, left_over};
+use crate::search::model_search::Attribution;
+use armgap_core::arm::Arm;
+use armgap_core::effect::find;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+/// Shortest push that is reported, s.
+pub(super) const SHORTEST: f64 = 0.005;
+
+/// Pieces of one log follow each other within this many sample periods.
+const FOLLOWS: f64 = 8.0;
+
+/// Part of a joint's travel that counts as its end.
+const NEAR_END: f64 = 0.12;
+
+/// Probability left to a push beside a remainder that nothing explains.
+const REMAINDER_DOUBT: f64 = 0.5;
+
+/// Predictions that miss by more than this factor are much worse.
+const MUCH_WORSE: f64 = 1.5;
+
+/// A push's impulse exceeds its standard deviation by this factor.
+const KNOWN: f64 = 2.0;
+
+/// Shortest log that is judged, s.
+const SHORTEST_LOG: f64 = 1.5;
+
+/// A push that was found.
+#[derive(Debug, Clone)]
+pub struct Disturbance {
+    /// Whether it lies in a holdout log rather than a training log.
+    pub holdout: bool,
+    /// Index of the log.
+    pub track: usize,
+    /// The push.
+    pub push: EffectInstance,
+    /// Standard deviations of its values.
+    pub sigma: [f64; 3],
+    /// Share of the cost of the windows it touches that it explains.
+    pub share: f64,
+    /// Probability that it is a push rather than something else that the model lacks.
+    pub probability: f64,
+}
+
+/// An attribution, and the external disturbances beside it.
+pub struct Conclusion<const N: usize, const P: usize> {
+    /// The attribution beside the disturbances.
+    pub attribution: Attribution<N, P>,
+    /// The one without them, where there are any.
+    pub alone: Option<Attribution<N, P>>,
+    /// The disturbances.
+    pub disturbances: Vec<Disturbance>,
+}
+
+impl<const N: usize, const P: usize> Conclusion<N, P> {
+    /// The attribution of the logs as they are.
+    pub fn without_disturbances(&self) -> &Attribution<N, P> {
+        self.alone.as_ref().unwrap_or(&self.attribution)
+    }
+
+    fn without(attribution: Attribution<N, P>) -> Self {
+        Self { attribution, alone: None, disturbances: Vec::new() }
+    }
+}
+
+/// What pushes are judged against.
+pub(super) struct PushState<'a, const N: usize, const P: usize> {
+    /// The model with all named causes.
+    pub(super) model: &'a Hypothesis<P>,
+    /// Covariance of its values.
+    pub(super) covariance: &'a DMatrix<f64>,
+    /// Scales of the residuals under it.
+    pub(super) scale: [f64; N],
+    /// Whether it leaves more unexplained than noise.
+    pub(super) remainder: bool,
+    /// Improvement relative to the motion below which nothing is worth a name.
+    pub(super) min_relevance: f64,
+    /// Improvement relative to the motion below which nothing is worth a name, for what stands far out of noise.
+    pub(super) faintest: f64,
+}
+
+/// Where a piece of a log is kept: whether in the holdout, and its index there.
+pub(super) type Place = (usize, usize);
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// An attribution of the logs as they are, with all pushes accounted for.
+    ///
+    /// Where that model describes the arm, pushes are looked for again under it. Beside a remainder they are kept as they were found: there
+    /// the second model was seen to take up a part of the pushes, and the second search to find fewer. Pushes beside which predictions miss
+    /// by much more than without are none. A law that explains some of them in their place stays beside the rest.
+    pub fn conclude(
+        &mut self,
+        mut alone: Attribution<N, P>,
+        max_causes: usize,
+        seed: u64,
+    ) -> Conclusion<N, P> {
+        let faint = alone.causes.is_empty();
+        let mut disturbances = self.disturbances(&alone, faint);
+        let law = self.law_in_place(&alone, &disturbances);
+        if law.is_some() {
+            alone = self.attribute(max_causes, seed, law.clone());
+            disturbances = self.disturbances(&alone, faint);
+        }
+        if disturbances.is_empty() {
+            return Conclusion::without(alone);
+        }
+        self.set_pushes(&disturbances);
+        let beside = self.attribute(max_causes, seed, law);
+        let harmful = beside.error() > MUCH_WORSE * alone.error();
+        if harmful {
+            disturbances.clear();
+        } else if !alone.is_unexplained() {
+            disturbances = self.disturbances(&beside, faint);
+        }
+        self.set_pushes(&disturbances);
+        if disturbances.is_empty() {
+            return Conclusion::without(alone);
+        }
+        // Like a further cause, a push answers for the gap it was taken up for.
+        let left = left_over(&beside.nodes).max(left_beside(&alone.nodes, &beside.nodes));
+        let belief = belief_beside(left, REMAINDER_DOUBT);
+        for disturbance in &mut disturbances {
+            disturbance.probability *= belief;
+        }
+        Conclusion { attribution: beside, alone: Some(alone), disturbances }
+    }
+
+    /// Pushes that the model of an attribution leaves unexplained, log by log; faint ones too where no greater cause was found without them.
+    fn disturbances(&self, attribution: &Attribution<N, P>, faint: bool) -> Vec<Disturbance> {
+        let (first, last) = (&attribution.nodes[0], &attribution.nodes[attribution.nodes.len() - 1]);
+        let state = PushState {
+            model: &attribution.model.hypothesis,
+            covariance: &attribution.model.covariance.matrix,
+            scale: last.weights.training.scale,
+            remainder: attribution.is_unexplained(),
+            min_relevance: min_relevance(first.relative_error()),
+            faintest: if faint { FAINTEST } else { min_relevance(first.relative_error()) },
+        };
+        let recordings = self.recordings();
+        self.progress.begin(Phase::Pushes, recordings.len());
+        let found: Vec<Vec<Disturbance>> = recordings
+            .par_iter()
+            .map(|places| {
+                self.progress.unit();
+                self.in_recording(places, &state)
+            })
+            .collect();
+        found.into_iter().flatten().collect()
+    }
+
+    fn in_recording(&self, places: &[Place], state: &PushState<'_, N, P>) -> Vec<Disturbance> {
+        let own = Own::new(self, places, state);
+        let mut disturbances = Vec::new();
+        if places.iter().any(|place| self.could_hold_a_push(*place, state)) {
+            disturbances = self.of_bells(places, state, &own);
+        }
+        if !state.remainder {
+            for place in places {
+                self.in_outlying_windows(*place, state, &own, &mut disturbances);
+            }
+            let all: Vec<Bell> = disturbances.iter().map(Disturbance::as_bell).collect();
+            disturbances.retain(|e| !self.meets_an_end(e, &all));
+        }
+        // So many are no rare events, but something that the arm does again and again.
+        if disturbances.len() < MAX_PUSHES { disturbances } else { Vec::new() }
+    }
+
+    /// Pushes that stand out of the torque that a recording lacks.
+    fn of_bells(
+        &self,
+        places: &[Place],
+        state: &PushState<'_, N, P>,
+        own: &Own<'_, A, N, P>,
+    ) -> Vec<Disturbance> {
+        let pieces: Vec<&Track<N>> = places.iter().map(|p| self.track(*p)).collect();
+        let whole = Track::joined(&pieces).filter(|t| t.t[t.len() - 1] - t.t[0] > SHORTEST_LOG);
+        let residual = whole.and_then(|track| Residual::new(&self.arm, &track, state.model, &self.prior));
+        let Some(found) = residual.and_then(|r| search(&r, state.remainder)) else { return Vec::new() };
+        let mut disturbances: Vec<Disturbance> = Vec::new();
+        for bell in &found.bells {
+            let Some(rough) = self.rough(places, bell, found.rest) else { continue };
+            disturbances.extend(self.sized(rough, state, own, &disturbances));
+        }
+        disturbances.retain(|e| e.is_known() && !self.meets_an_end(e, &found.bells));
+        disturbances
+    }
+
+    /// Whether a push and another one on its joint both drive it back from the same end of its travel: that is where it touches something.
+    fn meets_an_end(&self, disturbance: &Disturbance, bells: &[Bell]) -> bool {
+        let joint = disturbance.push.joint;
+        let [from, to] = self.scales.travel[joint];
+        let end = |q: f64, height: f64| -> i8 {
+            let depth = (q - from) / (to - from);
+            i8::from(depth > 1.0 - NEAR_END && height < 0.0) - i8::from(depth < NEAR_END && height > 0.0)
+        };
+        let track = self.track(disturbance.place());
+        let at = |t: f64| track.q[track.t.partition_point(|x| *x < t).min(track.len() - 1)][joint];
+        let own = end(at(disturbance.push.p[1]), disturbance.push.p[0]);
+        let inside =
+            |b: &&Bell| b.joint == joint && (track.t[0]..=track.t[track.len() - 1]).contains(&b.time);
+        own != 0 && bells.iter().filter(inside).filter(|b| end(at(b.time), b.height) == own).count() > 1
+    }
+
+    /// A push as the lacking torque shows it.
+    fn rough(&self, places: &[Place], bell: &Bell, rest: f64) -> Option<Disturbance> {
+        let covers = |p: &&Place| self.track(**p).t[0] <= bell.time;
+        let &(set, track) = places.iter().rfind(covers)?;
+        let law = find::<f64>("external_pulse")?;
+        let duration = bell.duration().max(SHORTEST);
+        let impulse = bell.impulse();
+        let sigma = bell.sigma / bell.height.abs().max(1e-300);
+        Some(Disturbance {
+            holdout: set == 1,
+            track,
+            push: EffectInstance::new(law, bell.joint, [impulse, bell.time, duration]),
+            sigma: [sigma * impulse.abs(), sigma * bell.width, sigma * duration],
+            share: 0.0,
+            probability: 1.0 - 0.5 * (rest / bell.z).powi(2).min(1.0),
+        })
+    }
+
+    /// Logs as they were recorded: pieces of the same log that follow each other in time belong together.
+    fn recordings(&self) -> Vec<Vec<Place>> {
+        let all = [&self.training, &self.holdout];
+        let mut places: Vec<Place> =
+            (0..2).flat_map(|s| (0..all[s].data.tracks.len()).map(move |i| (s, i))).collect();
+        places.sort_by(|a, b| self.track(*a).t[0].total_cmp(&self.track(*b).t[0]));
+        let mut recordings: Vec<Vec<Place>> = Vec::new();
+        for place in places {
+            let open = recordings.iter_mut().find(|r| r.last().is_some_and(|l| self.follows(*l, place)));
+            match open {
+                Some(recording) => recording.push(place),
+                None => recordings.push(vec![place]),
+            }
+        }
+        recordings
+    }
+
+    fn follows(&self, before: Place, after: Place) -> bool {
+        let (a, b) = (self.track(before), self.track(after));
+        let gap = b.t[0] - a.t[a.len() - 1];
+        stem(&a.name) == stem(&b.name) && gap > 0.0 && gap < FOLLOWS * a.period()
+    }
+
+    pub(super) fn track(&self, (set, index): Place) -> &Track<N> {
+        &[&self.training, &self.holdout][set].data.tracks[index]
+    }
+
+    /// Puts pushes into the logs they belong to, in place of those known before.
+    pub fn set_pushes(&mut self, disturbances: &[Disturbance]) {
+        for (set, sample) in [&mut self.training, &mut self.holdout].into_iter().enumerate() {
+            for (index, track) in sample.data.tracks.iter_mut().enumerate() {
+                track.pushes =
+                    disturbances.iter().filter(|e| e.place() == (set, index)).map(|e| e.push).collect();
+            }
+        }
+    }
+}
+
+impl Disturbance {
+    /// Whether its impulse is known not to be zero.
+    fn is_known(&self) -> bool {
+        self.clarity() > KNOWN
+    }
+
+    /// Its impulse in standard deviations.
+    pub fn clarity(&self) -> f64 {
+        self.push.p[0].abs() / self.sigma[0]
+    }
+
+    /// When, where and which way.
+    fn as_bell(&self) -> Bell {
+        let [height, time, width] = self.push.p;
+        Bell { joint: self.push.joint, time, width, height, sigma: self.sigma[0], z: 0.0 }
+    }
+
+    pub(super) fn place(&self) -> Place {
+        (usize::from(self.holdout), self.track)
+    }
+}
+
+/// Name of a log without what says which part of it this is.
+fn stem(name: &str) -> &str {
+    name.split(" (").next().unwrap_or(name)
+}

@@ -1,0 +1,85 @@
+//! How far a joint's residual scatters at every point of a log: more where the motion is violent, less where it is calm.
+//!
+//! The squared residual is taken as a sum of non-negative multiples of the log's activity (multiplicative updates of the likelihood of
+//! a scale mixture, so that single large values hardly count), and joined with the median of its size around each point.
+
+use super::residual::Residual;
+use crate::log::track::median;
+
+/// Degrees of freedom of the residual's tails.
+const FREEDOM: f64 = 5.0;
+
+/// Updates of the multiples.
+const UPDATES: usize = 60;
+
+/// Standard deviations of quiet and violent places, relative to the typical one.
+const QUIET: f64 = 0.5;
+const VIOLENT: f64 = 8.0;
+
+/// Half width of the stretch that a local median is taken over, s.
+const AROUND: f64 = 1.0;
+
+/// Points that a median is taken of at least.
+const FEWEST: usize = 40;
+
+/// From the median of absolute values to a standard deviation.
+const NORMAL: f64 = 1.4826;
+
+/// What a model of this kind never does better than, relative to the torque that the joint needs.
+const FLOOR: f64 = 0.002;
+
+/// Standard deviation of joint `j`'s residual at every grid point.
+pub fn scatter<const N: usize>(residual: &Residual<N>, j: usize, left: &[f64]) -> Vec<f64> {
+    let moves: Vec<bool> = residual.joints[j].rest.iter().map(|r| *r < 0.3).collect();
+    let of_moving = |x: &[f64]| x.iter().zip(&moves).filter(|(_, m)| **m).map(|(x, _)| x.abs()).collect();
+    let floor = FLOOR * residual.joints[j].typical;
+    let typical = (NORMAL * median(of_moving(left))).max(floor).max(1e-12);
+    let by_activity = by_activity(residual, j, left, &moves, typical);
+    let half = (AROUND / residual.step).round() as usize;
+    let mut local = typical;
+    let at = |i: usize| {
+        if i.is_multiple_of(10) {
+            let range = i.saturating_sub(half)..(i + half).min(left.len());
+            let near: Vec<f64> = range.filter(|&k| moves[k]).map(|k| left[k].abs()).collect();
+            local = if near.len() > FEWEST { NORMAL * median(near) } else { typical };
+        }
+        (local * local + by_activity[i] + floor * floor).sqrt()
+    };
+    (0..left.len()).map(at).collect()
+}
+
+/// Variances by activity.
+fn by_activity<const N: usize>(
+    residual: &Residual<N>,
+    j: usize,
+    left: &[f64],
+    moves: &[bool],
+    typical: f64,
+) -> Vec<f64> {
+    let near_rest: Vec<f64> = residual.joints[j].rest.iter().map(|r| 4.0 * r * (1.0 - r)).collect();
+    let even = vec![1.0; left.len()];
+    let features: Vec<&Vec<f64>> = [&even, &near_rest].into_iter().chain(residual.activity.iter()).collect();
+    let least = 1e-3 * typical * typical;
+    let sum = |a: &[f64], at: &[f64]| a.iter().zip(at).map(|(a, f)| a * f).sum::<f64>().max(least);
+    let rows: Vec<usize> = (0..left.len()).filter(|&i| moves[i]).collect();
+    let flat: Vec<f64> = rows.iter().flat_map(|&i| features.iter().map(move |f| f[i])).collect();
+    let mut a = vec![typical * typical / features.len() as f64; features.len()];
+    for _ in 0..UPDATES {
+        let (mut up, mut down) = (vec![0.0; a.len()], vec![1e-300; a.len()]);
+        for (at, &i) in flat.chunks_exact(a.len()).zip(&rows) {
+            let precision = 1.0 / sum(&a, at);
+            let square = left[i] * left[i] * precision;
+            let weight = (FREEDOM + 1.0) / (FREEDOM + square) * square * precision;
+            for ((up, down), feature) in up.iter_mut().zip(&mut down).zip(at) {
+                *up += feature * weight;
+                *down += feature * precision;
+            }
+        }
+        for k in 0..a.len() {
+            a[k] = (a[k] * (up[k] / down[k]).sqrt()).max(1e-8 * typical * typical);
+        }
+    }
+    let variance = |i: usize| a.iter().zip(&features).map(|(a, f)| a * f[i]).sum::<f64>().max(least);
+    let (least, most) = ((QUIET * typical).powi(2), (VIOLENT * typical).powi(2));
+    (0..left.len()).map(|i| variance(i).clamp(least, most)).collect()
+}

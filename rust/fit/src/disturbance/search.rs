@@ -1,0 +1,231 @@
+//! Pushes in the lacking torque of one log: bells that stand out once everything the model could be wrong by has been allowed for.
+//!
+//! Parameters, unknown laws and pushes are fitted together, linearly; what a bell at one time, of one width, on one joint would gain is
+//! weighed against the scatter there and against how much of the bell the other columns could imitate (a generalised likelihood ratio).
+//! The largest are added one by one, for one push hides another by raising the scatter, and then the doubtful are taken out again; beside a
+//! remainder also those that stand out only as long as they are fitted.
+
+use super::bell::{Bell, all_but};
+use super::linear::{Fitted, Linear};
+use super::residual::Residual;
+use crate::log::track::median;
+use rayon::prelude::*;
+
+/// Standard deviations of bells that are looked for, as they appear behind the low-pass, s.
+const WIDTHS: [f64; 7] = [0.045, 0.055, 0.07, 0.09, 0.115, 0.145, 0.18];
+
+/// Distance of centres that are tried, s, coarse and fine, and how far a fine search goes.
+const COARSE: f64 = 0.02;
+const FINE: f64 = 0.01;
+const REFINED: f64 = 0.08;
+
+/// Size, in standard deviations, from which a bell is tried, and from which it is a push: on an arm that the model describes; on one
+/// that it does not, if the bell also exceeds the joint's friction; on any.
+const TRIED: f64 = 2.5;
+const LIKELY: f64 = 5.0;
+const ABOVE_REMAINDER: f64 = 3.9;
+const CERTAIN: f64 = 12.0;
+
+/// Size that a bell has to have while what it consists of still counts as scatter. A log whose largest bell is smaller holds no push, not
+/// even ones that hide each other.
+const STANDS_OUT: f64 = 3.6;
+
+/// Height, relative to the joint's friction at rest, from which a push exceeds it.
+const ABOVE_FRICTION: f64 = 1.2;
+
+/// Pushes that are looked for in one log; as many are no rare events.
+pub const MAX_PUSHES: usize = 8;
+
+/// A joint that moves for less than this, s, is not judged.
+const MOVES: f64 = 0.5;
+
+/// The pushes of a log and the largest of what is left.
+pub struct Found {
+    /// Pushes, in the order in which they were found.
+    pub bells: Vec<Bell>,
+    /// Size of the largest bell that is none.
+    pub rest: f64,
+}
+
+impl Found {
+    /// Takes a bell out as no push.
+    fn dismiss(&mut self, bell: usize) {
+        self.rest = f64::max(self.rest, self.bells.remove(bell).z.min(LIKELY));
+    }
+}
+
+struct Search<'a, const N: usize> {
+    linear: Linear<'a, N>,
+    /// Whether the model leaves more unexplained than noise.
+    remainder: bool,
+    /// Size of chance bells per joint and width, at least one.
+    chance: Vec<Vec<f64>>,
+}
+
+/// Looks for pushes in a log; `remainder` tells whether the model leaves more unexplained than noise.
+pub fn search<const N: usize>(residual: &Residual<N>, remainder: bool) -> Option<Found> {
+    let chance = vec![vec![1.0; WIDTHS.len()]; N];
+    let mut search = Search { linear: Linear::new(residual), remainder, chance };
+    let bells = search.gather()?;
+    let mut found = Found { bells, rest: TRIED };
+    search.drop_doubtful(&mut found)?;
+    if remainder {
+        search.drop_aided(&mut found)?;
+    }
+    Some(found)
+}
+
+impl<const N: usize> Search<'_, N> {
+    /// The largest bells, one by one.
+    fn gather(&mut self) -> Option<Vec<Bell>> {
+        let mut bells: Vec<Bell> = Vec::new();
+        loop {
+            let fitted = self.linear.settle(&bells)?;
+            let largest = self.scan(&fitted);
+            if bells.is_empty() && largest.is_none_or(|b| b.z < STANDS_OUT) {
+                return Some(bells);
+            }
+            bells = self.refine(bells)?;
+            let Some(next) = largest.filter(|b| b.z > TRIED) else { return Some(bells) };
+            if bells.len() == MAX_PUSHES {
+                return Some(bells);
+            }
+            bells.push(next);
+            bells = self.refine(bells)?;
+        }
+    }
+
+    /// Takes out, the weakest first, what is no push beside the others.
+    fn drop_doubtful(&mut self, found: &mut Found) -> Option<()> {
+        while !found.bells.is_empty() {
+            self.settle(&mut found.bells)?;
+            let doubt = |b: &Bell| if self.stands(b) { b.z } else { 0.0 };
+            let sizes: Vec<f64> = found.bells.iter().map(doubt).collect();
+            let weakest = least(&sizes)?;
+            if self.stands(&found.bells[weakest]) {
+                break;
+            }
+            found.dismiss(weakest);
+        }
+        Some(())
+    }
+
+    /// Takes out, the weakest first, what stands out only as long as it is fitted: beside a remainder a bell takes what the model lacks there
+    /// for its own, and so seems to stand in a calm place.
+    fn drop_aided(&mut self, found: &mut Found) -> Option<()> {
+        while !found.bells.is_empty() {
+            let bells = &found.bells;
+            let unaided = |i| if self.stands(&bells[i]) { self.unaided(bells, i) } else { Some(0.0) };
+            let sizes: Vec<f64> = (0..bells.len()).map(unaided).collect::<Option<_>>()?;
+            let weakest = least(&sizes)?;
+            if sizes[weakest] > STANDS_OUT {
+                break;
+            }
+            found.dismiss(weakest);
+            self.settle(&mut found.bells)?;
+        }
+        Some(())
+    }
+
+    /// Bells where and as wide as they fit best beside each other, judged by the scatter that they leave.
+    fn settle(&mut self, bells: &mut Vec<Bell>) -> Option<()> {
+        let fitted = self.linear.settle(bells)?;
+        self.scan(&fitted);
+        *bells = self.refine(std::mem::take(bells))?;
+        Some(())
+    }
+
+    /// Whether a bell is a push.
+    fn stands(&self, bell: &Bell) -> bool {
+        let above = bell.height.abs() > ABOVE_FRICTION * self.linear.residual.joints[bell.joint].holding;
+        if self.remainder { bell.z > CERTAIN || (bell.z > ABOVE_REMAINDER && above) } else { bell.z > LIKELY }
+    }
+
+    /// Size of a bell beside the others where it has to stand out of a scatter that it raises itself.
+    fn unaided(&mut self, bells: &[Bell], i: usize) -> Option<f64> {
+        let others = all_but(bells, i);
+        let fitted = self.linear.settle(&others)?;
+        self.scan(&fitted);
+        Some(self.best_near(&fitted, &bells[i], true).z)
+    }
+
+    /// Bells of all widths over the log; keeps what their sizes typically are, and gives the largest.
+    fn scan(&mut self, fitted: &Fitted) -> Option<Bell> {
+        let moves = |j: usize| self.linear.moving[j].iter().sum::<f64>() * self.linear.residual.step > MOVES;
+        let kinds: Vec<(usize, usize)> =
+            (0..N).filter(|&j| moves(j)).flat_map(|j| (0..WIDTHS.len()).map(move |w| (j, w))).collect();
+        let scanned: Vec<(f64, Option<Bell>)> =
+            kinds.par_iter().map(|(joint, w)| self.scan_kind(fitted, *joint, WIDTHS[*w])).collect();
+        let mut largest: Option<Bell> = None;
+        for ((joint, w), (chance, best)) in kinds.into_iter().zip(scanned) {
+            self.chance[joint][w] = chance;
+            largest = largest.filter(|l| best.is_none_or(|b| l.z >= b.z)).or(best);
+        }
+        largest
+    }
+
+    /// Bells of one width on one joint: what their sizes typically are, and the largest in units of that.
+    fn scan_kind(&self, fitted: &Fitted, joint: usize, width: f64) -> (f64, Option<Bell>) {
+        let (from, to) = self.linear.span(width);
+        let count = ((to - from) / COARSE).floor().max(0.0) as usize;
+        let tried: Vec<Bell> = (0..count)
+            .map(|i| from + i as f64 * COARSE)
+            .map(|time| Bell { joint, time, width, height: 0.0, sigma: 0.0, z: 0.0 })
+            .map(|bell| self.linear.weigh(fitted, &bell))
+            .collect();
+        let chance = self.typical(joint, &tried);
+        let apart = |b: &Bell| fitted.bells.iter().all(|o| !b.touches(o));
+        let best = tried.into_iter().filter(apart).max_by(|a, b| a.z.total_cmp(&b.z));
+        (chance, best.map(|best| Bell { z: best.z / chance, ..best }))
+    }
+
+    /// Size that bells of one kind have by chance in this log, where the joint moves; at least one.
+    fn typical(&self, joint: usize, tried: &[Bell]) -> f64 {
+        let t = &self.linear.residual.t;
+        let moves =
+            |b: &&Bell| self.linear.moving[joint][t.partition_point(|t| *t < b.time).min(t.len() - 1)] > 0.5;
+        let mut sizes: Vec<f64> = tried.iter().filter(moves).map(|b| b.z).collect();
+        if sizes.len() < 20 {
+            return 1.0;
+        }
+        sizes.sort_by(f64::total_cmp);
+        let middle = 1.4826 * median(sizes.clone());
+        middle.max(sizes[sizes.len() * 9 / 10] / 1.645).max(1.0)
+    }
+
+    /// Times and widths that fit each bell best beside the others.
+    fn refine(&self, bells: Vec<Bell>) -> Option<Vec<Bell>> {
+        let mut bells = bells;
+        for i in 0..bells.len() {
+            let fitted = self.linear.fit(&all_but(&bells, i))?;
+            bells[i] = self.best_near(&fitted, &bells[i], false);
+        }
+        Some(bells)
+    }
+
+    /// The bell that fits best near one that the fit leaves out, or the one that stands out most.
+    fn best_near(&self, fitted: &Fitted, bell: &Bell, stands_out: bool) -> Bell {
+        let mut best = Bell { z: -1.0, ..*bell };
+        let mut largest = -1.0;
+        let steps = (REFINED / FINE).round() as i32;
+        for (w, &width) in WIDTHS.iter().enumerate() {
+            let (from, to) = self.linear.span(width);
+            let chance = self.chance[bell.joint][w];
+            for step in -steps..=steps {
+                let time = (bell.time + f64::from(step) * FINE).max(from).min(to);
+                let tried = self.linear.weigh(fitted, &Bell { time, width, ..*bell });
+                let size = if stands_out { tried.z / chance } else { tried.z };
+                if size > largest && fitted.bells.iter().all(|o| !tried.touches(o)) {
+                    best = Bell { z: tried.z / chance, sigma: tried.sigma * chance, ..tried };
+                    largest = size;
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Index of the smallest number.
+fn least(sizes: &[f64]) -> Option<usize> {
+    (0..sizes.len()).min_by(|&a, &b| sizes[a].total_cmp(&sizes[b]))
+}

@@ -1,0 +1,210 @@
+//! Covariance of fitted values, by the jackknife over windows.
+//!
+//! Windows are the independent observations. Leaving window `w` out moves the fitted values, to first order, by
+//!
+//! ```text
+//! d_w = (H - H_w)^-1 g_w,
+//! ```
+//!
+//! with `H` the curvature of the cost, `H_w` the window's part of it and `g_w` its score. The sum of `d_w d_w'` is the jackknife's
+//! covariance (Efron and Stein 1981; CR3 of Bell and `McCaffrey` 2002): unlike the scatter of scores it knows that a window which alone
+//! bears a value has drawn that value to itself. How many windows bear a value says which Student distribution its error follows: with
+//! `a_w = H^-1 H_w H^-1`,
+//!
+//! ```text
+//! freedom = (sum of a_w)^2 / sum of a_w^2        (diagonal elements; Satterthwaite 1946)
+//! ```
+
+use crate::likelihood::weighting::Gram;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// A window without which a value would be known by this factor less is indispensable.
+const INDISPENSABLE: f64 = 1e3;
+
+/// Keeps a curvature of unit diagonal invertible.
+const JITTER: f64 = 1e-12;
+
+/// Beyond this many degrees of freedom a Student distribution is normal.
+const NORMAL: f64 = 1e3;
+
+/// Two-sided 95 % of the normal distribution.
+pub const NORMAL_95: f64 = 1.96;
+
+/// Covariance of fitted values and what it rests on.
+#[derive(Debug, Clone)]
+pub struct ParameterCovariance {
+    /// Covariance, with each window as one independent observation.
+    pub matrix: DMatrix<f64>,
+    /// Degrees of freedom of each value's variance.
+    pub degrees_of_freedom: Vec<f64>,
+}
+
+impl ParameterCovariance {
+    /// Infinite variances of `k` values.
+    fn unknown(k: usize) -> Self {
+        Self {
+            matrix: DMatrix::from_diagonal_element(k, k, f64::INFINITY),
+            degrees_of_freedom: vec![NORMAL; k],
+        }
+    }
+
+    /// Of values that were fitted with the inner products `gram`, under a prior of the precisions `prior_precision`. A value that changes no
+    /// prediction is as likely anywhere within its `range`.
+    pub fn new(gram: &Gram, prior_precision: &[f64], range: &[f64]) -> Self {
+        let k = prior_precision.len();
+        let precision = |i: usize| gram.total[(i, i)] + prior_precision[i];
+        let (seen, unseen): (Vec<usize>, Vec<usize>) = (0..k).partition(|&i| precision(i) > 0.0);
+        let Some(known) = Determined::new(gram, prior_precision, &seen) else { return Self::unknown(k) };
+        let mut spread = Self { matrix: DMatrix::zeros(k, k), degrees_of_freedom: vec![NORMAL; k] };
+        for (a, &i) in seen.iter().enumerate() {
+            for (b, &j) in seen.iter().enumerate() {
+                spread.matrix[(i, j)] = known.covariance[(a, b)] / (precision(i) * precision(j)).sqrt();
+            }
+            spread.degrees_of_freedom[i] = known.degrees_of_freedom[a];
+        }
+        for i in unseen {
+            spread.matrix[(i, i)] = range[i].powi(2) / 12.0;
+        }
+        spread
+    }
+
+    /// Factor by which 95 % intervals are wider than those of a normal error.
+    pub fn student_t_factor(&self, i: usize) -> f64 {
+        StudentsT::new(0.0, 1.0, self.degrees_of_freedom[i])
+            .map_or(1.0, |t| (t.inverse_cdf(0.975) / NORMAL_95).max(1.0))
+    }
+}
+
+/// Covariance and degrees of freedom of the values on which predictions depend, each in units of its standard deviation given the others.
+struct Determined {
+    covariance: DMatrix<f64>,
+    degrees_of_freedom: Vec<f64>,
+}
+
+impl Determined {
+    fn new(gram: &Gram, prior_precision: &[f64], seen: &[usize]) -> Option<Self> {
+        let k = seen.len();
+        let unit: Vec<f64> =
+            seen.iter().map(|&i| (gram.total[(i, i)] + prior_precision[i]).sqrt().recip()).collect();
+        let trusted = DVector::from_fn(k, |a, _| prior_precision[seen[a]] * unit[a].powi(2));
+        let mut curvature = DMatrix::from_fn(k, k, |a, b| gram.total[(seen[a], seen[b])] * unit[a] * unit[b]);
+        curvature.set_diagonal(&(curvature.diagonal() + &trusted).add_scalar(JITTER));
+        let whole = curvature.clone().cholesky()?;
+        let inverse = whole.inverse();
+        let mut covariance = &inverse * DMatrix::from_diagonal(&trusted) * &inverse;
+        let mut sums: Vec<[f64; 2]> = covariance.diagonal().iter().map(|prior| [*prior, 0.0]).collect();
+        for (w, score) in gram.scores.iter().enumerate() {
+            let within = gram.within(w, seen, &unit);
+            let product = &within * &inverse;
+            let parts = (0..k).map(|a| inverse.column(a).dot(&product.column(a)));
+            let rest = (&curvature - within).cholesky().filter(|rest| determines(rest, &whole));
+            for (sum, part) in sums.iter_mut().zip(parts) {
+                sum[0] += part;
+                sum[1] += if rest.is_some() { part * part } else { 0.0 };
+            }
+            if let Some(rest) = rest {
+                let mut moved = DVector::from_fn(k, |a, _| score[seen[a]] * unit[a]);
+                rest.solve_mut(&mut moved);
+                covariance.ger(1.0, &moved, &moved, 1.0);
+            } else {
+                covariance += &inverse * product * relative_cost(gram, w);
+            }
+        }
+        let degrees_of_freedom =
+            sums.iter().map(|[all, squares]| (all * all / squares).clamp(1.0, NORMAL)).collect();
+        Some(Self { covariance, degrees_of_freedom })
+    }
+}
+
+/// Cost of a window relative to the average over all, at least one.
+fn relative_cost(gram: &Gram, window: usize) -> f64 {
+    let left = |score: &DVector<f64>| score[score.len() - 1];
+    let average = gram.scores.iter().map(left).sum::<f64>() / gram.scores.len() as f64;
+    if average > 0.0 { (left(&gram.scores[window]) / average).max(1.0) } else { 1.0 }
+}
+
+/// Whether a part of the curvature still determines every value, given those before it.
+fn determines(rest: &Cholesky<f64, Dyn>, whole: &Cholesky<f64, Dyn>) -> bool {
+    let (rest, whole) = (rest.l_dirty(), whole.l_dirty());
+    (0..rest.nrows()).all(|i| rest[(i, i)].powi(2) * INDISPENSABLE > whole[(i, i)].powi(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::random::Random;
+
+    /// Two values fitted to noise, whose columns have these sizes in each window: the values and their covariance.
+    fn fitted(sizes: &[[f64; 2]], random: &mut Random) -> ([f64; 2], ParameterCovariance) {
+        let mut rows: Vec<Vec<[f64; 3]>> = sizes
+            .iter()
+            .map(|size| {
+                let loud = 1.0 + 0.5 * random.normal().abs();
+                (0..20)
+                    .map(|_| [size[0] * random.normal(), size[1] * random.normal(), loud * random.normal()])
+                    .collect()
+            })
+            .collect();
+        let size =
+            (rows.iter().flatten().map(|r| r[2] * r[2]).sum::<f64>() / (20 * sizes.len()) as f64).sqrt();
+        rows.iter_mut().flatten().for_each(|r| r[2] /= size);
+        let products = |rows: &Vec<[f64; 3]>| -> Vec<f64> {
+            (0..9).map(|i| rows.iter().map(|r| r[i / 3] * r[i % 3]).sum()).collect()
+        };
+        let total = Gram::of(rows.iter().map(products).collect(), 2).total;
+        let seen = total.view((0, 0), (2, 2)) + DMatrix::from_diagonal_element(2, 2, JITTER);
+        let value = seen.cholesky().unwrap().solve(&total.view((0, 2), (2, 1)));
+        let left = |rows: &Vec<[f64; 3]>| {
+            rows.iter().map(|r| [r[0], r[1], r[2] - r[0] * value[0] - r[1] * value[1]]).collect()
+        };
+        let gram = Gram::of(rows.iter().map(left).map(|r| products(&r)).collect(), 2);
+        ([value[0], value[1]], ParameterCovariance::new(&gram, &[0.0; 2], &[1.0; 2]))
+    }
+
+    #[test]
+    fn intervals_hold_also_where_few_windows_bear_a_value() {
+        let mut random = Random(7);
+        let cases = 1000;
+        let shares = |sizes: &[[f64; 2]], random: &mut Random| -> [f64; 2] {
+            let mut held = [0.0; 2];
+            for _ in 0..cases {
+                let (value, spread) = fitted(sizes, random);
+                for i in 0..2 {
+                    let sigma = spread.matrix[(i, i)].sqrt() * spread.student_t_factor(i);
+                    held[i] += f64::from(u8::from(value[i].abs() < NORMAL_95 * sigma)) / f64::from(cases);
+                }
+            }
+            held
+        };
+        for few in [vec![1.0; 24], vec![1.0, 1.0, 1.0], vec![1.0, 0.5, 0.2], vec![1.0, 0.05], vec![1.0]] {
+            let sizes: Vec<[f64; 2]> = (0..24).map(|w| [1.0, few.get(w).copied().unwrap_or(0.0)]).collect();
+            for held in shares(&sizes, &mut random) {
+                assert!((0.93..0.999).contains(&held), "{few:?}: {held}");
+            }
+        }
+    }
+
+    #[test]
+    fn freedom_counts_the_windows_that_bear_a_value() {
+        let sizes: Vec<[f64; 2]> = (0..30).map(|w| [1.0, f64::from(u8::from(w < 3))]).collect();
+        let (_, spread) = fitted(&sizes, &mut Random(1));
+        assert!((20.0..30.0).contains(&spread.degrees_of_freedom[0]), "{}", spread.degrees_of_freedom[0]);
+        assert!((2.0..3.01).contains(&spread.degrees_of_freedom[1]), "{}", spread.degrees_of_freedom[1]);
+        assert!(spread.student_t_factor(0) < 1.07 && spread.student_t_factor(1) > 1.6);
+    }
+
+    #[test]
+    fn a_value_no_prediction_depends_on_is_anywhere_in_its_range() {
+        let (_, spread) = fitted(&[[1.0, 0.0]; 5], &mut Random(3));
+        assert!((spread.matrix[(1, 1)] - 1.0 / 12.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_trusted_value_keeps_its_trust() {
+        let gram = Gram::of(vec![vec![1.0, 0.0, 0.5, 0.0, 1e-9, 0.0, 0.5, 0.0, 1.0]; 4], 2);
+        let spread = ParameterCovariance::new(&gram, &[0.0, 25.0], &[1.0; 2]);
+        assert!((spread.matrix[(1, 1)].sqrt() - 0.2).abs() < 1e-6);
+        assert!(spread.student_t_factor(1) < 1.01);
+    }
+}

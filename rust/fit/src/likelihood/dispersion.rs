@@ -1,0 +1,64 @@
+//! Dispersion factor: standard deviations widened by the difference between fits to the training logs and to the holdout.
+//!
+//! A covariance from one set of windows knows how they scatter around their own fit, not what they all err by: an initial state
+//! behind a gear, friction that is smoother than the model's. What differs from motion to motion shows when the same model is fitted
+//! to other motions. Deviations are widened by the factor by which the two fits differ more than they should (the dispersion
+//! ratio of Birge 1932, over all values that the logs determine, and each value's own share of it).
+
+use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
+use crate::likelihood::solve::{Effort, Fit};
+use armgap_core::arm::Arm;
+
+/// A value counts as determined by a log if that log narrows its prior deviation to this part.
+const DETERMINED: f64 = 0.5;
+
+/// Weight of a value's own difference beside the dispersion of all: one observation of one degree of freedom.
+const OWN: f64 = 0.5;
+
+/// Deviations are not widened beyond this factor.
+const MOST: f64 = 1e3;
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// Multiplies the deviations of a fit by its dispersion factor against a fit of the same model to the holdout, and returns that one.
+    pub fn apply_dispersion_factor(&self, fit: &mut Fit<P>, weights: &SplitWeighting<N>) -> Fit<P> {
+        let other = self.judge(&weights.holdout).solve(&fit.hypothesis, Effort::FULL);
+        let squares = self.squared_differences(fit, &other);
+        let known: Vec<f64> = squares.iter().flatten().copied().collect();
+        if known.is_empty() {
+            return other;
+        }
+        let shared = known.iter().sum::<f64>() / known.len() as f64;
+        let factor: Vec<f64> = squares
+            .iter()
+            .map(|own| shared.max(own.unwrap_or(0.0) * OWN).clamp(1.0, MOST * MOST).sqrt())
+            .collect();
+        // What the arm file says of a value is no narrower for being told apart worse by the logs.
+        let widest = |i: usize| if i < P { self.prior.sigma[i] } else { f64::INFINITY };
+        let scale: Vec<f64> = (0..factor.len())
+            .map(|i| {
+                (factor[i] * fit.covariance.student_t_factor(i)).min((widest(i) / fit.sigma(i)).max(1.0))
+            })
+            .collect();
+        for ((i, j), value) in indices(factor.len()).zip(fit.covariance.matrix.iter_mut()) {
+            *value *= scale[i] * scale[j];
+        }
+        other
+    }
+
+    /// Squared difference of every determined value in units of its variance.
+    fn squared_differences(&self, here: &Fit<P>, there: &Fit<P>) -> Vec<Option<f64>> {
+        let (a, b) = (here.hypothesis.values(), there.hypothesis.values());
+        let one = |i: usize| {
+            let determined = |fit: &Fit<P>| i >= P || fit.sigma(i) < DETERMINED * self.prior.sigma[i];
+            let variance = here.sigma(i).powi(2) + there.sigma(i).powi(2);
+            let square = (a[i] - b[i]).powi(2) / variance;
+            (determined(here) && determined(there) && square.is_finite()).then_some(square)
+        };
+        (0..a.len()).map(one).collect()
+    }
+}
+
+/// Row and column of the entries of a square matrix, column by column.
+fn indices(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n).flat_map(move |j| (0..n).map(move |i| (i, j)))
+}

@@ -1,0 +1,111 @@
+//! The Jacobian of the predictions by the free values, at a point of a fit.
+
+use crate::likelihood::solve::{FitProblem, scaled_inverse};
+use crate::likelihood::weighting::Gram;
+use crate::model::hypothesis::Hypothesis;
+use armgap_core::arm::Arm;
+
+/// A column of which the others leave less than this part is collinear: then no columns are reused.
+const APART: f64 = 0.05;
+
+/// Jacobian columns of the free values, the first of them possibly reused from a neighbour, and their inner products.
+pub(crate) struct Jacobian<'a> {
+    reused_columns: &'a [Vec<f64>],
+    computed: Vec<Vec<f64>>,
+    pub(crate) gram: Gram,
+    /// Whether it is that of an earlier point.
+    pub(crate) is_reused: bool,
+}
+
+impl<'a> Jacobian<'a> {
+    /// All columns at the current point.
+    pub(crate) fn new<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        problem: &FitProblem<A, N, P>,
+        at: &Linearisation<P>,
+    ) -> Self {
+        Self::with(problem, at, &[])
+    }
+
+    /// With the columns `known` reused for the first values, unless the others are collinear with them.
+    pub(crate) fn reusing<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        problem: &FitProblem<A, N, P>,
+        at: &Linearisation<P>,
+        known: &'a [Vec<f64>],
+    ) -> Self {
+        let jacobian = Self::with(problem, at, known);
+        let apart = jacobian.reused_columns() == 0 || jacobian.are_distinct();
+        if apart { jacobian } else { Self::new(problem, at) }
+    }
+
+    fn with<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        problem: &FitProblem<A, N, P>,
+        at: &Linearisation<P>,
+        reused_columns: &'a [Vec<f64>],
+    ) -> Self {
+        let rest: Vec<usize> = (reused_columns.len()..at.hypothesis.values().len()).collect();
+        let computed = problem.sensitivities(&at.hypothesis, &at.residual, &rest);
+        let gram = Gram::default();
+        let mut jacobian = Self { reused_columns, computed, gram, is_reused: false };
+        jacobian.reuse_at(problem, at);
+        jacobian.is_reused = false;
+        jacobian
+    }
+
+    /// Whether no computed column is collinear with the others.
+    fn are_distinct(&self) -> bool {
+        let count = self.reused_columns() + self.computed.len();
+        let normal = self.gram.total.view((0, 0), (count, count)).into_owned();
+        scaled_inverse(&normal).is_some_and(|inverse| {
+            let left = |i: usize| 1.0 / (inverse[(i, i)] * normal[(i, i)]);
+            (self.reused_columns()..count).all(|i| normal[(i, i)] <= 0.0 || left(i) > APART)
+        })
+    }
+
+    /// Whether all columns belong to the current point.
+    pub(crate) fn is_current(&self) -> bool {
+        self.reused_columns() == 0 && !self.is_reused
+    }
+
+    /// Number of reused columns.
+    pub(crate) fn reused_columns(&self) -> usize {
+        self.reused_columns.len()
+    }
+
+    /// Reuses the columns at another point.
+    pub(crate) fn reuse_at<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        &mut self,
+        problem: &FitProblem<A, N, P>,
+        at: &Linearisation<P>,
+    ) {
+        let columns: Vec<&[f64]> =
+            self.reused_columns.iter().chain(&self.computed).map(Vec::as_slice).collect();
+        self.gram = problem.weighting.gram(problem.data, &columns, &at.residual);
+        self.is_reused = true;
+    }
+}
+
+/// A hypothesis with its residual and cost.
+pub(crate) struct Linearisation<const P: usize> {
+    pub(crate) hypothesis: Hypothesis<P>,
+    pub(crate) residual: Vec<f64>,
+    pub(crate) costs: Vec<f64>,
+    pub(crate) data_cost: f64,
+    pub(crate) prior_cost: f64,
+}
+
+impl<const P: usize> Linearisation<P> {
+    pub(crate) fn new<A: Arm<f64, N, P>, const N: usize>(
+        problem: &FitProblem<A, N, P>,
+        hypothesis: Hypothesis<P>,
+    ) -> Self {
+        let residual = problem.residual(&hypothesis);
+        let costs = problem.weighting.costs(problem.data, &residual);
+        let data_cost = problem.weighting.total(&costs);
+        let prior_cost = problem.prior.cost(&hypothesis.theta);
+        Self { hypothesis, residual, costs, data_cost, prior_cost }
+    }
+
+    pub(crate) fn cost(&self) -> f64 {
+        self.data_cost + self.prior_cost
+    }
+}

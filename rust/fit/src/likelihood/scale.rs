@@ -1,0 +1,159 @@
+//! Typical sizes on a given arm and log, by quantity: what "small" and "large" mean for an effect's parameter.
+
+use crate::log::track::Track;
+use crate::model::hypothesis::EffectInstance;
+use crate::predict::residual_torque::rms;
+use armgap_core::arm::Arm;
+use armgap_core::effect::{EffectParameter, NEVER, Quantity};
+use nalgebra::SVector;
+
+/// Typical sizes per joint.
+#[derive(Debug, Clone)]
+pub struct Scales<const N: usize> {
+    /// RMS torque.
+    pub torque: [f64; N],
+    /// RMS speed.
+    pub speed: [f64; N],
+    /// RMS deviation of position from its mean.
+    pub position: [f64; N],
+    /// Smallest and largest position.
+    pub travel: [[f64; 2]; N],
+    /// Own inertia at `q = 0`.
+    pub inertia: [f64; N],
+    /// Median sample period, s.
+    pub period: f64,
+    /// Length of the last link, m; 1 where unknown.
+    pub length: f64,
+    /// Acceleration of gravity, m/s^2.
+    pub gravity: f64,
+}
+
+/// A parameter this many times its typical size describes no arm; fits are kept below.
+const LARGEST: f64 = 50.0;
+
+/// Times are measured in sample periods; this many of them are possible.
+const LONGEST_TIME: f64 = 1000.0;
+
+/// A joint limit is soft if the joint's torque moves it by a share of the travel, hard if by this part of it.
+const HARDEST: f64 = 1e4;
+
+/// Laws that change with speed do so below this many times the RMS speed, or they are other laws.
+const FASTEST: f64 = 2.5;
+
+/// Natural frequency, 1/s, damping ratio, and the motor's share of the joint's inertia, of a typical elastic joint.
+const SHAFT_RATE: f64 = 100.0;
+const SHAFT_DAMPING: f64 = 0.2;
+const MOTOR_SHARE: f64 = 0.1;
+
+impl<const N: usize> Scales<N> {
+    /// Sizes seen in `tracks` on this arm.
+    pub fn new<A: Arm<f64, N, P>, const P: usize>(
+        arm: &A,
+        theta: &[f64; P],
+        tracks: &[Track<N>],
+        gravity: f64,
+        length: Option<f64>,
+    ) -> Self {
+        let inertia = arm.inertia(theta, &SVector::zeros());
+        Self {
+            torque: std::array::from_fn(|j| {
+                rms(tracks.iter().flat_map(|t| t.held.iter().map(move |p| p[j].start)))
+            }),
+            speed: std::array::from_fn(|j| rms(tracks.iter().flat_map(|t| speeds(t, j)))),
+            position: std::array::from_fn(|j| {
+                standard_deviation(tracks.iter().flat_map(|t| t.column(j)).collect())
+            }),
+            travel: std::array::from_fn(|j| {
+                let q = || tracks.iter().flat_map(move |t| t.q.iter().map(move |q| q[j]));
+                [q().fold(f64::INFINITY, f64::min), q().fold(f64::NEG_INFINITY, f64::max)]
+            }),
+            inertia: std::array::from_fn(|j| inertia[(j, j)]),
+            period: tracks.first().map_or(1e-3, Track::period),
+            length: length.unwrap_or(0.3),
+            gravity: gravity.abs().max(1.0),
+        }
+    }
+
+    /// RMS speed of the slowest joint.
+    pub fn slowest(&self) -> f64 {
+        self.speed.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Size of one quantity on joint `j`.
+    pub fn size(&self, quantity: Quantity, j: usize) -> f64 {
+        let value = match quantity {
+            Quantity::Torque => self.torque[j],
+            Quantity::Inertia => self.inertia[j],
+            Quantity::Drag => self.torque[j] / (self.speed[j] * self.speed[j]),
+            Quantity::CubicDrag => self.torque[j] / self.speed[j].powi(3),
+            Quantity::Damping | Quantity::ContactDamping => self.torque[j] / self.speed[j],
+            Quantity::Stiffness | Quantity::ContactStiffness => self.torque[j] / self.position[j],
+            Quantity::Impulse => self.inertia[j] * self.speed[j],
+            Quantity::Hardening => self.torque[j] / self.position[j].powi(3),
+            Quantity::ShaftStiffness => self.inertia[j] * SHAFT_RATE * SHAFT_RATE * MOTOR_SHARE,
+            Quantity::ShaftDamping => self.inertia[j] * SHAFT_RATE * MOTOR_SHARE * SHAFT_DAMPING,
+            Quantity::Speed => self.speed[j],
+            Quantity::Position | Quantity::Rest => self.position[j],
+            Quantity::Reach => self.travel[j][0].abs().max(self.travel[j][1].abs()),
+            Quantity::Cycles => std::f64::consts::TAU / (self.travel[j][1] - self.travel[j][0]),
+            Quantity::Angle | Quantity::Count | Quantity::Ratio | Quantity::Duration => 1.0,
+            Quantity::Time => self.period,
+            Quantity::Mass => self.torque[N - 1] / (self.gravity * self.length),
+            Quantity::Length => self.length,
+        };
+        if value.is_finite() && value > 0.0 { value } else { 1.0 }
+    }
+
+    /// Middle of a joint's travel.
+    fn middle(&self, j: usize) -> f64 {
+        let [from, to] = self.travel[j];
+        0.5 * (from + to)
+    }
+
+    /// Initial guess of a parameter of joint `j`, given in units of its size; none where the joint never gets there.
+    pub fn initial_guess(&self, quantity: Quantity, j: usize, value: f64) -> Option<f64> {
+        match quantity {
+            Quantity::Ratio => Some(value),
+            Quantity::Rest => Some(self.middle(j) + value * self.size(quantity, j)),
+            Quantity::Reach => {
+                let side = self.travel[j][usize::from(value > 0.0)];
+                (side * value > 0.0).then_some(value.abs() * side)
+            }
+            _ => Some(value * self.size(quantity, j)),
+        }
+    }
+
+    /// Value that a parameter's size is counted from: neutral, or zero where none is; of a rest position the middle of the travel.
+    pub fn centre(&self, parameter: &EffectParameter, j: usize) -> f64 {
+        match parameter.quantity {
+            Quantity::Rest => self.middle(j),
+            _ if parameter.neutral < NEVER => parameter.neutral,
+            _ => 0.0,
+        }
+    }
+
+    /// Largest deviation from that centre that a parameter of joint `j` can have.
+    pub fn largest(&self, quantity: Quantity, j: usize) -> f64 {
+        let most = match quantity {
+            Quantity::Time => LONGEST_TIME,
+            Quantity::Speed => FASTEST,
+            Quantity::ContactStiffness | Quantity::ContactDamping => HARDEST,
+            _ => LARGEST,
+        };
+        most * self.size(quantity, j)
+    }
+
+    /// Sizes of all parameters of an effect.
+    pub fn of(&self, effect: &EffectInstance) -> Vec<f64> {
+        effect.law.spec().parameters.iter().map(|p| self.size(p.quantity, effect.joint)).collect()
+    }
+}
+
+fn speeds<const N: usize>(track: &Track<N>, j: usize) -> Vec<f64> {
+    (0..track.len()).step_by(5).map(|k| track.local(j, k).dq).collect()
+}
+
+fn standard_deviation(x: Vec<f64>) -> f64 {
+    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+    rms(x.into_iter().map(|x| x - mean))
+}

@@ -1,0 +1,369 @@
+//! Gauss-Newton with Levenberg's damping over the arm's parameters and the effects' together (output error).
+//!
+//! Minimises `cost = |residual|^2 (weighted) + |(theta - nominal) / sigma|^2`, where the second term is the prior, from the arm
+//! file's values and sigmas, over the free values within their bounds.
+
+use crate::likelihood::covariance::ParameterCovariance;
+use crate::likelihood::jacobian::{Jacobian, Linearisation};
+use crate::likelihood::scale::Scales;
+use crate::likelihood::weighting::{Gram, Weighting};
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::predict::window::Dataset;
+use crate::progress::ProgressReporter;
+use armgap_core::arm::Arm;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Relative displacement for sensitivities; events are located to 1e-12, so a forward difference is good to 1e-6.
+const RELATIVE_STEP: f64 = 1e-6;
+
+/// Where the cost falls as predicted to within this part of what ends a search, the Jacobian is reused at the new point.
+const FORESEEN: f64 = 0.5;
+
+/// A reused Jacobian ends a search if it predicts a decrease of less than this part of what ends it.
+const LEAST: f64 = 0.1;
+
+/// Columns reused from a neighbour are reused again where the cost falls as predicted to within this part of the decrease.
+const SERVES: f64 = 0.25;
+
+/// How far a search is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// Iterations at most.
+    pub iterations: usize,
+    /// A decrease of the cost by less than this part of it ends the search.
+    pub enough: f64,
+    /// Whether the Jacobian of an earlier point may be reused and end the search.
+    pub reuse_jacobian: bool,
+}
+
+impl Effort {
+    /// Far enough to rank candidates.
+    pub const ROUGH: Self = Self { iterations: 4, enough: 1e-2, reuse_jacobian: true };
+    /// To the minimum.
+    pub const FULL: Self = Self { iterations: 15, enough: 1e-4, reuse_jacobian: false };
+}
+
+/// Prior of the arm's parameters.
+#[derive(Debug, Clone, Copy)]
+pub struct Prior<const P: usize> {
+    /// Values of the arm file.
+    pub theta: [f64; P],
+    /// Their standard deviations.
+    pub sigma: [f64; P],
+    /// How many of the first parameters are inertial; the rest is friction and may not be negative.
+    pub inertial: usize,
+}
+
+impl<const P: usize> Prior<P> {
+    /// Prior cost: squared distance from the arm file's values in units of sigma.
+    pub fn cost(&self, theta: &[f64; P]) -> f64 {
+        (0..P).map(|i| ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2)).sum()
+    }
+}
+
+/// Data and the weights to judge them by.
+pub struct FitProblem<'a, A, const N: usize, const P: usize> {
+    /// The arm.
+    pub arm: &'a A,
+    /// Logs cut into windows.
+    pub data: &'a Dataset<N>,
+    /// Measured positions of the windows.
+    pub measured: &'a [f64],
+    /// Weights.
+    pub weighting: &'a Weighting<N>,
+    /// Prior of the arm's parameters.
+    pub prior: &'a Prior<P>,
+    /// Typical sizes of the effects' parameters.
+    pub scales: &'a Scales<N>,
+    /// Progress report and cancellation.
+    pub progress: &'a ProgressReporter,
+}
+
+/// The end of a search.
+#[derive(Debug, Clone)]
+pub struct Fit<const P: usize> {
+    /// Best hypothesis found.
+    pub hypothesis: Hypothesis<P>,
+    /// Cost of the data.
+    pub data_cost: f64,
+    /// Prior cost.
+    pub prior_cost: f64,
+    /// Covariance of the free values.
+    pub covariance: ParameterCovariance,
+    /// Cost of every window as it is.
+    pub costs: Vec<f64>,
+    /// Whether the last Jacobian was its own, without reused columns.
+    pub own_jacobian: bool,
+}
+
+impl<const P: usize> Fit<P> {
+    /// Standard deviation of the free value `i`.
+    pub fn sigma(&self, i: usize) -> f64 {
+        self.covariance.matrix[(i, i)].max(0.0).sqrt()
+    }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> {
+    /// Whitened residual, measured minus predicted.
+    pub fn residual(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        self.progress.check();
+        let predicted = self.data.predict(self.arm, hypothesis, &self.weighting.offsets);
+        self.weighting.residual(self.measured, &predicted)
+    }
+
+    /// Student-t cost of every window.
+    pub fn window_costs(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        self.raw_costs(hypothesis).into_iter().map(|cost| self.weighting.student_t_cost(cost)).collect()
+    }
+
+    /// Cost of every window as it is.
+    pub fn raw_costs(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        self.weighting.costs(self.data, &self.residual(hypothesis))
+    }
+
+    /// Whitened sensitivities of the prediction to the free values `which`, given the residual at `hypothesis`.
+    pub fn sensitivities(
+        &self,
+        hypothesis: &Hypothesis<P>,
+        residual: &[f64],
+        which: &[usize],
+    ) -> Vec<Vec<f64>> {
+        let values = hypothesis.values();
+        let steps = self.steps(hypothesis);
+        which
+            .par_iter()
+            .map(|&i| {
+                let mut moved = values.clone();
+                moved[i] += steps[i];
+                let there = self.residual(&hypothesis.with_values(&moved));
+                residual.iter().zip(&there).map(|(here, there)| (here - there) / steps[i]).collect()
+            })
+            .collect()
+    }
+
+    /// Whitened Jacobian of the prediction by all free values.
+    pub fn jacobian(&self, hypothesis: &Hypothesis<P>) -> Vec<Vec<f64>> {
+        let all: Vec<usize> = (0..hypothesis.values().len()).collect();
+        self.sensitivities(hypothesis, &self.residual(hypothesis), &all)
+    }
+
+    /// Displacements for sensitivities, inward at an upper bound.
+    fn steps(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        let sizes = self.sizes(hypothesis);
+        let (_, upper) = self.bounds(hypothesis);
+        let values = hypothesis.values();
+        (0..values.len())
+            .map(|i| {
+                let step = RELATIVE_STEP * sizes[i];
+                if values[i] + step > upper[i] { -step } else { step }
+            })
+            .collect()
+    }
+
+    /// Typical sizes of the free values.
+    pub fn sizes(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
+        let theta = (0..P).map(|i| self.prior.theta[i].abs().max(self.prior.sigma[i]));
+        let effects = hypothesis.effects.iter().flat_map(|e| self.scales.of(e));
+        theta.chain(effects).collect()
+    }
+
+    /// Bounds of the free values.
+    fn bounds(&self, hypothesis: &Hypothesis<P>) -> (Vec<f64>, Vec<f64>) {
+        let friction = |i: usize| {
+            if i < self.prior.inertial { f64::NEG_INFINITY } else { 0.0 }
+        };
+        let mut lower: Vec<f64> = (0..P).map(friction).collect();
+        let mut upper = vec![f64::INFINITY; P];
+        for effect in &hypothesis.effects {
+            for parameter in effect.law.spec().parameters {
+                let reach = self.scales.largest(parameter.quantity, effect.joint);
+                let centre = self.scales.centre(parameter, effect.joint);
+                lower.push(parameter.lower.max(centre - reach));
+                upper.push(parameter.upper.min(centre + reach));
+            }
+        }
+        (lower, upper)
+    }
+
+    /// Minimises the cost from `initial_guess`, over all free values.
+    pub fn solve(&self, initial_guess: &Hypothesis<P>, effort: Effort) -> Fit<P> {
+        self.solve_reusing(initial_guess, effort, &[])
+    }
+
+    /// Minimises the cost from `initial_guess`, reusing a neighbour's Jacobian columns `known` for the first values as long as the cost falls as
+    /// they predict.
+    pub fn solve_reusing(&self, initial_guess: &Hypothesis<P>, effort: Effort, known: &[Vec<f64>]) -> Fit<P> {
+        let (lower, upper) = self.bounds(initial_guess);
+        let mut at = Linearisation::new(self, initial_guess.clone());
+        let mut damping = 1e-4;
+        let mut jacobian = Jacobian::reusing(self, &at, known);
+        'search: for _ in 0..effort.iterations {
+            let (normal, gradient) = self.normal_equations(&jacobian.gram, &at.hypothesis);
+            let now = at.hypothesis.values();
+            let mut fall = None;
+            for _ in 0..6 {
+                let values = inside(&now, step(&normal, &gradient, damping, &now, &lower, &upper), &lower, P);
+                let change = DVector::from_fn(now.len(), |i, _| values[i] - now[i]);
+                let foreseen = change.dot(&(2.0 * &gradient - &normal * &change));
+                if jacobian.is_reused && foreseen < LEAST * effort.enough * at.cost() {
+                    break 'search;
+                }
+                let trial = Linearisation::new(self, at.hypothesis.with_values(&values));
+                if trial.cost() < at.cost() {
+                    fall = Some((at.cost() - trial.cost(), foreseen));
+                    at = trial;
+                    damping = (damping * 0.1).max(1e-9);
+                    break;
+                }
+                if !jacobian.is_current() {
+                    break;
+                }
+                damping = (damping * 10.0).min(1e6);
+            }
+            let enough = effort.enough * at.cost();
+            match fall {
+                None if !jacobian.is_current() => jacobian = Jacobian::new(self, &at),
+                Some((fall, foreseen)) if fall > enough => {
+                    let missed = (fall - foreseen).abs();
+                    if effort.reuse_jacobian && missed < FORESEEN * enough {
+                        jacobian.reuse_at(self, &at);
+                        continue;
+                    }
+                    jacobian = if missed < SERVES * foreseen && jacobian.reused_columns() > 0 {
+                        Jacobian::reusing(self, &at, known)
+                    } else {
+                        Jacobian::new(self, &at)
+                    };
+                }
+                _ => break,
+            }
+        }
+        self.progress.unit();
+        let covariance = self.covariance(&jacobian.gram, &at);
+        let Linearisation { hypothesis, data_cost, prior_cost, costs, .. } = at;
+        Fit {
+            hypothesis,
+            data_cost,
+            prior_cost,
+            covariance,
+            costs,
+            own_jacobian: jacobian.reused_columns() == 0,
+        }
+    }
+
+    /// Normal matrix and right-hand side, the prior included.
+    fn normal_equations(&self, gram: &Gram, hypothesis: &Hypothesis<P>) -> (DMatrix<f64>, DVector<f64>) {
+        let k = gram.total.nrows() - 1;
+        let mut normal = gram.total.view((0, 0), (k, k)).into_owned();
+        let mut gradient = gram.total.column(k).rows(0, k).into_owned();
+        for i in 0..P {
+            let precision = 1.0 / self.prior.sigma[i].powi(2);
+            normal[(i, i)] += precision;
+            gradient[i] += precision * (self.prior.theta[i] - hypothesis.theta[i]);
+        }
+        (normal, gradient)
+    }
+
+    /// Covariance of the free values.
+    fn covariance(&self, gram: &Gram, at: &Linearisation<P>) -> ParameterCovariance {
+        let (lower, upper) = self.bounds(&at.hypothesis);
+        let prior_precision: Vec<f64> =
+            (0..lower.len()).map(|i| if i < P { self.prior.sigma[i].powi(-2) } else { 0.0 }).collect();
+        let range: Vec<f64> = lower.iter().zip(&upper).map(|(l, u)| u - l).collect();
+        ParameterCovariance::new(gram, &prior_precision, &range)
+    }
+}
+
+/// A step that takes no value after the first `free` more than nine tenths of the way to its lower bound: an effect that is switched
+/// off has no derivative to come back by.
+fn inside(now: &[f64], mut next: Vec<f64>, lower: &[f64], free: usize) -> Vec<f64> {
+    for i in free..next.len() {
+        if lower[i].is_finite() {
+            next[i] = next[i].max(lower[i] + 0.1 * (now[i] - lower[i]));
+        }
+    }
+    next
+}
+
+/// One damped step; values at a bound that the step would leave stay there.
+fn step(
+    normal: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    damping: f64,
+    values: &[f64],
+    lower: &[f64],
+    upper: &[f64],
+) -> Vec<f64> {
+    let at_bound = |i: usize| {
+        (values[i] <= lower[i] && gradient[i] < 0.0) || (values[i] >= upper[i] && gradient[i] > 0.0)
+    };
+    // A value that changes no prediction stays where it is.
+    let seen = |i: usize| normal[(i, i)] > 0.0;
+    let free: Vec<usize> = (0..values.len()).filter(|&i| seen(i) && !at_bound(i)).collect();
+    let mut reduced = DMatrix::from_fn(free.len(), free.len(), |a, b| normal[(free[a], free[b])]);
+    for a in 0..free.len() {
+        reduced[(a, a)] *= 1.0 + damping;
+    }
+    let right = DVector::from_fn(free.len(), |a, _| gradient[free[a]]);
+    let mut next = values.to_vec();
+    if let Some(inverse) = scaled_inverse(&reduced) {
+        let change = inverse * right;
+        for (a, &i) in free.iter().enumerate().filter(|(a, _)| change[*a].is_finite()) {
+            next[i] = (values[i] + change[a]).clamp(lower[i], upper[i]);
+        }
+    }
+    next
+}
+
+/// Inverse of a symmetric positive definite matrix, scaled to a unit diagonal first.
+pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let k = matrix.nrows();
+    let scale = DVector::from_fn(k, |i, _| 1.0 / matrix[(i, i)].max(1e-300).sqrt());
+    let mut scaled = DMatrix::from_fn(k, k, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    for i in 0..k {
+        scaled[(i, i)] += 1e-12;
+    }
+    let inverse = scaled.cholesky()?.inverse();
+    Some(DMatrix::from_fn(k, k, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+/// Inverse of a normal matrix over the values that change some prediction; zero for those that change none, such as a stop's that no window
+/// reaches.
+pub fn inverse_of_seen(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let seen: Vec<usize> = (0..normal.nrows()).filter(|&i| normal[(i, i)] > 0.0).collect();
+    let reduced = DMatrix::from_fn(seen.len(), seen.len(), |a, b| normal[(seen[a], seen[b])]);
+    let inverse = scaled_inverse(&reduced)?;
+    let mut whole = DMatrix::zeros(normal.nrows(), normal.nrows());
+    for (a, &i) in seen.iter().enumerate() {
+        for (b, &j) in seen.iter().enumerate() {
+            whole[(i, j)] = inverse[(a, b)];
+        }
+    }
+    Some(whole)
+}
+
+/// The effect switched off: its amplitudes at neutral, its shape as it is.
+pub fn neutral(effect: &EffectInstance) -> EffectInstance {
+    let mut off = *effect;
+    for (value, parameter) in off.p.iter_mut().zip(effect.law.spec().parameters).take(effect.amplitudes()) {
+        *value = parameter.neutral;
+    }
+    off
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_that_changes_nothing_leaves_the_others_their_inverse() {
+        let normal = DMatrix::from_row_slice(3, 3, &[4.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 2.0]);
+        let inverse = inverse_of_seen(&normal).unwrap();
+        let product = &normal * &inverse;
+        for (i, j) in [(0, 0), (0, 2), (2, 0), (2, 2)] {
+            assert!((product[(i, j)] - f64::from(u8::from(i == j))).abs() < 1e-9);
+        }
+        assert!(inverse.row(1).iter().chain(inverse.column(1).iter()).all(|x| *x == 0.0));
+    }
+}

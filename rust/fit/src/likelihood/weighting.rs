@@ -1,0 +1,365 @@
+//! Weighting of residuals, with each window's initial state projected out.
+//!
+//! The initial state of a window is measured, with noise. Its error is a nuisance with a prior; to first order it is projected out: with
+//! `X` the sensitivity of the window's prediction to its initial state and `L L'` the precision of the measured initial state,
+//!
+//! ```text
+//! cost(r) = min over d of |W^(1/2) (r - X d)|^2 + |L' (c + d)|^2 = |a|^2 - |Q' a|^2,     a = [W^(1/2) r; -L' c],
+//! ```
+//!
+//! where `Q` is an orthonormal basis of `[W^(1/2) X; L']` and `c` the offset of the initial state that the prediction already has (variable
+//! projection, Golub and Pereyra 1973).
+
+use crate::log::track::InitialState;
+use crate::model::hypothesis::Hypothesis;
+use crate::numeric::products::{cross, squares};
+use crate::predict::window::{Dataset, InitialStateOffset};
+use armgap_core::arm::Arm;
+use nalgebra::{DMatrix, DVector, SVector};
+use rayon::prelude::*;
+
+/// Factor on the standard deviations of a measured initial state.
+const INITIAL_STATE_INFLATION: f64 = 2.0;
+
+/// A local cubic errs by more where the acceleration jumps: the standard deviation of an initial state is raised to the offset it turned
+/// out to need, up to this many of its standard deviations.
+const LARGEST_INFLATION: f64 = 20.0;
+
+/// Heaviness of the tail of windows' costs: a window this many times worse than typical has about half its weight.
+const TAIL: f64 = 3.0;
+
+/// Displacements for the sensitivity to an initial state, in m or rad and per second.
+const INITIAL_STATE_STEP: f64 = 1e-6;
+
+/// One window's projection.
+#[derive(Debug, Clone)]
+struct Projection {
+    /// Rows of `Q` that belong to samples.
+    samples: DMatrix<f64>,
+    /// Rows of `Q` that belong to the prior of the initial state.
+    prior: DMatrix<f64>,
+    /// `-L' c`.
+    prior_residual: DVector<f64>,
+    /// `R^-1` of the same factorisation: corrections of the initial state from coordinates.
+    back: DMatrix<f64>,
+}
+
+impl Projection {
+    /// Columns of the rows that belong to samples.
+    fn basis(&self) -> Vec<&[f64]> {
+        self.samples.as_slice().chunks_exact(self.samples.nrows()).collect()
+    }
+
+    /// What the prior of the measured initial state adds to the residual's coordinates.
+    fn prior_coordinates(&self) -> DVector<f64> {
+        self.prior.tr_mul(&self.prior_residual)
+    }
+
+    /// Cost of a whitened residual.
+    fn cost(&self, residual: &[f64]) -> f64 {
+        let along = cross(&[residual], &self.basis());
+        let coordinates =
+            along.iter().zip(&self.prior_coordinates()).map(|(x, p)| (x + p).powi(2)).sum::<f64>();
+        (squares(&[residual])[0] + self.prior_residual.norm_squared() - coordinates).max(0.0)
+    }
+
+    /// Products of each of the first `lead` columns, and of the residual, with every column and last the residual, row by row; then the
+    /// squares of the columns after the first `lead`.
+    fn products(&self, lead: usize, columns: &[&[f64]], residual: &[f64]) -> Vec<f64> {
+        let all: Vec<&[f64]> = columns.iter().copied().chain([residual]).collect();
+        let (k, basis) = (columns.len(), self.basis());
+        let mut coordinates = cross(&all, &basis);
+        let at = |c: usize| c * basis.len()..(c + 1) * basis.len();
+        for (coordinate, prior_coordinates) in coordinates[at(k)].iter_mut().zip(&self.prior_coordinates()) {
+            *coordinate += prior_coordinates;
+        }
+        let leading: Vec<&[f64]> = columns[..lead].iter().copied().chain([residual]).collect();
+        let mut products = cross(&leading, &all);
+        products.extend(squares(&columns[lead..]));
+        let along = |a: usize, b: usize| -> f64 {
+            coordinates[at(a)].iter().zip(&coordinates[at(b)]).map(|(a, b)| a * b).sum()
+        };
+        let (rows, rest) = products.split_at_mut((lead + 1) * (k + 1));
+        for (i, row) in rows.chunks_exact_mut(k + 1).enumerate() {
+            for (c, product) in row.iter_mut().enumerate() {
+                *product -= along(if i < lead { i } else { k }, c);
+            }
+        }
+        for (c, square) in rest.iter_mut().enumerate() {
+            *square -= along(lead + c, lead + c);
+        }
+        rows[lead * (k + 1) + k] += self.prior_residual.norm_squared();
+        products
+    }
+}
+
+/// Weighting of a dataset's residuals.
+#[derive(Debug, Clone)]
+pub struct Weighting<const N: usize> {
+    /// Standard deviation each joint's residual is measured in.
+    pub scale: [f64; N],
+    /// Offset of each window's initial state that the predictions are made with.
+    pub offsets: Vec<InitialStateOffset<N>>,
+    /// Robust weight of each window; less than one where the model fails far beyond what is typical.
+    pub robust_weight: Vec<f64>,
+    /// Cost of a typical window under the hypothesis the weighting was made for.
+    pub typical: f64,
+    projections: Vec<Projection>,
+}
+
+/// Inner products of columns under the weighting, the residual last.
+#[derive(Debug, Clone, Default)]
+pub struct Gram {
+    /// Sum over windows.
+    pub total: DMatrix<f64>,
+    /// Per window, the products of every column with the residual.
+    pub scores: Vec<DVector<f64>>,
+    /// Per window, row by row, if all were taken.
+    products: Vec<Vec<f64>>,
+    robust_weight: Vec<f64>,
+}
+
+impl Gram {
+    /// From the products of `k` columns and, last, the residual within each window.
+    #[cfg(test)]
+    pub fn of(products: Vec<Vec<f64>>, k: usize) -> Self {
+        let windows = products.iter().map(|p| DMatrix::from_row_slice(k + 1, k + 1, p));
+        let total = windows.fold(DMatrix::zeros(k + 1, k + 1), |sum, window| sum + window);
+        let scores = products.iter().map(|p| DVector::from_column_slice(&p[k * (k + 1)..])).collect();
+        Self { total, scores, robust_weight: vec![1.0; products.len()], products }
+    }
+
+    /// Products of the columns `of` with each other within one window, each column in its `unit`; all of them have to have been taken.
+    pub fn within(&self, window: usize, of: &[usize], unit: &[f64]) -> DMatrix<f64> {
+        let columns = self.total.nrows();
+        let (products, robust_weight) = (&self.products[window], self.robust_weight[window]);
+        let entry =
+            |a: usize, b: usize| products[of[a] * columns + of[b]] * unit[a] * unit[b] * robust_weight;
+        DMatrix::from_fn(of.len(), of.len(), entry)
+    }
+}
+
+impl<const N: usize> Weighting<N> {
+    /// The weighting around a hypothesis that predicts `predicted`, with initial states displaced by `offsets`.
+    pub fn new<A: Arm<f64, N, P>, const P: usize>(
+        data: &Dataset<N>,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+        scale: [f64; N],
+        offsets: Vec<InitialStateOffset<N>>,
+        predicted: &[f64],
+    ) -> Self {
+        let sensitivities = initial_state_sensitivities(data, arm, hypothesis, &offsets, predicted);
+        let project = |(index, shift): (usize, &InitialStateOffset<N>)| {
+            let window = &data.windows[index];
+            let columns: Vec<&[f64]> = sensitivities.iter().map(|c| &c[window.range()]).collect();
+            projection(&columns, &scale, &window.initial_state, shift)
+        };
+        let projections = offsets.par_iter().enumerate().map(project).collect();
+        let robust_weight = vec![1.0; offsets.len()];
+        Self { scale, offsets, robust_weight, typical: 1.0, projections }
+    }
+
+    /// Sets the robust weights of the windows by how well a hypothesis of this residual explains them.
+    pub fn robust(mut self, data: &Dataset<N>, residual: &[f64]) -> Self {
+        let costs = self.costs(data, residual);
+        self.typical = crate::log::track::median(costs.clone()).max(f64::MIN_POSITIVE);
+        self.robust_weight = costs.iter().map(|cost| (1.0 + TAIL) / (TAIL + cost / self.typical)).collect();
+        self
+    }
+
+    /// Student-t cost of a window: the negative log-likelihood of a multivariate Student variable, linear for typical windows and logarithmic
+    /// far beyond.
+    pub fn student_t_cost(&self, cost: f64) -> f64 {
+        self.typical * (1.0 + TAIL) * (cost / (TAIL * self.typical)).ln_1p()
+    }
+
+    /// Sum of the windows' costs, each by its robust weight.
+    pub fn total(&self, costs: &[f64]) -> f64 {
+        costs.iter().zip(&self.robust_weight).map(|(cost, robust_weight)| cost * robust_weight).sum()
+    }
+
+    /// Whitened residual, measured minus predicted.
+    pub fn residual(&self, measured: &[f64], predicted: &[f64]) -> Vec<f64> {
+        let mut residual: Vec<f64> = measured.iter().zip(predicted).map(|(y, p)| y - p).collect();
+        self.whiten(&mut residual);
+        residual
+    }
+
+    /// Divides a flat vector by the joints' scales.
+    pub fn whiten(&self, column: &mut [f64]) {
+        for row in column.chunks_exact_mut(N) {
+            for (value, scale) in row.iter_mut().zip(self.scale) {
+                *value /= scale;
+            }
+        }
+    }
+
+    /// Inner products of whitened `columns` and, last, a whitened `residual`.
+    pub fn gram(&self, data: &Dataset<N>, columns: &[&[f64]], residual: &[f64]) -> Gram {
+        self.gram_with(columns.len(), data, columns, residual)
+    }
+
+    /// Inner products of whitened `columns` and, last, a whitened `residual`, without those of two different columns after the first `lead`:
+    /// these stay zero.
+    pub fn gram_with(&self, lead: usize, data: &Dataset<N>, columns: &[&[f64]], residual: &[f64]) -> Gram {
+        let k = columns.len();
+        let one = |(window, projection): (&crate::predict::window::Window<N>, &Projection)| {
+            let part: Vec<&[f64]> = columns.iter().map(|c| &c[window.range()]).collect();
+            projection.products(lead, &part, &residual[window.range()])
+        };
+        let windows: Vec<Vec<f64>> = data.windows.par_iter().zip(&self.projections).map(one).collect();
+        let mut total = DMatrix::zeros(k + 1, k + 1);
+        let mut scores = Vec::with_capacity(windows.len());
+        for (products, robust_weight) in windows.iter().zip(&self.robust_weight) {
+            let (rows, squares) = products.split_at((lead + 1) * (k + 1));
+            for (i, row) in rows.chunks_exact(k + 1).enumerate() {
+                for (c, product) in row.iter().enumerate() {
+                    total[(c, if i < lead { i } else { k })] += product * robust_weight;
+                }
+            }
+            for (c, square) in squares.iter().enumerate() {
+                total[(lead + c, lead + c)] += square * robust_weight;
+            }
+            scores.push(DVector::from_column_slice(&rows[lead * (k + 1)..]) * *robust_weight);
+        }
+        for i in (0..lead).chain([k]) {
+            for c in 0..=k {
+                total[(i, c)] = total[(c, i)];
+            }
+        }
+        let products = if lead == k { windows } else { Vec::new() };
+        Gram { total, scores, products, robust_weight: self.robust_weight.clone() }
+    }
+
+    /// Cost of every window for a whitened residual.
+    pub fn costs(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
+        let windows = data.windows.iter().zip(&self.projections);
+        windows.map(|(window, projection)| projection.cost(&residual[window.range()])).collect()
+    }
+
+    /// Squared residual of every window that is left once its initial state is fitted without regard to the measured one.
+    pub fn beside_free_states(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
+        let windows = data.windows.iter().zip(&self.projections);
+        windows
+            .map(|(window, projection)| {
+                let r = DVector::from_column_slice(&residual[window.range()]);
+                let basis = projection.samples.clone().qr().q();
+                (r.norm_squared() - basis.tr_mul(&r).norm_squared()).max(0.0)
+            })
+            .collect()
+    }
+
+    /// The residual that is left once the initial states are fitted, whitened, in the order of the flat vector.
+    pub fn remainder(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
+        let mut left = residual.to_vec();
+        for (window, projection) in data.windows.iter().zip(&self.projections) {
+            let r = DVector::from_column_slice(&residual[window.range()]);
+            let coordinates =
+                projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.prior_residual);
+            let fitted = &projection.samples * coordinates;
+            for (value, part) in left[window.range()].iter_mut().zip(fitted.iter()) {
+                *value -= part;
+            }
+        }
+        left
+    }
+
+    /// The offsets of all initial states that fit a whitened residual best.
+    pub fn refit_initial_states(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<InitialStateOffset<N>> {
+        let windows = data.windows.iter().zip(&self.projections).zip(&self.offsets);
+        windows
+            .map(|((window, projection), shift)| {
+                let r = DVector::from_column_slice(&residual[window.range()]);
+                let coordinates =
+                    projection.samples.tr_mul(&r) + projection.prior.tr_mul(&projection.prior_residual);
+                let change = &projection.back * coordinates;
+                InitialStateOffset {
+                    q: shift.q + SVector::from_fn(|j, _| change[j]),
+                    dq: shift.dq + SVector::from_fn(|j, _| change[N + j]),
+                }
+            })
+            .collect()
+    }
+}
+
+/// Derivatives of all predictions by initial positions and velocities, around the initial states displaced by `offsets`.
+pub fn initial_state_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    data: &Dataset<N>,
+    arm: &A,
+    hypothesis: &Hypothesis<P>,
+    offsets: &[InitialStateOffset<N>],
+    predicted: &[f64],
+) -> Vec<Vec<f64>> {
+    (0..2 * N)
+        .into_par_iter()
+        .map(|i| {
+            let displaced: Vec<InitialStateOffset<N>> = offsets
+                .iter()
+                .map(|shift| {
+                    let mut moved = *shift;
+                    if i < N {
+                        moved.q[i] += INITIAL_STATE_STEP;
+                    } else {
+                        moved.dq[i - N] += INITIAL_STATE_STEP;
+                    }
+                    moved
+                })
+                .collect();
+            let moved = data.predict(arm, hypothesis, &displaced);
+            moved
+                .iter()
+                .zip(predicted)
+                .map(|(a, b)| ((a - b) / INITIAL_STATE_STEP).clamp(-1e4, 1e4))
+                .collect()
+        })
+        .collect()
+}
+
+/// The projection of one window from the sensitivities to its initial state, scales and covariance.
+fn projection<const N: usize>(
+    columns: &[&[f64]],
+    scale: &[f64; N],
+    start: &InitialState<N>,
+    shift: &InitialStateOffset<N>,
+) -> Projection {
+    let rows = columns[0].len();
+    let mut stacked = DMatrix::zeros(rows + 2 * N, 2 * N);
+    for (c, column) in columns.iter().enumerate() {
+        for (r, value) in column.iter().enumerate() {
+            stacked[(r, c)] = value / scale[r % N];
+        }
+    }
+    let root = initial_state_precision_root(start, shift);
+    stacked.view_mut((rows, 0), (2 * N, 2 * N)).copy_from(&root);
+    let displacement = DVector::from_fn(2 * N, |i, _| if i < N { shift.q[i] } else { shift.dq[i - N] });
+    let prior_residual = -(&root * displacement);
+    let qr = stacked.qr();
+    let q = qr.q();
+    let back = qr.r().try_inverse().unwrap_or_else(|| DMatrix::zeros(2 * N, 2 * N));
+    Projection {
+        samples: q.rows(0, rows).into_owned(),
+        prior: q.rows(rows, 2 * N).into_owned(),
+        prior_residual,
+        back,
+    }
+}
+
+/// `L'` with `L L'` the precision of a measured initial state, positions first, then velocities.
+fn initial_state_precision_root<const N: usize>(
+    start: &InitialState<N>,
+    shift: &InitialStateOffset<N>,
+) -> DMatrix<f64> {
+    let mut root = DMatrix::zeros(2 * N, 2 * N);
+    for (j, &[vq, cov, vdq]) in start.covariance.iter().enumerate() {
+        let needed = (shift.dq[j].powi(2) / vdq).min(LARGEST_INFLATION.powi(2));
+        let inflation = INITIAL_STATE_INFLATION.powi(2) + needed;
+        let (vq, cov, vdq) = (vq * inflation, cov * inflation, vdq * inflation);
+        // Cholesky of the inverse of [[vq, cov], [cov, vdq]].
+        let given_q = (vdq - cov * cov / vq).max(1e-300);
+        root[(j, j)] = 1.0 / vq.sqrt();
+        root[(N + j, j)] = -cov / vq / given_q.sqrt();
+        root[(N + j, N + j)] = 1.0 / given_q.sqrt();
+    }
+    root
+}

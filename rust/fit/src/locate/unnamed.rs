@@ -1,0 +1,441 @@
+//! What the rest depends on: laws without a name through the torque that a model lacks along the measured motion.
+//!
+//! For every joint the residual torque by inverse dynamics is regressed on one variable of the motion at a time, as a table over classes of equal count
+//! (the regressogram of Tukey 1961), beside the arm's own parameters: what is missing has moved these, and the residual torque of a fitted model is what they leave of
+//! it. Residual torque, regressor and classes go through the same low-pass, so that neither noise of the acceleration nor a lag enters one of them alone. Laws are
+//! added one after another (forward selection). A law counts if it predicts logs that it was not fitted to: each log in turn is left
+//! out, and what the law of the others leaves there is compared with what the parameters alone leave. The scatter of that over blocks of a second says
+//! whether chance would do the same.
+
+use crate::locate::dependence::{Dependence, DependenceLaw, MotionVariable};
+use crate::locate::variable_classes::{CLASSES, Classes};
+use crate::log::track::Track;
+use crate::model::hypothesis::Hypothesis;
+use crate::numeric::low_pass::LowPass;
+use crate::predict::residual_torque::{
+    InverseDynamicsResidual, half_width, inverse_dynamics_residuals, rms_speeds, slow_speeds,
+};
+use armgap_core::arm::Arm;
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+/// Standard deviation of the low-pass, s: its cut-off of 7 Hz is above the motion of arms, and the noise of most encoders' second differences below.
+const LOW_PASS_S: f64 = 0.02;
+
+/// Distance of the points that count, s: about the low-pass's standard deviation.
+const GRID_S: f64 = 0.02;
+
+/// Share of the time around a point at which a joint may be at rest, where friction is whatever holds it, from which the point does not count.
+const AT_REST: f64 = 0.1;
+
+/// Length of the blocks over which the gain is taken as independent, s: residual torques have memories of 0.05 to 0.3 s.
+const BLOCK_S: f64 = 1.0;
+
+/// Points that count as one, as their errors are correlated by the low-pass and by the memory of the residual torque.
+const CORRELATED: f64 = 10.0;
+
+/// Gain in predicting logs that were left out, in its standard deviations, from which a law is believed. By chance a law predicts worse than none.
+const CERTAIN: f64 = 2.0;
+
+/// Share of the residual torque's variance beyond noise below which a law does not matter.
+const MATTERS: f64 = 0.15;
+
+/// Laws of one joint that are listed at most. There are none where what stays is no more than twice what the noise of positions makes.
+pub const MOST: usize = 3;
+
+/// Fewest blocks in which a law is judged.
+const FEWEST_BLOCKS: usize = 6;
+
+/// The torque that one log lacks under a model, sample by sample.
+pub struct LogResidual<const N: usize> {
+    /// Samples but those at either end.
+    pub samples: Vec<InverseDynamicsResidual<N>>,
+    /// Sample period, s.
+    period: f64,
+    /// Standard deviation of the position measurement.
+    noise: [f64; N],
+    /// Speeds below which a joint may be at rest.
+    slow: [f64; N],
+    /// Whether tables are taken from it; all logs judge which laws there are.
+    teaches: bool,
+}
+
+impl<const N: usize> LogResidual<N> {
+    /// The residual torque of a log; none where the model cannot be simulated.
+    pub fn new<A: Arm<f64, N, P>, const P: usize>(
+        arm: &A,
+        track: &Track<N>,
+        model: &Hypothesis<P>,
+        teaches: bool,
+    ) -> Option<Self> {
+        let slow = slow_speeds(track, &rms_speeds(track));
+        let slowest = slow.iter().copied().fold(f64::INFINITY, f64::min);
+        let half = half_width(track);
+        let samples = inverse_dynamics_residuals(arm, track, model, &track.pushes, half, slowest)?;
+        (samples.len() > 2).then(|| Self {
+            samples,
+            period: track.period(),
+            noise: track.noise,
+            slow,
+            teaches,
+        })
+    }
+
+    fn times(&self) -> Vec<f64> {
+        self.samples.iter().map(|x| x.t - self.samples[0].t).collect()
+    }
+}
+
+/// Residual torque of one joint, low-passed, with everything that it may depend on.
+#[derive(Debug, Clone, Default)]
+struct Rest {
+    /// Variables that a law may depend on.
+    variables: Vec<Classes>,
+    /// Residual torque.
+    torque: Vec<f64>,
+    /// Variance that the noise of positions puts into all of it together.
+    noise: f64,
+    /// Torque of each of the arm's parameters per standard deviation of the arm file, and one.
+    base: Vec<Vec<f64>>,
+    /// Log that each point belongs to.
+    log: Vec<usize>,
+    /// Whether tables are taken from a log.
+    teaches: Vec<bool>,
+    /// Block of a log that each point belongs to, counted through all logs.
+    block: Vec<usize>,
+}
+
+/// Which laws are wanted.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted {
+    /// Laws of one joint at most.
+    pub most: usize,
+    /// Whether the joints are rotary.
+    pub rotary: bool,
+}
+
+/// What the torques that logs lack depend on, of all joints, strongest first; `sigma` are the standard deviations of the arm file's parameters.
+pub fn dependences<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    arm: &A,
+    theta: &[f64; P],
+    sigma: &[f64; P],
+    logs: &[LogResidual<N>],
+    wanted: Wanted,
+) -> Vec<Dependence> {
+    let of_joint = |j| Rest::of_joint(arm, theta, sigma, logs, j).dependences(j + 1, wanted);
+    let mut found: Vec<Dependence> = (0..N).flat_map(of_joint).collect();
+    found.sort_by(|a, b| b.share.total_cmp(&a.share));
+    found
+}
+
+impl Rest {
+    /// What logs lack at joint `j`.
+    fn of_joint<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        arm: &A,
+        theta: &[f64; P],
+        sigma: &[f64; P],
+        logs: &[LogResidual<N>],
+        j: usize,
+    ) -> Self {
+        let mut rest = Self::default();
+        let lows: Vec<LowPass> =
+            logs.iter().map(|log| LowPass::new(&log.times(), GRID_S, LOW_PASS_S)).collect();
+        let mut kept: Vec<Vec<usize>> = Vec::new();
+        for (index, (log, low)) in logs.iter().zip(&lows).enumerate() {
+            let series = |f: &dyn Fn(&InverseDynamicsResidual<N>) -> f64| {
+                low.apply(&log.samples.iter().map(f).collect::<Vec<f64>>())
+            };
+            let still = series(&|x| f64::from(u8::from(x.motion[1][j].abs() < log.slow[j])));
+            let points: Vec<usize> = (0..low.grid.len()).filter(|i| still[*i] < AT_REST).collect();
+            let torque = series(&|x| x.residual[j]);
+            let columns: Vec<Vec<f64>> =
+                (0..P).map(|i| series(&|x| sigma[i] * column(arm, &x.motion, i, &log.slow)[j])).collect();
+            // Variance of the second derivative of white noise behind a Gaussian low-pass.
+            let curvature = 3.0 * log.period / (8.0 * std::f64::consts::PI.sqrt() * LOW_PASS_S.powi(5));
+            let middle = &log.samples[log.samples.len() / 2].motion[0];
+            let inertia = arm.inertia(theta, middle);
+            let variance: f64 =
+                (0..N).map(|i| (inertia[(j, i)] * log.noise[i]).powi(2)).sum::<f64>() * curvature;
+            rest.noise += variance * points.len() as f64;
+            let mut last = None;
+            for i in &points {
+                let block = (low.grid[*i] / BLOCK_S).floor() as usize;
+                let next = rest.block.last().map_or(0, |b| b + usize::from(last != Some(block)));
+                last = Some(block);
+                rest.block.push(next);
+                rest.log.push(index);
+                rest.torque.push(torque[*i]);
+                rest.base.push(columns.iter().map(|c| c[*i]).chain(std::iter::once(1.0)).collect());
+            }
+            rest.teaches.push(log.teaches);
+            kept.push(points);
+        }
+        let cut = |variable| Classes::new(variable, logs, &lows, &kept);
+        rest.variables = MotionVariable::all(N, j).into_iter().map(cut).collect();
+        rest
+    }
+
+    fn blocks(&self) -> usize {
+        self.block.last().map_or(0, |b| b + 1)
+    }
+
+    fn logs(&self) -> usize {
+        self.teaches.len()
+    }
+
+    /// The regression of the residual torque on the arm's parameters and on laws over these classes.
+    fn regression<'a>(&'a self, laws: Vec<&'a Classes>) -> Regression<'a> {
+        let own = self.base.first().map_or(0, Vec::len);
+        let k = own + CLASSES * laws.len();
+        let mut normal = vec![(DMatrix::zeros(k, k), DVector::zeros(k)); self.logs()];
+        for (i, y) in self.torque.iter().enumerate() {
+            let row = row(&self.base[i], &laws, i);
+            let (matrix, right) = &mut normal[self.log[i]];
+            matrix.ger(1.0, &row, &row, 1.0);
+            right.axpy(*y, &row, 1.0);
+        }
+        // Parameters are known as well as the arm file says; a class counts as if one point more had shown no torque there.
+        let variance = self.torque.iter().map(|y| y * y).sum::<f64>() / self.torque.len().max(1) as f64;
+        let precision = (0..k).map(|i| if i < own - 1 { CORRELATED * variance } else { 1.0 });
+        Regression {
+            rest: self,
+            laws,
+            normal,
+            ridge: DMatrix::from_diagonal(&DVector::from_iterator(k, precision)),
+        }
+    }
+
+    /// The laws of this joint, in the order in which they were added.
+    fn dependences(&self, joint: usize, wanted: Wanted) -> Vec<Dependence> {
+        let mut found: Vec<Dependence> = Vec::new();
+        if self.blocks() < FEWEST_BLOCKS || self.logs() < 2 {
+            return found;
+        }
+        let mut taken: Vec<&Classes> = Vec::new();
+        let Some(plain) = self.regression(Vec::new()).left_out() else { return found };
+        let whole = squares(&plain) - self.noise;
+        let mut before = plain;
+        while found.len() < wanted.most && whole > self.noise {
+            let with = |law| taken.iter().copied().chain(std::iter::once(law)).collect::<Vec<&Classes>>();
+            let open = self.variables.iter().filter(|v| taken.iter().all(|t| t.variable != v.variable));
+            let left = open.filter_map(|law| Some((law, self.regression(with(law)).left_out()?)));
+            let Some((law, left)) = left.min_by(|(_, a), (_, b)| squares(a).total_cmp(&squares(b))) else {
+                break;
+            };
+            let share = (squares(&before) - squares(&left)) / whole;
+            if share < MATTERS || certainty(&before, &left, self) < CERTAIN {
+                break;
+            }
+            let Some(table) = self.regression(with(law)).last_law() else { break };
+            found.push(Dependence {
+                joint,
+                variable: law.variable.name(),
+                depends_on: law.variable,
+                unit: law.variable.unit(wanted.rotary),
+                share: share.min(1.0),
+                law: table,
+            });
+            taken.push(law);
+            before = left;
+        }
+        found
+    }
+}
+
+/// Torque of parameter `i` per unit; the sign of friction is smoothed around rest.
+fn column<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    arm: &A,
+    [q, dq, ddq]: &[SVector<f64, N>; 3],
+    i: usize,
+    slow: &[f64; N],
+) -> SVector<f64, N> {
+    if let Some(j) = i.checked_sub(A::INERTIAL + N).filter(|j| *j < N) {
+        return SVector::from_fn(|k, _| if k == j { (dq[j] / slow[j]).tanh() } else { 0.0 });
+    }
+    let regressor: SMatrix<f64, N, P> = arm.regressor(q, dq, ddq);
+    regressor.column(i).into_owned()
+}
+
+/// A regression of a residual torque, with the normal equations of every log.
+struct Regression<'a> {
+    rest: &'a Rest,
+    laws: Vec<&'a Classes>,
+    normal: Vec<(DMatrix<f64>, DVector<f64>)>,
+    ridge: DMatrix<f64>,
+}
+
+/// The row of a point: the torques of the parameters, one, and the share of every class of each law.
+fn row(base: &[f64], laws: &[&Classes], point: usize) -> DVector<f64> {
+    let shares = laws.iter().flat_map(|law| law.share[point]);
+    DVector::from_iterator(base.len() + CLASSES * laws.len(), base.iter().copied().chain(shares))
+}
+
+impl Regression<'_> {
+    /// Sum of the normal equations of the logs that are wanted, with the prior.
+    fn system(&self, wanted: impl Fn(usize) -> bool) -> (DMatrix<f64>, DVector<f64>) {
+        let mut whole = (self.ridge.clone(), DVector::zeros(self.ridge.nrows()));
+        for (_, (matrix, right)) in self.normal.iter().enumerate().filter(|(log, _)| wanted(*log)) {
+            whole.0 += matrix;
+            whole.1 += right;
+        }
+        whole
+    }
+
+    fn row(&self, point: usize) -> DVector<f64> {
+        row(&self.rest.base[point], &self.laws, point)
+    }
+
+    /// What these values leave of a point.
+    fn left(&self, values: &DVector<f64>, point: usize) -> f64 {
+        self.rest.torque[point] - self.row(point).dot(values)
+    }
+
+    /// What the other logs leave of each point, none where they determine nothing.
+    fn left_out(&self) -> Option<Vec<f64>> {
+        let values: Vec<DVector<f64>> = (0..self.rest.logs())
+            .map(|log| {
+                let (matrix, right) = self.system(|other| other != log);
+                matrix.cholesky().map(|system| system.solve(&right))
+            })
+            .collect::<Option<_>>()?;
+        Some((0..self.rest.torque.len()).map(|i| self.left(&values[self.rest.log[i]], i)).collect())
+    }
+
+    /// The last law, of the logs that it is taken from: its torque by class and its standard deviation from the scatter of the blocks' scores
+    /// (sandwich).
+    fn last_law(&self) -> Option<DependenceLaw> {
+        let teaches = &self.rest.teaches;
+        let (matrix, right) = self.system(|log| teaches[log]);
+        let system = matrix.cholesky()?;
+        let values = system.solve(&right);
+        let k = values.len();
+        let first = k - CLASSES;
+        let last = self.laws.last()?;
+        let mut scores = vec![DVector::<f64>::zeros(k); self.rest.blocks()];
+        let mut weight = [0.0; CLASSES];
+        for i in (0..self.rest.torque.len()).filter(|i| teaches[self.rest.log[*i]]) {
+            scores[self.rest.block[i]].axpy(self.left(&values, i), &self.row(i), 1.0);
+            (0..CLASSES).for_each(|c| weight[c] += last.share[i][c]);
+        }
+        let scatter = scores.iter().fold(DMatrix::zeros(k, k), |sum, s| sum + s * s.transpose());
+        let inverse = system.inverse();
+        let covariance = &inverse * scatter * &inverse;
+        let all: f64 = weight.iter().sum();
+        let mean: f64 = (0..CLASSES).map(|c| weight[c] * values[first + c]).sum::<f64>() / all;
+        let constant = mean + values[self.rest.base.first()?.len() - 1];
+        let mut law = DependenceLaw { x: Vec::new(), torque: Vec::new(), sigma: Vec::new(), constant };
+        for (c, x) in last.mean.iter().enumerate().filter_map(|(c, x)| Some((c, (*x)?))) {
+            // Of the difference from the mean, as the torque is one.
+            let apart = DVector::from_fn(CLASSES, |i, _| f64::from(u8::from(i == c)) - weight[i] / all);
+            let own = covariance.view((first, first), (CLASSES, CLASSES));
+            law.x.push(x);
+            law.torque.push(values[first + c] - mean);
+            law.sigma.push((apart.transpose() * own * &apart)[0].max(0.0).sqrt());
+        }
+        Some(law)
+    }
+}
+
+fn squares(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum()
+}
+
+/// By how much the squares fall from one list to the other, in standard deviations from the scatter over the blocks.
+fn certainty(before: &[f64], after: &[f64], rest: &Rest) -> f64 {
+    let mut gains = vec![0.0; rest.blocks()];
+    for (block, (a, b)) in rest.block.iter().zip(before.iter().zip(after)) {
+        gains[*block] += a * a - b * b;
+    }
+    let n = gains.len() as f64;
+    let mean = gains.iter().sum::<f64>() / n;
+    let variance = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    mean * n / (n * variance).sqrt().max(f64::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::random::Random;
+    use armgap_core::arm::TwoLink;
+
+    fn found_in(logs: &[LogResidual<2>]) -> Vec<Dependence> {
+        let arm = TwoLink { gravity: 9.81, length1: 0.3 };
+        dependences(&arm, &[0.1; 9], &[0.01; 9], logs, Wanted { most: MOST, rotary: true })
+    }
+
+    /// Logs of two joints that swing at rates of their own, with a torque on each joint and noise; `memory` is the part of the noise that stays
+    /// from sample to sample.
+    fn logs(
+        memory: f64,
+        torque: impl Fn(usize, &InverseDynamicsResidual<2>) -> [f64; 2],
+    ) -> Vec<LogResidual<2>> {
+        let mut random = Random(5);
+        let log = |number: usize, random: &mut Random| {
+            let phase = number as f64;
+            let mut slow = [0.0; 2];
+            let samples = (0..2000)
+                .map(|k| {
+                    let t = 0.005 * f64::from(k);
+                    let q = SVector::from([(2.1 * t + phase).sin(), 0.8 * (3.7 * t - phase).sin()]);
+                    let dq = SVector::from([2.1 * (2.1 * t + phase).cos(), 2.96 * (3.7 * t - phase).cos()]);
+                    let tau = SVector::from([(5.3 * t + 2.0 * phase).sin(), (4.1 * t).cos()]);
+                    let ddq = -q + 0.3 * tau;
+                    let mut x =
+                        InverseDynamicsResidual { t, motion: [q, dq, ddq], tau, residual: SVector::zeros() };
+                    let own = torque(number, &x);
+                    for j in 0..2 {
+                        slow[j] = memory * slow[j] + (1.0 - memory * memory).sqrt() * 0.2 * random.normal();
+                        x.residual[j] = own[j] + slow[j];
+                    }
+                    x
+                })
+                .collect();
+            LogResidual { samples, period: 0.005, noise: [0.0; 2], slow: [0.05; 2], teaches: true }
+        };
+        (0..3).map(|number| log(number, &mut random)).collect()
+    }
+
+    #[test]
+    fn nothing_is_found_in_noise() {
+        for memory in [0.0, 0.9, 0.98] {
+            let found = found_in(&logs(memory, |_, _| [0.0; 2]));
+            assert!(found.is_empty(), "{memory}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_torque_that_depends_on_the_other_joint_is_found_with_its_law() {
+        let law = |q: f64| 0.5 * (2.0 * q).sin();
+        let found = found_in(&logs(0.9, |_, x| [0.0, law(x.motion[0][0])]));
+        assert_eq!(found.len(), 1, "{found:?}");
+        let Dependence { joint, variable, law: table, .. } = &found[0];
+        assert_eq!((*joint, variable.as_str()), (2, "q1"));
+        let mean = table.torque.iter().sum::<f64>() / table.x.len() as f64;
+        let centre = table.x.iter().map(|x| law(*x)).sum::<f64>() / table.x.len() as f64;
+        let beside = table.x.iter().zip(table.torque.iter().zip(&table.sigma));
+        let off =
+            beside.filter(|(x, (y, s))| (*y - mean - law(**x) + centre).abs() > 3.0 * **s + 0.02).count();
+        assert!(off <= 1, "{table:?}");
+    }
+
+    #[test]
+    fn torques_on_both_joints_are_found_strongest_first() {
+        let found = found_in(&logs(0.5, |_, x| [0.3 * x.tau[0], 0.6 * (3.0 * x.motion[0][0]).sin()]));
+        let names: Vec<_> = found.iter().map(|d| (d.joint, d.variable.as_str())).collect();
+        assert_eq!(names[0], (2, "q1"));
+        assert!(names.contains(&(1, "tau1")), "{names:?}");
+    }
+
+    #[test]
+    fn a_drift_is_a_law_of_time() {
+        let found = found_in(&logs(0.5, |_, x| [0.1 * x.t, 0.0]));
+        assert_eq!((found[0].joint, found[0].variable.as_str()), (1, "t"));
+    }
+
+    #[test]
+    fn what_one_log_alone_shows_is_no_law() {
+        let found = found_in(&logs(0.9, |number, x| {
+            [if number == 1 { (3.0 * x.motion[0][0]).sin() } else { 0.0 }, 0.0]
+        }));
+        assert!(found.iter().all(|d| d.variable != "q1"), "{found:?}");
+    }
+}

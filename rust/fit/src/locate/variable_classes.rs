@@ -1,0 +1,64 @@
+//! A variable of the motion cut into classes of equal count, and the share of the time around a point that each class takes.
+
+use crate::locate::dependence::MotionVariable;
+use crate::locate::unnamed::LogResidual;
+use crate::numeric::low_pass::LowPass;
+use crate::predict::residual_torque::InverseDynamicsResidual;
+
+/// Classes of a variable: a law that turns twice over the travel still shows, and each holds some hundred samples of a log of ten seconds.
+pub const CLASSES: usize = 16;
+
+/// A variable cut into classes.
+#[derive(Debug, Clone)]
+pub struct Classes {
+    /// The variable.
+    pub variable: MotionVariable,
+    /// Mean of the variable in each class; none of an empty one.
+    pub mean: [Option<f64>; CLASSES],
+    /// Share of the time around each point that each class takes.
+    pub share: Vec<[f64; CLASSES]>,
+}
+
+impl Classes {
+    /// The classes of a variable over all logs, and their shares around the points that count.
+    pub fn new<const N: usize>(
+        variable: MotionVariable,
+        logs: &[LogResidual<N>],
+        lows: &[LowPass],
+        kept: &[Vec<usize>],
+    ) -> Self {
+        let value = |log: &LogResidual<N>, x: &InverseDynamicsResidual<N>| {
+            variable.of(&x.motion, &x.tau, x.t - log.samples[0].t)
+        };
+        let values: Vec<Vec<f64>> =
+            logs.iter().map(|log| log.samples.iter().map(|x| value(log, x)).collect()).collect();
+        let edges = edges(values.concat());
+        let class = |x: f64| edges.partition_point(|edge| *edge <= x);
+        let (mut sum, mut count) = ([0.0; CLASSES], [0.0; CLASSES]);
+        for x in values.iter().flatten() {
+            sum[class(*x)] += x;
+            count[class(*x)] += 1.0;
+        }
+        let mut share = Vec::new();
+        for ((low, points), values) in lows.iter().zip(kept).zip(&values) {
+            let classes: Vec<usize> = values.iter().map(|x| class(*x)).collect();
+            for (first, weights) in points.iter().map(|i| &low.kernels[*i]) {
+                let mut around = [0.0; CLASSES];
+                for (weight, class) in weights.iter().zip(&classes[*first..]) {
+                    around[*class] += weight;
+                }
+                share.push(around);
+            }
+        }
+        let mean = std::array::from_fn(|c| (count[c] > 0.0).then(|| sum[c] / count[c]));
+        Self { variable, mean, share }
+    }
+}
+
+/// Edges between the classes of values: quantiles, equal values in one class.
+fn edges(mut values: Vec<f64>) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    let mut edges: Vec<f64> = (1..CLASSES).map(|k| values[k * values.len() / CLASSES]).collect();
+    edges.dedup();
+    edges
+}

@@ -1,0 +1,434 @@
+//! One log, ready to be simulated against: times, positions, held torques, and what its noise looks like.
+
+use crate::log::noise::noise;
+use crate::model::hypothesis::EffectInstance;
+use crate::numeric::smooth::{Local, local_cubic};
+use armgap_core::arm::Arm;
+use armgap_core::effect::InputSegment;
+use nalgebra::SVector;
+use rayon::prelude::*;
+use std::sync::OnceLock;
+
+/// Half widths, in samples, that a local cubic may have.
+const HALF_WIDTHS: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 27];
+
+/// Half width of the confidence intervals that successive widths must share, in standard deviations.
+const CONFIDENCE: f64 = 2.0;
+
+/// Mean square errors of a measured state, in units of its variance, are kept within these: one estimate from one window is no better
+/// known, and beyond the larger the positions are not what the arm did.
+const LEAST_ERROR: f64 = 0.25;
+const LARGEST_ERROR: f64 = 10.0;
+
+/// Samples that the widest local cubic rests on.
+const WIDEST: usize = 2 * HALF_WIDTHS[HALF_WIDTHS.len() - 1] + 1;
+
+/// One sample in so many says whether positions are smoother without what the torque makes of them.
+const ASKED: usize = 7;
+
+/// A log of `N` joints.
+#[derive(Debug, Clone)]
+pub struct Track<const N: usize> {
+    /// Name in results.
+    pub name: String,
+    /// Sample times, s, increasing; starts where the log starts.
+    pub t: Vec<f64>,
+    /// Measured positions.
+    pub q: Vec<SVector<f64, N>>,
+    /// Commanded torque, held until the next sample.
+    pub held: Vec<[InputSegment<f64>; N]>,
+    /// Standard deviation of the position measurement, per joint.
+    pub noise: [f64; N],
+    /// Whether its samples are held over several rows, per joint.
+    pub is_held: [bool; N],
+    /// Smallest step of the position measurement, per joint; zero where none is seen.
+    pub step: [f64; N],
+    /// Known external disturbances.
+    pub pushes: Vec<EffectInstance>,
+    /// Torque per unit of size of each custom effect, sample by sample.
+    pub tables: Vec<Vec<f64>>,
+    /// Reference of a position controller, of a log that holds one in place of torques.
+    pub reference: Option<Reference<N>>,
+    /// Acceleration that the torque gives each joint from a sample to the next, `M(q)^-1 tau`; none for a joint whose measured motion is no
+    /// smoother without it.
+    driven: [Option<Vec<f64>>; N],
+    /// Smoothed motion, once it is asked for.
+    path: OnceLock<Vec<MeasuredState<N>>>,
+    /// Local cubics, once they are asked for.
+    smoothed: OnceLock<Vec<[Smoothed; N]>>,
+}
+
+/// The reference of a position controller, row by row, held until the next sample.
+#[derive(Debug, Clone)]
+pub struct Reference<const N: usize> {
+    /// Positions.
+    pub q: Vec<[f64; N]>,
+    /// Velocities, where they are logged.
+    pub dq: Option<Vec<[f64; N]>>,
+}
+
+/// A local cubic as wide as the motion around its sample allows.
+#[derive(Debug, Clone, Copy)]
+pub struct Smoothed {
+    /// The cubic.
+    pub local: Local,
+    /// The widest that is consistent with it.
+    pub wider: Local,
+    /// Samples on either side that it rests on.
+    pub half_width: usize,
+}
+
+/// Measured state at one sample.
+#[derive(Debug, Clone, Copy)]
+pub struct MeasuredState<const N: usize> {
+    /// Positions.
+    pub q: SVector<f64, N>,
+    /// Velocities.
+    pub dq: SVector<f64, N>,
+}
+
+/// A measured initial state: position and velocity of each joint with their covariance.
+#[derive(Debug, Clone, Copy)]
+pub struct InitialState<const N: usize> {
+    /// Positions.
+    pub q: SVector<f64, N>,
+    /// Velocities.
+    pub dq: SVector<f64, N>,
+    /// Per joint: variance of position, covariance, variance of velocity.
+    pub covariance: [[f64; 3]; N],
+    /// Per joint: mean square error of position and of velocity, bias of the local cubic included, in units of their variance.
+    pub mean_square: [[f64; 2]; N],
+}
+
+impl<const N: usize> Track<N> {
+    /// A track from columns; `counts_per_rev` gives encoder steps where the arm file knows them.
+    pub fn new(name: &str, t: &[f64], q: &[f64], tau: &[f64], steps: Option<[f64; N]>) -> Self {
+        let rows = |x: &[f64]| -> Vec<[f64; N]> {
+            x.chunks_exact(N).map(|row| std::array::from_fn(|j| row[j])).collect()
+        };
+        let mut track = Self {
+            name: name.to_owned(),
+            t: t.to_vec(),
+            q: rows(q).into_iter().map(SVector::from).collect(),
+            held: rows(tau).into_iter().map(|row| row.map(InputSegment::held)).collect(),
+            noise: [0.0; N],
+            is_held: [false; N],
+            step: [0.0; N],
+            pushes: Vec::new(),
+            tables: Vec::new(),
+            reference: None,
+            driven: std::array::from_fn(|_| None),
+            path: OnceLock::new(),
+            smoothed: OnceLock::new(),
+        };
+        for j in 0..N {
+            let column = track.column(j);
+            track.step[j] = steps.map_or_else(|| smallest_step(&column), |s| s[j]);
+            let found = noise(&track.t, &column, track.step[j]);
+            (track.noise[j], track.is_held[j]) = (found.sigma, found.is_held);
+        }
+        track
+    }
+
+    /// Replaces held torques by straight lines of the same mean and these first moments about the middle of each interval.
+    pub fn with_moments(mut self, moments: Option<&[f64]>) -> Self {
+        let Some(moments) = moments else { return self };
+        for (k, row) in moments.chunks_exact(N).enumerate() {
+            let Some(h) = self.t.get(k + 1).map(|next| next - self.t[k]) else { break };
+            for (segment, moment) in self.held[k].iter_mut().zip(row) {
+                *segment = InputSegment::with_moment(segment.mean(), *moment, h);
+            }
+        }
+        self
+    }
+
+    /// Adds the torques of the custom effects to the log.
+    pub fn with_tables(mut self, tables: Vec<Vec<f64>>) -> Self {
+        self.tables = tables;
+        self
+    }
+
+    /// Lets local cubics describe what is left of the measured motion without what the torque makes of it.
+    ///
+    /// A torque that jumps from sample to sample, as that of a controller with a noisy velocity does, leaves no cubic through more than a
+    /// few samples. How far it moves the arm within some samples follows from the inertia `M(q)` alone; the rest, friction, gravity and what
+    /// the model lacks, is as smooth as its causes. Where the arm is not so driven (a wrong sign or unit, a motor behind a spring) the motion is no
+    /// smoother without it, and is taken as measured.
+    pub fn smoothed_beside_torque<A: Arm<f64, N, P>, const P: usize>(
+        mut self,
+        arm: &A,
+        theta: &[f64; P],
+    ) -> Self {
+        let accelerations: Vec<SVector<f64, N>> = self
+            .q
+            .iter()
+            .zip(&self.held)
+            .map(|(q, held)| {
+                let tau = SVector::from_fn(|j, _| held[j].mean());
+                arm.inertia(theta, q).cholesky().map_or_else(SVector::zeros, |inertia| inertia.solve(&tau))
+            })
+            .collect();
+        for j in (0..N).filter(|j| !self.is_held[*j]) {
+            let column: Vec<f64> = accelerations.iter().map(|a| a[j]).collect();
+            let is_finite = column.iter().all(|a| a.is_finite());
+            if is_finite && self.roughness(j, Some(&column)) < self.roughness(j, None) {
+                self.driven[j] = Some(column);
+            }
+        }
+        self
+    }
+
+    /// Mean logarithm of the variance of the velocities of a joint: low where cubics are wide.
+    fn roughness(&self, j: usize, driven: Option<&[f64]>) -> f64 {
+        (0..self.len()).step_by(ASKED).map(|k| self.widest(j, k, driven).local.covariance[2].ln()).sum()
+    }
+
+    /// Positions of joint `j` for cubics around a sample, from the returned one on: without the distance that these accelerations make from
+    /// there.
+    fn positions_near(&self, j: usize, at: usize, driven: Option<&[f64]>) -> (usize, [f64; WIDEST]) {
+        let first = at.saturating_sub(WIDEST / 2).min(self.len().saturating_sub(WIDEST));
+        let mut positions = [0.0; WIDEST];
+        for (place, q) in positions.iter_mut().zip(&self.q[first..]) {
+            *place = q[j];
+        }
+        let Some(driven) = driven else { return (first, positions) };
+        let (mut distance, mut speed) = (0.0, 0.0);
+        for k in at + 1..(first + WIDEST).min(self.len()) {
+            let (h, a) = (self.t[k] - self.t[k - 1], driven[k - 1]);
+            distance += h * (speed + 0.5 * h * a);
+            speed += h * a;
+            positions[k - first] -= distance;
+        }
+        (distance, speed) = (0.0, 0.0);
+        for k in (first..at).rev() {
+            let (h, a) = (self.t[k + 1] - self.t[k], driven[k]);
+            distance -= h * (speed - 0.5 * h * a);
+            speed -= h * a;
+            positions[k - first] -= distance;
+        }
+        (first, positions)
+    }
+
+    /// One track of pieces that follow each other in time.
+    pub fn joined(pieces: &[&Self]) -> Option<Self> {
+        let (first, rest) = pieces.split_first()?;
+        // A joint is taken beside its torque only where all pieces are.
+        let driven = std::array::from_fn(|j| {
+            pieces
+                .iter()
+                .map(|piece| piece.driven[j].clone())
+                .collect::<Option<Vec<_>>>()
+                .map(|all| all.concat())
+        });
+        let mut whole = Self {
+            path: OnceLock::new(),
+            smoothed: OnceLock::new(),
+            pushes: Vec::new(),
+            driven,
+            ..(*first).clone()
+        };
+        for piece in rest {
+            whole.t.extend(&piece.t);
+            whole.q.extend(&piece.q);
+            whole.held.extend(&piece.held);
+            for (table, more) in whole.tables.iter_mut().zip(&piece.tables) {
+                table.extend(more);
+            }
+        }
+        Some(whole)
+    }
+
+    /// Positions of one joint.
+    pub fn column(&self, j: usize) -> Vec<f64> {
+        self.q.iter().map(|q| q[j]).collect()
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+
+    /// Median sample period, s.
+    pub fn period(&self) -> f64 {
+        median(self.t.windows(2).map(|w| w[1] - w[0]).collect())
+    }
+
+    /// The measured state at a sample, from a local cubic in each joint.
+    pub fn initial_state(&self, at: usize) -> InitialState<N> {
+        let mut start = InitialState {
+            q: self.q[at],
+            dq: SVector::zeros(),
+            covariance: [[0.0; 3]; N],
+            mean_square: [[1.0; 2]; N],
+        };
+        for j in 0..N {
+            let smoothed = self.nested(j, at);
+            let local = smoothed.local;
+            start.mean_square[j] = self.mean_square(j, at, &smoothed);
+            let variance = self.noise[j] * self.noise[j];
+            (start.q[j], start.dq[j]) = (local.q, local.dq);
+            start.covariance[j] = local.covariance.map(|c| c * variance);
+        }
+        start
+    }
+
+    /// Smoothed motion at every sample.
+    pub fn path(&self) -> &[MeasuredState<N>] {
+        self.path.get_or_init(|| {
+            let moving = |smoothed: &[Smoothed; N]| MeasuredState {
+                q: SVector::from_fn(|j, _| smoothed[j].local.q),
+                dq: SVector::from_fn(|j, _| smoothed[j].local.dq),
+            };
+            self.smoothed().iter().map(moving).collect()
+        })
+    }
+
+    /// The local cubics of all joints at every sample.
+    pub fn smoothed(&self) -> &[[Smoothed; N]] {
+        let at = |k: usize| std::array::from_fn(|j| self.nested(j, k));
+        self.smoothed.get_or_init(|| (0..self.len()).into_par_iter().map(at).collect())
+    }
+
+    /// The local cubic of joint `j` around a sample, as wide as the motion there allows.
+    ///
+    /// Widths grow while the confidence intervals of their velocities still have a point in common; a jump of the acceleration
+    /// nearby ends that early, smooth motion late (intersection of confidence intervals, Goldenshluger and Nemirovski 1997). The
+    /// widest that passes may still err by several of its standard deviations, as its neighbours cannot tell; the one before
+    /// errs by a third of that and has the larger deviation, so it is the one that keeps what its covariance promises.
+    pub fn local(&self, j: usize, at: usize) -> Local {
+        self.nested(j, at).local
+    }
+
+    /// That local cubic, and the widest that passes.
+    fn nested(&self, j: usize, at: usize) -> Smoothed {
+        self.widest(j, at, self.driven[j].as_deref())
+    }
+
+    /// The widest local cubic but one that is consistent with all narrower ones.
+    fn widest(&self, j: usize, at: usize, driven: Option<&[f64]>) -> Smoothed {
+        let (first, positions) = self.positions_near(j, at, driven);
+        let fit = |half: usize| (local_cubic(&self.t, |k| positions[k - first], at, half), half);
+        let mut widest = fit(HALF_WIDTHS[0]);
+        let mut before = widest;
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        for half in HALF_WIDTHS.into_iter().filter(|half| 2 * half < self.len()) {
+            let (local, half) = fit(half);
+            let radius = CONFIDENCE * self.noise[j] * local.covariance[2].sqrt();
+            (low, high) = (low.max(local.dq - radius), high.min(local.dq + radius));
+            if low > high {
+                break;
+            }
+            (before, widest) = (widest, (local, half));
+        }
+        Smoothed { local: before.0, wider: widest.0, half_width: before.1 }
+    }
+
+    /// Mean square error of a local cubic's position and velocity in units of their variance: what it leaves of its samples is more than
+    /// noise where no cubic passes through the motion, and so is its distance from the sample itself, and from a wider cubic.
+    ///
+    /// Where positions are held, what a cubic leaves says nothing about the motion.
+    fn mean_square(&self, j: usize, at: usize, smoothed: &Smoothed) -> [f64; 2] {
+        if self.is_held[j] {
+            return [1.0; 2];
+        }
+        let Smoothed { local, wider, .. } = smoothed;
+        let noise = self.noise[j].powi(2);
+        let [vq, _, vdq] = local.covariance;
+        let misfit = local.misfit / noise;
+        let position = misfit + ((self.q[at][j] - local.q).powi(2) / noise - (1.0 - vq)) / vq;
+        let wide = ((local.dq - wider.dq).powi(2) / noise - (vdq - wider.covariance[2])) / vdq;
+        [position, misfit + wide].map(|error| error.clamp(LEAST_ERROR, LARGEST_ERROR))
+    }
+}
+
+/// Median of a list; zero for an empty one.
+pub fn median(mut x: Vec<f64>) -> f64 {
+    if x.is_empty() {
+        return 0.0;
+    }
+    x.sort_by(f64::total_cmp);
+    x[x.len() / 2]
+}
+
+/// Smallest non-zero difference that repeats throughout a column, if the column sits on such a grid.
+fn smallest_step(q: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = q.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 1e-12).collect();
+    if steps.len() < 20 {
+        return 0.0;
+    }
+    steps.sort_by(f64::total_cmp);
+    let step = steps[steps.len() / 200];
+    let on_grid = steps.iter().filter(|d| ((*d / step).round() * step - *d).abs() < 0.05 * step).count();
+    if on_grid * 10 > steps.len() * 9 { step } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::random::Random;
+    use armgap_core::arm::Pendulum;
+
+    const INERTIA: f64 = 0.5;
+    const STEP: f64 = 1e-7;
+
+    /// A pendulum's inertia under a torque that is new in every sample, and a slow motion beside it; positions, torques and true velocities.
+    fn jerky(sign: f64) -> (Track<1>, Vec<f64>) {
+        let (h, mut random) = (0.0025, Random(1));
+        let (mut q, mut dq) = (0.0, 0.0);
+        let (mut t, mut positions, mut torques, mut rates) = (vec![], vec![], vec![], vec![]);
+        for k in 0..800 {
+            let now = h * f64::from(k);
+            let tau = 3.0 * random.normal();
+            t.push(now);
+            positions.push(((q + now.powi(2)) / STEP).round() * STEP);
+            rates.push(dq + 2.0 * now);
+            torques.push(sign * tau);
+            q += h * (dq + 0.5 * h * tau / INERTIA);
+            dq += h * tau / INERTIA;
+        }
+        (Track::new("", &t, &positions, &torques, Some([STEP])), rates)
+    }
+
+    fn worst(track: &Track<1>, rates: &[f64]) -> f64 {
+        (10..790).map(|k| (track.initial_state(k).dq[0] - rates[k]).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_torque_s_part_of_a_jerky_motion_is_known() {
+        let (track, rates) = jerky(1.0);
+        let theta = [INERTIA, 0.0, 0.0, 0.0];
+        let arm = Pendulum { gravity: 9.81 };
+        let plain = worst(&track, &rates);
+        let beside = worst(&track.smoothed_beside_torque(&arm, &theta), &rates);
+        assert!(beside < 0.05 * plain, "{beside} beside {plain}");
+    }
+
+    #[test]
+    fn a_torque_of_the_wrong_sign_is_left_aside() {
+        let (track, rates) = jerky(-1.0);
+        let plain = worst(&track, &rates);
+        let beside = worst(
+            &track.smoothed_beside_torque(&Pendulum { gravity: 9.81 }, &[INERTIA, 0.0, 0.0, 0.0]),
+            &rates,
+        );
+        assert!((beside - plain).abs() < 1e-12, "{beside} beside {plain}");
+    }
+
+    #[test]
+    fn pieces_are_joined_with_what_their_torques_make() {
+        let arm = Pendulum { gravity: 9.81 };
+        let beside = || jerky(1.0).0.smoothed_beside_torque(&arm, &[INERTIA, 0.0, 0.0, 0.0]);
+        let mut later = beside();
+        later.t.iter_mut().for_each(|t| *t += 2.0);
+        let whole = Track::joined(&[&beside(), &later]).unwrap();
+        assert_eq!(whole.driven[0].as_ref().map(Vec::len), Some(whole.len()));
+        assert!(whole.initial_state(whole.len() - 1).dq[0].is_finite());
+        let mixed = Track::joined(&[&beside(), &jerky(1.0).0]).unwrap();
+        assert!(mixed.driven[0].is_none());
+    }
+}

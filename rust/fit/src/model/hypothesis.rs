@@ -1,0 +1,194 @@
+//! A hypothesis about the arm: parameter values, width of the friction regularisation, and effects on joints.
+
+use crate::model::custom_effect;
+use armgap_core::arm::Arm;
+use armgap_core::effect::{Active, Effect, InputSegment, MAX_PARAMETERS, Quantity, Scope, Trial};
+use armgap_core::integrate::State;
+use armgap_core::plant::Plant;
+use armgap_core::transmission::Sides;
+use nalgebra::SVector;
+
+/// An effect on a joint, with values for its parameters.
+#[derive(Clone, Copy)]
+pub struct EffectInstance {
+    /// The law.
+    pub law: &'static dyn Effect<f64>,
+    /// 0-based joint; 0 for effects of the whole arm.
+    pub joint: usize,
+    /// Parameter values, SI.
+    pub p: [f64; MAX_PARAMETERS],
+    /// Where encoder and friction sit; of effects with a transmission.
+    pub sides: Sides,
+}
+
+impl std::fmt::Debug for EffectInstance {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}:{}:{:?}", self.law.spec().name, self.joint + 1, &self.p[..self.len()])
+    }
+}
+
+impl EffectInstance {
+    /// An effect with encoder and friction on the link's side.
+    pub fn new(law: &'static dyn Effect<f64>, joint: usize, p: [f64; MAX_PARAMETERS]) -> Self {
+        Self { law, joint, p, sides: Sides::LINK }
+    }
+
+    /// The same effect with encoder and friction elsewhere.
+    pub fn with_sides(self, sides: Sides) -> Self {
+        Self { sides, ..self }
+    }
+
+    /// Number of parameters in use.
+    pub fn len(&self) -> usize {
+        self.law.spec().parameters.len()
+    }
+
+    /// An effect without parameters does not exist.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Number of its first parameters that switch it off together at their neutral values.
+    pub fn amplitudes(&self) -> usize {
+        match self.law.spec().trial {
+            Trial::Amplitudes(count) => count,
+            Trial::Ray => self.len(),
+            Trial::Whole | Trial::Disturbance => 1,
+        }
+    }
+
+    /// Whether `other` is the same effect on the same joint, whatever its values.
+    pub fn same_place(&self, other: &Self) -> bool {
+        self.law.spec().name == other.law.spec().name && self.joint == other.joint
+    }
+
+    /// Whether it acts beyond a position: its parameters are that, stiffness and damping.
+    pub fn is_contact(&self) -> bool {
+        self.law.spec().parameters.first().is_some_and(|p| p.quantity == Quantity::Reach)
+    }
+
+    /// Whether it repeats with position: its parameters are amplitude, cycles per turn and phase.
+    pub fn is_periodic(&self) -> bool {
+        self.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Cycles)
+    }
+
+    /// 1-based joint, or none for effects of the whole arm.
+    pub fn joint_number(&self) -> Option<usize> {
+        (self.law.spec().scope == Scope::Joint).then_some(self.joint + 1)
+    }
+}
+
+/// Everything a simulation needs besides the log.
+#[derive(Debug, Clone)]
+pub struct Hypothesis<const P: usize> {
+    /// The arm's parameters.
+    pub theta: [f64; P],
+    /// Width of the smoothed sign of friction, rad/s; zero for exact dry friction.
+    pub smoothing: f64,
+    /// Effects with their values.
+    pub effects: Vec<EffectInstance>,
+}
+
+impl<const P: usize> Hypothesis<P> {
+    /// The arm without effects.
+    pub fn rigid(theta: [f64; P]) -> Self {
+        Self { theta, smoothing: 0.0, effects: Vec::new() }
+    }
+
+    /// This hypothesis with one more effect.
+    pub fn with(&self, effect: EffectInstance) -> Self {
+        let mut more = self.clone();
+        more.effects.push(effect);
+        more
+    }
+
+    /// Free values: `theta`, then the effects' parameters.
+    pub fn values(&self) -> Vec<f64> {
+        let effects = self.effects.iter().flat_map(|e| e.p[..e.len()].iter().copied());
+        self.theta.iter().copied().chain(effects).collect()
+    }
+
+    /// This hypothesis with other values of `theta` and of the effects' parameters.
+    pub fn with_values(&self, values: &[f64]) -> Self {
+        let mut other = self.clone();
+        let mut rest = values.iter().copied();
+        for (slot, value) in other.theta.iter_mut().zip(rest.by_ref()) {
+            *slot = value;
+        }
+        for effect in &mut other.effects {
+            let n = effect.len();
+            for (slot, value) in effect.p[..n].iter_mut().zip(rest.by_ref()) {
+                *slot = value;
+            }
+        }
+        other
+    }
+
+    /// The simulator of this hypothesis; `None` if it names more effects than a plant carries.
+    pub fn plant<A: Arm<f64, N, P>, const N: usize>(&self, arm: &A) -> Option<Plant<f64, A, N, P>> {
+        let plant = Plant::new(arm.clone(), self.theta).with_smoothing(self.smoothing);
+        self.effects.iter().try_fold(plant, |plant, e| {
+            let plant = plant.with_effect(Active { law: e.law, joint: e.joint, p: e.p })?;
+            if e.sides == Sides::LINK { Some(plant) } else { plant.with_sides(e.joint, e.sides) }
+        })
+    }
+
+    /// Rewrites the held commands of a log into the torque that reaches the joints; `pushes` are added last, `tables` are those of the
+    /// custom effects.
+    pub fn command<const N: usize>(
+        &self,
+        t: &[f64],
+        held: &[[InputSegment<f64>; N]],
+        pushes: &[EffectInstance],
+        tables: &[Vec<f64>],
+    ) -> Option<Vec<[InputSegment<f64>; N]>> {
+        let laws = || self.effects.iter().chain(pushes).filter(|e| e.law.spec().hooks.command);
+        laws().next()?;
+        let mut torque = held.to_vec();
+        let mut column = Vec::with_capacity(torque.len());
+        for effect in laws() {
+            column.clear();
+            column.extend(torque.iter().map(|row| row[effect.joint]));
+            custom_effect::command(effect.law, &effect.p, t, tables, &mut column);
+            for (row, segment) in torque.iter_mut().zip(&column) {
+                row[effect.joint] = *segment;
+            }
+        }
+        Some(torque)
+    }
+
+    /// The state of joints whose encoders show these positions and velocities.
+    pub fn initial_state<const N: usize>(&self, q: SVector<f64, N>, dq: SVector<f64, N>) -> State<f64, N> {
+        if !self.distorts() {
+            return State::new(q, dq);
+        }
+        let at = SVector::from_fn(|j, _| self.actual(j, q[j]));
+        State::new(at, SVector::from_fn(|j, _| dq[j] / self.stretch(j, at[j])))
+    }
+
+    /// Position that joint `j`'s encoder shows.
+    pub fn measured(&self, j: usize, q: f64) -> f64 {
+        let on_joint = self.effects.iter().filter(|e| e.law.spec().hooks.measured && e.joint == j);
+        on_joint.fold(q, |q, e| e.law.measured(&e.p, q))
+    }
+
+    /// Position of joint `j` that its encoder shows as `reading`, by fixed-point iteration.
+    pub fn actual(&self, j: usize, reading: f64) -> f64 {
+        let mut q = reading;
+        for _ in 0..4 {
+            q += reading - self.measured(j, q);
+        }
+        q
+    }
+
+    /// How much faster joint `j`'s encoder moves than the joint itself at `q`, by central difference.
+    pub fn stretch(&self, j: usize, q: f64) -> f64 {
+        let step = 1e-5;
+        (self.measured(j, q + step) - self.measured(j, q - step)) / (2.0 * step)
+    }
+
+    /// Whether any effect changes what the encoders show.
+    pub fn distorts(&self) -> bool {
+        self.effects.iter().any(|e| e.law.spec().hooks.measured)
+    }
+}

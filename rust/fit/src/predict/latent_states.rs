@@ -1,0 +1,295 @@
+//! Latent states, which no encoder measures, at the start of every window: simulated along the measured motion from the start of the log.
+//!
+//! The hysteresis state of a joint depends on its path, and a motor behind a shaft or backlash moves under the logged torque against the
+//! measured position of its link; neither needs an initial guess.
+
+use crate::log::track::{MeasuredState, Track};
+use armgap_core::arm::Arm;
+use armgap_core::effect::{InputSegment, interval};
+use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::plant::{Mode, Plant};
+use armgap_core::transmission::{LatentState, Sides, Transmission};
+
+/// Natural frequency of the motor times the step length, at most.
+const STEP: f64 = 1.0;
+
+/// The same for an arm whose measured states are put in place at every sample, so that the steps only have to be stable.
+const STABLE: f64 = 1.5;
+
+/// Time in which a link behind the encoder of its motor is drawn to where the motor's torque balance has it, s: long beside a sample, as
+/// accelerations are noisy, short beside the ringing of a shaft with little damping, which would carry an error along the log.
+const MEMORY: f64 = 0.25;
+
+/// Steps per sample at most.
+const MAX_STEPS: usize = 8;
+
+/// A position or its rate beyond this [SI] is cut: the hypothesis is wrong, and its cost will say so.
+const LIMIT: f64 = 1e3;
+
+/// Latent states of a plant at every sample of a track up to `last`, under these torques.
+pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    track: &Track<N>,
+    plant: &Plant<f64, A, N, P>,
+    torque: &[[InputSegment<f64>; N]],
+    last: usize,
+) -> Vec<LatentState<f64, N>> {
+    let path = track.path();
+    if (0..N).any(|j| plant.drivetrain().sides(j) != Sides::LINK) {
+        return beside_measured(track, plant, torque, last);
+    }
+    let mut now = LatentState::none(path[0].q);
+    let mut all = Vec::with_capacity(last + 1);
+    for k in 0..=last {
+        now.memory = plant.memory(&path[k].q, &now);
+        now.anchor = path[k].q;
+        all.push(rigid(&now, plant));
+        let next = path.get(k + 1).unwrap_or(&path[k]);
+        for j in 0..N {
+            if let Some(transmission) = plant.drivetrain().get(j) {
+                let h = interval(&track.t, k);
+                let ends = [(path[k].q[j], path[k].dq[j]), (next.q[j], next.dq[j])];
+                let carried: f64 = (0..j).map(|i| next.dq[i] - path[k].dq[i]).sum();
+                let held =
+                    transmission.coupling_ratio * transmission.inertia * carried / h.max(f64::MIN_POSITIVE);
+                let torque = torque[k][j].map(|tau| tau - held);
+                let motor_motion = MotorMotion { transmission, torque: &torque, h, ends };
+                let (at, rate) =
+                    motor_motion.advance(ends[0].0 + now.deflection[j], ends[0].1 + now.deflection_rate[j]);
+                (now.deflection[j], now.deflection_rate[j]) = (at - ends[1].0, rate - ends[1].1);
+            }
+        }
+    }
+    all
+}
+
+/// Latent states of an arm of which some encoders measure motors, or friction brakes them: the whole arm is simulated from sample to sample, and
+/// what encoders measure is put in its place at each.
+fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    track: &Track<N>,
+    plant: &Plant<f64, A, N, P>,
+    torque: &[[InputSegment<f64>; N]],
+    last: usize,
+) -> Vec<LatentState<f64, N>> {
+    let path = track.path();
+    let drivetrain = plant.drivetrain();
+    let rate = plant.fastest(&path[0].q);
+    let mut now = State::new(path[0].q, path[0].dq);
+    let mut all = Vec::with_capacity(last + 1);
+    for k in 0..=last {
+        let before = now.latent.deflection;
+        if k > 0 {
+            let h = track.t[k] - track.t[k - 1];
+            let count = ((h * rate / STABLE).ceil() as usize).clamp(1, MAX_STEPS);
+            advance(plant, &mut now, &Interval { t: track.t[k - 1], h, torque: &torque[k - 1] }, count);
+        }
+        if !now.is_finite() || now.latent.deflection.amax() > LIMIT {
+            now = State::new(path[k].q, path[k].dq);
+        }
+        for j in 0..N {
+            let (at, rate) = (path[k].q[j], path[k].dq[j]);
+            let Some(transmission) = drivetrain.get(j) else {
+                (now.q[j], now.dq[j]) = (at, rate);
+                continue;
+            };
+            if drivetrain.sides(j).encoder_at_motor {
+                (now.latent.deflection[j], now.latent.deflection_rate[j]) = (at - now.q[j], rate - now.dq[j]);
+                if k > 0 && transmission.backlash <= 0.0 {
+                    let sample = Motor { path: [&path[k - 1], &path[k]], h: track.t[k] - track.t[k - 1], j };
+                    let predicted = 0.5 * (before[j] + now.latent.deflection[j]);
+                    if let Some(balance) =
+                        sample.deflection(plant, &torque[k - 1][j], now.latent.deflection_rate[j])
+                    {
+                        let share = (sample.h / MEMORY).min(0.5);
+                        now.latent.deflection[j] += share * (balance - predicted);
+                        now.q[j] = at - now.latent.deflection[j];
+                    }
+                }
+            } else {
+                now.latent.deflection[j] += now.q[j] - at;
+                now.latent.deflection_rate[j] += now.dq[j] - rate;
+                (now.q[j], now.dq[j]) = (at, rate);
+            }
+            if transmission.backlash > 0.0 {
+                let beyond = now.latent.deflection[j].abs() >= transmission.half_backlash();
+                if beyond || now.latent.side[j] != 0.0 {
+                    let side = if beyond { now.latent.deflection[j].signum() } else { now.latent.side[j] };
+                    now.latent.side[j] = side;
+                    now.latent.deflection[j] = side * transmission.half_backlash();
+                    now.latent.deflection_rate[j] = 0.0;
+                }
+                if drivetrain.sides(j).encoder_at_motor {
+                    now.q[j] = at - now.latent.deflection[j];
+                    now.dq[j] = rate - now.latent.deflection_rate[j];
+                }
+            }
+        }
+        now.modes =
+            std::array::from_fn(|j| Mode::of(drivetrain.friction_velocity(j, now.dq[j], &now.latent)));
+        now.latent.memory = plant.memory(&now.q, &now.latent);
+        now.latent.anchor = now.q;
+        all.push(now.latent);
+    }
+    all
+}
+
+/// One measured motor over one sample interval.
+struct Motor<'a, const N: usize> {
+    path: [&'a MeasuredState<N>; 2],
+    h: f64,
+    j: usize,
+}
+
+impl<const N: usize> Motor<'_, N> {
+    /// Deflection of the shaft that the motor's acceleration asks for, at this rate; none where the motor may stick.
+    fn deflection<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        plant: &Plant<f64, A, N, P>,
+        torque: &InputSegment<f64>,
+        rate: f64,
+    ) -> Option<f64> {
+        let Self { path: [from, to], h, j } = *self;
+        let transmission = plant.drivetrain().get(j)?;
+        let speed = 0.5 * (from.dq[j] + to.dq[j]);
+        let mut braked = 0.0;
+        if plant.drivetrain().sides(j).friction_at_motor {
+            if from.dq[j] * to.dq[j] <= 0.0 {
+                return None;
+            }
+            let rigid = plant.rigid();
+            braked = rigid.viscous[j] * speed + rigid.coulomb[j].max(0.0) * speed.signum();
+        }
+        let carried: f64 = (0..j).map(|i| to.dq[i] - from.dq[i]).sum();
+        let gained = to.dq[j] - from.dq[j] + transmission.coupling_ratio * carried;
+        let passed = torque.at(0.5) - braked - transmission.inertia * gained / h;
+        Some((passed - transmission.damping * rate) / transmission.stiffness)
+    }
+}
+
+/// These latent states with rigid flanks: a rotor behind a flank is put onto it.
+fn rigid<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    state: &LatentState<f64, N>,
+    plant: &Plant<f64, A, N, P>,
+) -> LatentState<f64, N> {
+    let mut rigid = *state;
+    for (j, transmission) in plant.drivetrain().iter().filter(|(_, transmission)| transmission.backlash > 0.0)
+    {
+        if state.deflection[j].abs() >= transmission.half_backlash() {
+            rigid.side[j] = state.deflection[j].signum();
+            (rigid.deflection[j], rigid.deflection_rate[j]) =
+                (rigid.side[j] * transmission.half_backlash(), 0.0);
+        }
+    }
+    rigid
+}
+
+/// One motor over one sample interval.
+struct MotorMotion<'a> {
+    transmission: &'a Transmission<f64>,
+    torque: &'a InputSegment<f64>,
+    h: f64,
+    /// Position and velocity of the link at both ends.
+    ends: [(f64, f64); 2],
+}
+
+impl MotorMotion<'_> {
+    /// Position and velocity of the link at the fraction `s` of the interval, by Hermite's cubic.
+    fn link(&self, s: f64) -> (f64, f64) {
+        let [(q0, v0), (q1, v1)] = self.ends;
+        let (d0, d1) = (v0 * self.h, v1 * self.h);
+        let (c2, c3) = (3.0 * (q1 - q0) - 2.0 * d0 - d1, 2.0 * (q0 - q1) + d0 + d1);
+        (q0 + s * (d0 + s * (c2 + s * c3)), (d0 + s * (2.0 * c2 + 3.0 * s * c3)) / self.h)
+    }
+
+    /// Torque on the motor, and position and velocity of the link, at the fraction `s` of the interval.
+    fn drawn(&self, s: f64) -> [f64; 3] {
+        let (q, dq) = self.link(s);
+        [self.torque.at(s), q, dq]
+    }
+
+    /// Acceleration of the motor under this torque, against this link.
+    fn slope(&self, [torque, q, dq]: &[f64; 3], at: f64, rate: f64) -> f64 {
+        (torque - self.transmission.transmitted(at - q, rate - dq)) / self.transmission.inertia
+    }
+
+    /// Acceleration at the fraction `s` of the interval of a motor at rest at zero, on a shaft without backlash.
+    fn push(&self, s: f64) -> f64 {
+        let (q, dq) = self.link(s);
+        (self.torque.at(s) + self.transmission.stiffness * q + self.transmission.damping * dq)
+            / self.transmission.inertia
+    }
+
+    /// Position and velocity of the motor at the end of the interval.
+    fn advance(&self, e: f64, v: f64) -> (f64, f64) {
+        if self.transmission.backlash > 0.0 {
+            return self.steps((e, v), |s| self.drawn(s), |here, e, v| self.slope(here, e, v));
+        }
+        // Without backlash everything is linear.
+        let Transmission { stiffness, damping, inertia, .. } = self.transmission;
+        let (pull, brake) = (stiffness / inertia, damping / inertia);
+        self.steps((e, v), |s| self.push(s), |push, e, v| push - pull * e - brake * v)
+    }
+
+    /// Position and velocity of the motor at the end of the interval by Runge-Kutta, given its input at a fraction of the interval and the
+    /// acceleration under that input.
+    #[inline(always)]
+    fn steps<D>(
+        &self,
+        (mut e, mut v): (f64, f64),
+        drawn: impl Fn(f64) -> D,
+        slope: impl Fn(&D, f64, f64) -> f64,
+    ) -> (f64, f64) {
+        let count = ((self.h * self.transmission.rate(f64::MAX) / STEP).ceil() as usize).clamp(1, MAX_STEPS);
+        let (dt, ds) = (self.h / count as f64, 1.0 / count as f64);
+        let (half, sixth) = (0.5 * dt, dt / 6.0);
+        let mut here = drawn(0.0);
+        for i in 0..count {
+            let s = i as f64 * ds;
+            let (middle, end) = (drawn(s + 0.5 * ds), drawn(s + ds));
+            let a1 = slope(&here, e, v);
+            let v2 = v + half * a1;
+            let a2 = slope(&middle, e + half * v, v2);
+            let v3 = v + half * a2;
+            let a3 = slope(&middle, e + half * v2, v3);
+            let v4 = v + dt * a3;
+            let a4 = slope(&end, e + dt * v3, v4);
+            e += sixth * (v + 2.0 * (v2 + v3) + v4);
+            v += sixth * (a1 + 2.0 * (a2 + a3) + a4);
+            here = end;
+        }
+        (e.clamp(-LIMIT, LIMIT), v.clamp(-LIMIT, LIMIT))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motor_behind_a_shaft_swings_as_its_equation_says() {
+        let (inertia, rate, torque, h) = (0.02, 150.0, 0.3, 0.002);
+        let stiffness = inertia * rate * rate;
+        let transmission = Transmission {
+            inertia,
+            stiffness,
+            damping: 0.0,
+            backlash: 0.0,
+            part_of_link: false,
+            coupling_ratio: 0.0,
+        };
+        let (speed, segment) = (0.4, InputSegment::held(torque));
+        // Behind a link at constant speed: a motor that starts with it oscillates about the deflection that carries the torque.
+        let (mut at, mut velocity) = (0.0, speed);
+        for k in 0..50 {
+            let t = f64::from(k) * h;
+            let ends = [(speed * t, speed), (speed * (t + h), speed)];
+            (at, velocity) =
+                MotorMotion { transmission: &transmission, torque: &segment, h, ends }.advance(at, velocity);
+            let phase = rate * (t + h);
+            let deflection = torque / stiffness * (1.0 - phase.cos());
+            assert!(
+                (at - speed * (t + h) - deflection).abs() < 1e-3 * torque / stiffness,
+                "{k}: {at} {deflection}"
+            );
+        }
+    }
+}

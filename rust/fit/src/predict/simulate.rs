@@ -1,0 +1,174 @@
+//! Simulation of a hypothesis under given torques, with sub-steps chosen from an error tolerance.
+
+use crate::model::arm::WithArm;
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::progress::{Phase, ProgressReporter};
+use armgap_core::arm::Arm;
+use armgap_core::effect::{InputSegment, interval};
+use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::kinematics::JointState;
+use nalgebra::SVector;
+
+/// Sub-steps per sample beyond which a tolerance is given up.
+const MAX_SUBSTEPS: usize = 256;
+
+/// Samples between two progress/cancellation checks.
+const LOOK: usize = 4096;
+
+/// A simulation to be run.
+#[derive(Clone)]
+pub struct Simulation<'a> {
+    /// Sample times, s.
+    pub t: &'a [f64],
+    /// Torques held from each sample to the next, row by row.
+    pub tau: &'a [f64],
+    /// Positions at the first sample.
+    pub q0: &'a [f64],
+    /// Velocities at the first sample.
+    pub dq0: &'a [f64],
+    /// Effects with their values.
+    pub effects: &'a [EffectInstance],
+    /// Largest admissible change of any position when the sub-steps are halved.
+    pub tolerance: f64,
+    /// Width of the smoothed sign, rad/s; zero for exact dry friction.
+    pub smoothing: f64,
+    /// Progress report and cancellation.
+    pub progress: &'a ProgressReporter,
+}
+
+/// Positions and velocities at the samples, row by row.
+#[derive(Debug, Clone)]
+pub struct Trajectory {
+    /// Positions as the encoders show them.
+    pub q: Vec<f64>,
+    /// Velocities.
+    pub dq: Vec<f64>,
+    /// Sub-steps per sample that met the tolerance.
+    pub substeps: usize,
+}
+
+/// Why a simulation has no result.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SimulationError {
+    /// More effects than a plant carries, or an effect on a joint the arm does not have.
+    Effects,
+    /// The motion left every finite range at this sample (0-based).
+    Diverged(usize),
+    /// Halving the sub-steps still changes a position by this much, more than the tolerance.
+    Tolerance(f64),
+}
+
+impl std::fmt::Display for SimulationError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Effects => write!(f, "too many effects, or an effect on a joint the arm does not have"),
+            Self::Diverged(k) => write!(f, "the simulated motion diverges at sample {}", k + 1),
+            Self::Tolerance(e) => write!(f, "positions still change by {e:.1e} when the steps are halved"),
+        }
+    }
+}
+
+impl WithArm for Simulation<'_> {
+    type Output = Result<Trajectory, SimulationError>;
+
+    /// Doubles the sub-steps until the positions change by less than the tolerance.
+    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
+        self,
+        arm: A,
+        theta: [f64; P],
+    ) -> Self::Output {
+        let hypothesis = Hypothesis { theta, smoothing: self.smoothing, effects: self.effects.to_vec() };
+        let first = self.first_substeps::<A, N, P>(&arm, &hypothesis)?;
+        let mut coarse = self.run::<A, N, P>(&arm, &hypothesis, first)?;
+        let mut substeps = 2 * first;
+        loop {
+            let fine = self.run::<A, N, P>(&arm, &hypothesis, substeps)?;
+            let change = coarse.q.iter().zip(&fine.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            if change <= self.tolerance {
+                return Ok(fine);
+            }
+            if substeps >= MAX_SUBSTEPS {
+                return Err(SimulationError::Tolerance(change));
+            }
+            coarse = fine;
+            substeps *= 2;
+        }
+    }
+}
+
+impl Simulation<'_> {
+    /// Sub-steps that keep the stiffest part of the arm stable.
+    fn first_substeps<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        &self,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+    ) -> Result<usize, SimulationError> {
+        let plant = hypothesis.plant(arm).ok_or(SimulationError::Effects)?;
+        let longest = self.t.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        let rate = plant.fastest(&SVector::from_fn(|j, _| self.q0[j]));
+        Ok(((rate * longest).ceil() as usize).clamp(1, MAX_SUBSTEPS / 2))
+    }
+
+    fn run<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+        &self,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+        substeps: usize,
+    ) -> Result<Trajectory, SimulationError> {
+        self.progress.begin(Phase::Simulate, self.t.len() / LOOK);
+        let plant = hypothesis.plant(arm).ok_or(SimulationError::Effects)?;
+        let held: Vec<[InputSegment<f64>; N]> =
+            self.tau.chunks_exact(N).map(|row| std::array::from_fn(|j| InputSegment::held(row[j]))).collect();
+        let torque = hypothesis.command(self.t, &held, &[], &[]).unwrap_or(held);
+        let start = |x: &[f64]| SVector::<f64, N>::from_fn(|j, _| x[j]);
+        let mut state = State::new(start(self.q0), start(self.dq0));
+        let n = self.t.len();
+        let (mut q, mut dq) = (Vec::with_capacity(n * N), Vec::with_capacity(n * N));
+        for k in 0..n {
+            if k % LOOK == LOOK - 1 {
+                self.progress.unit();
+            }
+            if !state.is_finite() {
+                return Err(SimulationError::Diverged(k));
+            }
+            let shown = plant.drivetrain().shown(&state.q, &state.latent);
+            q.extend((0..N).map(|j| hypothesis.measured(j, shown[j])));
+            let rates = |j: usize| {
+                let moves = plant.drivetrain().sides(j).encoder_at_motor;
+                state.dq[j] + if moves { state.latent.deflection_rate[j] } else { 0.0 }
+            };
+            dq.extend((0..N).map(rates));
+            let step = Interval { t: self.t[k], h: interval(self.t, k), torque: &torque[k] };
+            advance(&plant, &mut state, &step, substeps);
+        }
+        Ok(Trajectory { q, dq, substeps })
+    }
+}
+
+/// Inertia matrices of an arm with effects at the positions `q`, row by row.
+#[derive(Debug, Clone)]
+pub struct InertiaMatrices<'a> {
+    /// Positions.
+    pub q: &'a [f64],
+    /// Effects with their values.
+    pub effects: &'a [EffectInstance],
+}
+
+impl WithArm for InertiaMatrices<'_> {
+    type Output = Option<Vec<f64>>;
+
+    /// All entries of all matrices by rows; none for more effects than a plant carries.
+    fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
+        self,
+        arm: A,
+        theta: [f64; P],
+    ) -> Self::Output {
+        let hypothesis = Hypothesis { effects: self.effects.to_vec(), ..Hypothesis::rigid(theta) };
+        let plant = hypothesis.plant::<A, N>(&arm)?;
+        let at = |q: &[f64]| {
+            let joints = JointState { q: std::array::from_fn(|j| q[j]), dq: [0.0; N] };
+            plant.rigid().equation_terms(&joints).inertia
+        };
+        Some(self.q.chunks_exact(N).flat_map(|q| at(q).into_iter().flatten()).collect())
+    }
+}

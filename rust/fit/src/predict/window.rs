@@ -1,0 +1,333 @@
+//! Short windows cut from logs, and the simulation of a hypothesis over them.
+//!
+//! Every window starts from its measured initial state and runs under the logged torque; the predicted positions of all windows lie in one
+//! flat vector, row by row and joint by joint.
+
+use crate::log::cut::cut_at_smooth_motion;
+use crate::log::track::{InitialState, Track};
+use crate::model::hypothesis::Hypothesis;
+use crate::predict::latent_states::latent_states;
+use armgap_core::arm::Arm;
+use armgap_core::cpu::Level;
+use armgap_core::effect::InputSegment;
+use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::plant::{Mode, Plant};
+use armgap_core::rollout::{BatchRollout, Run, WIDTH};
+use armgap_core::transmission::LatentState;
+use nalgebra::SVector;
+use rayon::prelude::*;
+
+/// A prediction that left this range [rad or m] has diverged; it is kept there so that its cost stays finite.
+pub(crate) const DIVERGED: f64 = 1e3;
+
+/// Sub-steps per sample are capped here; what is too stiff for them is refused by its cost.
+const MAX_SUBSTEPS: usize = 4;
+
+/// Most sub-steps per sample for motors that oscillate against their links.
+const MAX_SUBSTEPS_DRIVEN: usize = 5;
+
+/// Most sub-steps per sample for joints that hit a joint limit.
+const MAX_SUBSTEPS_IMPACT: usize = 12;
+
+/// Most sub-steps per sample for joints whose viscous friction stops them within less than a sample, as that of a geared wrist does whose rotor
+/// the model lacks.
+const MAX_SUBSTEPS_STIFF: usize = 100;
+
+/// Samples `first ..= last` of one track; row 0 is sample `first + 1`.
+#[derive(Debug, Clone, Copy)]
+pub struct Window<const N: usize> {
+    /// Index of the track.
+    pub track: usize,
+    /// Sample the window starts from.
+    pub first: usize,
+    /// Last sample predicted.
+    pub last: usize,
+    /// Where its rows begin in the flat vector, in rows.
+    pub offset: usize,
+    /// Measured initial state.
+    pub initial_state: InitialState<N>,
+}
+
+impl<const N: usize> Window<N> {
+    /// Number of predicted samples.
+    pub fn rows(&self) -> usize {
+        self.last - self.first
+    }
+
+    /// Range of the window in a flat vector of `N` values per row.
+    pub fn range(&self) -> std::ops::Range<usize> {
+        self.offset * N..(self.offset + self.rows()) * N
+    }
+}
+
+/// Several logs cut into windows.
+#[derive(Debug, Clone)]
+pub struct Dataset<const N: usize> {
+    /// The logs.
+    pub tracks: Vec<Track<N>>,
+    /// The windows, in order.
+    pub windows: Vec<Window<N>>,
+    /// Predicted samples in all.
+    pub rows: usize,
+}
+
+impl<const N: usize> Dataset<N> {
+    /// These windows, with all known external disturbances removed from their logs.
+    pub fn without_pushes(&self) -> Self {
+        let mut bare = self.clone();
+        bare.tracks.iter_mut().for_each(|track| track.pushes.clear());
+        bare
+    }
+
+    /// The windows of one track that are wanted, as a dataset of that track alone.
+    pub fn of_track(&self, track: usize, wanted: impl Fn(&Window<N>) -> bool) -> Self {
+        let (mut windows, mut rows) = (Vec::new(), 0);
+        for window in self.windows.iter().filter(|w| w.track == track && wanted(w)) {
+            windows.push(Window { track: 0, offset: rows, ..*window });
+            rows += window.rows();
+        }
+        Self { tracks: vec![self.tracks[track].clone()], windows, rows }
+    }
+
+    /// The windows of both.
+    pub fn and(mut self, other: Self) -> Self {
+        let (tracks, rows) = (self.tracks.len(), self.rows);
+        let moved = |w: Window<N>| Window { track: w.track + tracks, offset: w.offset + rows, ..w };
+        self.windows.extend(other.windows.into_iter().map(moved));
+        self.tracks.extend(other.tracks);
+        self.rows += other.rows;
+        self
+    }
+
+    /// Cuts every track into windows of about `horizon` seconds, where its state is measured best; a gap in the samples ends a window.
+    pub fn new(tracks: Vec<Track<N>>, horizon: f64) -> Self {
+        let mut windows = Vec::new();
+        let mut rows = 0;
+        for (index, track) in tracks.iter().enumerate() {
+            for (first, last) in cut_at_smooth_motion(track, horizon) {
+                windows.push(Window {
+                    track: index,
+                    first,
+                    last,
+                    offset: rows,
+                    initial_state: track.initial_state(first),
+                });
+                rows += last - first;
+            }
+        }
+        Self { tracks, windows, rows }
+    }
+
+    /// Measured positions in the order of the flat vector.
+    pub fn measured(&self) -> Vec<f64> {
+        let samples = |w: &Window<N>| {
+            let track = w.track;
+            (w.first + 1..=w.last).map(move |k| (track, k))
+        };
+        self.windows
+            .iter()
+            .flat_map(samples)
+            .flat_map(|(track, k)| self.tracks[track].q[k].iter().copied().collect::<Vec<_>>())
+            .collect()
+    }
+
+    /// Zero offsets: initial states as measured.
+    pub fn zero_offsets(&self) -> Vec<InitialStateOffset<N>> {
+        vec![InitialStateOffset::none(); self.windows.len()]
+    }
+
+    /// Predicted positions of all windows, each from its measured initial state displaced by its entry of `offsets`.
+    pub fn predict<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+        offsets: &[InitialStateOffset<N>],
+    ) -> Vec<f64> {
+        self.predict_by(arm, hypothesis, offsets, |batched| {
+            let level = Level::widest();
+            batched
+                .par_chunks_mut(GROUP)
+                .for_each(|group| BatchRollout { runs: group, limit: DIVERGED }.run_all(level));
+        })
+    }
+
+    /// The same, run by run: for arms whose equation is too long to be worth the lanes of a vector unit.
+    pub fn predict_singly<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+    ) -> Vec<f64> {
+        self.predict_by(arm, hypothesis, &self.zero_offsets(), |runs| {
+            runs.par_iter_mut().for_each(run_stiff);
+        })
+    }
+
+    /// Predictions of which `rollout` simulates the runs that need no latent state and come near no edge.
+    fn predict_by<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        arm: &A,
+        hypothesis: &Hypothesis<P>,
+        offsets: &[InitialStateOffset<N>],
+        rollout: impl Fn(&mut [Run<'_, f64, A, N, P>]),
+    ) -> Vec<f64> {
+        let mut predicted = vec![DIVERGED; self.rows * N];
+        let Some(plant) = hypothesis.plant(arm) else {
+            return predicted;
+        };
+        let commands: Vec<_> = self
+            .tracks
+            .iter()
+            .map(|track| hypothesis.command(&track.t, &track.held, &track.pushes, &track.tables))
+            .collect();
+        let latent = self.latent(&plant, &commands);
+        let (mut batched, mut scalar) = (Vec::with_capacity(self.windows.len()), Vec::new());
+        let mut rest = predicted.as_mut_slice();
+        for (window, shift) in self.windows.iter().zip(offsets) {
+            let (positions, after) = rest.split_at_mut(window.rows() * N);
+            rest = after;
+            let track = &self.tracks[window.track];
+            let torque = commands[window.track].as_deref().unwrap_or(&track.held);
+            let mut state = hypothesis
+                .initial_state(window.initial_state.q + shift.q, window.initial_state.dq + shift.dq);
+            if let Some(states) = &latent[window.track] {
+                enter(&plant, &mut state, &states[window.first]);
+            }
+            let (t, torque) = (&track.t[window.first..=window.last], &torque[window.first..window.last]);
+            let runs =
+                if plant.only_modes_change() || (plant.is_plain() && !self.is_near_edge(window, &plant)) {
+                    &mut batched
+                } else {
+                    &mut scalar
+                };
+            runs.push(Run { plant: &plant, t, torque, state, positions });
+        }
+        rollout(&mut batched);
+        scalar.par_chunks_mut(WIDTH).for_each(|group| group.iter_mut().for_each(run_scalar));
+        if hypothesis.distorts() {
+            for row in predicted.chunks_exact_mut(N) {
+                for (j, q) in row.iter_mut().enumerate().filter(|(_, q)| **q < DIVERGED) {
+                    *q = hypothesis.measured(j, *q);
+                }
+            }
+        }
+        predicted
+    }
+
+    /// Whether a joint comes close to where a torque jumps, within a window.
+    fn is_near_edge<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        window: &Window<N>,
+        plant: &Plant<f64, A, N, P>,
+    ) -> bool {
+        let q = &self.tracks[window.track].q[window.first..=window.last];
+        (0..N).filter(|j| plant.edges(*j).next().is_some()).any(|j| {
+            let low = q.iter().map(|q| q[j]).fold(f64::INFINITY, f64::min);
+            let high = q.iter().map(|q| q[j]).fold(f64::NEG_INFINITY, f64::max);
+            let margin = NEAR_EDGE * (high - low);
+            plant.edges(j).any(|edge| (low - margin..=high + margin).contains(&edge.position))
+        })
+    }
+
+    /// Latent states at every track's samples, up to the start of its last window; none for a plant without any.
+    fn latent<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        plant: &Plant<f64, A, N, P>,
+        commands: &[Option<Vec<[InputSegment<f64>; N]>>],
+    ) -> Vec<Option<Vec<LatentState<f64, N>>>> {
+        let of = |(index, track): (usize, &Track<N>)| {
+            let last = self.windows.iter().filter(|w| w.track == index).map(|w| w.first).max()?;
+            if !plant.drivetrain().any() && !plant.has_hysteresis() {
+                return None;
+            }
+            let torque = commands[index].as_deref().unwrap_or(&track.held);
+            Some(latent_states(track, plant, torque, last))
+        };
+        self.tracks.iter().enumerate().map(of).collect()
+    }
+}
+
+/// An offset of a window's initial state.
+#[derive(Debug, Clone, Copy)]
+pub struct InitialStateOffset<const N: usize> {
+    /// Added to the positions.
+    pub q: SVector<f64, N>,
+    /// Added to the velocities.
+    pub dq: SVector<f64, N>,
+}
+
+impl<const N: usize> InitialStateOffset<N> {
+    /// No offset.
+    pub fn none() -> Self {
+        Self { q: SVector::zeros(), dq: SVector::zeros() }
+    }
+}
+
+/// A position this part of a window's travel beyond it is one that a prediction may reach.
+const NEAR_EDGE: f64 = 0.3;
+
+/// Runs that share the lanes of one vector unit: enough that few lanes are idle at the end.
+const GROUP: usize = 4 * WIDTH;
+
+/// Gives a state at the positions that encoders show its latent states: a link behind the encoder of its motor lies by the deflection off it.
+fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    plant: &Plant<f64, A, N, P>,
+    state: &mut State<f64, N>,
+    latent: &LatentState<f64, N>,
+) {
+    for j in (0..N).filter(|j| plant.drivetrain().sides(*j).encoder_at_motor) {
+        state.q[j] -= latent.deflection[j];
+        state.dq[j] -= latent.deflection_rate[j];
+    }
+    state.latent = LatentState { anchor: state.q, ..*latent };
+    state.modes = std::array::from_fn(|j| {
+        Mode::of(plant.drivetrain().friction_velocity(j, state.dq[j], &state.latent))
+    });
+}
+
+/// Simulates one run by the scalar integrator, in as many steps per sample as its plant needs.
+fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
+    let most = match (run.plant.jumps(), run.plant.drivetrain().any()) {
+        (true, _) => MAX_SUBSTEPS_IMPACT,
+        (false, true) => MAX_SUBSTEPS_DRIVEN,
+        (false, false) => MAX_SUBSTEPS,
+    };
+    let measures_motors = run.plant.drivetrain().measures_motors();
+    let state = &mut run.state;
+    for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
+        let h = run.t[k + 1] - run.t[k];
+        let mut rate = run.plant.fastest(&state.q);
+        if run.plant.jumps() {
+            rate = rate.max(run.plant.fastest(&(state.q + state.dq * h)));
+        }
+        let substeps = substeps(h * rate).min(most);
+        advance(run.plant, state, &Interval { t: run.t[k], h, torque: &run.torque[k] }, substeps);
+        if !state.is_finite() || state.q.amax() > DIVERGED {
+            break;
+        }
+        if measures_motors {
+            row.copy_from_slice(run.plant.drivetrain().shown(&state.q, &state.latent).as_slice());
+        } else {
+            row.copy_from_slice(state.q.as_slice());
+        }
+    }
+}
+
+/// Simulates one run in as many steps per sample as keep its viscous friction stable.
+fn run_stiff<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
+    let state = &mut run.state;
+    for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
+        let h = run.t[k + 1] - run.t[k];
+        let rate = run.plant.fastest(&state.q).max(run.plant.viscous_rate(&state.q));
+        let steps = substeps(h * rate).min(MAX_SUBSTEPS_STIFF);
+        advance(run.plant, state, &Interval { t: run.t[k], h, torque: &run.torque[k] }, steps);
+        if !state.is_finite() || state.q.amax() > DIVERGED {
+            break;
+        }
+        row.copy_from_slice(state.q.as_slice());
+    }
+}
+
+/// Steps per sample that keep Runge-Kutta stable against smoothed friction of this rate times the sample period.
+fn substeps(stiffness: f64) -> usize {
+    ((stiffness / 1.5).ceil() as usize).max(1)
+}

@@ -1,0 +1,426 @@
+//! How far predictions miss on the holdout: windows from measured initial states, and whole logs from their first sample.
+
+use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::weighting::Weighting;
+use crate::log::input::Options;
+use crate::log::track::InitialState;
+use crate::model::arm::ArmDescription;
+use crate::model::hypothesis::Hypothesis;
+use crate::numeric::products::squares;
+use crate::numeric::random::Random;
+use crate::predict::window::{Dataset, InitialStateOffset, Window};
+use crate::result::report::{AtHorizon, FreeRun, FreeRunSeries, Gap, Series};
+use armgap_core::arm::Arm;
+use rayon::prelude::*;
+
+/// Points of a drawn curve at most.
+const DRAWN: usize = 2500;
+
+/// Holdout logs that are drawn.
+const DRAWN_LOGS: usize = 3;
+
+/// Resamples of the holdout windows for the interval of the closed share.
+const RESAMPLES: usize = 500;
+
+/// Further prediction horizons, s.
+pub(crate) const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
+
+/// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
+const FREE_RUN_LIMIT: f64 = 100.0;
+
+/// Displaced initial states from which a perfect model's errors are estimated: the mean square of one window is then known to some 40 %, that
+/// of forty windows to 6 %.
+const DISPLACED: usize = 6;
+
+/// A window is consistent with its noise and its measured initial state up to this cost per sample and joint: the noise is known to 3 %, and
+/// of some hundred values the mean square scatters by 15 %.
+const CONSISTENT: f64 = 1.5;
+
+/// A torque that the model lacks leaves 1/36 of the squared errors it makes once the initial state is fitted, if it is constant over the window, and
+/// more if it is not. What is left beyond noise, with two standard deviations of it, times this may be a quarter of the squared errors at most in a
+/// window that a displaced initial state explains.
+const TORQUE_SHARE: f64 = 4.0 * 36.0;
+
+/// Fewest explained windows that say by how much initial states err beyond their covariance.
+const FEWEST_EXPLAINED: usize = 5;
+
+/// The three hypotheses a report compares.
+pub struct Compared<const P: usize> {
+    /// The arm file as it is.
+    pub before: Hypothesis<P>,
+    /// Parameters re-estimated.
+    pub refit: Hypothesis<P>,
+    /// Causes added.
+    pub after: Hypothesis<P>,
+}
+
+/// Predictions on the holdout from measured initial states, and their squared errors.
+pub struct Errors<const N: usize> {
+    before: Vec<f64>,
+    refit: Vec<f64>,
+    after: Vec<f64>,
+    /// Mean square that measured initial states and the measurement itself put into the errors, per joint.
+    floor: [f64; N],
+}
+
+impl<const N: usize> Errors<N> {
+    /// Predictions of the three hypotheses.
+    pub fn new<A: Arm<f64, N, P>, const P: usize>(
+        context: &DiagnosisContext<A, N, P>,
+        compared: &Compared<P>,
+        seed: u64,
+    ) -> Self {
+        let data = &context.holdout.data;
+        let offsets = data.zero_offsets();
+        let bare = data.without_pushes();
+        let after = data.predict(&context.arm, &compared.after, &offsets);
+        Self {
+            before: bare.predict(&context.arm, &compared.before, &offsets),
+            refit: bare.predict(&context.arm, &compared.refit, &offsets),
+            floor: floor(context, data, &compared.after, &after, seed),
+            after,
+        }
+    }
+
+    /// Measured and predicted positions for drawing.
+    pub fn series<A: Arm<f64, N, P>, const P: usize>(
+        &self,
+        context: &DiagnosisContext<A, N, P>,
+    ) -> Vec<Series> {
+        window_series(
+            &context.holdout.data,
+            &context.holdout.measured,
+            [&self.before, &self.refit, &self.after],
+        )
+    }
+}
+
+/// Mean square of a perfect model's errors: noise of the sample itself, and the error of the measured initial state carried along the
+/// window.
+///
+/// What the model misses by in a window is a perfect model's error where noise and a displaced initial state explain it: one within the
+/// covariance of the measured state, or one that leaves so little of the errors that no torque could have made them. Elsewhere that
+/// error is what displacements drawn from the measured state's covariance make, times what the errors of explained windows are of theirs, and
+/// no more than what the model misses by.
+fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    data: &Dataset<N>,
+    model: &Hypothesis<P>,
+    predicted: &[f64],
+    seed: u64,
+) -> [f64; N] {
+    let measured = data.measured();
+    let missed = window_squares(data, &measured, predicted);
+    let carried = carried(context, data, model, predicted, seed);
+    let weighting = Weighting::new(data, &context.arm, model, context.noise, data.zero_offsets(), predicted);
+    let residual = weighting.residual(&measured, predicted);
+    let costs = weighting.costs(data, &residual);
+    let left = weighting.beside_free_states(data, &residual);
+    let explained: Vec<bool> = data
+        .windows
+        .iter()
+        .zip(costs.iter().zip(&left))
+        .map(|(w, (cost, left))| {
+            let samples = (w.rows() * N) as f64;
+            let beyond_noise = left - samples + 2.0 * (2.0 * samples).sqrt();
+            let missed = squares(&[&residual[w.range()]])[0];
+            *cost < CONSISTENT * samples
+                || (*left < CONSISTENT * samples && TORQUE_SHARE * beyond_noise < missed)
+        })
+        .collect();
+    let carried = |index: usize, j: usize| context.noise[j].powi(2) + carried[index][j];
+    let enough = explained.iter().filter(|e| **e).count() >= FEWEST_EXPLAINED;
+    std::array::from_fn(|j| {
+        let of_explained = |square: &dyn Fn(usize) -> f64| -> f64 {
+            (0..explained.len()).filter(|&i| explained[i]).map(square).sum()
+        };
+        let ratio = of_explained(&|i| missed[i][j]) / of_explained(&|i| carried(i, j));
+        let beyond = if enough { ratio.max(1.0) } else { 1.0 };
+        let square =
+            |i: usize| if explained[i] { missed[i][j] } else { missed[i][j].min(beyond * carried(i, j)) };
+        (0..explained.len()).map(square).sum::<f64>() / explained.len() as f64
+    })
+}
+
+/// Mean square, window by window, of what displaced initial states change in the predictions.
+fn carried<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    data: &Dataset<N>,
+    model: &Hypothesis<P>,
+    predicted: &[f64],
+    seed: u64,
+) -> Vec<[f64; N]> {
+    let mut random = Random(seed);
+    let mut sum = vec![[0.0; N]; data.windows.len()];
+    for _ in 0..DISPLACED {
+        let offsets: Vec<InitialStateOffset<N>> =
+            data.windows.iter().map(|w| displaced(&w.initial_state, &mut random)).collect();
+        let there = data.predict(&context.arm, model, &offsets);
+        for (total, square) in sum.iter_mut().zip(window_squares(data, predicted, &there)) {
+            for j in 0..N {
+                total[j] += square[j] / DISPLACED as f64;
+            }
+        }
+    }
+    sum
+}
+
+/// An error of a measured initial state, drawn from its covariance and its bias.
+fn displaced<const N: usize>(state: &InitialState<N>, random: &mut Random) -> InitialStateOffset<N> {
+    let mut offset = InitialStateOffset::none();
+    for j in 0..N {
+        let [vq, cov, vdq] = state.covariance[j];
+        let [bias_q, bias_dq] = state.mean_square[j];
+        let (a, b) = (random.normal(), random.normal());
+        let given_q = (vdq - cov * cov / vq).max(0.0).sqrt();
+        offset.q[j] = (bias_q * vq).sqrt() * a;
+        offset.dq[j] = bias_dq.sqrt() * (cov / vq.sqrt() * a + given_q * b);
+    }
+    offset
+}
+
+/// Mean square difference of each joint, window by window.
+fn window_squares<const N: usize>(data: &Dataset<N>, one: &[f64], other: &[f64]) -> Vec<[f64; N]> {
+    let of = |window: &Window<N>| -> [f64; N] {
+        let mut sum = [0.0; N];
+        for (a, b) in one[window.range()].chunks_exact(N).zip(other[window.range()].chunks_exact(N)) {
+            for (total, (a, b)) in sum.iter_mut().zip(a.iter().zip(b)) {
+                *total += (a - b).powi(2);
+            }
+        }
+        sum.map(|x| x / window.rows() as f64)
+    };
+    data.windows.iter().map(of).collect()
+}
+
+/// RMS difference of each joint.
+pub fn rms<const N: usize>(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
+    let rows = (measured.len() / N).max(1) as f64;
+    let squares = |j: usize| -> f64 {
+        measured.iter().zip(predicted).skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
+    };
+    (0..N).map(|j| (squares(j) / rows).sqrt()).collect()
+}
+
+/// The gap before, re-estimated, and with the causes.
+pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    compared: &Compared<P>,
+    errors: &Errors<N>,
+    free: &FreeRuns<N>,
+    description: &ArmDescription,
+    options: &Options,
+) -> Gap {
+    let measured = &context.holdout.measured;
+    let floor: Vec<f64> = errors.floor.iter().map(|v| v.sqrt()).collect();
+    let before = rms::<N>(measured, &errors.before);
+    let after = rms::<N>(measured, &errors.after);
+    let refit = rms::<N>(measured, &errors.refit);
+    Gap {
+        horizon_s: options.horizon,
+        unit: if description.kind.rotary() { "rad" } else { "m" },
+        closed: closed(&before, &after, &floor),
+        closed_ci: closed_interval(context, errors, &floor, options.seed),
+        unexplained: (1.0 - closed(&refit, &after, &floor)).clamp(0.0, 1.0),
+        refit,
+        motion: rms::<N>(measured, &context.holdout.still()),
+        horizons: HORIZONS
+            .par_iter()
+            .filter_map(|h| at_horizon(context, compared, *h, options.seed))
+            .collect(),
+        free_run: FreeRun {
+            before: rms::<N>(&free.measured, &free.before),
+            after: rms::<N>(&free.measured, &free.after),
+        },
+        before,
+        after,
+        floor,
+    }
+}
+
+/// The gap at another prediction horizon; none where the logs are shorter than two of it.
+fn at_horizon<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    compared: &Compared<P>,
+    horizon: f64,
+    seed: u64,
+) -> Option<AtHorizon> {
+    let data = Dataset::new(context.holdout.data.tracks.clone(), horizon);
+    if data.windows.len() < 2 * data.tracks.len() {
+        return None;
+    }
+    let bare = data.without_pushes();
+    let (measured, offsets) = (data.measured(), data.zero_offsets());
+    let missed = |predicted: &[f64]| rms::<N>(&measured, &limited(&measured, predicted));
+    let after = data.predict(&context.arm, &compared.after, &offsets);
+    Some(AtHorizon {
+        horizon_s: horizon,
+        before: missed(&bare.predict(&context.arm, &compared.before, &offsets)),
+        refit: missed(&bare.predict(&context.arm, &compared.refit, &offsets)),
+        floor: floor(context, &data, &compared.after, &after, seed).map(f64::sqrt).to_vec(),
+        after: missed(&after),
+    })
+}
+
+/// Share of the gap above the floor that is closed, over all joints.
+pub(crate) fn closed(before: &[f64], after: &[f64], floor: &[f64]) -> f64 {
+    let above =
+        |x: &[f64]| x.iter().zip(floor).map(|(x, f)| ((x - f) / before_scale(before)).max(0.0)).sum::<f64>();
+    let (b, a) = (above(before), above(after));
+    if b > 0.0 { 1.0 - a / b } else { 0.0 }
+}
+
+fn before_scale(before: &[f64]) -> f64 {
+    before.iter().copied().fold(f64::MIN_POSITIVE, f64::max)
+}
+
+/// 95 % interval of the closed share from resampled holdout windows.
+fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    errors: &Errors<N>,
+    floor: &[f64],
+    seed: u64,
+) -> [f64; 2] {
+    let data = &context.holdout.data;
+    let squares = |predicted: &[f64], w: &Window<N>, j: usize| -> f64 {
+        let pairs = context.holdout.measured[w.range()].iter().zip(&predicted[w.range()]);
+        pairs.skip(j).step_by(N).map(|(a, b)| (a - b).powi(2)).sum()
+    };
+    let table = |predicted: &[f64]| -> Vec<[f64; N]> {
+        data.windows.iter().map(|w| std::array::from_fn(|j| squares(predicted, w, j))).collect()
+    };
+    let (before, after) = (table(&errors.before), table(&errors.after));
+    let mut random = Random(seed);
+    let count = data.windows.len();
+    let mut shares: Vec<f64> = (0..RESAMPLES)
+        .map(|_| {
+            let draw: Vec<usize> = (0..count).map(|_| random.below(count)).collect();
+            let rows: usize = draw.iter().map(|&w| data.windows[w].rows()).sum();
+            let pooled = |table: &[[f64; N]]| -> Vec<f64> {
+                (0..N)
+                    .map(|j| (draw.iter().map(|&w| table[w][j]).sum::<f64>() / rows.max(1) as f64).sqrt())
+                    .collect()
+            };
+            closed(&pooled(&before), &pooled(&after), floor)
+        })
+        .collect();
+    shares.sort_by(f64::total_cmp);
+    [shares[RESAMPLES / 40], shares[RESAMPLES - 1 - RESAMPLES / 40]]
+}
+
+/// The holdout as one window per log.
+pub(crate) fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
+    let (mut windows, mut rows) = (Vec::new(), 0);
+    for (index, track) in data.tracks.iter().enumerate() {
+        let last = track.len() - 1;
+        windows.push(Window {
+            track: index,
+            first: 0,
+            last,
+            offset: rows,
+            initial_state: track.initial_state(0),
+        });
+        rows += last;
+    }
+    Dataset { tracks: data.tracks.clone(), windows, rows }
+}
+
+/// Predictions kept within reach of the measurement, so that a diverged run stays a number.
+pub(crate) fn limited(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
+    let within = |p: &f64, m: &f64| m + (p - m).clamp(-FREE_RUN_LIMIT, FREE_RUN_LIMIT);
+    predicted.iter().zip(measured).map(|(p, m)| within(p, m)).collect()
+}
+
+/// Whole logs of the holdout from their first sample.
+pub struct FreeRuns<const N: usize> {
+    data: Dataset<N>,
+    measured: Vec<f64>,
+    before: Vec<f64>,
+    after: Vec<f64>,
+}
+
+impl<const N: usize> FreeRuns<N> {
+    /// Runs of the arm file as it is, and of the model with the causes.
+    pub fn new<A: Arm<f64, N, P>, const P: usize>(
+        context: &DiagnosisContext<A, N, P>,
+        compared: &Compared<P>,
+    ) -> Self {
+        let data = whole(&context.holdout.data);
+        let (bare, measured) = (data.without_pushes(), data.measured());
+        let offsets = vec![InitialStateOffset::none(); data.windows.len()];
+        let run = |data: &Dataset<N>, h| limited(&measured, &data.predict(&context.arm, h, &offsets));
+        let (before, after) = rayon::join(|| run(&bare, &compared.before), || run(&data, &compared.after));
+        Self { data, measured, before, after }
+    }
+
+    /// Curves for drawing.
+    pub fn series(&self) -> Vec<FreeRunSeries> {
+        free_run_series(&self.data, &self.measured, [&self.before, &self.after])
+    }
+}
+
+/// Curves of whole logs: measured positions, and predictions of the arm file as it is and of the model with causes.
+pub(crate) fn free_run_series<const N: usize>(
+    data: &Dataset<N>,
+    measured: &[f64],
+    [before, after]: [&[f64]; 2],
+) -> Vec<FreeRunSeries> {
+    let mut all = Vec::new();
+    for window in data.windows.iter().take(DRAWN_LOGS) {
+        let track = &data.tracks[window.track];
+        let rows: Vec<usize> = (0..window.rows()).step_by(window.rows().div_ceil(DRAWN)).collect();
+        for j in 0..N {
+            let pick = |x: &[f64]| rows.iter().map(|i| x[(window.offset + i) * N + j]).collect();
+            all.push(FreeRunSeries {
+                log: track.name.clone(),
+                joint: j + 1,
+                t: rows.iter().map(|i| track.t[i + 1]).collect(),
+                measured: pick(measured),
+                before: pick(before),
+                after: pick(after),
+            });
+        }
+    }
+    all
+}
+
+/// Curves of windows: measured positions, and predictions of the arm file as it is, re-estimated, and with causes.
+pub(crate) fn window_series<const N: usize>(
+    data: &Dataset<N>,
+    measured: &[f64],
+    [before, refit, after]: [&[f64]; 3],
+) -> Vec<Series> {
+    let mut all = Vec::new();
+    for (index, track) in data.tracks.iter().enumerate().take(DRAWN_LOGS) {
+        let stride = track.len().div_ceil(DRAWN);
+        for j in 0..N {
+            let mut s = Series {
+                log: track.name.clone(),
+                joint: j + 1,
+                t: Vec::new(),
+                measured: Vec::new(),
+                before: Vec::new(),
+                refit: Vec::new(),
+                after: Vec::new(),
+                window_start: Vec::new(),
+                initial_position: Vec::new(),
+                initial_velocity: Vec::new(),
+            };
+            for window in data.windows.iter().filter(|w| w.track == index) {
+                s.window_start.push(s.t.len());
+                s.initial_position.push(window.initial_state.q[j]);
+                s.initial_velocity.push(window.initial_state.dq[j]);
+                for i in (0..window.rows()).step_by(stride) {
+                    let at = (window.offset + i) * N + j;
+                    s.t.push(track.t[window.first + 1 + i]);
+                    s.measured.push(measured[at]);
+                    s.before.push(before[at]);
+                    s.refit.push(refit[at]);
+                    s.after.push(after[at]);
+                }
+            }
+            all.push(s);
+        }
+    }
+    all
+}

@@ -1,0 +1,218 @@
+//! What is fit to be named: causes of which size, value and probability stand, as many as are allowed. The rest are candidates.
+//!
+//! The model reported has the named causes only, so that the gap "after" is what a reader who applies them gets.
+
+use crate::disturbance::push::{Conclusion, Disturbance};
+use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
+use crate::likelihood::solve::Fit;
+use crate::model::hypothesis::EffectInstance;
+use crate::search::belief::Cause;
+use crate::search::model_search::{Attribution, refresh};
+use armgap_core::arm::Arm;
+use armgap_core::effect::{NEVER, Trial};
+
+/// Probability below which nothing is named.
+const NAMEABLE: f64 = 0.3;
+
+/// Probability below which a value that arms hardly ever have is not named.
+const LIKELY: f64 = 0.5;
+
+/// Gains of a drive: beyond, a column's unit is wrong, not its drive.
+const GAINS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+
+/// Something that was found and is not named, and why.
+#[derive(Debug, Clone)]
+pub struct Unnamed<T> {
+    /// What was found.
+    pub found: T,
+    /// Why it is not fit to be named.
+    pub why: String,
+}
+
+/// What a diagnosis names, and the model that goes with it.
+pub struct Headline<const N: usize, const P: usize> {
+    /// The model search.
+    pub attribution: Attribution<N, P>,
+    /// The model with the named causes.
+    pub model: Fit<P>,
+    /// Weights around it.
+    pub weights: SplitWeighting<N>,
+    /// Whether the search leaves a cost beside it that is more than noise.
+    pub open: bool,
+    /// Named causes, strongest first.
+    pub causes: Vec<Cause>,
+    /// Named external disturbances.
+    pub disturbances: Vec<Disturbance>,
+    /// Causes that are not named.
+    pub candidates: Vec<Unnamed<Cause>>,
+    /// External disturbances that are not named.
+    pub disturbance_candidates: Vec<Unnamed<Disturbance>>,
+}
+
+/// Why an effect of this probability, with these standard deviations of its values, is not fit to be named; none if it is.
+pub fn unfit(effect: &EffectInstance, sigma: &[f64], probability: f64) -> Option<String> {
+    if probability < NAMEABLE {
+        return Some(format!("its probability is {probability:.2}"));
+    }
+    impossible(effect, probability).or_else(|| uncertain(effect, sigma))
+}
+
+/// A value that no arm has.
+fn impossible(effect: &EffectInstance, probability: f64) -> Option<String> {
+    let value = effect.p[0];
+    match effect.law.spec().name {
+        "torque_gain" if !GAINS.contains(&value) => {
+            Some(format!("a gain of {value:.3} is no drive's; the torque column may have another unit"))
+        }
+        "joint_spring" if value < 0.0 && probability < LIKELY => {
+            Some("its stiffness is negative, which no spring's is".to_owned())
+        }
+        _ => None,
+    }
+}
+
+/// A size that is not told from nothing. A standard deviation says so only of what grows from nothing in proportion to its size: that of a threshold or of
+/// a transmission is along its other values as well, and the search has compared the whole effect with its absence.
+fn uncertain(effect: &EffectInstance, sigma: &[f64]) -> Option<String> {
+    let spec = effect.law.spec();
+    let amplitudes = spec.parameters.iter().zip(effect.p).zip(sigma).take(effect.amplitudes());
+    let deviations = amplitudes.map(|((parameter, value), sigma)| {
+        let neutral = if parameter.neutral < NEVER { parameter.neutral } else { 0.0 };
+        ((value - neutral).abs(), *sigma)
+    });
+    let (size, sigma) = deviations.max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))?;
+    let largest = if spec.trial == Trial::Whole { f64::INFINITY } else { size };
+    (sigma >= largest).then(|| {
+        format!("its {} is not told from none: its standard deviation is as large", spec.parameters[0].name)
+    })
+}
+
+/// Keeps what is fit to be named and hands back the rest; what is fit but one too many is not named either.
+fn sorted<T>(
+    all: Vec<T>,
+    allowed: usize,
+    most: usize,
+    why_not: impl Fn(&T) -> Option<String>,
+) -> (Vec<T>, Vec<Unnamed<T>>) {
+    let (mut named, mut rest) = (Vec::new(), Vec::new());
+    for found in all {
+        match why_not(&found) {
+            Some(why) => rest.push(Unnamed { found, why }),
+            None if named.len() < allowed => named.push(found),
+            None => rest.push(Unnamed { found, why: format!("no more than {most} causes were to be named") }),
+        }
+    }
+    (named, rest)
+}
+
+fn sorted_causes(causes: &[Cause], most: usize) -> (Vec<Cause>, Vec<Unnamed<Cause>>) {
+    sorted(causes.to_vec(), most, most, |c| unfit(&c.effect, &c.sigma, c.probability))
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// What is named of a conclusion, at most `most` causes and external disturbances together, and the model with that.
+    ///
+    /// Effects come before disturbances, and of these the clearest first. Disturbances that are not named are taken out of the logs; where
+    /// none is left, the search without them counts.
+    pub fn headline(&mut self, conclusion: Conclusion<N, P>, most: usize) -> Headline<N, P> {
+        let Conclusion { mut attribution, alone, mut disturbances } = conclusion;
+        self.weigh(&mut attribution);
+        let (mut causes, mut candidates) = sorted_causes(&attribution.causes, most);
+        disturbances.sort_by(|a, b| b.clarity().total_cmp(&a.clarity()));
+        let (disturbances, disturbance_candidates) =
+            sorted(disturbances, most - causes.len(), most, |e| unfit(&e.push, &e.sigma, e.probability));
+        let mut changed = !disturbance_candidates.is_empty();
+        if let Some(alone) = alone.filter(|_| changed && disturbances.is_empty()) {
+            attribution = alone;
+            self.set_pushes(&[]);
+            self.weigh(&mut attribution);
+            (causes, candidates) = sorted_causes(&attribution.causes, most);
+            changed = false;
+        }
+        self.set_pushes(&disturbances);
+        changed |= !candidates.is_empty();
+        let (model, weights, open) = self.reported(&attribution, &causes, &disturbances, changed);
+        refresh(&model, &mut causes);
+        Headline {
+            attribution,
+            model,
+            weights,
+            open,
+            causes,
+            disturbances,
+            candidates,
+            disturbance_candidates,
+        }
+    }
+
+    /// The model with the named causes alone, weights around it, and whether the search leaves a gap beside it.
+    fn reported(
+        &self,
+        attribution: &Attribution<N, P>,
+        causes: &[Cause],
+        disturbances: &[Disturbance],
+        changed: bool,
+    ) -> (Fit<P>, SplitWeighting<N>, bool) {
+        let last = &attribution.nodes[attribution.nodes.len() - 1];
+        let open = attribution.is_unexplained();
+        if !changed {
+            return (attribution.model.clone(), last.weights.clone(), open);
+        }
+        let (mut model, weights, open) = if causes.is_empty() && disturbances.is_empty() {
+            // The last one without effects: the arm with parameters estimated again, and what friction regularisation that alone asked for.
+            let bare = |i: &usize| attribution.nodes[*i].settled.hypothesis.effects.is_empty();
+            let node = (0..attribution.nodes.len()).rfind(bare).map_or(last, |i| &attribution.nodes[i]);
+            (node.settled.clone(), node.weights.clone(), node.is_unexplained())
+        } else {
+            let mut hypothesis = attribution.model.hypothesis.clone();
+            hypothesis.effects.retain(|e| causes.iter().any(|c| c.effect.same_place(e)));
+            let (model, weights) = self.settle(&hypothesis, last.weights.training.scale);
+            (model, weights, open)
+        };
+        self.apply_dispersion_factor(&mut model, &weights);
+        (model, weights, open)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armgap_core::effect::find;
+
+    fn effect(name: &str, p: [f64; 3]) -> EffectInstance {
+        EffectInstance::new(find::<f64>(name).unwrap(), 0, p)
+    }
+
+    #[test]
+    fn what_is_fit_to_be_named() {
+        for (name, p, sigma, probability, fit) in [
+            ("stribeck", [0.8, 0.3, 0.0], vec![0.03, 0.02], 0.99, true),
+            ("stribeck", [0.8, 0.3, 0.0], vec![0.03, 0.02], 0.29, false),
+            ("stribeck", [0.8, 0.3, 0.0], vec![0.8, 0.02], 0.99, false),
+            ("stribeck", [0.8, 0.3, 0.0], vec![0.03, 3.0], 0.99, true),
+            ("payload", [15.6, 0.2, 0.0], vec![50.0, 0.1], 0.99, false),
+            ("torque_gain", [1.02, 0.0, 0.0], vec![0.01], 0.9, true),
+            ("torque_gain", [1.02, 0.0, 0.0], vec![0.03], 0.9, false),
+            ("torque_gain", [20.0, 0.0, 0.0], vec![3.5], 0.9, false),
+            ("torque_gain", [0.08, 0.0, 0.0], vec![0.001], 1.0, false),
+            ("joint_spring", [-2.0, 0.1, 0.0], vec![0.1, 0.1], 0.4, false),
+            ("joint_spring", [-2.0, 0.1, 0.0], vec![0.1, 0.1], 0.9, true),
+            ("joint_spring", [2.0, 0.1, 0.0], vec![0.1, 0.1], 0.4, true),
+            ("position_dependent_friction", [0.01, 0.5, 0.0], vec![0.1, 0.1], 0.9, true),
+            ("torque_saturation", [12.0, 0.0, 0.0], vec![f64::INFINITY], 0.9, false),
+        ] {
+            let why = unfit(&effect(name, p), &sigma, probability);
+            assert_eq!(why.is_none(), fit, "{name} {p:?} {sigma:?} {probability}: {why:?}");
+        }
+    }
+
+    #[test]
+    fn one_too_many_is_a_candidate() {
+        let (named, rest) = sorted(vec![1, 2, 3, 4], 2, 3, |x| (*x == 1).then(|| "small".to_owned()));
+        assert_eq!(named, [2, 3]);
+        let why: Vec<(i32, &str)> = rest.iter().map(|u| (u.found, u.why.as_str())).collect();
+        assert_eq!(why, [(1, "small"), (4, "no more than 3 causes were to be named")]);
+        let (none, all) = sorted(vec![7], 0, 0, |_| None);
+        assert!(none.is_empty() && all.len() == 1);
+    }
+}

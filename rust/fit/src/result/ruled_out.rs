@@ -1,0 +1,176 @@
+//! What was looked for and not found: a status for every candidate that is no cause.
+
+use crate::candidates::screen::{ScoreTest, screen};
+use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::covariance::NORMAL_95;
+use crate::model::hypothesis::EffectInstance;
+use crate::result::report::{Bound, RuledOut, Status};
+use crate::search::acceptance::{ALMOST, MATTERS, restores};
+use crate::search::model_search::Attribution;
+use armgap_core::arm::Arm;
+use armgap_core::effect::{Scope, Spec, Trial, catalogue};
+
+/// An effect whose size this log pins down to no better than this part of a typical size has not been excited.
+const PINNED: f64 = 0.5;
+
+/// An effect that could be behind more than this part of what remains unexplained is not absent.
+const COULD_BE: f64 = 0.1;
+
+/// Status of every candidate that is no cause, from its first-order test around the final model.
+pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    attribution: &Attribution<N, P>,
+    rotary: bool,
+) -> Vec<RuledOut> {
+    let node = &attribution.nodes[attribution.nodes.len() - 1];
+    let model = &attribution.model.hypothesis;
+    let open = context.open_candidates(model);
+    let problem = context.problem(&node.weights.training);
+    let unchanged = model.effects.len() == node.settled.hypothesis.effects.len()
+        && model.values() == node.settled.hypothesis.values();
+    let known = node.screened.get(..open.len()).filter(|_| unchanged);
+    let scored = known.map_or_else(|| screen(&problem, model, &open), <[ScoreTest]>::to_vec);
+    let remains = problem.weighting.total(&problem.raw_costs(model));
+    let unexplained = node.is_open();
+    let mut list: Vec<(EffectInstance, RuledOut)> = Vec::new();
+    for test in &scored {
+        let mut entry = status(context, test, rotary);
+        if unexplained {
+            doubt(&mut entry, test, remains);
+        }
+        match list.iter_mut().find(|(place, _)| place.same_place(&test.effect)) {
+            // The weakest statement over an effect's shapes holds for the effect.
+            Some((_, known)) if weaker(&entry, known) => *known = entry,
+            Some(_) => {}
+            None => list.push((test.effect, entry)),
+        }
+    }
+    for (place, entry) in &mut list {
+        if let Some(instead) = rivalled(attribution, place) {
+            leave_open(entry, &instead);
+        }
+    }
+    let mut entries: Vec<RuledOut> = list.into_iter().map(|(_, entry)| entry).collect();
+    entries.extend(never_fitted::<N>());
+    entries
+}
+
+/// Status of the effects that no test of candidates looks for.
+fn never_fitted<const N: usize>() -> Vec<RuledOut> {
+    let laws = catalogue::<f64>().iter().map(|law| law.spec());
+    let unsearched = laws.filter(|spec| spec.initial_guesses.is_empty() && spec.least_joints <= N);
+    let entry = |spec: &Spec, joint: Option<usize>| {
+        let (status, why) = if spec.trial == Trial::Disturbance {
+            (
+                Status::Absent,
+                "no push stands out of what the model lacks in any of these logs; a joint at rest shows none below its friction",
+            )
+        } else {
+            (Status::Undecided, "another effect and other parameters of the arm give the same motion, always")
+        };
+        RuledOut { effect: spec.name, joint, status, bound: None, why: Some(why.to_owned()) }
+    };
+    let places = |spec: &Spec| -> Vec<Option<usize>> {
+        if spec.scope == Scope::Joint { (1..=N).map(Some).collect() } else { vec![None] }
+    };
+    unsearched.flat_map(|spec| places(spec).into_iter().map(move |joint| entry(spec, joint))).collect()
+}
+
+fn weaker(a: &RuledOut, b: &RuledOut) -> bool {
+    let size = |r: &RuledOut| r.bound.as_ref().map_or(f64::INFINITY, |b| b.value);
+    (a.status, size(a)) > (b.status, size(b))
+}
+
+fn status<A, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    test: &ScoreTest,
+    rotary: bool,
+) -> RuledOut {
+    let spec = test.effect.law.spec();
+    let parameter = &spec.parameters[0];
+    let typical = context.scales.size(parameter.quantity, test.effect.joint);
+    let sigma = test.sigma.max(test.information_sigma);
+    let (effect, joint) = (spec.name, test.effect.joint_number());
+    if spec.trial == Trial::Whole {
+        return threshold_status(test);
+    }
+    let pinned = sigma < PINNED * typical;
+    if !pinned {
+        let why = format!("these logs do not pin it down; it needs {}", spec.excited_by);
+        return RuledOut { effect, joint, status: Status::NotExcited, bound: None, why: Some(why) };
+    }
+    let value = test.estimate.abs() + NORMAL_95 * sigma;
+    let bound =
+        Bound { parameter: parameter.name, value, unit: parameter.quantity.unit(rotary), level: 0.95 };
+    let traced = test.estimate.abs() > 3.0 * sigma;
+    RuledOut {
+        effect,
+        joint,
+        status: if traced { Status::Undecided } else { Status::Absent },
+        bound: Some(bound),
+        why: traced.then(|| {
+            "it leaves a trace in the training logs, but does not reduce the gap on the holdout".to_owned()
+        }),
+    }
+}
+
+/// The named cause in whose place another effect would have done nearly as well, by the motion or by what it makes of the parameters.
+fn rivalled<const N: usize, const P: usize>(
+    attribution: &Attribution<N, P>,
+    place: &EffectInstance,
+) -> Option<EffectInstance> {
+    let named = |e: &&EffectInstance| attribution.causes.iter().any(|c| c.effect.same_place(e));
+    attribution.nodes.iter().enumerate().find_map(|(i, node)| {
+        let adopted = attribution.added(i).filter(named)?;
+        let at = |place: &EffectInstance| {
+            node.candidates.iter().find(|c| c.effect.is_some_and(|e| e.same_place(place)))
+        };
+        let (cause, rival) = (at(adopted)?, at(place)?);
+        let by_motion = node.share(cause) > MATTERS && node.share(rival) > ALMOST * node.share(cause);
+        (by_motion || (restores(node, cause) && restores(node, rival))).then_some(*adopted)
+    })
+}
+
+/// What would do nearly as well in place of a named cause is absent only if that is right.
+fn leave_open(entry: &mut RuledOut, instead: &EffectInstance) {
+    if entry.status == Status::Absent {
+        (entry.status, entry.bound) = (Status::Undecided, None);
+        let joint = instead.joint_number().map_or(String::new(), |j| format!(", joint {j}"));
+        entry.why = Some(format!(
+            "beside the named causes there is none of it, but in place of {}{joint} it would do nearly as well",
+            instead.law.spec().title
+        ));
+    }
+}
+
+/// Where a gap remains, an effect is absent only if the largest size it could have would explain next to nothing of it.
+fn doubt(entry: &mut RuledOut, test: &ScoreTest, remains: f64) {
+    let most = entry.bound.as_ref().map_or(test.gain, |bound| (bound.value / test.information_sigma).powi(2));
+    let share = (most / remains).min(1.0);
+    let law = test.effect.law;
+    if entry.status == Status::Absent && law.spec().trial == Trial::Whole && !law.has_transmission() {
+        // A stop or a limit: its trial values lie where the training logs went, and what remains may lie where only the holdout did.
+        entry.status = Status::Undecided;
+        entry.why = Some(
+            "a gap remains, and it may begin beyond where the training logs went; let them reach what the holdout reaches".to_owned(),
+        );
+    } else if entry.status == Status::Absent && share > COULD_BE {
+        entry.status = Status::Undecided;
+        let percent = 100.0 * share;
+        entry.why = Some(format!("a gap remains, and up to {percent:.0} % of it could be its doing"));
+    }
+}
+
+/// Status of an effect that begins beyond a threshold: excited if any trial threshold was passed.
+fn threshold_status(test: &ScoreTest) -> RuledOut {
+    let spec = test.effect.law.spec();
+    let (effect, joint) = (spec.name, test.effect.joint_number());
+    let reached = test.distinct > 0.0 && test.information_sigma < 0.5;
+    let why = if reached {
+        "at trial values it would leave a trace that these logs do not show".to_owned()
+    } else {
+        format!("these logs never reach it; it needs {}", spec.excited_by)
+    };
+    let status = if reached { Status::Absent } else { Status::NotExcited };
+    RuledOut { effect, joint, status, bound: None, why: Some(why) }
+}

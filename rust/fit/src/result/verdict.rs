@@ -1,0 +1,200 @@
+//! The verdict, as a function of plain evidence: what the table of the gap shows and whether a cause is named.
+
+use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// A prediction error beyond this many true floors is no noise: RMS errors of as few as ten windows, each with one start, scatter by less
+/// than twice, and what parameters still err by by about as much.
+const ABOVE_TRUE_FLOOR: f64 = 4.0;
+
+/// On one joint of twenty the floor that is claimed is beyond this many true ones (docs/input-defects.md).
+const CLAIMED_FLOOR: f64 = 1.25;
+
+/// A prediction error beyond this many claimed floors cannot be called noise: it may be beyond [`ABOVE_TRUE_FLOOR`] true ones.
+pub const ABOVE_NOISE: f64 = ABOVE_TRUE_FLOOR / CLAIMED_FLOOR;
+
+/// Share of a joint's error that re-estimated parameters must remove to be called an improvement: less is of no use to anyone.
+const IMPROVEMENT: f64 = 0.2;
+
+/// An error below this many floors leaves nothing to improve: the floor itself is known to a factor of about 1.4.
+const IMPROVABLE: f64 = 2.0;
+
+/// What a diagnosis comes to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// The gap is within noise, or of no consequence.
+    None,
+    /// Right structure, wrong values.
+    Parameters,
+    /// One or more causes are named.
+    Effect,
+    /// A gap that nothing named explains.
+    Unexplained,
+}
+
+/// What a verdict rests on; lists have one entry per joint: RMS position errors on the holdout over the horizon, rad or m.
+#[derive(Debug, Clone, Copy)]
+pub struct Evidence<'a> {
+    /// Whether a cause is named.
+    pub named: bool,
+    /// Whether the model search ended beside a cost that is more than noise.
+    pub open: bool,
+    /// The arm file as it is.
+    pub before: &'a [f64],
+    /// Parameters re-estimated.
+    pub refit: &'a [f64],
+    /// The model reported.
+    pub after: &'a [f64],
+    /// What measurement noise alone leaves.
+    pub floor: &'a [f64],
+    /// RMS displacement of the arm over the horizon, rad or m.
+    pub motion: &'a [f64],
+}
+
+impl Evidence<'_> {
+    /// Whether the model reported leaves a gap of consequence that is more than noise.
+    pub fn remains(&self) -> bool {
+        self.open || self.stands_out(self.after)
+    }
+
+    /// Whether some joint's error is several floors, and of consequence beside the joint's motion.
+    fn stands_out(&self, error: &[f64]) -> bool {
+        let limits = self.floor.iter().zip(self.motion);
+        error
+            .iter()
+            .zip(limits)
+            .any(|(e, (floor, motion))| *e > ABOVE_NOISE * floor && *e > CONSEQUENTIAL_ERROR * motion)
+    }
+
+    /// Whether re-estimated parameters bring some joint's error down.
+    fn is_improved(&self) -> bool {
+        let steps = self.before.iter().zip(self.refit).zip(self.floor);
+        steps.into_iter().any(|((before, refit), floor)| {
+            before - refit > IMPROVEMENT * before && *before > IMPROVABLE * floor
+        })
+    }
+
+    /// The verdict.
+    pub fn verdict(&self) -> Verdict {
+        match () {
+            () if self.named => Verdict::Effect,
+            () if self.remains() => Verdict::Unexplained,
+            // What only re-estimated values bring down to the noise is not within noise as it is.
+            () if self.is_improved() || self.stands_out(self.before) => Verdict::Parameters,
+            () => Verdict::None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FLOOR: f64 = 1e-3;
+
+    /// Errors in floors: of the arm file, re-estimated, and of the model reported; the motion in units of the unit error.
+    fn of(errors: [f64; 3], motion: f64, open: bool, named: bool) -> Verdict {
+        let [before, refit, after] = errors.map(|e| [0.1 * FLOOR, e * FLOOR]);
+        let (floor, motion) = ([FLOOR; 2], [1.0, motion * FLOOR]);
+        let (before, refit, after) = (&before, &refit, &after);
+        Evidence { named, open, before, refit, after, floor: &floor, motion: &motion }.verdict()
+    }
+
+    #[test]
+    fn verdicts_follow_from_the_table() {
+        for (errors, motion, wanted, what) in [
+            ([1.0, 1.0, 1.0], 1e3, Verdict::None, "within noise"),
+            ([1.9, 0.5, 0.5], 1e3, Verdict::None, "too little to improve"),
+            ([3.0, 2.8, 2.8], 1e3, Verdict::None, "hardly improved"),
+            ([3.0, 1.0, 1.0], 1e3, Verdict::Parameters, "improved"),
+            ([100.0, 1.2, 1.2], 1e3, Verdict::Parameters, "values far off"),
+            ([3.3, 3.1, 3.1], 1e3, Verdict::Parameters, "brought just below what stands out"),
+            ([100.0, 3.3, 3.3], 1e3, Verdict::Unexplained, "improved, and several floors left"),
+            ([3.3, 3.3, 3.3], 1e3, Verdict::Unexplained, "several floors"),
+            ([4.1, 4.1, 4.1], 1e4, Verdict::None, "several floors of no consequence"),
+            ([100.0, 5.0, 5.0], 1e4, Verdict::Parameters, "what is left is of no consequence"),
+            ([1.0, 5.0, 5.0], 1e3, Verdict::Unexplained, "worse than before"),
+            ([5.0, 5.0, 3.0], 1e3, Verdict::Parameters, "a nuisance takes what is left"),
+        ] {
+            assert_eq!(of(errors, motion, false, false), wanted, "{what}");
+            assert_eq!(of(errors, motion, false, true), Verdict::Effect, "{what}, with a name");
+            assert_eq!(
+                of(errors, motion, true, false),
+                Verdict::Unexplained,
+                "{what}, beside an open search"
+            );
+        }
+    }
+
+    #[test]
+    fn no_error_of_several_true_floors_is_called_noise_under_a_floor_that_is_claimed_too_high() {
+        // The 5 and 95 % points of claimed over true floors.
+        for claimed in [0.82, 1.0, 1.25] {
+            let left = 4.01 / claimed;
+            assert_eq!(of([100.0, left, left], 1e3, false, false), Verdict::Unexplained, "{claimed}");
+            assert_eq!(of([left; 3], 1e3, false, false), Verdict::Unexplained, "{claimed}");
+        }
+        // What scatters by twice is still noise under a floor that is claimed too low.
+        for claimed in [0.82, 1.0, 1.25] {
+            assert_eq!(of([2.0 / claimed; 3], 1e3, false, false), Verdict::None, "{claimed}");
+        }
+    }
+
+    #[test]
+    fn one_joint_is_enough_and_a_still_one_has_its_own_measure() {
+        let floor = [1e-4, 1e-4];
+        let joints = |after: [f64; 2], motion: [f64; 2]| {
+            let (named, open) = (false, false);
+            Evidence {
+                named,
+                open,
+                before: &after,
+                refit: &after,
+                after: &after,
+                floor: &floor,
+                motion: &motion,
+            }
+            .verdict()
+        };
+        assert_eq!(
+            joints([2e-2, 1e-4], [0.3, 300.0]),
+            Verdict::Unexplained,
+            "joint 2's motion hides nothing"
+        );
+        assert_eq!(joints([1e-4, 2e-2], [0.3, 300.0]), Verdict::None);
+        assert_eq!(
+            joints([5e-4, 1e-4], [0.0, 0.3]),
+            Verdict::Unexplained,
+            "a joint that should not have moved"
+        );
+    }
+
+    #[test]
+    fn what_remains_and_the_verdict_agree() {
+        for after in [0.5, 3.1, 3.3, 50.0] {
+            for motion in [1.0, 1e3, 1e6] {
+                for open in [false, true] {
+                    let (errors, floor, motion) = ([after * FLOOR], [FLOOR], [motion * FLOOR]);
+                    let evidence = Evidence {
+                        named: false,
+                        open,
+                        before: &errors,
+                        refit: &errors,
+                        after: &errors,
+                        floor: &floor,
+                        motion: &motion,
+                    };
+                    assert_eq!(evidence.remains(), evidence.verdict() == Verdict::Unexplained);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn verdicts_are_written_as_the_schema_has_them() {
+        let all = [Verdict::None, Verdict::Parameters, Verdict::Effect, Verdict::Unexplained];
+        assert_eq!(serde_json::to_string(&all).unwrap(), r#"["none","parameters","effect","unexplained"]"#);
+    }
+}

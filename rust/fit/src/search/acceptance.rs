@@ -1,0 +1,250 @@
+//! Acceptance criteria: what is accepted as a cause.
+//!
+//! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the
+//! windows' own scatter, or when it brings the parameters back to their prior values.
+
+use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
+use crate::likelihood::holdout::is_plausible;
+use crate::model::hypothesis::EffectInstance;
+use crate::search::attribute::{Candidate, SearchNode};
+use armgap_core::effect::{Quantity, Trial};
+
+/// Mean advantage per window, in standard errors, below which a cause is not accepted.
+pub const CERTAIN: f64 = 3.5;
+
+/// Mean advantage per window, in standard errors, below which a nuisance, which is never named, is not accepted.
+const CERTAIN_ENOUGH: f64 = 2.5;
+
+/// Mean advantage per holdout window, in standard errors, below which a cause is not accepted: on the holdout alone it must not fail.
+const HOLDOUT_CERTAIN: f64 = 1.0;
+
+/// Share of the gap above the floor below which an improvement does not matter.
+pub const MATTERS: f64 = 0.1;
+
+/// Share of a gap of no consequence below which an improvement does not matter: only an effect that explains most of it counts.
+const MATTERS_IN_SMALL: f64 = 0.5;
+
+/// Cost above the floor, as a factor, below which there is nothing left to explain.
+pub const ABOVE_FLOOR: f64 = 1.25;
+
+/// Cost of a typical window, relative to what noise alone leaves, up to which a gap is that of a few windows.
+const AT_FLOOR: f64 = 1.5;
+
+/// What a candidate must take off those few, in costs of a typical window, and what others may lose by it, as a part of that.
+const OUTLYING: f64 = 25.0;
+const HARMLESS: f64 = 0.05;
+
+/// Decrease of the prior cost, in squared sigmas, that makes a cause on its own.
+pub const TRUST_GAIN: f64 = 16.0;
+
+/// Beside an unexplained gap larger than this part of the motion, implausible values are no evidence: the gap may have moved them.
+const TRUSTWORTHY: f64 = 0.01;
+
+/// Candidates whose prior cost differs by less, in squared sigmas, are look-alikes.
+pub const ALIKE_TRUST: f64 = 6.0;
+
+/// Cost above the floor, as a factor, beyond which a gap without a cause is called unexplained.
+pub const UNEXPLAINED: f64 = 4.0;
+
+/// Improvement relative to the motion within a window below which an effect is of no consequence.
+pub const RELEVANT: f64 = 1e-4;
+
+/// A gap that is not worth a name by itself is looked into down to this size if it stands far above the floor.
+pub const FAINTEST: f64 = 5e-6;
+/// Cost above the floor, as a factor, from which such a gap is looked into.
+pub const CLEAR: f64 = 2.75;
+
+/// There a cause must explain this part of it, with this certainty, as no error of an integrator does.
+const MATTERS_IF_FAINT: f64 = 0.7;
+const CERTAIN_IF_FAINT: f64 = 5.0;
+
+/// How fast an unexplained remainder reduces the probability of the causes: effects that are in no library were seen to be imitated by
+/// two or three that are, for up to eight tenths of the gap.
+pub const REMAINDER_POWER: i32 = 6;
+
+/// Improvement relative to the first gap below which an effect is no cause of that gap.
+const NOTICEABLE: f64 = 0.02;
+
+/// A fit that ends this close to the largest possible size has found no effect.
+const AT_BOUND: f64 = 0.98;
+
+/// Resamples of the windows.
+pub const RESAMPLES: usize = 400;
+
+/// A candidate with fewer parameters is preferred if it reaches this part of the best one's advantage.
+pub const ALMOST: f64 = 0.95;
+
+/// Part of the best one's advantage for that preference where even the best leaves most of the gap: there, further parameters fit other causes.
+const ALMOST_IN_DOUBT: f64 = 0.6;
+
+/// A candidate that explains more than this part of the gap explains most of it.
+const MOST: f64 = 0.5;
+
+/// A candidate whose cost is within this part of the winner's advantage is a look-alike.
+const LOOK_ALIKE: f64 = 0.03;
+
+/// Minimum relevance of a cause: improvement relative to the motion below which it is not named, given the first gap. What is of
+/// consequence by itself is always named.
+pub fn min_relevance(first_gap: f64) -> f64 {
+    (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENTIAL_ERROR)
+}
+
+impl<const N: usize, const P: usize> SearchNode<N, P> {
+    /// Whether the data hardly prefer `best` to another candidate.
+    pub fn is_alike(&self, best: &Candidate<P>, other: &Candidate<P>) -> bool {
+        let advantage = self.base.score() - best.score();
+        other.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0) || best.z_over(other) < 1.0
+    }
+
+    /// Whether a candidate explains windows that stand far out of noise, in training and holdout, at no cost to any other.
+    ///
+    /// An effect that shows in a few windows, such as a joint limit that is hardly touched, never has a mean advantage of many standard errors.
+    /// Where all other windows are at the floor, it needs none: their noise is known, and it is not noise that it takes away.
+    fn settles_outliers(&self, candidate: &Candidate<P>) -> bool {
+        let windows = self.base.holdout.len() as f64;
+        self.weights.holdout.typical < AT_FLOOR * self.floor / windows
+            && self.share(candidate) > MOST
+            && self.settles(&candidate.training, &self.base.training)
+            && self.settles(&candidate.holdout, &self.base.holdout)
+    }
+
+    /// Whether one fit explains windows of the training or of the holdout that stand far out of noise under another, at no cost to any of
+    /// the rest.
+    pub fn takes_outliers(&self, fit: &Candidate<P>, other: &Candidate<P>) -> bool {
+        self.settles(&fit.training, &other.training) || self.settles(&fit.holdout, &other.holdout)
+    }
+
+    fn settles(&self, mine: &[f64], base: &[f64]) -> bool {
+        let gains = || base.iter().zip(mine).map(|(b, m)| b - m);
+        let gain: f64 = gains().filter(|g| *g > 0.0).sum();
+        let loss: f64 = gains().filter(|g| *g < 0.0).sum();
+        gain > OUTLYING * self.weights.holdout.typical && -loss < HARMLESS * gain
+    }
+
+    /// Whether an effect would show in this gap: a small one may be an integrator's error, which is like a shift in time or a stiff shaft.
+    pub fn shows(&self, effect: Option<&EffectInstance>) -> bool {
+        self.relative_error() > RELEVANT
+            || effect.is_some_and(|e| {
+                let spec = e.law.spec();
+                spec.trial != Trial::Whole && spec.parameters[0].quantity != Quantity::Time
+            })
+    }
+}
+
+/// Why a candidate is accepted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ground {
+    /// It moves predictions closer to the measurement.
+    Motion,
+    /// It brings the parameters back to their prior values.
+    Trust,
+}
+
+/// Index of the accepted candidate, and why, if any is accepted; friction regularisation is accepted once.
+///
+/// Improvements below `min_relevance`, relative to the motion, do not count.
+pub fn choose<const N: usize, const P: usize>(
+    node: &SearchNode<N, P>,
+    regularised: bool,
+    min_relevance: f64,
+) -> Option<(usize, Ground)> {
+    let by_motion = best(node, regularised).filter(|i| moves(node, &node.candidates[*i], min_relevance));
+    if let Some(best) = by_motion {
+        return Some((simplest(node, best, min_relevance), Ground::Motion));
+    }
+    let free = |i: usize| node.candidates[i].effect.as_ref().map_or(0, EffectInstance::len) as f64;
+    let trust = |i: &usize| node.candidates[*i].fit.prior_cost + free(*i);
+    (0..node.candidates.len())
+        .filter(|i| restores(node, &node.candidates[*i]))
+        .min_by(|a, b| trust(a).total_cmp(&trust(b)))
+        .map(|index| (index, Ground::Trust))
+}
+
+/// The best candidate that describes an arm; one with a value at its bound gives way to one that does almost as well without.
+pub fn best<const N: usize, const P: usize>(node: &SearchNode<N, P>, regularised: bool) -> Option<usize> {
+    let open = |i: &usize| node.candidates[*i].effect.is_some() || !regularised;
+    let first = (0..node.candidates.len()).find(open)?;
+    let advantage = |i: usize| node.base.score() - node.candidates[i].score();
+    let as_good = |i: &usize| open(i) && advantage(*i) >= ALMOST * advantage(first);
+    (first..node.candidates.len()).filter(as_good).find(|i| is_possible(&node.candidates[*i]))
+}
+
+/// Whether a candidate's effect is neither idle nor at the largest size.
+pub fn is_possible<const P: usize>(candidate: &Candidate<P>) -> bool {
+    candidate.size < AT_BOUND && !candidate.is_idle()
+}
+
+/// The candidate with the fewest parameters among those that do almost as well as the best: a spring with a far-off rest position is
+/// an offset.
+fn simplest<const N: usize, const P: usize>(
+    node: &SearchNode<N, P>,
+    best: usize,
+    min_relevance: f64,
+) -> usize {
+    let advantage = |i: usize| node.base.score() - node.candidates[i].score();
+    let size = |i: usize| node.candidates[i].effect.as_ref().map_or(0, EffectInstance::len);
+    let almost = if node.share(&node.candidates[best]) > MOST { ALMOST } else { ALMOST_IN_DOUBT };
+    let enough = almost * advantage(best);
+    let as_good = |i: &usize| {
+        advantage(*i) > enough && moves(node, &node.candidates[*i], min_relevance) && size(*i) > 0
+    };
+    if size(best) == 0 {
+        return best;
+    }
+    (0..node.candidates.len()).filter(as_good).min_by_key(|i| (size(*i), *i)).unwrap_or(best)
+}
+
+/// Whether a candidate closes a part of the gap that matters, on the holdout too.
+pub fn moves<const N: usize, const P: usize>(
+    node: &SearchNode<N, P>,
+    candidate: &Candidate<P>,
+    min_relevance: f64,
+) -> bool {
+    let (matters, certain) = match node.relative_error() {
+        _ if min_relevance <= FAINTEST => (MATTERS_IF_FAINT, CERTAIN_IF_FAINT),
+        error if error > CONSEQUENTIAL_ERROR => (MATTERS, CERTAIN),
+        _ => (MATTERS_IN_SMALL, CERTAIN),
+    };
+    node.excess() > ABOVE_FLOOR
+        && node.shows(candidate.effect.as_ref())
+        && is_possible(candidate)
+        && node.share(candidate) > matters
+        && node.relevance(candidate) > min_relevance
+        && (is_certain(node, candidate, certain) || node.settles_outliers(candidate))
+}
+
+/// Whether a candidate's advantage exceeds the windows' scatter, on the holdout alone too.
+fn is_certain<const N: usize, const P: usize>(
+    node: &SearchNode<N, P>,
+    candidate: &Candidate<P>,
+    certain: f64,
+) -> bool {
+    candidate.z_over(&node.base) > certain && candidate.holdout_z_over(&node.base) > HOLDOUT_CERTAIN
+}
+
+/// Whether friction regularisation, a nuisance that is never named, explains most of the gap.
+pub fn is_regularisation<const N: usize, const P: usize>(
+    node: &SearchNode<N, P>,
+    candidate: &Candidate<P>,
+) -> bool {
+    node.share(candidate) > MOST && is_certain(node, candidate, CERTAIN_ENOUGH)
+}
+
+/// Whether a candidate explains implausible parameters by one effect.
+pub fn restores<const N: usize, const P: usize>(node: &SearchNode<N, P>, candidate: &Candidate<P>) -> bool {
+    candidate.effect.is_some()
+        && (node.relative_error() < TRUSTWORTHY || !node.is_open())
+        && brings_back(node, candidate)
+}
+
+/// Whether a candidate brings implausible parameters back towards their prior values, at no cost.
+pub fn brings_back<const N: usize, const P: usize>(
+    node: &SearchNode<N, P>,
+    candidate: &Candidate<P>,
+) -> bool {
+    let before = node.base.fit.prior_cost;
+    !is_plausible::<P>(before)
+        && before - candidate.fit.prior_cost > TRUST_GAIN
+        && candidate.fit.prior_cost < 0.4 * before
+        && candidate.score() < node.base.score()
+}

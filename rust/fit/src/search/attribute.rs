@@ -1,0 +1,411 @@
+//! Which effect: screening, full fits of what passes, and the holdout's decision, one cause after another.
+
+use crate::candidates::screen::ScoreTest;
+use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
+use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
+use crate::likelihood::scale::Scales;
+use crate::likelihood::solve::{Effort, Fit};
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::progress::Phase;
+use crate::search::acceptance::{ABOVE_FLOOR, UNEXPLAINED};
+use armgap_core::arm::Arm;
+use armgap_core::effect::{MAX_PARAMETERS, Quantity, Trial, catalogue, find};
+use armgap_core::transmission::Sides;
+use rayon::prelude::*;
+
+/// Other sides of encoder and friction from which the best transmission is fitted again.
+const OTHER_SIDES: usize = 2;
+
+/// Candidates that are fitted again under the weights of the best.
+const FINALISTS: usize = 4;
+
+/// Candidates that are fitted with their own Jacobian before the finalists are chosen.
+const TAKEN_ON: usize = 2 * FINALISTS;
+
+/// Rounds in which the finalists are fitted under weights of the best one's residual.
+const MAX_REWEIGHTINGS: usize = 3;
+
+/// A residual whose scale has shrunk by less than this factor needs no new weights.
+const SHRUNK: f64 = 1.15;
+
+/// Finalists by prior cost lie within this many squared sigmas of the lowest.
+const TRUSTED: f64 = 10.0;
+
+/// Size relative to the largest possible below which nothing is left of an effect.
+const IDLE: f64 = 2e-5;
+
+/// Initial guess, relative to the typical size, of a parameter that a simpler law does not have.
+const LITTLE: f64 = 0.1;
+
+/// One alternative to the current model, fitted on the training windows and judged on the holdout.
+#[derive(Debug, Clone)]
+pub struct Candidate<const P: usize> {
+    /// The added effect; none for the current model, with or without friction regularisation.
+    pub effect: Option<EffectInstance>,
+    /// Size of the added effect's first parameter relative to the largest possible.
+    pub size: f64,
+    /// The fit.
+    pub fit: Fit<P>,
+    /// Student-t cost of every training window.
+    pub training: Vec<f64>,
+    /// Student-t cost of every holdout window.
+    pub holdout: Vec<f64>,
+    /// Cost of the holdout windows as they are, but for the worst few.
+    pub error: f64,
+}
+
+impl<const P: usize> Candidate<P> {
+    /// Cost on all windows plus the prior cost.
+    pub fn score(&self) -> f64 {
+        self.training.iter().chain(&self.holdout).sum::<f64>() + self.fit.prior_cost
+    }
+
+    /// Whether an effect that changes the arm wherever it sits has come down to nothing: its other parameters then stand for something else.
+    pub fn is_idle(&self) -> bool {
+        self.effect.is_some_and(|e| e.law.spec().trial == Trial::Whole) && self.size < IDLE
+    }
+
+    /// Whether two are of the same effect on the same joint, or both of none.
+    pub fn is_same(&self, other: &Self) -> bool {
+        match (&self.effect, &other.effect) {
+            (Some(a), Some(b)) => a.same_place(b),
+            (None, None) => true,
+            _ => false,
+        }
+    }
+
+    /// Advantage over `other` of every window, training first.
+    pub fn advantages(&self, other: &Self) -> Vec<f64> {
+        let here = self.training.iter().chain(&self.holdout);
+        other.training.iter().chain(&other.holdout).zip(here).map(|(b, a)| b - a).collect()
+    }
+
+    /// Mean advantage over `other` per window, in units of its standard error.
+    pub fn z_over(&self, other: &Self) -> f64 {
+        z_score(&self.advantages(other))
+    }
+
+    /// Mean advantage over `other` per holdout window, in units of its standard error.
+    pub fn holdout_z_over(&self, other: &Self) -> f64 {
+        z_score(&self.advantages(other)[self.training.len()..])
+    }
+}
+
+/// Mean in units of its standard error.
+fn z_score(x: &[f64]) -> f64 {
+    let n = x.len() as f64;
+    let mean = x.iter().sum::<f64>() / n;
+    let variance = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    mean / (variance / n).sqrt().max(1e-12)
+}
+
+/// One search node: the current model and its candidates, under common weights.
+#[derive(Debug, Clone)]
+pub struct SearchNode<const N: usize, const P: usize> {
+    /// The current model, fitted under weights of its own residual.
+    pub settled: Fit<P>,
+    /// The current model, fitted under the common weights.
+    pub base: Candidate<P>,
+    /// Alternatives, best first.
+    pub candidates: Vec<Candidate<P>>,
+    /// Every candidate that was fitted, by the share of the gap it removes under the current model's own weights, best first.
+    pub field: Vec<(Candidate<P>, f64)>,
+    /// First-order tests of all candidates around the settled model, the open ones first; none if they were not made under the weights in
+    /// force.
+    pub screened: Vec<ScoreTest>,
+    /// Weights in force.
+    pub weights: SplitWeighting<N>,
+    /// Cost the measurement noise alone would leave on the holdout, under these weights.
+    pub floor: f64,
+    /// Cost that predicting no motion at all within each window would have on the holdout.
+    pub motion: f64,
+}
+
+/// The finalists and the current model at the end of the last round.
+struct FinalRound<const N: usize, const P: usize> {
+    base: Candidate<P>,
+    candidates: Vec<Candidate<P>>,
+    /// Weights by the best candidate's residual, where that called for others.
+    weights: Option<SplitWeighting<N>>,
+}
+
+impl<const N: usize, const P: usize> SearchNode<N, P> {
+    /// Share of the holdout's cost above the floor that a candidate removes.
+    pub fn share(&self, candidate: &Candidate<P>) -> f64 {
+        let base: f64 = self.base.holdout.iter().sum();
+        let here: f64 = candidate.holdout.iter().sum();
+        (base - here) / (base - self.floor).max(1e-9 * base)
+    }
+
+    /// RMS improvement of a candidate on the holdout, relative to the motion within the windows.
+    pub fn relevance(&self, candidate: &Candidate<P>) -> f64 {
+        ((self.base.error - candidate.error).max(0.0) / self.motion).sqrt()
+    }
+
+    /// RMS error of the current model on the holdout, relative to the motion within the windows.
+    pub fn relative_error(&self) -> f64 {
+        (self.base.error / self.motion).sqrt()
+    }
+
+    /// Whether the current model leaves a gap of consequence above the floor.
+    pub fn is_open(&self) -> bool {
+        self.relative_error() > CONSEQUENTIAL_ERROR && self.excess() > ABOVE_FLOOR
+    }
+
+    /// Whether the current model leaves a gap of consequence that is more than noise.
+    pub fn is_unexplained(&self) -> bool {
+        self.relative_error() > CONSEQUENTIAL_ERROR && self.excess() > UNEXPLAINED
+    }
+
+    /// Whether the current model leaves a gap above the floor in which an improvement of `min_relevance` size can lie.
+    pub fn is_worth_more(&self, min_relevance: f64) -> bool {
+        self.relative_error() > min_relevance && self.excess() > ABOVE_FLOOR
+    }
+
+    /// How far the current model's cost lies above the floor, as a factor.
+    pub fn excess(&self) -> f64 {
+        self.base.holdout.iter().sum::<f64>() / self.floor
+    }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// The search node around the current model; improvements below `min_relevance`, relative to the motion, are not looked for.
+    pub fn node(&self, current: &Hypothesis<P>, scale: [f64; N], min_relevance: f64) -> SearchNode<N, P> {
+        self.node_around(self.settle(current, scale), min_relevance)
+    }
+
+    /// The search node around a fit under weights of its own residual; improvements below `min_relevance` are not looked for.
+    pub fn node_around(
+        &self,
+        (fit, weights): (Fit<P>, SplitWeighting<N>),
+        min_relevance: f64,
+    ) -> SearchNode<N, P> {
+        let (initial_guesses, screened) = self.initial_guesses(&fit, &weights, min_relevance);
+        self.progress.begin(Phase::Candidates, initial_guesses.len());
+        let problem = self.problem(&weights.training);
+        let jacobian =
+            if initial_guesses.is_empty() { Vec::new() } else { problem.jacobian(&fit.hypothesis) };
+        let first = self.fit_candidates(&weights, &fit.hypothesis, initial_guesses, Effort::ROUGH, &jacobian);
+        let first = self.taken_on(&weights, &fit.hypothesis, first);
+        let field = self.field(&weights, &fit, &first);
+        self.progress.begin(Phase::Finalists, 2 * FINALISTS + MAX_REWEIGHTINGS);
+        let final_round = self.final_round(&fit.hypothesis, first, &weights);
+        let screened = if final_round.weights.is_none() { screened } else { Vec::new() };
+        let FinalRound { base, candidates, weights: heavier } = final_round;
+        let weights = heavier.unwrap_or(weights);
+        let floor = self.floor(&weights);
+        let motion = self.motion(&weights);
+        self.duel(SearchNode { settled: fit, base, candidates, field, screened, weights, floor, motion })
+    }
+
+    /// Deviation of an effect's first parameter from neutral, relative to the largest possible.
+    fn relative_size(&self, effect: &EffectInstance) -> f64 {
+        let parameter = &effect.law.spec().parameters[0];
+        let centre = self.scales.centre(parameter, effect.joint);
+        (effect.p[0] - centre).abs() / self.scales.largest(parameter.quantity, effect.joint)
+    }
+
+    /// All fitted candidates with the share of the gap each removes.
+    fn field(
+        &self,
+        weights: &SplitWeighting<N>,
+        fit: &Fit<P>,
+        fitted: &[Candidate<P>],
+    ) -> Vec<(Candidate<P>, f64)> {
+        let base: f64 = self.judge(&weights.holdout).window_costs(&fit.hypothesis).iter().sum();
+        let above = (base - self.floor(weights)).max(1e-9 * base);
+        let share = |c: &Candidate<P>| (base - c.holdout.iter().sum::<f64>()) / above;
+        fitted.iter().filter(|c| c.effect.is_some()).map(|c| (c.clone(), share(c))).collect()
+    }
+
+    /// Fits all initial guesses and judges them, best first; `jacobian` is that of the model they add to, where it is known. What
+    /// diverged or came down to nothing is left out.
+    pub(crate) fn fit_candidates(
+        &self,
+        weights: &SplitWeighting<N>,
+        base: &Hypothesis<P>,
+        initial_guesses: Vec<Hypothesis<P>>,
+        effort: Effort,
+        jacobian: &[Vec<f64>],
+    ) -> Vec<Candidate<P>> {
+        let known = base.effects.len();
+        let fitted =
+            |initial_guess: Hypothesis<P>| self.candidate(weights, &initial_guess, known, effort, jacobian);
+        ranked(initial_guesses.into_par_iter().map(fitted).collect())
+    }
+
+    /// The best candidates, fitted again with their own Jacobian where they have reused columns of the model they add to.
+    fn taken_on(
+        &self,
+        weights: &SplitWeighting<N>,
+        base: &Hypothesis<P>,
+        candidates: Vec<Candidate<P>>,
+    ) -> Vec<Candidate<P>> {
+        let known = base.effects.len();
+        let on = |(i, c): (usize, Candidate<P>)| {
+            let done = c.fit.own_jacobian || i >= TAKEN_ON;
+            if done { c } else { self.candidate(weights, &c.fit.hypothesis, known, Effort::ROUGH, &[]) }
+        };
+        ranked(candidates.into_par_iter().enumerate().map(on).collect())
+    }
+
+    /// Fits an initial guess and judges it; its effect beyond the `known` ones is the one under test.
+    pub(crate) fn candidate(
+        &self,
+        weights: &SplitWeighting<N>,
+        initial_guess: &Hypothesis<P>,
+        known: usize,
+        effort: Effort,
+        jacobian: &[Vec<f64>],
+    ) -> Candidate<P> {
+        // Where an effect starts at neutral, the Jacobian of the model without it is nearly its own.
+        let near = initial_guess.effects.get(known).is_some_and(|e| e.law.spec().trial != Trial::Whole);
+        let jacobian = if near { jacobian } else { &[] };
+        let fit = self.problem(&weights.training).solve_reusing(initial_guess, effort, jacobian);
+        let training = fit.costs.iter().map(|cost| weights.training.student_t_cost(*cost)).collect();
+        let (holdout, error) = self.judged_on_holdout(weights, &fit);
+        let effect = fit.hypothesis.effects.get(known).copied();
+        let size = effect.as_ref().map_or(0.0, |e| self.relative_size(e));
+        Candidate { effect, size, fit, training, holdout, error }
+    }
+
+    /// Re-weights by the best candidate's residual and fits the finalists and the current model again.
+    fn final_round(
+        &self,
+        current: &Hypothesis<P>,
+        mut candidates: Vec<Candidate<P>>,
+        given: &SplitWeighting<N>,
+    ) -> FinalRound<N, P> {
+        let mut hopeless = f64::INFINITY;
+        let mut heavier: Option<SplitWeighting<N>> = None;
+        for round in 1..=MAX_REWEIGHTINGS {
+            let Some(best) = candidates.first() else { break };
+            let weights = heavier.as_ref().unwrap_or(given);
+            let scale = self.residual_scale(&weights.training, &best.fit.hypothesis);
+            let shrunk = (0..N).map(|j| weights.training.scale[j] / scale[j]).fold(0.0, f64::max);
+            if shrunk > SHRUNK {
+                heavier = Some(self.weights(&best.fit.hypothesis, scale));
+            }
+            let weights = heavier.as_ref().unwrap_or(given);
+            let last = shrunk <= SHRUNK || round == MAX_REWEIGHTINGS;
+            let mut initial_guesses = finalists(&candidates, hopeless);
+            initial_guesses.extend(candidates.first().and_then(|best| simpler(current, best)));
+            initial_guesses.extend(candidates.first().and_then(|best| richer(current, best, &self.scales)));
+            if last {
+                initial_guesses
+                    .extend(candidates.first().into_iter().flat_map(|c| self.other_sides(c, weights)));
+            }
+            let effort = if last { Effort::FULL } else { Effort::ROUGH };
+            let base = || self.candidate(weights, current, current.effects.len(), effort, &[]);
+            let (fitted, base) =
+                rayon::join(|| self.fit_candidates(weights, current, initial_guesses, effort, &[]), base);
+            candidates = fitted;
+            if last {
+                return FinalRound { base, candidates, weights: heavier };
+            }
+            let base = base.score();
+            hopeless = candidates.first().map_or(base, |best| 0.5 * (base + best.score()));
+        }
+        let weights = heavier.as_ref().unwrap_or(given);
+        let base = self.candidate(weights, current, current.effects.len(), Effort::FULL, &[]);
+        FinalRound { base, candidates, weights: heavier }
+    }
+
+    /// The model with a candidate whose effect is a transmission, with encoder and friction on other sides that they may be on: those that explain
+    /// the training windows best as it stands.
+    fn other_sides(&self, candidate: &Candidate<P>, weights: &SplitWeighting<N>) -> Vec<Hypothesis<P>> {
+        let Some(effect) = candidate.effect.filter(|effect| effect.law.has_transmission()) else {
+            return Vec::new();
+        };
+        let model = &candidate.fit.hypothesis;
+        let Some(index) = model.effects.iter().position(|e| e.same_place(&effect)) else {
+            return Vec::new();
+        };
+        let elastic = !effect.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Ratio);
+        let others: Vec<Sides> = self.sides[effect.joint]
+            .iter()
+            .copied()
+            .filter(|sides| *sides != effect.sides && (elastic || !sides.rotor_rides))
+            .collect();
+        let problem = self.problem(&weights.training);
+        let with = |sides: Sides| {
+            let mut other = model.clone();
+            other.effects[index].sides = sides;
+            (problem.window_costs(&other).iter().sum::<f64>(), other)
+        };
+        let mut found: Vec<(f64, Hypothesis<P>)> = others.into_par_iter().map(with).collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.into_iter().take(OTHER_SIDES).map(|(_, model)| model).collect()
+    }
+}
+
+/// Candidates, best first, none twice; what diverged or came down to nothing is left out.
+fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>> {
+    candidates.retain(|c| c.score().is_finite() && !c.is_idle());
+    candidates.sort_by(|a, b| a.score().total_cmp(&b.score()));
+    let mut best: Vec<Candidate<P>> = Vec::new();
+    for candidate in candidates {
+        if !best.iter().any(|c| c.is_same(&candidate)) {
+            best.push(candidate);
+        }
+    }
+    best
+}
+
+/// Hypotheses to be fitted to the end: the best by cost, of those that are not hopeless, and the best by prior cost.
+fn finalists<const P: usize>(candidates: &[Candidate<P>], hopeless: f64) -> Vec<Hypothesis<P>> {
+    let mut by_trust: Vec<usize> = (0..candidates.len()).collect();
+    let prior = |i: &usize| candidates[*i].fit.prior_cost;
+    by_trust.sort_by(|a, b| prior(a).total_cmp(&prior(b)));
+    by_trust.truncate(FINALISTS / 2);
+    let least = candidates.iter().map(|c| c.fit.prior_cost).fold(f64::INFINITY, f64::min);
+    by_trust.retain(|i| candidates[*i].fit.prior_cost < least + TRUSTED);
+    let kept = candidates.iter().enumerate();
+    kept.filter(|(i, c)| (*i < FINALISTS && c.score() < hopeless) || *i == 0 || by_trust.contains(i))
+        .map(|(_, c)| c.fit.hypothesis.clone())
+        .collect()
+}
+
+/// The model with another law at the candidate's values of the arm; none if it has that law there.
+fn with_law<const P: usize>(
+    model: &Hypothesis<P>,
+    candidate: &Candidate<P>,
+    law: EffectInstance,
+) -> Option<Hypothesis<P>> {
+    let taken = |e: &EffectInstance| e.law.spec().name == law.law.spec().name && e.joint == law.joint;
+    let theta = candidate.fit.hypothesis.theta;
+    (!model.effects.iter().any(taken)).then(|| Hypothesis { theta, ..model.with(law) })
+}
+
+/// The model with what is left of a candidate's effect when its first parameter vanishes, if that is an effect of its own.
+fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> Option<Hypothesis<P>> {
+    let effect = candidate.effect?;
+    let law = find::<f64>(effect.law.simpler()?)?;
+    let value =
+        |name: &str| effect.law.spec().parameters.iter().position(|p| p.name == name).map(|i| effect.p[i]);
+    let mut p = [0.0; MAX_PARAMETERS];
+    for (slot, parameter) in p.iter_mut().zip(law.spec().parameters) {
+        *slot = value(parameter.name)?;
+    }
+    with_law(model, candidate, EffectInstance::new(law, effect.joint, p))
+}
+
+/// The model with the law of which a candidate's effect is the simplest case, with a small value of the parameter that the simple one does not have.
+fn richer<const N: usize, const P: usize>(
+    model: &Hypothesis<P>,
+    candidate: &Candidate<P>,
+    scales: &Scales<N>,
+) -> Option<Hypothesis<P>> {
+    let effect = candidate.effect?;
+    let name = effect.law.spec().name;
+    let law = *catalogue::<f64>().iter().find(|law| law.simpler() == Some(name))?;
+    let known = |wanted: &str| effect.law.spec().parameters.iter().position(|p| p.name == wanted);
+    let mut p = [0.0; MAX_PARAMETERS];
+    for (slot, parameter) in p.iter_mut().zip(law.spec().parameters) {
+        *slot = match known(parameter.name) {
+            Some(i) => effect.p[i],
+            None => LITTLE * scales.size(parameter.quantity, effect.joint),
+        };
+    }
+    with_law(model, candidate, EffectInstance::new(law, effect.joint, p))
+}

@@ -1,0 +1,170 @@
+//! Selection probability of a cause.
+
+use crate::model::hypothesis::EffectInstance;
+use crate::numeric::random::Random;
+use crate::search::acceptance::{
+    ABOVE_FLOOR, ALIKE_TRUST, Ground, REMAINDER_POWER, RESAMPLES, UNEXPLAINED, restores,
+};
+use crate::search::attribute::{Candidate, SearchNode};
+use crate::search::equivalent;
+use crate::search::evidence::Evidence;
+
+/// A cause that was accepted.
+#[derive(Debug, Clone)]
+pub struct Cause {
+    /// The effect with its values in the final model.
+    pub effect: EffectInstance,
+    /// Standard deviations of its values.
+    pub sigma: Vec<f64>,
+    /// Probability that it, or an effect that no motion tells from it, is what the windows show.
+    pub probability: f64,
+    /// Share of the holdout's gap above the floor that it removed when it was added.
+    pub share: f64,
+    /// RMS improvement on the holdout when it was added, relative to the motion.
+    pub relevance: f64,
+    /// Effects that this log does not tell from it.
+    pub look_alikes: Vec<EffectInstance>,
+    /// What it rests on.
+    pub evidence: Evidence,
+    /// Why it was accepted.
+    pub ground: Ground,
+}
+
+impl<const N: usize, const P: usize> SearchNode<N, P> {
+    /// Whether no log of motion tells the effects of two candidates apart.
+    fn are_equivalent(&self, a: usize, b: usize) -> bool {
+        match (self.candidates[a].effect, self.candidates[b].effect) {
+            (Some(a), Some(b)) => equivalent::are(&a, &b, N),
+            _ => false,
+        }
+    }
+}
+
+/// The chosen candidate as a cause, with its look-alikes and probability.
+pub fn name<const N: usize, const P: usize>(
+    node: &SearchNode<N, P>,
+    choice: usize,
+    ground: Ground,
+    seed: u64,
+) -> Cause {
+    let best = &node.candidates[choice];
+    let alike = |c: &&Candidate<P>| match ground {
+        Ground::Motion => node.is_alike(best, c),
+        Ground::Trust => restores(node, c) && c.fit.prior_cost - best.fit.prior_cost < ALIKE_TRUST,
+    };
+    let others = node.candidates.iter().enumerate().filter(|(i, c)| *i != choice && c.effect.is_some());
+    let look_alikes: Vec<EffectInstance> =
+        others.map(|(_, c)| c).filter(alike).filter_map(|c| c.effect).take(3).collect();
+    let effect = best.effect.unwrap_or_else(|| unreachable!("only effects are named"));
+    let probability = match ground {
+        Ground::Motion => probability(node, choice, seed),
+        Ground::Trust => trust_probability(node, choice),
+    };
+    Cause {
+        effect,
+        sigma: Vec::new(),
+        probability,
+        share: node.share(best).clamp(0.0, 1.0),
+        relevance: node.relevance(best),
+        look_alikes,
+        evidence: Evidence { selected: probability, ..Evidence::default() },
+        ground,
+    }
+}
+
+/// How often the chosen candidate, or one that no motion tells from it, has the lowest cost when the windows are drawn again.
+fn probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize, seed: u64) -> f64 {
+    let advantages: Vec<Vec<f64>> = node.candidates.iter().map(|c| c.advantages(&node.base)).collect();
+    let own: Vec<f64> = node.candidates.iter().map(|c| node.base.fit.prior_cost - c.fit.prior_cost).collect();
+    // A law with more values that does no better is no evidence against one with fewer.
+    let size = |i: usize| node.candidates[i].effect.as_ref().map_or(0, EffectInstance::len);
+    let richer =
+        |i: usize| size(i) > size(choice) && node.is_alike(&node.candidates[choice], &node.candidates[i]);
+    let ours = |i: usize| i == choice || node.are_equivalent(i, choice) || richer(i);
+    let windows = advantages[choice].len();
+    let mut random = Random(seed);
+    let mut wins = 0;
+    for _ in 0..RESAMPLES {
+        let draw: Vec<usize> = (0..windows).map(|_| random.below(windows)).collect();
+        let gain = |i: usize| own[i] + draw.iter().map(|&w| advantages[i][w]).sum::<f64>();
+        let winner = (0..advantages.len()).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
+        if winner.is_some_and(|w| ours(w) && gain(w) > 0.0) {
+            wins += 1;
+        }
+    }
+    (f64::from(wins) + 0.5) / (RESAMPLES as f64 + 1.0)
+}
+
+/// How often one candidate has a lower cost than another when the windows are drawn again.
+pub fn probability_over<const P: usize>(one: &Candidate<P>, other: &Candidate<P>, seed: u64) -> f64 {
+    let advantages = one.advantages(other);
+    let own = other.fit.prior_cost - one.fit.prior_cost;
+    let mut random = Random(seed);
+    let gain = |random: &mut Random| -> f64 {
+        own + (0..advantages.len()).map(|_| advantages[random.below(advantages.len())]).sum::<f64>()
+    };
+    let wins = (0..RESAMPLES).filter(|_| gain(&mut random) > 0.0).count();
+    (wins as f64 + 0.5) / (RESAMPLES as f64 + 1.0)
+}
+
+/// Probability of the chosen candidate, or one that no motion tells from it, among all effects that would restore the prior values, from
+/// their prior costs.
+fn trust_probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize) -> f64 {
+    let best = node.candidates[choice].fit.prior_cost;
+    let free = |c: &Candidate<P>| c.effect.as_ref().map_or(0, EffectInstance::len) as f64;
+    // Every value of its own takes one squared sigma of the distance off by chance.
+    let mass = |c: &Candidate<P>| (-0.5 * (c.fit.prior_cost + free(c) - best)).exp();
+    let (mut ours, mut all) = (0.0, 0.0);
+    for (i, candidate) in node.candidates.iter().enumerate() {
+        if candidate.effect.is_none() {
+            continue;
+        }
+        all += mass(candidate);
+        if i == choice || node.are_equivalent(i, choice) {
+            ours += mass(candidate);
+        }
+    }
+    // What is left over by the best effect must itself be plausible, or the values are simply wrong.
+    let plausible = (-0.5 * (best - P as f64).max(0.0) / (2.0 * P as f64).sqrt()).exp();
+    (ours / all) * plausible
+}
+
+/// Part of the first gap that the final model leaves without explanation.
+pub fn left_over<const N: usize, const P: usize>(nodes: &[SearchNode<N, P>]) -> f64 {
+    unexplained_of(nodes.first(), nodes.last())
+}
+
+/// Part of the gap that a first attribution ends with that a second one leaves without explanation.
+pub fn left_beside<const N: usize, const P: usize>(
+    first: &[SearchNode<N, P>],
+    second: &[SearchNode<N, P>],
+) -> f64 {
+    unexplained_of(first.last(), second.last())
+}
+
+/// Part of one node's gap that is left in a later one, where that is more than noise.
+fn unexplained_of<const N: usize, const P: usize>(
+    earlier: Option<&SearchNode<N, P>>,
+    last: Option<&SearchNode<N, P>>,
+) -> f64 {
+    let (Some(earlier), Some(last)) = (earlier, last) else { return 0.0 };
+    if last.excess() < if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED } {
+        return 0.0;
+    }
+    left_of(earlier, last)
+}
+
+/// Part of one node's gap that is left in a later one.
+fn left_of<const N: usize, const P: usize>(earlier: &SearchNode<N, P>, last: &SearchNode<N, P>) -> f64 {
+    // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them. Where it is of no
+    // consequence by itself, both must say so.
+    let as_it_is = (last.relative_error() / earlier.relative_error()).powi(2);
+    let cut = last.excess() / earlier.excess();
+    let left = if last.is_open() { as_it_is.max(cut) } else { as_it_is.min(cut) };
+    left.min(1.0)
+}
+
+/// What a probability is multiplied by beside a part `left` of the gap that nothing explains: one for none, `least` for all of it.
+pub fn belief_beside(left: f64, least: f64) -> f64 {
+    least + (1.0 - least) * (1.0 - left).powi(REMAINDER_POWER)
+}

@@ -1,0 +1,136 @@
+//! Logs cut crosswise, for training logs that do not show what the holdout does.
+//!
+//! A stop that only the held-out motion reaches, a spring that only its speeds make worth telling from friction: no effect fitted to the
+//! training logs explains such a gap, and judged on both, the right one is worth nothing. So where a diagnosis ends beside a gap, every
+//! log is cut into stretches that are learnt from and judged on by turns. Both kinds of motion are then in both, and what explains
+//! nearly all of the gap there has been judged on stretches that it was not fitted to.
+
+use crate::likelihood::context::DiagnosisContext;
+use crate::log::cut::cut;
+use crate::log::input::LogData;
+use crate::search::attribute::SearchNode;
+use crate::search::belief::left_over;
+use crate::search::model_search::Attribution;
+use armgap_core::arm::Arm;
+
+/// Stretches per log, if it is long enough.
+const STRETCHES: usize = 6;
+
+/// Windows in a stretch at least.
+const WINDOWS: usize = 4;
+
+/// Part of the first gap that may be left for an attribution to logs cut crosswise to count.
+const LEFT: f64 = 0.1;
+
+/// It counts beside a remainder too if that stands this much less above the floor than the remainder it was made for.
+const MUCH_LESS: f64 = 0.1;
+
+/// Predictions miss by this factor more on the holdout, in the mean square, where it shows what the training logs do not.
+const MORE: f64 = 2.0;
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// Whether a search ended with predictions that miss by much more on the holdout than on the training logs: only then can stretches
+    /// of both tell more than the logs as they are.
+    pub(crate) fn holdout_shows_more(&self, attribution: &Attribution<N, P>) -> bool {
+        let Some(last) = attribution.nodes.last() else { return false };
+        let per_row = |costs: &[f64], rows: usize| costs.iter().sum::<f64>() / rows as f64;
+        let holdout = self.judge(&last.weights.holdout).raw_costs(&last.base.fit.hypothesis);
+        per_row(&holdout, self.holdout.data.rows)
+            > MORE * per_row(&last.base.fit.costs, self.training.data.rows)
+    }
+}
+
+/// Training and holdout stretches; none where a log is too short for two.
+pub fn crosswise<'a>(
+    training: &[LogData<'a>],
+    holdout: &[LogData<'a>],
+    horizon: f64,
+) -> Option<[Vec<LogData<'a>>; 2]> {
+    let mut sides = [Vec::new(), Vec::new()];
+    // A training log begins with a stretch to learn from, a holdout log with one to judge on.
+    for (turn, logs) in [training, holdout].into_iter().enumerate() {
+        for log in logs {
+            let count = (cut(log.t, horizon).len() / WINDOWS).min(STRETCHES);
+            if count < 2 {
+                return None;
+            }
+            let edge = |i: usize| i * log.t.len() / count;
+            for i in 0..count {
+                sides[(turn + i) % 2].push(stretch(log, edge(i)..edge(i + 1)));
+            }
+        }
+    }
+    Some(sides)
+}
+
+/// A stretch of a log under the log's name.
+fn stretch<'a>(log: &LogData<'a>, range: std::ops::Range<usize>) -> LogData<'a> {
+    let joints = log.q.len() / log.t.len();
+    let rows = range.start * joints..range.end * joints;
+    let t = &log.t[range.clone()];
+    let whole = match log.name.rsplit_once(" (") {
+        Some((before, within)) if within.contains(" to ") && within.ends_with(" s)") => before,
+        _ => &log.name,
+    };
+    LogData {
+        name: format!("{whole} ({} to {} s)", millis(t[0]), millis(t[t.len() - 1])),
+        t,
+        q: &log.q[rows.clone()],
+        moment: log.moment.map(|moment| &moment[rows.clone()]),
+        tau: &log.tau[rows],
+        reference: None,
+        tables: log.tables.iter().map(|table| &table[range.clone()]).collect(),
+    }
+}
+
+/// A time rounded to the millisecond.
+fn millis(t: f64) -> f64 {
+    (t * 1e3).round() / 1e3
+}
+
+/// Whether an attribution to logs cut crosswise explains what one to the logs as they are has left.
+pub fn explains<const N: usize, const P: usize>(
+    crosswise: &Attribution<N, P>,
+    plain: &Attribution<N, P>,
+) -> bool {
+    let excess = |a: &Attribution<N, P>| a.nodes.last().map_or(f64::INFINITY, SearchNode::excess);
+    let less = !crosswise.is_unexplained() || excess(crosswise) < MUCH_LESS * excess(plain);
+    !crosswise.causes.is_empty() && less && left_over(&crosswise.nodes) < LEFT
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_kinds_of_motion_are_on_both_sides_and_no_sample_on_two() {
+        let t: Vec<f64> = (0..2000).map(|k| f64::from(k) * 5e-3).collect();
+        let values: Vec<f64> = (0..4000).map(f64::from).collect();
+        let log = |name: &str| LogData {
+            name: name.to_owned(),
+            t: &t,
+            q: &values,
+            tau: &values,
+            reference: None,
+            moment: None,
+            tables: vec![&values[..2000]],
+        };
+        let (training, holdout) = ([log("a")], [log("b (last part) (0 to 9.995 s)")]);
+        let sides = crosswise(&training, &holdout, 0.25).unwrap();
+        let names = |i: usize| sides[i].iter().map(|l| l.name.as_str()).collect::<Vec<_>>();
+        assert_eq!(names(0)[..2], ["a (0 to 1.66 s)", "a (3.33 to 4.995 s)"]);
+        assert_eq!(names(1)[3], "b (last part) (0 to 1.66 s)");
+        for name in ["a", "b"] {
+            let mut rows: Vec<f64> = sides
+                .iter()
+                .flatten()
+                .filter(|l| l.name.starts_with(name))
+                .flat_map(|l| l.q.to_vec())
+                .collect();
+            rows.sort_by(f64::total_cmp);
+            assert_eq!(rows, values);
+        }
+        assert!(sides.iter().flatten().all(|l| l.q.len() == 2 * l.t.len() && l.tables[0].len() == l.t.len()));
+        assert!(crosswise(&training, &holdout, 2.0).is_none());
+    }
+}

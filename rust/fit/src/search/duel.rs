@@ -1,0 +1,67 @@
+//! Two effects that explain about the same, each under the weights it deserves.
+//!
+//! Windows are weighed, and their initial states fitted, around the best candidate. That flatters it: an initial state that had to be moved far for it
+//! is weighted less from then on, and lets the rival's advantage there pass. Of two that are close, each is therefore judged under
+//! weights made around either, and the one with the clearer win in its own has the last word.
+
+use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::solve::Effort;
+use crate::model::hypothesis::Hypothesis;
+use crate::search::acceptance::MATTERS;
+use crate::search::attribute::{Candidate, SearchNode};
+use crate::search::equivalent;
+use armgap_core::arm::Arm;
+
+/// A rival that is worse by less than this, in standard errors of the mean advantage per window, is close.
+const CLOSE: f64 = 3.0;
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// The node under the weights of its best candidate or of the best one's rival, whichever wins more clearly there.
+    pub(crate) fn duel(&self, node: SearchNode<N, P>) -> SearchNode<N, P> {
+        let Some((best, rival)) = close_pair(&node) else { return node };
+        let current = node.settled.hypothesis.clone();
+        let own = self.around(&current, &node, best);
+        let other = self.around(&current, &node, rival);
+        if lead(&other) > lead(&own) { other } else { own }
+    }
+
+    /// The node with its finalists fitted under weights made around one of them.
+    fn around(&self, current: &Hypothesis<P>, node: &SearchNode<N, P>, one: usize) -> SearchNode<N, P> {
+        let chosen = &node.candidates[one].fit.hypothesis;
+        let (_, weights) = self.settle(chosen, node.weights.training.scale);
+        let initial_guesses = node.candidates.iter().map(|c| c.fit.hypothesis.clone()).collect();
+        let candidates = self.fit_candidates(&weights, current, initial_guesses, Effort::FULL, &[]);
+        let base = self.candidate(&weights, current, current.effects.len(), Effort::FULL, &[]);
+        let (settled, field) = (node.settled.clone(), node.field.clone());
+        let (floor, motion) = (self.floor(&weights), self.motion(&weights));
+        SearchNode { settled, base, candidates, field, screened: Vec::new(), weights, floor, motion }
+    }
+}
+
+/// The best candidate and the first that is close to it, if motion can tell their effects apart.
+fn close_pair<const N: usize, const P: usize>(node: &SearchNode<N, P>) -> Option<(usize, usize)> {
+    let (best, others) = node.candidates.split_first()?;
+    if node.share(best) < MATTERS {
+        return None;
+    }
+    let rival = others.iter().position(|c| is_close(node, best, c))?;
+    Some((0, rival + 1))
+}
+
+fn is_close<const N: usize, const P: usize>(
+    node: &SearchNode<N, P>,
+    best: &Candidate<P>,
+    other: &Candidate<P>,
+) -> bool {
+    let (Some(a), Some(b)) = (best.effect, other.effect) else { return false };
+    let alike = node.is_alike(best, other) || best.z_over(other) < CLOSE;
+    alike && other.z_over(&node.base) > CLOSE && !equivalent::are(&a, &b, N)
+}
+
+/// By how much the best candidate of a node leads, in standard errors.
+fn lead<const N: usize, const P: usize>(node: &SearchNode<N, P>) -> f64 {
+    match &node.candidates[..] {
+        [best, second, ..] => best.z_over(second),
+        _ => 0.0,
+    }
+}

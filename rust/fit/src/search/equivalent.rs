@@ -1,0 +1,113 @@
+//! Pairs of effects that no log of motion alone tells apart.
+
+use crate::model::hypothesis::EffectInstance;
+
+/// An effect that could stand in for another, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Equivalent {
+    /// Name of the effect.
+    pub effect: &'static str,
+    /// 1-based joint; none for effects of the whole arm.
+    pub joint: Option<usize>,
+    /// Why the two cannot be told apart.
+    pub why: String,
+}
+
+/// Effects that are the same as this one on an arm with `joints` joints, whatever the motion.
+pub fn known(effect: &EffectInstance, joints: usize) -> Vec<Equivalent> {
+    let joint = effect.joint_number();
+    let one = |effect, joint, why: &str| vec![Equivalent { effect, joint, why: why.to_owned() }];
+    match effect.law.spec().name {
+        "coulomb_asymmetry" => one(
+            "torque_offset",
+            joint,
+            "the same function of time while the joint moves; a reading at rest with the motor off separates them",
+        ),
+        "torque_offset" => one(
+            "coulomb_asymmetry",
+            joint,
+            "the same function of time while the joint moves; a reading at rest with the motor off separates them",
+        ),
+        "base_tilt" => one(
+            "encoder_offset",
+            Some(1),
+            "both turn gravity by one angle; a level on the base separates them",
+        ),
+        "encoder_offset" if joint == Some(1) => {
+            one("base_tilt", None, "both turn gravity by one angle; a level on the base separates them")
+        }
+        "rotor_inertia" if joint == Some(2) => one(
+            "rotor_coupling",
+            None,
+            "the same motion with theta3 moved by as much; the rotor's own inertia separates them",
+        ),
+        "torque_gain" => (1..=joints)
+            .filter(|j| Some(*j) != joint)
+            .map(|j| Equivalent {
+                effect: "torque_gain",
+                joint: Some(j),
+                why: "the inverse gain there with all parameters scaled; a known added mass separates them"
+                    .to_owned(),
+            })
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Whether two effects are the same, or the same whatever the motion, on an arm with `joints` joints.
+pub fn are(a: &EffectInstance, b: &EffectInstance, joints: usize) -> bool {
+    let among = |a: &EffectInstance, b: &EffectInstance| {
+        let (name, joint) = (b.law.spec().name, b.joint_number());
+        known(a, joints).iter().any(|e| e.effect == name && e.joint == joint)
+    };
+    a.same_place(b) || among(a, b) || among(b, a)
+}
+
+/// Whether one effect is another where its further values are zero.
+fn contains(whole: &str, part: &str) -> bool {
+    (whole, part) == ("hardening_spring", "joint_spring")
+}
+
+/// The known equivalents and the look-alikes found in the data, none twice.
+pub fn all(effect: &EffectInstance, look_alikes: &[EffectInstance], joints: usize) -> Vec<Equivalent> {
+    let mut list = known(effect, joints);
+    for other in look_alikes {
+        let (name, joint) = (other.law.spec().name, other.joint_number());
+        if !list.iter().any(|e| e.effect == name && e.joint == joint) {
+            let why = if contains(name, effect.law.spec().name) {
+                "contains it: the same law where its further values are zero"
+            } else {
+                "explains these logs about as well; other motions may separate them"
+            };
+            list.push(Equivalent { effect: name, joint, why: why.to_owned() });
+        }
+    }
+    list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armgap_core::effect::find;
+
+    fn placed(name: &str, joint: usize) -> EffectInstance {
+        EffectInstance::new(find::<f64>(name).expect("in the catalogue"), joint, [0.0; 3])
+    }
+
+    #[test]
+    fn only_what_no_motion_tells_apart_is_the_same() {
+        let same = [("torque_offset", 1, "coulomb_asymmetry", 1), ("base_tilt", 0, "encoder_offset", 0)];
+        let other = [("torque_offset", 1, "coulomb_asymmetry", 0), ("actuator_lag", 0, "actuator_delay", 0)];
+        for (a, i, b, j) in same {
+            assert!(are(&placed(a, i), &placed(b, j), 2) && are(&placed(b, j), &placed(a, i), 2), "{a} {b}");
+        }
+        for (a, i, b, j) in other {
+            assert!(!are(&placed(a, i), &placed(b, j), 2), "{a} {b}");
+        }
+        assert!(are(&placed("torque_gain", 0), &placed("torque_gain", 1), 2));
+        let list =
+            all(&placed("joint_spring", 0), &[placed("hardening_spring", 0), placed("torque_ripple", 0)], 2);
+        assert!(list[0].why.starts_with("contains it") && list[1].why.contains("other motions"), "{list:?}");
+        assert!(are(&placed("payload", 0), &placed("payload", 0), 2));
+    }
+}

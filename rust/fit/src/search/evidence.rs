@@ -1,0 +1,183 @@
+//! What a cause rests on in the final model, and the probability that it is in the arm.
+//!
+//! A real arm always lacks something that has no name, so what stays unexplained is no evidence against a cause by itself. What counts is
+//! how the cause's own part compares with it: an effect that is not there takes up a part of the rest, and another part under another motion.
+//! So the probability follows from three figures: how often the cause is chosen when the windows are drawn again, by how much predictions
+//! of the holdout miss more without it, and whether the holdout asks for the same size as the training logs.
+
+use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::solve::{Effort, Fit, neutral};
+use crate::model::hypothesis::EffectInstance;
+use crate::search::acceptance::{ABOVE_FLOOR, Ground, UNEXPLAINED};
+use crate::search::attribute::SearchNode;
+use crate::search::model_search::Attribution;
+use armgap_core::arm::Arm;
+use armgap_core::effect::Trial;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Scatter of a size between logs, relative to it, that other missing effects make beside its standard deviation.
+const SAME: f64 = 0.15;
+
+/// Mean and scatter of the size that another log asks for, relative to the first, where the effect is not there.
+const OTHER: [f64; 2] = [0.7, 0.8];
+
+/// What a cause rests on.
+#[derive(Debug, Clone, Copy, Default, JsonSchema, Serialize)]
+pub struct Evidence {
+    /// How often it has the lowest cost of all candidates when the windows are drawn again, at the node where it was added.
+    pub selected: f64,
+    /// By how much the cost of the holdout rises without it, everything else fitted again, relative to the cost above the floor with it; none
+    /// where no more than noise stays.
+    pub gain: Option<f64>,
+    /// The same for a law without a name in its place: by how much the cost falls with the table over one variable that predicts best what the
+    /// arm leaves without the cause; none where no table does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rival_gain: Option<f64>,
+    /// Size that the holdout asks for, relative to that of the training logs; none where a size has no direction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_ratio: Option<f64>,
+    /// Standard deviation of that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_ratio_sigma: Option<f64>,
+}
+
+impl Evidence {
+    /// Probability that the effect is in the arm. A cause that takes off as much as what stays is as likely there as not, unless sizes say more.
+    pub fn probability(&self) -> f64 {
+        let Some(gain) = self.gain else { return self.selected };
+        let odds = gain.max(0.0) * self.agreement() * self.left_by_rival();
+        self.selected * odds / (1.0 + odds)
+    }
+
+    /// What a law without a name in the cause's place leaves, relative to what the cause leaves: 0 to 1.
+    fn left_by_rival(&self) -> f64 {
+        let (Some(gain), Some(rival)) = (self.gain, self.rival_gain) else { return 1.0 };
+        (1.0 + gain - rival).clamp(0.0, 1.0)
+    }
+
+    /// How much more likely the two sizes are for an effect that is there than for one that is not.
+    fn agreement(&self) -> f64 {
+        let (Some(ratio), Some(sigma)) = (self.size_ratio, self.size_ratio_sigma) else { return 1.0 };
+        let density = |mean: f64, scatter: f64| {
+            let scatter = scatter.hypot(sigma);
+            (-0.5 * ((ratio - mean) / scatter).powi(2)).exp() / scatter
+        };
+        let likelihood_ratio = density(1.0, SAME) / density(OTHER[0], OTHER[1]);
+        if likelihood_ratio.is_finite() { likelihood_ratio } else { 1.0 }
+    }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// Gives the causes of an attribution their evidence and probability.
+    pub(crate) fn weigh(&self, attribution: &mut Attribution<N, P>) {
+        let Some(last) = attribution.nodes.last() else { return };
+        if attribution.causes.is_empty() {
+            return;
+        }
+        let (model, on_holdout) = (&attribution.model, &attribution.on_holdout);
+        let cost = |fit: &Fit<P>| self.holdout_cost(&last.weights, fit);
+        let full = cost(model);
+        let rest = is_more_than_noise(last).then_some(full - last.floor).filter(|rest| *rest > 0.0);
+        for cause in &mut attribution.causes {
+            let Some(place) = model.hypothesis.effects.iter().position(|e| e.same_place(&cause.effect))
+            else {
+                continue;
+            };
+            if let Some(rest) = rest {
+                let mut taken_out = model.hypothesis.clone();
+                taken_out.effects.remove(place);
+                let bare = cost(&self.problem(&last.weights.training).solve(&taken_out, Effort::FULL));
+                cause.evidence.gain = Some((bare - full) / rest);
+                let rival = self.rival_cost(&taken_out, &last.weights);
+                cause.evidence.rival_gain = rival.map(|rival| (bare - rival) / rest);
+            }
+            if let Some((ratio, sigma)) = size_ratio(place, model, on_holdout) {
+                (cause.evidence.size_ratio, cause.evidence.size_ratio_sigma) = (Some(ratio), Some(sigma));
+            }
+            if cause.ground == Ground::Motion {
+                cause.probability = cause.evidence.probability();
+            }
+        }
+    }
+}
+
+/// Whether a search ended beside a cost that is more than noise.
+fn is_more_than_noise<const N: usize, const P: usize>(last: &SearchNode<N, P>) -> bool {
+    last.excess() > if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED }
+}
+
+/// Size of an effect in one fit relative to another, along the first, and its standard deviation; none for an effect whose first
+/// parameter is no amplitude.
+fn size_ratio<const P: usize>(place: usize, of: &Fit<P>, other: &Fit<P>) -> Option<(f64, f64)> {
+    let effects = &of.hypothesis.effects;
+    let (one, two) = (&effects[place], &other.hypothesis.effects[place]);
+    if matches!(one.law.spec().trial, Trial::Whole | Trial::Disturbance) {
+        return None;
+    }
+    let first = P + effects[..place].iter().map(EffectInstance::len).sum::<usize>();
+    let off = neutral(one);
+    let (mut along, mut square, mut variance) = (0.0, 0.0, 0.0);
+    for i in 0..one.amplitudes() {
+        let (a, b) = (one.p[i] - off.p[i], two.p[i] - off.p[i]);
+        along += a * b;
+        square += a * a;
+        variance += a * a * (of.sigma(first + i).powi(2) + other.sigma(first + i).powi(2));
+    }
+    let (ratio, sigma) = (along / square, variance.sqrt() / square);
+    (ratio.is_finite() && sigma.is_finite()).then_some((ratio, sigma))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn evidence(gain: f64, ratio: Option<f64>) -> Evidence {
+        Evidence {
+            selected: 1.0,
+            gain: Some(gain),
+            rival_gain: None,
+            size_ratio: ratio,
+            size_ratio_sigma: ratio.map(|_| 0.05),
+        }
+    }
+
+    #[test]
+    fn a_cause_without_a_rest_beside_it_is_as_sure_as_its_choice() {
+        let choice = Evidence { selected: 0.97, gain: None, ..evidence(0.0, Some(-3.0)) };
+        assert_eq!(choice.probability(), 0.97);
+    }
+
+    #[test]
+    fn a_cause_that_explains_more_than_what_is_left_is_likely() {
+        assert!((evidence(1.0, None).probability() - 0.5).abs() < 1e-12);
+        assert!(evidence(9.0, None).probability() > 0.89);
+        assert!(evidence(0.1, None).probability() < 0.1);
+        assert_eq!(evidence(-1.0, None).probability(), 0.0);
+    }
+
+    #[test]
+    fn a_law_without_a_name_takes_odds_from_a_cause_only_where_it_explains_more() {
+        let beside = |rival: f64| Evidence { rival_gain: Some(rival), ..evidence(1.0, None) }.probability();
+        let alone = evidence(1.0, None).probability();
+        assert_eq!((beside(-0.3), beside(0.5), beside(1.0)), (alone, alone, alone));
+        assert!((beside(1.5) - 1.0 / 3.0).abs() < 1e-12);
+        assert_eq!(beside(2.5), 0.0);
+    }
+
+    #[test]
+    fn sizes_that_agree_speak_for_a_cause_and_others_against_it() {
+        let [same, near, far, turned] =
+            [1.0, 0.85, 1.8, -0.5].map(|ratio| evidence(1.0, Some(ratio)).probability());
+        let silent = evidence(1.0, None).probability();
+        assert!(same > near && near > silent && silent > far && far > turned);
+    }
+
+    #[test]
+    fn a_size_that_is_hardly_known_says_little() {
+        let known = evidence(1.0, Some(1.6));
+        let unknown = Evidence { size_ratio_sigma: Some(2.0), ..known };
+        let silent = evidence(1.0, None).probability();
+        assert!((unknown.probability() - silent).abs() < 0.1 && known.probability() < 0.5 * silent);
+    }
+}

@@ -1,0 +1,254 @@
+//! The model search: one cause after another is added, and causes that have become idle are dropped.
+//!
+//! After every addition all causes are fitted together again, and one that has become idle is dropped.
+
+use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
+use crate::likelihood::solve::{Effort, Fit};
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::search::acceptance::{
+    CERTAIN, CLEAR, FAINTEST, RELEVANT, TRUST_GAIN, UNEXPLAINED, choose, min_relevance,
+};
+use crate::search::attribute::{Candidate, SearchNode};
+use crate::search::belief::{Cause, name};
+use crate::search::together::Both;
+use armgap_core::arm::Arm;
+
+/// Result of a model search.
+pub struct Attribution<const N: usize, const P: usize> {
+    /// Parameters re-estimated, no effects.
+    pub refit: Fit<P>,
+    /// The final model.
+    pub model: Fit<P>,
+    /// The same model fitted to the holdout.
+    pub on_holdout: Fit<P>,
+    /// Accepted causes, strongest first.
+    pub causes: Vec<Cause>,
+    /// Every search node, the last one being the one at which nothing was accepted.
+    pub nodes: Vec<SearchNode<N, P>>,
+}
+
+impl<const N: usize, const P: usize> Attribution<N, P> {
+    /// The effect that was added after a node.
+    pub fn added(&self, node: usize) -> Option<&EffectInstance> {
+        added(&self.nodes.iter().collect::<Vec<_>>(), node)
+    }
+
+    /// RMS error of the final model on the holdout relative to the motion.
+    pub fn error(&self) -> f64 {
+        self.nodes.last().map_or(f64::INFINITY, SearchNode::relative_error)
+    }
+
+    /// Whether the final model leaves a gap of consequence that is more than noise.
+    pub fn is_unexplained(&self) -> bool {
+        self.nodes.last().is_some_and(SearchNode::is_unexplained)
+    }
+}
+
+/// The effect that was added after one of these nodes.
+pub(crate) fn added<'a, const N: usize, const P: usize>(
+    nodes: &[&'a SearchNode<N, P>],
+    node: usize,
+) -> Option<&'a EffectInstance> {
+    let effects = |i: usize| nodes.get(i).map(|s| &s.settled.hypothesis.effects);
+    let before = effects(node)?;
+    effects(node + 1)?.iter().find(|e| !before.iter().any(|known| known.same_place(e)))
+}
+
+/// State of a model search.
+pub(crate) struct ModelSearch<const N: usize, const P: usize> {
+    pub causes: Vec<Cause>,
+    /// The nodes before this one.
+    pub nodes: Vec<SearchNode<N, P>>,
+    pub node: SearchNode<N, P>,
+    pub regularised: bool,
+    /// Whether the friction regularisation has been fitted.
+    pub regularisation_fitted: bool,
+    /// Improvements of this size count, relative to the motion.
+    pub threshold: f64,
+    /// Whether a cause has been swapped for a rival before.
+    pub turned: bool,
+}
+
+impl<const N: usize, const P: usize> ModelSearch<N, P> {
+    /// Adds two causes; returns the fit with both.
+    fn take_up(&mut self, both: Both<N, P>) -> Fit<P> {
+        let fit = both.node.candidates[both.choice].fit.clone();
+        self.causes.extend(both.causes);
+        self.nodes.push(std::mem::replace(&mut self.node, both.node));
+        fit
+    }
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// Attributes the gap to at most `max_causes` effects, one of which may be known beforehand.
+    pub fn attribute(&self, max_causes: usize, seed: u64, known: Option<Cause>) -> Attribution<N, P> {
+        let nominal = Hypothesis::rigid(self.prior.theta);
+        let scale = self.rough_scale(&nominal);
+        let settled = self.settle(&nominal, scale);
+        let mut node = self.node_around(settled.clone(), RELEVANT);
+        let refit = node.settled.clone();
+        let min_relevance = min_relevance(node.relative_error());
+        let threshold = self.look_closer(&mut node, settled, min_relevance, CLEAR);
+        let (causes, nodes) = (Vec::new(), Vec::new());
+        let mut search = ModelSearch {
+            causes,
+            nodes,
+            node,
+            regularised: false,
+            regularisation_fitted: false,
+            threshold,
+            turned: false,
+        };
+        if let Some(cause) = known.filter(|_| max_causes > 0) {
+            let with = search.node.settled.hypothesis.with(cause.effect);
+            let fit = self.problem(&search.node.weights.training).solve(&with, Effort::FULL);
+            search.causes.push(cause);
+            self.advance(&mut search, &fit, min_relevance);
+        }
+        self.pursue(&mut search, min_relevance, max_causes, seed);
+        if search.node.is_unexplained() && !search.causes.is_empty() && max_causes > 1 {
+            search = self.restarted(search, min_relevance, max_causes, seed);
+        }
+        let ModelSearch { mut causes, mut nodes, node, .. } = search;
+        let mut model = node.settled.clone();
+        self.prune(&mut model, &mut causes, &node);
+        let on_holdout = self.apply_dispersion_factor(&mut model, &node.weights);
+        nodes.push(node);
+        refresh(&model, &mut causes);
+        Attribution { refit, model, on_holdout, causes, nodes }
+    }
+
+    /// Adds one cause after another, or two at once, until no candidate is accepted.
+    pub(crate) fn pursue(
+        &self,
+        search: &mut ModelSearch<N, P>,
+        min_relevance: f64,
+        max_causes: usize,
+        seed: u64,
+    ) {
+        loop {
+            // A cause that stands in for its rival leaves a gap that others would be taken up for.
+            if let Some(other) = self.reconsidered(search, false, min_relevance, max_causes, seed) {
+                *search = other;
+                return;
+            }
+            if search.causes.len() >= max_causes {
+                break;
+            }
+            let node = &search.node;
+            let next = if let Some((choice, ground)) = choose(node, search.regularised, search.threshold) {
+                match node.candidates[choice].effect {
+                    Some(_) => search.causes.push(name(node, choice, ground, seed)),
+                    None => search.regularised = true,
+                }
+                node.candidates[choice].fit.clone()
+            } else if let Some(fit) =
+                (!search.regularisation_fitted).then(|| self.regularisation(node)).flatten()
+            {
+                (search.regularised, search.regularisation_fitted) = (true, true);
+                fit
+            } else {
+                let room = search.causes.len() + 2 <= max_causes;
+                let pair = room.then(|| self.together(node, None, search.threshold, seed)).flatten();
+                let Some(both) = pair else { break };
+                search.take_up(both)
+            };
+            self.advance(search, &next, min_relevance);
+        }
+        if let Some(other) = self.reconsidered(search, true, min_relevance, max_causes, seed) {
+            *search = other;
+        }
+    }
+
+    /// Restarts a search that has ended with a gap from its first node with another pair of causes: the first cause may have stood in for
+    /// both. Only a pair that explains nearly all of the gap counts.
+    fn restarted(
+        &self,
+        mut search: ModelSearch<N, P>,
+        min_relevance: f64,
+        max_causes: usize,
+        seed: u64,
+    ) -> ModelSearch<N, P> {
+        let first = &search.nodes[0];
+        let taken = search.causes[0].effect;
+        let Some(both) = self.together(first, Some(&taken), min_relevance, seed) else { return search };
+        search.node = search.nodes.swap_remove(0);
+        search.nodes.clear();
+        search.causes.clear();
+        (search.regularised, search.regularisation_fitted) = (false, false);
+        let next = search.take_up(both);
+        self.advance(&mut search, &next, min_relevance);
+        self.pursue(&mut search, min_relevance, max_causes, seed);
+        search
+    }
+
+    /// Goes on to the node around `next`.
+    pub(crate) fn advance(&self, search: &mut ModelSearch<N, P>, next: &Fit<P>, min_relevance: f64) {
+        let settled = self.settle(&next.hypothesis, search.node.weights.training.scale);
+        let node = self.node_around(settled.clone(), min_relevance);
+        search.nodes.push(std::mem::replace(&mut search.node, node));
+        search.threshold = self.look_closer(&mut search.node, settled, min_relevance, UNEXPLAINED);
+    }
+
+    /// Looks into a gap that is too small to matter by itself, and yet stands above the floor by the factor `clear`; returns which
+    /// improvements count. `settled` is what the node was made around.
+    fn look_closer(
+        &self,
+        node: &mut SearchNode<N, P>,
+        settled: (Fit<P>, SplitWeighting<N>),
+        min_relevance: f64,
+        clear: f64,
+    ) -> f64 {
+        if !(FAINTEST..=min_relevance).contains(&node.relative_error()) || node.excess() <= clear {
+            return min_relevance;
+        }
+        *node = self.node_around(settled, FAINTEST);
+        FAINTEST
+    }
+
+    /// Drops causes that the others have made idle.
+    pub(crate) fn prune(&self, model: &mut Fit<P>, causes: &mut Vec<Cause>, node: &SearchNode<N, P>) {
+        let mut i = 0;
+        while causes.len() > 1 && i < causes.len() {
+            let full = self.judged(node, model.clone(), None);
+            let mut without = model.hypothesis.clone();
+            without.effects.remove(i);
+            let fit = self.problem(&node.weights.training).solve(&without, Effort::FULL);
+            let reduced = self.judged(node, fit, None);
+            let idle = full.z_over(&reduced) < CERTAIN
+                && !node.takes_outliers(&full, &reduced)
+                && reduced.fit.prior_cost - full.fit.prior_cost < TRUST_GAIN;
+            if idle {
+                *model = reduced.fit;
+                causes.remove(i);
+                i = 0;
+            } else {
+                i += 1;
+            }
+        }
+    }
+
+    fn judged(&self, node: &SearchNode<N, P>, fit: Fit<P>, effect: Option<EffectInstance>) -> Candidate<P> {
+        let training = self.problem(&node.weights.training).window_costs(&fit.hypothesis);
+        let (holdout, error) = self.judged_on_holdout(&node.weights, &fit);
+        Candidate { effect, size: 0.0, fit, training, holdout, error }
+    }
+}
+
+/// Values and standard deviations of the causes from the final model.
+pub(crate) fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
+    for cause in causes.iter_mut() {
+        let mut first = P;
+        for effect in &model.hypothesis.effects {
+            if effect.same_place(&cause.effect) {
+                cause.effect = *effect;
+                // A value that the training windows do not show may be known from those of the holdout.
+                let known = cause.sigma.iter().copied().chain(std::iter::repeat(f64::INFINITY));
+                let fitted = (first..first + effect.len()).map(|i| model.sigma(i));
+                cause.sigma = fitted.zip(known).map(|(fitted, known)| fitted.min(known)).collect();
+            }
+            first += effect.len();
+        }
+    }
+    causes.sort_by(|a, b| b.relevance.total_cmp(&a.relevance));
+}

@@ -1,0 +1,180 @@
+//! The way back to a choice between rivals that was made too early.
+//!
+//! Of two effects that look alike, such as a lag and a delay, the better one may show only once the other causes are known: beside a gap
+//! ten times as large, what tells them apart is noise. And what a law with more values explained beyond one with fewer may have been the
+//! doing of a cause that was found later. So before a further cause is looked for, each rival takes the place of its cause beside all
+//! others; if it does better, or as well with fewer values, the search goes on from there again. The better end counts, if it is reached
+//! with no more causes: beside a gap, more are added by what they are not about.
+
+use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::solve::Effort;
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::search::acceptance::{ABOVE_FLOOR, Ground, MATTERS, is_possible};
+use crate::search::attribute::{Candidate, SearchNode};
+use crate::search::belief::{Cause, name, probability_over};
+use crate::search::equivalent;
+use crate::search::evidence::Evidence;
+use crate::search::model_search::{ModelSearch, added};
+use armgap_core::arm::Arm;
+
+/// A rival explains at least this part of what its cause explained when that was added.
+const RIVALS: f64 = 0.5;
+
+/// Rivals that are tried for each cause.
+const TRIED: usize = 3;
+
+/// Mean advantage, in standard errors, from which a rival is better beside the other causes.
+const BETTER: f64 = 2.0;
+
+/// A search from a rival with fewer values may end with predictions that miss by this factor more.
+const AS_WELL: f64 = 1.05;
+
+/// A search from a rival with more values has to end with predictions that miss by this factor less: a law that holds the other within it
+/// always fits a little better.
+const RICHER: f64 = 0.9;
+
+/// A rival that does better beside the other causes than the cause it could have been added for.
+struct Rival<const P: usize> {
+    /// The node in which it was passed over.
+    node: usize,
+    /// The rival as it was fitted there.
+    fitted: Candidate<P>,
+    /// The effect that was added.
+    instead_of: EffectInstance,
+    /// How sure it is that this one is better; none where it has fewer values and does as well.
+    better: Option<f64>,
+    /// By what factor the predictions of a search from it may miss more than those of the other's.
+    allowed: f64,
+}
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// The search that adds a better rival of one of the causes in that one's place, if it ends better. Those with more values are tried
+    /// once a search has `ended`: before, what they explain beyond may still be the doing of another cause. The others have been tried by then.
+    pub(crate) fn reconsidered(
+        &self,
+        search: &ModelSearch<N, P>,
+        ended: bool,
+        min_relevance: f64,
+        max_causes: usize,
+        seed: u64,
+    ) -> Option<ModelSearch<N, P>> {
+        if search.causes.len() < 2 || search.turned {
+            return None;
+        }
+        let rival = self.better_rival(search, ended, seed)?;
+        let mut other = self.back_to(search, &rival, min_relevance, seed);
+        self.pursue(&mut other, min_relevance, max_causes, seed);
+        let as_good = other.node.relative_error() < rival.allowed * search.node.relative_error();
+        (as_good && self.needed(&other) <= self.needed(search)).then_some(other)
+    }
+
+    /// The first rival that does better than its cause beside the others.
+    fn better_rival(&self, search: &ModelSearch<N, P>, ended: bool, seed: u64) -> Option<Rival<P>> {
+        let all: Vec<&SearchNode<N, P>> = search.nodes.iter().chain([&search.node]).collect();
+        (0..search.nodes.len()).find_map(|index| self.better_in(&all, index, ended, seed))
+    }
+
+    /// The first rival that does better than its cause beside the others, among those that were not chosen at one node.
+    fn better_in(&self, all: &[&SearchNode<N, P>], index: usize, ended: bool, seed: u64) -> Option<Rival<P>> {
+        let (node, last, adopted) = (all[index], *all.last()?, added(all, index)?);
+        let model = &last.settled.hypothesis;
+        let place = model.effects.iter().position(|e| e.same_place(adopted))?;
+        let cause = node.candidates.iter().find(|c| c.effect.is_some_and(|e| e.same_place(adopted)))?;
+        let open = last.excess() > ABOVE_FLOOR;
+        let size = |c: &Candidate<P>| c.effect.map_or(0, |e| e.len());
+        let is_rival = |c: &Candidate<P>, share: f64, of_cause: f64| {
+            let Some(effect) = c.effect else { return false };
+            let known = model.effects.iter().any(|e| e.same_place(&effect));
+            !known
+                && if ended { open && size(c) > size(cause) } else { size(c) <= size(cause) }
+                && !equivalent::are(&effect, adopted, N)
+                && is_possible(c)
+                && share > (RIVALS * of_cause).max(MATTERS)
+        };
+        let finalists =
+            node.candidates.iter().filter(|c| is_rival(c, node.share(c), node.share(cause))).take(TRIED);
+        // One with fewer values may have fallen behind just for what they are not about.
+        let of_cause = node.field.iter().find(|(c, _)| c.effect.is_some_and(|e| e.same_place(adopted)));
+        let is_final = |c: &Candidate<P>| node.candidates.iter().any(|f| f.is_same(c));
+        let passed_over = node.field.iter().filter(|(c, share)| {
+            size(c) < size(cause) && !is_final(c) && is_rival(c, *share, of_cause.map_or(0.0, |x| x.1))
+        });
+        let rivals: Vec<&Candidate<P>> = finalists.chain(passed_over.map(|(c, _)| c).take(TRIED)).collect();
+        if rivals.is_empty() {
+            return None;
+        }
+        let beside = |effects: Vec<EffectInstance>| {
+            let start = Hypothesis { effects, ..model.clone() };
+            self.candidate(&last.weights, &start, place, Effort::FULL, &[])
+        };
+        let full = beside(model.effects.clone());
+        let tried = rivals.into_iter().filter_map(|rival| {
+            let mut effects = model.effects.clone();
+            effects[place] = rival.effect?;
+            let swapped = beside(effects);
+            let better = (swapped.z_over(&full) > BETTER).then(|| probability_over(&swapped, &full, seed));
+            let does = better.is_some() || (size(&swapped) < size(cause) && as_well(&swapped, &full));
+            let allowed = if ended { RICHER } else { better.map_or(AS_WELL, |_| 1.0) };
+            let rival = Rival { node: index, fitted: rival.clone(), instead_of: *adopted, better, allowed };
+            (is_possible(&swapped) && does).then_some((swapped, rival))
+        });
+        let found: Vec<(Candidate<P>, Rival<P>)> = tried.collect();
+        let (best, _) = found.iter().min_by(|a, b| a.0.score().total_cmp(&b.0.score()))?;
+        let best = best.clone();
+        let as_good = found.into_iter().filter(|(swapped, _)| as_well(swapped, &best));
+        as_good.min_by_key(|(swapped, _)| size(swapped)).map(|(_, rival)| rival)
+    }
+
+    /// The search up to the node in which a rival was passed over, and the node after it instead.
+    fn back_to(
+        &self,
+        search: &ModelSearch<N, P>,
+        rival: &Rival<P>,
+        min_relevance: f64,
+        seed: u64,
+    ) -> ModelSearch<N, P> {
+        let mut node = search.nodes[rival.node].clone();
+        let added = node.settled.hypothesis.effects.len();
+        let choice = node.candidates.iter().position(|c| c.is_same(&rival.fitted)).unwrap_or_else(|| {
+            let start = &rival.fitted.fit.hypothesis;
+            node.candidates.push(self.candidate(&node.weights, start, added, Effort::FULL, &[]));
+            node.candidates.len() - 1
+        });
+        let before = &node.settled.hypothesis;
+        let known = |c: &&Cause| before.effects.iter().any(|e| e.same_place(&c.effect));
+        let mut causes: Vec<Cause> = search.causes.iter().filter(known).cloned().collect();
+        let named = name(&node, choice, Ground::Motion, seed);
+        let replaced = search.causes.iter().find(|c| c.effect.same_place(&rival.instead_of));
+        let as_sure = replaced.map_or(named.probability, |c| c.probability);
+        let selected = rival.better.unwrap_or(as_sure);
+        causes.push(Cause {
+            probability: selected,
+            evidence: Evidence { selected, ..named.evidence },
+            ..named
+        });
+        let next = node.candidates[choice].fit.clone();
+        let mut other = ModelSearch {
+            causes,
+            nodes: search.nodes[..rival.node].to_vec(),
+            regularised: before.smoothing > 0.0,
+            regularisation_fitted: false,
+            threshold: search.threshold,
+            node,
+            turned: true,
+        };
+        self.advance(&mut other, &next, min_relevance);
+        other
+    }
+
+    /// Causes that a search ends with once the idle are dropped.
+    fn needed(&self, search: &ModelSearch<N, P>) -> usize {
+        let (mut model, mut causes) = (search.node.settled.clone(), search.causes.clone());
+        self.prune(&mut model, &mut causes, &search.node);
+        causes.len()
+    }
+}
+
+/// Whether predictions of one candidate miss by hardly more than those of another.
+fn as_well<const P: usize>(one: &Candidate<P>, other: &Candidate<P>) -> bool {
+    one.error < AS_WELL.powi(2) * other.error
+}

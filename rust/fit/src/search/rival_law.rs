@@ -1,0 +1,80 @@
+//! The rival of every name: a torque without a name, as a table over the variable that predicts best what the arm lacks without the cause.
+//!
+//! An effect that is not in the arm is named where it imitates what is there better than the other effects do. A table has no form of its own to
+//! imitate with: where it explains much more of the holdout than the named effect, the form of the named effect is wrong.
+
+use crate::likelihood::context::{DiagnosisContext, SplitWeighting, WindowSet};
+use crate::likelihood::solve::{Effort, Fit};
+use crate::locate::dependence::Dependence;
+use crate::locate::unnamed::{LogResidual, MOST, Wanted, dependences};
+use crate::model::custom_effect::{self, UNNAMED};
+use crate::model::hypothesis::{EffectInstance, Hypothesis};
+use crate::predict::residual_torque::measured_motion;
+use crate::predict::window::Dataset;
+use crate::search::acceptance::MATTERS;
+use armgap_core::arm::Arm;
+use nalgebra::SVector;
+
+impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
+    /// What the torques that a model lacks depend on, strongest first: tables of the training logs that predict the holdout, each beside the model
+    /// with everything fitted again.
+    pub(crate) fn laws_beside(
+        &self,
+        model: &Fit<P>,
+        weights: &SplitWeighting<N>,
+        rotary: bool,
+    ) -> Vec<Dependence> {
+        let full = self.holdout_cost(weights, model);
+        let rest = full - self.floor(weights);
+        let predicts =
+            |law: &Dependence| full - self.cost_beside(&model.hypothesis, law, weights) > MATTERS * rest;
+        let mut laws = self.dependences(&model.hypothesis, Wanted { most: MOST, rotary });
+        laws.retain(predicts);
+        laws
+    }
+
+    /// What the torques that a model lacks depend on by inverse dynamics, strongest first; tables are taken from the training logs.
+    fn dependences(&self, model: &Hypothesis<P>, wanted: Wanted) -> Vec<Dependence> {
+        let of = |set: &WindowSet<N>, teaches| -> Vec<LogResidual<N>> {
+            let tracks = &set.data.tracks;
+            tracks.iter().filter_map(|track| LogResidual::new(&self.arm, track, model, teaches)).collect()
+        };
+        let mut logs = of(&self.training, true);
+        logs.extend(of(&self.holdout, false));
+        dependences(&self.arm, &model.theta, &self.prior.sigma, &logs, wanted)
+    }
+
+    /// Cost of predictions of the holdout by a model with the best law without a name; none where no law predicts what the model lacks.
+    pub(crate) fn rival_cost(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Option<f64> {
+        let rival = self.dependences(model, Wanted { most: 1, rotary: true }).into_iter().next()?;
+        Some(self.cost_beside(model, &rival, weights))
+    }
+
+    /// Cost of predictions of the holdout by a model with the torques of a law, everything fitted again to the training logs.
+    fn cost_beside(&self, model: &Hypothesis<P>, law: &Dependence, weights: &SplitWeighting<N>) -> f64 {
+        let beside = Self {
+            training: WindowSet::new(with_torques(&self.training.data, law)),
+            holdout: WindowSet::new(with_torques(&self.holdout.data, law)),
+            ..self.on_windows(Dataset::new(Vec::new(), 1.0))
+        };
+        let effect = EffectInstance::new(custom_effect::law(UNNAMED), law.joint - 1, [1.0, 0.0, 0.0]);
+        let fit = beside.problem(&weights.training).solve(&model.with(effect), Effort::FULL);
+        beside.holdout_cost(weights, &fit)
+    }
+}
+
+/// The same windows, with the torques of a law along the measured motion as a table of their logs.
+fn with_torques<const N: usize>(data: &Dataset<N>, law: &Dependence) -> Dataset<N> {
+    let mut data = data.clone();
+    for track in &mut data.tracks {
+        let torque = |k: usize| {
+            let motion = measured_motion(track, k);
+            let tau = SVector::from_fn(|j, _| track.held[k][j].mean());
+            law.law.at(law.depends_on.of(&motion, &tau, track.t[k] - track.t[0]))
+        };
+        let torques = (0..track.len()).map(torque).collect();
+        track.tables.resize(UNNAMED, Vec::new());
+        track.tables.push(torques);
+    }
+    data
+}
