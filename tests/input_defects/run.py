@@ -73,7 +73,9 @@ def _options() -> argparse.ArgumentParser:
     parser.add_argument(
         "--models", help="machines, with commas; all by default (the trial's own shares in other modes)"
     )
-    parser.add_argument("--defects", help="beginnings of names, with commas; all by default (modes defects and repaired)")
+    parser.add_argument(
+        "--defects", help="beginnings of names, with commas; all by default (modes defects and repaired)"
+    )
     parser.add_argument(
         "--hidden", type=float, default=0.5, metavar="SHARE", help="of cases with an effect (mode defects)"
     )
