@@ -30,7 +30,8 @@ _FEWEST_ROWS = 100
 # one pair: the more the one says, the less is asked of the other. Effects of the library leave less than a tenth of a torque on simulated
 # logs, and less than a quarter on logs of a real arm; a torque of which a third is noise was predicted to 0.001. Torques played backwards leave
 # 0.3 to 1.1 and are missed by 0.42 to 2.2 (18 development cases), by 0.28 of the motion at most where an effect is hidden.
-_UNRELATED = ((0.5, EXPLAINS), (0.25, 0.4))
+_UNRELATED = (0.5, 0.25)
+_UNPREDICTED = (0.3, 0.4)
 # Shifts of the torques under which predictions that come right are no sign of other columns [samples].
 _SHIFTS = (-8, -5, -2, 2, 5, 8)
 # A limit of the drive counts in their place if it leaves less than this of every joint's torque. Drives that are limited leave 0.03 at most, torques
@@ -116,7 +117,7 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
         applied = factors.corrections if repair and factors.checks[0].severity == "repaired" else Corrections()
         said = [c if c.severity != "repaired" or repair else replace(c, severity="warning") for c in factors.checks]
         return _applied(replace(now, arm=_doubted(now.arm, factors)), applied, said)
-    odd = base.of_torques(stands).share.max() >= min(share for share, _ in _UNRELATED)
+    odd = base.of_torques(stands).share.max() >= min(_UNRELATED)
     elastic = _beside_elasticity(base, logs, now.arm) if suspects or odd else stands
     suspects = [s for s in suspects if s.fit.cost < elastic.cost + _CLOSE]
     found = confirm(stands, suspects, now.training, now.holdout, now.arm, horizon)
@@ -133,7 +134,7 @@ def _strangers(elastic: Fit, now: Examined, horizon: float) -> list[Check]:
     """
     share = elastic.share
     worst = int(np.argmax(share))
-    missed = [part for least, part in _UNRELATED if share[worst] >= least]
+    missed = [part for least, part in zip(_UNRELATED, _UNPREDICTED, strict=True) if share[worst] >= least]
     logs = [*now.training, *now.holdout]
     if not missed or torque_unit.limited(logs, now.arm, worst).share.max() < _LIMITED:
         return []

@@ -4,15 +4,9 @@ use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// A prediction error beyond this many true floors is no noise: RMS errors of as few as ten windows, each with one start, scatter by less
-/// than twice, and what parameters still err by by about as much.
-const ABOVE_TRUE_FLOOR: f64 = 4.0;
-
-/// On one joint of twenty the floor that is claimed is beyond this many true ones (docs/input-defects.md).
-const CLAIMED_FLOOR: f64 = 1.25;
-
-/// A prediction error beyond this many claimed floors cannot be called noise: it may be beyond [`ABOVE_TRUE_FLOOR`] true ones.
-pub const ABOVE_NOISE: f64 = ABOVE_TRUE_FLOOR / CLAIMED_FLOOR;
+/// A prediction error beyond this many claimed floors cannot be called noise. Four true ones are none: RMS errors of as few as ten windows, each with
+/// one start, scatter by less than twice. On one joint of twenty the floor that is claimed is 1.25 times the true one (docs/input-defects.md).
+pub const ABOVE_NOISE: f64 = 3.2;
 
 /// Share of a joint's error that re-estimated parameters must remove to be called an improvement: less is of no use to anyone.
 const IMPROVEMENT: f64 = 0.2;
