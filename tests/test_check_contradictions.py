@@ -12,8 +12,8 @@ from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, e
 from armgap.check.contradiction import READINGS, Refit, screen
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.diagnosis.diagnosis import _ambiguous_lag
+from armgap.diagnosis.prepared_input import prepare
 from armgap.errors import ColumnError, OptionError
-from armgap.prepared_input import prepare
 from armgap.simulation import Effect
 from swings import off, sines, swing
 

@@ -11,12 +11,12 @@ import polars as pl
 import pytest
 
 from armgap import Arm, Log, diagnose, identify
+from armgap.arm.controller import Controller
 from armgap.check import Corrections, data_checks
 from armgap.check.serial import contradictions
-from armgap.controller import Controller
+from armgap.diagnosis.prepared_input import split
 from armgap.errors import ArmFileError, ColumnError, UnitError
 from armgap.log.stretches import choose
-from armgap.prepared_input import split
 
 #: Two links in a vertical plane behind a PD controller.
 ARM = """\

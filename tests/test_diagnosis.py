@@ -94,7 +94,7 @@ def test_no_holdout_is_said_and_cut_from_the_logs(clean):
 
 
 def test_no_training_sample_is_judged_on(pendulum):
-    from armgap.prepared_input import split
+    from armgap.diagnosis.prepared_input import split
 
     whole = swing(pendulum, 1)
     (first,), (last,) = split([whole])

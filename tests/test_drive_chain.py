@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from armgap import Arm, Diagnosis, Log, diagnose
 from armgap.check import Corrections
 from armgap.diagnosis import diagnosis_schema
-from armgap.drive import Drive
-from armgap.drive_chain import LEAST_SHARE, ChainEntry, drive_chain
+from armgap.diagnosis.drive import Drive
+from armgap.diagnosis.drive_chain import LEAST_SHARE, ChainEntry, drive_chain
 from armgap.errors import ColumnError
 from armgap.report.output import diagnosis_report
 

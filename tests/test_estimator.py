@@ -31,7 +31,7 @@ def test_one_by_one_is_all_at_once(arm: Arm, seed_log: Log):
     run = all_at_once.run(seed_log.q, seed_log.tau, h=0.0025)
     np.testing.assert_array_equal(one.theta, run.theta[-1])
     np.testing.assert_array_equal(one.sigma, all_at_once.sigma)
-    assert outcomes == [armgap.estimator.OUTCOMES[k] for k in run.outcome]
+    assert outcomes == [armgap.estimation.estimator.OUTCOMES[k] for k in run.outcome]
     assert outcomes[:3] == ["starting", "starting", "updated"]
     assert (one.updates, one.rejected) == (len(seed_log.t) - 2, 0)
 

@@ -10,8 +10,8 @@ import pytest
 
 import armgap
 from armgap import Arm, plan
+from armgap.arm.free_space import JOINED, FreeSpace
 from armgap.errors import ArmFileError, OptionError
-from armgap.free_space import JOINED, FreeSpace
 from armgap.planning import search
 from conftest import TABLE_ONE
 from test_plan import CONTROLLER, DURATION, LIMITS, slow_log

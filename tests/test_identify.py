@@ -12,7 +12,7 @@ from scipy.signal import lfilter, savgol_filter
 
 from armgap import Arm, Log, identify, seed_torque, simulate
 from armgap.errors import ColumnError, OptionError
-from armgap.identification import SCHEMES, velocity
+from armgap.estimation.identification import SCHEMES, velocity
 from armgap.simulation import Effect
 
 CUTOFF_RAD_S = 50.0

@@ -13,9 +13,9 @@ import pytest
 from numpy.typing import NDArray
 
 from armgap import Arm, read_model
+from armgap.arm.rigid_body import about_com, about_origin, inconsistency, moved, symmetric
+from armgap.arm.serial_trust import TRUSTS
 from armgap.errors import ModelFileError, OptionError
-from armgap.rigid_body import about_com, about_origin, inconsistency, moved, symmetric
-from armgap.serial_trust import TRUSTS
 from three_joints import ARM, LINKS, URDF
 
 Array = NDArray[np.float64]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib
 import re
+import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import armgap
-from armgap._renamed import RENAMED
+from armgap._renamed import MOVED, RENAMED
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTATION = (ROOT / "docs" / "notation.md").read_text()
@@ -87,6 +88,37 @@ def test_a_former_name_warns_and_is_the_new_one(old: str) -> None:
     assert name not in getattr(importlib.import_module(module), "__all__", ())
 
 
+@pytest.mark.parametrize("old", MOVED)
+def test_a_former_module_warns_and_is_the_new_one(old: str) -> None:
+    sys.modules.pop(old, None)
+    with pytest.warns(DeprecationWarning, match=re.escape(f"{old} is now {MOVED[old]}")) as caught:
+        __import__(old)
+    assert sys.modules[old] is importlib.import_module(MOVED[old])
+    assert caught[0].filename == __file__
+
+
+def test_a_module_of_a_package_that_moved_is_the_new_one() -> None:
+    from armgap.arm.description import read
+
+    with pytest.warns(
+        DeprecationWarning, match=re.escape("armgap.description.read is now armgap.arm.description.read")
+    ):
+        assert importlib.import_module("armgap.description.read") is read
+    with (
+        pytest.warns(DeprecationWarning, match=re.escape("armgap.description.nothing")),
+        pytest.raises(ModuleNotFoundError, match=re.escape("arm.description.nothing")),
+    ):
+        importlib.import_module("armgap.description.nothing")
+
+
+def test_a_former_module_is_an_attribute_of_the_package() -> None:
+    armgap.__dict__.pop("controller", None)
+    with pytest.warns(DeprecationWarning, match=re.escape("armgap.controller is now armgap.arm.controller")) as caught:
+        module = armgap.controller
+    assert module is importlib.import_module("armgap.arm.controller")
+    assert caught[0].filename == __file__
+
+
 def test_new_names_and_other_names_do_not_warn() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -100,6 +132,10 @@ def test_new_names_and_other_names_do_not_warn() -> None:
 
 def test_the_page_lists_every_renamed_public_name() -> None:
     assert rows("Renamed in 0.2.0") == [[f"`{old}`", f"`{new}`"] for old, new in RENAMED.items()]
+
+
+def test_the_page_lists_every_module_that_moved() -> None:
+    assert rows("Moved in 0.2.0") == [[f"`{old}`", f"`{new}`"] for old, new in MOVED.items()]
 
 
 def bound(tree: ast.AST) -> Iterator[str]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armgap.identification import SCHEMES
+from armgap.estimation.identification import SCHEMES
 from armgap.reproduction import LADDER, PAPER_ESTIMATES, PAPER_MEASURED, Reproduction, reproduce, seed_arm
 from armgap.reproduction.page import render
 

@@ -18,8 +18,8 @@ from scipy.signal import lfilter
 
 import armgap
 from armgap import Arm, Estimator, Log, identify, read_model
-from armgap.base_columns import base_parameters
 from armgap.errors import OptionError
+from armgap.estimation.base_columns import base_parameters
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -164,7 +164,7 @@ def recorded(request: pytest.FixtureRequest) -> Recorded:
     )
 
 
-@pytest.mark.parametrize("scheme", armgap.identification.SCHEMES)
+@pytest.mark.parametrize("scheme", armgap.estimation.identification.SCHEMES)
 def test_estimates_converge_to_the_true_base_parameters(recorded: Recorded, scheme: Any) -> None:
     arm, log = recorded.arm, recorded.log
     estimator = Estimator(arm, scheme=scheme)

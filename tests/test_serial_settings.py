@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from armgap.check import Check
-from armgap.serial_settings import serial_settings
+from armgap.diagnosis.serial_settings import serial_settings
 
 
 def noticed(name: str) -> Check:

@@ -17,7 +17,7 @@ import pytest
 mujoco = pytest.importorskip("mujoco")
 
 from armgap import _native, controller  # noqa: E402
-from armgap.rigid_body import inconsistency  # noqa: E402
+from armgap.arm.rigid_body import inconsistency  # noqa: E402
 from serial_trial import arms, motion  # noqa: E402
 from serial_trial.arms import FAMILIES, STEP, SerialRobot, draw_robot, perturbed  # noqa: E402
 from serial_trial.case import LEAST, NULLS, OFF, TRUST, effect_of, hidden_effect, make_case, sigma_of  # noqa: E402

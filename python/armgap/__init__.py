@@ -6,22 +6,23 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from armgap._native import __version__
+from armgap._renamed import find_moved_modules, old_names
 
 if TYPE_CHECKING:
     from armgap.arm import Arm
-    from armgap.base_columns import BaseParameters, base_parameters
+    from armgap.arm.model import read_model
     from armgap.check import CheckName, Severity
-    from armgap.custom_effect import CustomEffect
     from armgap.diagnosis import Diagnosis, diagnose
+    from armgap.diagnosis.custom_effect import CustomEffect
     from armgap.errors import ArmgapError
-    from armgap.estimator import Estimator
+    from armgap.estimation.base_columns import BaseParameters, base_parameters
+    from armgap.estimation.estimator import Estimator
+    from armgap.estimation.fitting import ArmFit, fit
+    from armgap.estimation.identification import Identification, identify
     from armgap.export import Corrected, correct
-    from armgap.fitting import ArmFit, fit
-    from armgap.identification import Identification, identify
     from armgap.inspection import Inspection, inspect
     from armgap.literals import Filters, Scheme, Status, Verdict
     from armgap.log import Finding, Log
-    from armgap.model import read_model
     from armgap.planning import Plan, plan
     from armgap.reproduction import Reproduction, reproduce
     from armgap.simulation import effects, seed_torque, simulate
@@ -65,8 +66,8 @@ __all__ = [
 _HOMES = {
     "Arm": "armgap.arm",
     "ArmgapError": "armgap.errors",
-    "BaseParameters": "armgap.base_columns",
-    "base_parameters": "armgap.base_columns",
+    "BaseParameters": "armgap.estimation.base_columns",
+    "base_parameters": "armgap.estimation.base_columns",
     "CheckName": "armgap.check",
     "Severity": "armgap.check",
     "Filters": "armgap.literals",
@@ -77,18 +78,18 @@ _HOMES = {
     "correct": "armgap.export",
     "Diagnosis": "armgap.diagnosis",
     "diagnose": "armgap.diagnosis",
-    "Estimator": "armgap.estimator",
+    "Estimator": "armgap.estimation.estimator",
     "Finding": "armgap.log",
-    "ArmFit": "armgap.fitting",
-    "fit": "armgap.fitting",
+    "ArmFit": "armgap.estimation.fitting",
+    "fit": "armgap.estimation.fitting",
     "Log": "armgap.log",
-    "CustomEffect": "armgap.custom_effect",
-    "Identification": "armgap.identification",
-    "identify": "armgap.identification",
+    "CustomEffect": "armgap.diagnosis.custom_effect",
+    "Identification": "armgap.estimation.identification",
+    "identify": "armgap.estimation.identification",
     "Reproduction": "armgap.reproduction",
     "Inspection": "armgap.inspection",
     "inspect": "armgap.inspection",
-    "read_model": "armgap.model",
+    "read_model": "armgap.arm.model",
     "Plan": "armgap.planning",
     "plan": "armgap.planning",
     "reproduce": "armgap.reproduction",
@@ -97,11 +98,13 @@ _HOMES = {
     "simulate": "armgap.simulation",
 }
 
+find_moved_modules()
+
 
 def __getattr__(name: str) -> Any:
     """Load a public name when it is first used, so that importing the package stays fast."""
     if name not in _HOMES:
-        return import_module("armgap._renamed").old_names(__name__, stacklevel=3)(name)
+        return old_names(__name__, stacklevel=3)(name)
     value = getattr(import_module(_HOMES[name]), name)
     globals()[name] = value
     return value

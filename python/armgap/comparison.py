@@ -8,11 +8,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from armgap.diagnosis import MOST_BYTES, Cause, Diagnosis, RuledOut, Value
+from armgap.diagnosis.result import MOST_BYTES, Cause, Diagnosis, RuledOut, Value
 from armgap.errors import OptionError
-from armgap.literals import CauseStatus, GapOutcome, Verdict
+from armgap.literals import CauseStatus, GapOutcome, Verdict, joint_units
 from armgap.reading import read_bounded
-from armgap.report.words import joint_units
 
 __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare", "read_diagnosis"]
 

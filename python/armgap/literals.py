@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 __all__ = [
     "CAUSE_STATUSES",
@@ -24,6 +24,7 @@ __all__ = [
     "TauKind",
     "VelocityMethod",
     "Verdict",
+    "joint_units",
 ]
 
 Scheme = Literal["filtered-dynamic", "supplied-energy", "filtered-power"]
@@ -55,3 +56,10 @@ GAP_OUTCOMES: tuple[GapOutcome, ...] = get_args(GapOutcome)
 """What can become of the gap between two diagnoses."""
 CHAIN_STAGES: tuple[ChainStage, ...] = get_args(ChainStage)
 """Stages from command to measured position."""
+
+
+def joint_units(data: dict[str, Any]) -> list[str]:
+    """Unit of each joint's position in a result; a serial arm may have joints that turn and joints that slide."""
+    n_joints = len(data["gap"]["before"])
+    units = list((data.get("arm") or {}).get("joint_unit") or [])
+    return units if len(units) == n_joints else [str(data["gap"].get("unit", "rad"))] * n_joints

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armgap import _native, options
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.errors import OptionError
-from armgap.log import Log
+from armgap.log.log import Log
 from armgap.progress import report_progress
 
 __all__ = ["Effect", "effects", "seed_torque", "simulate"]

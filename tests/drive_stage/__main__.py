@@ -95,7 +95,7 @@ def delivered(case: Kept, log: str, rng: np.random.Generator) -> np.ndarray:
 def _asked(stage: str, folder: Path) -> tuple[str, str, str]:
     """The stage, the case, and the answer: stages with their shares, largest first."""
     from armgap import Arm, Log
-    from armgap.drive_chain import drive_chain
+    from armgap.diagnosis.drive_chain import drive_chain
 
     case = read(folder)
     rng = np.random.default_rng(int(folder.name.split("-")[3]))

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import armgap
-import armgap.controller
+import armgap.arm.controller
+from armgap.arm.serial_chain import SerialChain
 from armgap.literals import SERIAL
-from armgap.serial_chain import SerialChain
 
 from .arms import SerialRobot, draw_robot, perturbed
 from .effects import EFFECTS, Effect, Null
@@ -104,7 +104,7 @@ def arm_of(robot: SerialRobot, period: float, trust: str, by: Controller | None 
         robot.counts,
         robot.effort,
         chain=chain,
-        controller=None if by is None else armgap.controller.Controller(by.kp, by.kd),
+        controller=None if by is None else armgap.arm.controller.Controller(by.kp, by.kd),
     )
 
 

@@ -1,7 +1,7 @@
 """Plausibility of the input: what contradicts the arm file, or was done to a log before it got here, said before any effect."""
 
+from armgap.arm.corrections import CORRECTIONS, Corrections
 from armgap.check.check import NAMES, Check, CheckName, Severity
-from armgap.check.corrections import CORRECTIONS, Corrections
 from armgap.check.data import copied_holdout, data_checks
 from armgap.check.stage import Examined, examine
 

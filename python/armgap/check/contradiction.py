@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.check import (
     gravity_missing,
     gravity_sign,
@@ -27,7 +27,7 @@ from armgap.check import (
 )
 from armgap.check.equation_error import EquationError, Fit, Rows, bounds
 from armgap.check.reading import Reading
-from armgap.log import Log
+from armgap.log.log import Log
 
 Array = NDArray[np.float64]
 

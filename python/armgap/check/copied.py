@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from armgap.check.check import Check
 from armgap.check.outcome import ranges
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["copied_holdout"]
 

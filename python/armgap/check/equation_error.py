@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.arm import Arm
-from armgap.log import Log
+from armgap.arm.arm import Arm
+from armgap.log.log import Log
 
 __all__ = ["CUTOFF", "EquationError", "Fit", "Rows", "bounds"]
 

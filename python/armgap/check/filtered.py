@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.check.check import Check
 from armgap.check.numbers import ORDERS, blocks, from_neighbours, grid_step, noise_by_order, rounding, travel_per_row
 from armgap.check.outcome import NOTHING, Outcome
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["look"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from armgap.arm import Arm
-from armgap.check.corrections import Corrections
+from armgap.arm.arm import Arm
+from armgap.arm.corrections import Corrections
 from armgap.check.reading import Reading, reading
 
 __all__ = ["readings"]

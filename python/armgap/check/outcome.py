@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.check.check import Check
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["NOTHING", "Outcome", "ranges", "seconds", "with_rows"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from armgap.arm.corrections import Corrections
 from armgap.check.check import CheckName
-from armgap.check.corrections import Corrections
 
 __all__ = ["Reading", "reading"]
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.check.check import Check
 from armgap.check.numbers import blocks, grid_step, travel_per_row
 from armgap.check.outcome import NOTHING, Outcome, ranges, with_rows
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["look"]
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
+from armgap.arm.corrections import Corrections
 from armgap.check import (
     gravity_missing,
     gravity_sign,
@@ -25,9 +26,8 @@ from armgap.check import (
     torque_sign,
 )
 from armgap.check.check import Check
-from armgap.check.corrections import Corrections
 from armgap.check.reading import Reading
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["contradictions"]
 

@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.check.check import Check
 from armgap.check.outcome import NOTHING, Outcome, ranges, seconds, with_rows
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["look"]
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
+from armgap.arm.corrections import Corrections
 from armgap.check import dead_stretch, time_shift, torque_is_position, torque_unit
 from armgap.check.check import Check
 from armgap.check.contradiction import BETTER, EXPLAINS, Found, Refit, Suspect, confirm, screen
-from armgap.check.corrections import Corrections
 from armgap.check.equation_error import EquationError, Fit, Rows, bounds
-from armgap.log import Log
+from armgap.log.log import Log
 from armgap.progress import report_progress
 
 __all__ = ["Examined", "examine"]

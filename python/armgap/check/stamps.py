@@ -14,11 +14,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.check.check import Check
 from armgap.check.numbers import blocks, from_neighbours
 from armgap.check.outcome import NOTHING, Outcome
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["look"]
 

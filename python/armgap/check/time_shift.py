@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
+from armgap.arm.corrections import Corrections
 from armgap.check.check import Check
 from armgap.check.contradiction import Refit
-from armgap.check.corrections import Corrections
 from armgap.check.equation_error import EquationError, Rows, bounds
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["acausal", "causal", "confirmed", "early", "taken_back"]
 

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.check.check import Check
 from armgap.check.equation_error import EquationError, Rows, bounds
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["find"]
 

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
+from armgap.arm.corrections import Corrections
 from armgap.check.check import Check, Severity
-from armgap.check.corrections import Corrections
 from armgap.check.equation_error import EquationError, Fit, Rows, bounds
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["Factors", "find", "limited", "refined", "said"]
 

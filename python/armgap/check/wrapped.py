@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.check.check import Check
 from armgap.check.outcome import NOTHING, Outcome, ranges, seconds
-from armgap.log import Log
+from armgap.log.log import Log
 from armgap.log.turns import turn_jumps, unwrapped
 
 __all__ = ["look"]

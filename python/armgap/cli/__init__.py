@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 import click
 
-from armgap import __version__
+from armgap._native import __version__
 from armgap.cli.streams import EndedError, abandon_stdout, ended_by_signals, open_streams
 from armgap.errors import ArmgapError
 

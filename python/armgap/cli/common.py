@@ -19,7 +19,7 @@ from armgap.cli.files import Command, InputFile, OutputFile, Words
 from armgap.errors import OptionError
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
+    from armgap.arm.arm import Arm
 
 __all__ = [
     "ManyValues",
@@ -102,8 +102,8 @@ def corrections_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def read_arm(path: str, given: Mapping[str, Any]) -> Arm:
     """Read an arm file, with the values of `corrections_options` on top of its own corrections."""
-    from armgap.arm import Arm
-    from armgap.check.corrections import Corrections
+    from armgap.arm.arm import Arm
+    from armgap.arm.corrections import Corrections
 
     arm = Arm.read(Path(path))
     wanted = Corrections.parse(**{name: given[name] for name in (*_CORRECTIONS, "gravity")})

@@ -23,8 +23,8 @@ __all__ = ["command"]
 def command(before: str, after: str, report_file: str | None, json_file: str | None, quiet: bool) -> None:
     """Say what changed between two diagnoses of one arm, as before and after a repair."""
     from armgap.comparison import compare, read_diagnosis
-    from armgap.report import check_report, render_report
     from armgap.report.compared import comparison_document, comparison_summary
+    from armgap.report.output import check_report, render_report
 
     check_report(report_file)
     result = compare(read_diagnosis(before), read_diagnosis(after), _names(before, after))

@@ -27,7 +27,7 @@ from armgap.errors import OptionError
 from armgap.output import is_stdout, write
 
 if TYPE_CHECKING:
-    from armgap.diagnosis import Diagnosis
+    from armgap.diagnosis.result import Diagnosis
     from armgap.trial.key import Key
 
 __all__ = ["command"]
@@ -71,7 +71,7 @@ def command(
     quiet: bool,
 ) -> None:
     """Diagnose a sample log whose hidden cause is sealed, then open the key; or diagnose LOGs of your own."""
-    from armgap.report import check_report
+    from armgap.report.output import check_report
 
     check_report(report_file)
     outputs = (report_file, json_file, quiet)
@@ -118,10 +118,11 @@ def _diagnose(
     naming: dict[str, Any],
     outputs: tuple[str, str | None, bool],
 ) -> Diagnosis:
-    from armgap.arm import Arm
-    from armgap.diagnosis import diagnose
+    from armgap.arm.arm import Arm
+    from armgap.diagnosis.diagnosis import diagnose
     from armgap.log import gather
-    from armgap.report import diagnosis_report, summary_table
+    from armgap.report.output import diagnosis_report
+    from armgap.report.terminal import summary_table
 
     report_file, json_file, quiet = outputs
     arm = Arm.read(arm_file)
@@ -155,7 +156,7 @@ def _case(folder: Path | None, fresh: int | None, *, quiet: bool) -> Iterator[Pa
         return
     if folder is not None:
         raise OptionError("--case and --fresh were both given", remedy="give one of the two")
-    from armgap.trial import make_demo_case
+    from armgap.trial.demo import make_demo_case
 
     with tempfile.TemporaryDirectory(prefix="armgap-demo-") as scratch:
         with working(f"making the case of seed {fresh}", quiet=quiet):

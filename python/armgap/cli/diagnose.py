@@ -66,9 +66,9 @@ def command(
     **corrections: Any,
 ) -> None:
     """Say where the gap between LOGs and the nominal arm lies, what causes it, and how far it shrinks."""
-    from armgap.diagnosis import diagnose
+    from armgap.diagnosis.diagnosis import diagnose
     from armgap.log import gather
-    from armgap.report import check_report, diagnosis_report, prepare_report
+    from armgap.report.output import check_report, diagnosis_report, prepare_report
 
     check_report(report_file)
     arm = read_arm(arm_file, corrections)
@@ -85,7 +85,7 @@ def command(
     if json_file is not None:
         write(json_file, result.to_json(indent=2))
     if not (quiet or is_stdout(json_file, report_file)):
-        from armgap.report import summary_table
+        from armgap.report.terminal import summary_table
 
         say = console()
         say.print(summary_table(result))

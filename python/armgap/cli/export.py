@@ -72,8 +72,11 @@ def command(
     quiet: bool,
 ) -> None:
     """Write what a diagnosis found as a model for a simulator: MJCF, URDF, an arm file, or JSON."""
-    from armgap.arm import Arm
-    from armgap.export import correct, into_description, randomization, read_diagnosis
+    from armgap.arm.arm import Arm
+    from armgap.export import randomization
+    from armgap.export.correction import correct
+    from armgap.export.original import into_description
+    from armgap.export.read import read_diagnosis
 
     chosen = form or _FORMATS.get(Path(output).suffix.lower())
     if chosen is None:

@@ -188,7 +188,7 @@ def _values(value: Any) -> Iterator[str]:
 
 
 def _read_by(parameter: click.Parameter, value: str) -> list[_Named]:
-    from armgap.log import paths
+    from armgap.log.gather import paths
 
     kind = parameter.type
     if isinstance(kind, InputFolder):

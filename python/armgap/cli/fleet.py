@@ -53,7 +53,8 @@ def command(manifest: str, folder: Path, engine: str, quiet: bool, **options: An
     The MANIFEST is CSV, Parquet or TOML with the columns robot, arm, logs, holdout, time; several logs are separated by ;.
     A run that was interrupted goes on where it stopped.
     """
-    from armgap.fleet import read_manifest, run_fleet
+    from armgap.fleet.folder import run_fleet
+    from armgap.fleet.manifest import read_manifest
     from armgap.fleet.page import moved, plain_time
     from armgap.fleet.series import moving
 

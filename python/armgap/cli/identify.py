@@ -27,10 +27,10 @@ from armgap.output import is_stdout, write
 from armgap.progress import part_callback, use_callback
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
-    from armgap.identification import Identification
+    from armgap.arm.arm import Arm
+    from armgap.estimation.identification import Identification
     from armgap.literals import Scheme
-    from armgap.log import Log
+    from armgap.log.log import Log
 
 __all__ = ["command"]
 
@@ -121,7 +121,7 @@ def _identified(
     logs: Sequence[Log], arm: Arm, schemes: Sequence[Scheme], settings: dict[str, Any]
 ) -> list[Identification]:
     """Every scheme on every log."""
-    from armgap.identification import identify
+    from armgap.estimation.identification import identify
 
     work = [(log, scheme) for log in logs for scheme in schemes]
     results = []

@@ -24,8 +24,9 @@ from armgap.cli.progress import working
 from armgap.output import is_stdout, write
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
-    from armgap.inspection import Columns, Inspection
+    from armgap.arm.arm import Arm
+    from armgap.inspection.inspection import Inspection
+    from armgap.inspection.unmapped import Columns
 
 __all__ = ["command"]
 
@@ -63,8 +64,8 @@ def command(
     """
     import json
 
-    from armgap.inspection import Columns
-    from armgap.log import paths
+    from armgap.inspection.unmapped import Columns
+    from armgap.log.gather import paths
 
     naming = {"columns": parse_columns(columns), "units": parse_units(units)}
     arm = read_arm(arm_file, corrections) if arm_file is not None else None
@@ -102,8 +103,9 @@ def _inspected(
 ) -> Inspection | Columns:
     """What a log holds; or, where nobody has said which column is which, what columns there are."""
     from armgap.errors import ColumnError
-    from armgap.inspection import columns_of, inspect
-    from armgap.log import Log
+    from armgap.inspection.inspection import inspect
+    from armgap.inspection.unmapped import columns_of
+    from armgap.log.log import Log
 
     try:
         return inspect(Log.read(path, arm=arm, **naming), arm, repair=repair)

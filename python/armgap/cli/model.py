@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from armgap.arm.serial_trust import TRUSTS
 from armgap.cli.common import console, freeze_option, frozen_positions, quiet_option
 from armgap.cli.files import Command, InputFile, OutputFile, Words
 from armgap.output import is_stdout, write
-from armgap.serial_trust import TRUSTS
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from armgap.serial_chain import SerialChain
+    from armgap.arm.serial_chain import SerialChain
 
 __all__ = ["command"]
 
@@ -50,7 +50,7 @@ def command(
     quiet: bool,
 ) -> None:
     """Make an arm file of a URDF or MJCF model: the chain of moving joints from base to tip, with all that hangs on it."""
-    from armgap.model import read_model
+    from armgap.arm.model import read_model
 
     arm = read_model(
         description,

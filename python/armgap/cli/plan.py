@@ -54,11 +54,10 @@ def command(
     quiet: bool,
 ) -> None:
     """Plan the motion that settles best what a diagnosis left open, within the arm file's limits."""
-    from armgap.arm import Arm
-    from armgap.planning import plan
+    from armgap.arm.arm import Arm
     from armgap.planning.page import plan_document, plan_summary
-    from armgap.planning.planning import check_output
-    from armgap.report import check_report, prepare_report, render_report
+    from armgap.planning.planning import check_output, plan
+    from armgap.report.output import check_report, prepare_report, render_report
 
     if len(diagnosis_files) > 1:
         problem = f"{len(diagnosis_files)} diagnoses were given"

@@ -58,9 +58,9 @@ def command(
     quiet: bool,
 ) -> None:
     """Write measured and predicted arm side by side as a recording for the Rerun viewer."""
-    from armgap.arm import Arm
+    from armgap.arm.arm import Arm
     from armgap.comparison import read_diagnosis
-    from armgap.log import Log
+    from armgap.log.log import Log
     from armgap.report.replay import models, predicted, write_replay
 
     if Path(output).suffix != SUFFIX:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from armgap.log import Log
+    from armgap.log.log import Log
 
 __all__ = ["command"]
 
@@ -89,8 +89,8 @@ def command(
     """Simulate the arm of an arm file, with effects on request, and write the log."""
     import numpy as np
 
-    from armgap.arm import Arm
-    from armgap.log import Log
+    from armgap.arm.arm import Arm
+    from armgap.log.log import Log
     from armgap.simulation import Effect, seed_torque, simulate
 
     if output != STANDARD_STREAM and Path(output).suffix.lower() not in (".parquet", ".pq", ".csv"):
@@ -128,7 +128,7 @@ def command(
 
 def _start(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the state a log starts from; its velocity is the slope of its first samples where no sensor gives it."""
-    from armgap.identification import velocity
+    from armgap.estimation.identification import velocity
 
     if log.dq is not None:
         return log.q[0], log.dq[0]

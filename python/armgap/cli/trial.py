@@ -19,11 +19,13 @@ from armgap.cli.common import console, interruptible, json_option, quiet_option
 from armgap.cli.files import Group, InputFolder, OutputFolder
 from armgap.cli.numbers import Seed
 from armgap.cli.progress import working
+from armgap.cli.trial_commands import make, run, score
+from armgap.cli.trial_commands.all import all_of_it
+from armgap.cli.trial_commands.run import baselines, former_name
 from armgap.errors import OptionError
 from armgap.options import positive
 from armgap.output import is_stdout, write
 from armgap.progress import report_progress, use_callback
-from armgap.trial.commands import all_of_it, baselines, former_name, make, run, score
 from armgap.trial.layout import MOST_CASES, belongs, case_folders_in
 
 if TYPE_CHECKING:
@@ -127,7 +129,7 @@ def _cases(made: Path | None, folder: Path | None, make: Callable[[Path], list[P
 
 
 def _make(target: Path, cases: int, seed: int | None, duration: float, quiet: bool) -> list[Path]:
-    from armgap.trial import fresh_seed, make_trial
+    from armgap.trial.trial import fresh_seed, make_trial
 
     chosen = fresh_seed() if seed is None else seed
     with working(f"making {cases} cases of seed {chosen}", quiet=quiet):
@@ -140,8 +142,8 @@ def _ignore(_: str, __: float) -> None:
 
 def _score(case: Path, horizon: float) -> tuple[str, Judgement, float]:
     """Diagnose one case without its key, then open the key; return its name, the judgement, and what was closed."""
-    from armgap.diagnosis import diagnose
-    from armgap.trial import open_key
+    from armgap.diagnosis.diagnosis import diagnose
+    from armgap.trial.key import open_key
     from armgap.trial.verdict import judge
 
     training, held = (sorted(case.glob(f"{part}-*.parquet")) for part in ("train", "holdout"))

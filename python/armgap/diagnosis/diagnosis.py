@@ -13,19 +13,21 @@ from typing import Annotated, Any, Literal, TypedDict
 import numpy as np
 
 from armgap import _native, options
-from armgap.arm import Arm
-from armgap.check import Check, Corrections, torque_unit
+from armgap.arm.arm import Arm
+from armgap.arm.corrections import Corrections
+from armgap.check import torque_unit
+from armgap.check.check import Check
 from armgap.check.time_shift import causal, early, taken_back
-from armgap.custom_effect import CustomEffect, TorqueTables, check_effects
+from armgap.diagnosis.custom_effect import CustomEffect, TorqueTables, check_effects
+from armgap.diagnosis.drive_chain import drive_chain
+from armgap.diagnosis.prepared_input import PreparedInput, prepare, refused
 from armgap.diagnosis.result import Diagnosis
-from armgap.drive_chain import drive_chain
+from armgap.diagnosis.serial_settings import serial_settings
 from armgap.errors import OptionError
 from armgap.evidence import consistency, laws, plausibility
-from armgap.log import Log
+from armgap.log.log import Log
 from armgap.log.units import si
-from armgap.prepared_input import PreparedInput, prepare, refused
 from armgap.progress import ProgressCallback, report_progress, use_callback
-from armgap.serial_settings import serial_settings
 
 __all__ = ["InputSummary", "LogRemark", "diagnose"]
 

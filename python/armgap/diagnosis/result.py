@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
-from armgap.check import Check
+from armgap.check.check import Check
 from armgap.literals import ChainStage, Status, Verdict
 from armgap.log.findings import remarks
 from armgap.report.notebook import NotebookDisplay
@@ -230,9 +230,9 @@ class ChainPart:
     joint : int
         Joint, from 1.
     share : float
-        Share of the squared gap with parameters re-estimated, from 0 to 1; see `armgap.drive_chain`.
+        Share of the squared gap with parameters re-estimated, from 0 to 1; see `armgap.diagnosis.drive_chain`.
     parameters : dict
-        Of a drive: ``delay``, ``gain``, ``offset``, ``viscous`` and ``inertia``, see `armgap.drive`.
+        Of a drive: ``delay``, ``gain``, ``offset``, ``viscous`` and ``inertia``, see `armgap.diagnosis.drive`.
     detail : str
         The same in words, with the figures.
     """

@@ -8,11 +8,11 @@ from typing import Annotated, Any
 from armgap import _native
 from armgap.check.check import CheckEntry
 from armgap.diagnosis.diagnosis import InputSummary, LogRemark
-from armgap.drive_chain import ChainEntry
+from armgap.diagnosis.drive_chain import ChainEntry
+from armgap.diagnosis.provenance import Provenance
 from armgap.evidence.laws import Law
 from armgap.evidence.plausibility import Plausibility
 from armgap.json_schema import schema_of
-from armgap.provenance import Provenance
 
 __all__ = ["diagnosis_schema"]
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
+from armgap.arm.rigid_body import inconsistency
 from armgap.evidence.plausibility import Plausibility
-from armgap.rigid_body import inconsistency
 
 __all__ = ["consistency"]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap._renamed import old_names
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 
 __all__ = ["EffectInstance", "Hypothesis"]
 

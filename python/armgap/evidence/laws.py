@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.evidence.hypothesis import Array, EffectInstance, Hypothesis, delivered, true_positions
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["laws"]
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any, TypedDict
 
 import numpy as np
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.evidence.hypothesis import Array, Hypothesis
 
 __all__ = ["plausibility"]

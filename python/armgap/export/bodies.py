@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.rigid_body import inconsistency, pseudo_inertia
+from armgap.arm.rigid_body import inconsistency, pseudo_inertia
 
 __all__ = ["BODY_TOLERANCE", "Bodies", "nearest_bodies"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.arm import Arm
-from armgap.diagnosis import Cause
+from armgap.arm.arm import Arm
+from armgap.diagnosis.result import Cause
 from armgap.export.errors import ExportError
 from armgap.export.fields import FIELDS, FORMATS, field_of
 from armgap.export.joint import Joint

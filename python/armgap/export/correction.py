@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from armgap.arm import Arm
-from armgap.diagnosis import Diagnosis
+from armgap.arm.arm import Arm
+from armgap.diagnosis.result import Diagnosis
 from armgap.export.corrected import Corrected, placed
 from armgap.export.errors import ExportError
 from armgap.export.planar import correct_planar

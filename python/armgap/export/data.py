@@ -6,10 +6,10 @@ import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from armgap import __version__
+from armgap._native import __version__
 
 if TYPE_CHECKING:
-    from armgap.diagnosis import Cause
+    from armgap.diagnosis.result import Cause
     from armgap.export.corrected import Corrected
 
 __all__ = ["SCHEMA", "render", "to_dict"]

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
-from armgap import __version__
+from armgap._native import __version__
 
 if TYPE_CHECKING:
     from armgap.export.corrected import Corrected

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from armgap.diagnosis import Cause
+    from armgap.diagnosis.result import Cause
 
 __all__ = ["ON_JOINT", "Joint", "with_causes"]
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from armgap.export.errors import ExportError
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
+    from armgap.arm.arm import Arm
 
 __all__ = ["Links", "links_of", "physical"]
 

@@ -7,9 +7,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from armgap.arm.rigid_body import about_com
 from armgap.export import header
 from armgap.export.model import SimulatorModel, number, numbers
-from armgap.rigid_body import about_com
 
 if TYPE_CHECKING:
     from armgap.export.corrected import Corrected

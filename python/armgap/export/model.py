@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armgap.arm.serial_chain import SerialChain
 from armgap.export.joint import Joint
-from armgap.serial_chain import SerialChain
 
 __all__ = ["SimulatorModel", "number", "numbers"]
 
@@ -31,7 +31,7 @@ class SimulatorModel:
     chain : SerialChain
         Joints with their placements, limits of position, and gravity in the frame of the base.
     inertial : ndarray, shape (n_joints, 10)
-        Inertia of each link, see `armgap.rigid_body`; each is that of a body.
+        Inertia of each link, see `armgap.arm.rigid_body`; each is that of a body.
     joints : tuple of Joint
         What sits at the joints.
     sample_period : float

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
-from armgap.diagnosis import Diagnosis
+from armgap.arm.arm import Arm
+from armgap.diagnosis.result import Diagnosis
 
 __all__ = ["States", "any_states", "diagnosed_states", "positions"]
 

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.description.read import read_tree
-from armgap.description.resolve import Carried, locate
-from armgap.description.tree import Tree
+from armgap.arm.description.read import read_tree
+from armgap.arm.description.resolve import Carried, locate
+from armgap.arm.description.tree import Tree
+from armgap.arm.rigid_body import moved
 from armgap.export.corrected import Corrected
 from armgap.export.errors import ExportError
 from armgap.export.serial import CorrectedSerial
-from armgap.rigid_body import moved
 
 __all__ = ["CorrectedDescription", "into_description"]
 

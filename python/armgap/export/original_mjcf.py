@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.description.resolve import Located
-from armgap.description.tree import Tree
+from armgap.arm.description.resolve import Located
+from armgap.arm.description.tree import Tree
+from armgap.arm.rigid_body import about_com, moved
 from armgap.errors import ModelFileError
 from armgap.export import header
 from armgap.export.errors import ExportError
 from armgap.export.joint import Joint
 from armgap.export.mjcf import FAR, SHARP
 from armgap.export.serial import CorrectedSerial
-from armgap.rigid_body import about_com, moved
 
 __all__ = ["write_mjcf"]
 

@@ -10,14 +10,14 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.description.edit import XmlText
-from armgap.description.resolve import Located
-from armgap.description.xml import Element, parse, read_text
+from armgap.arm.description.edit import XmlText
+from armgap.arm.description.resolve import Located
+from armgap.arm.description.xml import Element, parse, read_text
+from armgap.arm.rigid_body import about_axis, rpy_matrix, rpy_of
 from armgap.export import header
 from armgap.export.model import number, numbers
 from armgap.export.serial import CorrectedSerial
 from armgap.export.urdf import assumed, inertia_entries
-from armgap.rigid_body import about_axis, rpy_matrix, rpy_of
 
 __all__ = ["write_urdf"]
 

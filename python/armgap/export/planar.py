@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.arm import Arm
-from armgap.diagnosis import Cause, Value
+from armgap.arm.arm import Arm
+from armgap.arm.rigid_body import about_axis, about_origin
+from armgap.arm.serial_chain import JointKind, SerialChain
+from armgap.diagnosis.result import Cause, Value
 from armgap.export.corrected import LEAST_SIGMA, Corrected, value
 from armgap.export.errors import ExportError
 from armgap.export.fields import field_of
 from armgap.export.joint import Joint, with_causes
 from armgap.export.links import Links, links_of, physical
 from armgap.export.model import SimulatorModel
-from armgap.rigid_body import about_axis, about_origin
-from armgap.serial_chain import JointKind, SerialChain
 
 __all__ = ["CorrectedPlanar", "correct_planar"]
 

@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap import __version__
+from armgap._native import __version__
+from armgap.arm.rigid_body import about_com
 from armgap.export.bodies import nearest_bodies
 from armgap.export.corrected import Corrected
 from armgap.export.serial import CorrectedSerial
-from armgap.rigid_body import about_com
 
 __all__ = ["SCHEMA", "covariance", "randomization"]
 

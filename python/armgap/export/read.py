@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from armgap.diagnosis import MOST_BYTES, Diagnosis
+from armgap.diagnosis.result import MOST_BYTES, Diagnosis
 from armgap.export.errors import DiagnosisFileError
 from armgap.reading import read_bounded
 

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
-from armgap.diagnosis import Cause, Diagnosis, Value
+from armgap.arm.arm import Arm
+from armgap.arm.rigid_body import INERTIAL_NAMES, about_axis, about_com, about_origin
+from armgap.arm.serial_chain import SerialChain
+from armgap.diagnosis.result import Cause, Diagnosis, Value
 from armgap.export.bodies import Bodies, nearest_bodies
 from armgap.export.corrected import LEAST_SIGMA, Corrected, value
 from armgap.export.errors import ExportError
 from armgap.export.joint import Joint, with_causes
 from armgap.export.model import SimulatorModel
 from armgap.export.motion import any_states, diagnosed_states, positions
-from armgap.rigid_body import INERTIAL_NAMES, about_axis, about_com, about_origin
-from armgap.serial_chain import SerialChain
 
 __all__ = ["CorrectedSerial", "correct_serial"]
 

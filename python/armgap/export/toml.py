@@ -9,7 +9,7 @@ from armgap.export import header
 from armgap.export.corrected import LEAST_SIGMA
 
 if TYPE_CHECKING:
-    from armgap.diagnosis import Value
+    from armgap.diagnosis.result import Value
     from armgap.export.corrected import Corrected
 
 __all__ = ["render"]

@@ -9,9 +9,9 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
+from armgap.arm.rigid_body import about_axis, about_com, rotation_between, rpy_of
 from armgap.export import header
 from armgap.export.model import SimulatorModel, number, numbers
-from armgap.rigid_body import about_axis, about_com, rotation_between, rpy_of
 
 if TYPE_CHECKING:
     from armgap.export.corrected import Corrected

@@ -12,7 +12,7 @@ from typing import Any
 
 import polars as pl
 
-from armgap import __version__
+from armgap._native import __version__
 from armgap.errors import ArmgapError
 from armgap.fleet.manifest import Entry, is_url
 
@@ -56,12 +56,12 @@ def answer(entry: Entry, settings: Mapping[str, Any]) -> Outcome:
     settings : mapping
         Keyword arguments of `armgap.diagnose`.
     """
-    import armgap
+    from armgap.diagnosis.diagnosis import diagnose
 
     start = time.perf_counter()
     try:
         logs, holdout = ([_source(place) for place in places] for places in (entry.logs, entry.holdout))
-        found = armgap.diagnose(logs, Path(entry.arm), holdout=holdout or None, **settings)
+        found = diagnose(logs, Path(entry.arm), holdout=holdout or None, **settings)
         outcome: Outcome = {"diagnosis": found.to_json()}
     except ArmgapError as error:
         outcome = {"error": str(error)}

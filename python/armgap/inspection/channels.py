@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap._renamed import old_names
-from armgap.arm import Arm
-from armgap.log import Log
+from armgap.arm.arm import Arm
+from armgap.log.log import Log
 
 __all__ = ["FlatTop", "JointChannels", "joint", "step_of"]
 

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap._renamed import old_names
-from armgap.arm import Arm
-from armgap.estimator import Estimator
-from armgap.log import Log
+from armgap.arm.arm import Arm
+from armgap.estimation.estimator import Estimator
+from armgap.log.log import Log
 from armgap.log.stretches import choose
 
 __all__ = ["Excitation", "ParameterExcitation", "excitation"]

@@ -7,13 +7,17 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from armgap.arm import Arm
-from armgap.check import Check, data_checks, examine
+from armgap.arm.arm import Arm
+from armgap.check.check import Check
+from armgap.check.data import data_checks
+from armgap.check.stage import examine
 from armgap.errors import LogShapeError, OptionError
 from armgap.inspection.channels import JointChannels, joint
 from armgap.inspection.excitation import Excitation, excitation
 from armgap.inspection.sampling import Sampling, sampling
-from armgap.log import Finding, Log, gather
+from armgap.log import gather
+from armgap.log.findings import Finding
+from armgap.log.log import Log
 from armgap.progress import report_progress
 
 __all__ = ["Inspection", "inspect"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armgap.log import Log
+from armgap.log.log import Log
 
 __all__ = ["Sampling", "sampling"]
 

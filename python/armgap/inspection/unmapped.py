@@ -16,12 +16,12 @@ import polars as pl
 from numpy.typing import NDArray
 
 from armgap.errors import ArmgapError, UnitError
-from armgap.log import Log
-from armgap.log.formats import record
+from armgap.log.formats.all import record
+from armgap.log.log import Log
 from armgap.log.recording import Recording
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
+    from armgap.arm.arm import Arm
 
 __all__ = ["Column", "Columns", "columns_of"]
 

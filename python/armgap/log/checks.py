@@ -14,7 +14,7 @@ from armgap.log.findings import Finding, counted
 from armgap.log.recording import Recording
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
+    from armgap.arm.arm import Arm
 
 __all__ = ["motion", "notice", "order", "unused", "without_repeats"]
 

@@ -20,7 +20,7 @@ from armgap.log.findings import Finding, counted
 from armgap.log.units import FACTORS, Scales
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
+    from armgap.arm.arm import Arm
 
 __all__ = ["in_seconds", "ticks"]
 

@@ -19,7 +19,7 @@ from armgap.log.recording import Recording
 from armgap.progress import report_progress
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
+    from armgap.arm.arm import Arm
 
 __all__ = ["OPTIONAL", "Arrays", "Names", "Raw", "extract", "left_out", "no_controller", "resolve"]
 

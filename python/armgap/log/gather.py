@@ -13,7 +13,7 @@ from armgap.log.frames import is_table
 from armgap.log.log import Log
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
+    from armgap.arm.arm import Arm
 
 __all__ = ["gather", "paths"]
 

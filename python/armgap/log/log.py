@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from armgap.errors import ColumnError, OptionError
 from armgap.log import checks, clocks, columns, frames, units
 from armgap.log.findings import Finding
-from armgap.log.formats import record
+from armgap.log.formats.all import record
 from armgap.log.recording import Recording
 from armgap.output import write
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
+    from armgap.arm.arm import Arm
 
 __all__ = ["COLUMNS", "SIGNALS", "Log"]
 

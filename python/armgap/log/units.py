@@ -17,7 +17,7 @@ from armgap.log.findings import Finding
 from armgap.log.turns import TURN, unwrapped
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
+    from armgap.arm.arm import Arm
 
 __all__ = ["FACTORS", "Scales", "check", "in_file", "recognised", "scaled", "si", "stated"]
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.evidence.hypothesis import EffectInstance, Hypothesis, true_positions
 from armgap.planning.columns import Columns
 from armgap.planning.dynamics import LATENT, inverse_dynamics

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.arm import Arm, MotionLimits
+from armgap.arm.arm import Arm, MotionLimits
 from armgap.errors import ArmFileError
 
 __all__ = ["PlanLimits", "limits_of"]

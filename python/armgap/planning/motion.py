@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import MotionLimits
+from armgap.arm.arm import MotionLimits
 
 __all__ = ["PER_JOINT", "Motion", "build", "count", "named"]
 

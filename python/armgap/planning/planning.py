@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import options
-from armgap.arm import Arm, only_planar
-from armgap.diagnosis import Diagnosis
+from armgap.arm.arm import Arm, only_planar
+from armgap.diagnosis.result import Diagnosis
 from armgap.errors import OptionError, ResultError
 from armgap.output import STANDARD_STREAM, write
 from armgap.planning.criterion import PredictedMotion, Setting
@@ -280,7 +280,7 @@ def check_optimiser() -> None:
 
 def _usable(diagnosis: Diagnosis | str | os.PathLike[str], arm: Arm) -> dict[str, Any]:
     """Return the JSON object of a diagnosis that belongs to the arm and leaves something to ask."""
-    from armgap.export import read_diagnosis
+    from armgap.export.read import read_diagnosis
 
     if isinstance(diagnosis, list | tuple):
         raise OptionError(f"{len(diagnosis)} diagnoses were given", remedy="give one; diagnose its logs together first")

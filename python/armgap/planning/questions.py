@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from armgap import _native
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.errors import OptionError
 from armgap.evidence.hypothesis import Hypothesis
 from armgap.planning.sizes import PLANNED

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import MotionLimits
+from armgap.arm.arm import MotionLimits
 from armgap.errors import OptionError
 from armgap.planning.criterion import PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics, torque_with

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 
 __all__ = ["PLANNED", "Scales", "Shape", "levels", "shapes"]
 

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from armgap.comparison import SHARE, SIGMAS, CauseChange, Comparison
-from armgap.diagnosis import Value
+from armgap.diagnosis.result import Value
 from armgap.literals import SERIAL
 from armgap.report import charts
 from armgap.report.conventions import brief, section

@@ -10,7 +10,7 @@ from armgap.report import conventions, words
 from armgap.report.page import Section
 
 if TYPE_CHECKING:
-    from armgap.diagnosis import Diagnosis
+    from armgap.diagnosis.result import Diagnosis
 
 __all__ = ["Document", "diagnosis_document"]
 
@@ -43,7 +43,8 @@ class Document:
 
 def diagnosis_document(diagnosis: Diagnosis | dict[str, Any]) -> Document:
     """Return the report of a diagnosis, or of its JSON object."""
-    from armgap.report.sections import SECTIONS, input_checks
+    from armgap.report.sections.all import SECTIONS
+    from armgap.report.sections.checks import input_checks
 
     data = diagnosis if isinstance(diagnosis, dict) else diagnosis.to_dict()
     arm = data.get("arm") or {}

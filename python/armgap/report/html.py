@@ -9,7 +9,7 @@ from armgap.output import write
 from armgap.report.document import Document, diagnosis_document
 
 if TYPE_CHECKING:
-    from armgap.diagnosis import Diagnosis
+    from armgap.diagnosis.result import Diagnosis
 
 __all__ = ["page_of", "render_html", "write_html"]
 

@@ -13,7 +13,7 @@ from armgap.errors import OptionError
 from armgap.report.document import Document, diagnosis_document
 
 if TYPE_CHECKING:
-    from armgap.diagnosis import Diagnosis
+    from armgap.diagnosis.result import Diagnosis
 
 __all__ = ["FORMS", "check_report", "diagnosis_report", "prepare_report", "render_report"]
 

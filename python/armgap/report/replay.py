@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armgap import _native
-from armgap.arm import Arm, only_planar
+from armgap.arm.arm import Arm, only_planar
 from armgap.errors import ArmgapError, OptionError
 from armgap.evidence.hypothesis import Array, Hypothesis
-from armgap.log import Log
+from armgap.log.log import Log
 from armgap.output import write
 from armgap.report import charts
 
 if TYPE_CHECKING:
-    from armgap.diagnosis import Diagnosis
+    from armgap.diagnosis.result import Diagnosis
 
 __all__ = ["RerunMissingError", "models", "poses", "predicted", "write_replay"]
 

@@ -14,8 +14,8 @@ from armgap.report.sketch import panel
 from armgap.report.words import figure, parameter_text, unit_text, value
 
 if TYPE_CHECKING:
-    from armgap.arm import Arm
-    from armgap.log import Log
+    from armgap.arm.arm import Arm
+    from armgap.log.log import Log
 
 __all__ = ["Facts", "arm_facts", "log_facts"]
 

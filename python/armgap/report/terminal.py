@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from armgap.literals import joint_units
 from armgap.report import words
 from armgap.report.advice import next_steps
 
@@ -11,7 +12,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
-    from armgap.diagnosis import Diagnosis
+    from armgap.diagnosis.result import Diagnosis
 
 __all__ = ["answer_lines", "gap_table", "summary_table"]
 
@@ -66,9 +67,7 @@ def gap_table(data: Data) -> Table:
     table = Table(
         box=box.SIMPLE_HEAD,
         pad_edge=False,
-        title=Text(
-            f"RMS error over {gap['horizon_s']:g} s on held-out motion [{words.milli_unit(words.joint_units(data))}]"
-        ),
+        title=Text(f"RMS error over {gap['horizon_s']:g} s on held-out motion [{words.milli_unit(joint_units(data))}]"),
         title_justify="left",
     )
     table.add_column("joint")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from armgap import _native
 from armgap._renamed import old_names
-from armgap.literals import SERIAL
+from armgap.literals import SERIAL, joint_units
 
 __all__ = [
     "SummaryAnswer",
@@ -21,7 +21,6 @@ __all__ = [
     "error_text",
     "figure",
     "joint_text",
-    "joint_units",
     "milli_unit",
     "millis",
     "named",
@@ -199,13 +198,6 @@ def error_text(number: float) -> str:
     ('40', '0.0070', '102')
     """
     return figure(number) if abs(number) >= 100 or number == 0 else f"{number:#.2g}".rstrip(".")
-
-
-def joint_units(data: Data) -> list[str]:
-    """Unit of each joint's position; a serial arm may have joints that turn and joints that slide."""
-    n_joints = len(data["gap"]["before"])
-    units = list((data.get("arm") or {}).get("joint_unit") or [])
-    return units if len(units) == n_joints else [str(data["gap"].get("unit", "rad"))] * n_joints
 
 
 def milli_unit(units: Sequence[str]) -> str:

@@ -3,7 +3,6 @@
 F. Reyes and R. Kelly, *Experimental evaluation of identification schemes on a direct drive robot*, Robotica 15 (1997) 563-571.
 """
 
-from armgap.reproduction.command import command
 from armgap.reproduction.experiment import (
     LADDER,
     PAPER_ESTIMATES,
@@ -19,7 +18,6 @@ __all__ = [
     "PAPER_ESTIMATES",
     "PAPER_MEASURED",
     "Reproduction",
-    "command",
     "reproduce",
     "seed_arm",
     "seed_run",

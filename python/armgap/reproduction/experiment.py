@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap import _native
-from armgap.arm import Arm
-from armgap.identification import Identification, identify
+from armgap.arm.arm import Arm
+from armgap.estimation.identification import Identification, identify
 from armgap.literals import SCHEMES, Filters, Scheme, VelocityMethod
-from armgap.log import Log
+from armgap.log.log import Log
 from armgap.simulation import Effect, seed_torque, simulate
 
 __all__ = ["LADDER", "PAPER_ESTIMATES", "PAPER_MEASURED", "Reproduction", "reproduce", "seed_arm", "seed_run"]

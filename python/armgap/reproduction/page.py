@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from armgap.identification import Identification
+from armgap.estimation.identification import Identification
 from armgap.literals import SCHEMES, Scheme
-from armgap.report import Document, charts
+from armgap.report import charts
+from armgap.report.document import Document
 from armgap.report.html import page_of
 from armgap.report.page import Drawing, Section
 from armgap.report.words import SummaryAnswer, unit_text

@@ -14,7 +14,7 @@ from armgap.errors import ArmgapError
 from armgap.output import write
 from armgap.trial.armfile import arm_toml, draw_nominal
 from armgap.trial.arms import TrialArm, random_arm
-from armgap.trial.effects import REGISTRY, Draw, NoTravelError, usage
+from armgap.trial.effects.base import REGISTRY, Draw, NoTravelError, usage
 from armgap.trial.engine import mujoco
 from armgap.trial.excitation import STYLES, Excitation, Tracked, acceptable, draw_excitation, rings
 from armgap.trial.key import KEY_FILE, HiddenEffect, Key

@@ -14,7 +14,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import armgap
+from armgap import _native
 from armgap.errors import OptionError, ResultError
 from armgap.output import write, write_folder
 from armgap.trial.engine import mujoco
@@ -76,7 +76,7 @@ def make_cases(folder: Path, seed: int, cases: int, duration: float = 10.0, work
     OptionError
         The folder holds something else.
     """
-    wanted = Manifest(seed, cases, duration, armgap.__version__, f"mujoco {mujoco().__version__}")
+    wanted = Manifest(seed, cases, duration, _native.__version__, f"mujoco {mujoco().__version__}")
     _claim(folder, wanted)
     plans = [replace(p, duration=duration) for p in plan_trial(seed, cases)]
     targets = [folder / case_name(i) for i in range(cases)]

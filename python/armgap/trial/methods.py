@@ -9,13 +9,12 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import armgap
 from armgap import _native
 from armgap.diagnosis.result import GapAtHorizon
 from armgap.trial.answers import AbsentEffect, Answer, NamedCause, Size
 
 if TYPE_CHECKING:
-    from armgap.diagnosis import Cause, Diagnosis
+    from armgap.diagnosis.result import Cause, Diagnosis
     from armgap.trial.sealed import SealedCase
 
 __all__ = ["ARMGAP", "Method", "methods"]
@@ -27,7 +26,7 @@ HORIZON = 0.25  # s
 def _build() -> str:
     """Version of armgap, with a mark of the compiled core: answers of another build are given again."""
     core = hashlib.sha256(Path(_native.__file__).read_bytes()).hexdigest()
-    return f"{armgap.__version__}+{core[:8]}"
+    return f"{_native.__version__}+{core[:8]}"
 
 
 @dataclass(frozen=True)
@@ -61,14 +60,14 @@ class Method:
 
 def methods() -> dict[str, Method]:
     """All methods by name, armgap first."""
-    from armgap.trial.baselines import BASELINES
+    from armgap.trial.baselines.all import BASELINES
 
     return {m.name: m for m in (ARMGAP, *BASELINES)}
 
 
 def answer_with_armgap(case: SealedCase) -> Answer:
     """Diagnose a case with default settings."""
-    from armgap.diagnosis import diagnose
+    from armgap.diagnosis.diagnosis import diagnose
 
     result = diagnose(case.training, case.arm, holdout=case.holdout, horizon=HORIZON)
     return from_diagnosis(result, case.arm.parameter_names)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.errors import OptionError
-from armgap.log import Log
+from armgap.log.log import Log
 from armgap.trial.layout import ARM_FILE, case_folders_in
 
 __all__ = ["SealedCase", "case_folders"]

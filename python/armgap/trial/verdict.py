@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from armgap.trial.key import HiddenEffect, Key
 
 if TYPE_CHECKING:
-    from armgap.diagnosis import Diagnosis
+    from armgap.diagnosis.result import Diagnosis
 
 Name = tuple[str, int | None]
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from armgap.literals import joint_units
 from armgap.report import charts
-from armgap.report.words import joint_units, milli_unit
+from armgap.report.words import milli_unit
 
 __all__ = ["Data", "ModelLabel", "joint_unit", "load_text", "model_labels", "small_unit", "torque_unit"]
 

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from armgap.literals import joint_units
 from armgap.report import charts
 from armgap.report.page import Drawing, Section, Table
 from armgap.report.sections.model_labels import Data, joint_unit, model_labels
-from armgap.report.words import each_joint, figure, joint_units
+from armgap.report.words import each_joint, figure
 
 __all__ = ["free_run", "horizons", "predictions"]
 

@@ -1,12 +1,5 @@
-"""Baselines: other methods that name a cause, answering the same sealed cases; one file each, one line in :data:`BASELINES`."""
+"""Baselines: other methods that name a cause, answering the same sealed cases; one file each, one line in `BASELINES`."""
 
-from __future__ import annotations
+from armgap.trial.baselines.all import BASELINES
 
-from armgap.trial.baselines.constant import CONSTANT
-from armgap.trial.baselines.correlation import CORRELATION
-from armgap.trial.baselines.frols import FROLS
-from armgap.trial.baselines.stepwise import STEPWISE
-from armgap.trial.baselines.sysid import SYSID
-from armgap.trial.methods import Method
-
-BASELINES: tuple[Method, ...] = (SYSID, STEPWISE, CORRELATION, FROLS, CONSTANT)
+__all__ = ["BASELINES"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.trial.answers import Answer, NamedCause
 from armgap.trial.baselines.regression import Array, RegressionData, regression_data
 from armgap.trial.baselines.signatures import Signature, signatures

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.trial.baselines.regression import Array
 from armgap.trial.engine import mujoco
 

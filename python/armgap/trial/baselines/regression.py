@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armgap.arm import Arm
-from armgap.log import Log
+from armgap.arm.arm import Arm
+from armgap.log.log import Log
 from armgap.trial.sealed import SealedCase
 
 __all__ = ["Motion", "RegressionData", "motion", "regression_data", "regressor"]

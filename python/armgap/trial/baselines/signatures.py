@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.trial.baselines.regression import Array, Motion, RegressionData, regressor
 
 __all__ = ["Signature", "signatures"]

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.trial.answers import Answer, NamedCause, Size
 from armgap.trial.baselines.mujoco_model import build_spec, set_coulomb, set_inertial
 from armgap.trial.baselines.regression import Array

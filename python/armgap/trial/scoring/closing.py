@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armgap.arm import Arm
+from armgap.arm.arm import Arm
 from armgap.simulation import effects
 from armgap.trial.answers import Answer
 from armgap.trial.key import Key

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armgap.trial.effects import REGISTRY
+from armgap.trial.effects.base import REGISTRY
 from armgap.trial.making import Manifest
 from armgap.trial.methods import methods
 from armgap.trial.scoring.case_score import GROUPS

@@ -1,0 +1,343 @@
+"""Arm files: the nominal model of an arm and how far its values are trusted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap import _native
+from armgap.errors import OptionError
+from armgap.literals import SERIAL, Side, TauKind
+
+if TYPE_CHECKING:
+    from armgap.arm.controller import Controller
+    from armgap.arm.corrections import Corrections
+    from armgap.arm.free_space import FreeSpace
+    from armgap.arm.serial_chain import SerialChain
+
+__all__ = ["Arm", "MotionLimits", "kinds", "listed", "only_planar", "quoted"]
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """What an arm's joints may do; the torque's limit is the arm's `torque_limit`.
+
+    Attributes
+    ----------
+    position_min, position_max : ndarray, shape (n_joints,)
+        Range of positions [rad or m].
+    speed, acceleration : ndarray, shape (n_joints,)
+        Largest speed [rad/s or m/s] and acceleration [rad/s^2 or m/s^2].
+    space : FreeSpace, optional
+        What the links must not touch.
+    """
+
+    position_min: NDArray[np.float64]
+    position_max: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+    space: FreeSpace | None = None
+
+    def toml_lines(self) -> list[str]:
+        """Return the table of an arm file, without the links' lengths."""
+        names = ("position_min", "position_max", "speed", "acceleration")
+        lines = [f"{name} = {listed(getattr(self, name))}" for name in names]
+        if self.space is not None:
+            boxes = ", ".join(listed(box) for box in self.space.boxes)
+            lines += [f"link_radius = {listed(self.space.link_radius)}", f"boxes = [{boxes}]"]
+        return ["[limits]", *lines]
+
+
+@dataclass(frozen=True)
+class Arm:
+    """The nominal model of an arm.
+
+    Attributes
+    ----------
+    name : str
+        Name for people.
+    kind : str
+        ``"axis"``, ``"pendulum"``, ``"two-link"`` or ``"serial"``.
+    gravity : float
+        Acceleration of gravity [m/s^2].
+    sample_period : float
+        Nominal sample period [s].
+    theta, sigma : ndarray, shape (n_parameters,)
+        Inertial base parameters, then viscous, then Coulomb coefficients per joint [SI], and the 1-sigma trust in each. Of a serial arm the
+        inertial ones are ten per link, see `armgap.arm.rigid_body`, then the rotors' inertias at the joints.
+    counts_per_rev : ndarray, shape (n_joints,), optional
+        Encoder counts per revolution (per metre on a linear joint).
+    torque_limit : ndarray, shape (n_joints,), optional
+        Torque limit [N m].
+    link_length : ndarray, shape (n_joints,), optional
+        Link lengths [m].
+    link_mass : ndarray, shape (n_joints,), optional
+        Link masses [kg]; motion does not tell them, an export to a simulator wants them.
+    encoder_side, friction_side : tuple of {"motor", "link", "unknown"}, optional
+        Per joint, the side of the transmission that the encoder measures and that friction acts on. Where it is unknown, an elastic or
+        slack transmission is tried with both.
+    gear_ratio : ndarray, shape (n_joints,), optional
+        Turns of the motor per turn of the joint.
+    columns : dict of str to str
+        Names that the arm's logs use for ``t``, ``q1``, ``tau1`` and so on.
+    sealed : str, optional
+        SHA-256 of a sealed key that belongs to the arm's logs.
+    path : Path, optional
+        File it was read from.
+    corrections : Corrections, optional
+        How columns of the arm's logs are to be read otherwise than they stand.
+    limits : MotionLimits, optional
+        What a planned motion keeps to.
+    chain : SerialChain, optional
+        Joints and their placements, of a serial arm; gravity as a vector is part of it.
+    controller : Controller, optional
+        Position controller: it tracks a planned motion, and logs may hold its references in place of torques.
+    tau_kind : {"command", "measured"}
+        Whether torques are commands, held until the next row, or measured, interpolated.
+    notes : tuple of str
+        What was noticed while the description was read.
+
+    Raises
+    ------
+    OptionError
+        If a serial arm has no chain, another kind has one, or `theta` does not suit it.
+    """
+
+    name: str
+    kind: str
+    gravity: float
+    sample_period: float
+    theta: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    counts_per_rev: NDArray[np.float64] | None = None
+    torque_limit: NDArray[np.float64] | None = None
+    link_length: NDArray[np.float64] | None = None
+    columns: dict[str, str] = field(default_factory=dict)
+    sealed: str | None = None
+    path: Path | None = None
+    link_mass: NDArray[np.float64] | None = None
+    encoder_side: tuple[Side, ...] | None = None
+    friction_side: tuple[Side, ...] | None = None
+    gear_ratio: NDArray[np.float64] | None = None
+    corrections: Corrections | None = None
+    limits: MotionLimits | None = None
+    chain: SerialChain | None = None
+    controller: Controller | None = None
+    tau_kind: TauKind = "command"
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check that kind, chain and parameters belong together."""
+        if (self.kind == SERIAL) != (self.chain is not None):
+            raise OptionError(
+                f"an arm of kind `{self.kind}` and its chain do not fit", remedy='give kind "serial" a chain'
+            )
+        if self.chain is not None and not len(self.theta) == len(self.sigma) == 13 * self.chain.n_joints:
+            raise OptionError(
+                f"theta has {len(self.theta)} entries, sigma {len(self.sigma)}",
+                remedy=f"give {13 * self.chain.n_joints}: ten per link, then rotor, viscous and Coulomb per joint",
+            )
+
+    @classmethod
+    def read(cls, path: str | Path) -> Arm:
+        """Read and check an arm file.
+
+        Parameters
+        ----------
+        path : path-like
+            TOML file.
+
+        Raises
+        ------
+        ArmFileError
+            If the file is missing, not TOML, or describes no possible arm; it names the key.
+        """
+        from armgap.arm.arm_file import ArmFile
+
+        arm = cls(**ArmFile.load(Path(path)).fields())
+        return arm if arm.corrections is None else arm.corrections.on_arm(arm)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints."""
+        return int(self._kind["n_joints"]) if self.chain is None else self.chain.n_joints
+
+    @property
+    def n_inertial(self) -> int:
+        """Number of inertial base parameters; of a serial arm ten per link and one per rotor."""
+        return int(self._kind["n_inertial"]) if self.chain is None else 11 * self.chain.n_joints
+
+    @property
+    def rotary(self) -> bool:
+        """Whether all positions are angles."""
+        return all(self.rotary_joints)
+
+    @property
+    def rotary_joints(self) -> tuple[bool, ...]:
+        """Whether the position of each joint is an angle."""
+        if self.chain is not None:
+            return self.chain.rotary
+        return (bool(self._kind["rotary"]),) * self.n_joints
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the entries of `theta`."""
+        return tuple(self._kind["parameter_names"]) if self.chain is None else self.chain.parameter_names
+
+    @property
+    def parameter_units(self) -> tuple[str, ...]:
+        """Units of the entries of `theta`."""
+        return tuple(self._kind["parameter_units"]) if self.chain is None else self.chain.parameter_units
+
+    @property
+    def gravity_parameters(self) -> NDArray[np.intp]:
+        """Indices of the entries of `theta` that are weights: torques or forces of gravity [N m or N]; none of a serial arm."""
+        if self.chain is not None:
+            return np.empty(0, dtype=np.intp)
+        weight = "N m" if self.rotary else "N"
+        return np.array([i for i in range(self.n_inertial) if self.parameter_units[i] == weight], dtype=np.intp)
+
+    @property
+    def expects_weight(self) -> bool:
+        """Whether the weights in `theta` are those of an arm that hangs down at zero: none negative, one positive."""
+        weights = self.theta[self.gravity_parameters]
+        return bool(np.all(weights >= 0) and np.any(weights > 0))
+
+    @property
+    def _kind(self) -> dict[str, Any]:
+        return kinds()[self.kind]
+
+    @property
+    def encoder_step(self) -> NDArray[np.float64] | None:
+        """Position step of one encoder count [rad or m], shape (n_joints,)."""
+        if self.counts_per_rev is None:
+            return None
+        return np.where(self.rotary_joints, 2 * np.pi, 1.0) / self.counts_per_rev
+
+    def _repr_html_(self) -> str:
+        """Return kind, conventions and parameters as HTML for a notebook."""
+        from armgap.report.shown import arm_facts
+
+        return arm_facts(self).html()
+
+    def _repr_markdown_(self) -> str:
+        """Return kind, conventions and parameters as Markdown."""
+        from armgap.report.shown import arm_facts
+
+        return arm_facts(self).markdown()
+
+    def to_native(self) -> dict[str, Any]:
+        """Return the arm as the compiled core takes it."""
+
+        def as_list(x: NDArray[np.float64] | None) -> list[float] | None:
+            return None if x is None else [float(v) for v in x]
+
+        chain: dict[str, Any] = {} if self.chain is None else {"chain": self.chain.to_native()}
+        if self.chain is not None and self.controller is not None:
+            chain["controller"] = self.controller.to_native()
+        return {
+            "kind": self.kind,
+            "gravity": self.gravity,
+            "theta": as_list(self.theta),
+            "sigma": as_list(self.sigma),
+            "counts_per_rev": as_list(self.counts_per_rev),
+            "torque_limit": as_list(self.torque_limit),
+            "link_length": as_list(self.link_length),
+            "encoder_at_motor": _at_motor(self.encoder_side),
+            "friction_at_motor": _at_motor(self.friction_side),
+            "gear_ratio": as_list(self.gear_ratio),
+            **chain,
+        }
+
+    def to_toml(self) -> str:
+        """Return the arm as an arm file; that of a serial arm holds its chain and needs no other file."""
+        if self.chain is not None:
+            from armgap.arm.serial_toml import serial_toml
+
+            return serial_toml(self)
+        n, b = self.n_joints, self.n_inertial
+        lines = [
+            f"name = {quoted(self.name)}",
+            f"kind = {quoted(self.kind)}",
+            f"gravity = {self.gravity!r}",
+            f"sample_period = {self.sample_period!r}",
+            "",
+            "[inertial]",
+            f"theta = {listed(self.theta[:b])}",
+            f"sigma = {listed(self.sigma[:b])}",
+            "",
+            "[friction]",
+            f"viscous = {listed(self.theta[b : b + n])}",
+            f"coulomb = {listed(self.theta[b + n :])}",
+            f"sigma_viscous = {listed(self.sigma[b : b + n])}",
+            f"sigma_coulomb = {listed(self.sigma[b + n :])}",
+        ]
+        return "\n".join([*lines, *self.table_lines()]) + "\n"
+
+    def table_lines(self) -> list[str]:
+        """Return the lines of an arm file that all kinds of arm have: encoders, transmissions, limits, columns and corrections."""
+        lines: list[str] = []
+        columns = {**self.columns, **({} if self.tau_kind == "command" else {"tau_kind": self.tau_kind})}
+        for table, key, value in (
+            ("encoder", "counts_per_rev", self.counts_per_rev),
+            ("encoder", "side", self.encoder_side),
+            ("transmission", "friction_side", self.friction_side),
+            ("transmission", "gear_ratio", self.gear_ratio),
+            ("actuator", "torque_limit", self.torque_limit),
+            ("geometry", "link_length", self.link_length),
+            ("geometry", "link_mass", self.link_mass),
+        ):
+            if value is not None:
+                opened = f"[{table}]" in lines
+                lines += [*(() if opened else ("", f"[{table}]")), f"{key} = {listed(value)}"]
+        if self.limits is not None:
+            lines += ["", *self.limits.toml_lines()]
+        if self.controller is not None:
+            kind = [f"kind = {quoted(self.controller.kind)}", f"kd_on = {quoted(self.controller.kd_on)}"]
+            gains = [f"{name} = {listed(values)}" for name, values in self.controller.vectors]
+            lines += ["", "[controller]", *kind, *gains]
+        if columns:
+            lines += ["", "[columns]", *(f"{k} = {quoted(v)}" for k, v in columns.items())]
+        if self.corrections:
+            lines += ["", "[corrections]", *self.corrections.toml_lines()]
+        if self.sealed is not None:
+            lines += ["", "[sealed]", f"sha256 = {quoted(self.sealed)}"]
+        return lines
+
+
+def quoted(text: str) -> str:
+    """Return a text as a basic string of TOML, which escapes what JSON does, and DEL."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def listed(values: Iterable[Any]) -> str:
+    """Return words or numbers as an array of TOML, numbers at full precision."""
+    return "[" + ", ".join(quoted(v) if isinstance(v, str) else repr(float(v)) for v in values) + "]"
+
+
+def _at_motor(sides: tuple[Side, ...] | None) -> list[bool | None] | None:
+    """Return per joint whether something sits at the motor, None where that is unknown."""
+    return None if sides is None else [None if side == "unknown" else side == "motor" for side in sides]
+
+
+def kinds() -> dict[str, dict[str, Any]]:
+    """Return the kinds of arm by name: joints, number of inertial parameters, parameter names and units."""
+    return {entry["kind"]: entry for entry in _native.arm_kinds()}
+
+
+def only_planar(arm: Arm, what: str) -> None:
+    """Raise for a serial arm, where only the closed kinds of arm are supported.
+
+    Raises
+    ------
+    OptionError
+        It names what was asked for.
+    """
+    if arm.chain is not None:
+        raise OptionError(f"{what} does not take serial arms", remedy=f"give an arm of the kind {', '.join(kinds())}")

@@ -1,0 +1,190 @@
+"""MJCF, as MuJoCo's own compiler resolves it: defaults, includes, meshes, inertias from shapes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm.description.tree import MOVING, Joint, Mimic, Tree
+from armgap.arm.rigid_body import about_origin, moved, unit_axis
+from armgap.errors import ModelFileError, OptionError
+
+__all__ = ["mjcf_tree"]
+
+Array = NDArray[np.float64]
+
+
+def mjcf_tree(path: Path) -> Tree:
+    """Return bodies and joints of an MJCF model.
+
+    A body with several joints becomes several links, of which the last has the body's name and inertia. The frame of a link is that of its
+    joint: at the joint's ``pos``, along the body's axes. Bodies and joints without names are called ``body1``, ``joint0`` by their numbers.
+
+    Raises
+    ------
+    OptionError
+        If MuJoCo is not installed.
+    ModelFileError
+        If MuJoCo refuses the file.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        remedy = "install it with pip install 'armgap[trial]', or give a URDF"
+        raise OptionError("MJCF is read by MuJoCo, which is not installed", remedy=remedy) from None
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except (ValueError, RuntimeError) as error:
+        said = " ".join(str(error).split())[:300]
+        raise ModelFileError(f"MuJoCo refuses it: {said}", remedy="correct the model", file=path) from None
+    return _Mjcf(mujoco, model, path).tree()
+
+
+class _Mjcf:
+    def __init__(self, mujoco: Any, model: Any, path: Path) -> None:
+        self.mujoco = mujoco
+        self.model = model
+        self.path = path
+
+    def tree(self) -> Tree:
+        m = self.model
+        links: dict[str, Array] = {self._body(0): np.zeros(10)}
+        joints: dict[str, Joint] = {}
+        offset = {0: np.zeros(3)}
+        for body in range(1, m.nbody):
+            parent = int(m.body_parentid[body])
+            name, before = self._body(body), self._body(parent)
+            first, count = int(m.body_jntadr[body]), int(m.body_jntnum[body])
+            rotation = _matrix(m.body_quat[body])
+            origin = m.body_pos[body] - offset[parent]  # in the frame of the parent's last joint
+            anchor = np.zeros(3)
+            for j in range(first, first + count):
+                last = j == first + count - 1
+                link = name if last else f"{name}/{self._joint_name(j)}"
+                anchor = m.jnt_pos[j].copy()
+                placed = (
+                    (rotation, origin + rotation @ anchor) if j == first else (np.eye(3), anchor - m.jnt_pos[j - 1])
+                )
+                joint = self._joint(j, before, link, *placed)
+                joints[joint.name] = joint
+                links[link] = np.zeros(10)
+                before = link
+            if count == 0:
+                fixed = f"{name}/fixed"
+                joints[fixed] = Joint(fixed, before, name, "fixed", rotation, origin)
+            offset[body] = anchor
+            links[name] = self._inertial(body, anchor)
+        self._actuated(joints)
+        self._coupled(joints)
+        name = str(m.names[: m.names.index(b"\0")], "utf-8", "replace") if isinstance(m.names, bytes) else ""
+        return Tree(self.path, "MJCF", name, links, joints, np.array(m.opt.gravity), tuple(self._notes()))
+
+    def _body(self, body: int) -> str:
+        return self.model.body(body).name or f"body{body}"
+
+    def _joint_name(self, j: int) -> str:
+        return self.model.joint(j).name or f"joint{j}"
+
+    def _inertial(self, body: int, anchor: Array) -> Array:
+        m = self.model
+        ten = about_origin(float(m.body_mass[body]), np.zeros(3), np.diag(m.body_inertia[body]))
+        return moved(ten, _matrix(m.body_iquat[body]), m.body_ipos[body] - anchor)
+
+    def _joint(self, j: int, parent: str, child: str, rotation: Array, translation: Array) -> Joint:
+        m, types = self.model, self.mujoco.mjtJoint
+        kinds = {types.mjJNT_HINGE: "revolute", types.mjJNT_SLIDE: "prismatic", types.mjJNT_BALL: "ball"}
+        kind = kinds.get(types(int(m.jnt_type[j])), "free")
+        joint = Joint(self._joint_name(j), parent, child, kind, rotation, translation)
+        if kind not in MOVING:
+            return joint
+        axis = unit_axis(m.jnt_axis[j])
+        dof, reference = int(m.jnt_dofadr[j]), float(m.qpos0[m.jnt_qposadr[j]])
+        if axis is not None and reference != 0:  # the model is drawn at `ref`, not at 0
+            if kind == "prismatic":
+                translation = translation - reference * (rotation @ axis)
+            else:
+                half = -0.5 * reference
+                rotation = rotation @ _matrix(np.array([math.cos(half), *(math.sin(half) * axis)]))
+        limited = bool(m.jnt_limited[j])
+        lower, upper = (float(x) for x in m.jnt_range[j]) if limited else (-math.inf, math.inf)
+        effort = float(m.jnt_actfrcrange[j][1]) if m.jnt_actfrclimited[j] else math.inf
+        return replace(
+            joint,
+            rotation=rotation,
+            translation=translation,
+            axis=axis,
+            lower=lower,
+            upper=upper,
+            effort=effort,
+            viscous=float(m.dof_damping[dof]),
+            coulomb=float(m.dof_frictionloss[dof]),
+            rotor_inertia=float(m.dof_armature[dof]) or math.nan,
+        )
+
+    def _actuated(self, joints: dict[str, Joint]) -> None:
+        """Give joints the limits and gains of their actuators."""
+        m, enum = self.model, self.mujoco
+        for a in range(m.nu):
+            if m.actuator_trntype[a] != enum.mjtTrn.mjTRN_JOINT:
+                continue
+            name = self._joint_name(int(m.actuator_trnid[a][0]))
+            joint, gear = joints[name], float(m.actuator_gear[a][0])
+            gain, bias = m.actuator_gainprm[a], m.actuator_biasprm[a]
+            fixed = m.actuator_gaintype[a] == enum.mjtGain.mjGAIN_FIXED
+            limits = [joint.effort]
+            if m.actuator_forcelimited[a]:
+                limits.append(abs(gear) * float(np.max(np.abs(m.actuator_forcerange[a]))))
+            if fixed and m.actuator_biastype[a] == enum.mjtBias.mjBIAS_NONE and m.actuator_ctrllimited[a]:
+                limits.append(abs(gear * gain[0]) * float(np.max(np.abs(m.actuator_ctrlrange[a]))))
+            joint = replace(joint, effort=min(limits))
+            affine = m.actuator_biastype[a] == enum.mjtBias.mjBIAS_AFFINE
+            if fixed and affine and gain[0] > 0 and math.isclose(-bias[1], gain[0]):
+                joint = replace(joint, kp=float(gain[0]) * gear**2, kd=max(-float(bias[2]), 0.0) * gear**2)
+            joints[name] = joint
+
+    def _coupled(self, joints: dict[str, Joint]) -> None:
+        """Make joints follow those that an equality constraint ties them to."""
+        m = self.model
+        for e in np.flatnonzero(m.eq_type == self.mujoco.mjtEq.mjEQ_JOINT):
+            if not m.eq_active0[e]:
+                continue
+            follower, leader = int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
+            offset, multiplier = (float(x) for x in m.eq_data[e][:2])
+            # The constraint is between displacements from the pose that the model is drawn in.
+            at = float(m.qpos0[m.jnt_qposadr[follower]])
+            if leader < 0:
+                mimic = Mimic("", 0.0, at + offset)
+            else:
+                leader_at = float(m.qpos0[m.jnt_qposadr[leader]])
+                mimic = Mimic(self._joint_name(leader), multiplier, at + offset - multiplier * leader_at)
+            name = self._joint_name(follower)
+            joints[name] = replace(joints[name], mimic=mimic)
+
+    def _notes(self) -> list[str]:
+        m, notes = self.model, []
+        sprung = [self._joint_name(j) for j in range(m.njnt) if m.jnt_stiffness[j] != 0]
+        if sprung:
+            notes.append(f"springs are left out: {', '.join(f'`{name}`' for name in sprung[:12])}")
+        closing = (self.mujoco.mjtEq.mjEQ_CONNECT, self.mujoco.mjtEq.mjEQ_WELD)
+        if any(kind in closing for kind in m.eq_type):
+            notes.append("connections that close a chain are left out")
+        if m.ntendon:
+            notes.append("tendons are left out")
+        return notes
+
+
+def _matrix(quaternion: Array) -> Array:
+    """Return the rotation of a quaternion ``w, x, y, z``, of any length but 0."""
+    w, x, y, z = quaternion / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+        ]
+    )

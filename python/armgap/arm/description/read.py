@@ -1,0 +1,66 @@
+"""From the file of a description to a chain."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from armgap.arm.description.resolve import resolve
+from armgap.arm.description.resolved import ResolvedModel
+from armgap.arm.description.tree import Tree
+from armgap.arm.description.urdf import urdf_tree
+from armgap.arm.description.xml import parse, read_text
+from armgap.errors import ModelFileError
+
+__all__ = ["read_description", "read_tree"]
+
+_ROOT = re.compile(rb"<\s*([A-Za-z_][\w:.-]*)")
+_ASIDE = re.compile(rb"<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>]*>", re.DOTALL)
+_FOUND = {"robot": "URDF", "mujoco": "MJCF"}
+
+
+def read_description(
+    path: Path, *, base: str | None, tip: str | None, frozen: Mapping[str, float], expected: str | None = None
+) -> ResolvedModel:
+    """Read a URDF or MJCF file, told apart by its first element, and resolve it to a chain.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+    base, tip, frozen
+        As in `armgap.arm.description.resolve.resolve`.
+    expected : {"URDF", "MJCF"}, optional
+        What it is said to be.
+
+    Raises
+    ------
+    ModelFileError
+        If it cannot be read or has no such chain.
+    OptionError
+        If it is MJCF and MuJoCo is not installed.
+    """
+    return resolve(read_tree(path, expected), base=base, tip=tip, frozen=frozen)
+
+
+def read_tree(path: Path, expected: str | None = None) -> Tree:
+    """Read a URDF or MJCF file as a tree of links and joints; parameters and errors as for `read_description`."""
+    data = read_text(path)
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        first = parse(data, path).tag
+    else:
+        match = _ROOT.search(_ASIDE.sub(b"", data))
+        first = "" if match is None else match[1].decode("ascii", "replace")
+    found = _FOUND.get(first)
+    if found is None:
+        what = f"begins with <{first}>" if first else "is no XML"
+        remedy = "convert it to URDF first" if first == "sdf" else "give a URDF (<robot>) or an MJCF model (<mujoco>)"
+        raise ModelFileError(f"{what} and is no description of a robot", remedy=remedy, file=path)
+    if expected not in (None, found):
+        raise ModelFileError(f"is {found}, not {expected}", remedy=f"write {found.lower()} = ... instead", file=path)
+    if found == "MJCF":
+        from armgap.arm.description.mjcf import mjcf_tree
+
+        return mjcf_tree(path)
+    return urdf_tree(parse(data, path), path)

@@ -1,0 +1,206 @@
+"""Logs and arm as a diagnosis takes them: read, corrected, repaired, split, cut into stretches, and checked against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from armgap.arm.arm import Arm
+from armgap.arm.corrections import Corrections
+from armgap.check import torque_unit
+from armgap.check.check import Check
+from armgap.check.data import copied_holdout, data_checks
+from armgap.check.serial import contradictions
+from armgap.check.stage import examine
+from armgap.diagnosis.provenance import provenance
+from armgap.errors import LogShapeError, OptionError
+from armgap.log import gather
+from armgap.log.columns import no_controller
+from armgap.log.log import Log
+from armgap.log.stretches import choose
+from armgap.reading import printable
+
+__all__ = ["PreparedInput", "prepare", "refused", "split"]
+
+# Share of every log that is held out where no holdout is given.
+_HELD_OUT = 0.4
+
+
+@dataclass(frozen=True)
+class PreparedInput:
+    """Logs and arm, and what is to be said about them."""
+
+    training: list[Log]
+    holdout: list[Log]
+    arm: Arm
+    notes: tuple[str, ...]
+    checks: tuple[Check, ...]
+    factors: Mapping[str, float] = field(default_factory=dict)
+    shift: float = 0.0
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def with_factors(self, factors: Mapping[str, float]) -> PreparedInput:
+        """Return the input with other factors on its torque columns than those that it was repaired with."""
+        by_column = {
+            f"tau{j + 1}": self.factors.get(f"tau{j + 1}", self.factors.get("tau", 1.0))
+            for j in range(self.arm.n_joints)
+        }
+        ratio = Corrections(factor={column: c / by_column[column] for column, c in factors.items()})
+        checks = [c for c in self.checks if c.check != "torque_unit"]
+        return replace(
+            self,
+            training=[replace(ratio.on_log(log), findings=log.findings) for log in self.training],
+            holdout=[replace(ratio.on_log(log), findings=log.findings) for log in self.holdout],
+            checks=(*torque_unit.said(factors), *checks),
+            factors=factors,
+        )
+
+    def without_shift(self) -> PreparedInput:
+        """Return the input with torques at the times at which they stand in the file."""
+        back = Corrections(shift={"tau": -self.shift})
+        return replace(
+            self,
+            training=[replace(back.on_log(log), findings=log.findings) for log in self.training],
+            holdout=[replace(back.on_log(log), findings=log.findings) for log in self.holdout],
+            checks=tuple(c for c in self.checks if c.check != "time_shift"),
+            shift=0.0,
+        )
+
+
+def prepare(
+    logs: Any, holdout: Any, arm: Arm, corrections: Corrections, settings: Mapping[str, Any], *, repair: bool
+) -> PreparedInput:
+    """Read logs and make them ready for a diagnosis.
+
+    Parameters
+    ----------
+    logs, holdout : Log, path, pattern, table, or sequence of these
+        Training logs, and logs to judge on; without a holdout (None) the last part of every training log is held out.
+    arm : Arm
+        Nominal model.
+    corrections : Corrections
+        How columns are to be read otherwise than they stand.
+    settings : mapping
+        What was asked for, `horizon` [s] among it.
+    repair : bool
+        Whether defects are repaired that leave nothing to guess.
+    """
+    read = {"training": _read(logs, arm), "holdout": [] if holdout is None else _read(holdout, arm)}
+    asked = {**settings, "repair": repair, "corrections": corrections.to_dict()}
+    given = _given(read["training"], read["holdout"], arm, corrections, repair=repair)
+    given = replace(given, provenance=provenance(arm, read, asked))
+    return _examined(given, settings["horizon"], repair=repair)
+
+
+def _given(
+    logs: Sequence[Log], holdout: Sequence[Log], arm: Arm, corrections: Corrections, *, repair: bool
+) -> PreparedInput:
+    """Correct and repair the logs, each by itself, and split them where nothing is held out."""
+    training, checks = _repaired(logs, arm, corrections, repair=repair)
+    arm = corrections.on_arm(arm)
+    if not holdout:
+        training, held = split(_tell_apart(training, [])[0])
+        note = f"no holdout was given: the last {100 * _HELD_OUT:.0f} % of every log were held out"
+        return PreparedInput(training, held, arm, (note,), tuple(checks))
+    held, more = _repaired(holdout, arm, corrections, repair=repair)
+    checks += [*more, *copied_holdout(training, held)]
+    return PreparedInput(*_tell_apart(training, held), arm, (), tuple(checks))
+
+
+def _examined(given: PreparedInput, horizon: float, *, repair: bool) -> PreparedInput:
+    """Choose stretches of long logs, and compare logs and arm file with and without each defect."""
+    training, held = (choose(group, horizon=horizon) for group in (given.training, given.holdout))
+    for log in (*training, *held):
+        if log.duration < horizon:
+            raise LogShapeError(
+                f"lasts {log.duration:.3g} s, less than the horizon of {horizon:g} s",
+                remedy="give a longer log or a shorter --horizon",
+                file=log.path or log.name,
+            )
+    if given.arm.chain is not None:
+        corrections, found_in_all = contradictions([*training, *held], given.arm, repair=repair)
+        return replace(
+            given,
+            training=[corrections.on_log(log) for log in training],
+            holdout=[corrections.on_log(log) for log in held],
+            arm=corrections.on_arm(given.arm),
+            checks=(*found_in_all, *given.checks),
+        )
+    try:
+        found = examine(training, held, given.arm, horizon=horizon, repair=repair)
+    except ValueError as error:
+        raise refused(str(error), training, held) from None
+    checks = (*found.checks, *given.checks)
+    return replace(
+        given,
+        training=found.training,
+        holdout=found.holdout,
+        arm=found.arm,
+        checks=checks,
+        factors=found.corrections.factor,
+        shift=found.corrections.shift.get("tau", 0.0),
+    )
+
+
+def _repaired(
+    logs: Sequence[Log], arm: Arm, corrections: Corrections, *, repair: bool
+) -> tuple[list[Log], list[Check]]:
+    examined = [data_checks(corrections.on_log(log), arm, repair=repair) for log in logs]
+    return [log for log, _ in examined], [check.of(check.log or log.name) for log, found in examined for check in found]
+
+
+def _read(logs: Any, arm: Arm) -> list[Log]:
+    read = gather(logs, arm)
+    if not read:
+        raise OptionError("no log was given", remedy="give at least one")
+    for log in read:
+        if log.n_joints != arm.n_joints:
+            raise LogShapeError(
+                f"has {log.n_joints} joints, the arm has {arm.n_joints}",
+                remedy="use the arm file that belongs to this log",
+                file=log.path or log.name,
+            )
+        if not log.has_torques:
+            if arm.chain is None:
+                log.with_torques(f"the diagnosis of an arm of kind `{arm.kind}`")
+            if arm.controller is None:
+                raise no_controller(arm, log.path or log.name)
+    return read
+
+
+def refused(message: str, training: list[Log], held: list[Log]) -> LogShapeError:
+    """Name the logs that the core could not work with."""
+    problem, _, remedy = message.partition("; ")
+    logs = held if "holdout" in problem else training
+    files = ", ".join(dict.fromkeys(str(log.path or log.name) for log in logs))
+    return LogShapeError(problem, remedy=remedy or "see the log and the options", file=files)
+
+
+def _tell_apart(training: list[Log], held: list[Log]) -> tuple[list[Log], list[Log]]:
+    """Give logs of the same name their folder's name, then a number."""
+    logs = [*training, *held]
+    for rename in (_with_folder, _with_number):
+        names = [log.name for log in logs]
+        logs = [rename(log, i) if names.count(log.name) > 1 else log for i, log in enumerate(logs, start=1)]
+    return logs[: len(training)], logs[len(training) :]
+
+
+def _with_folder(log: Log, _: int) -> Log:
+    return log if log.path is None else replace(log, name=f"{printable(log.path.resolve().parent.name)}/{log.name}")
+
+
+def _with_number(log: Log, number: int) -> Log:
+    return replace(log, name=f"{log.name} ({number})")
+
+
+def split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
+    """Return the first parts of logs, to learn from, and the last 40 % of each, to judge on."""
+    training, held = [], []
+    for log in logs:
+        cut = int(np.searchsorted(log.t, log.t[0] + (1 - _HELD_OUT) * log.duration))
+        training.append(log.part(0, cut, f"{log.name} (first part)"))
+        held.append(log.part(cut, len(log), f"{log.name} (last part)"))
+    return training, held

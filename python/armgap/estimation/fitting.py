@@ -1,0 +1,118 @@
+"""All parameters of an arm from one log by output error, with exact dry friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap import _native, options
+from armgap.arm.arm import Arm, only_planar
+from armgap.errors import LogShapeError
+from armgap.log.log import Log
+
+__all__ = ["ArmFit", "fit"]
+
+
+@dataclass(frozen=True)
+class ArmFit:
+    """The result of `fit`.
+
+    Attributes
+    ----------
+    log : str
+        What was fitted.
+    parameter_names, parameter_units : tuple of str
+        Names and SI units of the entries of `theta`.
+    theta : ndarray, shape (n_parameters,)
+        Parameters at the minimum.
+    sigma : ndarray, shape (n_parameters,)
+        Standard deviations, as if the differences were white and the windows' first states exact.
+    rms : float
+        RMS difference between measured and predicted positions, all joints together [rad or m].
+    iterations : int
+        Steps taken.
+    settled : bool
+        Whether the last step changed nothing any more.
+    """
+
+    log: str
+    parameter_names: tuple[str, ...]
+    parameter_units: tuple[str, ...]
+    theta: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    rms: float
+    iterations: int
+    settled: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result, ready for JSON."""
+        rows = zip(self.parameter_names, self.theta, self.sigma, self.parameter_units, strict=True)
+        return {
+            "log": self.log,
+            "parameters": {name: {"value": float(v), "sigma": float(s), "unit": unit} for name, v, s, unit in rows},
+            "rms": self.rms,
+            "iterations": self.iterations,
+            "settled": self.settled,
+        }
+
+
+def fit(log: Log, arm: Arm, *, horizon: float = 0.25) -> ArmFit:
+    """Fit all parameters of an arm to a log by output error.
+
+    The log is cut into windows, each of which is simulated from its measured first state under the logged torque; the squared differences
+    of positions are minimised by Gauss-Newton steps from the arm's own values. The model has no effects beyond the arm's own: where
+    something is missing, `diagnose` says what.
+
+    Parameters
+    ----------
+    log : Log
+        The log.
+    arm : Arm
+        The arm; its values are where the search starts.
+    horizon : float, default 0.25
+        Length of a window [s]. Longer windows are more sensitive to the parameters and less to first states.
+
+    Returns
+    -------
+    ArmFit
+
+    Raises
+    ------
+    OptionError
+        If the horizon is not a positive number.
+    LogShapeError
+        If the log has another number of joints, or fewer samples within whole windows than the arm has parameters.
+
+    References
+    ----------
+    L. Ljung, *System Identification: Theory for the User* (1999), section 7.2.
+    """
+    only_planar(arm, "fit")
+    horizon = options.positive(horizon, "horizon")
+    if log.n_joints != arm.n_joints:
+        raise LogShapeError(
+            f"has {log.n_joints} joints, the arm has {arm.n_joints}",
+            remedy="use the arm file that belongs to this log",
+            file=log.path or log.name,
+        )
+    t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.with_torques("a fit").tau))
+    found = _native.fit(arm.to_native(), t, q, tau, horizon)
+    if found is None:
+        raise LogShapeError(
+            f"lasts {log.duration:.3g} s, too short for {len(arm.theta)} parameters in windows of {horizon:g} s",
+            remedy="give a longer log or a shorter horizon",
+            file=log.path or log.name,
+        )
+    return ArmFit(
+        log=log.name,
+        parameter_names=tuple(arm.parameter_names),
+        parameter_units=tuple(arm.parameter_units),
+        theta=np.asarray(found["theta"]),
+        sigma=np.asarray(found["sigma"]),
+        rms=found["rms"],
+        iterations=found["iterations"],
+        settled=found["settled"],
+    )

@@ -1,0 +1,76 @@
+"""All formats of logs, and which of them a file has."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from armgap.errors import LogReadError
+from armgap.log.formats import hdf5, matlab, mcap, npz, parquet, rosbag, text
+from armgap.log.formats.format import Format
+from armgap.log.recording import Recording, Source
+from armgap.reading import printable
+
+__all__ = ["FORMATS", "record"]
+
+FORMATS: tuple[Format, ...] = (
+    parquet.FORMAT,
+    text.FORMAT,
+    npz.FORMAT,
+    matlab.FORMAT,
+    hdf5.FORMAT,
+    mcap.FORMAT,
+    rosbag.FORMAT,
+)
+"""Formats, in the order in which they are asked whether a file is theirs."""
+
+#: Bytes from the beginning of a file that tell its format.
+_HEAD = 1024
+
+
+def record(path: str | Path) -> tuple[Recording, str, Path]:
+    """Return what a file holds, a name for it, and its path; ``-`` is standard input.
+
+    Raises
+    ------
+    LogReadError, ColumnError
+        If it cannot be read; the file is named, and the place where it is known.
+    """
+    path = Path(path)
+    if str(path) == "-":
+        source, name = Source(path, sys.stdin.buffer.read()), "stdin"
+    else:
+        source, name = Source(path), printable(path.stem)
+    return _format(source).read(source), name, path
+
+
+def _format(source: Source) -> Format:
+    """Return the format by a file's first bytes, else by its ending."""
+    if source.data is None and source.path.is_dir():
+        if rosbag.is_bag(source.path):
+            return rosbag.FORMAT
+        raise LogReadError(
+            "is a folder",
+            remedy="give the path of a log file, or a pattern in quotes such as 'logs/*.parquet'",
+            file=source.path,
+        )
+    head = _head(source)
+    if not head.strip():
+        raise LogReadError("is empty", remedy="give a log with samples", file=source.path)
+    suffix = source.path.suffix.lower()
+    for known in FORMATS:
+        if known.recognises(head):
+            return known
+    for known in FORMATS:
+        if suffix in known.endings or (source.data is not None and known is text.FORMAT):
+            return known
+    endings = ", ".join(ending for known in FORMATS for ending in known.endings)
+    raise LogReadError(f"has the unknown ending `{source.path.suffix}`", remedy=f"known: {endings}", file=source.path)
+
+
+def _head(source: Source) -> bytes:
+    try:
+        return source.head(_HEAD)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise LogReadError(f"cannot be read ({reason})", remedy="give the path of a log", file=source.path) from None
