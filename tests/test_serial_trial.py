@@ -16,7 +16,8 @@ import pytest
 
 mujoco = pytest.importorskip("mujoco")
 
-from armgap import _native, controller  # noqa: E402
+from armgap import _native  # noqa: E402
+from armgap.arm import controller  # noqa: E402
 from armgap.arm.rigid_body import inconsistency  # noqa: E402
 from serial_trial import arms, motion  # noqa: E402
 from serial_trial.arms import FAMILIES, STEP, SerialRobot, draw_robot, perturbed  # noqa: E402

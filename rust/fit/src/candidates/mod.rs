@@ -1,9 +1,9 @@
 //! Which effects are worth a full fit, and from which values.
 //!
-//! * [`contact_guess`]: initial guesses of contacts from the residual torque.
-//! * [`initial_guess`]: candidates that pass, at their initial guesses.
-//! * [`periodogram`]: initial guesses of ripple from the residual's periodogram over position.
-//! * [`screen`]: score tests of all candidates from one Jacobian.
+//! * `contact_guess`: initial guesses of contacts from the residual torque.
+//! * `initial_guess`: candidates that pass, at their initial guesses.
+//! * `periodogram`: initial guesses of ripple from the residual's periodogram over position.
+//! * `screen`: score tests of all candidates from one Jacobian.
 
 pub(crate) mod contact_guess;
 pub(crate) mod initial_guess;

@@ -1,8 +1,8 @@
 //! Pushes from outside: torques that no log shows, at one time of one log, judged inside that log.
 //!
-//! [`residual`](super::residual) is the torque that a log lacks under a model, beside everything the model could be wrong by; [`search`](super::search) finds in it what
-//! comes once and does not follow from the state; [`outlying`](super::outlying) finds what is too light for that; [`fit`](super::fit) sizes it by output error, where
-//! the model is good enough for that; [`law`](super::law) tells it from what a limit of the drive or a stop does.
+//! `residual` is the torque that a log lacks under a model, beside everything the model could be wrong by; `search` finds in it what comes once
+//! and does not follow from the state; `outlying` finds what is too light for that; `fit` sizes it by output error, where the model is good
+//! enough for that; `law` tells it from what a limit of the drive or a stop does.
 
 use super::bell::Bell;
 use super::own::Own;

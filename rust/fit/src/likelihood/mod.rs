@@ -1,13 +1,13 @@
 //! How well a hypothesis explains the windows, and the values with which it does so best.
 //!
-//! * [`context`]: arm, prior, scales, training and holdout windows; re-weighting until the scales are those of the residual.
-//! * [`covariance`]: covariance of fitted values by the jackknife over windows.
-//! * [`dispersion`]: dispersion factor between fits to different motions.
-//! * [`holdout`]: cost of a fit on the holdout, beside noise and motion.
-//! * [`jacobian`]: Jacobian of the predictions, with columns reused between neighbouring points.
-//! * [`scale`]: typical sizes of quantities on this arm and these logs.
-//! * [`solve`]: Gauss-Newton over parameters and effects together.
-//! * [`weighting`]: weights of residuals: initial states projected out, robust weights of windows.
+//! * `context`: arm, prior, scales, training and holdout windows; re-weighting until the scales are those of the residual.
+//! * `covariance`: covariance of fitted values by the jackknife over windows.
+//! * `dispersion`: dispersion factor between fits to different motions.
+//! * `holdout`: cost of a fit on the holdout, beside noise and motion.
+//! * `jacobian`: Jacobian of the predictions, with columns reused between neighbouring points.
+//! * `scale`: typical sizes of quantities on this arm and these logs.
+//! * `solve`: Gauss-Newton over parameters and effects together.
+//! * `weighting`: weights of residuals: initial states projected out, robust weights of windows.
 
 pub mod context;
 pub mod covariance;

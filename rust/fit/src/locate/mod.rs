@@ -1,10 +1,10 @@
 //! Where the gap lies: on which joint, in which regime of its motion, and on which variables it depends.
 //!
-//! * [`dependence`]: a torque as a table over one variable of the motion.
-//! * [`energy`]: energy balance of the residual torque.
-//! * [`regimes`]: residual torque in windows, by regime.
-//! * [`unnamed`]: laws without a name: tables that predict logs which were left out.
-//! * [`variable_classes`]: a variable cut into classes of equal count.
+//! * `dependence`: a torque as a table over one variable of the motion.
+//! * `energy`: energy balance of the residual torque.
+//! * `regimes`: residual torque in windows, by regime.
+//! * `unnamed`: laws without a name: tables that predict logs which were left out.
+//! * `variable_classes`: a variable cut into classes of equal count.
 
 pub mod dependence;
 pub mod energy;
