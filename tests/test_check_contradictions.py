@@ -11,7 +11,7 @@ from armgap import Arm, Log, diagnose, simulate
 from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, time_shift, torque_unit
 from armgap.check.contradiction import READINGS, Refit, screen
 from armgap.check.equation_error import EquationError, Rows, bounds
-from armgap.diagnosis.diagnosis import _ambiguous_lag
+from armgap.diagnosis.diagnosis import _ambiguous_lag, _hidden_delay
 from armgap.diagnosis.prepared_input import prepare
 from armgap.errors import ColumnError, OptionError
 from armgap.simulation import Effect
@@ -225,6 +225,14 @@ def test_torques_that_come_early_are_seen_by_predictions(two_links: list[Log], a
     assert check is not None
     assert (check.check, check.severity) == ("time_shift", "warning")
     assert float(check.remedy.removeprefix("--shift tau=")) == pytest.approx(3 * arm.sample_period)
+    given = prepare(early[:1], early[1:], arm, Corrections(), {"horizon": 0.25}, repair=True)
+    gap = {"horizon_s": 0.25}
+    assert _hidden_delay({"verdict": "unexplained", "causes": [], "gap": gap}, given) == [check]
+    late = [{"effect": effect, "joint": j} for j, effect in enumerate(("actuator_lag", "actuator_delay"), start=1)]
+    assert _hidden_delay({"verdict": "effect", "causes": late, "gap": gap}, given) == [check]
+    assert _hidden_delay({"verdict": "effect", "causes": late[:1], "gap": gap}, given) == [], "one drive's own lag"
+    said = replace(given, checks=(check,))
+    assert _hidden_delay({"verdict": "unexplained", "causes": [], "gap": gap}, said) == [], "said already"
 
 
 def test_torques_played_backwards_are_another_arm_s(two_links: list[Log], arm: Arm) -> None:
