@@ -11,7 +11,7 @@ from armgap import Arm, Log, diagnose, simulate
 from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, time_shift, torque_unit
 from armgap.check.contradiction import READINGS, Refit, screen
 from armgap.check.equation_error import EquationError, Rows, bounds
-from armgap.diagnosis.diagnosis import _ambiguous_lag
+from armgap.diagnosis.diagnosis import _ambiguous_lag, _hidden_delay
 from armgap.diagnosis.prepared_input import prepare
 from armgap.errors import ColumnError, OptionError
 from armgap.simulation import Effect
@@ -216,6 +216,49 @@ def test_torques_that_come_late_in_the_file(two_links: list[Log], arm: Arm, samp
     assert (check.check, check.severity) == ("time_shift", "repaired")
     assert float(check.remedy.removeprefix("--shift tau=")) == pytest.approx(-samples * arm.sample_period)
     assert [c.severity for c in checked(late, arm, repair=False)] == ["warning"]
+
+
+def test_torques_that_come_early_are_seen_by_predictions(two_links: list[Log], arm: Arm) -> None:
+    assert time_shift.early(two_links[:1], two_links[1:], arm, 0.25) is None
+    early = [replace(log, tau=np.vstack([log.tau[3:], np.repeat(log.tau[-1:], 3, axis=0)])) for log in two_links]
+    check = time_shift.early(early[:1], early[1:], arm, 0.25)
+    assert check is not None
+    assert (check.check, check.severity) == ("time_shift", "warning")
+    assert float(check.remedy.removeprefix("--shift tau=")) == pytest.approx(3 * arm.sample_period)
+    given = prepare(early[:1], early[1:], arm, Corrections(), {"horizon": 0.25}, repair=True)
+    gap = {"horizon_s": 0.25}
+    assert _hidden_delay({"verdict": "unexplained", "causes": [], "gap": gap}, given) == [check]
+    late = [{"effect": effect, "joint": j} for j, effect in enumerate(("actuator_lag", "actuator_delay"), start=1)]
+    assert _hidden_delay({"verdict": "effect", "causes": late, "gap": gap}, given) == [check]
+    assert _hidden_delay({"verdict": "effect", "causes": late[:1], "gap": gap}, given) == [], "one drive's own lag"
+    said = replace(given, checks=(check,))
+    assert _hidden_delay({"verdict": "unexplained", "causes": [], "gap": gap}, said) == [], "said already"
+
+
+def test_torques_played_backwards_are_another_arm_s(two_links: list[Log], arm: Arm) -> None:
+    backwards = [replace(log, tau=np.ascontiguousarray(log.tau[::-1])) for log in two_links]
+    [check] = checked(backwards, arm)
+    assert (check.check, check.severity) == ("joint_order", "error")
+    assert check.remedy.startswith("--columns ")
+
+
+def test_columns_share_the_factor_of_the_joint_that_knows_it() -> None:
+    common = torque_unit._common(np.array([50.0, 65.0]), np.array([0.004, 0.29]))
+    assert common == pytest.approx(50.0, rel=0.01)
+    assert torque_unit._common(np.array([49.0, 51.0]), np.array([1e-5, 1e-6])) == pytest.approx(50.0, rel=0.01)
+
+
+def test_a_joint_whose_torque_is_mostly_noise_hides_no_factor(two_links: list[Log], arm: Arm) -> None:
+    rng = np.random.default_rng(5)
+    fast = [np.column_stack([np.zeros(len(log)), rng.standard_normal(len(log))]) for log in two_links]
+    size = 4.0 * np.std(two_links[0].tau[:, 1])
+    amperes = [replace(log, tau=(log.tau + size * x) / 12.0) for log, x in zip(two_links, fast, strict=True)]
+    found = torque_unit.find(EquationError([Rows.of(log, arm) for log in amperes], arm), amperes, arm)
+    assert found is not None
+    assert found.doubtful
+    assert set(found.corrections.factor) == {"tau"}
+    assert found.corrections.factor["tau"] == pytest.approx(12.0, rel=0.05)
+    assert "torque_unit" in [check.check for check in checked(amperes, arm)]
 
 
 def test_halves_that_do_not_agree_leave_a_late_torque_to_predictions(two_links: list[Log], arm: Arm) -> None:

@@ -73,7 +73,9 @@ def _options() -> argparse.ArgumentParser:
     parser.add_argument(
         "--models", help="machines, with commas; all by default (the trial's own shares in other modes)"
     )
-    parser.add_argument("--defects", help="beginnings of names, with commas; all by default (mode defects)")
+    parser.add_argument(
+        "--defects", help="beginnings of names, with commas; all by default (modes defects and repaired)"
+    )
     parser.add_argument(
         "--hidden", type=float, default=0.5, metavar="SHARE", help="of cases with an effect (mode defects)"
     )
@@ -108,7 +110,9 @@ def _tasks(options: argparse.Namespace, cases: list[str], names: list[str]) -> I
             yield from (Task(case, name) for name in names)
         elif options.mode == "repaired":
             rng = np.random.default_rng([options.seed, int(case.split("-")[3])])
-            yield from (Task(case, str(rng.choice(variants))) for variants in REPAIRED.values())
+            # All kinds are drawn, so that a run of some asks what a run of all would.
+            drawn = [str(rng.choice(variants)) for variants in REPAIRED.values()]
+            yield from (Task(case, name) for name in drawn if name in names)
 
 
 def _done(options: argparse.Namespace) -> set[Task]:

@@ -33,9 +33,15 @@ _ALIKE = 1.5
 # Parameters may differ from the arm file by this factor while a column's factor is estimated.
 _TRUST = 2.0
 _ROUNDS = 4
-# The factor has to lower the mean log share of unexplained torque by this much, and to leave no more than this share of a joint's torque.
-_GAIN_IN_COST = 0.5
+# The factor has to lower the mean log share of unexplained torque by this much; where it lowers it by less than the second, predictions have to
+# agree: friction without bound takes much of a torque in another unit.
+_GAIN_IN_COST = 0.2
+_CLEAR_GAIN = 0.5
+# A joint of whose torque it leaves more than this share says nothing of a factor: noise that a controller feeds back, or a stop, has made most of
+# it. Where there is one, predictions have to agree.
 _LEFT = 0.3
+# Share of a torque below which its factor is known as well as it can be: what is off then are the values of the arm file.
+_LEAST_SHARE = 1e-3
 # Quantiles of a torque's size that a drive's limit may be at: a limit between two of them still explains what no factor does.
 _LEVELS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 # Times in which a drive may take its torque through the range of its commands [s]: steps of a fourth, from what shows in no log to what leaves a
@@ -45,32 +51,58 @@ _SLEW_TIMES = tuple(0.05 * 1.25**k for k in range(25))
 
 @dataclass(frozen=True)
 class Factors:
-    """Factors on torque columns, what they leave unexplained, and what is to be said about them."""
+    """Factors on torque columns, what they leave unexplained, and what is to be said about them.
+
+    Attributes
+    ----------
+    corrections : Corrections
+        The factors.
+    closeness : float
+        Of the fit with them (`Fit.closeness`).
+    checks : tuple of Check
+        What is to be said.
+    doubtful : bool
+        Whether the equation of motion alone does not decide: predictions have to confirm them.
+    """
 
     corrections: Corrections
     closeness: float
     checks: tuple[Check, ...]
+    doubtful: bool = False
 
 
 def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     """Return the factors that belong on torque columns of the logs (`base`), or None; a drive that saturates is no factor."""
     low, high = bounds(arm, _TRUST)
     factors = _factors(base, low, high)
-    odd = [j for j, c in enumerate(factors) if not _within(c, _GAIN)]
-    if not odd or np.any(factors <= 0):
+    share = base.with_factors(low, high, factors).share
+    known = share < _LEFT
+    odd = [j for j, c in enumerate(factors) if known[j] and not _within(c, _GAIN)]
+    if not odd or np.any(factors[known] <= 0):
+        return None
+    shared = len(odd) == int(known.sum()) and float(factors[known].max() / factors[known].min()) < _ALIKE
+    if not shared and not known.all():
         return None
     applied = np.where(np.isin(np.arange(len(factors)), odd), factors, 1.0)
-    shared = len(odd) == len(factors) and float(factors.max() / factors.min()) < _ALIKE
     if shared:
-        applied = np.full(len(factors), math.exp(float(np.mean(np.log(factors)))))
+        odd = list(range(len(factors)))
+        applied = np.full(len(factors), _common(factors[known], share[known]))
     fit = base.with_factors(low, high, applied)
-    needed = 0.0 if shared and _within(applied[0], _SCALED) else _GAIN_IN_COST
-    if base.with_factors(low, high, np.ones_like(applied)).cost - fit.cost < needed or float(fit.share.max()) > _LEFT:
+    gain = base.with_factors(low, high, np.ones_like(applied)).cost - fit.cost
+    scaled = shared and _within(applied[0], _SCALED)
+    if gain < (0.0 if scaled else _GAIN_IN_COST):
         return None
     if min(limited(logs, arm, j).closeness for j in odd) < fit.closeness:
         return None
     corrections, checks = _said(applied, odd, shared)
-    return Factors(corrections, fit.closeness, tuple(checks))
+    doubtful = float(fit.share.max()) > _LEFT or (gain < _CLEAR_GAIN and not scaled)
+    return Factors(corrections, fit.closeness, tuple(checks), doubtful)
+
+
+def _common(factors: NDArray[np.float64], share: NDArray[np.float64]) -> float:
+    """Return the factor that columns share, each by what its joint says of it: the variance of a fitted factor goes with what the fit leaves."""
+    weight = (1.0 - share) / np.maximum(share, _LEAST_SHARE)
+    return math.exp(float(np.average(np.log(factors), weights=weight)))
 
 
 def limited(logs: Sequence[Log], arm: Arm, joint: int) -> Fit:

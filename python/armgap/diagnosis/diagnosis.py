@@ -17,7 +17,7 @@ from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check import torque_unit
 from armgap.check.check import Check
-from armgap.check.time_shift import causal, taken_back
+from armgap.check.time_shift import causal, early, taken_back
 from armgap.diagnosis.custom_effect import CustomEffect, TorqueTables, check_effects
 from armgap.diagnosis.drive_chain import drive_chain
 from armgap.diagnosis.prepared_input import PreparedInput, prepare, refused
@@ -170,7 +170,7 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
         if "log" in cause:
             cause["log"] = _WHOLE.sub("", cause["log"])
     data["notes"] = [*given.notes, *data["notes"]]
-    checks = [*given.checks, *_ambiguous_delay(data, training, arm)]
+    checks = [*given.checks, *(_ambiguous_delay(data, training, arm) or _hidden_delay(data, given))]
     _ambiguous_lag(data, given.checks)
     data["checks"] = [check.to_dict() for check in checks]
     known, corrected_logs = tables.applied(data, (*training, *held))
@@ -233,6 +233,16 @@ def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> lis
                 {"effect": "time_shift", "joint": None, "why": "torques early in the file by as much"}
             )
     return [check]
+
+
+def _hidden_delay(data: dict[str, Any], given: PreparedInput) -> list[Check]:
+    """Warn of a shift of the file that predictions see beside a gap without a name, or beside delays and lags that are all joints' together."""
+    late = {c["joint"] for c in data["causes"] if c["effect"] in ("actuator_delay", "actuator_lag")}
+    asked = data["verdict"] == "unexplained" or len(late) == given.arm.n_joints > 1
+    if not asked or given.arm.chain is not None or any(check.check == "time_shift" for check in given.checks):
+        return []
+    check = early(given.training, given.holdout, given.arm, data["gap"]["horizon_s"])
+    return [] if check is None else [check]
 
 
 def _ambiguous_lag(data: dict[str, Any], checks: Sequence[Check]) -> None:
