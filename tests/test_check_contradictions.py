@@ -11,6 +11,7 @@ from armgap import Arm, Log, diagnose, simulate
 from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, time_shift, torque_unit
 from armgap.check.contradiction import READINGS, Refit, screen
 from armgap.check.equation_error import EquationError, Rows, bounds
+from armgap.check.stage import unexplained_columns
 from armgap.diagnosis.diagnosis import _ambiguous_lag, _hidden_delay
 from armgap.diagnosis.prepared_input import prepare
 from armgap.errors import ColumnError, OptionError
@@ -240,6 +241,14 @@ def test_torques_played_backwards_are_another_arm_s(two_links: list[Log], arm: A
     [check] = checked(backwards, arm)
     assert (check.check, check.severity) == ("joint_order", "error")
     assert check.remedy.startswith("--columns ")
+
+
+def test_a_diagnosis_that_still_misses_the_motion_asks_for_the_columns_again(two_links: list[Log], arm: Arm) -> None:
+    backwards = [replace(log, tau=np.ascontiguousarray(log.tau[::-1])) for log in two_links]
+    [check] = unexplained_columns(backwards[:1], backwards[1:], arm, 0.25, 0.9)
+    assert (check.check, check.severity) == ("joint_order", "error")
+    assert unexplained_columns(backwards[:1], backwards[1:], arm, 0.25, 0.1) == []
+    assert unexplained_columns(two_links[:1], two_links[1:], arm, 0.25, 0.9) == []
 
 
 def test_columns_share_the_factor_of_the_joint_that_knows_it() -> None:

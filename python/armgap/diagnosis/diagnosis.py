@@ -17,6 +17,7 @@ from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check import torque_unit
 from armgap.check.check import Check
+from armgap.check.stage import unexplained_columns
 from armgap.check.time_shift import causal, early, taken_back
 from armgap.diagnosis.custom_effect import CustomEffect, TorqueTables, check_effects
 from armgap.diagnosis.drive_chain import drive_chain
@@ -163,6 +164,8 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
         return _diagnose(replace(given.with_factors(factors), factors={}), settings, effects)
     if taken_back(data["causes"], arm.n_joints, given.shift):
         return _diagnose(given.without_shift(), settings, effects)
+    if not contradictory and (columns := _columns(data, given)):
+        return _diagnose(replace(given, checks=(*columns, *given.checks)), settings, effects)
     if contradictory:
         data = _contradicted(data)
     data["arm"]["name"] = arm.name
@@ -243,6 +246,15 @@ def _hidden_delay(data: dict[str, Any], given: PreparedInput) -> list[Check]:
         return []
     check = early(given.training, given.holdout, given.arm, data["gap"]["horizon_s"])
     return [] if check is None else [check]
+
+
+def _columns(data: dict[str, Any], given: PreparedInput) -> list[Check]:
+    """Say that these are not the columns of this arm's joints, where no effect of the library brings predictions near the motion."""
+    if given.arm.chain is not None:
+        return []
+    gap = data["gap"]
+    relative = max(after / motion for after, motion in zip(gap["after"], gap["motion"], strict=True))
+    return unexplained_columns(given.training, given.holdout, given.arm, gap["horizon_s"], relative)
 
 
 def _ambiguous_lag(data: dict[str, Any], checks: Sequence[Check]) -> None:
