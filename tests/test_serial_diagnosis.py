@@ -354,3 +354,22 @@ def test_joints_that_slide_have_their_own_unit(found: Diagnosis) -> None:
     [far] = [a for a in diagnosis_document(data).answers if a.question == "How far does it shrink?"]
     units = re.findall(r"joint \d: [^;]*?(mrad|mm)", far.detail, re.IGNORECASE)
     assert units == ["mrad", "mm", "mrad"]
+
+
+def test_friction_of_all_joints_is_one_cause(arm: Arm) -> None:
+    """The arm's own law on each joint; another amplitude on each."""
+    amplitudes = (1.2, 1.5, 0.8)
+    everywhere = [Effect("stribeck", j, {"amplitude": a, "velocity": 0.15}) for j, a in enumerate(amplitudes, 1)]
+    cause = asked(logs(arm, *everywhere), arm).causes[0]
+    assert (cause.effect, cause.joint, cause.joints) == ("stribeck", None, (1, 2, 3))
+    np.testing.assert_allclose(cause.values["amplitude"].value, amplitudes, rtol=0.3)
+    assert cause.probability > SURE
+
+
+def test_one_delay_of_all_joints_is_one_cause(arm: Arm) -> None:
+    late = 0.012
+    found = asked(logs(arm, *(Effect("actuator_delay", j, {"delay": late}) for j in (1, 2, 3))), arm)
+    cause = found.causes[0]
+    assert cause.effect in ("actuator_delay", "actuator_lag")
+    assert cause.joints == (1, 2, 3)
+    assert len(found.causes) == 1

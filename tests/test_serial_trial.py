@@ -41,8 +41,8 @@ MOVING = 0.02
 #: asymmetry that is rounded at standstill or is not.
 AGREE, OTHERWISE = 0.01, {"load_dependent_friction": 0.25, "coulomb_asymmetry": 0.03}
 #: Effects of which the torque at another joint may change by more than at their own, relative to that joint's torque: what they change is part
-#: of the arm, or both ends of a cable.
-OF_THE_ARM = {"nominal_link", "cable_spring"}
+#: of the arm, or of both joints that a cable or a transmission couples.
+OF_THE_ARM = {"nominal_link", "cable_spring", "coupled_transmission"}
 #: The same, because links move otherwise than motors.
 TRANSMISSIONS = {"joint_elasticity", "backlash"}
 #: Share of the position error, and of the torque, by which a servo that holds its torque over half a millisecond and reads whole counts differs
@@ -369,6 +369,23 @@ def test_answers_are_scored_by_the_first_cause() -> None:
     rotor = {"values": {"lacking": False, "inertia": 1.0}, "theta": theta}
     assert outcome(record("rotor_inertia", 2, [], parameters={"rotor2": 1.9}, **rotor)) == "value"
     assert outcome(record("rotor_inertia", 2, [], parameters={"rotor2": 1.0}, **rotor)) == "not named"
+
+
+def test_effects_of_several_joints_are_scored_by_their_place() -> None:
+    cable = record("cable_spring", 2, [("joint_spring", None)])
+    assert outcome(cable) == "wrong"
+    cable["causes"][0] |= {"joints": [2, 3], "row": [1, 1]}
+    assert outcome(cable) == "right"
+    difference = record("coupled_transmission", 1, [("coupled_transmission", None)], values={"factor": -1.0})
+    difference["causes"][0] |= {"joints": [1, 2], "row": [1, 1]}
+    assert outcome(difference) == "wrong"
+    difference["causes"][0]["row"] = [1, -1]
+    assert outcome(difference) == "right"
+    everywhere = record("actuator_delay_all", None, [("actuator_delay", None)])
+    everywhere["causes"][0]["joints"] = [1, 2, 3]
+    assert outcome(everywhere) == "right"
+    lines = report([everywhere | {"outcome": "right"}]).splitlines()
+    assert "effects of all joints: 1 of 1 named in one cause of half of the joints or more" in lines
 
 
 def test_the_report_counts_every_answer() -> None:

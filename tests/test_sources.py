@@ -24,6 +24,7 @@ ORDER = (
         "json_schema",
         "progress",
         "workers",
+        "several_joints",
     ),
     *("log", "arm", "simulation", "check", "estimation", "evidence", "diagnosis", "comparison", "export", "report"),
     *("inspection", "planning", "fleet", "reproduction", "trial", "cli", "own"),

@@ -5,17 +5,19 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from armgap.diagnosis.result import MOST_BYTES, Cause, Diagnosis, RuledOut, Value
+from armgap.diagnosis.result import MOST_BYTES, Cause, Diagnosis, Equivalent, RuledOut, Value
 from armgap.errors import OptionError
 from armgap.literals import CauseStatus, GapOutcome, Verdict, joint_units
 from armgap.reading import read_bounded
 
 __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare", "read_diagnosis"]
 
-_Key = tuple[str, int | None, str | None, int]
+_Place = tuple[str, int | None, tuple[int, ...] | None, tuple[int, int] | None]
+_Key = tuple[_Place, str | None, int]
 SCHEMA = "armgap.diagnosis/1"
 #: Factors of the gap above the sensors' floor at which it counts as smaller or larger: other motions alone vary it by less.
 SMALLER, LARGER = 0.8, 1.25
@@ -52,7 +54,7 @@ class CauseChange:
     effect : str
         Name of the effect.
     joint : int or None
-        1-based joint.
+        1-based joint; a law on several joints is compared joint by joint.
     status : str
         ``"gone"``, ``"unseen"`` (the later log could not show it), ``"undecided"``, ``"new"``, ``"smaller"``, ``"larger"``, ``"unchanged"``, or
         ``"renamed"``: the later diagnosis names a look-alike of it.
@@ -60,6 +62,8 @@ class CauseChange:
         Parameters where it is named.
     why : str
         What the status rests on.
+    joints, row : tuple of int, optional
+        Two joints and the factors of their motion, of a term on a row over them.
     """
 
     effect: str
@@ -68,6 +72,8 @@ class CauseChange:
     before: dict[str, Value] | None
     after: dict[str, Value] | None
     why: str
+    joints: tuple[int, ...] | None = None
+    row: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -244,39 +250,45 @@ def _causes(before: Diagnosis, after: Diagnosis) -> tuple[CauseChange, ...]:
     old, new = _placed(before), _placed(after)
     changes = []
     for key, cause in old.items():
-        place = (cause.effect, cause.joint)
         if key in new:
             status, why = _resized(cause.parameters, new[key].parameters)
-            changes.append(CauseChange(*place, status, cause.parameters, new[key].parameters, why))
+            changes.append(_changed(cause, status, cause.parameters, new[key].parameters, why))
         else:
-            named = {(c.effect, c.joint) for c in after.causes}
-            alike = next(((e.effect, e.joint) for e in cause.equivalents if (e.effect, e.joint) in named), None)
-            status, why = _vanished(place, after, alike)
-            changes.append(CauseChange(*place, status, cause.parameters, None, why))
+            named = {_place(single) for c in after.causes for single in (c, *c.by_joint())}
+            alike = next((e.effect for e in cause.equivalents if _place(e) in named), None)
+            status, why = _vanished(_place(cause), after, alike)
+            changes.append(_changed(cause, status, cause.parameters, None, why))
     for key, cause in new.items():
         if key not in old:
-            place = (cause.effect, cause.joint)
-            earlier = next((r for r in before.ruled_out if (r.effect, r.joint) == place), None)
-            changes.append(CauseChange(*place, "new", None, cause.parameters, _earlier(earlier)))
+            earlier = next((r for r in before.ruled_out if _place(r) == _place(cause)), None)
+            changes.append(_changed(cause, "new", None, cause.parameters, _earlier(earlier)))
     return tuple(changes)
 
 
+def _place(found: Cause | Equivalent | RuledOut) -> _Place:
+    return found.effect, found.joint, found.joints, found.row
+
+
+def _changed(
+    cause: Cause, status: CauseStatus, before: dict[str, Value] | None, after: dict[str, Value] | None, why: str
+) -> CauseChange:
+    return CauseChange(cause.effect, cause.joint, status, before, after, why, cause.joints, cause.row)
+
+
 def _placed(diagnosis: Diagnosis) -> dict[_Key, Cause]:
-    """Causes by effect, joint and log; of several pushes in one log, by their order."""
+    """Causes by effect, joint and log, a law on several joints joint by joint; of several pushes in one log, by their order."""
     found: dict[_Key, Cause] = {}
-    for cause in diagnosis.causes:
-        number = sum(key[:3] == (cause.effect, cause.joint, cause.log) for key in found)
-        found[cause.effect, cause.joint, cause.log, number] = cause
+    for cause in chain.from_iterable(cause.by_joint() for cause in diagnosis.causes):
+        number = sum(key[:2] == (_place(cause), cause.log) for key in found)
+        found[_place(cause), cause.log, number] = cause
     return found
 
 
-def _vanished(
-    place: tuple[str, int | None], after: Diagnosis, alike: tuple[str, int | None] | None
-) -> tuple[CauseStatus, str]:
+def _vanished(place: _Place, after: Diagnosis, alike: str | None) -> tuple[CauseStatus, str]:
     """Status of a cause that the later diagnosis does not name."""
     if alike is not None:
-        return "renamed", f"{alike[0]} is named instead, which motion does not tell from it"
-    found = next((r for r in after.ruled_out if (r.effect, r.joint) == place), None)
+        return "renamed", f"{alike} is named instead, which motion does not tell from it"
+    found = next((r for r in after.ruled_out if _place(r) == place), None)
     if found is None:
         return "undecided", "the later diagnosis says nothing about it"
     if found.status == "not excited":

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from armgap.diagnosis import Diagnosis, diagnosis_schema
+from armgap.diagnosis import Cause, Diagnosis, diagnosis_schema
 
 #: Fields of the typed result whose keys are elsewhere in the JSON object: field, and the path of keys to it.
 ELSEWHERE = {
@@ -56,9 +56,11 @@ def _differences(typed: Any, data: Any, place: str) -> list[str]:
     if is_dataclass(typed) and not isinstance(typed, type):
         found = []
         for field in fields(typed):
-            if field.name.startswith("_"):
+            if field.name.startswith("_") or (isinstance(typed, Cause) and field.name == "values"):
                 continue
             value = getattr(typed, field.name)
+            if isinstance(typed, Cause) and field.name == "parameters" and typed.values:
+                value = typed.values
             if field.name == "extra":
                 found += [f"{place}.{k}: lost" for k in data if k not in value and k not in _own(typed) | {"schema"}]
                 continue

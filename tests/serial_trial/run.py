@@ -20,6 +20,10 @@ Record = dict[str, Any]
 OUTCOMES = ("right", "look-alike", "later", "value", "candidate", "not named", "joint only", "wrong")
 #: A rotor inertia that is estimated to within this share is right.
 _VALUE = 0.2
+#: End of the names of effects that are on every joint.
+_ALL = "_all"
+#: Effects on a row over two joints, with their names in the library.
+_ON_ROW = {"cable_spring": "joint_spring", "coupled_transmission": "coupled_transmission"}
 #: Entries of a key that an answer takes along.
 _TOLD = (
     "seed", "number", "draw", "effect", "joint", "values", "outside", "change", "family", "joints", "kinds", "period", "noise", "controller",
@@ -33,7 +37,7 @@ def ask(case: Case) -> Record:
     found = armgap.diagnose(case.training, case.arm, holdout=case.holdout)
     seconds = time.perf_counter() - began
     data = found.to_dict()
-    kept = ("effect", "joint", "probability", "closed", "equivalents", "why", "parameters")
+    kept = ("effect", "joint", "joints", "row", "probability", "closed", "equivalents", "why", "parameters")
     causes, candidates = ([{k: c[k] for k in kept if k in c} for c in data[part]] for part in ("causes", "candidates"))
     record = {
         **{name: case.key[name] for name in _TOLD if name in case.key},
@@ -51,8 +55,13 @@ def answer(seed: int, number: int, *, commanded: bool = False) -> Record:
 
 def is_hidden(record: Record, name: dict[str, Any]) -> bool:
     """Whether a cause, a candidate or an equivalent is what the case hides; an effect of all joints may be named on any of them."""
-    if record["effect"] == "stribeck_all":
-        return bool(name["effect"] == "stribeck")
+    effect = record["effect"]
+    if effect.endswith(_ALL):
+        return bool(name["effect"] == effect.removesuffix(_ALL))
+    if effect in _ON_ROW:
+        first, factor = record["joint"], record["values"].get("factor", 1.0)
+        place = name.get("joints") == [first, first + 1] and name.get("row") == [1, int(factor)]
+        return bool(place and name["effect"] == _ON_ROW[effect])
     return bool(name["effect"] == record["effect"] and name["joint"] == record["joint"])
 
 
@@ -105,6 +114,16 @@ def report(records: list[Record]) -> str:
             lines.append(
                 f"{label}: {len(named)} of {len(of)} with a cause named, {sure} of them at a probability of 0.5 or more"
             )
+    everywhere = [r for r in hidden if r["effect"].endswith(_ALL)]
+    if everywhere:
+        one = sum(
+            is_hidden(r, c) and len(c.get("joints") or ()) >= r["joints"] / 2
+            for r in everywhere
+            for c in r["causes"][:1]
+        )
+        lines.append(
+            f"effects of all joints: {one} of {len(everywhere)} named in one cause of half of the joints or more"
+        )
     if answers:
         seconds = [r["seconds"] for r in answers]
         lines.append(f"seconds per diagnosis: median {np.median(seconds):.1f}, longest {max(seconds):.1f}")
@@ -133,9 +152,14 @@ def _counts(records: list[Record]) -> list[str]:
 def _line(r: Record) -> str:
     """One case that is not right: what is hidden and what was said."""
 
+    def place(c: dict[str, Any]) -> str:
+        joints = "/".join(map(str, c.get("joints") or [c["joint"] or ""]))
+        row = f" {c['row']}" if c.get("row") else ""
+        return f"{c['effect']}:{joints}{row}"
+
     def name(c: dict[str, Any]) -> str:
-        alike = ",".join(f"{e['effect']}:{e['joint'] or ''}" for e in c["equivalents"])
-        return f"{c['effect']}:{c['joint'] or ''} {c['probability']:.2f}{f' ~{alike}' if alike else ''}"
+        alike = ",".join(map(place, c["equivalents"]))
+        return f"{place(c)} {c['probability']:.2f}{f' ~{alike}' if alike else ''}"
 
     values = ", ".join(f"{k} {_short(v)}" for k, v in r["values"].items())
     seen = f", {r['above_floor']:.1f} floors, {r['moved']:.1f} sigmas" if "visible" in r else ""

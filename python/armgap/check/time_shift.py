@@ -20,6 +20,7 @@ from armgap.check.check import Check
 from armgap.check.contradiction import Refit
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.log.log import Log
+from armgap.several_joints import by_joint
 
 __all__ = ["acausal", "causal", "confirmed", "early", "taken_back"]
 
@@ -124,7 +125,9 @@ def confirmed(
 
 def taken_back(causes: Sequence[Mapping[str, Any]], n_joints: int, shift: float) -> bool:
     """Return whether named delays on all joints undo a shift [s] of the torques that was repaired before: then none was there."""
-    delays = {c["joint"]: c["parameters"]["delay"]["value"] for c in causes if c["effect"] == "actuator_delay"}
+    delays = {
+        c["joint"]: c["parameters"]["delay"]["value"] for c in by_joint(causes) if c["effect"] == "actuator_delay"
+    }
     return shift < 0.0 and len(delays) == n_joints and min(delays.values()) > -_TAKEN_BACK * shift
 
 
@@ -140,7 +143,11 @@ def causal(causes: Sequence[Mapping[str, Any]], n_joints: int, period: float) ->
     period : float
         Sample period [s].
     """
-    delays = {cause["joint"]: cause["parameters"]["delay"] for cause in causes if cause["effect"] == "actuator_delay"}
+    delays = {
+        cause["joint"]: cause["parameters"]["delay"]
+        for cause in by_joint(causes)
+        if cause["effect"] == "actuator_delay"
+    }
     if len(delays) < n_joints:
         return None
     values = [delay["value"] for delay in delays.values()]

@@ -19,6 +19,7 @@ from armgap.arm.corrections import Corrections
 from armgap.check.check import Check, Severity
 from armgap.check.equation_error import EquationError, Fit, Rows, bounds
 from armgap.log.log import Log
+from armgap.several_joints import by_joint
 
 __all__ = ["Factors", "find", "limited", "refined", "said"]
 
@@ -188,9 +189,9 @@ def refined(factors: Mapping[str, float], causes: Sequence[Mapping[str, Any]], n
     A column of unknown unit has no gain of its own: what the fit finds there is what the factor was off by. A gain of another joint is the
     inverse on this one, as the size of all parameters is only trusted to a few percent.
     """
-    gains = {c["joint"]: c["parameters"]["gain"]["value"] for c in causes if c["effect"] == "torque_gain"}
-    by_joint = {j: factors.get(f"tau{j}", factors.get("tau")) for j in range(1, n_joints + 1)}
-    repaired = {j: c for j, c in by_joint.items() if c is not None}
+    gains = {c["joint"]: c["parameters"]["gain"]["value"] for c in by_joint(causes) if c["effect"] == "torque_gain"}
+    given = {j: factors.get(f"tau{j}", factors.get("tau")) for j in range(1, n_joints + 1)}
+    repaired = {j: c for j, c in given.items() if c is not None}
     if not gains or not repaired:
         return {}
     elsewhere = math.prod(gain for j, gain in gains.items() if j not in repaired)

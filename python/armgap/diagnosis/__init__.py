@@ -24,6 +24,7 @@ from armgap.diagnosis.result import (
     RuledOut,
     Sanity,
     Value,
+    Values,
 )
 from armgap.diagnosis.schema import diagnosis_schema
 
@@ -40,6 +41,7 @@ __all__ = [
     "RuledOut",
     "Sanity",
     "Value",
+    "Values",
     "diagnose",
     "diagnosis_schema",
 ]

@@ -261,10 +261,12 @@ def _ambiguous_lag(data: dict[str, Any], checks: Sequence[Check]) -> None:
     """List a low-pass of the positions among the equivalents of what delays a joint's torque; as long as nobody knows, each has half."""
     joints = {check.joint for check in checks if check.check == "filtered_positions"}
     for cause in data["causes"]:
-        if cause["joint"] in joints and cause["effect"] in ("actuator_lag", "actuator_delay"):
+        found = {j for j in cause.get("joints") or [cause["joint"]] if j in joints}
+        if found and cause["effect"] in ("actuator_lag", "actuator_delay"):
             cause["probability"] *= 0.5
-            why = f"q{cause['joint']} is smoother than its encoder: a low-pass before logging delays positions as much"
-            cause["equivalents"].append({"effect": "filtered_positions", "joint": cause["joint"], "why": why})
+            for joint in sorted(found):
+                why = f"q{joint} is smoother than its encoder: a low-pass before logging delays positions as much"
+                cause["equivalents"].append({"effect": "filtered_positions", "joint": joint, "why": why})
 
 
 def _contradicted(data: dict[str, Any]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
 from armgap.check.check import Check
@@ -25,6 +25,7 @@ __all__ = [
     "RuledOut",
     "Sanity",
     "Value",
+    "Values",
 ]
 
 MOST_BYTES = 2**28
@@ -37,6 +38,15 @@ class Value:
 
     value: float
     sigma: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Values:
+    """The same of several joints, in their order."""
+
+    value: tuple[float, ...]
+    sigma: tuple[float, ...]
     unit: str
 
 
@@ -111,11 +121,13 @@ class Location:
 
 @dataclass(frozen=True)
 class Equivalent:
-    """An effect that these logs do not tell from a named one, and why."""
+    """An effect that these logs do not tell from a named one, and why; `joints` and `row` as in `Cause`."""
 
     effect: str
     joint: int | None
     why: str
+    joints: tuple[int, ...] | None = None
+    row: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -124,6 +136,10 @@ class Cause:
 
     An elastic or slack transmission has `sides`: ``encoder`` and ``friction`` at the ``"motor"`` or the ``"link"``, and whether its ``rotor``
     ``"rides"`` on the joints before or is ``"geared"``.
+
+    The same law on several `joints` at once is one cause: its `joint` is None, its `parameters` are empty, and `values` has one per joint
+    (`by_joint` makes causes of single joints of it). A term that acts on a sum or a difference of two joints' motion has a `row`, their
+    factors.
     """
 
     effect: str
@@ -136,6 +152,24 @@ class Cause:
     log: str | None = None
     why: str | None = None
     sides: dict[str, str] | None = None
+    joints: tuple[int, ...] | None = None
+    row: tuple[int, int] | None = None
+    values: dict[str, Values] = field(default_factory=dict)
+
+    def by_joint(self) -> tuple[Cause, ...]:
+        """Return this cause, or one per joint where it has the same law on several."""
+        if not self.joints or self.row:
+            return (self,)
+        return tuple(
+            replace(
+                self,
+                joint=joint,
+                joints=None,
+                values={},
+                parameters={name: Value(v.value[i], v.sigma[i], v.unit) for name, v in self.values.items()},
+            )
+            for i, joint in enumerate(self.joints)
+        )
 
 
 @dataclass(frozen=True)
@@ -150,13 +184,15 @@ class Bound:
 
 @dataclass(frozen=True)
 class RuledOut:
-    """A candidate that was looked for and not found: ``absent``, ``not excited`` or ``undecided``."""
+    """A candidate that was looked for and not found: ``absent``, ``not excited`` or ``undecided``; `joints` and `row` as in `Cause`."""
 
     effect: str
     joint: int | None
     status: Status
     bound: Bound | None
     why: str | None
+    joints: tuple[int, ...] | None = None
+    row: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -244,7 +280,7 @@ class ChainPart:
     detail: str
 
 
-_Record = TypeVar("_Record", Value, Equivalent, Bound, Sanity)
+_Record = TypeVar("_Record", Value, Bound, Sanity)
 
 
 @dataclass(frozen=True)
@@ -371,18 +407,30 @@ def _location(data: dict[str, Any]) -> Location:
     )  # fmt: skip
 
 
+def _several(data: dict[str, Any]) -> dict[str, Any]:
+    """Joints and row of what is on several joints."""
+    return {key: tuple(data[key]) for key in ("joints", "row") if data.get(key)}
+
+
 def _cause(data: dict[str, Any]) -> Cause:
+    parameters = data["parameters"].items()
+    single = {name: _take(Value, v) for name, v in parameters if not isinstance(v["value"], list)}
+    values = {
+        name: Values(tuple(v["value"]), tuple(v["sigma"]), v["unit"]) for name, v in parameters if name not in single
+    }
     return Cause(
         data["effect"],
         data.get("title", data["effect"].replace("_", " ")),
         data["joint"],
         data["probability"],
-        {name: _take(Value, value) for name, value in data["parameters"].items()},
+        single,
         data["closed"],
-        tuple(_take(Equivalent, e) for e in data["equivalents"]),
+        tuple(Equivalent(e["effect"], e["joint"], e["why"], **_several(e)) for e in data["equivalents"]),
         data.get("log"),
         data.get("why"),
         data.get("sides"),
+        values=values,
+        **_several(data),
     )
 
 
@@ -399,5 +447,10 @@ def _chain_part(data: dict[str, Any]) -> ChainPart:
 def _ruled_out(data: dict[str, Any]) -> RuledOut:
     bound = data.get("bound")
     return RuledOut(
-        data["effect"], data["joint"], data["status"], _take(Bound, bound) if bound else None, data.get("why")
+        data["effect"],
+        data["joint"],
+        data["status"],
+        _take(Bound, bound) if bound else None,
+        data.get("why"),
+        **_several(data),
     )

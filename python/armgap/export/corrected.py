@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.arm.arm import Arm
-from armgap.diagnosis.result import Cause
+from armgap.diagnosis.result import Cause, Equivalent
 from armgap.export.errors import ExportError
 from armgap.export.fields import FIELDS, FORMATS, field_of
 from armgap.export.joint import Joint
 from armgap.export.model import SimulatorModel
+from armgap.several_joints import place_text
 
 __all__ = ["LEAST_SIGMA", "Corrected", "placed", "value"]
 
@@ -79,7 +80,7 @@ class Corrected(ABC):
 
     def field_of(self, cause: Cause, form: str) -> str | None:
         """Return where a cause goes in a format, None if it has no field there."""
-        return field_of(cause.effect, cause.joint, form, self.arm.kind)
+        return None if cause.row else field_of(cause.effect, cause.joint, form, self.arm.kind)
 
     def missing(self, form: str) -> tuple[str, ...]:
         """Return one line per cause that a format has no field for, or only in part."""
@@ -114,14 +115,16 @@ def value(cause: Cause, name: str) -> float:
     return cause.parameters[name].value
 
 
-def placed(effect: str, joint: int | None) -> str:
+def placed(found: Cause | Equivalent) -> str:
     """Name of an effect where it sits."""
-    return effect if joint is None else f"{effect} of joint {joint}"
+    if found.joint is None and not found.joints:
+        return found.effect
+    return f"{found.effect} of {place_text(vars(found))}"
 
 
 def _named(cause: Cause) -> str:
     sizes = ", ".join(f"{name} {v.value:.6g} {v.unit}" for name, v in cause.parameters.items())
-    return f"{placed(cause.effect, cause.joint)} ({sizes})"
+    return f"{placed(cause)} ({sizes})"
 
 
 def _equation(cause: Cause) -> str:

@@ -44,7 +44,8 @@ def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_
     """
     _check(diagnosis, arm, stage)
     values = [diagnosis.parameters[stage][name] for name in arm.parameter_names]
-    causes = diagnosis.causes if stage == "with_causes" else ()
+    found = diagnosis.causes if stage == "with_causes" else ()
+    causes = tuple(single for cause in found for single in cause.by_joint())
     notes = _notes(diagnosis, stage)
     if arm.chain is None:
         return correct_planar(arm, stage, values, causes, notes, diagnosis.verdict, keep_lengths=keep_lengths)
@@ -88,7 +89,5 @@ def _notes(diagnosis: Diagnosis, stage: str) -> tuple[str, ...]:
         )
     unsure = [c for c in diagnosis.causes if c.equivalents] if stage == "with_causes" else []
     return tuple(
-        f"these logs do not tell {placed(c.effect, c.joint)} from "
-        + ", ".join(placed(e.effect, e.joint) for e in c.equivalents)
-        for c in unsure
+        f"these logs do not tell {placed(c)} from " + ", ".join(placed(e) for e in c.equivalents) for c in unsure
     )

@@ -39,6 +39,7 @@ def _effect(model: Corrected, cause: Cause) -> dict[str, Any]:
     return {
         "effect": cause.effect,
         "joint": cause.joint,
+        **({"joints": list(cause.joints or ()), "row": list(cause.row)} if cause.row else {}),
         "probability": cause.probability,
         "parameters": {name: asdict(value) for name, value in cause.parameters.items()},
         "fields": {form: model.field_of(cause, form) for form in ("mjcf", "urdf", "toml")},

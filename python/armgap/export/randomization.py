@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from armgap._native import __version__
 from armgap.arm.rigid_body import about_com
+from armgap.diagnosis.result import Cause
 from armgap.export.bodies import nearest_bodies
 from armgap.export.corrected import Corrected
 from armgap.export.serial import CorrectedSerial
@@ -140,10 +141,16 @@ def _of_joints(model: CorrectedSerial) -> Iterable[dict[str, Any]]:
 def _of_causes(model: Corrected) -> list[dict[str, Any]]:
     """Parameters of the causes; of those that are in the links or rotors they tell where the others' values come from."""
     return [
-        _entry({"effect": cause.effect, "joint": cause.joint, "quantity": name}, v.value, v.sigma, v.unit)
+        _entry({"effect": cause.effect, **_place(cause), "quantity": name}, v.value, v.sigma, v.unit)
         for cause in model.causes
         for name, v in cause.parameters.items()
     ]
+
+
+def _place(cause: Cause) -> dict[str, Any]:
+    """Entries that say where a cause is."""
+    on_row = {"joints": list(cause.joints or ()), "row": list(cause.row)} if cause.row else {}
+    return {"joint": cause.joint, **on_row}
 
 
 def _draw(model: CorrectedSerial, spread: Array, rng: np.random.Generator) -> dict[str, Any]:

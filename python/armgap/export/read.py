@@ -53,7 +53,7 @@ def _load(path: str | Path) -> Any:
 
 def _check_numbers(diagnosis: Diagnosis) -> None:
     sets = [(stage, values) for stage, values in diagnosis.parameters.items()]
-    sets += [(cause.effect, cause.parameters) for cause in diagnosis.causes]
+    sets += [(cause.effect, single.parameters) for cause in diagnosis.causes for single in cause.by_joint()]
     for place, values in sets:
         for name, value in values.items():
             if not (_is_finite(value.value) and _is_finite(value.sigma)):

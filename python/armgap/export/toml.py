@@ -19,7 +19,11 @@ def render(model: Corrected) -> str:
     """Return an arm file; causes that it has no field for stand in its head as options of ``armgap simulate``."""
     head = [f"# {line}" for line in header.lines(model, "toml")]
     head.append(f"# sigma: the estimate's, but at least {LEAST_SIGMA:.0%} of the value")
-    options = [_option(c.effect, c.joint, c.parameters) for c in model.causes if model.field_of(c, "toml") is None]
+    options = [
+        _option(c.effect, c.joint, c.parameters)
+        for c in model.causes
+        if model.field_of(c, "toml") is None and not c.row
+    ]
     head += [f"# armgap simulate {' '.join(options)}"] if options else []
     return "\n".join(head) + "\n" + model.nominal().to_toml()
 

@@ -12,7 +12,8 @@ from armgap.fleet.series import Move, Odd, moving, odd
 from armgap.report import charts
 from armgap.report.document import Document
 from armgap.report.page import Bar, Drawing, Section, Table
-from armgap.report.words import SummaryAnswer, figure, joint_text, parameter_text, title
+from armgap.report.words import SummaryAnswer, figure, parameter_text, title
+from armgap.several_joints import joint_text
 
 if TYPE_CHECKING:
     from armgap.fleet.folder import Fleet

@@ -8,6 +8,7 @@ from typing import Any
 import polars as pl
 
 from armgap.fleet.manifest import Entry
+from armgap.several_joints import by_joint
 
 __all__ = ["PARAMETERS", "SUMMARY", "failed_row", "parameter_rows", "summary_rows"]
 
@@ -47,7 +48,10 @@ def summary_rows(entry: Entry, diagnosis: dict[str, Any]) -> list[Row]:
         "unexplained": gap["unexplained"],
         "seconds": diagnosis["seconds"],
     }
-    named = [{"effect": c["effect"], "joint": c["joint"], "probability": c["probability"]} for c in diagnosis["causes"]]
+    named = [
+        {"effect": c["effect"], "joint": c["joint"], "probability": c["probability"]}
+        for c in by_joint(diagnosis["causes"])
+    ]
     return [{**of_entry, **cause} for cause in named] or [of_entry]
 
 
@@ -60,13 +64,20 @@ def _empty(entry: Entry) -> Row:
     return {**dict.fromkeys(SUMMARY), "robot": entry.robot, "time": entry.time or None}
 
 
+def _place(cause: dict[str, Any]) -> str:
+    """Where a cause is: a joint, two joints with the sign of the second's motion, or nothing."""
+    if cause.get("row"):
+        return f"{cause['joints'][0]}{'+' if cause['row'][1] > 0 else '-'}{cause['joints'][1]}"
+    return str(cause["joint"] or "")
+
+
 def parameter_rows(entry: Entry, diagnosis: dict[str, Any]) -> Iterator[Row]:
     """Yield the re-estimated parameters of the arm, and those of its named causes."""
     place = {"robot": entry.robot, "time": entry.time or None}
     arm = diagnosis["parameters"]["with_causes"]
     found = [("arm", name, value) for name, value in arm.items()]
-    for cause in diagnosis["causes"]:
-        of = f"{cause['effect']}:{cause['joint'] or ''}"
+    for cause in by_joint(diagnosis["causes"]):
+        of = f"{cause['effect']}:{_place(cause)}"
         found += [(of, name, value) for name, value in cause["parameters"].items()]
     for of, name, value in found:
         yield {**place, "of": of, "name": name, **{key: value.get(key) for key in ("value", "sigma", "unit")}}

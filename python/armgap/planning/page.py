@@ -12,7 +12,8 @@ from armgap.report import charts
 from armgap.report.conventions import brief, section
 from armgap.report.document import Document
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
-from armgap.report.words import SummaryAnswer, figure, joint_text, percent, title
+from armgap.report.words import SummaryAnswer, figure, percent, title
+from armgap.several_joints import joint_text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

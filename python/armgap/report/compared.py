@@ -17,13 +17,13 @@ from armgap.report.words import (
     each_joint,
     error_text,
     figure,
-    joint_text,
     milli_unit,
     percent,
     sizes,
     title,
     value,
 )
+from armgap.several_joints import place_text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -105,7 +105,7 @@ def _moved(c: Comparison) -> tuple[str, str]:
 
 
 def _name(cause: CauseChange) -> str:
-    return f"{title(cause.effect)}, {joint_text(cause.joint)}"
+    return f"{title(cause.effect)}, {place_text(vars(cause))}"
 
 
 def _gap(c: Comparison) -> Section:

@@ -12,6 +12,7 @@ from armgap.errors import ArmgapError, OptionError
 from armgap.literals import SERIAL
 from armgap.report import charts, words
 from armgap.report.sections.model_labels import joint_unit, model_labels, small_unit, torque_unit
+from armgap.several_joints import by_joint
 
 if TYPE_CHECKING:
     import polars as pl
@@ -138,7 +139,7 @@ def _rows(data: Data) -> list[Data]:
         empty
         | {"effect": c["effect"], "joint": c["joint"], "status": "named", "probability": c["probability"]}
         | {"closed": c["closed"], "parameter": name, **p}
-        for c in data.get("causes") or []
+        for c in by_joint(data.get("causes") or [])
         for name, p in c["parameters"].items()
     ]
     for r in data.get("ruled_out") or []:

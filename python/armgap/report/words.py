@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from armgap import _native
 from armgap._renamed import old_names
 from armgap.literals import SERIAL, joint_units
+from armgap.several_joints import place_text
 
 __all__ = [
     "SummaryAnswer",
@@ -20,7 +21,6 @@ __all__ = [
     "each_joint",
     "error_text",
     "figure",
-    "joint_text",
     "milli_unit",
     "millis",
     "named",
@@ -98,6 +98,7 @@ _INERTIAL = {
 #: Terms of a serial arm that are no effects of the library.
 _OF_SERIAL_ARMS = {
     "nominal_link": "wrong nominal link",
+    "coupled_transmission": "transmission that couples two joints",
     "controller_gain": "wrong proportional gain of the position controller",
     "controller_damping": "wrong derivative gain of the position controller",
     "reference_delay": "late reference",
@@ -143,11 +144,6 @@ def title(effect: str) -> str:
     return _OF_SERIAL_ARMS.get(effect) or _titles().get(effect, effect.replace("_", " "))
 
 
-def joint_text(joint: int | None) -> str:
-    """Where an effect sits."""
-    return "whole arm" if joint is None else f"joint {joint}"
-
-
 def figure(number: float | None, digits: int = 3) -> str:
     """A number with a few significant digits; a dash where there is none."""
     if number is None:
@@ -172,7 +168,12 @@ def value(entry: Any, digits: int = 4) -> str:
     """A value with its uncertainty and unit, both to the same place; or a bare number."""
     if not isinstance(entry, dict):
         return "" if entry is None else figure(float(entry), digits)
-    return f"{_spread(entry['value'], entry['sigma'], digits)} {unit_text(str(entry.get('unit', '')))}".strip()
+    if isinstance(entry["value"], list):
+        each = zip(entry["value"], entry["sigma"], strict=True)
+        numbers = " / ".join(_spread(number, sigma, digits) for number, sigma in each)
+    else:
+        numbers = _spread(entry["value"], entry["sigma"], digits)
+    return f"{numbers} {unit_text(str(entry.get('unit', '')))}".strip()
 
 
 def _spread(number: float | None, sigma: float | None, digits: int) -> str:
@@ -263,7 +264,7 @@ def parameter_text(kind: str, name: str) -> str:
 
 def named(effect: Data) -> str:
     """An effect with its place, and its log if it belongs to one."""
-    place = f"{title(effect['effect'])}, {joint_text(effect['joint'])}"
+    place = f"{title(effect['effect'])}, {place_text(effect)}"
     if sides := effect.get("sides"):
         encoder, friction = sides["encoder"], sides["friction"]
         place += f" ({f'encoder and friction at the {encoder}' if encoder == friction else f'encoder at the {encoder}, friction at the {friction}'})"
@@ -415,7 +416,7 @@ def _which(data: Data) -> tuple[str, str]:
         if data["verdict"] == "unexplained" and (data.get("arm") or {}).get("kind") == SERIAL:
             return _NO_CAUSE_OF_SERIAL
         return _NO_CAUSE.get(data["verdict"], ("No cause was named", ""))
-    headline = _capital(" and ".join(_counted([f"{title(c['effect'])}, {joint_text(c['joint'])}" for c in causes])))
+    headline = _capital(" and ".join(_counted([f"{title(c['effect'])}, {place_text(c)}" for c in causes])))
     text = " ".join(_about(cause, alone=len(causes) == 1) for cause in causes)
     if doubtful(data):
         headline += " (doubtful)"

@@ -17,6 +17,7 @@ from .friction import (
     ViscousAsymmetry,
 )
 from .outside import CableSpring, LoadedCogging, TorqueDrift
+from .several import CoupledTransmission, DelayEverywhere, LoadFrictionEverywhere
 from .torque import Contact, JointSpring, TorqueOffset, TorqueRipple
 from .transmission import Backlash, JointElasticity
 
@@ -29,6 +30,7 @@ EFFECTS: dict[str, type[Effect]] = {
         LoadDependentFriction, PositionDependentFriction, FrictionWarmup, TorqueOffset, TorqueRipple, JointSpring, Contact,
         ActuatorLag, ActuatorDelay, TorqueSaturation, TorqueDeadZone, TorqueGain, EncoderOffset, EncoderEccentricity, JointElasticity, Backlash,
         TorqueDrift, CableSpring, LoadedCogging,
+        DelayEverywhere, LoadFrictionEverywhere, CoupledTransmission,
     )
 }  # fmt: skip
 """Every effect by name; `Null` is not among them."""

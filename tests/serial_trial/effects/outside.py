@@ -34,7 +34,6 @@ class CableSpring(Effect):
     k: float
     rest: float
     name: ClassVar[str] = "cable_spring"
-    outside: ClassVar[bool] = True
 
     @classmethod
     def draw(cls, robot, joint, share, use, rng):

@@ -8,7 +8,8 @@ from typing import Any
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Drawing, Section, Table
 from armgap.report.sections.model_labels import Data, load_text, small_unit, torque_unit
-from armgap.report.words import error_text, figure, joint_text, named, percent, sizes, symbol_text, title
+from armgap.report.words import error_text, figure, named, percent, sizes, symbol_text, title
+from armgap.several_joints import place_text
 
 __all__ = ["candidates", "evidence", "look_alikes", "ranking", "unnamed"]
 
@@ -168,8 +169,8 @@ def look_alikes(data: Data) -> Section | None:
     """What these logs do not tell from the named causes, and why."""
     rows = [
         (
-            f"{title(c['effect'])} ({joint_text(c['joint'])})",
-            f"{title(e['effect'])} ({joint_text(e['joint'])})",
+            f"{title(c['effect'])} ({place_text(c)})",
+            f"{title(e['effect'])} ({place_text(e)})",
             e["why"],
         )
         for c in data.get("causes") or []

@@ -5,7 +5,8 @@ from __future__ import annotations
 from armgap.report import charts
 from armgap.report.page import Bar, Cell, Section, Table
 from armgap.report.sections.model_labels import Data
-from armgap.report.words import joint_text, percent, value
+from armgap.report.words import percent, value
+from armgap.several_joints import joint_text
 
 __all__ = ["along_the_chain"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from armgap.report.page import Section, Table
 from armgap.report.sections.model_labels import Data
-from armgap.report.words import joint_text
+from armgap.several_joints import joint_text
 
 __all__ = ["checks", "input_checks"]
 

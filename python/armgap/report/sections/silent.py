@@ -7,7 +7,8 @@ import functools
 from armgap import _native
 from armgap.report.page import Section, Table
 from armgap.report.sections.model_labels import Data
-from armgap.report.words import figure, joint_text, named, title, unit_text
+from armgap.report.words import figure, named, title, unit_text
+from armgap.several_joints import place_text
 
 __all__ = ["excited_by", "not_shown", "ruled_out"]
 
@@ -29,7 +30,7 @@ def not_shown(data: Data) -> Section | None:
         return None
     joints: dict[str, list[str]] = {}
     for r in silent:
-        joints.setdefault(r["effect"], []).append(joint_text(r["joint"]))
+        joints.setdefault(r["effect"], []).append(place_text(r))
     rows = [(title(effect), ", ".join(places), excited_by(effect)) for effect, places in joints.items()]
     text = "These effects could be present without leaving a trace in these logs. The last column says which motion would show them."
     return Section("What these logs could not show", text=[text], tables=[Table(("effect", "where", "needs"), rows)])

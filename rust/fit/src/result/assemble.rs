@@ -13,8 +13,8 @@ use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::result::gap::{Compared, Errors, FreeRuns, gap, rms};
 use crate::result::headline::Headline;
 use crate::result::report::{
-    self, ArmSummary, Cause, Diagnosis, EquivalentSummary, LogSummary, Named, Noise, OptionSummary,
-    Parameters, Ranked, SidesSummary, StageSummary, Value,
+    self, ArmSummary, Cause, CauseValue, Diagnosis, EquivalentSummary, LogSummary, Named, Noise,
+    OptionSummary, Parameters, Ranked, SeveralJoints, SidesSummary, StageSummary, Value,
 };
 use crate::result::ruled_out::ruled_out;
 use crate::result::sanity::{Estimate, Sanity, bounded_sigma, sanity};
@@ -190,12 +190,18 @@ fn cause(cause: &crate::search::belief::Cause, joints: usize, rotary: bool) -> C
         effect: spec.name,
         title: spec.title,
         joint: cause.effect.joint_number(),
+        on: SeveralJoints::default(),
         probability: cause.probability,
-        parameters: effect_values(&cause.effect, &cause.sigma, rotary),
+        parameters: cause_values(&cause.effect, &cause.sigma, rotary),
         closed: cause.share,
         equivalents: equivalents
             .into_iter()
-            .map(|e| EquivalentSummary { effect: e.effect, joint: e.joint, why: e.why })
+            .map(|e| EquivalentSummary {
+                effect: e.effect,
+                joint: e.joint,
+                on: SeveralJoints::default(),
+                why: e.why,
+            })
             .collect(),
         evidence: Some(cause.evidence),
         sides: cause.effect.law.has_transmission().then(|| SidesSummary::of(cause.effect.sides)),
@@ -215,14 +221,19 @@ fn push<A, const N: usize, const P: usize>(
         effect: spec.name,
         title: spec.title,
         joint: disturbance.push.joint_number(),
+        on: SeveralJoints::default(),
         probability: disturbance.probability,
-        parameters: effect_values(&disturbance.push, &disturbance.sigma, rotary),
+        parameters: cause_values(&disturbance.push, &disturbance.sigma, rotary),
         closed: disturbance.share.clamp(0.0, 1.0),
         equivalents: Vec::new(),
         evidence: None,
         sides: None,
         log: Some(sample.data.tracks[disturbance.track].name.clone()),
     }
+}
+
+fn cause_values(effect: &EffectInstance, sigma: &[f64], rotary: bool) -> Named<CauseValue> {
+    effect_values(effect, sigma, rotary).into_iter().map(|(name, v)| (name, CauseValue::One(v))).collect()
 }
 
 fn effect_values(effect: &EffectInstance, sigma: &[f64], rotary: bool) -> Named<Value> {
@@ -279,6 +290,7 @@ fn nodes<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let summary_of = |effect: &EffectInstance| EquivalentSummary {
         effect: effect.law.spec().name,
         joint: effect.joint_number(),
+        on: SeveralJoints::default(),
         why: String::new(),
     };
     let summary = |(i, node): (usize, &crate::search::attribute::SearchNode<N, P>)| StageSummary {

@@ -25,6 +25,49 @@ pub struct Value {
     pub unit: &'static str,
 }
 
+/// The same of several joints, in their order.
+#[derive(Debug, Clone, JsonSchema, Serialize)]
+pub struct Values {
+    /// Values, SI.
+    pub value: Vec<f64>,
+    /// Standard deviations.
+    pub sigma: Vec<f64>,
+    /// SI unit.
+    pub unit: &'static str,
+}
+
+/// Value of a cause's parameter: a number, or one per joint of a cause on several.
+#[derive(Debug, Clone, JsonSchema, Serialize)]
+#[serde(untagged)]
+pub enum CauseValue {
+    /// Of a cause on one joint, on a row over two, or on the whole arm.
+    One(Value),
+    /// Of the same law on several joints.
+    Each(Values),
+}
+
+impl CauseValue {
+    /// The number, of one.
+    pub const fn one(&self) -> Option<&Value> {
+        match self {
+            Self::One(value) => Some(value),
+            Self::Each(_) => None,
+        }
+    }
+}
+
+/// Where something is that is neither on one joint nor on the whole arm.
+#[derive(Debug, Clone, Default, JsonSchema, Serialize)]
+pub struct SeveralJoints {
+    /// 1-based joints, of what is on several at once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = 1)))]
+    pub joints: Option<Vec<usize>>,
+    /// Factors of two joints' motion, of what acts on a sum or a difference of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub row: Option<[i32; 2]>,
+}
+
 /// JSON Schema (draft 2020-12) of what the core says of a diagnosis.
 pub fn schema() -> Schema {
     SchemaSettings::draft2020_12().for_serialize().into_generator().into_root_schema_for::<Diagnosis>()
@@ -161,11 +204,14 @@ pub struct Cause {
     /// 1-based joint.
     #[schemars(range(min = 1))]
     pub joint: Option<usize>,
+    /// Its joints, where it is on several.
+    #[serde(flatten)]
+    pub on: SeveralJoints,
     /// Probability.
     #[schemars(range(min = 0, max = 1))]
     pub probability: f64,
     /// Its parameters.
-    pub parameters: Named<Value>,
+    pub parameters: Named<CauseValue>,
     /// Share of the gap above the floor it removed when it was added.
     pub closed: f64,
     /// What this log does not tell from it.
@@ -219,6 +265,9 @@ pub struct EquivalentSummary {
     /// 1-based joint.
     #[schemars(range(min = 1))]
     pub joint: Option<usize>,
+    /// Its joints, where it is on several.
+    #[serde(flatten)]
+    pub on: SeveralJoints,
     /// Why.
     pub why: String,
 }
@@ -244,6 +293,9 @@ pub struct RuledOut {
     /// 1-based joint.
     #[schemars(range(min = 1))]
     pub joint: Option<usize>,
+    /// Its joints, where it is on several.
+    #[serde(flatten)]
+    pub on: SeveralJoints,
     /// What is known of it.
     pub status: Status,
     /// Upper bound of its size.

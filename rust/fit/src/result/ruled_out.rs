@@ -4,7 +4,7 @@ use crate::candidates::screen::{ScoreTest, screen};
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::covariance::NORMAL_95;
 use crate::model::hypothesis::EffectInstance;
-use crate::result::report::{Bound, RuledOut, Status};
+use crate::result::report::{Bound, RuledOut, SeveralJoints, Status};
 use crate::search::acceptance::{ALMOST, MATTERS, restores};
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
@@ -68,7 +68,14 @@ fn never_fitted<const N: usize>() -> Vec<RuledOut> {
         } else {
             (Status::Undecided, "another effect and other parameters of the arm give the same motion, always")
         };
-        RuledOut { effect: spec.name, joint, status, bound: None, why: Some(why.to_owned()) }
+        RuledOut {
+            effect: spec.name,
+            joint,
+            on: SeveralJoints::default(),
+            status,
+            bound: None,
+            why: Some(why.to_owned()),
+        }
     };
     let places = |spec: &Spec| -> Vec<Option<usize>> {
         if spec.scope == Scope::Joint { (1..=N).map(Some).collect() } else { vec![None] }
@@ -97,7 +104,14 @@ fn status<A, const N: usize, const P: usize>(
     let pinned = sigma < PINNED * typical;
     if !pinned {
         let why = format!("these logs do not pin it down; it needs {}", spec.excited_by);
-        return RuledOut { effect, joint, status: Status::NotExcited, bound: None, why: Some(why) };
+        return RuledOut {
+            effect,
+            joint,
+            on: SeveralJoints::default(),
+            status: Status::NotExcited,
+            bound: None,
+            why: Some(why),
+        };
     }
     let value = test.estimate.abs() + NORMAL_95 * sigma;
     let bound =
@@ -106,6 +120,7 @@ fn status<A, const N: usize, const P: usize>(
     RuledOut {
         effect,
         joint,
+        on: SeveralJoints::default(),
         status: if traced { Status::Undecided } else { Status::Absent },
         bound: Some(bound),
         why: traced.then(|| {
@@ -172,5 +187,5 @@ fn threshold_status(test: &ScoreTest) -> RuledOut {
         format!("these logs never reach it; it needs {}", spec.excited_by)
     };
     let status = if reached { Status::Absent } else { Status::NotExcited };
-    RuledOut { effect, joint, status, bound: None, why: Some(why) }
+    RuledOut { effect, joint, on: SeveralJoints::default(), status, bound: None, why: Some(why) }
 }

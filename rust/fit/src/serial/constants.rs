@@ -52,6 +52,9 @@ pub const RESAMPLES: usize = 400;
 /// Part of the joints that move on which a law has to be found to be one cause of the whole arm.
 pub const ARM_WIDE: f64 = 0.5;
 
+/// Laws that are tried on all joints at once, of those that explain most to first order.
+pub const ARM_WIDE_FINALISTS: usize = 2;
+
 /// Probability below which a cause is only a candidate.
 pub const NAMED: f64 = 0.3;
 

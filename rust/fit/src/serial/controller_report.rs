@@ -2,11 +2,11 @@
 
 use super::controller::{JointController, PositionController};
 use super::term::{Term, TermKind};
-use crate::result::report::{Cause, EquivalentSummary};
+use crate::result::report::{Cause, CauseValue, EquivalentSummary, SeveralJoints};
 
 /// Controllers with the settings that terms say.
 pub(super) fn with_settings(mut joints: Vec<JointController>, terms: &[Term]) -> Vec<JointController> {
-    for term in terms {
+    for term in terms.iter().flat_map(Term::members) {
         if let TermKind::Controller(of) = term.kind {
             joints[of.joint] = of.on(&joints[of.joint], term.p[0]);
         }
@@ -21,10 +21,17 @@ const NOT_TESTED: [(&str, &str); 2] = [("joint_elasticity", "a shaft that twists
 pub(super) fn behind_controller(cause: &Cause, controller: &PositionController) -> Vec<EquivalentSummary> {
     let Some(joint) = cause.joint else { return Vec::new() };
     let of = &controller.joints[joint - 1];
-    let why = |effect, why: String| EquivalentSummary { effect, joint: cause.joint, why };
+    let why = |effect, why: String| EquivalentSummary {
+        effect,
+        joint: cause.joint,
+        on: SeveralJoints::default(),
+        why,
+    };
     match cause.effect {
         "torque_offset" if of.gains[0] > 0.0 => {
-            let Some(offset) = cause.parameters.get("offset") else { return Vec::new() };
+            let Some(offset) = cause.parameters.get("offset").and_then(CauseValue::one) else {
+                return Vec::new();
+            };
             let unit = if offset.unit == "N" { "m" } else { "rad" };
             let off = figure(offset.value / of.gains[0]);
             vec![why(
@@ -81,12 +88,13 @@ mod tests {
     fn alike(effect: &'static str, rate_of_error: bool) -> Vec<&'static str> {
         let joints = vec![JointController { rate_of_error, ..SERVO }; 2];
         let controller = PositionController { joints, sigma: [vec![], vec![], vec![]] };
-        let offset = ("offset".to_owned(), Value { value: 2.0, sigma: 0.1, unit: "N m" });
-        let parameters: Named<Value> = std::iter::once(offset).collect();
+        let offset = ("offset".to_owned(), CauseValue::One(Value { value: 2.0, sigma: 0.1, unit: "N m" }));
+        let parameters: Named<CauseValue> = std::iter::once(offset).collect();
         let cause = Cause {
             effect,
             title: effect,
             joint: Some(2),
+            on: SeveralJoints::default(),
             probability: 1.0,
             parameters,
             closed: 0.5,

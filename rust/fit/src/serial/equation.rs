@@ -3,7 +3,7 @@
 use super::commanded::Commanded;
 use super::intervals::{Intervals, Middle, TestFunction};
 use super::predict::turned;
-use super::rows::{JointRows, Rows, Signal};
+use super::rows::{JointRows, Rows, Signal, sum};
 use super::term::{Term, TermKind, depends, of_load};
 use super::transmission::Computed;
 use crate::log::track::Track;
@@ -20,9 +20,6 @@ const BLOCK_S: f64 = 1.0;
 
 /// A row of which the joint is at rest for more than this share is no datum.
 const MOSTLY_AT_REST: f64 = 0.05;
-
-/// Displacement of the base's tilt for its derivative, rad; the torque is smooth in it.
-const TILT_STEP: f64 = 1e-4;
 
 /// Time over which the rate of the inertia matrix along the motion is taken, s.
 const RATE_STEP: f64 = 1e-5;
@@ -209,6 +206,11 @@ impl<const N: usize, const P: usize> Equation<N, P> {
             TermKind::BaseTilt => self.of_tilt(&term.p, theta),
             TermKind::Transmission(law) => self.of_transmission(&law, term.p[0], theta),
             TermKind::Controller(setting) => self.of_controller(setting, term.p[0]),
+            TermKind::Row(row) => self.of_row(&row, &term.p),
+            TermKind::Joints(_) => {
+                let members = term.members();
+                sum(&self.rows, &members.iter().map(|m| self.signal_with_mean(m, theta)).collect::<Vec<_>>())
+            }
         }
     }
 
@@ -412,16 +414,13 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// Gravity from another direction: to first order in the tilt.
+    /// Gravity from another direction.
     fn of_tilt(&self, p: &[f64], theta: &[f64; P]) -> Signal {
         let theta = SVector::from(*theta);
-        let size = p[0].abs().max(p[1].abs());
-        if size == 0.0 {
+        if p[0] == 0.0 && p[1] == 0.0 {
             return vec![None; N];
         }
-        let by = |scale: f64| turned(&self.arm, [p[0] * scale, p[1] * scale]);
-        let scale = TILT_STEP / size;
-        let (ahead, behind) = (by(scale), by(-scale));
+        let there = turned(&self.arm, [p[0], p[1]]);
         let zero = SVector::zeros();
         let torques: Vec<Vec<SVector<f64, N>>> = self
             .logs
@@ -433,7 +432,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
                         let y: nalgebra::SMatrix<f64, N, P> = arm.potential_regressor(&q, &zero);
                         y * theta
                     };
-                    (of(&ahead) - of(&behind)) / (2.0 * scale)
+                    of(&there) - of(&self.arm)
                 };
                 log.middles.par_iter().map(at).collect()
             })

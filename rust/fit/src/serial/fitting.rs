@@ -1,6 +1,7 @@
 //! A model with terms, fitted to the training logs and judged on the holdout.
 
 use super::constants::{ENOUGH, ITERATIONS, LOOSE};
+use super::row_term::{RowLaw, RowTerm};
 use super::rows::{Estimate, Regression, Signal, sum};
 use super::search::{Motion, Search};
 use super::term::{Term, TermKind};
@@ -8,6 +9,9 @@ use rayon::prelude::*;
 
 /// Relative step of numerical derivatives of a term's torque.
 const STEP: f64 = 1e-3;
+
+/// Precision to which an amplitude is zero that is not there.
+const HELD: f64 = 1e30;
 
 /// A model with terms, fitted to the training logs and judged on the holdout.
 #[derive(Debug, Clone)]
@@ -123,7 +127,8 @@ impl Search<'_> {
             }
             _ => motion.signal(term, theta),
         };
-        let changing: Vec<Signal> = terms.iter().filter(|t| t.changes_command()).map(taken).collect();
+        let members = terms.iter().filter(|t| t.changes_command()).flat_map(Term::members);
+        let changing: Vec<Signal> = members.map(|term| taken(&term)).collect();
         if changing.is_empty() {
             return scales;
         }
@@ -141,37 +146,38 @@ impl Search<'_> {
     }
 
     pub(super) fn rotary_of(&self, term: &Term) -> bool {
-        term.joint().is_none_or(|j| self.rotary[j - 1])
+        term.joints().first().is_none_or(|j| self.rotary[j - 1])
     }
 
     /// Terms moved by part of a step, within their bounds.
     pub(super) fn moved(&self, terms: &[Term], step: &[f64], part: f64) -> Vec<Term> {
-        let mut rest = step.iter();
+        let mut rest = step;
         terms
             .iter()
             .map(|term| {
-                let bounds = term.parameters(self.rotary_of(term));
-                let p = term
-                    .p
-                    .iter()
-                    .zip(&bounds)
-                    .map(|(p, b)| {
-                        let by = part * rest.next().copied().unwrap_or(0.0);
-                        // A shape or a threshold changes by no more than a factor of two in one step.
-                        let by =
-                            if *p == 0.0 || b.neutral == 0.0 && p.abs() < by.abs() && term.amplitudes() > 0 {
-                                by
-                            } else if term.amplitudes() == 0 && p.abs() > 0.0 {
-                                by.clamp(-0.5 * p.abs(), p.abs())
-                            } else {
-                                by
-                            };
-                        (p + by).clamp(b.bounds[0], b.bounds[1])
-                    })
-                    .collect();
-                term.with(p)
+                let (own, others) = rest.split_at(term.p.len().min(rest.len()));
+                rest = others;
+                self.moved_one(term, own, part)
             })
             .collect()
+    }
+
+    /// One term moved by part of a step, within its bounds.
+    fn moved_one(&self, term: &Term, step: &[f64], part: f64) -> Term {
+        let bounds = term.parameters(self.rotary_of(term));
+        let p = term.p.iter().zip(&bounds).enumerate().map(|(i, (p, b))| {
+            let by = part * step.get(i).copied().unwrap_or(0.0);
+            // A shape or a threshold changes by no more than a factor of two in one step.
+            let by = if *p == 0.0 || b.neutral == 0.0 && p.abs() < by.abs() && term.amplitudes() > 0 {
+                by
+            } else if term.amplitudes() == 0 && p.abs() > 0.0 {
+                by.clamp(-0.5 * p.abs(), p.abs())
+            } else {
+                by
+            };
+            (p + by).clamp(b.bounds[0], b.bounds[1])
+        });
+        term.with(p.collect())
     }
 
     /// Derivatives of the terms' torques by all their parameters.
@@ -181,7 +187,7 @@ impl Search<'_> {
         places
             .par_iter()
             .map(|&(i, k)| {
-                let term = &terms[i];
+                let (term, k) = terms[i].moved_by(k);
                 let step = STEP * if term.p[k] == 0.0 { 1.0 } else { term.p[k].abs() };
                 let at = |sign: f64| {
                     let mut p = term.p.clone();
@@ -205,13 +211,16 @@ impl Search<'_> {
                 let sigma = &self.prior.sigma[10 * link..];
                 (0..columns).map(|i| if sigma[i] > 0.0 { (LOOSE * sigma[i]).powi(-2) } else { 0.0 }).collect()
             }
+            TermKind::Row(RowTerm { law: RowLaw::Transmission(free), .. }) => {
+                free.iter().map(|free| if *free { 0.0 } else { HELD }).take(columns).collect()
+            }
             _ => vec![0.0; columns],
         }
     }
 }
 
 /// Difference of two signals over a step.
-fn difference(a: &Signal, b: &Signal, step: f64) -> Signal {
+pub(super) fn difference(a: &Signal, b: &Signal, step: f64) -> Signal {
     a.iter()
         .zip(b)
         .map(|(a, b)| match (a, b) {

@@ -6,8 +6,11 @@
 //! how far the gap shrinks. The way of the data is `intervals` (log) -> `equation` (rows, torques of terms) -> `rows` (regression) ->
 //! `search` (which terms) -> `predict` (gap) -> `result`.
 
+mod arm_wide;
+mod cause_report;
 mod closed_loop;
 mod commanded;
+mod conclusion;
 mod constants;
 pub mod controller;
 mod controller_report;
@@ -19,9 +22,11 @@ mod intervals;
 mod predict;
 mod regularisation;
 mod result;
+mod row_term;
 mod rows;
 mod screening;
 mod search;
+mod several_joints;
 mod term;
 mod transmission;
 
@@ -234,7 +239,7 @@ fn controller_settings(controller: &PositionController, inertia: &[f64], period:
     let group = |setting: Setting, joint: usize| {
         let guesses = setting.guesses(&controller.joints[joint], inertia[joint], period);
         let kind = TermKind::Controller(ControllerTerm { setting, joint });
-        guesses.into_iter().map(|value| Term { kind, p: vec![value], degrees: 1.0 }).collect()
+        guesses.into_iter().map(|value| Term { kind: kind.clone(), p: vec![value], degrees: 1.0 }).collect()
     };
     let all = Setting::ALL.into_iter().flat_map(|s| (0..controller.joints.len()).map(move |j| (s, j)));
     all.map(|(setting, joint)| group(setting, joint)).collect()
@@ -297,6 +302,7 @@ fn candidates<const N: usize, const P: usize>(
             groups.push(places.map(term).collect());
         }
     }
+    groups.extend(row_term::candidates(&arm.joints().iter().map(|joint| joint.kind).collect::<Vec<_>>()));
     if gravity > 0.0 {
         groups.push(vec![Term::neutral(TermKind::BaseTilt)]);
     }

@@ -1,6 +1,7 @@
 //! Predictions of a serial arm with terms, over short windows and over whole logs.
 
 use super::closed_loop::ClosedLoop;
+use super::row_term::{RowTerm, without_rows};
 use super::term::{Term, TermKind, of_load};
 use crate::model::hypothesis::Hypothesis;
 use crate::predict::window::{Dataset, Window};
@@ -13,13 +14,15 @@ pub struct Model<const N: usize, const P: usize> {
     arm: Chain<f64, N>,
     hypothesis: Hypothesis<P>,
     closed_loop: Option<ClosedLoop<N>>,
+    rows: Vec<(RowTerm, Vec<f64>)>,
 }
 
 impl<const N: usize, const P: usize> Model<N, P> {
     /// The arm with these parameters and terms.
     pub fn new(arm: &Chain<f64, N>, theta: [f64; P], terms: &[Term]) -> Self {
-        let mut model = Self { arm: *arm, hypothesis: Hypothesis::rigid(theta), closed_loop: None };
-        for term in terms {
+        let mut model =
+            Self { arm: *arm, hypothesis: Hypothesis::rigid(theta), closed_loop: None, rows: Vec::new() };
+        for term in terms.iter().flat_map(Term::members) {
             match term.kind {
                 TermKind::Law(_) => model.hypothesis.effects.extend(term.effect()),
                 TermKind::Payload => model.add(N - 1, &of_load(&term.p)),
@@ -32,8 +35,9 @@ impl<const N: usize, const P: usize> Model<N, P> {
                     model.hypothesis.effects.push(effect);
                 }
                 TermKind::BaseTilt => model.arm = turned(&model.arm, [term.p[0], term.p[1]]),
-                // A part of the closed loop.
-                TermKind::Controller(_) => {}
+                TermKind::Row(row) => model.rows.push((row, term.p)),
+                // A part of the closed loop; members of what is on several joints.
+                TermKind::Controller(_) | TermKind::Joints(_) => {}
             }
         }
         model
@@ -52,6 +56,15 @@ impl<const N: usize, const P: usize> Model<N, P> {
 
     /// Predicted positions of all windows.
     pub fn predict(&self, data: &Dataset<N>) -> Vec<f64> {
+        if !self.rows.is_empty() {
+            let tracks = data.tracks.iter().map(|track| without_rows(track, &self.rows)).collect();
+            let beside = Dataset { tracks, windows: data.windows.clone(), rows: data.rows };
+            return self.predict_along(&beside);
+        }
+        self.predict_along(data)
+    }
+
+    fn predict_along(&self, data: &Dataset<N>) -> Vec<f64> {
         match &self.closed_loop {
             Some(closed_loop) => closed_loop.predict(data, &self.arm, &self.hypothesis),
             None => data.predict_singly(&self.arm, &self.hypothesis),

@@ -1,13 +1,13 @@
 //! From the end of a search to the diagnosis as data.
 
+use super::cause_report::{cause, ruled_out};
 use super::closed_loop::ClosedLoop;
-use super::constants::{CONSEQUENCE, NAMED, NOTICED, SIGNIFICANT};
-use super::controller::PositionController;
-use super::controller_report::{behind_controller, gains_note, with_settings};
+use super::constants::NAMED;
+use super::controller_report::{gains_note, with_settings};
 use super::fitting::Fitted;
 use super::predict::{Model, floor};
-use super::search::{Found, Tested};
-use super::term::{Term, TermKind};
+use super::search::Found;
+use super::term::Term;
 use super::{SerialArm, Set};
 use crate::locate::regimes::Location;
 use crate::log::input::Options;
@@ -16,28 +16,14 @@ use crate::predict::window::Dataset;
 use crate::progress::{Phase, ProgressReporter};
 use crate::result::gap::{HORIZONS, closed, free_run_series, limited, rms, whole, window_series};
 use crate::result::report::{
-    ArmSummary, AtHorizon, Bound, Candidate, Cause, Diagnosis, EquivalentSummary, FreeRun, FreeRunSeries,
-    Gap, LogSummary, Named, Noise, OptionSummary, Parameters, RuledOut, Status, Value,
+    ArmSummary, AtHorizon, Candidate, Cause, Diagnosis, FreeRun, FreeRunSeries, Gap, LogSummary, Named,
+    Noise, OptionSummary, Parameters, Value,
 };
 use crate::result::verdict::Evidence;
 use armgap_core::chain::Chain;
-use armgap_core::effect::{Effect, Scope, Trial, catalogue};
-
-/// Quantile of the normal distribution for bounds at 95 %.
-const NORMAL_95: f64 = 1.645;
-
-/// An effect that is known no better than to this part of the joint's torque has not been excited.
-const NOT_EXCITED: f64 = 0.2;
-
-/// Unexplained share of a joint's torque in which a transmission that gives way may hide: what it does beyond first order.
-const HIDES: f64 = 0.01;
 
 /// Resamples of the holdout's windows for the interval of the closed share.
 const RESAMPLES: usize = 500;
-
-const NOT_TESTED: &str = "not tested on serial arms from such logs";
-
-const LOOK_ALIKE: &str = "explains the torque along these logs as well";
 
 /// The three models a report compares, and their predictions on the holdout.
 struct Compared<const N: usize, const P: usize> {
@@ -135,45 +121,6 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
         notes: notes(found, training, holdout, &rotary),
         gap,
     }
-}
-
-fn rotary_of(term: &Term, rotary: &[bool]) -> bool {
-    term.joint().is_none_or(|j| rotary[j - 1])
-}
-
-fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
-    let parameters = term.parameters(rotary_of(term, rotary));
-    let value = |(i, p): (usize, &super::term::TermParameter)| {
-        let sigma = sigma.get(i).copied().filter(|s| s.is_finite()).unwrap_or(0.0);
-        match p.inverse {
-            Some((name, unit)) if term.p[i] != 0.0 => {
-                (name.to_owned(), Value { value: 1.0 / term.p[i], sigma: sigma / term.p[i].powi(2), unit })
-            }
-            _ => (p.name.to_owned(), Value { value: term.p[i], sigma, unit: p.unit }),
-        }
-    };
-    parameters.iter().enumerate().map(value).collect()
-}
-
-fn cause(named: &super::search::Named, rotary: &[bool], controller: Option<&PositionController>) -> Cause {
-    let term = &named.term;
-    let alike =
-        |t: &Term| EquivalentSummary { effect: t.name(), joint: t.joint(), why: LOOK_ALIKE.to_owned() };
-    let mut cause = Cause {
-        effect: term.name(),
-        title: term.title(),
-        joint: term.joint(),
-        probability: named.probability,
-        parameters: named_values(term, &named.sigma, rotary),
-        closed: named.evidence.share.clamp(0.0, 1.0),
-        equivalents: named.alike.iter().map(alike).collect(),
-        evidence: None,
-        sides: None,
-        log: None,
-    };
-    let behind = controller.map(|controller| behind_controller(&cause, controller));
-    cause.equivalents.extend(behind.into_iter().flatten());
-    cause
 }
 
 /// The arm as the arm file has it, with its parameters estimated again, and with the named terms; behind the position controllers of the holdout.
@@ -329,72 +276,6 @@ fn unexplained<const N: usize, const P: usize>(set: &Fitted, holdout: &Set<N, P>
         (y > 0.0).then(|| (square(&residual[j]) / y).sqrt())
     };
     (0..N).map(share).collect()
-}
-
-/// Status of every place that is not in the model.
-fn ruled_out(found: &Found, unexplained: &[Option<f64>], rotary: &[bool]) -> Vec<RuledOut> {
-    let named = |t: &Tested| found.named.iter().any(|n| n.term.same_place(&t.term));
-    let mut all: Vec<RuledOut> =
-        found.tested.iter().filter(|t| !named(t)).map(|t| status(found, unexplained, t, rotary)).collect();
-    let is_tested = |name: &str, j: usize| {
-        let tested = found.tested.iter().map(|t| &t.term).chain(found.named.iter().map(|n| &n.term));
-        tested.into_iter().any(|t| t.name() == name && t.joint() == Some(j + 1))
-    };
-    let hidden_from_encoders = |law: &&&'static dyn Effect<f64>| {
-        law.has_transmission() || law.spec().scope == Scope::Joint && law.spec().trial == Trial::Disturbance
-    };
-    for law in catalogue::<f64>().iter().filter(hidden_from_encoders) {
-        let open = (0..rotary.len()).filter(|j| !is_tested(law.spec().name, *j));
-        all.extend(open.map(|j| RuledOut {
-            effect: law.spec().name,
-            joint: Some(j + 1),
-            status: Status::Undecided,
-            bound: None,
-            why: Some(NOT_TESTED.to_owned()),
-        }));
-    }
-    all
-}
-
-fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &[bool]) -> RuledOut {
-    let term = &tested.term;
-    let (effect, joint) = (term.name(), term.joint());
-    let entry = |status, bound, why| RuledOut { effect, joint, status, bound, why };
-    let alike = found.named.iter().find(|n| n.alike.iter().any(|a| a.same_place(term)));
-    if let Some(cause) = alike {
-        let place = cause.term.joint().map_or_else(String::new, |j| format!(" of joint {j}"));
-        let why = format!("looks like {}{place} in these logs", cause.term.name());
-        return entry(Status::Undecided, None, Some(why));
-    }
-    let [size, sigma] = tested.size;
-    let known = sigma * tested.consequence;
-    if !known.is_finite() || known > NOT_EXCITED || tested.consequence == 0.0 {
-        return entry(Status::NotExcited, None, Some("these logs do not pin its size down".to_owned()));
-    }
-    let statistic = (size / sigma.max(f64::MIN_POSITIVE)).powi(2);
-    let largest = size.abs() + NORMAL_95 * sigma;
-    if statistic > SIGNIFICANT - NOTICED && largest * tested.consequence > 10.0 * CONSEQUENCE {
-        let why = "explains a part of what remains, and too little of it to be named".to_owned();
-        return entry(Status::Undecided, None, Some(why));
-    }
-    if let TermKind::Transmission(law) = term.kind
-        && let Some(left) = unexplained[law.joint].filter(|left| *left > HIDES)
-    {
-        let why = format!(
-            "its test is to first order, and {:.1} % of the joint's torque is unexplained",
-            100.0 * left
-        );
-        return entry(Status::Undecided, None, Some(why));
-    }
-    let parameters = term.parameters(rotary_of(term, rotary));
-    let bound = (term.amplitudes() > 0 && !matches!(term.kind, TermKind::NominalLink(_)))
-        .then(|| {
-            let p = parameters.first()?;
-            let value = (largest * (term.p[0] - p.neutral)).abs();
-            value.is_finite().then_some(Bound { parameter: p.name, value, unit: p.unit, level: 0.95 })
-        })
-        .flatten();
-    entry(Status::Absent, bound, None)
 }
 
 fn values(description: &SerialArm, theta: &[f64], sigma: &[f64]) -> Named<Value> {

@@ -1,7 +1,8 @@
 //! First-order tests of all candidates, and fits of those that pass.
 
 use super::constants::{FINALISTS, PRICE};
-use super::fitting::Fitted;
+use super::fitting::{Fitted, difference};
+use super::row_term::{RowLaw, RowTerm};
 use super::rows::{Estimate, Regression, Signal};
 use super::search::Search;
 use super::term::{Term, TermKind};
@@ -11,6 +12,9 @@ use rayon::prelude::*;
 
 /// A first-order test is not trusted farther than so many initial guesses.
 const FARTHEST: f64 = 50.0;
+
+/// Tilt of the base from which the first-order test follows, rad; its torque is smooth.
+const TILT_STEP: f64 = 1e-3;
 
 /// A term at an initial guess with the torques of its first-order test, along the training logs.
 pub struct Guess {
@@ -32,6 +36,19 @@ impl Search<'_> {
                     let at =
                         |phase: f64| self.training.signal(&term.with(vec![1.0, term.p[1], phase]), theta);
                     vec![at(0.0), at(std::f64::consts::FRAC_PI_2)]
+                }
+                TermKind::Row(RowTerm { law: RowLaw::Spring, .. }) => {
+                    let [far, near] =
+                        [-1.0, 0.0].map(|q0| self.training.signal(&term.with(vec![1.0, q0]), theta));
+                    let preload = difference(&far, &near, 1.0);
+                    vec![near, preload]
+                }
+                TermKind::BaseTilt => {
+                    let none = self.training.signal(&term.with(vec![0.0; 2]), theta);
+                    let at = |p: [f64; 2]| {
+                        difference(&self.training.signal(&term.with(p.to_vec()), theta), &none, TILT_STEP)
+                    };
+                    vec![at([TILT_STEP, 0.0]), at([0.0, TILT_STEP])]
                 }
                 _ if term.amplitudes() == 0 => vec![self.training.signal(term, theta)],
                 _ => (0..term.amplitudes()).map(|i| self.unit(term, i, theta)).collect(),
@@ -76,6 +93,14 @@ impl Search<'_> {
         if matches!(term.kind, TermKind::Law(effect) if effect.is_periodic()) {
             let (sine, cosine) = (score.size[0], score.size[1]);
             return Some((term.with(vec![sine.hypot(cosine), term.p[1], cosine.atan2(sine)]), score.gain));
+        }
+        match term.kind {
+            TermKind::Row(RowTerm { law: RowLaw::Spring, .. }) => {
+                let (k, preload) = (score.size[0], score.size[1]);
+                return (k != 0.0).then(|| (term.with(vec![k, -preload / k]), score.gain));
+            }
+            TermKind::Row(row) => return test_row(regression, at, guess, row),
+            _ => {}
         }
         let count = term.amplitudes();
         if count > 0 {
@@ -178,5 +203,24 @@ impl Search<'_> {
                 self.fit(regression, terms, &model.estimate.theta)
             })
             .collect()
+    }
+}
+
+/// Tests inertia and friction along a row, none of which can be negative.
+fn test_row(regression: &Regression, at: &Estimate, guess: &Guess, row: RowTerm) -> Option<(Term, f64)> {
+    let mut free: Vec<usize> = (0..guess.columns.len()).collect();
+    loop {
+        let columns: Vec<Signal> = free.iter().map(|i| guess.columns[*i].clone()).collect();
+        let score = regression.score(at, &columns, &vec![0.0; columns.len()])?;
+        let (least, size) = score.size.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1))?;
+        if *size < 0.0 {
+            free.remove(least);
+            continue;
+        }
+        let mut p = vec![0.0; guess.columns.len()];
+        free.iter().zip(&score.size).for_each(|(i, size)| p[*i] = *size);
+        let law = RowLaw::Transmission(std::array::from_fn(|i| free.contains(&i)));
+        let kind = TermKind::Row(RowTerm { law, ..row });
+        return Some((Term { kind, p, degrees: free.len() as f64 }, score.gain));
     }
 }

@@ -1,14 +1,11 @@
 //! Which terms a serial arm's model lacks: added one after another, dropped when idle.
 
-use super::constants::{ALIKE, ALIKE_COST, ARM_WIDE, NAMED};
-use super::evidence::{Evidence, consequence, stability, trust};
+use super::evidence::Evidence;
 use super::fitting::Fitted;
-use super::rows::{JointRows, Prior, Regression, Rows, Signal};
+use super::rows::{Prior, Regression, Rows, Signal};
 use super::screening::Guess;
 use super::term::Term;
 use crate::progress::{Phase, ProgressReporter};
-use armgap_core::chain::LINK_PARAMETERS;
-use rayon::prelude::*;
 
 /// Rows of an arm along some logs, and the torques of terms along them.
 pub trait Motion: Sync {
@@ -96,8 +93,7 @@ impl Search<'_> {
         let guesses = self.guesses(&regression, &model.estimate);
         for _ in 0..most {
             let Some(added) = self.best_addition(&guesses, &regression, &model) else { break };
-            let mut terms = model.terms.clone();
-            terms.extend(added);
+            let terms = self.joined(model.terms.clone(), added);
             let beside = self.beside(self.training, &terms, &model.estimate.theta);
             regression = Regression::reweighted(self.training.rows(), self.prior, &beside);
             model = self.without_idle(&regression, self.fit(&regression, terms, &model.estimate.theta));
@@ -109,68 +105,35 @@ impl Search<'_> {
         self.concluded(&guesses, &regression, [refit, model], sigma, seed)
     }
 
-    /// The terms of the best decision; none where no candidate is accepted.
-    fn best_addition(
-        &self,
-        guesses: &[Vec<Guess>],
-        regression: &Regression,
-        model: &Fitted,
-    ) -> Option<Vec<Term>> {
+    /// The term of the best decision; none where no candidate is accepted.
+    fn best_addition(&self, guesses: &[Vec<Guess>], regression: &Regression, model: &Fitted) -> Option<Term> {
         let screened = self.screened(guesses, regression, model);
-        let fitted = self.finalists(regression, model, &screened);
+        let single = self.finalists(regression, model, &screened);
         let last = model.terms.len();
-        let accepted: Vec<&Fitted> =
-            fitted.iter().filter(|with| self.evidence(regression, model, with, last).is_accepted()).collect();
-        let best = accepted.iter().min_by(|a, b| a.total().total_cmp(&b.total()))?;
-        let term = &best.terms[last];
-        Some(self.everywhere(regression, model, &screened, term).unwrap_or_else(|| vec![term.clone()]))
-    }
-
-    /// The same law on every joint where it is accepted, if these are enough to be one cause of the whole arm.
-    fn everywhere(
-        &self,
-        regression: &Regression,
-        model: &Fitted,
-        screened: &[(Term, f64)],
-        best: &Term,
-    ) -> Option<Vec<Term>> {
-        if !best.is_of_a_joint() {
-            return None;
-        }
-        let last = model.terms.len();
-        let moving = self.training.rows().joints.iter().filter(|r| !r.y.is_empty()).count();
-        let alike: Vec<&Term> = screened
-            .iter()
-            .map(|(t, _)| t)
-            .filter(|t| t.name() == best.name() && !t.same_place(best))
-            .collect();
-        let mut all: Vec<Term> = alike
-            .par_iter()
-            .filter_map(|term| {
-                let mut terms = model.terms.clone();
-                terms.push((*term).clone());
-                let with = self.fit(regression, terms, &model.estimate.theta);
-                let accepted = self.is_accepted(regression, [model, &with], last);
-                accepted.then(|| with.terms[last].clone())
-            })
-            .collect();
-        all.push(best.clone());
-        let enough = (ARM_WIDE * moving as f64).max(2.0);
-        (all.len() as f64 >= enough).then_some(all)
+        let accepted =
+            single.into_iter().filter(|with| self.evidence(regression, model, with, last).is_accepted());
+        let on_several = self.on_several_joints(regression, model, &screened);
+        let best = accepted.chain(on_several).min_by(|a, b| a.total().total_cmp(&b.total()))?;
+        Some(best.terms[last].clone())
     }
 
     /// Whether term `index` of the second model is accepted beside the first, which lacks it.
-    fn is_accepted(&self, regression: &Regression, [without, with]: [&Fitted; 2], index: usize) -> bool {
+    pub(super) fn is_accepted(
+        &self,
+        regression: &Regression,
+        [without, with]: [&Fitted; 2],
+        index: usize,
+    ) -> bool {
         !self.is_sampling(&with.terms[index]) && self.evidence(regression, without, with, index).is_accepted()
     }
 
     /// Whether a term is a delay or lag of less than a sample period.
     fn is_sampling(&self, term: &Term) -> bool {
-        term.is_delay() && term.p[0] < self.period
+        term.is_delay() && term.members().iter().all(|member| member.p[0] < self.period)
     }
 
     /// The model without term `index`, fitted.
-    fn without(&self, regression: &Regression, model: &Fitted, index: usize) -> Fitted {
+    pub(super) fn without(&self, regression: &Regression, model: &Fitted, index: usize) -> Fitted {
         let mut terms = model.terms.clone();
         terms.remove(index);
         self.fit(regression, terms, &model.estimate.theta)
@@ -190,137 +153,6 @@ impl Search<'_> {
         }
         model
     }
-
-    /// Probabilities, look-alikes, and tests of what is not in the model.
-    fn concluded(
-        &self,
-        guesses: &[Vec<Guess>],
-        regression: &Regression,
-        [refit, model]: [Fitted; 2],
-        refit_sigma: Vec<f64>,
-        seed: u64,
-    ) -> Found {
-        let mut named: Vec<Named> =
-            (0..model.terms.len()).map(|i| self.named(guesses, regression, &model, i, seed)).collect();
-        named.sort_by(|a, b| {
-            (b.evidence.gain + b.evidence.holdout_gain)
-                .total_cmp(&(a.evidence.gain + a.evidence.holdout_gain))
-        });
-        let tested = self.tested(guesses, regression, &model);
-        // Re-estimated costs are comparable only under the same weights.
-        let refit = if model.terms.is_empty() {
-            refit
-        } else {
-            self.fit(regression, Vec::new(), &refit.estimate.theta)
-        };
-        let probable = named.iter().filter(|n| n.probability >= NAMED).map(|n| n.term.clone()).collect();
-        let reported = self.feasible(regression, self.fit(regression, probable, &model.estimate.theta));
-        let refit_feasible = self.feasible(regression, refit.clone());
-        Found {
-            refit,
-            refit_feasible,
-            named,
-            reported,
-            tested,
-            sigma: [refit_sigma, regression.sigma()],
-            model,
-        }
-    }
-
-    /// A model whose links are so near to those of the arm file that the inertia matrix is positive definite, with rotor inertias and friction
-    /// estimated again.
-    fn feasible(&self, regression: &Regression, model: Fitted) -> Fitted {
-        if (self.is_feasible)(&model.estimate.theta) {
-            return model;
-        }
-        let links = LINK_PARAMETERS * self.rotary.len();
-        let mut prior = self.prior.clone();
-        for part in [0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0] {
-            for i in 0..links {
-                let nominal = self.prior.theta[i];
-                prior.theta[i] = nominal + part * (model.estimate.theta[i] - nominal);
-                prior.sigma[i] = 0.0;
-            }
-            let near = Regression::new(self.training.rows(), &prior, regression.weights.clone());
-            let fitted = self.fit(&near, model.terms.clone(), &prior.theta);
-            if (self.is_feasible)(&fitted.estimate.theta) {
-                return fitted;
-            }
-        }
-        model
-    }
-
-    /// Cost that noisy positions alone put into the holdout's rows, by joint.
-    fn floor(&self, regression: &Regression) -> Vec<f64> {
-        let of = |(rows, w): (&JointRows, &f64)| w * rows.floor.iter().map(|f| f * f).sum::<f64>();
-        self.holdout.rows().joints.iter().zip(&regression.weights).map(of).collect()
-    }
-
-    fn named(
-        &self,
-        guesses: &[Vec<Guess>],
-        regression: &Regression,
-        model: &Fitted,
-        index: usize,
-        seed: u64,
-    ) -> Named {
-        let term = model.terms[index].clone();
-        let without = self.without(regression, model, index);
-        let evidence = self.evidence(regression, &without, model, index);
-        let mut rivals = self.finalists(regression, &without, &self.screened(guesses, regression, &without));
-        let last = without.terms.len();
-        rivals.retain(|r| !r.terms[last].same_place(&term));
-        let explained = without.total() - model.total();
-        let alike = |rival: &Fitted| {
-            rival.total() - model.total() < (ALIKE * explained).max(ALIKE_COST)
-                || rival.terms[last].includes(&term, self.rotary.len())
-        };
-        let (same, others): (Vec<Fitted>, Vec<Fitted>) = rivals.into_iter().partition(alike);
-        let mut against: Vec<&Fitted> = others.iter().collect();
-        against.push(&without);
-        let wins = stability(model, &against, seed);
-        let trust = trust(&without, model, &evidence, &self.floor(regression));
-        let columns = self.derivatives(std::slice::from_ref(&term), &model.estimate.theta);
-        let sigma =
-            regression.score(&model.estimate, &columns, &self.ridge_of(&term, columns.len())).map_or_else(
-                || vec![f64::INFINITY; term.p.len()],
-                |score| {
-                    let covariance = regression.sandwich(&model.estimate, &columns, &score);
-                    // Blocks do not show how far the arm file's values are off; the information does, which holds their prior.
-                    let variance = |i: usize| covariance[(i, i)].max(score.inverse()[(i, i)]).max(0.0);
-                    (0..term.p.len()).map(|i| variance(i).sqrt()).collect()
-                },
-            );
-        let mut alike: Vec<Term> = same.into_iter().map(|r| r.terms[last].clone()).collect();
-        let including = self.candidates.iter().filter_map(|group| group.first());
-        for other in including.filter(|other| other.includes(&term, self.rotary.len())) {
-            if !alike.iter().any(|t| t.same_place(other)) {
-                alike.push(other.clone());
-            }
-        }
-        Named { term, sigma, evidence, probability: wins * trust, alike }
-    }
-
-    /// Tests of every place that is not in the model, beside it.
-    fn tested(&self, guesses: &[Vec<Guess>], regression: &Regression, model: &Fitted) -> Vec<Tested> {
-        let screened = self.screened(guesses, regression, model);
-        let open = self.candidates.iter().filter_map(|group| group.first());
-        open.filter(|term| !model.terms.iter().any(|t| t.same_place(term)))
-            .map(|first| {
-                let found = screened.iter().find(|(t, _)| t.same_place(first));
-                let term = found.map_or_else(|| first.clone(), |(t, _)| t.clone());
-                let signal = self.training.signal(&term, &model.estimate.theta);
-                let column = std::slice::from_ref(&signal);
-                let score = regression.score(&model.estimate, column, &[0.0]);
-                let size = score.map_or([0.0, f64::INFINITY], |score| {
-                    let sigma = regression.sandwich(&model.estimate, column, &score)[(0, 0)].max(0.0).sqrt();
-                    [score.size[0], sigma]
-                });
-                let consequence = consequence(self.training.rows(), &signal);
-                Tested { term, size, consequence }
-            })
-            .collect()
-    }
 }
 
 #[cfg(test)]
@@ -329,7 +161,10 @@ mod tests {
     use crate::model::hypothesis::EffectInstance;
     use crate::numeric::random::Random;
     use crate::progress::{Control, Observer};
+    use crate::serial::row_term::{self, RowLaw, RowTerm};
     use crate::serial::rows::JointRows;
+    use crate::serial::term::TermKind;
+    use armgap_core::chain::JointKind;
     use armgap_core::effect::find;
 
     const ROWS: usize = 600;
@@ -345,6 +180,14 @@ mod tests {
     }
 
     fn sine(term: &Term, phase: f64) -> Signal {
+        if let TermKind::Row(row) = term.kind {
+            // Each amplitude has a rate of its own; the second joint feels the same with the row's factor.
+            let wave = |k: usize| (1..=3).map(|i| term.p[i - 1] * (0.31 * (i * k) as f64).sin()).sum::<f64>();
+            return [1.0, row.factor].map(|by| Some((0..ROWS).map(|k| by * wave(k)).collect())).into();
+        }
+        if term.is_on_several_joints() {
+            return (0..2).map(|j| term.members().iter().find_map(|m| sine(m, phase)[j].clone())).collect();
+        }
         let wave = (0..ROWS).map(|k| term.p[0] * (rate(term) * k as f64 + phase).sin()).collect();
         (0..2).map(|j| (term.joint() == Some(j + 1)).then(|| Vec::clone(&wave))).collect()
     }
@@ -391,11 +234,37 @@ mod tests {
         Term::of_law(EffectInstance::new(find(name).unwrap(), joint, [size, 0.0, 0.0]))
     }
 
+    fn prior() -> Prior {
+        Prior { theta: vec![1.8; 2], sigma: vec![0.5; 2], positive: vec![false; 2] }
+    }
+
+    fn progress() -> ProgressReporter {
+        let observer: Observer = std::sync::Arc::new(|_| Control::Go);
+        ProgressReporter::new(observer)
+    }
+
+    fn search<'a>(
+        training: &'a Sines,
+        holdout: &'a Sines,
+        prior: &'a Prior,
+        candidates: Vec<Vec<Term>>,
+        progress: &'a ProgressReporter,
+    ) -> Search<'a> {
+        Search {
+            training,
+            holdout,
+            prior,
+            candidates,
+            rotary: vec![true; 2],
+            period: 0.0025,
+            is_feasible: &|_| true,
+            progress,
+        }
+    }
+
     fn found(truth: &[Term], most: usize) -> Found {
         let (training, holdout) = (Sines::with(truth, 1), Sines::with(truth, 2));
-        let prior = Prior { theta: vec![1.8; 2], sigma: vec![0.5; 2], positive: vec![false; 2] };
-        let observer: Observer = std::sync::Arc::new(|_| Control::Go);
-        let progress = ProgressReporter::new(observer);
+        let (prior, progress) = (prior(), progress());
         let names = [
             "torque_offset",
             "quadratic_drag",
@@ -403,18 +272,11 @@ mod tests {
             "load_dependent_friction",
             "actuator_delay",
         ];
-        let candidates = names.iter().flat_map(|name| (0..2).map(|j| vec![law(name, j, 0.05)])).collect();
-        let search = Search {
-            training: &training,
-            holdout: &holdout,
-            prior: &prior,
-            candidates,
-            rotary: vec![true; 2],
-            period: 0.0025,
-            is_feasible: &|_| true,
-            progress: &progress,
-        };
-        search.run(most, 1)
+        let on_joints = names.iter().flat_map(|name| (0..2).map(|j| vec![law(name, j, 0.05)]));
+        let rows = row_term::candidates(&[JointKind::Revolute; 2]);
+        let rows = rows.into_iter().filter(|group| group[0].name() == "coupled_transmission");
+        let candidates = on_joints.chain(rows).collect();
+        search(&training, &holdout, &prior, candidates, &progress).run(most, 1)
     }
 
     fn names(found: &Found) -> Vec<(&'static str, Option<usize>)> {
@@ -451,7 +313,51 @@ mod tests {
     #[test]
     fn a_law_on_all_joints_is_one_decision() {
         let found = found(&[offset(0, 0.5), offset(1, 0.6)], 1);
-        assert_eq!(found.named.len(), 2);
+        assert_eq!(names(&found), [("torque_offset", None)]);
+        let term = &found.named[0].term;
+        assert_eq!((term.joints(), term.degrees), (vec![1, 2], 2.0));
+        assert!((term.p[0] - 0.5).abs() < 0.01 && (term.p[1] - 0.6).abs() < 0.01, "{:?}", term.p);
+        assert!(found.named[0].probability > 0.9);
+    }
+
+    #[test]
+    fn a_delay_of_all_joints_is_one_value() {
+        let found = found(&[law("actuator_delay", 0, 0.3), law("actuator_delay", 1, 0.3)], 1);
+        assert_eq!(names(&found), [("actuator_delay", None)]);
+        let term = &found.named[0].term;
+        assert!(term.has_common_value() && (term.p[0] - 0.3).abs() < 0.01, "{:?}", term.p);
+    }
+
+    #[test]
+    fn delays_that_differ_have_a_value_each() {
+        let found = found(&[law("actuator_delay", 0, 0.2), law("actuator_delay", 1, 0.4)], 1);
+        assert_eq!(names(&found), [("actuator_delay", None)]);
+        assert_eq!(found.named[0].term.p.len(), 2);
+    }
+
+    #[test]
+    fn a_law_found_on_one_joint_after_another_is_one_cause() {
+        let (training, prior) = (Sines::with(&[], 1), prior());
+        let progress = progress();
+        let search = search(&training, &training, &prior, Vec::new(), &progress);
+        let joined = search.joined(vec![offset(0, 0.5)], offset(1, 0.1));
+        assert_eq!((joined.len(), joined[0].joints()), (1, vec![1, 2]));
+        let apart = search.joined(vec![offset(0, 0.5)], law("quadratic_drag", 1, 0.1));
+        assert_eq!(apart.len(), 2);
+    }
+
+    #[test]
+    fn friction_along_a_row_over_two_joints_is_one_cause_that_is_not_negative() {
+        let row = RowTerm { first: 0, factor: -1.0, law: RowLaw::Transmission([true; 3]) };
+        let truth = Term::neutral(TermKind::Row(row)).with(vec![-0.3, 0.2, 0.4]);
+        let found = found(&[truth], 1);
+        let term = &found.named[0].term;
+        assert_eq!(
+            (term.name(), term.joints(), term.row()),
+            ("coupled_transmission", vec![1, 2], Some([1, -1]))
+        );
+        assert_eq!((term.p[0], term.degrees), (0.0, 2.0));
+        assert!((term.p[1] - 0.2).abs() < 0.01 && (term.p[2] - 0.4).abs() < 0.01, "{:?}", term.p);
     }
 
     #[test]

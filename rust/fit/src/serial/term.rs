@@ -1,6 +1,8 @@
 //! Terms that a serial arm's model may lack: the library's laws joint by joint, and what changes the arm itself.
 
 use super::controller_term::{ControllerTerm, Setting};
+use super::row_term::{RowLaw, RowTerm};
+use super::several_joints::SeveralJoints;
 use super::transmission::TransmissionLaw;
 use crate::model::hypothesis::EffectInstance;
 use armgap_core::chain::LINK_NAMES;
@@ -18,7 +20,7 @@ pub struct Term {
 }
 
 /// What a term is.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub enum TermKind {
     /// A law of the library on one joint; the values of the instance are an initial guess.
     Law(EffectInstance),
@@ -32,6 +34,10 @@ pub enum TermKind {
     Transmission(TransmissionLaw),
     /// A setting of a position controller.
     Controller(ControllerTerm),
+    /// The same law on several joints.
+    Joints(SeveralJoints),
+    /// A term on a sum or a difference of two joints' motion.
+    Row(RowTerm),
 }
 
 /// Name and unit of one parameter.
@@ -67,6 +73,8 @@ impl Term {
             TermKind::BaseTilt => TURN.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
             TermKind::Transmission(_) | TermKind::Controller(_) => 1,
+            TermKind::Joints(ref of) => of.members.iter().map(|m| m.p.len()).sum(),
+            TermKind::Row(row) => row.len(),
         };
         Self { kind, p: vec![0.0; count], degrees: count as f64 }
     }
@@ -80,6 +88,8 @@ impl Term {
             TermKind::NominalLink(_) => "nominal_link",
             TermKind::Transmission(law) => law.name(),
             TermKind::Controller(of) => of.setting.name(),
+            TermKind::Joints(ref of) => of.members[0].name(),
+            TermKind::Row(row) => row.name(),
         }
     }
 
@@ -92,6 +102,8 @@ impl Term {
             TermKind::NominalLink(_) => "wrong nominal link",
             TermKind::Transmission(law) => law.title(),
             TermKind::Controller(of) => of.setting.title(),
+            TermKind::Joints(ref of) => of.members[0].title(),
+            TermKind::Row(row) => row.title(),
         }
     }
 
@@ -102,21 +114,37 @@ impl Term {
             TermKind::NominalLink(link) => Some(link + 1),
             TermKind::Transmission(law) => Some(law.joint + 1),
             TermKind::Controller(of) => Some(of.joint + 1),
-            TermKind::Payload | TermKind::BaseTilt => None,
+            TermKind::Payload | TermKind::BaseTilt | TermKind::Joints(_) | TermKind::Row(_) => None,
         }
     }
 
-    /// Whether both are the same term, whatever their values.
+    /// Factors of two joints, of a term on a row over them.
+    pub fn row(&self) -> Option<[i32; 2]> {
+        if let TermKind::Row(row) = self.kind { Some(row.row()) } else { None }
+    }
+
+    /// 1-based joints that it is on; none of what belongs to the whole arm.
+    pub fn joints(&self) -> Vec<usize> {
+        match &self.kind {
+            TermKind::Joints(of) => of.members.iter().filter_map(Self::joint).collect(),
+            TermKind::Row(row) => vec![row.first + 1, row.first + 2],
+            _ => self.joint().into_iter().collect(),
+        }
+    }
+
+    /// Whether both are the same term, whatever their values; on several joints, whether they have one in common.
     pub fn same_place(&self, other: &Self) -> bool {
-        self.name() == other.name() && self.joint() == other.joint()
+        let (own, others) = (self.joints(), other.joints());
+        let overlap = self.row().is_none() && own.iter().any(|j| others.contains(j));
+        self.name() == other.name() && self.row() == other.row() && (own == others || overlap)
     }
 
     /// Whether it can be all that another term is, whatever the motion: a load on the last of so many links is a change of that link, and a heavier
     /// last link is a load on it.
     pub fn includes(&self, other: &Self, links: usize) -> bool {
-        match (self.kind, other.kind) {
-            (TermKind::NominalLink(link), TermKind::Payload) => link + 1 == links,
-            (TermKind::Payload, TermKind::NominalLink(link)) => link + 1 == links && other.p[0] > 0.0,
+        match (&self.kind, &other.kind) {
+            (TermKind::NominalLink(link), TermKind::Payload) => *link + 1 == links,
+            (TermKind::Payload, TermKind::NominalLink(link)) => *link + 1 == links && other.p[0] > 0.0,
             _ => false,
         }
     }
@@ -153,6 +181,11 @@ impl Term {
             TermKind::NominalLink(_) => LINK_NAMES.iter().map(free).collect(),
             TermKind::Transmission(law) => vec![law.parameter(rotary)],
             TermKind::Controller(of) => vec![of.setting.parameter(rotary)],
+            TermKind::Joints(ref of) => {
+                let different = if of.common { 1 } else { of.members.len() };
+                of.members[..different].iter().flat_map(|m| m.parameters(rotary)).collect()
+            }
+            TermKind::Row(row) => row.parameters(rotary),
         }
     }
 
@@ -172,7 +205,9 @@ impl Term {
             TermKind::Payload | TermKind::Controller(_) => 0,
             TermKind::BaseTilt => TURN.len(),
             TermKind::NominalLink(_) => LINK_NAMES.len(),
-            TermKind::Transmission(_) => 1,
+            TermKind::Joints(ref of) => of.members[0].amplitudes(),
+            TermKind::Row(RowTerm { law: RowLaw::Transmission(_), .. }) => 3,
+            TermKind::Transmission(_) | TermKind::Row(_) => 1,
         }
     }
 
@@ -181,12 +216,19 @@ impl Term {
         match self.kind {
             TermKind::Law(effect) => effect.law.spec().scope == Scope::Joint,
             TermKind::Transmission(_) | TermKind::Controller(_) => true,
-            TermKind::Payload | TermKind::BaseTilt | TermKind::NominalLink(_) => false,
+            TermKind::Payload
+            | TermKind::BaseTilt
+            | TermKind::NominalLink(_)
+            | TermKind::Joints(_)
+            | TermKind::Row(_) => false,
         }
     }
 
     /// Whether it changes the torque that a command becomes at the joint: of the command itself, or by a torque that depends on it.
     pub fn changes_command(&self) -> bool {
+        if let TermKind::Joints(of) = &self.kind {
+            return of.members[0].changes_command();
+        }
         let TermKind::Law(effect) = self.kind else { return self.share_of_command().is_some() };
         effect.law.spec().hooks.command || depends(&effect, |x, value| x.tau = value)
     }
@@ -198,6 +240,9 @@ impl Term {
 
     /// Whether it is a factor on the command.
     pub fn is_gain(&self) -> bool {
+        if let TermKind::Joints(of) = &self.kind {
+            return of.members[0].is_gain();
+        }
         let TermKind::Law(effect) = self.kind else { return false };
         let spec = effect.law.spec();
         spec.hooks.command && spec.parameters.iter().all(|p| p.quantity == Quantity::Ratio)
@@ -205,6 +250,9 @@ impl Term {
 
     /// Whether it delays the command: a time is all that it has.
     pub fn is_delay(&self) -> bool {
+        if let TermKind::Joints(of) = &self.kind {
+            return of.members[0].is_delay();
+        }
         let TermKind::Law(effect) = self.kind else {
             return matches!(self.kind, TermKind::Controller(of) if of.setting == Setting::ReferenceDelay);
         };
@@ -214,7 +262,7 @@ impl Term {
 
     /// This term with other values.
     pub fn with(&self, p: Vec<f64>) -> Self {
-        Self { kind: self.kind, p, degrees: self.degrees }
+        Self { kind: self.kind.clone(), p, degrees: self.degrees }
     }
 
     /// The library's effect with these values; none for what is no law.

@@ -1,0 +1,155 @@
+//! A law on all joints at once: found as one cause, in one decision.
+//!
+//! Friction laws, delays and lags usually sit on every joint. The candidate has an amplitude per joint, or one value for all where the law is a delay or a
+//! gain, and is judged as others are, by its own number of parameters. It has to be noticed on each joint that it keeps, on half of those that move, and what
+//! it explains beside the law on the one joint where that explains most has to be accepted by itself.
+
+use super::constants::{ARM_WIDE, ARM_WIDE_FINALISTS, CONSEQUENCE, NOTICED, PRICE};
+use super::evidence::consequence;
+use super::fitting::Fitted;
+use super::rows::Regression;
+use super::search::Search;
+use super::term::Term;
+
+/// A claim about the arm rests on so many joints at least, or on all of them.
+const FEWEST_JOINTS: usize = 3;
+
+impl Search<'_> {
+    /// Models with one law more on several joints at once that is accepted; the laws that explain most to first order.
+    pub(super) fn on_several_joints(
+        &self,
+        regression: &Regression,
+        model: &Fitted,
+        screened: &[(Term, f64)],
+    ) -> Vec<Fitted> {
+        let mut laws: Vec<(Vec<Term>, f64)> = Vec::new();
+        let names = screened.iter().filter(|(term, _)| term.is_of_a_joint()).map(|(term, _)| term);
+        for first in names {
+            if laws.iter().any(|(terms, _)| terms[0].name() == first.name()) {
+                continue;
+            }
+            let alike: Vec<&(Term, f64)> =
+                screened.iter().filter(|(term, _)| self.is_same_law(term, first)).collect();
+            let gain: f64 = alike.iter().map(|(_, gain)| gain).sum();
+            laws.push((alike.iter().map(|(term, _)| term.clone()).collect(), gain));
+        }
+        let degrees = |terms: &[Term]| terms.iter().map(|term| term.degrees).sum::<f64>();
+        laws.retain(|(terms, gain)| terms.len() >= self.fewest() && *gain > PRICE + 2.0 * degrees(terms));
+        laws.sort_by(|a, b| (b.1 - 2.0 * degrees(&b.0)).total_cmp(&(a.1 - 2.0 * degrees(&a.0))));
+        let finalists = laws.into_iter().take(ARM_WIDE_FINALISTS);
+        finalists.filter_map(|(terms, _)| self.one_cause(regression, model, terms)).collect()
+    }
+
+    /// Whether both are the same law, in the same unit, on whichever joint.
+    fn is_same_law(&self, a: &Term, b: &Term) -> bool {
+        let units = |term: &Term| -> Vec<&'static str> {
+            term.parameters(self.rotary_of(term)).iter().map(|p| p.unit).collect()
+        };
+        a.is_of_a_joint() && a.name() == b.name() && units(a) == units(b)
+    }
+
+    /// Joints that a claim about the whole arm needs.
+    fn fewest(&self) -> usize {
+        let moving = self.training.rows().joints.iter().filter(|r| !r.y.is_empty()).count();
+        let half = (ARM_WIDE * moving as f64).ceil() as usize;
+        half.max(FEWEST_JOINTS.min(moving)).max(2)
+    }
+
+    /// The model with this law on all joints where it is noticed, if that is accepted as one cause.
+    fn one_cause(&self, regression: &Regression, model: &Fitted, terms: Vec<Term>) -> Option<Fitted> {
+        let last = model.terms.len();
+        let with = |term: Term| {
+            let mut terms = model.terms.clone();
+            terms.push(term);
+            self.fit(regression, terms, &model.estimate.theta)
+        };
+        let has_common = terms[0].is_delay() || terms[0].is_gain();
+        let all = with(Term::on_joints(terms));
+        let noticed = self.noticed(regression, model, &all, last);
+        if noticed.len() < self.fewest() {
+            return None;
+        }
+        let everywhere = has_common.then(|| self.on_every_joint(model, &noticed));
+        let is_kept = noticed.len() == all.terms[last].joints().len();
+        let mut best = if is_kept { all } else { with(Term::on_joints(noticed)) };
+        if let Some(everywhere) = everywhere {
+            let common = with(everywhere);
+            if common.total() < best.total() {
+                best = common;
+            }
+        }
+        let is_noticed = self.noticed(regression, model, &best, last).len() >= self.fewest();
+        let is_accepted = is_noticed
+            && self.evidence(regression, model, &best, last).is_accepted()
+            && self.is_more_than_on_one_joint(regression, model, &best);
+        is_accepted.then_some(best)
+    }
+
+    /// The law with one value, the mean of those on which it is noticed, on every joint that moves and has it not yet.
+    fn on_every_joint(&self, model: &Fitted, noticed: &[Term]) -> Term {
+        let rows = &self.training.rows().joints;
+        let moves = |term: &Term| {
+            term.joint().is_some_and(|joint| !rows[joint - 1].y.is_empty())
+                && !model.terms.iter().any(|known| known.same_place(term))
+        };
+        let alike = self.candidates.iter().filter_map(|group| group.first());
+        let members =
+            alike.filter(|term| self.is_same_law(term, &noticed[0]) && moves(term)).cloned().collect();
+        Term::common(members).with(Term::common(noticed.to_vec()).p)
+    }
+
+    /// Members of the last term that are noticed on their joints, in training logs and holdout.
+    fn noticed(&self, regression: &Regression, without: &Fitted, with: &Fitted, last: usize) -> Vec<Term> {
+        let held = |set: &Fitted, joint: usize| set.costs[1][joint - 1].iter().sum::<f64>();
+        let is_noticed = |member: &Term| {
+            let signal = self.training.signal(member, &with.estimate.theta);
+            let column = std::slice::from_ref(&signal);
+            let statistic = regression.score(&with.estimate, column, &[0.0]).map_or(0.0, |score| {
+                1.0 / regression.sandwich(&with.estimate, column, &score)[(0, 0)].max(f64::MIN_POSITIVE)
+            });
+            let joint = member.joint().unwrap_or(1);
+            statistic > NOTICED
+                && consequence(self.training.rows(), &signal) > CONSEQUENCE
+                && held(with, joint) < held(without, joint)
+        };
+        with.terms[last].members().into_iter().filter(is_noticed).collect()
+    }
+
+    /// Whether what the last term explains beside the same law on the one joint where that explains most is accepted.
+    fn is_more_than_on_one_joint(&self, regression: &Regression, model: &Fitted, with: &Fitted) -> bool {
+        let last = model.terms.len();
+        let fell = |term: &Term| {
+            let joint = term.joint().unwrap_or(1) - 1;
+            let cost = |set: &Fitted| set.costs.iter().flat_map(|sets| &sets[joint]).sum::<f64>();
+            cost(model) - cost(with)
+        };
+        let mut members = with.terms[last].members();
+        let Some(strongest) =
+            (0..members.len()).max_by(|a, b| fell(&members[*a]).total_cmp(&fell(&members[*b])))
+        else {
+            return false;
+        };
+        let mut terms = model.terms.clone();
+        terms.push(members.swap_remove(strongest));
+        let alone = self.fit(regression, terms.clone(), &model.estimate.theta);
+        let common = with.terms[last].has_common_value();
+        terms.push(if common { Term::common(members) } else { Term::on_joints(members) });
+        let apart = Fitted { terms, ..with.clone() };
+        self.evidence(regression, &alone, &apart, last + 1).is_accepted()
+    }
+
+    /// The terms with one more; the same law on so many joints that it is one of the whole arm becomes one term.
+    pub(super) fn joined(&self, terms: Vec<Term>, added: Term) -> Vec<Term> {
+        let first = added.members().swap_remove(0);
+        let (same, mut joined): (Vec<Term>, Vec<Term>) =
+            terms.into_iter().partition(|term| self.is_same_law(&term.members()[0], &first));
+        let members: Vec<Term> = same.iter().flat_map(Term::members).chain(added.members()).collect();
+        if !same.is_empty() && members.len() >= self.fewest() {
+            joined.push(Term::on_joints(members));
+        } else {
+            joined.extend(same);
+            joined.push(added);
+        }
+        joined
+    }
+}

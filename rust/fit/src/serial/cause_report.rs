@@ -1,0 +1,177 @@
+//! Causes as results state them, and the status of every term that is none.
+
+use super::constants::{CONSEQUENCE, NOTICED, SIGNIFICANT};
+use super::controller::PositionController;
+use super::controller_report::behind_controller;
+use super::search::{Found, Tested};
+use super::term::{Term, TermKind};
+use crate::result::report::{
+    Bound, Cause, CauseValue, EquivalentSummary, Named, RuledOut, SeveralJoints, Status, Value, Values,
+};
+use armgap_core::effect::{Effect, Scope, Trial, catalogue};
+
+/// Quantile of the normal distribution for bounds at 95 %.
+const NORMAL_95: f64 = 1.645;
+
+/// An effect that is known no better than to this part of the joint's torque has not been excited.
+const NOT_EXCITED: f64 = 0.2;
+
+/// Unexplained share of a joint's torque in which a transmission that gives way may hide: what it does beyond first order.
+const HIDES: f64 = 0.01;
+
+const NOT_TESTED: &str = "not tested on serial arms from such logs";
+
+const LOOK_ALIKE: &str = "explains the torque along these logs as well";
+
+fn rotary_of(term: &Term, rotary: &[bool]) -> bool {
+    term.joints().first().is_none_or(|j| rotary[j - 1])
+}
+
+/// Joints of what is on several of them.
+fn several(term: &Term) -> SeveralJoints {
+    let joints = term.joints();
+    SeveralJoints { joints: (joints.len() > 1).then_some(joints), row: term.row() }
+}
+
+/// Values of a term: numbers, or one per joint of a law on several.
+fn cause_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<CauseValue> {
+    if !term.is_on_several_joints() {
+        let one = |(name, value)| (name, CauseValue::One(value));
+        return named_values(term, sigma, rotary).into_iter().map(one).collect();
+    }
+    let members = term.members();
+    let count = members[0].p.len();
+    let of = |(i, member): (usize, &Term)| {
+        let first = if term.has_common_value() { 0 } else { i * count };
+        named_values(member, sigma.get(first..first + count).unwrap_or(&[]), rotary)
+    };
+    let by_joint: Vec<Named<Value>> = members.iter().enumerate().map(of).collect();
+    let each = |(name, first): (&String, &Value)| {
+        let values = || by_joint.iter().filter_map(|values| values.get(name));
+        let value = values().map(|v| v.value).collect();
+        let sigma = values().map(|v| v.sigma).collect();
+        (name.clone(), CauseValue::Each(Values { value, sigma, unit: first.unit }))
+    };
+    by_joint[0].iter().map(each).collect()
+}
+
+fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
+    let parameters = term.parameters(rotary_of(term, rotary));
+    let value = |(i, p): (usize, &super::term::TermParameter)| {
+        let sigma = sigma.get(i).copied().filter(|s| s.is_finite()).unwrap_or(0.0);
+        match p.inverse {
+            Some((name, unit)) if term.p[i] != 0.0 => {
+                (name.to_owned(), Value { value: 1.0 / term.p[i], sigma: sigma / term.p[i].powi(2), unit })
+            }
+            _ => (p.name.to_owned(), Value { value: term.p[i], sigma, unit: p.unit }),
+        }
+    };
+    parameters.iter().enumerate().map(value).collect()
+}
+
+pub(super) fn cause(
+    named: &super::search::Named,
+    rotary: &[bool],
+    controller: Option<&PositionController>,
+) -> Cause {
+    let term = &named.term;
+    let alike = |t: &Term| EquivalentSummary {
+        effect: t.name(),
+        joint: t.joint(),
+        on: several(t),
+        why: LOOK_ALIKE.to_owned(),
+    };
+    let mut cause = Cause {
+        effect: term.name(),
+        title: term.title(),
+        joint: term.joint(),
+        on: several(term),
+        probability: named.probability,
+        parameters: cause_values(term, &named.sigma, rotary),
+        closed: named.evidence.share.clamp(0.0, 1.0),
+        equivalents: named.alike.iter().map(alike).collect(),
+        evidence: None,
+        sides: None,
+        log: None,
+    };
+    let behind = controller.map(|controller| behind_controller(&cause, controller));
+    cause.equivalents.extend(behind.into_iter().flatten());
+    cause
+}
+
+/// Status of every place that is not in the model.
+pub(super) fn ruled_out(found: &Found, unexplained: &[Option<f64>], rotary: &[bool]) -> Vec<RuledOut> {
+    let named = |t: &Tested| found.named.iter().any(|n| n.term.same_place(&t.term));
+    let mut all: Vec<RuledOut> =
+        found.tested.iter().filter(|t| !named(t)).map(|t| status(found, unexplained, t, rotary)).collect();
+    let is_tested = |name: &str, j: usize| {
+        let tested = found.tested.iter().map(|t| &t.term).chain(found.named.iter().map(|n| &n.term));
+        tested.into_iter().any(|t| t.name() == name && t.row().is_none() && t.joints().contains(&(j + 1)))
+    };
+    let hidden_from_encoders = |law: &&&'static dyn Effect<f64>| {
+        law.has_transmission() || law.spec().scope == Scope::Joint && law.spec().trial == Trial::Disturbance
+    };
+    for law in catalogue::<f64>().iter().filter(hidden_from_encoders) {
+        let open = (0..rotary.len()).filter(|j| !is_tested(law.spec().name, *j));
+        all.extend(open.map(|j| RuledOut {
+            effect: law.spec().name,
+            joint: Some(j + 1),
+            on: SeveralJoints::default(),
+            status: Status::Undecided,
+            bound: None,
+            why: Some(NOT_TESTED.to_owned()),
+        }));
+    }
+    all
+}
+
+/// Where a term is, behind its name.
+fn place_of(term: &Term) -> String {
+    let joints: Vec<String> = term.joints().iter().map(usize::to_string).collect();
+    match joints.as_slice() {
+        [] => String::new(),
+        [joint] => format!(" of joint {joint}"),
+        several => format!(" of joints {}", several.join(", ")),
+    }
+}
+
+fn status(found: &Found, unexplained: &[Option<f64>], tested: &Tested, rotary: &[bool]) -> RuledOut {
+    let term = &tested.term;
+    let (effect, joint) = (term.name(), term.joint());
+    let entry = |status, bound, why| RuledOut { effect, joint, on: several(term), status, bound, why };
+    let alike = found.named.iter().find(|n| n.alike.iter().any(|a| a.same_place(term)));
+    if let Some(cause) = alike {
+        let place = place_of(&cause.term);
+        let why = format!("looks like {}{place} in these logs", cause.term.name());
+        return entry(Status::Undecided, None, Some(why));
+    }
+    let [size, sigma] = tested.size;
+    let known = sigma * tested.consequence;
+    if !known.is_finite() || known > NOT_EXCITED || tested.consequence == 0.0 {
+        return entry(Status::NotExcited, None, Some("these logs do not pin its size down".to_owned()));
+    }
+    let statistic = (size / sigma.max(f64::MIN_POSITIVE)).powi(2);
+    let largest = size.abs() + NORMAL_95 * sigma;
+    if statistic > SIGNIFICANT - NOTICED && largest * tested.consequence > 10.0 * CONSEQUENCE {
+        let why = "explains a part of what remains, and too little of it to be named".to_owned();
+        return entry(Status::Undecided, None, Some(why));
+    }
+    if let TermKind::Transmission(law) = term.kind
+        && let Some(left) = unexplained[law.joint].filter(|left| *left > HIDES)
+    {
+        let why = format!(
+            "its test is to first order, and {:.1} % of the joint's torque is unexplained",
+            100.0 * left
+        );
+        return entry(Status::Undecided, None, Some(why));
+    }
+    let parameters = term.parameters(rotary_of(term, rotary));
+    let bound = (term.amplitudes() > 0 && !matches!(term.kind, TermKind::NominalLink(_)))
+        .then(|| {
+            let p = parameters.first()?;
+            let value = (largest * (term.p[0] - p.neutral)).abs();
+            value.is_finite().then_some(Bound { parameter: p.name, value, unit: p.unit, level: 0.95 })
+        })
+        .flatten();
+    entry(Status::Absent, bound, None)
+}

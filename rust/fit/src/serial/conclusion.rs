@@ -1,0 +1,147 @@
+//! The end of a search: probabilities of its terms, what looks alike, and tests of what is not in the model.
+
+use super::constants::{ALIKE, ALIKE_COST, NAMED};
+use super::evidence::{consequence, stability, trust};
+use super::fitting::Fitted;
+use super::rows::{JointRows, Regression};
+use super::screening::Guess;
+use super::search::{Found, Named, Search, Tested};
+use super::term::Term;
+use armgap_core::chain::LINK_PARAMETERS;
+
+impl Search<'_> {
+    /// Probabilities, look-alikes, and tests of what is not in the model.
+    pub(super) fn concluded(
+        &self,
+        guesses: &[Vec<Guess>],
+        regression: &Regression,
+        [refit, model]: [Fitted; 2],
+        refit_sigma: Vec<f64>,
+        seed: u64,
+    ) -> Found {
+        let mut named: Vec<Named> =
+            (0..model.terms.len()).map(|i| self.named(guesses, regression, &model, i, seed)).collect();
+        named.sort_by(|a, b| {
+            (b.evidence.gain + b.evidence.holdout_gain)
+                .total_cmp(&(a.evidence.gain + a.evidence.holdout_gain))
+        });
+        let tested = self.tested(guesses, regression, &model);
+        // Re-estimated costs are comparable only under the same weights.
+        let refit = if model.terms.is_empty() {
+            refit
+        } else {
+            self.fit(regression, Vec::new(), &refit.estimate.theta)
+        };
+        let probable = named.iter().filter(|n| n.probability >= NAMED).map(|n| n.term.clone()).collect();
+        let reported = self.feasible(regression, self.fit(regression, probable, &model.estimate.theta));
+        let refit_feasible = self.feasible(regression, refit.clone());
+        Found {
+            refit,
+            refit_feasible,
+            named,
+            reported,
+            tested,
+            sigma: [refit_sigma, regression.sigma()],
+            model,
+        }
+    }
+
+    /// A model whose links are so near to those of the arm file that the inertia matrix is positive definite, with rotor inertias and friction
+    /// estimated again.
+    fn feasible(&self, regression: &Regression, model: Fitted) -> Fitted {
+        if (self.is_feasible)(&model.estimate.theta) {
+            return model;
+        }
+        let links = LINK_PARAMETERS * self.rotary.len();
+        let mut prior = self.prior.clone();
+        for part in [0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0] {
+            for i in 0..links {
+                let nominal = self.prior.theta[i];
+                prior.theta[i] = nominal + part * (model.estimate.theta[i] - nominal);
+                prior.sigma[i] = 0.0;
+            }
+            let near = Regression::new(self.training.rows(), &prior, regression.weights.clone());
+            let fitted = self.fit(&near, model.terms.clone(), &prior.theta);
+            if (self.is_feasible)(&fitted.estimate.theta) {
+                return fitted;
+            }
+        }
+        model
+    }
+
+    /// Cost that noisy positions alone put into the holdout's rows, by joint.
+    fn floor(&self, regression: &Regression) -> Vec<f64> {
+        let of = |(rows, w): (&JointRows, &f64)| w * rows.floor.iter().map(|f| f * f).sum::<f64>();
+        self.holdout.rows().joints.iter().zip(&regression.weights).map(of).collect()
+    }
+
+    fn named(
+        &self,
+        guesses: &[Vec<Guess>],
+        regression: &Regression,
+        model: &Fitted,
+        index: usize,
+        seed: u64,
+    ) -> Named {
+        let term = model.terms[index].clone();
+        let without = self.without(regression, model, index);
+        let evidence = self.evidence(regression, &without, model, index);
+        let screened = self.screened(guesses, regression, &without);
+        let mut rivals = self.finalists(regression, &without, &screened);
+        if term.is_on_several_joints() {
+            rivals.extend(self.on_several_joints(regression, &without, &screened));
+        }
+        let last = without.terms.len();
+        rivals.retain(|r| !r.terms[last].same_place(&term));
+        let explained = without.total() - model.total();
+        let alike = |rival: &Fitted| {
+            rival.total() - model.total() < (ALIKE * explained).max(ALIKE_COST)
+                || rival.terms[last].includes(&term, self.rotary.len())
+        };
+        let (same, others): (Vec<Fitted>, Vec<Fitted>) = rivals.into_iter().partition(alike);
+        let mut against: Vec<&Fitted> = others.iter().collect();
+        against.push(&without);
+        let wins = stability(model, &against, seed);
+        let trust = trust(&without, model, &evidence, &self.floor(regression));
+        let columns = self.derivatives(std::slice::from_ref(&term), &model.estimate.theta);
+        let sigma =
+            regression.score(&model.estimate, &columns, &self.ridge_of(&term, columns.len())).map_or_else(
+                || vec![f64::INFINITY; term.p.len()],
+                |score| {
+                    let covariance = regression.sandwich(&model.estimate, &columns, &score);
+                    // Blocks do not show how far the arm file's values are off; the information does, which holds their prior.
+                    let variance = |i: usize| covariance[(i, i)].max(score.inverse()[(i, i)]).max(0.0);
+                    (0..term.p.len()).map(|i| variance(i).sqrt()).collect()
+                },
+            );
+        let mut alike: Vec<Term> = same.into_iter().map(|r| r.terms[last].clone()).collect();
+        let including = self.candidates.iter().filter_map(|group| group.first());
+        for other in including.filter(|other| other.includes(&term, self.rotary.len())) {
+            if !alike.iter().any(|t| t.same_place(other)) {
+                alike.push(other.clone());
+            }
+        }
+        Named { term, sigma, evidence, probability: wins * trust, alike }
+    }
+
+    /// Tests of every place that is not in the model, beside it.
+    fn tested(&self, guesses: &[Vec<Guess>], regression: &Regression, model: &Fitted) -> Vec<Tested> {
+        let screened = self.screened(guesses, regression, model);
+        let open = self.candidates.iter().filter_map(|group| group.first());
+        open.filter(|term| !model.terms.iter().any(|t| t.same_place(term)))
+            .map(|first| {
+                let found = screened.iter().find(|(t, _)| t.same_place(first));
+                let term = found.map_or_else(|| first.clone(), |(t, _)| t.clone());
+                let signal = self.training.signal(&term, &model.estimate.theta);
+                let column = std::slice::from_ref(&signal);
+                let score = regression.score(&model.estimate, column, &[0.0]);
+                let size = score.map_or([0.0, f64::INFINITY], |score| {
+                    let sigma = regression.sandwich(&model.estimate, column, &score)[(0, 0)].max(0.0).sqrt();
+                    [score.size[0], sigma]
+                });
+                let consequence = consequence(self.training.rows(), &signal);
+                Tested { term, size, consequence }
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,213 @@
+//! Terms on a sum or a difference of two adjacent joints' motion: gears, belts and tendons that both joints turn, cables past both.
+//!
+//! With the row `r = (1, s)` of a coupled transmission (Siciliano 2009, section 5.1) and `q_r = q_j + s q_k`, a torque `tau_r` along it is the torque
+//! `r' tau_r` on the joints: `tau_r = inertia ddq_r + viscous dq_r + coulomb sign(dq_r)` of what turns with the row, and `k (q_r - q0)` of a spring on it.
+
+use super::equation::Equation;
+use super::intervals::{Intervals, Middle};
+use super::rows::Signal;
+use super::term::{Term, TermKind, TermParameter};
+use crate::log::track::Track;
+use armgap_core::chain::JointKind;
+use armgap_core::effect::InputSegment;
+use nalgebra::SVector;
+
+/// A term on a row over two adjacent joints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RowTerm {
+    /// First of the two joints, from 0.
+    pub first: usize,
+    /// Factor of the second joint's motion: 1 or -1; that of the first is 1.
+    pub factor: f64,
+    /// What acts along the row.
+    pub law: RowLaw,
+}
+
+/// What acts along a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RowLaw {
+    /// Inertia, viscous and Coulomb friction; which of the three are there.
+    Transmission([bool; 3]),
+    /// A spring.
+    Spring,
+}
+
+impl RowTerm {
+    /// Name in results.
+    pub fn name(&self) -> &'static str {
+        match self.law {
+            RowLaw::Transmission(_) => "coupled_transmission",
+            RowLaw::Spring => "joint_spring",
+        }
+    }
+
+    /// Name for people.
+    pub fn title(&self) -> &'static str {
+        match self.law {
+            RowLaw::Transmission(_) => "transmission that couples two joints",
+            RowLaw::Spring => "spring across two joints",
+        }
+    }
+
+    /// Number of parameters.
+    pub fn len(&self) -> usize {
+        match self.law {
+            RowLaw::Transmission(_) => 3,
+            RowLaw::Spring => 2,
+        }
+    }
+
+    /// Factors of the two joints.
+    pub fn row(&self) -> [i32; 2] {
+        [1, if self.factor > 0.0 { 1 } else { -1 }]
+    }
+
+    /// Its parameters; `rotary` tells of both joints.
+    pub fn parameters(&self, rotary: bool) -> Vec<TermParameter> {
+        let units: &[(&str, &str, f64)] = match (self.law, rotary) {
+            (RowLaw::Transmission(_), true) => {
+                &[("inertia", "kg m^2", 0.0), ("viscous", "N m s/rad", 0.0), ("coulomb", "N m", 0.0)]
+            }
+            (RowLaw::Transmission(_), false) => {
+                &[("inertia", "kg", 0.0), ("viscous", "N s/m", 0.0), ("coulomb", "N", 0.0)]
+            }
+            (RowLaw::Spring, true) => {
+                &[("k", "N m/rad", f64::NEG_INFINITY), ("q0", "rad", f64::NEG_INFINITY)]
+            }
+            (RowLaw::Spring, false) => &[("k", "N/m", f64::NEG_INFINITY), ("q0", "m", f64::NEG_INFINITY)],
+        };
+        let of = |&(name, unit, lower): &(&'static str, &'static str, f64)| TermParameter {
+            name,
+            unit,
+            bounds: [lower, f64::INFINITY],
+            neutral: 0.0,
+            inverse: None,
+        };
+        units.iter().map(of).collect()
+    }
+
+    /// Momentum along the row, and the rest of the torque, in the middle of an interval.
+    fn along<const N: usize>(&self, m: &Middle<N>, p: &[f64]) -> [f64; 2] {
+        let of = |x: &[f64; N]| x[self.first] + self.factor * x[self.first + 1];
+        match self.law {
+            RowLaw::Transmission(_) => {
+                let speed = of(&m.dq);
+                [p[0] * of(&m.mean_dq), p[1] * speed + p[2] * direction(speed)]
+            }
+            RowLaw::Spring => [0.0, p[0] * (of(&m.q) - p[1])],
+        }
+    }
+
+    /// Torque on the two joints in the middle of an interval.
+    fn torque<const N: usize>(&self, m: &Middle<N>, p: &[f64]) -> f64 {
+        let inertia = match self.law {
+            RowLaw::Transmission(_) => p[0] * (m.ddq[self.first] + self.factor * m.ddq[self.first + 1]),
+            RowLaw::Spring => 0.0,
+        };
+        inertia + self.along(m, p)[1]
+    }
+}
+
+fn direction(speed: f64) -> f64 {
+    if speed == 0.0 { 0.0 } else { speed.signum() }
+}
+
+/// Every row over two adjacent joints of one kind, with the terms that are sought on it.
+pub fn candidates(kinds: &[JointKind]) -> Vec<Vec<Term>> {
+    let pairs = (1..kinds.len()).filter(|k| kinds[*k] == kinds[k - 1]).map(|k| k - 1);
+    let laws = [RowLaw::Transmission([true; 3]), RowLaw::Spring];
+    let rows = pairs.flat_map(|first| [1.0, -1.0].map(|factor| (first, factor)));
+    rows.flat_map(|(first, factor)| laws.map(|law| RowTerm { first, factor, law }))
+        .map(|row| vec![Term::neutral(TermKind::Row(row))])
+        .collect()
+}
+
+impl<const N: usize, const P: usize> Equation<N, P> {
+    /// The torque of a term on a row over two joints.
+    pub(super) fn of_row(&self, row: &RowTerm, p: &[f64]) -> Signal {
+        let changes: Vec<Vec<[SVector<f64, N>; 2]>> = self
+            .logs()
+            .iter()
+            .map(|log| {
+                let at = |m: &Middle<N>| row.along(m, p).map(|torque| row.on_both(torque));
+                log.middles.iter().map(at).collect()
+            })
+            .collect();
+        let mut signal = self.weak_parts(&changes);
+        (0..N).filter(|j| *j != row.first && *j != row.first + 1).for_each(|j| signal[j] = None);
+        signal
+    }
+}
+
+impl RowTerm {
+    fn on_both<const N: usize>(&self, torque: f64) -> SVector<f64, N> {
+        let mut on = SVector::zeros();
+        (on[self.first], on[self.first + 1]) = (torque, self.factor * torque);
+        on
+    }
+}
+
+/// The log with what terms on rows take along the measured path taken from its torques: no integrator knows them.
+pub fn without_rows<const N: usize>(track: &Track<N>, rows: &[(RowTerm, Vec<f64>)]) -> Track<N> {
+    let mut track = track.clone();
+    let intervals = Intervals::new(&track);
+    for (held, m) in track.held.iter_mut().zip(&intervals.middles) {
+        for (row, p) in rows {
+            let torque = row.torque(m, p);
+            for (j, by) in [(row.first, torque), (row.first + 1, row.factor * torque)] {
+                let segment = &mut held[j];
+                *segment = InputSegment {
+                    start: segment.start - by,
+                    middle: segment.middle - by,
+                    end: segment.end - by,
+                };
+            }
+        }
+    }
+    track
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MIDDLE: Middle<3> = Middle {
+        t: 0.0,
+        h: 0.01,
+        q: [0.1, 0.2, 0.5],
+        dq: [1.0, 2.0, 0.5],
+        ddq: [0.0, 3.0, 1.0],
+        mean_dq: [1.0, 2.0, 0.5],
+        tau: [0.0; 3],
+        rest: [false; 3],
+    };
+
+    fn row(factor: f64, law: RowLaw) -> RowTerm {
+        RowTerm { first: 1, factor, law }
+    }
+
+    #[test]
+    fn friction_and_inertia_are_of_the_sum_or_the_difference() {
+        let sum = row(1.0, RowLaw::Transmission([true; 3]));
+        assert_eq!(sum.along(&MIDDLE, &[2.0, 10.0, 0.3]), [5.0, 25.3]);
+        let difference = row(-1.0, RowLaw::Transmission([true; 3]));
+        assert_eq!(difference.torque(&MIDDLE, &[2.0, 10.0, 0.3]), 4.0 + 15.3);
+        assert_eq!(difference.on_both::<3>(2.0), SVector::from([0.0, 2.0, -2.0]));
+    }
+
+    #[test]
+    fn a_spring_pulls_both_joints_towards_its_rest() {
+        let spring = row(1.0, RowLaw::Spring);
+        assert!((spring.torque(&MIDDLE, &[10.0, 0.4]) - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn rows_are_over_adjacent_joints_of_one_kind() {
+        let kinds = [JointKind::Revolute, JointKind::Revolute, JointKind::Prismatic];
+        let found = candidates(&kinds);
+        assert_eq!(found.len(), 4);
+        assert!(found.iter().all(|group| group[0].joints() == [1, 2] && group[0].joint().is_none()));
+        let springs: Vec<_> = found.iter().filter(|group| group[0].name() == "joint_spring").collect();
+        assert!(!springs[0][0].same_place(&springs[1][0]));
+    }
+}
