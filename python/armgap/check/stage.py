@@ -34,8 +34,8 @@ _FEWEST_ROWS = 100
 # where an effect is hidden.
 _UNRELATED = (0.5, 0.25)
 _UNPREDICTED = (0.3, 0.4)
-# A joint is driven if its torque's mean square is this part of that of the largest term of its equation of motion; a joint that is not, as the passive
-# one of an acrobot, has no torque to be explained.
+# A joint is driven if its torque's mean square is this part of that of the largest term of its equation of motion; one that is not, as the passive
+# joint of an acrobot, has no torque to be explained.
 _DRIVEN = 0.1
 # Shifts of the torques under which predictions that come right are no sign of other columns [samples].
 _SHIFTS = (-8, -5, -2, 2, 5, 8)
