@@ -26,13 +26,17 @@ Array = NDArray[np.float64]
 _CLOSE = 1.0
 # Rows of the equation of motion that a comparison needs.
 _FEWEST_ROWS = 100
-# Columns do not belong together if this share of a joint's torque stays unexplained and predictions miss by this part of the motion, or, where the
-# best that the library's effects do still misses by as much, at the second pair: the more the one says, the less is asked of the other. Effects of
-# the library leave less than a tenth of a torque on simulated logs, but a stiff hardening spring 0.38, and less than a quarter on logs of a real
-# arm; a torque of which a third is noise was predicted to 0.001. Torques played backwards leave 0.3 to 1.1 and are missed by 0.42 to 2.2 (18
-# development cases), by 0.28 of the motion at most where an effect is hidden.
+# Columns do not belong together if this share of what moves a joint (its torque, or the largest term of its equation of motion) stays unexplained and
+# predictions miss by this part of the motion; or, at the second pair, if that share of a driven joint's torque does and the best that the library's
+# effects do misses by as much: the more the one says, the less is asked of the other. Effects of the library leave less than a tenth of a
+# torque on simulated logs, but a stiff hardening spring 0.38, and less than a quarter on logs of a real arm; a torque of which a third is noise was
+# predicted to 0.001. Torques played backwards leave 0.3 to 1.1 and are missed by 0.42 to 2.2 (18 development cases), by 0.28 of the motion at most
+# where an effect is hidden.
 _UNRELATED = (0.5, 0.25)
 _UNPREDICTED = (0.3, 0.4)
+# A joint is driven if its torque's mean square is this part of that of the largest term of its equation of motion; one that is not, as the passive
+# joint of an acrobot, has no torque to be explained.
+_DRIVEN = 0.1
 # Shifts of the torques under which predictions that come right are no sign of other columns [samples].
 _SHIFTS = (-8, -5, -2, 2, 5, 8)
 # A limit of the drive counts in their place if it leaves less than this of every joint's torque. Drives that are limited leave 0.03 at most, torques
@@ -118,12 +122,12 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
         applied = factors.corrections if repair and factors.checks[0].severity == "repaired" else Corrections()
         said = [c if c.severity != "repaired" or repair else replace(c, severity="warning") for c in factors.checks]
         return _applied(replace(now, arm=_doubted(now.arm, factors)), applied, said)
-    odd = base.of_torques(stands).share.max() >= _UNRELATED[0]
+    odd = stands.share.max() >= _UNRELATED[0]
     elastic = _beside_elasticity(base, logs, now.arm) if suspects or odd else stands
     suspects = [s for s in suspects if s.fit.cost < elastic.cost + _CLOSE]
     found = confirm(stands, suspects, now.training, now.holdout, now.arm, horizon)
     if found is None:
-        return _applied(now, Corrections(), _strangers(base.of_torques(elastic), now, horizon, 0))
+        return _applied(now, Corrections(), _strangers(elastic.share, now, horizon, 0))
     return _applied(now, found.reading.corrections, [_said(found, now.arm, horizon)])
 
 
@@ -153,18 +157,18 @@ def unexplained_columns(
     base = EquationError([Rows.of(log, arm) for log in (*training, *holdout)], arm)
     if len(base) < _FEWEST_ROWS:
         return []
-    elastic = _beside_elasticity(base, [*training, *holdout], arm)
-    now = Examined(list(training), list(holdout), arm, (), Corrections())
-    return _strangers(base.of_torques(elastic), now, horizon, 1)
+    elastic = base.of_torques(_beside_elasticity(base, [*training, *holdout], arm))
+    share = np.where(base.square >= _DRIVEN * base.scale, elastic.share, 0.0)
+    return _strangers(share, Examined(list(training), list(holdout), arm, (), Corrections()), horizon, 1)
 
 
-def _strangers(elastic: Fit, now: Examined, horizon: float, pair: int) -> list[Check]:
+def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[Check]:
     """Say that torques and positions do not belong together, by one pair of thresholds.
 
-    So it is where no parameters with the arm file's signs explain a part of a torque, not even beside springs and contacts, which can take most of it
-    (`elastic`), or behind a drive that saturates far below its command, and where they do not predict the motion, not even with shifted torques.
+    So it is where no parameters with the arm file's signs explain a part of a torque (`share` per joint), not even beside springs and contacts, which
+    can take most of it, or behind a drive that saturates far below its command, and where they do not predict the motion, not even with shifted
+    torques.
     """
-    share = elastic.share
     worst = int(np.argmax(share))
     logs = [*now.training, *now.holdout]
     if share[worst] < _UNRELATED[pair] or torque_unit.limited(logs, now.arm, worst).share.max() < _LIMITED:

@@ -14,8 +14,9 @@ use armgap_core::effect::{NEVER, Trial};
 /// Probability below which nothing is named.
 const NAMEABLE: f64 = 0.3;
 
-/// Probability below which a value that arms hardly ever have is not named.
-const LIKELY: f64 = 0.5;
+/// Probability below which a value that arms hardly ever have is not named. Single logs of a real arm whose encoders start from another zero each
+/// gave negative stiffnesses up to 0.80 (docs/real-arm.md).
+const LIKELY: f64 = 0.9;
 
 /// Gains of a drive: beyond, a column's unit is wrong, not its drive.
 const GAINS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
