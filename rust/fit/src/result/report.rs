@@ -403,6 +403,6 @@ pub struct OptionSummary {
     pub max_causes: usize,
     /// Seed.
     pub seed: u64,
-    /// Width of smoothed friction that the logs asked for, rad/s; zero for dry friction.
-    pub friction_smoothing: f64,
+    /// Joint by joint, the width over which the logs asked for friction to be smoothed, rad/s; zero for dry friction.
+    pub friction_smoothing: Vec<f64>,
 }

@@ -128,7 +128,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
             horizon_s: options.horizon,
             max_causes: options.max_causes,
             seed: options.seed,
-            friction_smoothing: 0.0,
+            friction_smoothing: vec![0.0; N],
         },
         version: env!("CARGO_PKG_VERSION"),
         seconds: 0.0,
