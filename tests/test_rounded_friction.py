@@ -39,10 +39,10 @@ def dry(hidden) -> Diagnosis:
 def test_the_width_is_found_and_gets_no_name(width, hidden, dry):
     result = diagnosed(width, *hidden)
     assert [c.effect for c in result.causes] == [e.name for e in hidden]
-    assert result.to_dict()["options"]["friction_smoothing"] == pytest.approx(width, rel=0.05)
+    assert result.to_dict()["options"]["friction_widths"] == pytest.approx([width, width], rel=0.05)
     assert all(np.array(result.gap.after) < 2.0 * np.array(result.gap.floor))
 
 
 def test_dry_friction_stays_dry(hidden, dry):
     assert [c.effect for c in dry.causes] == [e.name for e in hidden]
-    assert dry.to_dict()["options"]["friction_smoothing"] == 0.0
+    assert dry.to_dict()["options"]["friction_widths"] == [0.0, 0.0]

@@ -116,7 +116,7 @@ def test_a_value_that_no_arm_has_is_a_candidate(pendulum: Arm) -> None:
     assert all(c["probability"] >= 0.3 for c in data["causes"])
     assert all(c["why"] for c in data["candidates"])
     assert not contradicts(data)
-    if not data["causes"] and not data["options"]["friction_smoothing"]:
+    if not data["causes"] and not any(data["options"]["friction_widths"]):
         assert data["gap"]["after"] == data["gap"]["refit"]
 
 

@@ -104,7 +104,7 @@ def simulate(
     noise: float = 0.0,
     seed: int = 0,
     tolerance: float = 1e-9,
-    smoothing: float = 0.0,
+    smoothing: ArrayLike = 0.0,
     sensor: bool = False,
     name: str = "simulated",
 ) -> Log:
@@ -133,8 +133,8 @@ def simulate(
         Seed of the noise.
     tolerance : float, default 1e-9
         Largest admissible change of a position when steps are halved [rad or m].
-    smoothing : float, default 0
-        Width of a smoothed sign of friction [rad/s]; 0 is dry friction.
+    smoothing : float or array_like, shape (n_joints,), default 0
+        Width of a smoothed sign of friction [rad/s], of all joints or joint by joint; 0 is dry friction.
     sensor : bool, default False
         Keep the simulated velocities as the log's `dq`.
     name : str
@@ -161,12 +161,13 @@ def simulate(
         raise OptionError("`t` must increase and everything be finite", remedy="correct the torque table")
     if not (noise >= 0 and np.isfinite(noise)):
         raise OptionError(f"the noise is {noise}", remedy="give its standard deviation, 0 or more")
+    widths = np.broadcast_to(np.asarray(smoothing, dtype=np.float64), n).tolist()
     placed = [(e.name, e.joint, dict(e.parameters)) for e in effects]
     try:
         if arm.chain is not None:
             theta = arm.theta.tolist()
             motion = arm.chain.native().simulate(
-                theta, t, tau, start, speed, placed, tolerance, smoothing, report_progress
+                theta, t, tau, start, speed, placed, tolerance, widths, report_progress
             )
         else:
             lengths = None if arm.link_length is None else arm.link_length.tolist()
@@ -181,7 +182,7 @@ def simulate(
                 speed,
                 placed,
                 tolerance,
-                smoothing,
+                widths,
                 report_progress,
             )
         q, dq = motion

@@ -52,7 +52,7 @@ def obtained(effect: str, arm_file: Path, arm: TrialArm, trace: Trace, horizon: 
             rows = slice(w * s, w * s + s + 1)
             predicted[w], _ = _native.simulate(
                 stated.kind, stated.gravity, lengths, theta.tolist(), trace.t[rows], trace.tau[rows], trace.q_true[w * s],
-                trace.dq_true[w * s], [], 0.1 * float(weight.min()), 0.0,
+                trace.dq_true[w * s], [], 0.1 * float(weight.min()),
             )  # fmt: skip
         return np.concatenate([measured - factors(predicted), u])
 

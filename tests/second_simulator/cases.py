@@ -44,7 +44,12 @@ ALIKE = (
     {"joint_spring", "position_dependent_friction", "encoder_offset"},
     {"rotor_inertia", "payload", "joint_elasticity", "backlash"},
 )
-FAMILIES = ("single", "pair", "clutter", "clutter-only", "hidden-state", "null", "parameters", "outside")
+FAMILIES = (
+    "single", "pair", "clutter", "clutter-only", "hidden-state", "null", "rounding", "presliding", "parameters", "outside",
+)  # fmt: skip
+#: Widths [rad/s] over which the sign of dry friction is rounded, the same on both joints, and in the family "rounding" another on each.
+WIDTHS = (1e-3, 8e-3)
+WIDE = (1e-3, 5e-2)
 
 
 @dataclass
@@ -81,6 +86,10 @@ class Machine:
         return np.array([self.theta[0] + 2.0 * self.theta[1], self.theta[2]])
 
 
+def _log_uniform(rng: np.random.Generator, ends: tuple[float, float]) -> float:
+    return float(np.exp(rng.uniform(math.log(ends[0]), math.log(ends[1]))))
+
+
 def draw_machine(rng: np.random.Generator) -> Machine:
     """An arm around one of the designs."""
     design = str(rng.choice(list(DESIGNS)))
@@ -91,7 +100,7 @@ def draw_machine(rng: np.random.Generator) -> Machine:
 
     (m1, m2), (l1, _), (c1, c2), (i1, i2) = spread(mass), spread(length), spread(com), spread(inertia)
     fv, fc = spread(viscous, 0.4), spread(coulomb, 0.4)
-    width = float(np.exp(rng.uniform(math.log(1e-3), math.log(8e-3))))
+    width = _log_uniform(rng, WIDTHS)
     joints = [{"viscous": v, "coulomb": c, "width": width} for v, c in zip(fv, fc, strict=True)]
     step = np.full(2, TURN / counts)
     arm = np.array([m1, m2, l1, c1, c2, i1, i2, 9.81])
@@ -222,6 +231,8 @@ def hide(machine: Machine, name: str, j: int, share: float, use: Use, rng: np.ra
             values = {"viscous_asymmetry": sign * torque / use.speed}
         case "stribeck":
             values = {"stribeck": 2.5 * torque, "stribeck_velocity": use.speed * float(rng.uniform(0.05, 0.3))}
+        case "presliding":
+            values = {"bristle": 1.5 * torque, "bristle_path": (use.high - use.low) * _log_uniform(rng, (1e-3, 1e-2))}
         case "quadratic_drag":
             values = {"quadratic": 0.7 * torque / use.speed**2}
         case "load_dependent_friction":
@@ -332,6 +343,9 @@ def make(seed: tuple[int, int], family: str, folder: Path, duration: float = 10.
 
 def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) -> dict[str, Any] | None:
     machine = draw_machine(rng)
+    if family == "rounding":
+        for p in machine.joints:
+            p["width"], p["algebraic"] = _log_uniform(rng, WIDE), float(rng.uniform() < 0.5)
     cluttered = family.startswith("clutter")
     names = ["train-1", "train-2", "holdout-1"] if cluttered else ["train-1", "holdout-1"]
     references = [draw_reference(rng, machine, duration) for _ in names]
@@ -380,13 +394,16 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
     runs = [run(machine, r, s, z) for r, s, z in zip(references, seeds, zeros, strict=True)]
     if not all(_sane(r) for r in [*runs, *without]):
         return None
-    exact = family == "null" or (family != "parameters" and rng.uniform() < 0.5)
+    exact = family in ("null", "rounding") or (family != "parameters" and rng.uniform() < 0.5)
     trust = np.repeat(TRUST, [5, 4])
     stated = nominal_theta * (1.0 + (0.0 if exact else 1.0) * trust * np.clip(rng.standard_normal(9), -2.5, 2.5))
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "arm.toml").write_text(_arm_file(machine, stated, trust * np.abs(stated)))
     _write(folder, names, runs)
-    key = {"family": family, "design": machine.design, "effects": effects, "clutter": small, "exact": exact}
+    key = {
+        "family": family, "design": machine.design, "effects": effects, "clutter": small, "exact": exact,
+        "rounding": [{k: p[k] for k in ("width", "algebraic") if k in p} for p in machine.joints],
+    }  # fmt: skip
     if cluttered and mains:
         (folder / "without").mkdir(exist_ok=True)
         _write(folder / "without", names, without)
@@ -401,6 +418,7 @@ def _draw_mains(rng: np.random.Generator, family: str) -> list[tuple[str, int | 
         "pair": known,
         "clutter": known,
         "hidden-state": requests(HIDDEN_STATES),
+        "presliding": requests(("presliding",)),
         "outside": requests(OUTSIDE),
     }.get(family, [])
     if not offered:

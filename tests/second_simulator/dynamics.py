@@ -18,6 +18,7 @@ NAMES = (
     "asymmetry", "viscous_asymmetry", "stribeck", "stribeck_velocity", "quadratic", "load", "cos_friction", "sin_friction",
     "warm", "warm_time", "spring", "spring_q0", "armature", "efficiency_loss", "stop", "stop_stiffness", "stop_damping",
     "rotor", "shaft", "shaft_damping", "play", "friction_at_motor", "cubic", "cross_position", "drift", "product",
+    "algebraic", "bristle", "bristle_path",
 )  # fmt: skip
 COLUMN = {name: i for i, name in enumerate(NAMES)}
 (
@@ -25,6 +26,7 @@ COLUMN = {name: i for i, name in enumerate(NAMES)}
     ASYMMETRY, VISCOUS_ASYMMETRY, STRIBECK, STRIBECK_VELOCITY, QUADRATIC, LOAD, COS_FRICTION, SIN_FRICTION,
     WARM, WARM_TIME, SPRING, SPRING_Q0, ARMATURE, EFFICIENCY_LOSS, STOP, STOP_STIFFNESS, STOP_DAMPING,
     ROTOR, SHAFT, SHAFT_DAMPING, PLAY, FRICTION_AT_MOTOR, CUBIC, CROSS_POSITION, DRIFT, PRODUCT,
+    ALGEBRAIC, BRISTLE, BRISTLE_PATH,
 ) = range(len(NAMES))  # fmt: skip
 
 
@@ -32,7 +34,7 @@ def table(joints: list[dict[str, float]]) -> np.ndarray:
     """Values of both joints as the compiled code takes them; what is not given is neutral."""
     values = np.zeros((2, len(NAMES)))
     values[:, GAIN], values[:, SATURATION], values[:, STOP] = 1.0, np.inf, np.inf
-    values[:, STRIBECK_VELOCITY] = values[:, WARM_TIME] = 1.0
+    values[:, STRIBECK_VELOCITY] = values[:, WARM_TIME] = values[:, BRISTLE_PATH] = 1.0
     for row, given in zip(values, joints, strict=True):
         for name, value in given.items():
             row[COLUMN[name]] = value
@@ -41,8 +43,8 @@ def table(joints: list[dict[str, float]]) -> np.ndarray:
 
 @numba.njit(fastmath=False)
 def friction(p, q, dq, load, t):
-    """Friction torque of one joint at a speed."""
-    shape = np.tanh(dq / p[WIDTH])
+    """Friction torque of one joint at a speed, without that of its bristles."""
+    shape = dq / np.hypot(dq, p[WIDTH]) if p[ALGEBRAIC] > 0.5 else np.tanh(dq / p[WIDTH])
     level = p[COULOMB] + p[STRIBECK] * np.exp(-((dq / p[STRIBECK_VELOCITY]) ** 2)) + p[LOAD] * abs(load)
     level += p[COS_FRICTION] * np.cos(q) + p[SIN_FRICTION] * np.sin(q)
     cold = 1.0 + p[WARM] * np.exp(-t / p[WARM_TIME])
@@ -61,7 +63,10 @@ def drive(p, command):
 
 @numba.njit(fastmath=False)
 def slope(arm, tilt, payload, P, x, u, disturbance, t):
-    """Time derivative of the state ``[q1, q2, m1, m2, dq1, dq2, dm1, dm2]`` under drive torques `u`."""
+    """Time derivative of the state ``[q1, q2, m1, m2, dq1, dq2, dm1, dm2, z1, z2]`` under drive torques `u`.
+
+    Bristles between links are deflected by `z` of their largest deflection (LuGre without damping of its own).
+    """
     m1, m2, l1, c1, c2, i1, i2, g = arm
     mp, lp = payload
     q1, q2, d1, d2 = x[0], x[1], x[4], x[5]
@@ -75,7 +80,7 @@ def slope(arm, tilt, payload, P, x, u, disturbance, t):
     rhs[0] = b * s * d2 * (2.0 * d1 + d2) - g1
     rhs[1] = -b * s * d1 * d1 - g2
     load = (g1, g2)
-    out = np.empty(8)
+    out = np.empty(10)
     out[0], out[1] = d1, d2
     for j in range(2):
         p = P[j]
@@ -83,6 +88,8 @@ def slope(arm, tilt, payload, P, x, u, disturbance, t):
         torque = disturbance[j] + p[OFFSET] + p[RIPPLE] * np.sin(p[RIPPLE_N] * q + p[RIPPLE_PHASE])
         torque -= p[SPRING] * (q - p[SPRING_Q0])
         torque += p[CROSS_POSITION] * np.sin(3.0 * x[0]) * np.cos(2.0 * x[1]) + p[DRIFT] * t + p[PRODUCT] * q * abs(dq)
+        torque -= p[BRISTLE] * x[8 + j]
+        out[8 + j] = (dq - abs(dq) * x[8 + j]) / p[BRISTLE_PATH]
         side = np.sign(p[STOP]) if np.isfinite(p[STOP]) else 0.0
         depth = side * (q - p[STOP]) if side != 0.0 else -1.0
         if depth > 0.0:
@@ -141,7 +148,7 @@ def simulate(arm, tilt, payload, P, encoder, reference, period, steps, disturban
         np.zeros((samples, 2)),
         np.zeros((samples, 2)),
     )
-    x = np.zeros(8)
+    x = np.zeros(10)
     for j in range(2):
         x[j] = x[2 + j] = reference[0, j, 0]
     act, now, before = np.zeros(2), np.zeros(2), np.zeros(2)

@@ -61,14 +61,15 @@ class Hypothesis:
         Parameters [SI].
     effects : tuple of EffectInstance
         Effects with their values.
-    smoothing : float
+    smoothing : tuple of float
         Width of the smoothed sign of friction [rad/s]; 0 is dry friction.
     """
 
     arm: Arm
     theta: tuple[float, ...]
     effects: tuple[EffectInstance, ...] = ()
-    smoothing: float = 0.0
+    #: Width of the rounded sign of friction of every joint, rad/s; none for dry friction.
+    smoothing: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, data: dict[str, Any], arm: Arm) -> Hypothesis:
@@ -83,7 +84,9 @@ class Hypothesis:
             )
             for c in data.get("causes") or []
         )
-        smoothing = float((data.get("options") or {}).get("friction_smoothing") or 0.0)
+        options = data.get("options") or {}
+        common = [options.get("friction_smoothing") or 0.0] * arm.n_joints
+        smoothing = tuple(float(width) for width in options.get("friction_widths") or common)
         return cls(arm, tuple(float(found[name]["value"]) for name in arm.parameter_names), effects, smoothing)
 
     def only(self, effects: Sequence[EffectInstance]) -> Hypothesis:
@@ -130,7 +133,7 @@ def delivered(t: Array, tau: Array, effects: Sequence[EffectInstance]) -> Array:
         mine = [e.on(1) for e in effects if e.joint == joint]
         column = np.ascontiguousarray(tau[:, [joint - 1]])
         start = np.zeros(1)
-        _, speed = _native.simulate("axis", 0.0, None, [1.0, 0.0, 0.0, 0.0], t, column, start, start, mine, 1e-3, 0.0)
+        _, speed = _native.simulate("axis", 0.0, None, [1.0, 0.0, 0.0, 0.0], t, column, start, start, mine, 1e-3)
         found[:-1, joint - 1] = np.diff(speed[:, 0]) / np.diff(t)
     return found
 
@@ -147,7 +150,7 @@ def true_positions(q: Array, effects: Sequence[EffectInstance]) -> Array:
         t = np.linspace(0.0, 1.0, TABLE)
         shown, _ = _native.simulate(
             "pendulum", 0.0, None, [1.0, 0.0, 0.0, 0.0], t, np.zeros((TABLE, 1)),
-            np.array([low]), np.array([high - low]), mine, 1e-9, 0.0,
+            np.array([low]), np.array([high - low]), mine, 1e-9,
         )  # fmt: skip
         found[:, joint - 1] = np.interp(q[:, joint - 1], shown[:, 0], low + (high - low) * t)
     return found

@@ -187,7 +187,11 @@ class PredictedMotion:
         return white.ravel(), (1.0 / np.sqrt(noise[:, None, :] + bend)).ravel()
 
     def predicted(
-        self, theta: tuple[float, ...], effects: Sequence[EffectInstance], lead: bool, smoothing: float | None = None
+        self,
+        theta: tuple[float, ...],
+        effects: Sequence[EffectInstance],
+        lead: bool,
+        smoothing: tuple[float, ...] | None = None,
     ) -> Array:
         """Factors of the polynomials in the predictions of all windows, one column of numbers [rad or m].
 
@@ -202,7 +206,11 @@ class PredictedMotion:
         return self._known[key]
 
     def _predict(
-        self, theta: tuple[float, ...], effects: Sequence[EffectInstance], lead: bool, smoothing: float | None
+        self,
+        theta: tuple[float, ...],
+        effects: Sequence[EffectInstance],
+        lead: bool,
+        smoothing: tuple[float, ...] | None,
     ) -> Array:
         arm, model, s = self._arm, self._setting.model, self._samples
         before = round(LEAD / self._setting.step) if lead else 0
@@ -260,9 +268,9 @@ class PredictedMotion:
         speed = float(np.sqrt(np.mean(self.dq**2)))
         lead = latent(model.effects)
         for part in SMOOTHED:
-            width = max(part * speed, 2.0 * model.smoothing)
+            widths = tuple(max(part * speed, 2.0 * width) for width in model.smoothing or (0.0,) * arm.n_joints)
             columns.append(
-                self.predicted(model.theta, model.effects, lead, width)
+                self.predicted(model.theta, model.effects, lead, widths)
                 - self.predicted(model.theta, model.effects, lead)
             )
         late = [EffectInstance("actuator_delay", j + 1, {"delay": arm.sample_period}) for j in range(arm.n_joints)]

@@ -49,7 +49,7 @@ def inverse_dynamics(model: Hypothesis, q: Array, dq: Array, ddq: Array) -> Arra
     arm = model.arm
     b, n = arm.n_inertial, arm.n_joints
     theta = np.array(model.theta)
-    smooth = replace(model, theta=tuple(np.concatenate([theta[:b], np.zeros(2 * n)])), effects=(), smoothing=0.0)
+    smooth = replace(model, theta=tuple(np.concatenate([theta[:b], np.zeros(2 * n)])), effects=(), smoothing=())
     free = accelerations(smooth, q, dq, np.zeros_like(q), np.zeros(len(q)))
     needed = np.einsum("kij,kj->ki", smooth.inertia(q), ddq - free)
     return np.asarray(needed + theta[b : b + n] * dq + theta[b + n :] * np.sign(dq), dtype=np.float64)

@@ -88,7 +88,7 @@ def _predict(m: Mechanism, theta: Array, w: Window, effects: Sequence[NativeEffe
     arm = (m.kind, m.gravity, list(m.link_length), theta.tolist())
     for tolerance in TOLERANCES:
         try:
-            return _native.simulate(*arm, w.t, w.tau, w.q0, w.dq0, list(effects), tolerance, 0.0)[0][1:]
+            return _native.simulate(*arm, w.t, w.tau, w.q0, w.dq0, list(effects), tolerance)[0][1:]
         except ValueError as error:
             problem = error
     raise problem

@@ -149,6 +149,22 @@ fn a_smoothed_sign_tends_to_dry_friction() {
 }
 
 #[test]
+fn every_joint_is_rounded_over_a_width_of_its_own() {
+    let of = |widths, substeps| {
+        run(&seed(THETA).with_rounding(widths), at_rest(), 1.0, H, substeps, seed_torque).q
+    };
+    let exact = run(&seed(THETA), at_rest(), 1.0, H, 4, seed_torque).q;
+    assert_eq!(
+        of([0.1, 0.1], 16),
+        run(&seed(THETA).with_smoothing(0.1), at_rest(), 1.0, H, 16, seed_torque).q
+    );
+    assert_eq!(of([0.0, 0.0], 4), exact);
+    // Beside dry friction on the first joint, and a width too small to matter there.
+    let [beside_dry, beside_narrow] = [of([0.0, 0.1], 32), of([5e-4, 0.1], 64)];
+    assert!((beside_dry - beside_narrow).amax() < 0.1 * (beside_dry - exact).amax());
+}
+
+#[test]
 fn a_delayed_command_keeps_its_impulse_and_its_moment() {
     let t: Vec<f64> = (0..50).map(|k| f64::from(k) * H + 1e-4 * f64::from(k % 3)).collect();
     let u: Vec<f64> = t.iter().map(|&t| seed_torque(t)[0]).collect();

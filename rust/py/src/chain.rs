@@ -333,7 +333,7 @@ impl Chain {
         Ok((kinetic, self.scalars(py, Quantity::PotentialEnergy, arguments(theta))?))
     }
 
-    #[pyo3(signature = (theta, t, tau, q0, dq0, effects, tolerance=1e-9, smoothing=0.0, progress=None))]
+    #[pyo3(signature = (theta, t, tau, q0, dq0, effects, tolerance=1e-9, smoothing=Vec::new(), progress=None))]
     fn simulate<'py>(
         &self,
         py: Python<'py>,
@@ -344,7 +344,7 @@ impl Chain {
         dq0: PyReadonlyArray1<'py, f64>,
         effects: Vec<(String, Option<usize>, BTreeMap<String, f64>)>,
         tolerance: f64,
-        smoothing: f64,
+        smoothing: Vec<f64>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Motion<'py>> {
         let (n, theta) = (self.joints(), self.parameters_of(Some(theta))?);

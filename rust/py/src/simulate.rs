@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 /// Positions and velocities of an arm under held torques.
 #[pyfunction]
-#[pyo3(signature = (kind, gravity, link_length, theta, t, tau, q0, dq0, effects, tolerance=1e-9, smoothing=0.0, progress=None))]
+#[pyo3(signature = (kind, gravity, link_length, theta, t, tau, q0, dq0, effects, tolerance=1e-9, smoothing=Vec::new(), progress=None))]
 pub fn simulate<'py>(
     py: Python<'py>,
     kind: &str,
@@ -26,7 +26,7 @@ pub fn simulate<'py>(
     dq0: PyReadonlyArray1<'py, f64>,
     effects: Vec<(String, Option<usize>, BTreeMap<String, f64>)>,
     tolerance: f64,
-    smoothing: f64,
+    smoothing: Vec<f64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Motion<'py>> {
     let kind = kind_of(kind)?;
@@ -46,7 +46,8 @@ pub(crate) struct Inputs<'a, 'py> {
     pub(crate) start: [&'a PyReadonlyArray1<'py, f64>; 2],
     pub(crate) effects: Vec<EffectInstance>,
     pub(crate) tolerance: f64,
-    pub(crate) smoothing: f64,
+    /// Joint by joint, the width of the rounded sign of friction; none for dry friction.
+    pub(crate) smoothing: Vec<f64>,
 }
 
 /// Positions and velocities, one row per sample.
@@ -79,7 +80,7 @@ impl Inputs<'_, '_> {
                 dq0: &dq0,
                 effects: &effects,
                 tolerance,
-                smoothing,
+                smoothing: &smoothing,
                 progress: &reporter,
             };
             guarded(|| run(work))

@@ -61,7 +61,7 @@ _OF_SERIAL_ARMS = (
 
 def _facts(data: Data) -> list[tuple[str, str]]:
     arm, options = data.get("arm") or {}, data.get("options") or {}
-    smoothing = options.get("friction_smoothing")
+    smoothing = options.get("friction_widths") or [options.get("friction_smoothing") or 0.0]
     facts = [
         ("arm", f"{arm.get('name', '')} ({arm.get('kind', '')}, {arm.get('n_joints', '')} joints)"),
         ("prediction horizon", f"{options.get('horizon_s', '')} s"),
@@ -69,7 +69,11 @@ def _facts(data: Data) -> list[tuple[str, str]]:
         ("seed of the resampling", str(options.get("seed", ""))),
         (
             "friction",
-            "" if arm.get("kind") == SERIAL else f"smoothed over {figure(smoothing)} rad/s" if smoothing else "dry",
+            ""
+            if arm.get("kind") == SERIAL
+            else "smoothed over " + ", ".join(map(figure, smoothing)) + " rad/s"
+            if any(smoothing)
+            else "dry",
         ),
         ("schema", str(data.get("schema", ""))),
         ("armgap", str(data.get("version", ""))),

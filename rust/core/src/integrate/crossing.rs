@@ -31,12 +31,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         trial: &State<T, N>,
     ) -> Option<ModeEvent<T>> {
         let &TrialStep { state, x, dt, k1 } = trial_step;
-        let exact = self.plant.smoothing() == T::zero();
+        let exact = |j: usize| !self.plant.is_rounded(j);
         let velocity = |j: usize, at: &State<T, N>| self.plant.friction_velocity(j, &at.dq, &at.latent);
         let reverses = |j: usize| {
-            exact && self.plant.is_dry(j) && velocity(j, trial) * state.modes[j].direction() < T::zero()
+            exact(j) && self.plant.is_dry(j) && velocity(j, trial) * state.modes[j].direction() < T::zero()
         };
-        let sticks = |j: usize| exact && state.modes[j] == Mode::Stuck;
+        let sticks = |j: usize| exact(j) && state.modes[j] == Mode::Stuck;
         let has_backlash = self.plant.drivetrain().has_backlash();
         let edge = |j: usize| self.plant.edge_between(j, state.q[j], trial.q[j]);
         if !has_backlash && !(0..N).any(|j| edge(j).is_some()) && !(0..N).any(|j| sticks(j) || reverses(j)) {

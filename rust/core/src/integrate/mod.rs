@@ -97,7 +97,7 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     let dt = interval.h / lit(count as f64);
     for i in 0..count {
         let from = dt * lit(i as f64);
-        if plant.smoothing() > T::zero() && !plant.drivetrain().has_backlash() {
+        if (0..N).all(|j| plant.is_rounded(j)) && !plant.drivetrain().has_backlash() {
             *state = SubStep::new(plant, interval, state).smooth(state, from, dt);
         } else {
             SubStep::new(plant, interval, state).exact(state, from, dt);
@@ -221,7 +221,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
         next
     }
 
-    /// A step with smoothed friction: no events.
+    /// A step with friction that is rounded on all joints: no events.
     fn smooth(&self, state: &State<T, N>, x: T, dt: T) -> State<T, N> {
         let k1 = self.motion(x, state);
         self.runge_kutta(state, x, dt, &k1)
@@ -256,8 +256,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
 
     /// Holds every joint with dry friction whose velocity contradicts its mode.
     fn hold_reversed(&self, state: &mut State<T, N>) {
-        let exact = self.plant.smoothing() == T::zero();
-        for j in (0..N).filter(|j| exact && self.plant.is_dry(*j)) {
+        for j in (0..N).filter(|j| !self.plant.is_rounded(*j) && self.plant.is_dry(*j)) {
             let velocity = self.plant.friction_velocity(j, &state.dq, &state.latent);
             if velocity * state.modes[j].direction() < T::zero() {
                 self.stop(j, state);

@@ -16,7 +16,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// Direction in which joint `j` slides, between -1 and 1 where friction is smoothed.
     #[inline]
     pub(super) fn sliding(&self, j: usize, dq: &[T; N], modes: &[Mode; N]) -> T {
-        if self.smoothing > T::zero() { (dq[j] / self.smoothing).tanh() } else { modes[j].direction() }
+        if self.is_rounded(j) { (dq[j] / self.rounding[j]).tanh() } else { modes[j].direction() }
     }
 
     /// Coulomb level of joint `j` in a direction, never negative.
@@ -50,8 +50,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// Dry friction torque of a joint that is not stuck.
     #[inline]
     pub(super) fn dry_friction(&self, j: usize, x: &JointPoint<T>, mode: Mode) -> T {
-        if self.smoothing > T::zero() {
-            let soft = (x.dq / self.smoothing).tanh();
+        if self.is_rounded(j) {
+            let soft = (x.dq / self.rounding[j]).tanh();
             return self.level(j, x, if soft < T::zero() { -T::one() } else { T::one() }) * soft;
         }
         match mode {

@@ -73,7 +73,7 @@ pub struct Accelerations<T, const N: usize> {
 pub struct Plant<T: Real, A, const N: usize, const P: usize> {
     rigid: RigidArm<T, A, N, P>,
     drivetrain: Drivetrain<T, N>,
-    smoothing: T,
+    rounding: [T; N],
     effects: [Option<Active<T>>; MAX_EFFECTS],
     n_effects: usize,
     hooks: [Hooks; N],
@@ -89,7 +89,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         Self {
             rigid: RigidArm { arm, theta, viscous, coulomb, constant_inertia, tilt },
             drivetrain: Drivetrain::none(),
-            smoothing: T::zero(),
+            rounding: [T::zero(); N],
             effects: [None; MAX_EFFECTS],
             n_effects: 0,
             hooks: [Hooks::NONE; N],
@@ -98,9 +98,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         }
     }
 
-    /// Replaces `sgn(dq)` by `tanh(dq / width)`; a width of zero keeps exact dry friction.
-    pub fn with_smoothing(mut self, width: T) -> Self {
-        self.smoothing = if width > T::zero() { width } else { T::zero() };
+    /// Replaces `sgn(dq)` by `tanh(dq / width)` on every joint; a width of zero keeps exact dry friction.
+    pub fn with_smoothing(self, width: T) -> Self {
+        self.with_rounding([width; N])
+    }
+
+    /// Replaces `sgn(dq)` of every joint by `tanh(dq / width)` with the joint's own width; a width of zero keeps exact dry friction there.
+    pub fn with_rounding(mut self, widths: [T; N]) -> Self {
+        self.rounding = widths.map(|width| if width > T::zero() { width } else { T::zero() });
         self
     }
 
@@ -205,7 +210,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// Whether friction is exact and there are no latent states; torques may jump at a position.
     #[inline]
     pub fn is_plain(&self) -> bool {
-        self.smoothing == T::zero() && !self.drivetrain.any() && !self.has_hysteresis
+        !(0..N).any(|j| self.is_rounded(j)) && !self.drivetrain.any() && !self.has_hysteresis
     }
 
     /// Whether effects add a torque to joint `j`, and whether they change its Coulomb level.
@@ -231,9 +236,16 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         if self.is_dry(j) { T::one() } else { T::zero() }
     }
 
-    /// Width of the smoothed sign, zero for exact dry friction.
-    pub fn smoothing(&self) -> T {
-        self.smoothing
+    /// Width of the rounded sign of joint `j`, zero for exact dry friction.
+    #[inline]
+    pub fn rounding(&self, j: usize) -> T {
+        self.rounding[j]
+    }
+
+    /// Whether the sign of joint `j`'s dry friction is rounded.
+    #[inline]
+    pub fn is_rounded(&self, j: usize) -> bool {
+        self.rounding[j] > T::zero()
     }
 
     /// A plant none of whose numbers is infinite or undefined.
@@ -445,11 +457,10 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         Accelerations { ddq, friction_at_rest, deflection_acceleration: zero, motor_friction: zero }
     }
 
-    /// Which joints are held; none with smoothed friction.
+    /// Which joints are held; none whose friction is rounded.
     #[inline]
     fn stuck(&self, modes: &[Mode; N]) -> [bool; N] {
-        let exact = self.smoothing == T::zero();
-        core::array::from_fn(|j| exact && modes[j] == Mode::Stuck)
+        core::array::from_fn(|j| !self.is_rounded(j) && modes[j] == Mode::Stuck)
     }
 
     /// Stiction violation of joint `j` at rest (friction torque at rest less the Coulomb level), and the direction it would slide in.

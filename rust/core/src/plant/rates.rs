@@ -50,19 +50,19 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
         let mut fastest = T::zero();
         let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));
-        if self.smoothing == T::zero() && !self.drivetrain.any() && !behind {
+        if !(0..N).any(|j| self.is_rounded(j)) && !self.drivetrain.any() && !behind {
             return fastest;
         }
         let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
         for j in 0..N {
             let free = free_inertia(&inertia, j).max(lit(1e-9));
-            if self.smoothing > T::zero() {
+            if self.is_rounded(j) {
                 let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
                 let braked = match self.drivetrain.get(j) {
                     Some(transmission) if self.drivetrain.sides(j).friction_at_motor => transmission.inertia,
                     _ => free,
                 };
-                fastest = fastest.max(self.level(j, &x, T::one()) / (self.smoothing * braked));
+                fastest = fastest.max(self.level(j, &x, T::one()) / (self.rounding[j] * braked));
             }
             if let Some(transmission) = self.drivetrain.get(j).filter(|d| d.backlash <= T::zero()) {
                 fastest = fastest.max(transmission.rate(free));

@@ -28,22 +28,16 @@ const TRACE: f64 = 0.01;
 /// of it would be named.
 const TRACE_IN_SMALL: f64 = 0.1;
 
-/// A wider regularisation is fitted only if it does not raise the cost by more than this factor before the fit.
-const WORTH_SMOOTHING: f64 = 2.0;
-
-/// Widths that compete with the candidates of every search node, relative to the slowest joint's RMS speed.
-const SMOOTHING: [f64; 2] = [0.03, 0.1];
-
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Hypotheses that are worth a full fit: one candidate more than the fitted model, or friction regularisation. And the score
-    /// tests of all candidates, the open ones first, where they were made.
+    /// Hypotheses that are worth a full fit: one candidate more than the fitted model. And the score tests of all candidates, the open ones
+    /// first, where they were made. `size` is that of the gap.
     pub(crate) fn initial_guesses(
         &self,
         fit: &Fit<P>,
         weights: &SplitWeighting<N>,
+        size: f64,
         min_relevance: f64,
     ) -> (Vec<Hypothesis<P>>, Vec<ScoreTest>) {
-        let size = self.relative_gap(weights, fit);
         let gap = size > min_relevance;
         if !gap && is_plausible::<P>(fit.prior_cost) {
             return (Vec::new(), Vec::new());
@@ -64,26 +58,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             initial_guesses
                 .extend(self.contact_guesses(&all, &trusted).into_iter().map(|stop| trusted.with(stop)));
         }
-        if gap {
-            initial_guesses.extend(self.regularisation_guesses(&fit.hypothesis, weights, training));
-        }
         (initial_guesses, screened)
-    }
-
-    /// The model with wider friction regularisation, or with exact friction if it is regularised now, where that is not plainly worse.
-    pub fn regularisation_guesses(
-        &self,
-        model: &Hypothesis<P>,
-        weights: &SplitWeighting<N>,
-        cost: f64,
-    ) -> Vec<Hypothesis<P>> {
-        let widths = SMOOTHING.iter().map(|w| w * self.scales.slowest()).chain([0.0]);
-        let other = widths.filter(|w| *w != model.smoothing);
-        let problem = self.problem(&weights.training);
-        other
-            .map(|smoothing| Hypothesis { smoothing, ..model.clone() })
-            .filter(|h| problem.window_costs(h).iter().sum::<f64>() < WORTH_SMOOTHING * cost)
-            .collect()
     }
 
     /// Part of the training windows' cost above the floor that any one candidate removes to first order.

@@ -252,6 +252,20 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         }
     }
 
+    /// Cost at a hypothesis once its free values are estimated again to first order, with the Jacobian of a neighbour; infinite where it
+    /// cannot be computed.
+    pub(crate) fn cost_refitted(&self, hypothesis: &Hypothesis<P>, jacobian: &[Vec<f64>]) -> f64 {
+        let residual = self.residual(hypothesis);
+        let columns: Vec<&[f64]> = jacobian.iter().map(Vec::as_slice).collect();
+        let gram = self.weighting.gram(self.data, &columns, &residual);
+        let (normal, gradient) = self.normal_equations(&gram, hypothesis);
+        let k = gradient.len();
+        let as_it_is = gram.total[(k, k)] + self.prior.cost(&hypothesis.theta);
+        let fall = inverse_of_seen(&normal).map_or(0.0, |inverse| gradient.dot(&(inverse * &gradient)));
+        let cost = as_it_is - fall;
+        if cost.is_finite() { cost } else { f64::INFINITY }
+    }
+
     /// Normal matrix and right-hand side, the prior included.
     fn normal_equations(&self, gram: &Gram, hypothesis: &Hypothesis<P>) -> (DMatrix<f64>, DVector<f64>) {
         let k = gram.total.nrows() - 1;

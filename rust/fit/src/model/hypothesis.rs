@@ -1,7 +1,8 @@
-//! A hypothesis about the arm: parameter values, width of the friction regularisation, and effects on joints.
+//! A hypothesis about the arm: parameter values, widths of the friction regularisation, and effects on joints.
 
 use crate::model::custom_effect;
 use armgap_core::arm::Arm;
+use armgap_core::chain::MAX_JOINTS;
 use armgap_core::effect::{Active, Effect, InputSegment, MAX_PARAMETERS, Quantity, Scope, Trial};
 use armgap_core::integrate::State;
 use armgap_core::plant::Plant;
@@ -83,8 +84,8 @@ impl EffectInstance {
 pub struct Hypothesis<const P: usize> {
     /// The arm's parameters.
     pub theta: [f64; P],
-    /// Width of the smoothed sign of friction, rad/s; zero for exact dry friction.
-    pub smoothing: f64,
+    /// Joint by joint, the width of the rounded sign of friction, rad/s (m/s); zero for exact dry friction.
+    pub rounding: [f64; MAX_JOINTS],
     /// Effects with their values.
     pub effects: Vec<EffectInstance>,
 }
@@ -92,7 +93,21 @@ pub struct Hypothesis<const P: usize> {
 impl<const P: usize> Hypothesis<P> {
     /// The arm without effects.
     pub fn rigid(theta: [f64; P]) -> Self {
-        Self { theta, smoothing: 0.0, effects: Vec::new() }
+        Self { theta, rounding: [0.0; MAX_JOINTS], effects: Vec::new() }
+    }
+
+    /// Whether the friction of any joint is rounded.
+    pub fn is_rounded(&self) -> bool {
+        self.rounding.iter().any(|width| *width > 0.0)
+    }
+
+    /// This hypothesis with friction rounded over these widths.
+    pub fn rounded_over<const N: usize>(&self, widths: [f64; N]) -> Self {
+        let mut other = self.clone();
+        for (slot, width) in other.rounding.iter_mut().zip(widths) {
+            *slot = width;
+        }
+        other
     }
 
     /// This hypothesis with one more effect.
@@ -126,7 +141,8 @@ impl<const P: usize> Hypothesis<P> {
 
     /// The simulator of this hypothesis; `None` if it names more effects than a plant carries.
     pub fn plant<A: Arm<f64, N, P>, const N: usize>(&self, arm: &A) -> Option<Plant<f64, A, N, P>> {
-        let plant = Plant::new(arm.clone(), self.theta).with_smoothing(self.smoothing);
+        let widths = std::array::from_fn(|j| self.rounding.get(j).copied().unwrap_or(0.0));
+        let plant = Plant::new(arm.clone(), self.theta).with_rounding(widths);
         self.effects.iter().try_fold(plant, |plant, e| {
             let plant = plant.with_effect(Active { law: e.law, joint: e.joint, p: e.p })?;
             if e.sides == Sides::LINK { Some(plant) } else { plant.with_sides(e.joint, e.sides) }

@@ -43,7 +43,8 @@ pub fn inverse_dynamics_residuals<A: Arm<f64, N, P>, const N: usize, const P: us
     let plant = model.plant(arm)?;
     let has_latent = plant.drivetrain().any() || plant.has_hysteresis();
     let latent = has_latent.then(|| latent_states(track, &plant, held, track.len() - 1));
-    let soft = plant.with_smoothing(slow.max(model.smoothing));
+    let widths = std::array::from_fn(|j| plant.rounding(j).max(slow));
+    let soft = plant.with_rounding(widths);
     let sample = |k: usize| {
         let at: [Local; N] =
             std::array::from_fn(|j| local_cubic(&track.t, |i| model.actual(j, track.q[i][j]), k, half));

@@ -30,8 +30,8 @@ pub struct Simulation<'a> {
     pub effects: &'a [EffectInstance],
     /// Largest admissible change of any position when the sub-steps are halved.
     pub tolerance: f64,
-    /// Width of the smoothed sign, rad/s; zero for exact dry friction.
-    pub smoothing: f64,
+    /// Joint by joint, the width of the rounded sign of friction, rad/s (m/s); zero for exact dry friction, and where none is given.
+    pub smoothing: &'a [f64],
     /// Progress report and cancellation.
     pub progress: &'a ProgressReporter,
 }
@@ -77,7 +77,9 @@ impl WithArm for Simulation<'_> {
         arm: A,
         theta: [f64; P],
     ) -> Self::Output {
-        let hypothesis = Hypothesis { theta, smoothing: self.smoothing, effects: self.effects.to_vec() };
+        let widths: [f64; N] = std::array::from_fn(|j| self.smoothing.get(j).copied().unwrap_or(0.0));
+        let hypothesis =
+            Hypothesis { effects: self.effects.to_vec(), ..Hypothesis::rigid(theta).rounded_over(widths) };
         let first = self.first_substeps::<A, N, P>(&arm, &hypothesis)?;
         let mut coarse = self.run::<A, N, P>(&arm, &hypothesis, first)?;
         let mut substeps = 2 * first;

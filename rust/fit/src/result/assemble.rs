@@ -109,7 +109,8 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             horizon_s: options.horizon,
             max_causes: options.max_causes,
             seed: options.seed,
-            friction_smoothing: headline.model.hypothesis.smoothing,
+            friction_smoothing: headline.model.hypothesis.rounding.iter().copied().fold(0.0, f64::max),
+            friction_widths: headline.model.hypothesis.rounding[..N].to_vec(),
         },
         version: env!("CARGO_PKG_VERSION"),
         seconds: 0.0,
@@ -363,11 +364,11 @@ fn notes<const N: usize, const P: usize>(
     description: &ArmDescription,
 ) -> Vec<String> {
     let mut notes = Vec::new();
-    let smoothing = headline.model.hypothesis.smoothing;
-    if smoothing > 0.0 {
-        notes.push(format!(
-            "the logs fit friction smoothed over {smoothing:.3} rad/s better than dry friction"
-        ));
+    if headline.model.hypothesis.is_rounded() {
+        let widths: Vec<String> =
+            headline.model.hypothesis.rounding[..N].iter().map(|width| format!("{width:.3}")).collect();
+        let widths = widths.join(" and ");
+        notes.push(format!("the logs fit friction smoothed over {widths} rad/s better than dry friction"));
     }
     let named = !headline.causes.is_empty() || !headline.disturbances.is_empty();
     if max_causes == 0 {

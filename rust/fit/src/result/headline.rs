@@ -76,7 +76,9 @@ fn impossible(effect: &EffectInstance, probability: f64) -> Option<String> {
 /// a transmission is along its other values as well, and the search has compared the whole effect with its absence.
 fn uncertain(effect: &EffectInstance, sigma: &[f64]) -> Option<String> {
     let spec = effect.law.spec();
-    let amplitudes = spec.parameters.iter().zip(effect.p).zip(sigma).take(effect.amplitudes());
+    // Along a ray all values leave nothing together, and the first is the size.
+    let count = if spec.trial == Trial::Ray { 1 } else { effect.amplitudes() };
+    let amplitudes = spec.parameters.iter().zip(effect.p).zip(sigma).take(count);
     let deviations = amplitudes.map(|((parameter, value), sigma)| {
         let neutral = if parameter.neutral < NEVER { parameter.neutral } else { 0.0 };
         ((value - neutral).abs(), *sigma)
@@ -191,6 +193,8 @@ mod tests {
             ("stribeck", [0.8, 0.3, 0.0], vec![0.03, 0.02], 0.29, false),
             ("stribeck", [0.8, 0.3, 0.0], vec![0.8, 0.02], 0.99, false),
             ("stribeck", [0.8, 0.3, 0.0], vec![0.03, 3.0], 0.99, true),
+            ("presliding", [0.4, 30.0, 0.0], vec![0.05, 20.0], 0.99, true),
+            ("presliding", [1e-16, 300.0, 0.0], vec![0.008, 90.0], 0.99, false),
             ("payload", [15.6, 0.2, 0.0], vec![50.0, 0.1], 0.99, false),
             ("torque_gain", [1.02, 0.0, 0.0], vec![0.01], 0.9, true),
             ("torque_gain", [1.02, 0.0, 0.0], vec![0.03], 0.9, false),

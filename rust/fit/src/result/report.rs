@@ -455,6 +455,8 @@ pub struct OptionSummary {
     pub max_causes: usize,
     /// Seed.
     pub seed: u64,
-    /// Width of smoothed friction that the logs asked for, rad/s; zero for dry friction.
+    /// Largest width over which the logs asked for friction to be smoothed, rad/s; zero for dry friction.
     pub friction_smoothing: f64,
+    /// That width joint by joint.
+    pub friction_widths: Vec<f64>,
 }

@@ -153,7 +153,7 @@ pub fn choose<const N: usize, const P: usize>(
 ) -> Option<(usize, Ground)> {
     let by_motion = best(node, regularised).filter(|i| moves(node, &node.candidates[*i], min_relevance));
     if let Some(best) = by_motion {
-        return Some((simplest(node, best, min_relevance), Ground::Motion));
+        return Some((simplest(node, best, regularised, min_relevance), Ground::Motion));
     }
     let free = |i: usize| node.candidates[i].effect.as_ref().map_or(0, EffectInstance::len) as f64;
     let trust = |i: &usize| node.candidates[*i].fit.prior_cost + free(*i);
@@ -178,23 +178,51 @@ pub fn is_possible<const P: usize>(candidate: &Candidate<P>) -> bool {
 }
 
 /// The candidate with the fewest parameters among those that do almost as well as the best: a spring with a far-off rest position is
-/// an offset.
+/// an offset, and a hysteresis over next to no path is rounded friction.
 fn simplest<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     best: usize,
+    regularised: bool,
     min_relevance: f64,
 ) -> usize {
-    let advantage = |i: usize| node.base.score() - node.candidates[i].score();
-    let size = |i: usize| node.candidates[i].effect.as_ref().map_or(0, EffectInstance::len);
     let almost = if node.share(&node.candidates[best]) > MOST { ALMOST } else { ALMOST_IN_DOUBT };
-    let enough = almost * advantage(best);
-    let as_good = |i: &usize| {
-        advantage(*i) > enough && moves(node, &node.candidates[*i], min_relevance) && size(*i) > 0
+    let offer = |candidate: &Candidate<P>| Offer {
+        advantage: node.base.score() - candidate.score(),
+        values: free_values(candidate, regularised),
+        moves: moves(node, candidate, min_relevance),
     };
-    if size(best) == 0 {
+    let offers: Vec<Offer> = node.candidates.iter().map(offer).collect();
+    fewest_values(&offers, best, almost)
+}
+
+/// What a choice for simplicity needs to know of a candidate.
+#[derive(Debug, Clone, Copy)]
+struct Offer {
+    /// Decrease of the cost.
+    advantage: f64,
+    /// Values that it is free in beyond the arm's; none if it is not to be chosen.
+    values: usize,
+    /// Whether it would be accepted by itself.
+    moves: bool,
+}
+
+/// The offer with the fewest values among those that are accepted by themselves and reach more than the part `almost` of the best one's
+/// advantage, the first of several.
+fn fewest_values(offers: &[Offer], best: usize, almost: f64) -> usize {
+    let Offer { advantage, values, .. } = offers[best];
+    if values == 0 {
         return best;
     }
-    (0..node.candidates.len()).filter(as_good).min_by_key(|i| (size(*i), *i)).unwrap_or(best)
+    let as_good =
+        |i: &usize| offers[*i].advantage > almost * advantage && offers[*i].moves && offers[*i].values > 0;
+    (0..offers.len()).filter(as_good).min_by_key(|i| (offers[*i].values, *i)).unwrap_or(best)
+}
+
+/// Values that a candidate is free in beyond the arm's: those of its effect, or the width of rounded friction while that is open. None of a
+/// candidate that is not to be chosen for its simplicity.
+fn free_values<const P: usize>(candidate: &Candidate<P>, regularised: bool) -> usize {
+    let width = usize::from(!regularised && candidate.fit.hypothesis.is_rounded());
+    candidate.effect.as_ref().map_or(width, EffectInstance::len)
 }
 
 /// Whether a candidate closes a part of the gap that matters, on the holdout too.
@@ -250,4 +278,28 @@ pub fn brings_back<const N: usize, const P: usize>(
         && before - candidate.fit.prior_cost > TRUST_GAIN
         && candidate.fit.prior_cost < 0.4 * before
         && candidate.score() < node.base.score()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn offer(advantage: f64, values: usize) -> Offer {
+        Offer { advantage, values, moves: true }
+    }
+
+    #[test]
+    fn rounded_friction_goes_before_a_hysteresis_that_hardly_does_better() {
+        let [hysteresis, rounding] = [offer(100.0, 2), offer(97.0, 1)];
+        assert_eq!(fewest_values(&[hysteresis, rounding], 0, ALMOST), 1);
+        assert_eq!(fewest_values(&[hysteresis, Offer { values: 0, ..rounding }], 0, ALMOST), 0);
+        assert_eq!(fewest_values(&[hysteresis, offer(60.0, 1)], 0, ALMOST), 0);
+        assert_eq!(fewest_values(&[hysteresis, Offer { moves: false, ..rounding }], 0, ALMOST), 0);
+    }
+
+    #[test]
+    fn the_better_of_two_with_as_many_values_stays() {
+        assert_eq!(fewest_values(&[offer(100.0, 1), offer(99.0, 1)], 0, ALMOST), 0);
+        assert_eq!(fewest_values(&[offer(100.0, 3), offer(99.0, 2), offer(98.0, 2)], 0, ALMOST), 1);
+    }
 }

@@ -180,11 +180,16 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (fit, weights): (Fit<P>, SplitWeighting<N>),
         min_relevance: f64,
     ) -> SearchNode<N, P> {
-        let (initial_guesses, screened) = self.initial_guesses(&fit, &weights, min_relevance);
-        self.progress.begin(Phase::Candidates, initial_guesses.len());
+        let size = self.relative_gap(&weights, &fit);
+        let (mut initial_guesses, screened) = self.initial_guesses(&fit, &weights, size, min_relevance);
+        let gap = size > min_relevance;
         let problem = self.problem(&weights.training);
-        let jacobian =
-            if initial_guesses.is_empty() { Vec::new() } else { problem.jacobian(&fit.hypothesis) };
+        let needed = gap || !initial_guesses.is_empty();
+        let jacobian = if needed { problem.jacobian(&fit.hypothesis) } else { Vec::new() };
+        if gap {
+            initial_guesses.extend(self.regularisation_guesses(&fit.hypothesis, &weights, &jacobian));
+        }
+        self.progress.begin(Phase::Candidates, initial_guesses.len());
         let first = self.fit_candidates(&weights, &fit.hypothesis, initial_guesses, Effort::ROUGH, &jacobian);
         let first = self.taken_on(&weights, &fit.hypothesis, first);
         let field = self.field(&weights, &fit, &first);

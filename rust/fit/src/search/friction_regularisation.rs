@@ -1,64 +1,155 @@
-//! Friction regularisation: the width over which the sign of friction changes around standstill, fitted as a nuisance.
+//! Friction regularisation: the widths over which the sign of friction changes around standstill, fitted as a nuisance.
 //!
-//! Dry friction jumps; the friction of many simulators, and of joints that creep, follows `tanh(dq / width)`. The width is no cause of a gap that
-//! has a name, but a model with another one misses every reversal, and what it misses there hides small causes.
+//! Dry friction jumps; the friction of many simulators, and of joints that creep, follows `tanh(dq / width)`, on every joint with a width of its
+//! own. The widths are no cause of a gap that has a name, but a model with others misses every reversal, and what it misses there hides
+//! small causes, or takes the name of an effect that acts at reversals too. So the model with the best widths is a rival of every candidate,
+//! and of every cause that is to stay.
 
-use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::solve::{Effort, Fit, FitProblem};
 use crate::model::hypothesis::Hypothesis;
 use crate::numeric::minimum::minimum;
 use crate::search::acceptance::{ABOVE_FLOOR, is_regularisation};
-use crate::search::attribute::SearchNode;
+use crate::search::attribute::{Candidate, SearchNode};
 use armgap_core::arm::Arm;
-use rayon::prelude::*;
 
-/// Where nothing is accepted, widths that are fitted first, relative to the slowest joint's RMS speed.
-const WIDTHS: [f64; 6] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
+/// Widths that are tried on all joints at once, relative to the slowest joint's RMS speed.
+const WIDTHS: [f64; 7] = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
 
-/// A short fit keeps some of the values that suit the width they come from, which has been too small so far: the search goes down from the
-/// best by the first factor and up by the second.
-const REACH: [f64; 2] = [4.0, 16.0];
+/// From the best of them the common width is searched by this factor either way, and from there each joint's own by the second.
+const REACH: [f64; 2] = [4.0, 20.0];
 
-/// Evaluations of the search, each a fit of the parameters.
-const EVALUATIONS: u64 = 9;
+/// Evaluations of each search, of the common width and of one joint's.
+const EVALUATIONS: [u64; 2] = [6, 7];
 
-/// Data cost plus prior cost, parameters fitted, as a function of the width.
-struct ByWidth<'a, A, const N: usize, const P: usize> {
-    problem: &'a FitProblem<'a, A, N, P>,
-    model: &'a Hypothesis<P>,
-}
+/// Times that the widths are searched again with the parameters fitted beside them.
+const ROUNDS: usize = 2;
 
-impl<A: Arm<f64, N, P>, const N: usize, const P: usize> ByWidth<'_, A, N, P> {
-    fn rounded_over(&self, width: f64) -> Hypothesis<P> {
-        Hypothesis { smoothing: width, ..self.model.clone() }
+/// The widths, joint by joint, that cost least, and what they cost: the best of those `tried` on all joints, then a common one beside it, then
+/// each joint's own.
+fn least_widths<const N: usize>(
+    cost: impl Fn([f64; N]) -> f64,
+    tried: impl IntoIterator<Item = f64>,
+) -> Option<([f64; N], f64)> {
+    let mut best = tried
+        .into_iter()
+        .map(|width| ([width; N], cost([width; N])))
+        .filter(|(_, cost)| cost.is_finite())
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let mut search = |joints: std::ops::Range<usize>, reach: f64, evaluations: u64| {
+        let (from, least) = best;
+        let at = |logarithm: f64| {
+            let mut widths = from;
+            widths[joints.clone()].fill(logarithm.exp());
+            widths
+        };
+        let centre = from[joints.start].ln();
+        let within = [centre - reach.ln(), centre + reach.ln()];
+        let Some(found) = minimum(|x| cost(at(x)), within, evaluations) else { return };
+        let reached = cost(at(found));
+        if reached < least {
+            best = (at(found), reached);
+        }
+    };
+    search(0..N, REACH[0], EVALUATIONS[0]);
+    if N > 1 {
+        for joint in 0..N {
+            search(joint..joint + 1, REACH[1], EVALUATIONS[1]);
+        }
     }
-
-    fn cost_of(&self, width: f64) -> f64 {
-        let fit = self.problem.solve(&self.rounded_over(width), Effort::ROUGH);
-        fit.data_cost + fit.prior_cost
-    }
+    Some(best)
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The current model with friction regularised over the best width, if that explains most of the gap.
+    /// The model with the widths that suit the training windows best, its values estimated again to first order from its `jacobian`; none
+    /// where no width does better than those that it has.
+    pub(crate) fn rounded(
+        &self,
+        problem: &FitProblem<A, N, P>,
+        model: &Hypothesis<P>,
+        jacobian: &[Vec<f64>],
+    ) -> Option<Hypothesis<P>> {
+        let slowest = self.scales.slowest();
+        let cost = |widths: [f64; N]| problem.cost_refitted(&model.rounded_over(widths), jacobian);
+        let now = problem.cost_refitted(model, jacobian);
+        let (widths, least) = least_widths(cost, WIDTHS.map(|part| part * slowest))?;
+        (least < now).then(|| model.rounded_over(widths))
+    }
+
+    /// The model with the widths of friction regularisation that suit it best, and with exact friction if it is regularised now.
+    pub fn regularisation_guesses(
+        &self,
+        model: &Hypothesis<P>,
+        weights: &SplitWeighting<N>,
+        jacobian: &[Vec<f64>],
+    ) -> Vec<Hypothesis<P>> {
+        let rounded = self.rounded(&self.problem(&weights.training), model, jacobian);
+        let exact = model.is_rounded().then(|| model.rounded_over([0.0; N]));
+        rounded.into_iter().chain(exact).collect()
+    }
+
+    /// The best fit of a model to the training windows: with the widths of friction regularisation that it has, or with those that suit it
+    /// best. What a cause is compared with when it is taken out.
+    pub(crate) fn fit_with_any_rounding(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Fit<P> {
+        let problem = self.problem(&weights.training);
+        let fit = problem.solve(model, Effort::FULL);
+        let jacobian = problem.jacobian(&fit.hypothesis);
+        let Some(rounded) = self.rounded(&problem, &fit.hypothesis, &jacobian) else { return fit };
+        let other = problem.solve(&rounded, Effort::FULL);
+        let cost = |fit: &Fit<P>| fit.data_cost + fit.prior_cost;
+        if cost(&other) < cost(&fit) { other } else { fit }
+    }
+
+    /// The current model with friction regularised over the best widths, if that explains most of the gap.
     pub fn regularisation(&self, node: &SearchNode<N, P>) -> Option<Fit<P>> {
         if node.excess() < ABOVE_FLOOR {
             return None;
         }
-        let (base, model) = (&node.base.fit, &node.base.fit.hypothesis);
         let problem = self.problem(&node.weights.training);
-        let by_width = ByWidth { problem: &problem, model };
-        let slowest = self.scales.slowest();
-        let fitted: Vec<(f64, f64)> =
-            WIDTHS.par_iter().map(|part| (by_width.cost_of(part * slowest), part * slowest)).collect();
-        let (least, width) = fitted.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-        if least >= base.data_cost + base.prior_cost {
-            return None;
+        let mut best: Candidate<P> = node.base.clone();
+        for _ in 0..ROUNDS {
+            let model = &best.fit.hypothesis;
+            let Some(rounded) = self.rounded(&problem, model, &problem.jacobian(model)) else { break };
+            let found = self.candidate(&node.weights, &rounded, model.effects.len(), Effort::FULL, &[]);
+            if found.fit.data_cost + found.fit.prior_cost >= best.fit.data_cost + best.fit.prior_cost {
+                break;
+            }
+            best = found;
         }
-        let within = [(width / REACH[0]).ln(), (width * REACH[1]).ln()];
-        let best = minimum(|logarithm| by_width.cost_of(logarithm.exp()), within, EVALUATIONS)?;
-        let initial_guess = by_width.rounded_over(best.exp());
-        let candidate = self.candidate(&node.weights, &initial_guess, model.effects.len(), Effort::FULL, &[]);
-        is_regularisation(node, &candidate).then_some(candidate.fit)
+        is_regularisation(node, &best).then_some(best.fit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Squared distances of the widths' logarithms from those of the best.
+    fn apart<const N: usize>(best: [f64; N]) -> impl Fn([f64; N]) -> f64 {
+        move |widths| (0..N).map(|j| (widths[j] / best[j]).ln().powi(2)).sum()
+    }
+
+    #[test]
+    fn a_common_width_is_found_between_those_tried() {
+        let (widths, cost) = least_widths(apart([0.005]), WIDTHS).expect("finite costs");
+        assert!((widths[0] / 0.005).ln().abs() < 0.05 && cost < 0.0025, "{widths:?}");
+    }
+
+    #[test]
+    fn every_joint_has_a_width_of_its_own() {
+        for best in [[0.002, 0.03], [0.05, 0.004], [0.01, 0.01]] {
+            let (widths, _) = least_widths(apart(best), WIDTHS).expect("finite costs");
+            for (found, wanted) in widths.iter().zip(best) {
+                assert!((found / wanted).ln().abs() < 0.2, "{widths:?} for {best:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn widths_that_cannot_be_simulated_are_passed_over() {
+        let cost = |widths: [f64; 2]| if widths[0] < 0.01 { f64::NAN } else { widths[0] + widths[1] };
+        let (widths, cost) = least_widths(cost, WIDTHS).expect("some are finite");
+        assert!(widths[0] >= 0.01 && cost.is_finite());
+        assert!(least_widths(|_: [f64; 2]| f64::INFINITY, WIDTHS).is_none());
     }
 }

@@ -153,10 +153,23 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 let Some(both) = pair else { break };
                 search.take_up(both)
             };
+            let rounding = search.node.settled.hypothesis.rounding;
             self.advance(search, &next, min_relevance);
+            if next.hypothesis.rounding != rounding {
+                self.drop_idle(search, min_relevance);
+            }
         }
         if let Some(other) = self.reconsidered(search, true, min_relevance, max_causes, seed) {
             *search = other;
+        }
+    }
+
+    /// Drops the causes that stood in for rounded friction, once that is in the model, and goes on to the node without them.
+    fn drop_idle(&self, search: &mut ModelSearch<N, P>, min_relevance: f64) {
+        let (mut model, known) = (search.node.settled.clone(), search.causes.len());
+        self.prune(&mut model, &mut search.causes, &search.node);
+        if search.causes.len() < known {
+            self.advance(search, &model, min_relevance);
         }
     }
 
@@ -206,14 +219,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FAINTEST
     }
 
-    /// Drops causes that the others have made idle.
+    /// Drops causes that the others have made idle, or rounded friction has.
     pub(crate) fn prune(&self, model: &mut Fit<P>, causes: &mut Vec<Cause>, node: &SearchNode<N, P>) {
         let mut i = 0;
-        while causes.len() > 1 && i < causes.len() {
+        while (causes.len() > 1 || model.hypothesis.is_rounded()) && i < causes.len() {
             let full = self.judged(node, model.clone(), None);
             let mut without = model.hypothesis.clone();
             without.effects.remove(i);
-            let fit = self.problem(&node.weights.training).solve(&without, Effort::FULL);
+            let fit = self.fit_with_any_rounding(&without, &node.weights);
             let reduced = self.judged(node, fit, None);
             let idle = full.z_over(&reduced) < CERTAIN
                 && !node.takes_outliers(&full, &reduced)

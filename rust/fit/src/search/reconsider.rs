@@ -156,7 +156,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let mut other = ModelSearch {
             causes,
             nodes: search.nodes[..rival.node].to_vec(),
-            regularised: before.smoothing > 0.0,
+            regularised: before.is_rounded(),
             regularisation_fitted: false,
             threshold: search.threshold,
             node,

@@ -115,6 +115,7 @@ pub(crate) fn assemble<const N: usize, const P: usize>(
             max_causes: options.max_causes,
             seed: options.seed,
             friction_smoothing: 0.0,
+            friction_widths: vec![0.0; N],
         },
         version: env!("CARGO_PKG_VERSION"),
         seconds: 0.0,
