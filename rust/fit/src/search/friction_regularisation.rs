@@ -63,7 +63,7 @@ fn least_widths<const N: usize>(
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// The model with the widths that suit the training windows best, its values estimated again to first order from its `jacobian`; none
     /// where no width does better than those that it has.
-    pub(crate) fn rounded(
+    pub(crate) fn with_best_widths(
         &self,
         problem: &FitProblem<A, N, P>,
         model: &Hypothesis<P>,
@@ -83,9 +83,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weights: &SplitWeighting<N>,
         jacobian: &[Vec<f64>],
     ) -> Vec<Hypothesis<P>> {
-        let rounded = self.rounded(&self.problem(&weights.training), model, jacobian);
+        let regularised = self.with_best_widths(&self.problem(&weights.training), model, jacobian);
         let exact = model.is_rounded().then(|| model.rounded_over([0.0; N]));
-        rounded.into_iter().chain(exact).collect()
+        regularised.into_iter().chain(exact).collect()
     }
 
     /// The best fit of a model to the training windows: with the widths of friction regularisation that it has, or with those that suit it
@@ -94,8 +94,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let problem = self.problem(&weights.training);
         let fit = problem.solve(model, Effort::FULL);
         let jacobian = problem.jacobian(&fit.hypothesis);
-        let Some(rounded) = self.rounded(&problem, &fit.hypothesis, &jacobian) else { return fit };
-        let other = problem.solve(&rounded, Effort::FULL);
+        let Some(regularised) = self.with_best_widths(&problem, &fit.hypothesis, &jacobian) else {
+            return fit;
+        };
+        let other = problem.solve(&regularised, Effort::FULL);
         let cost = |fit: &Fit<P>| fit.data_cost + fit.prior_cost;
         if cost(&other) < cost(&fit) { other } else { fit }
     }
@@ -109,8 +111,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         let mut best: Candidate<P> = node.base.clone();
         for _ in 0..ROUNDS {
             let model = &best.fit.hypothesis;
-            let Some(rounded) = self.rounded(&problem, model, &problem.jacobian(model)) else { break };
-            let found = self.candidate(&node.weights, &rounded, model.effects.len(), Effort::FULL, &[]);
+            let Some(regularised) = self.with_best_widths(&problem, model, &problem.jacobian(model)) else {
+                break;
+            };
+            let found = self.candidate(&node.weights, &regularised, model.effects.len(), Effort::FULL, &[]);
             if found.fit.data_cost + found.fit.prior_cost >= best.fit.data_cost + best.fit.prior_cost {
                 break;
             }
