@@ -49,7 +49,7 @@ def simulate(
     dq0: NDArray[np.float64],
     effects: Sequence[tuple[str, int | None, dict[str, float]]],
     tolerance: float = 1e-9,
-    smoothing: Sequence[float] = (),
+    smoothing: Sequence[float] = ...,
     progress: Callable[[str, float], object] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 def inertia(
@@ -187,6 +187,6 @@ class Chain:
         dq0: _Floats,
         effects: Sequence[tuple[str, int | None, dict[str, float]]],
         tolerance: float = 1e-9,
-        smoothing: Sequence[float] = (),
+        smoothing: Sequence[float] = ...,
         progress: Callable[[str, float], object] | None = None,
     ) -> tuple[_Floats, _Floats]: ...
