@@ -154,7 +154,7 @@ fn main() -> std::io::Result<()> {
     )?;
     writeln!(out, "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")?;
     let mut same = true;
-    for case in [
+    for case in vec![
         Case::new("one of 10 s, dry friction", true),
         Case::new("one of 10 s, no dry friction", false),
         Case::new("", true).many("64 of 0.5 s, dry friction", 64, 200),
