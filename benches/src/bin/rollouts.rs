@@ -145,6 +145,18 @@ fn compare(case: &Case) -> ([f64; 6], f64) {
     (times.each_mut().map(|t| median(t)), q[1..].iter().map(|q| apart(q)).fold(0.0, f64::max))
 }
 
+/// Runs that are compared.
+fn cases() -> Vec<Case> {
+    vec![
+        Case::new("one of 10 s, dry friction", true),
+        Case::new("one of 10 s, no dry friction", false),
+        Case::new("", true).many("64 of 0.5 s, dry friction", 64, 200),
+        Case::new("", false).many("64 of 0.5 s, no dry friction", 64, 200),
+        Case::new("", true).windows("50 windows of 0.2 s, dry friction", 80),
+        Case::new("", false).windows("50 windows of 0.2 s, no dry friction", 80),
+    ]
+}
+
 fn main() -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     let (level, widest) = (Level::detect().name(), Level::widest().name());
@@ -154,14 +166,7 @@ fn main() -> std::io::Result<()> {
     )?;
     writeln!(out, "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")?;
     let mut same = true;
-    for case in vec![
-        Case::new("one of 10 s, dry friction", true),
-        Case::new("one of 10 s, no dry friction", false),
-        Case::new("", true).many("64 of 0.5 s, dry friction", 64, 200),
-        Case::new("", false).many("64 of 0.5 s, no dry friction", 64, 200),
-        Case::new("", true).windows("50 windows of 0.2 s, dry friction", 80),
-        Case::new("", false).windows("50 windows of 0.2 s, no dry friction", 80),
-    ] {
+    for case in cases() {
         let (t, off) = compare(&case);
         same &= off < SAME;
         let times: Vec<String> = t.iter().map(|t| format!("{t:.0}")).collect();
