@@ -253,7 +253,8 @@ def _columns(data: dict[str, Any], given: PreparedInput) -> list[Check]:
     if given.arm.chain is not None:
         return []
     gap = data["gap"]
-    relative = max(after / motion for after, motion in zip(gap["after"], gap["motion"], strict=True))
+    moving = [(after, motion) for after, motion in zip(gap["after"], gap["motion"], strict=True) if motion > 0.0]
+    relative = max((after / motion for after, motion in moving), default=0.0)
     return unexplained_columns(given.training, given.holdout, given.arm, gap["horizon_s"], relative)
 
 

@@ -16,7 +16,7 @@ pub struct Cause {
     pub effect: EffectInstance,
     /// Standard deviations of its values.
     pub sigma: Vec<f64>,
-    /// Probability that it, or an effect that no motion tells from it, is what the windows show.
+    /// Probability that it, or one of its look-alikes, is in the arm.
     pub probability: f64,
     /// Share of the holdout's gap above the floor that it removed when it was added.
     pub share: f64,
