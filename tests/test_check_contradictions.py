@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, e
 from armgap.check.contradiction import READINGS, Refit, screen
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.check.stage import unexplained_columns
-from armgap.diagnosis.diagnosis import _ambiguous_lag, _columns, _hidden_delay
+from armgap.diagnosis.diagnosis import _ambiguous_lag, _hidden_delay
 from armgap.diagnosis.prepared_input import prepare
 from armgap.errors import ColumnError, OptionError
 from armgap.simulation import Effect
@@ -250,12 +249,6 @@ def test_a_diagnosis_that_still_misses_the_motion_asks_for_the_columns_again(two
     assert (check.check, check.severity) == ("joint_order", "error")
     assert unexplained_columns(backwards[:1], backwards[1:], arm, 0.25, 0.1) == []
     assert unexplained_columns(two_links[:1], two_links[1:], arm, 0.25, 0.9) == []
-
-
-def test_a_joint_that_stands_still_asks_for_no_other_columns(two_links: list[Log], arm: Arm) -> None:
-    given = SimpleNamespace(arm=arm, training=two_links[:1], holdout=two_links[1:])
-    still = {"gap": {"after": [0.1, 0.001], "motion": [0.0, 1.0], "horizon_s": 0.25}}
-    assert _columns(still, given) == []
 
 
 def test_columns_share_the_factor_of_the_joint_that_knows_it() -> None:

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import pytest
 
 import report_cases
 from armgap import Arm, Diagnosis, Log, _native, diagnose
+from armgap.diagnosis.diagnosis import _columns
 from armgap.evidence import plausibility
 from armgap.simulation import Effect
 from swings import off, swing
@@ -161,3 +163,9 @@ def test_one_thread_and_two_give_the_same_bytes(tmp_path: Any) -> None:
         return subprocess.run([sys.executable, "-c", _RUN, file], env=env, capture_output=True, check=True).stdout
 
     assert result(1) == result(2)
+
+
+def test_a_joint_that_stands_still_asks_for_no_other_columns(pendulum: Arm) -> None:
+    given = SimpleNamespace(arm=pendulum, training=[swing(pendulum, 1)], holdout=[swing(pendulum, 2)])
+    still = {"gap": {"after": [0.1], "motion": [0.0], "horizon_s": 0.25}}
+    assert _columns(still, given) == []
