@@ -1,10 +1,11 @@
 /*
  * The three schemes of Reyes and Kelly (1997) for their two-link arm in plain C: the yardstick of the benchmarks.
  *
- * What a controls engineer would write by hand for this one arm: fixed sizes, the sample period known beforehand and its filter
- * coefficients computed once, least squares by equation (21) as it is printed, on the full matrix, in a form that rounding keeps
- * symmetric and that compilers vectorize. No checks of the input. `exact` selects the consistent filters of
- * docs/decisions/007-exact-filters.md instead of the paper's.
+ * What a controls engineer would write by hand for this one arm, as lean as it can be: the sample period known beforehand and everything
+ * that depends on it computed once, sines and cosines of two angles only, no entry of a regressor that is always zero filtered, least
+ * squares by equation (21) on the full matrix, in a form that rounding keeps symmetric and that compilers vectorize (the upper triangle
+ * alone takes as long, and longer with wide vectors), and a loop of its own for each scheme and pair of filters, into which all of it is
+ * inlined. No checks of the input. `exact` selects the consistent filters of docs/decisions/007-exact-filters.md instead of the paper's.
  */
 #include "online.h"
 
@@ -12,11 +13,12 @@
 #include <string.h>
 
 #define R BASELINE_PARAMETERS
+#define INLINE static inline __attribute__((always_inline))
 
 static struct baseline_step step_of(double lambda, double h)
 {
 	double x = lambda * h, a = exp(-x), mean = (1 - a) / x;
-	struct baseline_step s = {a, mean - a, 1 - mean, 4 / x * (1 - 2 / x + a * (1 + 2 / x)), lambda};
+	struct baseline_step s = {a, 1 - a, mean - a, 1 - mean, 4 / x * (1 - 2 / x + a * (1 + 2 / x)), lambda};
 	return s;
 }
 
@@ -25,61 +27,48 @@ static double sgn(double x)
 	return (x > 0) - (x < 0);
 }
 
-/* ---- regressors of the arm: momentum, the rest without friction, energy; joint 1's entries first ---- */
+/* ---- regressors of the arm, their entries that are not always zero ---- */
 
-static void momentum_rows(const double *q, const double *dq, double rows[2][R])
+/* Momentum: columns 0, 1, 2 of joint 1, columns 1, 2 of joint 2; the rest without friction: columns 3, 4 of joint 1 (4 of joint 2 is the
+ * same), column 1 of joint 2. */
+INLINE void torque_entries(const double *q, const double *dq, double momentum[5], double rest[3])
 {
-	double c2 = cos(q[1]);
-	memset(rows, 0, 2 * R * sizeof(double));
-	rows[0][0] = dq[0];
-	rows[0][1] = c2 * (2 * dq[0] + dq[1]);
-	rows[0][2] = dq[1];
-	rows[1][1] = c2 * dq[0];
-	rows[1][2] = dq[0] + dq[1];
+	double s1 = sin(q[0]), c1 = cos(q[0]), s2 = sin(q[1]), c2 = cos(q[1]), sum = dq[0] + dq[1];
+	momentum[0] = dq[0];
+	momentum[1] = c2 * (dq[0] + sum);
+	momentum[2] = dq[1];
+	momentum[3] = c2 * dq[0];
+	momentum[4] = sum;
+	rest[0] = s1;
+	rest[1] = s1 * c2 + c1 * s2;
+	rest[2] = s2 * dq[0] * sum;
 }
 
-static void potential_rows(const double *q, const double *dq, double rows[2][R])
+/* Columns 0 to 4. */
+INLINE void energy_entries(const double *q, const double *dq, double e[5])
 {
-	double outer = sin(q[0] + q[1]);
-	memset(rows, 0, 2 * R * sizeof(double));
-	rows[0][3] = sin(q[0]);
-	rows[0][4] = outer;
-	rows[1][1] = sin(q[1]) * dq[0] * (dq[0] + dq[1]);
-	rows[1][4] = outer;
+	double s1 = sin(q[0]), c1 = cos(q[0]), s2 = sin(q[1]), c2 = cos(q[1]);
+	e[0] = 0.5 * dq[0] * dq[0];
+	e[1] = c2 * dq[0] * (dq[0] + dq[1]);
+	e[2] = dq[1] * (dq[0] + 0.5 * dq[1]);
+	e[3] = 1 - c1;
+	e[4] = 1 - (c1 * c2 - s1 * s2);
 }
 
-static void add_friction(const double *dq, double rows[2][R])
+/* Columns 5 to 8. */
+INLINE void power_entries(const double *dq, double w[4])
 {
-	rows[0][5] += dq[0];
-	rows[1][6] += dq[1];
-	rows[0][7] += sgn(dq[0]);
-	rows[1][8] += sgn(dq[1]);
+	w[0] = dq[0] * dq[0];
+	w[1] = dq[1] * dq[1];
+	w[2] = fabs(dq[0]);
+	w[3] = fabs(dq[1]);
 }
 
-static void energy_row(const double *q, const double *dq, double row[R])
-{
-	memset(row, 0, R * sizeof(double));
-	row[0] = 0.5 * dq[0] * dq[0];
-	row[1] = cos(q[1]) * dq[0] * (dq[0] + dq[1]);
-	row[2] = dq[1] * (dq[0] + 0.5 * dq[1]);
-	row[3] = 1 - cos(q[0]);
-	row[4] = 1 - cos(q[0] + q[1]);
-}
+/* ---- recursive least squares, equations (20) to (22) ---- */
 
-static void power_row(const double *dq, double row[R])
+INLINE void learn(struct baseline *p, const double psi[R], double y)
 {
-	memset(row, 0, R * sizeof(double));
-	row[5] = dq[0] * dq[0];
-	row[6] = dq[1] * dq[1];
-	row[7] = fabs(dq[0]);
-	row[8] = fabs(dq[1]);
-}
-
-/* ---- recursive least squares, equations (20) to (22), one row ---- */
-
-static void learn(struct baseline *p, const double psi[R], double y, double error_variance)
-{
-	double g[R] = {0}, s = error_variance, e = y;
+	double g[R] = {0}, s = p->forgetting, e = y;
 	for (int j = 0; j < R; j++)
 		for (int i = 0; i < R; i++)
 			g[i] += p->P[j][i] * psi[j];
@@ -95,6 +84,38 @@ static void learn(struct baseline *p, const double psi[R], double y, double erro
 			p->P[j][i] -= g[i] * g[j] * scale;
 }
 
+/* Two rows: one after the other, or, with wide vectors, in one pass over the matrix. */
+INLINE void learn_both(struct baseline *p, const double a[R], const double b[R], double ya, double yb)
+{
+#ifndef __AVX2__
+	learn(p, a, ya);
+	learn(p, b, yb);
+#else
+	double g[R] = {0}, k[R] = {0}, s = p->forgetting, t = p->forgetting, c = 0, e = ya, f = yb;
+	for (int j = 0; j < R; j++)
+		for (int i = 0; i < R; i++) {
+			g[i] += p->P[j][i] * a[j];
+			k[i] += p->P[j][i] * b[j];
+		}
+	for (int i = 0; i < R; i++) {
+		s += a[i] * g[i];
+		c += b[i] * g[i];
+		t += b[i] * k[i];
+		e -= a[i] * p->theta[i];
+		f -= b[i] * p->theta[i];
+	}
+	double first = 1 / s, share = c * first, second = 1 / (t - share * c);
+	f -= share * e;
+	for (int i = 0; i < R; i++) {
+		k[i] -= share * g[i];
+		p->theta[i] += g[i] * (e * first) + k[i] * (f * second);
+	}
+	for (int j = 0; j < R; j++)
+		for (int i = 0; i < R; i++)
+			p->P[j][i] -= g[i] * g[j] * first + k[i] * k[j] * second;
+#endif
+}
+
 static void forget(struct baseline *p)
 {
 	if (p->forgetting == 1)
@@ -107,10 +128,31 @@ static void forget(struct baseline *p)
 
 /* ---- filters ---- */
 
-static void low_ramp(const struct baseline_step *s, double *y, const double *from, const double *to, int n)
+/* The paper's D, of what was last and what is now. */
+INLINE void derive(const struct baseline_step *s, double *y, double *last, const double *now, int n)
 {
-	for (int i = 0; i < n; i++)
-		y[i] = s->decay * y[i] + s->first * from[i] + s->last * to[i];
+	for (int i = 0; i < n; i++) {
+		y[i] = s->decay * y[i] + s->lambda * (now[i] - last[i]);
+		last[i] = now[i];
+	}
+}
+
+/* The paper's F, of what was last; what is now waits for the next sample. */
+INLINE void hold(const struct baseline_step *s, double *y, double *last, const double *now, int n)
+{
+	for (int i = 0; i < n; i++) {
+		y[i] = s->decay * y[i] + s->held * last[i];
+		last[i] = now[i];
+	}
+}
+
+/* F of what is linear in between. */
+INLINE void low_ramp(const struct baseline_step *s, double *y, double *last, const double *now, int n)
+{
+	for (int i = 0; i < n; i++) {
+		y[i] = s->decay * y[i] + s->first * last[i] + s->last * now[i];
+		last[i] = now[i];
+	}
 }
 
 /* ---- friction over an interval in which the joint may turn round, velocity linear ---- */
@@ -145,166 +187,150 @@ static double square(const struct baseline_step *s, double y, double from, doubl
 
 /* ---- filtered dynamic model, equation (24) ---- */
 
-static void dynamic_start(struct baseline *p, const double *q, const double *dq, const double *tau)
+INLINE void friction_entries(const double *dq, double f[4])
 {
-	double potential[2][R];
-	momentum_rows(q, dq, p->derivative_in);
-	potential_rows(q, dq, potential);
-	memcpy(p->potential, potential, sizeof potential);
-	add_friction(dq, potential);
-	memcpy(p->rest_in, potential, sizeof potential);
-	memset(p->derivative, 0, sizeof p->derivative);
-	memset(p->rest, 0, sizeof p->rest);
-	if (p->exact)
-		memcpy(p->derivative, p->derivative_in, sizeof p->derivative);
-	memcpy(p->supply_in, tau, sizeof p->supply_in);
-	memset(p->supply, 0, sizeof p->supply);
+	f[0] = dq[0];
+	f[1] = dq[1];
+	f[2] = sgn(dq[0]);
+	f[3] = sgn(dq[1]);
 }
 
-static void dynamic_paper(struct baseline *p, const double *q, const double *dq, const double *tau)
+static void dynamic_start(struct baseline *p, const double *q, const double *dq, const double *tau)
 {
-	const struct baseline_step *s = &p->whole;
-	double momentum[2][R], rest[2][R], psi[2][R], y[2];
-	momentum_rows(q, dq, momentum);
-	potential_rows(q, dq, rest);
-	add_friction(dq, rest);
-	for (int i = 0; i < 2; i++) {
-		for (int j = 0; j < R; j++) {
-			p->derivative[i][j] = s->decay * p->derivative[i][j] + s->lambda * (momentum[i][j] - p->derivative_in[i][j]);
-			p->rest[i][j] = s->decay * p->rest[i][j] + (1 - s->decay) * p->rest_in[i][j];
-			psi[i][j] = p->derivative[i][j] + p->rest[i][j];
-		}
-		y[i] = p->supply[i] = s->decay * p->supply[i] + (1 - s->decay) * p->supply_in[i];
-	}
-	memcpy(p->derivative_in, momentum, sizeof momentum);
-	memcpy(p->rest_in, rest, sizeof rest);
+	torque_entries(q, dq, p->inertial_in, p->rest_in);
+	friction_entries(dq, p->rest_in + 3);
+	if (p->exact)
+		memcpy(p->inertial, p->inertial_in, sizeof p->inertial);
 	memcpy(p->supply_in, tau, sizeof p->supply_in);
-	learn(p, psi[0], y[0], p->forgetting);
-	learn(p, psi[1], y[1], p->forgetting);
+}
+
+/* Both rows from filtered entries. */
+INLINE void dynamic_learn(struct baseline *p, const double m[5])
+{
+	const double *r = p->rest;
+	double a[R] = {m[0], m[1], m[2], r[0], r[1], r[3], 0, r[5], 0};
+	double b[R] = {0, m[3] + r[2], m[4], 0, r[1], 0, r[4], 0, r[6]};
+	learn_both(p, a, b, p->supply[0], p->supply[1]);
 	forget(p);
 }
 
-static void dynamic_exact(struct baseline *p, const double *q, const double *dq, const double *before, const double *now)
+INLINE void dynamic_paper(struct baseline *p, const double *q, const double *dq, const double *tau)
+{
+	double momentum[5], rest[7];
+	torque_entries(q, dq, momentum, rest);
+	friction_entries(dq, rest + 3);
+	derive(&p->whole, p->inertial, p->inertial_in, momentum, 5);
+	hold(&p->whole, p->rest, p->rest_in, rest, 7);
+	hold(&p->whole, p->supply, p->supply_in, tau, 2);
+	dynamic_learn(p, p->inertial);
+}
+
+INLINE void dynamic_exact(struct baseline *p, const double *q, const double *dq, const double *before, const double *now)
 {
 	const struct baseline_step *s = &p->whole;
-	double momentum[2][R], potential[2][R], psi[2][R], y[2], x = s->lambda * p->h;
-	momentum_rows(q, dq, momentum);
-	potential_rows(q, dq, potential);
-	low_ramp(s, &p->rest[0][0], &p->potential[0][0], &potential[0][0], 2 * R);
-	low_ramp(s, &p->derivative[0][0], &p->derivative_in[0][0], &momentum[0][0], 2 * R);
+	double momentum[5], rest[5], derivative[5];
+	torque_entries(q, dq, momentum, rest);
+	rest[3] = dq[0];
+	rest[4] = dq[1];
+	low_ramp(s, p->inertial, p->inertial_in, momentum, 5);
+	low_ramp(s, p->rest, p->rest_in, rest, 5);
+	for (int i = 0; i < 5; i++)
+		derivative[i] = s->lambda * (momentum[i] - p->inertial[i]);
 	for (int i = 0; i < 2; i++) {
-		p->viscous[i] = s->decay * p->viscous[i] + s->first * p->last_dq[i] + s->last * dq[i];
-		p->coulomb[i] = s->decay * p->coulomb[i] + sign_step(s, x, p->last_dq[i], dq[i]);
-		for (int j = 0; j < R; j++)
-			psi[i][j] = s->lambda * (momentum[i][j] - p->derivative[i][j]) + p->rest[i][j];
-		psi[i][5 + i] += p->viscous[i];
-		psi[i][7 + i] += p->coulomb[i];
-		p->supply[i] = p->half.decay * p->supply[i] + (1 - p->half.decay) * before[i];
-		y[i] = p->supply[i] = p->half.decay * p->supply[i] + (1 - p->half.decay) * now[i];
+		p->rest[5 + i] = s->decay * p->rest[5 + i] + sign_step(s, s->lambda * p->h, p->last_dq[i], dq[i]);
+		p->supply[i] = p->half.decay * p->supply[i] + p->half.held * before[i];
+		p->supply[i] = p->half.decay * p->supply[i] + p->half.held * now[i];
 	}
-	memcpy(p->derivative_in, momentum, sizeof momentum);
-	memcpy(p->potential, potential, sizeof potential);
-	learn(p, psi[0], y[0], p->forgetting);
-	learn(p, psi[1], y[1], p->forgetting);
+	dynamic_learn(p, derivative);
+}
+
+/* ---- schemes with one row: energies, then powers of friction ---- */
+
+static void scalar_start(struct baseline *p, const double *q, const double *dq, const double *tau)
+{
+	energy_entries(q, dq, p->inertial_in);
+	power_entries(dq, p->rest_in);
+	if (p->exact && p->scheme == BASELINE_POWER)
+		memcpy(p->inertial, p->inertial_in, sizeof p->inertial);
+	p->supply_in[0] = tau[0] * dq[0] + tau[1] * dq[1];
+}
+
+INLINE void scalar_learn(struct baseline *p, const double e[5])
+{
+	const double *r = p->rest;
+	double psi[R] = {e[0], e[1], e[2], e[3], e[4], r[0], r[1], r[2], r[3]};
+	learn(p, psi, p->supply[0]);
 	forget(p);
 }
 
 /* ---- supplied energy model, equation (28) ---- */
 
-static void energy_start(struct baseline *p, const double *q, const double *dq, const double *tau)
+INLINE void energy_update(struct baseline *p, int exact, const double *q, const double *dq, const double *tau, const double *before, const double *middle)
 {
-	energy_row(q, dq, p->derivative_in[0]);
-	memset(p->rest, 0, sizeof p->rest);
-	p->supply[0] = 0;
-	p->supply_in[0] = tau[0] * dq[0] + tau[1] * dq[1];
-}
-
-static void energy_update(struct baseline *p, const double *q, const double *dq, const double *tau, const double *before, const double *middle)
-{
-	double energy[R], psi[R], half = 0.5 * p->h;
-	if (p->exact) {
+	double energy[5], half = 0.5 * p->h;
+	energy_entries(q, dq, energy);
+	if (exact) {
 		for (int i = 0; i < 2; i++) {
 			double from = p->last_dq[i], to = dq[i], sum = fabs(from) + fabs(to);
-			p->rest[0][5 + i] += p->h / 3 * (from * from + from * to + to * to);
-			p->rest[0][7 + i] += half * (turns(from, to) ? (from * from + to * to) / sum : sum);
-		}
-		for (int i = 0; i < 2; i++)
+			p->rest[i] += p->third * (from * from + from * to + to * to);
+			p->rest[2 + i] += half * (turns(from, to) ? (from * from + to * to) / sum : sum);
 			p->supply[0] += before[i] * (middle[i] - p->state_q[i]) + tau[i] * (q[i] - middle[i]);
+		}
 	} else {
-		double a[R], b[R], supplied = tau[0] * dq[0] + tau[1] * dq[1];
-		power_row(p->last_dq, a);
-		power_row(dq, b);
-		for (int j = 0; j < R; j++)
-			p->rest[0][j] += (a[j] + b[j]) * half;
+		double power[4], supplied = tau[0] * dq[0] + tau[1] * dq[1];
+		power_entries(dq, power);
+		for (int j = 0; j < 4; j++) {
+			p->rest[j] += (p->rest_in[j] + power[j]) * half;
+			p->rest_in[j] = power[j];
+		}
 		p->supply[0] += (p->supply_in[0] + supplied) * half;
 		p->supply_in[0] = supplied;
 	}
-	energy_row(q, dq, energy);
-	for (int j = 0; j < R; j++)
-		psi[j] = energy[j] - p->derivative_in[0][j] + p->rest[0][j];
-	learn(p, psi, p->supply[0], p->forgetting);
-	forget(p);
+	for (int j = 0; j < 5; j++)
+		energy[j] -= p->inertial_in[j];
+	scalar_learn(p, energy);
 }
 
 /* ---- filtered power model, equation (30) ---- */
 
-static void power_start(struct baseline *p, const double *q, const double *dq, const double *tau)
+INLINE void power_paper(struct baseline *p, const double *q, const double *dq, const double *tau)
 {
-	energy_row(q, dq, p->derivative_in[0]);
-	power_row(dq, p->rest_in[0]);
-	memset(p->derivative, 0, sizeof p->derivative);
-	memset(p->rest, 0, sizeof p->rest);
-	if (p->exact)
-		memcpy(p->derivative[0], p->derivative_in[0], sizeof p->derivative[0]);
-	p->supply[0] = 0;
-	p->supply_in[0] = tau[0] * dq[0] + tau[1] * dq[1];
+	double energy[5], power[4], supplied = tau[0] * dq[0] + tau[1] * dq[1];
+	energy_entries(q, dq, energy);
+	power_entries(dq, power);
+	derive(&p->whole, p->inertial, p->inertial_in, energy, 5);
+	hold(&p->whole, p->rest, p->rest_in, power, 4);
+	hold(&p->whole, p->supply, p->supply_in, &supplied, 1);
+	scalar_learn(p, p->inertial);
 }
 
-static void power_paper(struct baseline *p, const double *q, const double *dq, const double *tau)
+INLINE void power_exact(struct baseline *p, const double *q, const double *dq, const double *before, const double *now)
 {
 	const struct baseline_step *s = &p->whole;
-	double energy[R], power[R], psi[R];
-	energy_row(q, dq, energy);
-	power_row(dq, power);
-	for (int j = 0; j < R; j++) {
-		p->derivative[0][j] = s->decay * p->derivative[0][j] + s->lambda * (energy[j] - p->derivative_in[0][j]);
-		p->rest[0][j] = s->decay * p->rest[0][j] + (1 - s->decay) * p->rest_in[0][j];
-		psi[j] = p->derivative[0][j] + p->rest[0][j];
-	}
-	memcpy(p->derivative_in[0], energy, sizeof energy);
-	memcpy(p->rest_in[0], power, sizeof power);
-	p->supply[0] = s->decay * p->supply[0] + (1 - s->decay) * p->supply_in[0];
-	p->supply_in[0] = tau[0] * dq[0] + tau[1] * dq[1];
-	learn(p, psi, p->supply[0], p->forgetting);
-	forget(p);
-}
-
-static void power_exact(struct baseline *p, const double *q, const double *dq, const double *before, const double *now)
-{
-	const struct baseline_step *s = &p->whole;
-	double energy[R], middle[R], psi[R], half_q[2], half_dq[2];
+	double energy[5], middle[5], derivative[5], half_q[2], half_dq[2];
 	for (int i = 0; i < 2; i++) {
 		half_q[i] = 0.5 * (p->state_q[i] + q[i]) - (dq[i] - p->last_dq[i]) * (0.125 * p->h);
 		half_dq[i] = 0.5 * (p->last_dq[i] + dq[i]);
 	}
-	energy_row(q, dq, energy);
-	energy_row(half_q, half_dq, middle);
+	energy_entries(q, dq, energy);
+	energy_entries(half_q, half_dq, middle);
 	for (int i = 0; i < 2; i++) {
-		p->rest[0][5 + i] = square(s, p->rest[0][5 + i], p->last_dq[i], dq[i]);
-		p->rest[0][7 + i] = speed(s, s->lambda * p->h, p->rest[0][7 + i], p->last_dq[i], dq[i]);
+		p->rest[i] = square(s, p->rest[i], p->last_dq[i], dq[i]);
+		p->rest[2 + i] = speed(s, s->lambda * p->h, p->rest[2 + i], p->last_dq[i], dq[i]);
 	}
-	for (int j = 0; j < R; j++) {
-		double height = middle[j] - 0.5 * (energy[j] + p->derivative_in[0][j]);
-		p->derivative[0][j] = s->decay * p->derivative[0][j] + s->first * p->derivative_in[0][j] + s->last * energy[j] + s->bulge * height;
-		psi[j] = s->lambda * (energy[j] - p->derivative[0][j]) + p->rest[0][j];
+	for (int j = 0; j < 5; j++)
+		middle[j] -= 0.5 * (energy[j] + p->inertial_in[j]);
+	low_ramp(s, p->inertial, p->inertial_in, energy, 5);
+	for (int j = 0; j < 5; j++) {
+		p->inertial[j] += s->bulge * middle[j];
+		derivative[j] = s->lambda * (energy[j] - p->inertial[j]);
 	}
-	memcpy(p->derivative_in[0], energy, sizeof energy);
-	double first[2] = {before[0] * p->last_dq[0] + before[1] * p->last_dq[1], before[0] * half_dq[0] + before[1] * half_dq[1]};
-	double second[2] = {now[0] * half_dq[0] + now[1] * half_dq[1], now[0] * dq[0] + now[1] * dq[1]};
-	low_ramp(&p->half, p->supply, &first[0], &first[1], 1);
-	low_ramp(&p->half, p->supply, &second[0], &second[1], 1);
-	learn(p, psi, p->supply[0], p->forgetting);
-	forget(p);
+	double from = before[0] * p->last_dq[0] + before[1] * p->last_dq[1];
+	double turn = before[0] * half_dq[0] + before[1] * half_dq[1];
+	double on = now[0] * half_dq[0] + now[1] * half_dq[1], to = now[0] * dq[0] + now[1] * dq[1];
+	low_ramp(&p->half, p->supply, &from, &turn, 1);
+	low_ramp(&p->half, p->supply, &on, &to, 1);
+	scalar_learn(p, derivative);
 }
 
 /* ---- one sample in ---- */
@@ -315,6 +341,8 @@ void baseline_start(struct baseline *p, enum baseline_scheme scheme, int exact, 
 	p->scheme = scheme;
 	p->exact = exact;
 	p->h = h;
+	p->inverse = 1 / h;
+	p->third = h / 3;
 	p->forgetting = forgetting;
 	p->whole = step_of(cutoff, h);
 	p->half = step_of(cutoff, 0.5 * h);
@@ -326,39 +354,37 @@ static void begin(struct baseline *p, const double *q, const double *dq, const d
 {
 	if (p->scheme == BASELINE_DYNAMIC)
 		dynamic_start(p, q, dq, tau);
-	else if (p->scheme == BASELINE_ENERGY)
-		energy_start(p, q, dq, tau);
 	else
-		power_start(p, q, dq, tau);
+		scalar_start(p, q, dq, tau);
 }
 
-static void regress(struct baseline *p, const double *q, const double *dq, const double *tau, const double *before, const double *middle)
+INLINE void regress(struct baseline *p, enum baseline_scheme scheme, int exact, const double *q, const double *dq, const double *tau, const double *before, const double *middle)
 {
-	if (p->scheme == BASELINE_ENERGY)
-		energy_update(p, q, dq, tau, before, middle);
-	else if (p->scheme == BASELINE_DYNAMIC && p->exact)
+	if (scheme == BASELINE_ENERGY)
+		energy_update(p, exact, q, dq, tau, before, middle);
+	else if (scheme == BASELINE_DYNAMIC && exact)
 		dynamic_exact(p, q, dq, before, tau);
-	else if (p->scheme == BASELINE_DYNAMIC)
+	else if (scheme == BASELINE_DYNAMIC)
 		dynamic_paper(p, q, dq, tau);
-	else if (p->exact)
+	else if (exact)
 		power_exact(p, q, dq, before, tau);
 	else
 		power_paper(p, q, dq, tau);
 }
 
-void baseline_update(struct baseline *p, const double q[2], const double tau[2])
+INLINE void update(struct baseline *p, enum baseline_scheme scheme, int exact, const double q[2], const double tau[2])
 {
 	double at[2], dq[2] = {0, 0};
 	for (int i = 0; i < 2; i++) {
-		at[i] = p->exact ? 0.5 * (p->q[i] + q[i]) : q[i];
+		at[i] = exact ? 0.5 * (p->q[i] + q[i]) : q[i];
 		if (p->samples > 0)
-			dq[i] = (q[i] - p->q[i]) / p->h;
+			dq[i] = (q[i] - p->q[i]) * p->inverse;
 	}
-	const double *torque = p->exact ? p->tau : tau;
-	if (p->samples == p->exact)
+	const double *torque = exact ? p->tau : tau;
+	if (p->samples == exact)
 		begin(p, at, dq, torque);
-	else if (p->samples > p->exact)
-		regress(p, at, dq, torque, p->tau_before, p->q);
+	else if (p->samples > exact)
+		regress(p, scheme, exact, at, dq, torque, p->tau_before, p->q);
 	memcpy(p->state_q, at, sizeof at);
 	memcpy(p->last_dq, dq, sizeof dq);
 	memcpy(p->tau_before, p->tau, sizeof p->tau);
@@ -367,13 +393,34 @@ void baseline_update(struct baseline *p, const double q[2], const double tau[2])
 	p->samples++;
 }
 
+void baseline_update(struct baseline *p, const double q[2], const double tau[2])
+{
+	update(p, p->scheme, p->exact, q, tau);
+}
+
 long baseline_size(void)
 {
 	return sizeof(struct baseline);
 }
 
-void baseline_run(struct baseline *p, const double *q, const double *tau, long samples)
+INLINE void run(struct baseline *p, enum baseline_scheme scheme, int exact, const double *q, const double *tau, long samples)
 {
 	for (long k = 0; k < samples; k++)
-		baseline_update(p, q + 2 * k, tau + 2 * k);
+		update(p, scheme, exact, q + 2 * k, tau + 2 * k);
+}
+
+void baseline_run(struct baseline *p, const double *q, const double *tau, long samples)
+{
+	if (p->scheme == BASELINE_DYNAMIC && p->exact)
+		run(p, BASELINE_DYNAMIC, 1, q, tau, samples);
+	else if (p->scheme == BASELINE_DYNAMIC)
+		run(p, BASELINE_DYNAMIC, 0, q, tau, samples);
+	else if (p->scheme == BASELINE_ENERGY && p->exact)
+		run(p, BASELINE_ENERGY, 1, q, tau, samples);
+	else if (p->scheme == BASELINE_ENERGY)
+		run(p, BASELINE_ENERGY, 0, q, tau, samples);
+	else if (p->exact)
+		run(p, BASELINE_POWER, 1, q, tau, samples);
+	else
+		run(p, BASELINE_POWER, 0, q, tau, samples);
 }

@@ -7,7 +7,7 @@
 enum baseline_scheme { BASELINE_DYNAMIC, BASELINE_ENERGY, BASELINE_POWER };
 
 struct baseline_step {
-	double decay, first, last, bulge, lambda;
+	double decay, held, first, last, bulge, lambda;
 };
 
 struct baseline {
@@ -16,12 +16,13 @@ struct baseline {
 	enum baseline_scheme scheme;
 	int exact;
 	long samples;
-	double h, forgetting;
+	double h, inverse, third, forgetting;
 	struct baseline_step whole, half;
 	double q[2], tau[2], tau_before[2], state_q[2], last_dq[2];
-	double derivative[2][BASELINE_PARAMETERS], derivative_in[2][BASELINE_PARAMETERS];
-	double rest[2][BASELINE_PARAMETERS], rest_in[2][BASELINE_PARAMETERS], potential[2][BASELINE_PARAMETERS];
-	double viscous[2], coulomb[2];
+	/* Momentum or energies, filtered, and as they came in last. */
+	double inertial[5], inertial_in[5];
+	/* The rest and friction alike. */
+	double rest[7], rest_in[7];
 	double supply[2], supply_in[2];
 };
 

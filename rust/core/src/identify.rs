@@ -311,7 +311,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
                 }
             }
             Some(Regression::Energy(scheme)) => {
-                let (psi, y) = scheme.update::<A, S, R>(arm, columns, variant, now, interval, tau);
+                let (psi, y) = scheme.update::<C, A, S, R>(arm, columns, variant, now, interval, tau);
                 scalar(self.rls.learn::<C, _>(&psi, &y))
             }
             Some(Regression::Power(scheme)) => {

@@ -8,6 +8,8 @@
 //! W. J. Cody and W. Waite 1980, *Software manual for the elementary functions*, chapter 8. The coefficients interpolate the series at
 //! Chebyshev's points of `r^2` up to `(pi/2)^2`; the polynomials are off by less than 4e-17, in single precision by 1.1e-10.
 
+use crate::cpu::Cpu;
+use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::real::{Real, lit};
 
@@ -95,6 +97,23 @@ pub(crate) fn largest<T: Real>() -> f64 {
 #[inline(always)]
 pub fn sin_cos<T: Real>(x: T) -> (T, T) {
     if x.abs() <= lit(largest::<T>()) { series_of(x) } else { x.sin_cos() }
+}
+
+/// Sines and cosines of several angles, rad, side by side in a vector unit.
+#[inline(always)]
+pub fn sines_cosines<C: Cpu, T: Real, const N: usize>(angles: [T; N]) -> [SinCos<T>; N] {
+    let mut within = true;
+    for x in angles {
+        within &= x.abs() <= lit(largest::<T>());
+    }
+    if within {
+        let (sine, cosine) = series_of(Lanes::<T, C, N>::new(angles));
+        return core::array::from_fn(|i| SinCos { sine: sine.0[i], cosine: cosine.0[i] });
+    }
+    angles.map(|x| {
+        let (sine, cosine) = sin_cos(x);
+        SinCos { sine, cosine }
+    })
 }
 
 /// Sine and cosine of `x` rad by the series alone; valid up to [`largest`].

@@ -5,6 +5,7 @@ mod common;
 use armgap_core::arm::{Arm, EquationTerms, LinkParameters, TwoLink};
 use armgap_core::chain::{Chain, ChainJoint, JointKind, parameter};
 use armgap_core::cpu::Portable;
+use armgap_core::cpu::Portable;
 use armgap_core::effect::{Active, InputSegment, find};
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::kinematics::JointState;
@@ -105,7 +106,7 @@ fn check<const N: usize, const P: usize>(numbers: &mut Numbers) {
     let friction = Arm::<f64, N, P>::friction(&chain, &theta, &dq);
     near(&(Arm::<f64, N, P>::regressor(&chain, &q, &dq, &ddq) * vector), &(torque + friction));
     let (momentum, potential): (SMatrix<f64, N, P>, SMatrix<f64, N, P>) =
-        chain.momentum_and_potential(&q, &dq);
+        chain.momentum_and_potential::<Portable>(&q, &dq);
     near(&(momentum * vector), &(m * dq));
     let kinetic = 0.5 * dq.dot(&(m * dq));
     let energy_row =

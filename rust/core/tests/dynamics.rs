@@ -1,6 +1,7 @@
 //! The arms as mechanics: identities that hold for every arm and every state.
 
 use armgap_core::arm::{Arm, ArmKind, Axis, EquationTerms, Pendulum, TwoLink};
+use armgap_core::cpu::Portable;
 use armgap_core::trig::SinCos;
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
@@ -31,7 +32,7 @@ fn check<A: Arm<f64, N, P>, const N: usize, const P: usize>(arm: &A, theta: [f64
     let kinetic = energy - arm.energy_regressor(&q, &SVector::zeros()).dot(&vector);
     assert!((kinetic - 0.5 * dq.dot(&(m * dq))).abs() < 1e-12 * (1.0 + energy.abs()));
     let both = (arm.momentum_regressor(&q, &dq), arm.potential_regressor(&q, &dq));
-    let together = arm.momentum_and_potential(&q, &dq);
+    let together = arm.momentum_and_potential::<Portable>(&q, &dq);
     assert!(
         (together.0 - both.0).amax().max((together.1 - both.1).amax())
             < 1e-12 * (1.0 + dq.amax() * dq.amax())

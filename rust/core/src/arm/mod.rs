@@ -18,6 +18,7 @@ pub use axis::Axis;
 pub use pendulum::Pendulum;
 pub use two_link::{LinkParameters, TwoLink};
 
+use crate::cpu::Cpu;
 use crate::number::Number;
 use crate::real::{Real, sgn};
 use crate::trig::SinCos;
@@ -129,9 +130,15 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Regressor of `g(q) - dK/dq`: what is left of the inertial torque once the momentum's rate is taken out.
     fn potential_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, P>;
 
-    /// The two regressors above together, for the online estimator; arms override it where terms are shared.
+    /// The regressor of the energy, for the online estimator; arms override it where the processor `C` computes several angles at once.
     #[inline(always)]
-    fn momentum_and_potential(
+    fn energy_regressor_on<C: Cpu>(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SVector<T, P> {
+        self.energy_regressor(q, dq)
+    }
+
+    /// The regressors of momentum and potential together, for the online estimator; arms override it where terms are shared.
+    #[inline(always)]
+    fn momentum_and_potential<C: Cpu>(
         &self,
         q: &SVector<T, N>,
         dq: &SVector<T, N>,

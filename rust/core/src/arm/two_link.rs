@@ -12,9 +12,10 @@
 //! `C dq`; for that one only `dq' (dM/dt - 2 C) dq = 0` holds.
 
 use super::{Arm, EquationTerms, Parameter};
+use crate::cpu::{Cpu, Portable};
 use crate::number::Number;
 use crate::real::{Real, lit};
-use crate::trig::{SinCos, sin_cos};
+use crate::trig::{SinCos, sin_cos, sines_cosines};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// The two-link vertical arm.
@@ -118,10 +119,15 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
         EquationTerms { inertia, bias: [bias1, (ks * dq[0]).fused(dq[0], outer)] }
     }
 
-    #[inline(always)]
     fn energy_regressor(&self, q: &Vector2<T>, dq: &Vector2<T>) -> SVector<T, 9> {
+        self.energy_regressor_on::<Portable>(q, dq)
+    }
+
+    #[inline(always)]
+    fn energy_regressor_on<C: Cpu>(&self, q: &Vector2<T>, dq: &Vector2<T>) -> SVector<T, 9> {
         let (half, sum) = (lit::<T>(0.5), dq[0] + dq[1]);
-        let ((s1, c1), (s2, c2)) = (sin_cos(q[0]), sin_cos(q[1]));
+        let [SinCos { sine: s1, cosine: c1 }, SinCos { sine: s2, cosine: c2 }] =
+            sines_cosines::<C, T, 2>((*q).into());
         let mut e = SVector::zeros();
         e[0] = half * dq[0] * dq[0];
         e[1] = c2 * dq[0] * sum;
@@ -153,12 +159,13 @@ impl<T: Real> Arm<T, 2, 9> for TwoLink<T> {
     }
 
     #[inline(always)]
-    fn momentum_and_potential(
+    fn momentum_and_potential<C: Cpu>(
         &self,
         q: &Vector2<T>,
         dq: &Vector2<T>,
     ) -> (SMatrix<T, 2, 9>, SMatrix<T, 2, 9>) {
-        let ((s1, c1), (s2, c2)) = (sin_cos(q[0]), sin_cos(q[1]));
+        let [SinCos { sine: s1, cosine: c1 }, SinCos { sine: s2, cosine: c2 }] =
+            sines_cosines::<C, T, 2>((*q).into());
         let (sum, outer) = (dq[0] + dq[1], s1 * c2 + c1 * s2);
         let (mut p, mut b) = (SMatrix::zeros(), SMatrix::zeros());
         p[(0, 0)] = dq[0];

@@ -8,6 +8,7 @@ use super::inertia::{LINK_PARAMETERS, LinkInertia, point_mass};
 use super::parameters::PARAMETERS_PER_JOINT;
 use super::{Chain, vector};
 use crate::arm::{Arm, EquationTerms, Parameter};
+use crate::cpu::{Cpu, Portable};
 use crate::number::Number;
 use crate::real::{Real, lit};
 use crate::trig::SinCos;
@@ -160,14 +161,14 @@ impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
     }
 
     fn momentum_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, P> {
-        self.momentum_and_potential(q, dq).0
+        self.momentum_and_potential::<Portable>(q, dq).0
     }
 
     fn potential_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, P> {
-        self.momentum_and_potential(q, dq).1
+        self.momentum_and_potential::<Portable>(q, dq).1
     }
 
-    fn momentum_and_potential(
+    fn momentum_and_potential<C: Cpu>(
         &self,
         q: &SVector<T, N>,
         dq: &SVector<T, N>,

@@ -6,7 +6,7 @@
 use super::friction::Friction;
 use super::{Columns, SampleInterval, SegmentCoefficients, Snapshot, Variant};
 use crate::arm::Arm;
-use crate::cpu::Cpu;
+use crate::cpu::{Cpu, Portable};
 use crate::filter::Cutoff;
 use crate::real::Real;
 use nalgebra::{SMatrix, SVector};
@@ -28,7 +28,7 @@ pub struct FilteredDynamic<T: Real, const N: usize, const P: usize> {
 impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
     /// The scheme at its first state.
     pub fn new<A: Arm<T, N, P>>(arm: &A, variant: Variant, cutoff: &Cutoff<T>, now: &Snapshot<T, N>) -> Self {
-        let (last_momentum, last_potential) = arm.momentum_and_potential(&now.q, &now.dq);
+        let (last_momentum, last_potential) = arm.momentum_and_potential::<Portable>(&now.q, &now.dq);
         let momentum = match variant {
             Variant::Paper => SMatrix::zeros(),
             Variant::Exact => last_momentum,
@@ -55,7 +55,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
         now: &Snapshot<T, N>,
         interval: &SampleInterval<T, N>,
     ) -> ([[T; R]; N], [T; N]) {
-        let (momentum, potential) = arm.momentum_and_potential(&now.q, &now.dq);
+        let (momentum, potential) = arm.momentum_and_potential::<C>(&now.q, &now.dq);
         let mut whole = SMatrix::zeros();
         match variant {
             Variant::Paper => self.paper::<C, A>(&momentum, interval, &mut whole),

@@ -57,7 +57,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
         interval: &SampleInterval<T, N>,
         tau: &SVector<T, N>,
     ) -> ([[T; R]; 1], [T; 1]) {
-        let energy = arm.energy_regressor(&now.q, &now.dq);
+        let energy = arm.energy_regressor_on::<C>(&now.q, &now.dq);
         let mut whole = SMatrix::zeros();
         match variant {
             Variant::Paper => self.paper::<C, A>(&energy, interval, &mut whole),
@@ -94,7 +94,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
     ) {
         let step = self.steps.whole(interval.h);
         let half_way = self.last.half_way(now, interval.h);
-        let middle = arm.energy_regressor(&half_way.q, &half_way.dq);
+        let middle = arm.energy_regressor_on::<C>(&half_way.q, &half_way.dq);
         for j in 0..A::INERTIAL {
             let height = middle[j] - (energy[j] + self.last_energy[j]) * lit(0.5);
             self.energy[j] = step.curve::<C>(self.energy[j], self.last_energy[j], energy[j], height);

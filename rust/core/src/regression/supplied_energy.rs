@@ -6,6 +6,7 @@
 use super::friction::Friction;
 use super::{Columns, SampleInterval, Snapshot, Variant};
 use crate::arm::Arm;
+use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 use nalgebra::{SMatrix, SVector};
 
@@ -33,7 +34,7 @@ impl<T: Real, const N: usize, const P: usize> SuppliedEnergy<T, N, P> {
 
     /// The row and output at the next state, reached by `interval`; `tau` is the torque that acts from then on.
     #[inline(always)]
-    pub fn update<A: Arm<T, N, P>, S: Columns<T, N, P, R>, const R: usize>(
+    pub fn update<C: Cpu, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const R: usize>(
         &mut self,
         arm: &A,
         columns: &S,
@@ -55,7 +56,7 @@ impl<T: Real, const N: usize, const P: usize> SuppliedEnergy<T, N, P> {
             }
         }
         (self.last, self.last_supply) = (*now, supply);
-        let energy = arm.energy_regressor(&now.q, &now.dq);
+        let energy = arm.energy_regressor_on::<C>(&now.q, &now.dq);
         let mut whole = SMatrix::<T, 1, P>::zeros();
         for j in 0..A::INERTIAL {
             whole[j] = energy[j] - self.first[j];
