@@ -3,32 +3,16 @@
 //! A serial arm has dozens of parameters and hundreds of candidate effects, and its torques are mostly those of a controller or of measured
 //! currents: not an input that is independent of what the model lacks. So terms are sought in the equation of motion along the measured
 //! path, in its weak form, where all parameters and most terms are linear and no rollout is needed; predictions over short windows only say
-//! how far the gap shrinks. The way of the data is `intervals` (log) -> `equation` (rows, torques of terms) -> `rows` (regression) ->
+//! how far the gap shrinks. The way of the data is `weak_form` (a log's intervals, torques of terms, rows of the regression) ->
 //! `search` (which terms) -> `predict` (gap) -> `result`.
 
-mod arm_wide;
-mod cause_report;
-mod closed_loop;
-mod commanded;
-mod conclusion;
 mod constants;
 pub mod controller;
-mod controller_report;
-mod controller_term;
-mod equation;
-mod evidence;
-mod fitting;
-mod intervals;
 mod predict;
-mod regularisation;
 mod result;
-mod row_term;
-mod rows;
-mod screening;
 mod search;
-mod several_joints;
 mod term;
-mod transmission;
+mod weak_form;
 
 use crate::candidates::screen::effect_instances;
 use crate::likelihood::scale::Scales;
@@ -41,15 +25,16 @@ use crate::progress::{Observer, ProgressReporter, guarded};
 use crate::result::report::Diagnosis;
 use armgap_core::chain::{Chain, ChainJoint, JointKind, PARAMETERS_PER_JOINT};
 use armgap_core::effect::{Quantity, Scope, Trial};
-use controller::PositionController;
-use controller_term::{ControllerTerm, Setting};
-use equation::Equation;
-use intervals::HALF_WIDTH_S;
-use rows::{Prior, Rows, Signal};
+use controller::{PositionController, commanded};
 use search::{Motion, Search};
 use std::time::Instant;
-use term::{Term, TermKind};
-use transmission::{Compliance, TransmissionLaw};
+use term::controller_term::{ControllerTerm, Setting};
+use term::transmission::{Compliance, TransmissionLaw};
+use term::{Term, TermKind, row_term};
+use weak_form::equation::Equation;
+use weak_form::intervals::HALF_WIDTH_S;
+use weak_form::regularisation;
+use weak_form::rows::{Prior, Rows, Signal};
 
 /// A serial arm as an arm file describes it.
 #[derive(Debug, Clone)]

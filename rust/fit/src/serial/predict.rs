@@ -1,10 +1,10 @@
 //! Predictions of a serial arm with terms, over short windows and over whole logs.
 
-use super::closed_loop::ClosedLoop;
-use super::row_term::{RowTerm, without_rows};
-use super::term::{Term, TermKind, of_load};
 use crate::model::hypothesis::Hypothesis;
 use crate::predict::window::{Dataset, Window};
+use crate::serial::controller::closed_loop::ClosedLoop;
+use crate::serial::term::row_term::{RowTerm, without_rows};
+use crate::serial::term::{Term, TermKind, of_load};
 use armgap_core::arm::Arm;
 use armgap_core::chain::Chain;
 use nalgebra::SVector;

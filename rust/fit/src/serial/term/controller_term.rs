@@ -1,7 +1,7 @@
 //! Settings of a position controller that may differ from those of the arm file.
 
-use super::controller::JointController;
-use super::term::TermParameter;
+use crate::serial::controller::JointController;
+use crate::serial::term::TermParameter;
 
 /// A setting of one joint's controller.
 #[derive(Debug, Clone, Copy)]

@@ -5,12 +5,12 @@
 //! gain beside the arm's. What an integral part held before the log began is a constant torque that no log tells from an offset, so that the mean over
 //! each log is left out of the rows of such a joint.
 
-use super::controller::{Given, JointController, PositionController};
-use super::controller_term::ControllerTerm;
-use super::equation::{Equation, Torques};
-use super::rows::{Signal, sum};
-use super::term::Term;
 use crate::log::track::Track;
+use crate::serial::controller::{Given, JointController, PositionController};
+use crate::serial::term::Term;
+use crate::serial::term::controller_term::ControllerTerm;
+use crate::serial::weak_form::equation::{Equation, Torques};
+use crate::serial::weak_form::rows::{Signal, sum};
 use armgap_core::effect::InputSegment;
 
 /// Position controllers along logs.
@@ -144,7 +144,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// Leaves the mean over each log out of values of joint `j`'s rows, if it has an integral part.
-    pub(super) fn centre(&self, j: usize, values: &mut [f64]) {
+    pub(in crate::serial) fn centre(&self, j: usize, values: &mut [f64]) {
         if !self.integrates(j) {
             return;
         }
@@ -157,7 +157,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// What a controller's setting takes from the nominal torque.
-    pub(super) fn of_controller(&self, term: ControllerTerm, value: f64) -> Signal {
+    pub(in crate::serial) fn of_controller(&self, term: ControllerTerm, value: f64) -> Signal {
         let Some(commanded) = &self.commanded else { return vec![None; N] };
         let j = term.joint;
         let changed = term.on(&commanded.controller.joints[j], value);
@@ -197,8 +197,8 @@ mod tests {
     use super::*;
     use crate::log::track::Reference;
     use crate::serial::controller::tests::SERVO;
-    use crate::serial::controller_term::Setting;
-    use crate::serial::intervals::HALF_WIDTH_S;
+    use crate::serial::term::controller_term::Setting;
+    use crate::serial::weak_form::intervals::HALF_WIDTH_S;
     use armgap_core::chain::{Chain, ChainJoint, JointKind};
 
     const PERIOD: f64 = 0.004;

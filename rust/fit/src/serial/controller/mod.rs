@@ -8,6 +8,9 @@
 //! velocity are continuous. So a sample interval has a torque at its start, its middle and its end, with positions and velocities from local
 //! cubics, and the middle from the cubic between the samples (Hermite). What is late is late by the library's delay.
 
+pub(in crate::serial) mod closed_loop;
+pub(in crate::serial) mod commanded;
+
 use crate::log::track::Track;
 use armgap_core::effect::{InputSegment, find, interval};
 
@@ -223,7 +226,7 @@ fn late(t: &[f64], delay: f64, column: &mut [InputSegment<f64>]) {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(in crate::serial) mod tests {
     use super::*;
     use crate::log::track::Reference;
 

@@ -1,12 +1,12 @@
 //! What speaks for a term: the model with it against the model without, and what probability that makes.
 
-use super::constants::{
+use crate::numeric::random::Random;
+use crate::serial::constants::{
     CONSEQUENCE, HOLDOUT_DEVIATIONS, MATTERS, NOTICED, PRICE, RESAMPLES, RESTORES, RESTORES_EACH, SIGNIFICANT,
 };
-use super::fitting::Fitted;
-use super::rows::{JointRows, Regression, Rows, Signal};
-use super::search::Search;
-use crate::numeric::random::Random;
+use crate::serial::search::Search;
+use crate::serial::search::fitting::Fitted;
+use crate::serial::weak_form::rows::{JointRows, Regression, Rows, Signal};
 
 /// What speaks for a term: the model with it against the model without.
 #[derive(Debug, Clone, Copy)]
@@ -62,7 +62,7 @@ impl Search<'_> {
     /// the training logs have it, a slope of zero that it is not. It judges on the joints that the term acts on, as the scatter of the other joints'
     /// parameters says nothing about it. The slope's standard deviation comes from the scatter of the blocks' scores. How unevenly an effect is spread over
     /// the blocks does not count against it: a stop may be met twice in a log.
-    pub(super) fn evidence(
+    pub(in crate::serial) fn evidence(
         &self,
         regression: &Regression,
         without: &Fitted,
@@ -119,7 +119,7 @@ fn confirmed(joints: &[usize], weights: &[f64], rows: &Rows, [without, with]: [&
 }
 
 /// Largest RMS torque of a signal beside that of the joint it acts on.
-pub(super) fn consequence(rows: &Rows, signal: &Signal) -> f64 {
+pub(in crate::serial) fn consequence(rows: &Rows, signal: &Signal) -> f64 {
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     let of = |(rows, s): (&JointRows, &Option<Vec<f64>>)| match s {
         Some(s) if !s.is_empty() => (square(s) / square(&rows.y).max(f64::MIN_POSITIVE)).sqrt(),
@@ -129,7 +129,7 @@ pub(super) fn consequence(rows: &Rows, signal: &Signal) -> f64 {
 }
 
 /// Share of resamples of the blocks, of training and holdout, in which a model costs less than every rival.
-pub(super) fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64) -> f64 {
+pub(in crate::serial) fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64) -> f64 {
     let by_block = |fitted: &Fitted| -> Vec<f64> {
         fitted
             .costs
@@ -158,7 +158,7 @@ pub(super) fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64) -> f64 {
 
 /// Probability that what a term explains is not something that no term of the library is: its own part of the joint's holdout cost over
 /// that and what stays beyond noise; of a term that restores the arm file's values, by how much it does.
-pub(super) fn trust(without: &Fitted, with: &Fitted, evidence: &Evidence, floor: &[f64]) -> f64 {
+pub(in crate::serial) fn trust(without: &Fitted, with: &Fitted, evidence: &Evidence, floor: &[f64]) -> f64 {
     let joint = |set: &Fitted, j: usize| set.costs[1][j].iter().sum::<f64>();
     let own = (0..floor.len()).max_by(|a, b| {
         let fell = |j: usize| joint(without, j) - joint(with, j);
@@ -176,7 +176,7 @@ pub(super) fn trust(without: &Fitted, with: &Fitted, evidence: &Evidence, floor:
 mod tests {
     use super::*;
     use crate::numeric::random::Random;
-    use crate::serial::rows::Estimate;
+    use crate::serial::weak_form::rows::Estimate;
 
     const ROWS: usize = 240;
 

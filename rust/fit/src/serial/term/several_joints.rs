@@ -1,6 +1,6 @@
 //! The same law on several joints at once: one decision, with an amplitude per joint or one value for all.
 
-use super::term::{Term, TermKind};
+use crate::serial::term::{Term, TermKind};
 
 /// The same law on several joints.
 #[derive(Debug, Clone)]

@@ -1,10 +1,10 @@
 //! A model with terms, fitted to the training logs and judged on the holdout.
 
-use super::constants::{ENOUGH, ITERATIONS, LOOSE};
-use super::row_term::{RowLaw, RowTerm};
-use super::rows::{Estimate, Regression, Signal, sum};
-use super::search::{Motion, Search};
-use super::term::{Term, TermKind};
+use crate::serial::constants::{ENOUGH, ITERATIONS, LOOSE};
+use crate::serial::search::{Motion, Search};
+use crate::serial::term::row_term::{RowLaw, RowTerm};
+use crate::serial::term::{Term, TermKind};
+use crate::serial::weak_form::rows::{Estimate, Regression, Signal, sum};
 use rayon::prelude::*;
 
 /// Relative step of numerical derivatives of a term's torque.
@@ -28,23 +28,23 @@ pub struct Fitted {
 
 impl Fitted {
     /// Effective number of its terms' parameters.
-    pub(super) fn parameters(&self) -> f64 {
+    pub(in crate::serial) fn parameters(&self) -> f64 {
         self.terms.iter().map(|t| t.degrees).sum()
     }
 
-    pub(super) fn holdout_cost(&self) -> f64 {
+    pub(in crate::serial) fn holdout_cost(&self) -> f64 {
         self.costs[1].iter().flatten().sum()
     }
 
     /// What ranks models: cost of training logs, prior and holdout, and the price of its parameters.
-    pub(super) fn total(&self) -> f64 {
+    pub(in crate::serial) fn total(&self) -> f64 {
         self.estimate.cost + self.holdout_cost() + 2.0 * self.parameters()
     }
 }
 
 impl Search<'_> {
     /// Torques of all terms together.
-    pub(super) fn beside(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Signal {
+    pub(in crate::serial) fn beside(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Signal {
         if terms.is_empty() {
             return vec![None; self.rotary.len()];
         }
@@ -101,7 +101,12 @@ impl Search<'_> {
     }
 
     /// Parameters beside these terms, and the cost in units of the torque that reaches the joints.
-    pub(super) fn estimated(&self, regression: &Regression, terms: &[Term], theta: &[f64]) -> Estimate {
+    pub(in crate::serial) fn estimated(
+        &self,
+        regression: &Regression,
+        terms: &[Term],
+        theta: &[f64],
+    ) -> Estimate {
         let mut estimate = regression.estimate(&self.beside(self.training, terms, theta));
         let scales = self.scales(self.training, terms, &estimate.theta);
         if scales.iter().any(|scale| *scale != 1.0) {
@@ -116,7 +121,7 @@ impl Search<'_> {
     /// By joint, the factor between squared residuals with these terms and without, for terms that change what a command becomes: what they leave
     /// is to be seen beside the torque that reaches the joint, and beside the inertia that it moves. A term that makes torques smaller, and with them
     /// all parameters, makes what stays of them smaller too, and explains nothing by that.
-    pub(super) fn scales(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Vec<f64> {
+    pub(in crate::serial) fn scales(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Vec<f64> {
         let mut scales = vec![1.0; self.rotary.len()];
         let taken = |term: &Term| match (term.share_of_command(), term.joint()) {
             (Some(share), Some(joint)) => {
@@ -145,12 +150,12 @@ impl Search<'_> {
         scales
     }
 
-    pub(super) fn rotary_of(&self, term: &Term) -> bool {
+    pub(in crate::serial) fn rotary_of(&self, term: &Term) -> bool {
         term.joints().first().is_none_or(|j| self.rotary[j - 1])
     }
 
     /// Terms moved by part of a step, within their bounds.
-    pub(super) fn moved(&self, terms: &[Term], step: &[f64], part: f64) -> Vec<Term> {
+    pub(in crate::serial) fn moved(&self, terms: &[Term], step: &[f64], part: f64) -> Vec<Term> {
         let mut rest = step;
         terms
             .iter()
@@ -181,7 +186,7 @@ impl Search<'_> {
     }
 
     /// Derivatives of the terms' torques by all their parameters.
-    pub(super) fn derivatives(&self, terms: &[Term], theta: &[f64]) -> Vec<Signal> {
+    pub(in crate::serial) fn derivatives(&self, terms: &[Term], theta: &[f64]) -> Vec<Signal> {
         let places: Vec<(usize, usize)> =
             terms.iter().enumerate().flat_map(|(i, t)| (0..t.p.len()).map(move |k| (i, k))).collect();
         places
@@ -200,12 +205,12 @@ impl Search<'_> {
     }
 
     /// Precision that holds what motion does not tell of the values of these terms.
-    pub(super) fn ridge(&self, terms: &[Term]) -> Vec<f64> {
+    pub(in crate::serial) fn ridge(&self, terms: &[Term]) -> Vec<f64> {
         terms.iter().flat_map(|term| self.ridge_of(term, term.p.len())).collect()
     }
 
     /// The same of one term with so many columns: of a link's ten numbers by the arm file's trust in them, of laws none.
-    pub(super) fn ridge_of(&self, term: &Term, columns: usize) -> Vec<f64> {
+    pub(in crate::serial) fn ridge_of(&self, term: &Term, columns: usize) -> Vec<f64> {
         match term.kind {
             TermKind::NominalLink(link) => {
                 let sigma = &self.prior.sigma[10 * link..];
@@ -220,7 +225,7 @@ impl Search<'_> {
 }
 
 /// Difference of two signals over a step.
-pub(super) fn difference(a: &Signal, b: &Signal, step: f64) -> Signal {
+pub(in crate::serial) fn difference(a: &Signal, b: &Signal, step: f64) -> Signal {
     a.iter()
         .zip(b)
         .map(|(a, b)| match (a, b) {

@@ -5,11 +5,11 @@
 //! rotor and friction leave of the motor's torque, and the links are where the motor is less the deflection; where it measures the link, `T` is the torque
 //! of the links, and rotor and friction are where the link is and the deflection more.
 
-use super::equation::Equation;
-use super::intervals::Middle;
-use super::rows::Signal;
-use super::term::TermParameter;
 use crate::model::hypothesis::EffectInstance;
+use crate::serial::term::TermParameter;
+use crate::serial::weak_form::equation::Equation;
+use crate::serial::weak_form::intervals::Middle;
+use crate::serial::weak_form::rows::Signal;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Effect, find};
 use armgap_core::kinematics::JointState;
@@ -110,7 +110,12 @@ impl TransmissionLaw {
 
 impl<const N: usize, const P: usize> Equation<N, P> {
     /// The torque of a transmission of this compliance, rad/(N m), or gap, rad: to first order, and so in proportion to either.
-    pub(super) fn of_transmission(&self, law: &TransmissionLaw, size: f64, theta: &[f64; P]) -> Signal {
+    pub(in crate::serial) fn of_transmission(
+        &self,
+        law: &TransmissionLaw,
+        size: f64,
+        theta: &[f64; P],
+    ) -> Signal {
         if size == 0.0 {
             return vec![None; N];
         }

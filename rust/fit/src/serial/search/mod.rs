@@ -1,11 +1,17 @@
 //! Which terms a serial arm's model lacks: added one after another, dropped when idle.
 
-use super::evidence::Evidence;
-use super::fitting::Fitted;
-use super::rows::{Prior, Regression, Rows, Signal};
-use super::screening::Guess;
-use super::term::Term;
+pub(in crate::serial) mod arm_wide;
+pub(in crate::serial) mod conclusion;
+pub(in crate::serial) mod evidence;
+pub(in crate::serial) mod fitting;
+pub(in crate::serial) mod screening;
+
 use crate::progress::{Phase, ProgressReporter};
+use crate::serial::search::evidence::Evidence;
+use crate::serial::search::fitting::Fitted;
+use crate::serial::search::screening::Guess;
+use crate::serial::term::Term;
+use crate::serial::weak_form::rows::{Prior, Regression, Rows, Signal};
 
 /// Rows of an arm along some logs, and the torques of terms along them.
 pub trait Motion: Sync {
@@ -118,7 +124,7 @@ impl Search<'_> {
     }
 
     /// Whether term `index` of the second model is accepted beside the first, which lacks it.
-    pub(super) fn is_accepted(
+    pub(in crate::serial) fn is_accepted(
         &self,
         regression: &Regression,
         [without, with]: [&Fitted; 2],
@@ -133,7 +139,7 @@ impl Search<'_> {
     }
 
     /// The model without term `index`, fitted.
-    pub(super) fn without(&self, regression: &Regression, model: &Fitted, index: usize) -> Fitted {
+    pub(in crate::serial) fn without(&self, regression: &Regression, model: &Fitted, index: usize) -> Fitted {
         let mut terms = model.terms.clone();
         terms.remove(index);
         self.fit(regression, terms, &model.estimate.theta)
@@ -161,9 +167,9 @@ mod tests {
     use crate::model::hypothesis::EffectInstance;
     use crate::numeric::random::Random;
     use crate::progress::{Control, Observer};
-    use crate::serial::row_term::{self, RowLaw, RowTerm};
-    use crate::serial::rows::JointRows;
     use crate::serial::term::TermKind;
+    use crate::serial::term::row_term::{self, RowLaw, RowTerm};
+    use crate::serial::weak_form::rows::JointRows;
     use armgap_core::chain::JointKind;
     use armgap_core::effect::find;
 

@@ -1,11 +1,14 @@
 //! What a result says of position controllers: their settings, look-alikes that no log of references and positions tells apart, and estimated gains.
 
-use super::controller::{JointController, PositionController};
-use super::term::{Term, TermKind};
 use crate::result::report::{Cause, CauseValue, EquivalentSummary, SeveralJoints};
+use crate::serial::controller::{JointController, PositionController};
+use crate::serial::term::{Term, TermKind};
 
 /// Controllers with the settings that terms say.
-pub(super) fn with_settings(mut joints: Vec<JointController>, terms: &[Term]) -> Vec<JointController> {
+pub(in crate::serial) fn with_settings(
+    mut joints: Vec<JointController>,
+    terms: &[Term],
+) -> Vec<JointController> {
     for term in terms.iter().flat_map(Term::members) {
         if let TermKind::Controller(of) = term.kind {
             joints[of.joint] = of.on(&joints[of.joint], term.p[0]);
@@ -18,7 +21,10 @@ pub(super) fn with_settings(mut joints: Vec<JointController>, terms: &[Term]) ->
 const NOT_TESTED: [(&str, &str); 2] = [("joint_elasticity", "a shaft that twists"), ("backlash", "backlash")];
 
 /// What no log of references and positions tells from a cause, and what was not tested beside it.
-pub(super) fn behind_controller(cause: &Cause, controller: &PositionController) -> Vec<EquivalentSummary> {
+pub(in crate::serial) fn behind_controller(
+    cause: &Cause,
+    controller: &PositionController,
+) -> Vec<EquivalentSummary> {
     let Some(joint) = cause.joint else { return Vec::new() };
     let of = &controller.joints[joint - 1];
     let why = |effect, why: String| EquivalentSummary {
@@ -58,7 +64,7 @@ pub(super) fn behind_controller(cause: &Cause, controller: &PositionController) 
 }
 
 /// Remark on gains that were estimated.
-pub(super) fn gains_note(
+pub(in crate::serial) fn gains_note(
     controller: &PositionController,
     differences: &[f64],
     sigma: &[f64],

@@ -3,8 +3,8 @@
 //! Where friction comes from a soft constraint, as in some simulators, or from grease, its torque does not jump at a reversal. What a jump in
 //! the model leaves there looks like a delay of the torque.
 
-use super::constants::PRICE;
-use super::rows::{Prior, Regression, Rows};
+use crate::serial::constants::PRICE;
+use crate::serial::weak_form::rows::{Prior, Regression, Rows};
 
 /// Widths that are tried, rad/s (m/s).
 const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];

@@ -1,12 +1,12 @@
 //! First-order tests of all candidates, and fits of those that pass.
 
-use super::constants::{FINALISTS, PRICE};
-use super::fitting::{Fitted, difference};
-use super::row_term::{RowLaw, RowTerm};
-use super::rows::{Estimate, Regression, Signal};
-use super::search::Search;
-use super::term::{Term, TermKind};
 use crate::progress::Phase;
+use crate::serial::constants::{FINALISTS, PRICE};
+use crate::serial::search::Search;
+use crate::serial::search::fitting::{Fitted, difference};
+use crate::serial::term::row_term::{RowLaw, RowTerm};
+use crate::serial::term::{Term, TermKind};
+use crate::serial::weak_form::rows::{Estimate, Regression, Signal};
 use armgap_core::effect::Trial;
 use rayon::prelude::*;
 
@@ -18,13 +18,13 @@ const TILT_STEP: f64 = 1e-3;
 
 /// A term at an initial guess with the torques of its first-order test, along the training logs.
 pub struct Guess {
-    pub(super) term: Term,
-    pub(super) columns: Vec<Signal>,
+    pub(in crate::serial) term: Term,
+    pub(in crate::serial) columns: Vec<Signal>,
 }
 
 impl Search<'_> {
     /// Every candidate at every initial guess with the torques that test it.
-    pub(super) fn guesses(&self, regression: &Regression, at: &Estimate) -> Vec<Vec<Guess>> {
+    pub(in crate::serial) fn guesses(&self, regression: &Regression, at: &Estimate) -> Vec<Vec<Guess>> {
         let theta = &at.theta;
         let columns = |term: &Term| -> Vec<Signal> {
             match term.kind {
@@ -79,7 +79,12 @@ impl Search<'_> {
     }
 
     /// Tests a term to first order; returns it with the values that the test suggests, and the decrease of the cost.
-    pub(super) fn test(&self, regression: &Regression, at: &Estimate, guess: &Guess) -> Option<(Term, f64)> {
+    pub(in crate::serial) fn test(
+        &self,
+        regression: &Regression,
+        at: &Estimate,
+        guess: &Guess,
+    ) -> Option<(Term, f64)> {
         let term = &guess.term;
         let bounds = term.parameters(self.rotary_of(term));
         let within = |p: &[f64]| p.iter().zip(&bounds).all(|(p, b)| *p >= b.bounds[0] && *p <= b.bounds[1]);
@@ -150,7 +155,7 @@ impl Search<'_> {
     }
 
     /// Torque per unit of one amplitude, the others switched off.
-    pub(super) fn unit(&self, term: &Term, amplitude: usize, theta: &[f64]) -> Signal {
+    pub(in crate::serial) fn unit(&self, term: &Term, amplitude: usize, theta: &[f64]) -> Signal {
         let neutral = term.parameters(self.rotary_of(term));
         let mut p = term.p.clone();
         for (i, value) in p.iter_mut().enumerate().take(term.amplitudes()) {
@@ -160,7 +165,7 @@ impl Search<'_> {
     }
 
     /// Best initial guess of every place that is not in the model, best first.
-    pub(super) fn screened(
+    pub(in crate::serial) fn screened(
         &self,
         guesses: &[Vec<Guess>],
         regression: &Regression,
@@ -185,7 +190,7 @@ impl Search<'_> {
     }
 
     /// Models with one more term each, fitted: the finalists of the screening.
-    pub(super) fn finalists(
+    pub(in crate::serial) fn finalists(
         &self,
         regression: &Regression,
         model: &Fitted,

@@ -1,17 +1,17 @@
 //! The end of a search: probabilities of its terms, what looks alike, and tests of what is not in the model.
 
-use super::constants::{ALIKE, ALIKE_COST, NAMED};
-use super::evidence::{consequence, stability, trust};
-use super::fitting::Fitted;
-use super::rows::{JointRows, Regression};
-use super::screening::Guess;
-use super::search::{Found, Named, Search, Tested};
-use super::term::Term;
+use crate::serial::constants::{ALIKE, ALIKE_COST, NAMED};
+use crate::serial::search::evidence::{consequence, stability, trust};
+use crate::serial::search::fitting::Fitted;
+use crate::serial::search::screening::Guess;
+use crate::serial::search::{Found, Named, Search, Tested};
+use crate::serial::term::Term;
+use crate::serial::weak_form::rows::{JointRows, Regression};
 use armgap_core::chain::LINK_PARAMETERS;
 
 impl Search<'_> {
     /// Probabilities, look-alikes, and tests of what is not in the model.
-    pub(super) fn concluded(
+    pub(in crate::serial) fn concluded(
         &self,
         guesses: &[Vec<Guess>],
         regression: &Regression,

@@ -3,11 +3,11 @@
 //! With the row `r = (1, s)` of a coupled transmission (Siciliano 2009, section 5.1) and `q_r = q_j + s q_k`, a torque `tau_r` along it is the torque
 //! `r' tau_r` on the joints: `tau_r = inertia ddq_r + viscous dq_r + coulomb sign(dq_r)` of what turns with the row, and `k (q_r - q0)` of a spring on it.
 
-use super::equation::Equation;
-use super::intervals::{Intervals, Middle};
-use super::rows::Signal;
-use super::term::{Term, TermKind, TermParameter};
 use crate::log::track::Track;
+use crate::serial::term::{Term, TermKind, TermParameter};
+use crate::serial::weak_form::equation::Equation;
+use crate::serial::weak_form::intervals::{Intervals, Middle};
+use crate::serial::weak_form::rows::Signal;
 use armgap_core::chain::JointKind;
 use armgap_core::effect::InputSegment;
 use nalgebra::SVector;
@@ -124,7 +124,7 @@ pub fn candidates(kinds: &[JointKind]) -> Vec<Vec<Term>> {
 
 impl<const N: usize, const P: usize> Equation<N, P> {
     /// The torque of a term on a row over two joints.
-    pub(super) fn of_row(&self, row: &RowTerm, p: &[f64]) -> Signal {
+    pub(in crate::serial) fn of_row(&self, row: &RowTerm, p: &[f64]) -> Signal {
         let changes: Vec<Vec<[SVector<f64, N>; 2]>> = self
             .logs()
             .iter()

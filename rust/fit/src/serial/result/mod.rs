@@ -1,14 +1,8 @@
 //! From the end of a search to the diagnosis as data.
 
-use super::cause_report::{cause, ruled_out};
-use super::closed_loop::ClosedLoop;
-use super::constants::NAMED;
-use super::controller_report::{gains_note, with_settings};
-use super::fitting::Fitted;
-use super::predict::{Model, floor};
-use super::search::Found;
-use super::term::Term;
-use super::{SerialArm, Set};
+pub(in crate::serial) mod cause_report;
+pub(in crate::serial) mod controller_report;
+
 use crate::locate::regimes::Location;
 use crate::log::input::Options;
 use crate::numeric::random::Random;
@@ -20,6 +14,15 @@ use crate::result::report::{
     Noise, OptionSummary, Parameters, Value,
 };
 use crate::result::verdict::Evidence;
+use crate::serial::constants::NAMED;
+use crate::serial::controller::closed_loop::ClosedLoop;
+use crate::serial::predict::{Model, floor};
+use crate::serial::result::cause_report::{cause, ruled_out};
+use crate::serial::result::controller_report::{gains_note, with_settings};
+use crate::serial::search::Found;
+use crate::serial::search::fitting::Fitted;
+use crate::serial::term::Term;
+use crate::serial::{SerialArm, Set};
 use armgap_core::chain::Chain;
 
 /// Resamples of the holdout's windows for the interval of the closed share.
@@ -270,7 +273,8 @@ fn unexplained<const N: usize, const P: usize>(set: &Fitted, holdout: &Set<N, P>
     let rows = &holdout.equation.rows;
     let theta = std::array::from_fn(|i| set.estimate.theta[i]);
     let signals: Vec<_> = set.terms.iter().map(|t| holdout.equation.signal(t, &theta)).collect();
-    let beside = if signals.is_empty() { vec![None; N] } else { super::rows::sum(rows, &signals) };
+    let beside =
+        if signals.is_empty() { vec![None; N] } else { crate::serial::weak_form::rows::sum(rows, &signals) };
     let residual = rows.residual(&set.estimate.theta, &beside);
     let share = |j: usize| {
         let y = square(&rows.joints[j].y);

@@ -1,13 +1,13 @@
 //! The weak equation of motion of an arm along its logs, and the torque of any term along the same motion.
 
-use super::commanded::Commanded;
-use super::intervals::{Intervals, Middle, TestFunction};
-use super::predict::turned;
-use super::rows::{JointRows, Rows, Signal, sum};
-use super::term::{Term, TermKind, depends, of_load};
-use super::transmission::Computed;
 use crate::log::track::Track;
 use crate::model::hypothesis::EffectInstance;
+use crate::serial::controller::commanded::Commanded;
+use crate::serial::predict::turned;
+use crate::serial::term::transmission::Computed;
+use crate::serial::term::{Term, TermKind, depends, of_load};
+use crate::serial::weak_form::intervals::{Intervals, Middle, TestFunction};
+use crate::serial::weak_form::rows::{JointRows, Rows, Signal, sum};
 use armgap_core::arm::Arm;
 use armgap_core::chain::Chain;
 use armgap_core::effect::{InputSegment, JointPoint};
@@ -33,20 +33,20 @@ pub struct Equation<const N: usize, const P: usize> {
     pub arm: Chain<f64, N>,
     /// Rows.
     pub rows: Rows,
-    pub(super) logs: Vec<Intervals<N>>,
+    pub(in crate::serial) logs: Vec<Intervals<N>>,
     times: Vec<Vec<f64>>,
     held: Vec<Vec<[InputSegment<f64>; N]>>,
-    pub(super) functions: Vec<TestFunction>,
+    pub(in crate::serial) functions: Vec<TestFunction>,
     /// Test functions of each joint's rows.
-    pub(super) kept: Vec<Vec<usize>>,
+    pub(in crate::serial) kept: Vec<Vec<usize>>,
     /// Torques of transmissions.
-    pub(super) computed: Computed<P>,
+    pub(in crate::serial) computed: Computed<P>,
     /// The position controllers behind the torques, of logs that hold references in their place.
-    pub(super) commanded: Option<Commanded<N>>,
+    pub(in crate::serial) commanded: Option<Commanded<N>>,
 }
 
 /// Torques per interval of every log on the joints that a term acts on.
-pub(super) type Torques<const N: usize> = [Option<Vec<Vec<f64>>>; N];
+pub(in crate::serial) type Torques<const N: usize> = [Option<Vec<Vec<f64>>>; N];
 
 impl<const N: usize, const P: usize> Equation<N, P> {
     /// The equation along these logs, weighed by test functions of this half width, s; `theta` are nominal values.
@@ -194,7 +194,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// The same before the mean over each log is left out of joints with an integral controller.
-    pub(super) fn signal_with_mean(&self, term: &Term, theta: &[f64; P]) -> Signal {
+    pub(in crate::serial) fn signal_with_mean(&self, term: &Term, theta: &[f64; P]) -> Signal {
         match term.kind {
             TermKind::Law(_) => match term.effect() {
                 Some(effect) if effect.law.spec().hooks.measured => self.displaced(&effect, theta),
@@ -226,7 +226,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// Averages of torques per interval over the test functions of each joint's rows.
-    pub(super) fn weak(&self, torques: &Torques<N>) -> Signal {
+    pub(in crate::serial) fn weak(&self, torques: &Torques<N>) -> Signal {
         let joint = |j: usize| {
             torques[j].as_ref().map(|torque| {
                 let row = |i: &usize| {
@@ -339,7 +339,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// Rows of a change of the momentum and of the rest of the torque, interval by interval.
-    pub(super) fn weak_parts(&self, changes: &[Vec<[SVector<f64, N>; 2]>]) -> Signal {
+    pub(in crate::serial) fn weak_parts(&self, changes: &[Vec<[SVector<f64, N>; 2]>]) -> Signal {
         let joint = |joint: usize| {
             let row = |i: &usize| {
                 let phi = &self.functions[*i];
@@ -356,7 +356,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// The logs, interval by interval.
-    pub(super) fn logs(&self) -> &[Intervals<N>] {
+    pub(in crate::serial) fn logs(&self) -> &[Intervals<N>] {
         &self.logs
     }
 
@@ -393,7 +393,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 
     /// Momentum, and the rest of the torque: `C dq + g - dM/dt dq` and friction.
-    pub(super) fn parts(&self, m: &Middle<N>, theta: &[f64; P]) -> [SVector<f64, N>; 2] {
+    pub(in crate::serial) fn parts(&self, m: &Middle<N>, theta: &[f64; P]) -> [SVector<f64, N>; 2] {
         let (q, dq) = (SVector::from(m.q), SVector::from(m.dq));
         let momentum = self.arm.inertia(theta, &q) * SVector::from(m.mean_dq);
         let ahead = self.arm.inertia(theta, &(q + dq * RATE_STEP)) * dq;
@@ -403,7 +403,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         [momentum, bias - (ahead - behind) / (2.0 * RATE_STEP) + friction]
     }
 
-    pub(super) fn rigid(&self, theta: &[f64; P]) -> RigidArm<f64, Chain<f64, N>, N, P> {
+    pub(in crate::serial) fn rigid(&self, theta: &[f64; P]) -> RigidArm<f64, Chain<f64, N>, N, P> {
         RigidArm {
             arm: self.arm,
             theta: *theta,

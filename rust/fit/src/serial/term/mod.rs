@@ -1,10 +1,15 @@
 //! Terms that a serial arm's model may lack: the library's laws joint by joint, and what changes the arm itself.
 
-use super::controller_term::{ControllerTerm, Setting};
-use super::row_term::{RowLaw, RowTerm};
-use super::several_joints::SeveralJoints;
-use super::transmission::TransmissionLaw;
+pub(in crate::serial) mod controller_term;
+pub(in crate::serial) mod row_term;
+pub(in crate::serial) mod several_joints;
+pub(in crate::serial) mod transmission;
+
 use crate::model::hypothesis::EffectInstance;
+use crate::serial::term::controller_term::{ControllerTerm, Setting};
+use crate::serial::term::row_term::{RowLaw, RowTerm};
+use crate::serial::term::several_joints::SeveralJoints;
+use crate::serial::term::transmission::TransmissionLaw;
 use armgap_core::chain::LINK_NAMES;
 use armgap_core::effect::{JointPoint, Quantity, Scope, Trial};
 

@@ -1,13 +1,13 @@
 //! Causes as results state them, and the status of every term that is none.
 
-use super::constants::{CONSEQUENCE, NOTICED, SIGNIFICANT};
-use super::controller::PositionController;
-use super::controller_report::behind_controller;
-use super::search::{Found, Tested};
-use super::term::{Term, TermKind};
 use crate::result::report::{
     Bound, Cause, CauseValue, EquivalentSummary, Named, RuledOut, SeveralJoints, Status, Value, Values,
 };
+use crate::serial::constants::{CONSEQUENCE, NOTICED, SIGNIFICANT};
+use crate::serial::controller::PositionController;
+use crate::serial::result::controller_report::behind_controller;
+use crate::serial::search::{Found, Tested};
+use crate::serial::term::{Term, TermKind};
 use armgap_core::effect::{Effect, Scope, Trial, catalogue};
 
 /// Quantile of the normal distribution for bounds at 95 %.
@@ -57,7 +57,7 @@ fn cause_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<CauseValue
 
 fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
     let parameters = term.parameters(rotary_of(term, rotary));
-    let value = |(i, p): (usize, &super::term::TermParameter)| {
+    let value = |(i, p): (usize, &crate::serial::term::TermParameter)| {
         let sigma = sigma.get(i).copied().filter(|s| s.is_finite()).unwrap_or(0.0);
         match p.inverse {
             Some((name, unit)) if term.p[i] != 0.0 => {
@@ -69,8 +69,8 @@ fn named_values(term: &Term, sigma: &[f64], rotary: &[bool]) -> Named<Value> {
     parameters.iter().enumerate().map(value).collect()
 }
 
-pub(super) fn cause(
-    named: &super::search::Named,
+pub(in crate::serial) fn cause(
+    named: &crate::serial::search::Named,
     rotary: &[bool],
     controller: Option<&PositionController>,
 ) -> Cause {
@@ -100,7 +100,11 @@ pub(super) fn cause(
 }
 
 /// Status of every place that is not in the model.
-pub(super) fn ruled_out(found: &Found, unexplained: &[Option<f64>], rotary: &[bool]) -> Vec<RuledOut> {
+pub(in crate::serial) fn ruled_out(
+    found: &Found,
+    unexplained: &[Option<f64>],
+    rotary: &[bool],
+) -> Vec<RuledOut> {
     let named = |t: &Tested| found.named.iter().any(|n| n.term.same_place(&t.term));
     let mut all: Vec<RuledOut> =
         found.tested.iter().filter(|t| !named(t)).map(|t| status(found, unexplained, t, rotary)).collect();

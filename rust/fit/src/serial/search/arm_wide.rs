@@ -4,19 +4,19 @@
 //! gain, and is judged as others are, by its own number of parameters. It has to be noticed on each joint that it keeps, on half of those that move, and what
 //! it explains beside the law on the one joint where that explains most has to be accepted by itself.
 
-use super::constants::{ARM_WIDE, ARM_WIDE_FINALISTS, CONSEQUENCE, NOTICED, PRICE};
-use super::evidence::consequence;
-use super::fitting::Fitted;
-use super::rows::Regression;
-use super::search::Search;
-use super::term::Term;
+use crate::serial::constants::{ARM_WIDE, ARM_WIDE_FINALISTS, CONSEQUENCE, NOTICED, PRICE};
+use crate::serial::search::Search;
+use crate::serial::search::evidence::consequence;
+use crate::serial::search::fitting::Fitted;
+use crate::serial::term::Term;
+use crate::serial::weak_form::rows::Regression;
 
 /// A claim about the arm rests on so many joints at least, or on all of them.
 const FEWEST_JOINTS: usize = 3;
 
 impl Search<'_> {
     /// Models with one law more on several joints at once that is accepted; the laws that explain most to first order.
-    pub(super) fn on_several_joints(
+    pub(in crate::serial) fn on_several_joints(
         &self,
         regression: &Regression,
         model: &Fitted,
@@ -139,7 +139,7 @@ impl Search<'_> {
     }
 
     /// The terms with one more; the same law on so many joints that it is one of the whole arm becomes one term.
-    pub(super) fn joined(&self, terms: Vec<Term>, added: Term) -> Vec<Term> {
+    pub(in crate::serial) fn joined(&self, terms: Vec<Term>, added: Term) -> Vec<Term> {
         let first = added.members().swap_remove(0);
         let (same, mut joined): (Vec<Term>, Vec<Term>) =
             terms.into_iter().partition(|term| self.is_same_law(&term.members()[0], &first));

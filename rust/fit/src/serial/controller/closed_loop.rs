@@ -4,9 +4,9 @@
 //! middle: a torque of the state at its start would be late by half a period, which at a stiff gain is a force along the velocity. Effects that change what a
 //! command becomes are given the torques of the last periods, before a window's start those along the measured path.
 
-use super::controller::{Given, JointController};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::predict::window::{DIVERGED, Dataset, Window};
+use crate::serial::controller::{Given, JointController};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{InputSegment, Quantity, find};
 use armgap_core::integrate::{Interval, State, advance};
