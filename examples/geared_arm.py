@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from armgap import Arm, Log, diagnose, simulate
-from armgap.comparison import compare
+from armgap.diagnosis.comparison import compare
 from armgap.simulation import Effect
 
 arm = Arm.read(Path(__file__).parent / "dfki-double-pendulum.toml")

@@ -161,7 +161,7 @@ def test_an_interrupt_ends_cleanly(arm_file, tmp_path):
     # A shell's background job is started with interrupts ignored; a terminal's is not.
     code = (
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-        "import polars; import armgap.cli.simulate; print(flush=True); armgap.cli.main()"
+        "import polars; import armgap.cli.model_commands.simulate; print(flush=True); armgap.cli.main()"
     )
     command = [sys.executable, "-c", code, *map(str, words)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)

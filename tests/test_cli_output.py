@@ -13,7 +13,7 @@ import pytest
 from armgap import Log
 from armgap.cli.common import ManyValues
 from armgap.errors import ResultError
-from armgap.output import write
+from armgap.files.output import write
 
 
 @click.command(cls=ManyValues)

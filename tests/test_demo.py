@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from armgap.cli.demo import CASE_FOLDER as CASE
-from armgap.trial.key import HiddenEffect, Key, open_key
+from armgap.trial.cases.key import HiddenEffect, Key, open_key
 from armgap.trial.verdict import judge
 from doc_blocks import agrees, blocks
 

@@ -11,7 +11,7 @@ import pytest
 
 from armgap import Arm, _native, diagnose
 from armgap.diagnosis import diagnosis_schema, schema
-from armgap.json_schema import schema_of
+from armgap.files.json_schema import schema_of
 from armgap.literals import STATUSES, VERDICTS
 from diagnosis_schema.checking import losses, misfits
 from swings import swing

@@ -15,7 +15,7 @@ import pytest
 
 import armgap
 from armgap import effects
-from armgap.log.units import FACTORS
+from armgap.log.conversion.units import FACTORS
 
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST_EXAMPLE = 60  # lines

@@ -16,8 +16,8 @@ import pytest
 
 from armgap import Arm, Diagnosis, correct, diagnose, effects, simulate
 from armgap.export import FIELDS, ExportError
+from armgap.export.chain.joint import ON_JOINT
 from armgap.export.corrected import LEAST_SIGMA
-from armgap.export.joint import ON_JOINT
 from armgap.simulation import Effect
 from export_cases import SIZES, THETA, found, make_arm
 

@@ -18,7 +18,7 @@ from armgap.arm.description.xml import parse
 from armgap.arm.rigid_body import about_com, rotation_between, rpy_matrix, rpy_of
 from armgap.errors import ArmgapError, ModelFileError
 from armgap.export import CorrectedSerial, ExportError, into_description, randomization
-from armgap.export.bodies import BODY_TOLERANCE
+from armgap.export.chain.bodies import BODY_TOLERANCE
 from export_cases import found, make_arm
 from serial_export_cases import (
     CAUSES,

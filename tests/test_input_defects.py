@@ -15,10 +15,10 @@ import pytest
 
 from armgap.check import NAMES
 from armgap.trial import make_case
-from armgap.trial.arms import random_arm
-from armgap.trial.case import simulated_arm_of
-from armgap.trial.key import HiddenEffect
-from armgap.trial.plant import Plant
+from armgap.trial.cases.case import simulated_arm_of
+from armgap.trial.cases.key import HiddenEffect
+from armgap.trial.simulation.arms import random_arm
+from armgap.trial.simulation.plant import Plant
 from input_defects.answering import WHOLE, answer, answer_floor
 from input_defects.case import Inputs, Table, Truth, toml
 from input_defects.defect import ANY

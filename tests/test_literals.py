@@ -8,7 +8,7 @@ import armgap
 import report_cases as cases
 from armgap import Arm, Estimator, identify, literals
 from armgap.check.check import NAMES, SEVERITIES
-from armgap.comparison import compare
+from armgap.diagnosis.comparison import compare
 from armgap.errors import OptionError
 from armgap.report.advice import next_steps
 from armgap.report.words import answers, verdict

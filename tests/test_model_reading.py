@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from armgap import Arm, read_model
 from armgap.arm.rigid_body import about_com, about_origin, inconsistency, moved, symmetric
-from armgap.arm.serial_trust import TRUSTS
+from armgap.arm.serial.trust import TRUSTS
 from armgap.errors import ModelFileError, OptionError
 from three_joints import ARM, LINKS, URDF
 

@@ -92,7 +92,7 @@ def test_every_command_that_writes_is_among_the_cases():
 
 
 def test_only_one_module_writes_files():
-    """Everything that opens a file for writing stands in `armgap.output`; tables and recordings are handed a path by it."""
+    """Everything that opens a file for writing stands in `armgap.files.output`; tables and recordings are handed a path by it."""
     handed = {"log/log.py", "trial/case.py", "cli/simulate.py", "fleet/folder.py", "planning/planning.py"}
     writing = re.compile(r"\.write_(text|bytes|parquet|csv)\b|(?<!def )(?<![\w.])open\(")
     found = {

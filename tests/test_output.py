@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from armgap.errors import ResultError
-from armgap.output import check_writable, is_stdout, write, write_folder
+from armgap.files.output import check_writable, is_stdout, write, write_folder
 from commands import refused
 
 # Whole or not at all
@@ -68,7 +68,8 @@ def test_the_owner_is_kept(tmp_path):
 
 def as_nobody(body: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a few lines without the rights of root."""
-    code = f"import os\nfrom armgap.output import write\nos.chdir({str(folder)!r})\nos.setgroups([])\nos.setgid(65534)\nos.setuid(65534)\n{body}"
+    other = "os.setgroups([])\nos.setgid(65534)\nos.setuid(65534)"
+    code = f"import os\nfrom armgap.files.output import write\nos.chdir({str(folder)!r})\n{other}\n{body}"
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120)
 
 
@@ -91,7 +92,7 @@ def _check_left_alone(reason: str, folder: Path) -> None:
         target.chmod(0o666)
     if reason.startswith("folder"):
         os.chown(target, 65534, 65534)
-    done = as_nobody("from armgap.output import check_writable\ncheck_writable('out.json')", folder)
+    done = as_nobody("from armgap.files.output import check_writable\ncheck_writable('out.json')", folder)
     assert reason in done.stderr.splitlines()[-1]
     done = as_nobody("write('out.json', 'mine')", folder)
     assert "ResultError" in done.stderr
@@ -174,7 +175,7 @@ def test_a_signal_in_the_middle_of_writing_leaves_nothing(number, tmp_path):
     code = (
         "import signal, sys, time; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "import armgap.cli.bench as bench\n"
-        "from armgap.output import write\n"
+        "from armgap.files.output import write\n"
         "def slow(path):\n    path.write_text('half'); print('now', flush=True); time.sleep(60)\n"
         "bench.measure = lambda *a, **k: write('out.json', slow)\n"
         "bench.interruptible = lambda work: work()\n"
@@ -239,7 +240,7 @@ def test_files_that_the_shell_has_opened_are_written_through(tmp_path):
     file.write_text("before\n")
     for name in ("/dev/stdout", "/dev/fd/1", "-", str(file)):
         with file.open("ab") as stream:
-            code = f"from armgap.output import write; print('one'); write({name!r}, 'two\\n'); print('three')"
+            code = f"from armgap.files.output import write; print('one'); write({name!r}, 'two\\n'); print('three')"
             subprocess.run([sys.executable, "-c", code], stdout=stream, check=True, timeout=120)
     assert file.read_text() == "before\n" + 4 * "one\ntwo\nthree\n"
 

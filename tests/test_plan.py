@@ -19,8 +19,8 @@ from armgap.planning.criterion import HypothesisPair, PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics
 from armgap.planning.limits import MARGIN, TORQUE_MARGIN, limits_of
 from armgap.planning.motion import Motion, build, count, named
+from armgap.planning.open_questions.questions import asked, known_model, open_questions
 from armgap.planning.outcome import settled
-from armgap.planning.questions import asked, known_model, open_questions
 from armgap.simulation import Effect
 from conftest import TABLE_ONE
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import report_cases as cases
-from armgap.comparison import compare
+from armgap.diagnosis.comparison import compare
 from armgap.report import render_report, words, write_html
 from armgap.report.compared import comparison_document
 

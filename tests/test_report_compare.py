@@ -9,7 +9,7 @@ import pytest
 
 import report_cases as cases
 from armgap import Diagnosis
-from armgap.comparison import compare, read_diagnosis
+from armgap.diagnosis.comparison import compare, read_diagnosis
 from armgap.errors import OptionError
 from armgap.report import render_report
 from armgap.report.compared import answers, comparison_document, lead
@@ -154,7 +154,7 @@ def test_the_command_reports_in_every_form(run, files, tmp_path) -> None:
         assert " ".join(answer.headline.split()) in text
     assert "worn" in (tmp_path / "out.md").read_text()
     assert "<canvas" not in (tmp_path / "out.md").read_text()
-    assert json.loads((tmp_path / "out.json").read_text())["schema"] == "armgap.comparison/1"
+    assert json.loads((tmp_path / "out.json").read_text())["schema"] == "armgap.diagnosis.comparison/1"
     assert (tmp_path / "out.html").read_text().startswith("<!DOCTYPE html>")
 
 

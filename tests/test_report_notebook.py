@@ -9,7 +9,7 @@ import pytest
 import report_cases as cases
 from armgap import Diagnosis, Log
 from armgap.errors import OptionError
-from armgap.report.notebook import PlotLibraryMissingError
+from armgap.report.forms.notebook import PlotLibraryMissingError
 from armgap.report.words import figure
 
 

@@ -10,7 +10,7 @@ import pytest
 import report_cases as cases
 from armgap import Log
 from armgap.errors import OptionError
-from armgap.report.replay import RerunMissingError, models, poses, predicted, write_replay
+from armgap.report.forms.replay import RerunMissingError, models, poses, predicted, write_replay
 
 HORIZON = 0.25
 

@@ -11,8 +11,8 @@ import pytest
 from armgap import Arm, Diagnosis, correct
 from armgap.check.time_shift import causal
 from armgap.check.torque_unit import refined
-from armgap.comparison import compare
 from armgap.diagnosis import Value
+from armgap.diagnosis.comparison import compare
 from armgap.export.randomization import randomization
 from armgap.fleet.manifest import Entry
 from armgap.fleet.tables import parameter_rows, summary_rows

@@ -13,20 +13,8 @@ MOST_LINES = 500
 PACKAGE = ROOT / "python" / "armgap"
 #: Modules and folders of the package in the order of the data, after what all use.
 ORDER = (
-    *(
-        "_native",
-        "_renamed",
-        "errors",
-        "literals",
-        "options",
-        "reading",
-        "output",
-        "json_schema",
-        "progress",
-        "workers",
-        "several_joints",
-    ),
-    *("log", "arm", "simulation", "check", "estimation", "evidence", "diagnosis", "comparison", "export", "report"),
+    *("_native", "_renamed", "errors", "literals", "options", "files", "progress", "workers", "several_joints"),
+    *("log", "arm", "simulation", "check", "estimation", "evidence", "diagnosis", "export", "report"),
     *("inspection", "planning", "fleet", "reproduction", "trial", "cli", "own"),
 )
 #: What shows itself in a notebook or as text, by reports; and an entry point, which is a command.

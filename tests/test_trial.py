@@ -24,15 +24,15 @@ from armgap.trial import (
     plan_trial,
     possible,
 )
-from armgap.trial.actuator import Actuator, DeadZone, Delay, Encoder, Lag, Saturation
-from armgap.trial.arms import AXIS, DIRECT_DRIVE, GEARED, PENDULUM, TrialArm, random_arm
-from armgap.trial.case import NoMotionError, _one, simulated_arm_of
+from armgap.trial.cases.case import NoMotionError, _one, simulated_arm_of
+from armgap.trial.cases.key import HiddenEffect, Key
 from armgap.trial.effects import REGISTRY, Draw, usage
 from armgap.trial.effects.base import JointUsage
-from armgap.trial.excitation import draw_excitation
-from armgap.trial.key import HiddenEffect, Key
-from armgap.trial.plant import Flexure, Plant, PlantConfig, Rotor
-from armgap.trial.simulated_arm import SimulatedArm, run
+from armgap.trial.simulation.actuator import Actuator, DeadZone, Delay, Encoder, Lag, Saturation
+from armgap.trial.simulation.arms import AXIS, DIRECT_DRIVE, GEARED, PENDULUM, TrialArm, random_arm
+from armgap.trial.simulation.excitation import draw_excitation
+from armgap.trial.simulation.plant import Flexure, Plant, PlantConfig, Rotor
+from armgap.trial.simulation.simulated_arm import SimulatedArm, run
 from armgap.trial.verdict import equivalent
 
 DEMO_CASE = Path(__file__).parents[1] / "python" / "armgap" / "demo_case"

@@ -18,10 +18,10 @@ from armgap.trial.baselines import BASELINES
 from armgap.trial.baselines.mujoco_model import build_spec
 from armgap.trial.baselines.regression import RegressionData, motion, regression_data, regressor
 from armgap.trial.baselines.signatures import COUPLED, PER_ARM, PER_JOINT, ROTARY, signatures
-from armgap.trial.engine import TrialEngineMissingError
+from armgap.trial.cases.sealed import SealedCase
+from armgap.trial.cases.windows import Mechanism, cut, misses
 from armgap.trial.methods import methods
-from armgap.trial.sealed import SealedCase
-from armgap.trial.windows import Mechanism, cut, misses
+from armgap.trial.simulation.engine import TrialEngineMissingError
 
 SIZES = {
     "quadratic_drag": {"c": 0.15},

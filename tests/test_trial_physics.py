@@ -10,13 +10,13 @@ import pytest
 pytest.importorskip("mujoco", reason="making cases needs armgap[trial]")
 pytest.importorskip("scipy")
 
-from armgap.trial.arms import DIRECT_DRIVE, GEARED, TrialArm
-from armgap.trial.case import make_case, simulated_arm_of
+from armgap.trial.cases.case import make_case, simulated_arm_of
+from armgap.trial.cases.key import HiddenEffect
 from armgap.trial.effects import REGISTRY
-from armgap.trial.excitation import Tracked, rings
-from armgap.trial.key import HiddenEffect
-from armgap.trial.plant import PlantConfig
-from armgap.trial.simulated_arm import CommandSource, SimulatedArm, Trace, run
+from armgap.trial.simulation.arms import DIRECT_DRIVE, GEARED, TrialArm
+from armgap.trial.simulation.excitation import Tracked, rings
+from armgap.trial.simulation.plant import PlantConfig
+from armgap.trial.simulation.simulated_arm import CommandSource, SimulatedArm, Trace, run
 from dry_friction import DryArm
 
 TH = np.array(DIRECT_DRIVE.theta)

@@ -14,19 +14,19 @@ from armgap.diagnosis.result import GapAtHorizon
 from armgap.errors import OptionError
 from armgap.trial import make_case
 from armgap.trial.answers import AbsentEffect, Answer, NamedCause, Size, read_answer
-from armgap.trial.arms import AXIS, PENDULUM, TrialArm
-from armgap.trial.case import simulated_arm_of
+from armgap.trial.cases.case import simulated_arm_of
+from armgap.trial.cases.key import HiddenEffect, Key
+from armgap.trial.cases.visibility import MULTIPLE, VISIBLE_SIGMAS, visibility
+from armgap.trial.cases.windows import Mechanism, cut, misses, refit
 from armgap.trial.effects import REGISTRY
-from armgap.trial.excitation import draw_excitation
-from armgap.trial.key import HiddenEffect, Key
 from armgap.trial.scoring import score_case
 from armgap.trial.scoring.calibration import calibrate, wilson
 from armgap.trial.scoring.case_score import GROUPS
 from armgap.trial.scoring.closing import HISTORY, closing
 from armgap.trial.scoring.sizes import MAIN, VECTOR, bound_scores, size_scores
-from armgap.trial.simulated_arm import Trace, run
-from armgap.trial.visibility import MULTIPLE, VISIBLE_SIGMAS, visibility
-from armgap.trial.windows import Mechanism, cut, misses, refit
+from armgap.trial.simulation.arms import AXIS, PENDULUM, TrialArm
+from armgap.trial.simulation.excitation import draw_excitation
+from armgap.trial.simulation.simulated_arm import Trace, run
 
 STRIBECK = HiddenEffect("stribeck", 2, {"amplitude": 0.5, "velocity": 0.1})
 DRAG = HiddenEffect("quadratic_drag", 1, {"c": 0.2})

@@ -21,8 +21,8 @@ HEAVY = ("bokeh", "jinja2", "mujoco", "numpy", "polars", "rich")
         ("import armgap.report", ()),
         ("from armgap import Arm", ("numpy",)),
         ("from armgap import diagnose, identify, simulate, correct", ("numpy", "polars")),
-        ("import armgap.cli.diagnose", ("rich",)),
-        ("import armgap.cli.export", ("rich",)),
+        ("import armgap.cli.diagnosis_commands.diagnose", ("rich",)),
+        ("import armgap.cli.model_commands.export", ("rich",)),
         ("import armgap.cli.demo", ("rich",)),
     ],
 )

@@ -17,8 +17,8 @@ THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLA
 def planar(seed: int, cases: int) -> Iterator[tuple[str, str]]:
     """Names and JSON texts of diagnoses of planar arms."""
     from armgap import diagnose
-    from armgap.trial.making import make_cases
-    from armgap.trial.sealed import SealedCase
+    from armgap.trial.cases.making import make_cases
+    from armgap.trial.cases.sealed import SealedCase
 
     with TemporaryDirectory() as folder:
         for place in make_cases(Path(folder) / "cases", seed, cases, duration=6.0):

@@ -77,8 +77,8 @@ def _wanted(options: argparse.Namespace) -> Iterator[tuple[str, Path]]:
 
 def delivered(case: Kept, log: str, rng: np.random.Generator) -> np.ndarray:
     """Torque that reaches the joints at the log's times, shape (n_samples, n_joints), with noise of a part of its size."""
-    from armgap.trial.case import simulated_arm_of
-    from armgap.trial.plant import Plant
+    from armgap.trial.cases.case import simulated_arm_of
+    from armgap.trial.simulation.plant import Plant
 
     rig = simulated_arm_of(arm_of(case), case.key.effects, log)
     plant = Plant(rig.config)

@@ -11,11 +11,11 @@ import polars as pl
 
 from armgap.fleet import read_manifest, run_fleet
 from armgap.fleet.series import moving
-from armgap.trial.armfile import arm_toml, draw_nominal
-from armgap.trial.arms import TrialArm, random_arm
-from armgap.trial.excitation import acceptable, draw_excitation
-from armgap.trial.plant import PlantConfig
-from armgap.trial.simulated_arm import SimulatedArm, Trace, run
+from armgap.trial.cases.armfile import arm_toml, draw_nominal
+from armgap.trial.simulation.arms import TrialArm, random_arm
+from armgap.trial.simulation.excitation import acceptable, draw_excitation
+from armgap.trial.simulation.plant import PlantConfig
+from armgap.trial.simulation.simulated_arm import SimulatedArm, Trace, run
 
 from .judging import ask, report, truth_name
 from .truth import Array, Design, Truth, day, draw, robot_name

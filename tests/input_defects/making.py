@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from armgap.trial.arms import MODELS
-from armgap.trial.case import Case, NoMotionError, possible
-from armgap.trial.key import Key, open_key
+from armgap.trial.cases.case import Case, NoMotionError, possible
+from armgap.trial.cases.key import Key, open_key
+from armgap.trial.simulation.arms import MODELS
 from armgap.trial.trial import Plan, plan_trial
 
 from .case import Array, Inputs, Table, Truth

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from armgap.trial.arms import MODELS
-from armgap.trial.engine import worker_pool
+from armgap.trial.simulation.arms import MODELS
+from armgap.trial.simulation.engine import worker_pool
 from armgap.trial.trial import Plan
 
 from .answering import WHOLE, Record, about, answer, answer_floor, build

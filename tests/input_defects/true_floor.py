@@ -18,12 +18,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from armgap.trial.actuator import Encoder
-from armgap.trial.arms import TrialArm, random_arm
-from armgap.trial.case import simulated_arm_of
-from armgap.trial.engine import mujoco
-from armgap.trial.plant import Plant
-from armgap.trial.simulated_arm import SimulatedArm
+from armgap.trial.cases.case import simulated_arm_of
+from armgap.trial.simulation.actuator import Encoder
+from armgap.trial.simulation.arms import TrialArm, random_arm
+from armgap.trial.simulation.engine import mujoco
+from armgap.trial.simulation.plant import Plant
+from armgap.trial.simulation.simulated_arm import SimulatedArm
 
 from .case import Array
 from .making import Kept

@@ -15,13 +15,13 @@ from armgap.evidence.hypothesis import EffectInstance, Hypothesis
 from armgap.planning.criterion import HypothesisPair, PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics
 from armgap.planning.limits import MARGIN, TORQUE_MARGIN
-from armgap.planning.questions import known_model
-from armgap.trial.armfile import arm_toml, draw_nominal
-from armgap.trial.arms import AXIS, DIRECT_DRIVE, GEARED, PENDULUM, TURN, TrialArm
-from armgap.trial.case import simulated_arm_of
+from armgap.planning.open_questions.questions import known_model
+from armgap.trial.cases.armfile import arm_toml, draw_nominal
+from armgap.trial.cases.case import simulated_arm_of
+from armgap.trial.cases.key import HiddenEffect
 from armgap.trial.effects.drive import BACKLASH_ROTOR
-from armgap.trial.key import HiddenEffect
-from armgap.trial.simulated_arm import CommandSource, Trace, run
+from armgap.trial.simulation.arms import AXIS, DIRECT_DRIVE, GEARED, PENDULUM, TURN, TrialArm
+from armgap.trial.simulation.simulated_arm import CommandSource, Trace, run
 
 Array = NDArray[np.float64]
 

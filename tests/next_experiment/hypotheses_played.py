@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 import armgap
-from armgap.trial.arms import TrialArm
 from armgap.trial.effects import REGISTRY, Draw, NoTravelError, usage
-from armgap.trial.simulated_arm import Trace
+from armgap.trial.simulation.arms import TrialArm
+from armgap.trial.simulation.simulated_arm import Trace
 
 from .cases import LIMITS, Case, Reference, play, poor
 

@@ -14,8 +14,8 @@ from scipy.optimize import least_squares
 
 import armgap
 from armgap import _native
-from armgap.trial.arms import TrialArm
-from armgap.trial.simulated_arm import Trace
+from armgap.trial.simulation.arms import TrialArm
+from armgap.trial.simulation.simulated_arm import Trace
 
 Array = NDArray[np.float64]
 

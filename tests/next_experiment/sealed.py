@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from armgap.planning.sizes import PLANNED
-from armgap.trial.arms import random_arm
-from armgap.trial.case import possible
+from armgap.planning.open_questions.sizes import PLANNED
+from armgap.trial.cases.case import possible
 from armgap.trial.effects import REGISTRY, Draw, NoTravelError, usage
+from armgap.trial.simulation.arms import random_arm
 
 from .cases import ARMS, Case, multisine, play, write_arm
 

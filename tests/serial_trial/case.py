@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import armgap
 import armgap.arm.controller
-from armgap.arm.serial_chain import SerialChain
+from armgap.arm.serial.chain import SerialChain
 from armgap.literals import SERIAL
 
 from .arms import SerialRobot, draw_robot, perturbed

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from armgap.arm.controller import Controller
     from armgap.arm.corrections import Corrections
     from armgap.arm.free_space import FreeSpace
-    from armgap.arm.serial_chain import SerialChain
+    from armgap.arm.serial.chain import SerialChain
 
 __all__ = ["Arm", "MotionLimits", "kinds", "listed", "only_planar", "quoted"]
 
@@ -222,13 +222,13 @@ class Arm:
 
     def _repr_html_(self) -> str:
         """Return kind, conventions and parameters as HTML for a notebook."""
-        from armgap.report.shown import arm_facts
+        from armgap.report.forms.shown import arm_facts
 
         return arm_facts(self).html()
 
     def _repr_markdown_(self) -> str:
         """Return kind, conventions and parameters as Markdown."""
-        from armgap.report.shown import arm_facts
+        from armgap.report.forms.shown import arm_facts
 
         return arm_facts(self).markdown()
 
@@ -258,7 +258,7 @@ class Arm:
     def to_toml(self) -> str:
         """Return the arm as an arm file; that of a serial arm holds its chain and needs no other file."""
         if self.chain is not None:
-            from armgap.arm.serial_toml import serial_toml
+            from armgap.arm.serial.toml import serial_toml
 
             return serial_toml(self)
         n, b = self.n_joints, self.n_inertial

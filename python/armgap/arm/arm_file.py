@@ -18,8 +18,8 @@ from armgap.arm.arm import MotionLimits, kinds
 from armgap.arm.controller import Controller, DerivativeOn
 from armgap.arm.free_space import FreeSpace
 from armgap.errors import ArmFileError, OptionError
+from armgap.files.reading import printable, read_bounded
 from armgap.literals import SERIAL, Side
-from armgap.reading import printable, read_bounded
 
 if TYPE_CHECKING:
     from armgap.arm.corrections import Corrections
@@ -98,7 +98,7 @@ class ArmFile:
     def fields(self) -> dict[str, Any]:
         """Return the fields of an `Arm`, all of them checked."""
         if self.data.get("kind") == SERIAL:
-            from armgap.arm.serial_arm_file import SerialArmFile
+            from armgap.arm.serial.arm_file import SerialArmFile
 
             return SerialArmFile(self.path, self.data).fields()
         self._check_keys()

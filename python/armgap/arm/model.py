@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
 from armgap.arm.arm_file import LONGEST_PERIOD_S, SHORTEST_PERIOD_S, STRONGEST_GRAVITY
-from armgap.arm.serial_trust import TRUSTS
+from armgap.arm.serial.trust import TRUSTS
 from armgap.errors import OptionError
 from armgap.literals import SERIAL
 from armgap.options import positive
@@ -50,7 +50,7 @@ def read_model(
         Acceleration of gravity in the frame of the base [m/s^2]; a number g stands for ``[0, 0, -g]``. By default that of the description:
         9.81 against the z axis of a URDF's root.
     trust : {"published", "cad", "guess", "none"}
-        How far the description's masses and inertias are trusted, see `armgap.arm.serial_trust`.
+        How far the description's masses and inertias are trusted, see `armgap.arm.serial.trust`.
     name : str, optional
         Name of the arm; by default the description's.
     sample_period : float, default 0.002
@@ -75,7 +75,7 @@ def read_model(
     'shoulder_pan_joint'
     """
     from armgap.arm.description.read import read_description
-    from armgap.arm.serial_arm_file import SerialArmFile
+    from armgap.arm.serial.arm_file import SerialArmFile
 
     if trust not in TRUSTS:
         raise OptionError(f"the trust is {trust!r}", remedy=f"write one of {', '.join(TRUSTS)}")

@@ -9,8 +9,8 @@ import numpy as np
 from armgap.arm.arm import Arm
 from armgap.check.check import Check
 from armgap.check.outcome import NOTHING, Outcome, ranges, seconds
+from armgap.log.conversion.turns import turn_jumps, unwrapped
 from armgap.log.log import Log
-from armgap.log.turns import turn_jumps, unwrapped
 
 __all__ = ["look"]
 

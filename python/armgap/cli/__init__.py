@@ -19,18 +19,21 @@ from armgap.errors import ArmgapError
 __all__ = ["main"]
 
 COMMANDS = {
-    "diagnose": ("armgap.cli.diagnose", "Where the gap lies, what causes it, how far it shrinks."),
-    "plan": ("armgap.cli.plan", "The next experiment: the motion that settles what a diagnosis left open."),
-    "compare": ("armgap.cli.compare", "Two diagnoses of one arm, as before and after a repair."),
-    "fleet": ("armgap.cli.fleet", "Many robots: the same diagnosis for every entry of a manifest."),
-    "model": ("armgap.cli.model", "A URDF or MJCF model as an arm file."),
-    "inspect": ("armgap.cli.inspect", "What logs hold, and what they tell about an arm."),
-    "identify": ("armgap.cli.identify", "Estimate the arm's parameters from logs."),
-    "simulate": ("armgap.cli.simulate", "Simulate an arm, with effects on request."),
-    "export": ("armgap.cli.export", "What was found, as a model for a simulator."),
+    "diagnose": ("armgap.cli.diagnosis_commands.diagnose", "Where the gap lies, what causes it, how far it shrinks."),
+    "plan": (
+        "armgap.cli.diagnosis_commands.plan",
+        "The next experiment: the motion that settles what a diagnosis left open.",
+    ),
+    "compare": ("armgap.cli.diagnosis_commands.compare", "Two diagnoses of one arm, as before and after a repair."),
+    "fleet": ("armgap.cli.diagnosis_commands.fleet", "Many robots: the same diagnosis for every entry of a manifest."),
+    "model": ("armgap.cli.model_commands.model", "A URDF or MJCF model as an arm file."),
+    "inspect": ("armgap.cli.diagnosis_commands.inspect", "What logs hold, and what they tell about an arm."),
+    "identify": ("armgap.cli.diagnosis_commands.identify", "Estimate the arm's parameters from logs."),
+    "simulate": ("armgap.cli.model_commands.simulate", "Simulate an arm, with effects on request."),
+    "export": ("armgap.cli.model_commands.export", "What was found, as a model for a simulator."),
     "bench": ("armgap.cli.bench", "Cost per sample on this machine against the sample period."),
     "demo": ("armgap.cli.demo", "Diagnose the sample log and open its sealed key."),
-    "replay": ("armgap.cli.replay", "Measured and predicted arm side by side, for the Rerun viewer."),
+    "replay": ("armgap.cli.model_commands.replay", "Measured and predicted arm side by side, for the Rerun viewer."),
     "reproduce": ("armgap.cli.reproduce", "The seed paper's tables and figures beside our own."),
     "trial": ("armgap.cli.trial", "Blind trials: sealed cases, diagnosed and scored."),
 }

@@ -12,8 +12,8 @@ from armgap.cli.common import console, interruptible, json_option, quiet_option
 from armgap.cli.files import Command
 from armgap.cli.numbers import Number
 from armgap.cli.progress import working
+from armgap.files.output import is_stdout, write
 from armgap.literals import SCHEMES
-from armgap.output import is_stdout, write
 from armgap.progress import report_progress
 
 __all__ = ["command", "measure"]

@@ -24,11 +24,11 @@ from armgap.cli.files import InputFile, InputFolder, OutputFile
 from armgap.cli.numbers import Seed
 from armgap.cli.progress import working
 from armgap.errors import OptionError
-from armgap.output import is_stdout, write
+from armgap.files.output import is_stdout, write
 
 if TYPE_CHECKING:
     from armgap.diagnosis.result import Diagnosis
-    from armgap.trial.key import Key
+    from armgap.trial.cases.key import Key
 
 __all__ = ["command"]
 
@@ -98,7 +98,7 @@ def _own_logs(
 
 
 def _sealed_case(folder: Path, outputs: tuple[str, str | None, bool]) -> None:
-    from armgap.trial.key import check_seal, open_key
+    from armgap.trial.cases.key import check_seal, open_key
 
     say = _voice(outputs)
     seal = check_seal(folder)
@@ -121,8 +121,8 @@ def _diagnose(
     from armgap.arm.arm import Arm
     from armgap.diagnosis.diagnosis import diagnose
     from armgap.log import gather
+    from armgap.report.forms.terminal import summary_table
     from armgap.report.output import diagnosis_report
-    from armgap.report.terminal import summary_table
 
     report_file, json_file, quiet = outputs
     arm = Arm.read(arm_file)
@@ -156,7 +156,7 @@ def _case(folder: Path | None, fresh: int | None, *, quiet: bool) -> Iterator[Pa
         return
     if folder is not None:
         raise OptionError("--case and --fresh were both given", remedy="give one of the two")
-    from armgap.trial.demo import make_demo_case
+    from armgap.trial.cases.demo import make_demo_case
 
     with tempfile.TemporaryDirectory(prefix="armgap-demo-") as scratch:
         with working(f"making the case of seed {fresh}", quiet=quiet):

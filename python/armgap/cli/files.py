@@ -17,7 +17,7 @@ from typing import Any
 import click
 
 from armgap.errors import ArmgapError, OptionError, ResultError
-from armgap.output import STANDARD_STREAM, check_writable, status_of
+from armgap.files.output import STANDARD_STREAM, check_writable, status_of
 
 __all__ = [
     "Command",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from armgap.cli.files import Command, OutputFile
-from armgap.output import is_stdout, write
+from armgap.files.output import is_stdout, write
 from armgap.reproduction.experiment import Reproduction, reproduce
 
 if TYPE_CHECKING:

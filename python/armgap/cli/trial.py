@@ -23,10 +23,10 @@ from armgap.cli.trial_commands import make, run, score
 from armgap.cli.trial_commands.all import all_of_it
 from armgap.cli.trial_commands.run import baselines, former_name
 from armgap.errors import OptionError
+from armgap.files.output import is_stdout, write
 from armgap.options import positive
-from armgap.output import is_stdout, write
 from armgap.progress import report_progress, use_callback
-from armgap.trial.layout import MOST_CASES, belongs, case_folders_in
+from armgap.trial.cases.layout import MOST_CASES, belongs, case_folders_in
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -143,7 +143,7 @@ def _ignore(_: str, __: float) -> None:
 def _score(case: Path, horizon: float) -> tuple[str, Judgement, float]:
     """Diagnose one case without its key, then open the key; return its name, the judgement, and what was closed."""
     from armgap.diagnosis.diagnosis import diagnose
-    from armgap.trial.key import open_key
+    from armgap.trial.cases.key import open_key
     from armgap.trial.verdict import judge
 
     training, held = (sorted(case.glob(f"{part}-*.parquet")) for part in ("train", "holdout"))

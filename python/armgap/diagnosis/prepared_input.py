@@ -17,11 +17,11 @@ from armgap.check.serial import contradictions
 from armgap.check.stage import examine
 from armgap.diagnosis.provenance import provenance
 from armgap.errors import LogShapeError, OptionError
+from armgap.files.reading import printable
 from armgap.log import gather
-from armgap.log.columns import no_controller
+from armgap.log.conversion.columns import no_controller
 from armgap.log.log import Log
 from armgap.log.stretches import choose
-from armgap.reading import printable
 
 __all__ = ["PreparedInput", "prepare", "refused", "split"]
 

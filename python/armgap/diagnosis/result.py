@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from armgap.check.check import Check
 from armgap.literals import ChainStage, Status, Verdict
 from armgap.log.findings import remarks
-from armgap.report.notebook import NotebookDisplay
+from armgap.report.forms.notebook import NotebookDisplay
 
 __all__ = [
     "Bound",

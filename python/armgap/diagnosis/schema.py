@@ -12,7 +12,7 @@ from armgap.diagnosis.drive_chain import ChainEntry
 from armgap.diagnosis.provenance import Provenance
 from armgap.evidence.laws import Law
 from armgap.evidence.plausibility import Plausibility
-from armgap.json_schema import schema_of
+from armgap.files.json_schema import schema_of
 
 __all__ = ["diagnosis_schema"]
 

@@ -1,17 +1,17 @@
 """What was found goes back into a simulator: MJCF, URDF, an arm file, JSON."""
 
+from armgap.export.chain.joint import Joint
+from armgap.export.chain.links import Links, physical
+from armgap.export.chain.model import SimulatorModel
+from armgap.export.chain.planar import CorrectedPlanar
+from armgap.export.chain.serial import CorrectedSerial
 from armgap.export.corrected import Corrected
 from armgap.export.correction import STAGES, correct
 from armgap.export.errors import DiagnosisFileError, ExportError
 from armgap.export.fields import FIELDS, FORMATS, Field
-from armgap.export.joint import Joint
-from armgap.export.links import Links, physical
-from armgap.export.model import SimulatorModel
-from armgap.export.original import CorrectedDescription, into_description
-from armgap.export.planar import CorrectedPlanar
+from armgap.export.formats.original import CorrectedDescription, into_description
 from armgap.export.randomization import randomization
 from armgap.export.read import read_diagnosis
-from armgap.export.serial import CorrectedSerial
 
 __all__ = [
     "FIELDS",

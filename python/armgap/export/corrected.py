@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from armgap import _native
 from armgap.arm.arm import Arm
 from armgap.diagnosis.result import Cause, Equivalent
+from armgap.export.chain.joint import Joint
+from armgap.export.chain.model import SimulatorModel
 from armgap.export.errors import ExportError
 from armgap.export.fields import FIELDS, FORMATS, field_of
-from armgap.export.joint import Joint
-from armgap.export.model import SimulatorModel
 from armgap.several_joints import place_text
 
 __all__ = ["LEAST_SIGMA", "Corrected", "placed", "value"]
@@ -102,7 +102,8 @@ class Corrected(ABC):
         ExportError
             If the format does not exist, or needs links and no arm that could be built has these values.
         """
-        from armgap.export import data, mjcf, toml, urdf
+        from armgap.export import data
+        from armgap.export.formats import mjcf, toml, urdf
 
         writers = {"mjcf": mjcf.render, "urdf": urdf.render, "toml": toml.render, "json": data.render}
         if form not in writers:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from armgap.arm.arm import Arm
 from armgap.diagnosis.result import Diagnosis
+from armgap.export.chain.planar import correct_planar
+from armgap.export.chain.serial import correct_serial
 from armgap.export.corrected import Corrected, placed
 from armgap.export.errors import ExportError
-from armgap.export.planar import correct_planar
-from armgap.export.serial import correct_serial
 
 __all__ = ["STAGES", "correct"]
 

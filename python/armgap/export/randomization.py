@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from armgap._native import __version__
 from armgap.arm.rigid_body import about_com
 from armgap.diagnosis.result import Cause
-from armgap.export.bodies import nearest_bodies
+from armgap.export.chain.bodies import nearest_bodies
+from armgap.export.chain.serial import CorrectedSerial
 from armgap.export.corrected import Corrected
-from armgap.export.serial import CorrectedSerial
 
 __all__ = ["SCHEMA", "covariance", "randomization"]
 

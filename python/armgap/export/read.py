@@ -9,7 +9,7 @@ from typing import Any
 
 from armgap.diagnosis.result import MOST_BYTES, Diagnosis
 from armgap.export.errors import DiagnosisFileError
-from armgap.reading import read_bounded
+from armgap.files.reading import read_bounded
 
 __all__ = ["read_diagnosis"]
 

@@ -11,11 +11,11 @@ from typing import Any
 import polars as pl
 
 from armgap.errors import OptionError, ResultError
+from armgap.files.output import write
 from armgap.fleet.engines import ENGINES
 from armgap.fleet.manifest import Entry
 from armgap.fleet.tables import PARAMETERS, SUMMARY, failed_row, parameter_rows, summary_rows
 from armgap.fleet.work import Outcome, content_key
-from armgap.output import write
 
 __all__ = ["LIMIT_S", "Fleet", "belongs", "run_fleet"]
 

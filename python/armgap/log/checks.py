@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.errors import LogShapeError, TimeError
-from armgap.log.columns import OPTIONAL, Arrays, Names, left_out
+from armgap.log.conversion.columns import OPTIONAL, Arrays, Names, left_out
 from armgap.log.findings import Finding, counted
 from armgap.log.recording import Recording
 

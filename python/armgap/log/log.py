@@ -13,11 +13,12 @@ import polars as pl
 from numpy.typing import ArrayLike, NDArray
 
 from armgap.errors import ColumnError, OptionError
-from armgap.log import checks, clocks, columns, frames, units
+from armgap.files.output import write
+from armgap.log import checks, frames
+from armgap.log.conversion import clocks, columns, units
 from armgap.log.findings import Finding
 from armgap.log.formats.all import record
 from armgap.log.recording import Recording
-from armgap.output import write
 
 if TYPE_CHECKING:
     from armgap.arm.arm import Arm
@@ -111,7 +112,7 @@ class Log:
         arm : Arm, optional
             Arm the log belongs to; its joints, sample period and limits are checked too.
         units : mapping, optional
-            Units of the file where they are not SI: ``{"t": "ms", "q": "deg"}``, see `armgap.log.units.FACTORS`. A
+            Units of the file where they are not SI: ``{"t": "ms", "q": "deg"}``, see `armgap.log.conversion.units.FACTORS`. A
             group of columns whose unit is declared is not checked for its magnitude.
 
         Raises
@@ -304,13 +305,13 @@ class Log:
 
     def _repr_html_(self) -> str:
         """Return length, rate and columns as HTML for a notebook."""
-        from armgap.report.shown import log_facts
+        from armgap.report.forms.shown import log_facts
 
         return log_facts(self).html()
 
     def _repr_markdown_(self) -> str:
         """Return length, rate and columns as Markdown."""
-        from armgap.report.shown import log_facts
+        from armgap.report.forms.shown import log_facts
 
         return log_facts(self).markdown()
 
@@ -349,6 +350,6 @@ class Log:
         return pl.DataFrame(data)
 
     def write(self, path: str | Path) -> None:
-        """Write the log as Parquet, or as CSV if the name ends in ``.csv``; see `armgap.output.write`."""
+        """Write the log as Parquet, or as CSV if the name ends in ``.csv``; see `armgap.files.output.write`."""
         frame = self.to_polars()
         write(path, frame.write_csv if Path(path).suffix.lower() == ".csv" else frame.write_parquet)

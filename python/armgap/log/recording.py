@@ -50,7 +50,7 @@ class Stream:
     time : str, optional
         Column that holds the times, where the format knows.
     units : mapping
-        Units that the file states, by column, as in `armgap.log.units.FACTORS`.
+        Units that the file states, by column, as in `armgap.log.conversion.units.FACTORS`.
     """
 
     columns: tuple[str, ...]

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armgap.planning.open_questions.questions import NONE
 from armgap.planning.planning import Plan, PlannedQuestion
-from armgap.planning.questions import NONE
 from armgap.report import charts
 from armgap.report.conventions import brief, section
 from armgap.report.document import Document
@@ -183,7 +183,7 @@ def plan_summary(plan: Plan) -> RenderableType:
     from rich.console import Group
     from rich.text import Text
 
-    from armgap.report.terminal import answer_lines
+    from armgap.report.forms.terminal import answer_lines
 
     printed = [line for a in answers(plan) for line in answer_lines(a)]
     return Group(Text(lead(plan), style="bold reverse"), Text(), *printed)

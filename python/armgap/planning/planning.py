@@ -18,16 +18,16 @@ from armgap import options
 from armgap.arm.arm import Arm, only_planar
 from armgap.diagnosis.result import Diagnosis
 from armgap.errors import OptionError, ResultError
-from armgap.output import STANDARD_STREAM, write
+from armgap.files.output import STANDARD_STREAM, write
 from armgap.planning.criterion import PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics
-from armgap.planning.hypotheses import HypothesisBuilder, TestedQuestion
 from armgap.planning.limits import TORQUE_MARGIN, PlanLimits, limits_of
 from armgap.planning.motion import Motion
+from armgap.planning.open_questions.hypotheses import HypothesisBuilder, TestedQuestion
+from armgap.planning.open_questions.questions import NONE, Question, asked, known_model, open_questions, rank, spelt
+from armgap.planning.open_questions.sizes import Scales
 from armgap.planning.outcome import Outcome
-from armgap.planning.questions import NONE, Question, asked, known_model, open_questions, rank, spelt
 from armgap.planning.search import Search, standard
-from armgap.planning.sizes import Scales
 from armgap.progress import ProgressCallback, use_callback
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ from armgap.arm.arm import MotionLimits
 from armgap.errors import OptionError
 from armgap.planning.criterion import PredictedMotion, Setting
 from armgap.planning.dynamics import inverse_dynamics, torque_with
-from armgap.planning.hypotheses import TestedQuestion
 from armgap.planning.limits import TORQUE_MARGIN, TORQUE_MOST, PlanLimits
 from armgap.planning.motion import LOOK_HZ, Motion, build, count, named
+from armgap.planning.open_questions.hypotheses import TestedQuestion
 from armgap.planning.outcome import Outcome
 from armgap.progress import report_progress
 

@@ -1,9 +1,9 @@
 """Reports: results, then documents of sections, then HTML, Markdown or a terminal."""
 
 from armgap.report.document import Document, diagnosis_document
-from armgap.report.html import render_html, write_html
+from armgap.report.forms.html import render_html, write_html
+from armgap.report.forms.terminal import summary_table
 from armgap.report.output import check_report, diagnosis_report, prepare_report, render_report
-from armgap.report.terminal import summary_table
 
 __all__ = [
     "Document",

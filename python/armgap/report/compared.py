@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from armgap.comparison import SHARE, SIGMAS, CauseChange, Comparison
+from armgap.diagnosis.comparison import SHARE, SIGMAS, CauseChange, Comparison
 from armgap.diagnosis.result import Value
 from armgap.literals import SERIAL
 from armgap.report import charts
@@ -186,7 +186,7 @@ def comparison_summary(c: Comparison) -> RenderableType:
     from rich.table import Table as Grid
     from rich.text import Text
 
-    from armgap.report.terminal import answer_lines
+    from armgap.report.forms.terminal import answer_lines
 
     grid = Grid(
         box=box.SIMPLE_HEAD,

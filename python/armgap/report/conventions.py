@@ -118,7 +118,7 @@ def _rows(kind: str, log: Data, si: Data) -> list[tuple[str, ...]]:
 
 
 def _row(kind: str, key: str, name: str, unit: str, si: Data) -> tuple[str, ...]:
-    from armgap.log.units import FACTORS
+    from armgap.log.conversion.units import FACTORS
 
     match = _KEY.fullmatch(key)
     group, joint = match.groups() if match else (key, "")

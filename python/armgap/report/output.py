@@ -21,13 +21,13 @@ STANDARD_STREAM = "-"
 
 
 def _html(document: Document, _: dict[str, Any]) -> str:
-    from armgap.report.html import page_of
+    from armgap.report.forms.html import page_of
 
     return page_of(document)
 
 
 def _markdown(document: Document, _: dict[str, Any]) -> str:
-    from armgap.report.markdown import markdown_of
+    from armgap.report.forms.markdown import markdown_of
 
     return markdown_of(document)
 

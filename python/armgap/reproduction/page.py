@@ -11,7 +11,7 @@ from armgap.estimation.identification import Identification
 from armgap.literals import SCHEMES, Scheme
 from armgap.report import charts
 from armgap.report.document import Document
-from armgap.report.html import page_of
+from armgap.report.forms.html import page_of
 from armgap.report.page import Drawing, Section
 from armgap.report.words import SummaryAnswer, unit_text
 from armgap.reproduction.experiment import LADDER, PAPER_ESTIMATES, PAPER_MEASURED, Reproduction

@@ -7,10 +7,10 @@ armgap's own dynamics takes part, so that a diagnosis cannot be right merely bec
 from typing import TYPE_CHECKING
 
 from armgap._renamed import old_names
-from armgap.trial.case import Case, NoMotionError, make_case, possible
-from armgap.trial.demo import DEMO_SEED, make_demo_case
-from armgap.trial.engine import TrialEngineMissingError
-from armgap.trial.key import HiddenEffect, Key, SealError, open_key
+from armgap.trial.cases.case import Case, NoMotionError, make_case, possible
+from armgap.trial.cases.demo import DEMO_SEED, make_demo_case
+from armgap.trial.cases.key import HiddenEffect, Key, SealError, open_key
+from armgap.trial.simulation.engine import TrialEngineMissingError
 from armgap.trial.trial import DEVELOPMENT_SEED, fresh_seed, make_trial, plan_trial
 
 __all__ = [

@@ -9,7 +9,7 @@ import click
 from armgap.cli.files import Command, OutputFolder
 from armgap.cli.numbers import Seed
 from armgap.errors import OptionError
-from armgap.trial.demo import DEMO_SEED, make_demo_case
+from armgap.trial.cases.demo import DEMO_SEED, make_demo_case
 
 
 @click.command(cls=Command)

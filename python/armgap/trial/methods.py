@@ -15,7 +15,7 @@ from armgap.trial.answers import AbsentEffect, Answer, NamedCause, Size
 
 if TYPE_CHECKING:
     from armgap.diagnosis.result import Cause, Diagnosis
-    from armgap.trial.sealed import SealedCase
+    from armgap.trial.cases.sealed import SealedCase
 
 __all__ = ["ARMGAP", "Method", "methods"]
 

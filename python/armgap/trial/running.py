@@ -12,13 +12,13 @@ from concurrent.futures import TimeoutError as TookTooLong
 from pathlib import Path
 
 from armgap.errors import ArmgapError, ResultError
-from armgap.output import write
+from armgap.files.output import write
 from armgap.trial.answers import Answer
-from armgap.trial.engine import worker_pool
-from armgap.trial.key import sealed_hash
-from armgap.trial.layout import ANSWERS
+from armgap.trial.cases.key import sealed_hash
+from armgap.trial.cases.layout import ANSWERS
+from armgap.trial.cases.sealed import SealedCase, case_folders
 from armgap.trial.methods import Method, methods
-from armgap.trial.sealed import SealedCase, case_folders
+from armgap.trial.simulation.engine import worker_pool
 from armgap.workers import one_thread
 
 __all__ = ["ANSWERS", "answer_cases", "answer_file", "open_cases"]

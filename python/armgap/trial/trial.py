@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from armgap.output import write_folder
-from armgap.trial.arms import MODELS
-from armgap.trial.case import Case, EffectRequest, NoMotionError, make_case, possible
-from armgap.trial.layout import case_name
+from armgap.files.output import write_folder
+from armgap.trial.cases.case import Case, EffectRequest, NoMotionError, make_case, possible
+from armgap.trial.cases.layout import case_name
+from armgap.trial.simulation.arms import MODELS
 
 #: Families of cases and their usual shares.
 FAMILIES = {"single": 0.65, "null": 0.08, "parameters": 0.07, "pair": 0.12, "outside": 0.08}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from armgap.trial.key import HiddenEffect, Key
+from armgap.trial.cases.key import HiddenEffect, Key
 
 if TYPE_CHECKING:
     from armgap.diagnosis.result import Diagnosis

@@ -14,7 +14,7 @@ from armgap.arm.controller import Controller
 from armgap.arm.description.resolved import ResolvedModel
 from armgap.arm.description.tree import MOVING, Joint, Tree
 from armgap.arm.rigid_body import about_axis, inconsistency, moved
-from armgap.arm.serial_chain import JointKind, SerialChain
+from armgap.arm.serial.chain import JointKind, SerialChain
 
 __all__ = ["Carried", "Located", "locate", "resolve"]
 

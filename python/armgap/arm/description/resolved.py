@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.arm.controller import Controller
-from armgap.arm.serial_chain import SerialChain
+from armgap.arm.serial.chain import SerialChain
 
 __all__ = ["ResolvedModel"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from armgap.errors import ModelFileError
-from armgap.reading import read_bounded
+from armgap.files.reading import read_bounded
 
 __all__ = ["Element", "parse", "read_text"]
 

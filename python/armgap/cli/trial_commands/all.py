@@ -11,7 +11,7 @@ from armgap.cli.files import Command
 from armgap.cli.trial_commands.common import cases_option, duration_option, output_option, seed_option, workers_option
 from armgap.cli.trial_commands.run import limit_option
 from armgap.cli.trial_commands.score import md_option
-from armgap.output import is_stdout
+from armgap.files.output import is_stdout
 
 __all__ = ["all_of_it"]
 

@@ -10,7 +10,7 @@ import click
 
 from armgap.cli.files import InputFolder, OutputFolder
 from armgap.cli.numbers import Number, Seed
-from armgap.trial.layout import MOST_CASES, belongs
+from armgap.trial.cases.layout import MOST_CASES, belongs
 
 __all__ = [
     "cases_option",

@@ -34,7 +34,7 @@ def make(cases: int, seed: int | None, folder: Path, duration: float, workers: i
 
 def make_them(folder: Path, cases: int, seed: int | None, duration: float, workers: int, quiet: bool) -> list[Path]:
     """Make the cases that are missing, and say how they are sealed."""
-    from armgap.trial.making import make_cases, read_manifest, seal_of_all
+    from armgap.trial.cases.making import make_cases, read_manifest, seal_of_all
     from armgap.trial.trial import fresh_seed
 
     if seed is None:

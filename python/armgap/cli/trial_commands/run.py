@@ -71,9 +71,9 @@ former_name = Command(
 
 def answer_all(folder: Path, names: Sequence[str], workers: int, limit_s: float, again: bool, quiet: bool) -> None:
     """Let methods answer the cases that they have not answered."""
+    from armgap.trial.cases.sealed import case_folders
     from armgap.trial.methods import methods
     from armgap.trial.running import answer_cases, open_cases
-    from armgap.trial.sealed import case_folders
 
     total = len(case_folders(folder))
     for method in (methods()[name] for name in names):

@@ -11,7 +11,7 @@ import click
 from armgap.cli.common import console, json_option, quiet_option
 from armgap.cli.files import Command, OutputFile
 from armgap.cli.trial_commands.common import folder_argument
-from armgap.output import is_stdout, write
+from armgap.files.output import is_stdout, write
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -41,10 +41,10 @@ def score(folder: Path, json_file: str | None, md_file: str | None, quiet: bool)
 
 def score_all(folder: Path, json_file: str | None, md_file: str | None, quiet: bool) -> None:
     """Score all methods that answered, and write what is asked for."""
-    from armgap.trial.making import read_manifest, seal_of_all
+    from armgap.trial.cases.making import read_manifest, seal_of_all
+    from armgap.trial.cases.sealed import case_folders
     from armgap.trial.scoring.figures import figures, opened_keys
     from armgap.trial.scoring.page import page
-    from armgap.trial.sealed import case_folders
 
     cases = case_folders(folder)
     names, partly = _answered(cases)

@@ -6,10 +6,10 @@ import sys
 from pathlib import Path
 
 from armgap.errors import LogReadError
+from armgap.files.reading import printable
 from armgap.log.formats import hdf5, matlab, mcap, npz, parquet, rosbag, text
 from armgap.log.formats.format import Format
 from armgap.log.recording import Recording, Source
-from armgap.reading import printable
 
 __all__ = ["FORMATS", "record"]
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.log import guard
+from armgap.log.conversion.spellings import unit_of
 from armgap.log.findings import Finding
 from armgap.log.formats import arrays
 from armgap.log.formats.format import Format, load, reading
 from armgap.log.recording import Recording, Source
-from armgap.log.spellings import unit_of
 
 __all__ = ["FORMAT", "SIGNATURE", "read"]
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import polars as pl
 
 from armgap.errors import ArmgapError, LogReadError
+from armgap.files.reading import is_text
 from armgap.log.formats import parquet_structure
 from armgap.log.formats.format import Format, first_line
 from armgap.log.recording import Recording, Source, Stream
-from armgap.reading import is_text
 
 __all__ = ["FORMAT"]
 

@@ -18,10 +18,10 @@ from pathlib import Path
 import polars as pl
 
 from armgap.errors import ColumnError, LogReadError
+from armgap.log.conversion.spellings import unit_of
 from armgap.log.findings import Finding
 from armgap.log.formats.format import Format, first_line
 from armgap.log.recording import Recording, Source, Stream
-from armgap.log.spellings import unit_of
 from armgap.progress import report_progress
 
 __all__ = ["FORMAT"]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from armgap.trial.answers import Answer, NamedCause
+from armgap.trial.cases.sealed import SealedCase
 from armgap.trial.methods import Method
-from armgap.trial.sealed import SealedCase
 
 __all__ = ["CONSTANT"]
 

@@ -12,8 +12,8 @@ from armgap.arm.arm import Arm
 from armgap.trial.answers import Answer, NamedCause
 from armgap.trial.baselines.regression import Array, RegressionData, regression_data
 from armgap.trial.baselines.signatures import Signature, signatures
+from armgap.trial.cases.sealed import SealedCase
 from armgap.trial.methods import Method
-from armgap.trial.sealed import SealedCase
 
 __all__ = ["CORRELATION", "refit_residual"]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from armgap.arm.arm import Arm
 from armgap.trial.baselines.regression import Array
-from armgap.trial.engine import mujoco
+from armgap.trial.simulation.engine import mujoco
 
 __all__ = ["build_spec", "set_coulomb", "set_inertial"]
 

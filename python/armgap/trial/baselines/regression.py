@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
 from armgap.log.log import Log
-from armgap.trial.sealed import SealedCase
+from armgap.trial.cases.sealed import SealedCase
 
 __all__ = ["Motion", "RegressionData", "motion", "regression_data", "regressor"]
 

@@ -21,8 +21,8 @@ import numpy as np
 from armgap.trial.answers import Answer, NamedCause
 from armgap.trial.baselines.regression import Array, regression_data
 from armgap.trial.baselines.signatures import Signature, signatures
+from armgap.trial.cases.sealed import SealedCase
 from armgap.trial.methods import Method
-from armgap.trial.sealed import SealedCase
 
 __all__ = ["STEPWISE"]
 

@@ -27,10 +27,10 @@ from armgap.arm.arm import Arm
 from armgap.trial.answers import Answer, NamedCause, Size
 from armgap.trial.baselines.mujoco_model import build_spec, set_coulomb, set_inertial
 from armgap.trial.baselines.regression import Array
-from armgap.trial.engine import TrialEngineMissingError
+from armgap.trial.cases.sealed import SealedCase
+from armgap.trial.cases.windows import Window, cut
 from armgap.trial.methods import HORIZON, Method
-from armgap.trial.sealed import SealedCase
-from armgap.trial.windows import Window, cut
+from armgap.trial.simulation.engine import TrialEngineMissingError
 
 __all__ = ["SYSID"]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armgap.trial.arms import TrialArm
-from armgap.trial.simulated_arm import Array, SimulatedArm, Trace
+from armgap.trial.simulation.arms import TrialArm
+from armgap.trial.simulation.simulated_arm import Array, SimulatedArm, Trace
 
 Parameters = dict[str, float]
 #: Logs have a travel in common if it is at least this share of the smallest range of any of them.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from armgap.trial.actuator import DeadZone, Delay, Gain, Lag, MagneticHysteresis, Saturation, SlewLimit
 from armgap.trial.effects.base import Draw, Parameters, effect
 from armgap.trial.effects.friction import torque_law
-from armgap.trial.plant import TIME_STEP, Rotor
-from armgap.trial.simulated_arm import SimulatedArm
+from armgap.trial.simulation.actuator import DeadZone, Delay, Gain, Lag, MagneticHysteresis, Saturation, SlewLimit
+from armgap.trial.simulation.plant import TIME_STEP, Rotor
+from armgap.trial.simulation.simulated_arm import SimulatedArm
 
 SPAN = 2.0 * math.pi
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from armgap.trial.effects.base import ANY, TWO_LINK, Draw, Parameters, effect
-from armgap.trial.plant import FrictionLaw, JointState, TorqueLaw
-from armgap.trial.simulated_arm import SimulatedArm
+from armgap.trial.simulation.plant import FrictionLaw, JointState, TorqueLaw
+from armgap.trial.simulation.simulated_arm import SimulatedArm
 
 
 def torque_law(sim: SimulatedArm, joint: int, law: TorqueLaw) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from armgap.trial.effects.base import ROTARY, Draw, Parameters, effect
-from armgap.trial.simulated_arm import SimulatedArm
+from armgap.trial.simulation.simulated_arm import SimulatedArm
 
 
 @effect("encoder_offset", lambda d: {"offset": d.sign() * d.between(0.01, 0.15)}, kinds=ROTARY)

@@ -6,8 +6,8 @@ import math
 
 from armgap.trial.effects.base import ROTARY, TWO_LINK, Draw, Parameters, effect
 from armgap.trial.effects.friction import torque_law
-from armgap.trial.plant import TIME_STEP, Flexure, JointState
-from armgap.trial.simulated_arm import SimulatedArm
+from armgap.trial.simulation.plant import TIME_STEP, Flexure, JointState
+from armgap.trial.simulation.simulated_arm import SimulatedArm
 
 
 def _draw_payload(d: Draw) -> Parameters:

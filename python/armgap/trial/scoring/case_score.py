@@ -9,7 +9,7 @@ from typing import Any
 
 from armgap.simulation import effects
 from armgap.trial.answers import Answer, Name, NamedCause
-from armgap.trial.key import Key
+from armgap.trial.cases.key import Key
 from armgap.trial.verdict import describe, equivalent
 
 __all__ = ["GROUPS", "CaseScore", "hidden_names", "score_case"]
@@ -37,7 +37,7 @@ class CaseScore:
         Distinct hidden effects.
     visible : float
         How far the least visible hidden effect stands above what the measurement leaves; see
-        `armgap.trial.visibility`.
+        `armgap.trial.cases.visibility`.
     named : tuple of NamedCause
         What was named, first cause first.
     matches : tuple of bool

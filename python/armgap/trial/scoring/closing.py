@@ -18,10 +18,10 @@ import numpy as np
 from armgap.arm.arm import Arm
 from armgap.simulation import effects
 from armgap.trial.answers import Answer
-from armgap.trial.key import Key
+from armgap.trial.cases.key import Key
+from armgap.trial.cases.sealed import SealedCase
+from armgap.trial.cases.windows import Array, Mechanism, NativeEffect, Window, cut, misses
 from armgap.trial.methods import HORIZON
-from armgap.trial.sealed import SealedCase
-from armgap.trial.windows import Array, Mechanism, NativeEffect, Window, cut, misses
 
 __all__ = ["HISTORY", "Closing", "closing", "model_error"]
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from armgap.errors import OptionError
 from armgap.trial.answers import Answer, read_answer
-from armgap.trial.key import Key, open_key, sealed_hash
+from armgap.trial.cases.key import Key, open_key, sealed_hash
 from armgap.trial.running import answer_file
 from armgap.trial.scoring.calibration import Calibration, calibrate, wilson
 from armgap.trial.scoring.case_score import GROUPS, CaseScore, score_case

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from armgap.trial.cases.making import Manifest
+from armgap.trial.cases.visibility import MULTIPLE, VISIBLE_SIGMAS
 from armgap.trial.effects.base import REGISTRY
-from armgap.trial.making import Manifest
 from armgap.trial.methods import methods
 from armgap.trial.scoring.case_score import GROUPS
 from armgap.trial.scoring.figures import CONFIDENT, Figures, Share, share
 from armgap.trial.trial import DEVELOPMENT_SEEDS
-from armgap.trial.visibility import MULTIPLE, VISIBLE_SIGMAS
 
 __all__ = ["page"]
 

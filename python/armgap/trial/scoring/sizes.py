@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from armgap.trial.answers import AbsentEffect, Answer, NamedCause
-from armgap.trial.key import HiddenEffect, Key
+from armgap.trial.cases.key import HiddenEffect, Key
 from armgap.trial.verdict import equivalent
 
 __all__ = ["BoundScore", "SizeScore", "bound_scores", "size_scores"]

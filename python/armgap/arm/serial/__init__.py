@@ -1,0 +1,1 @@
+"""Serial arms: their chain, their arm files, and how far nominal values are trusted."""

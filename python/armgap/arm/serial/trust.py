@@ -1,0 +1,112 @@
+"""How far the nominal values of a serial arm are trusted, where the arm file does not say it value by value.
+
+Links
+    One word for all of them, `Trust`. Its share t of the mass m is the mass's standard deviation. First moments have ``t m L`` and inertias
+    ``t m L^2``, with L the largest of the distance to the next joint, the distance to the centre of mass, and the radius of gyration, at least
+    5 % of the arm's reach (0.1 m for an arm without reach): a centre of mass on an axis, or an inertia of zero, is then no better known
+    than the rest of the link. ``"none"`` stands for values that are unknown: the standard deviation of the mass is what 100 kg per metre of L
+    make, an order of magnitude above usual links (UR10: 15 to 25 kg/m, Panda: 10), and at least the mass itself.
+Friction
+    Half of each value. Where there is none, a fifth of the largest torque that the joint is known to deal with: its limit of torque, or the
+    largest weight that it can carry of the arm itself, but at least 2 % of that of any joint; viscous coefficients reach it at 1 rad/s
+    (0.2 m/s).
+Rotors
+    The value itself. Where there is none, the inertia that the joint moves with the arm stretched out, but at least 2 % of that of any joint: the
+    last joints of geared arms carry little and have rotors of the same size.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm.rigid_body import about_com
+from armgap.arm.serial.chain import SerialChain
+
+__all__ = ["FRICTION_SHARE", "TRUSTS", "Scales", "Trust", "link_sigma"]
+
+Array = NDArray[np.float64]
+Trust = Literal["published", "cad", "guess", "none"]
+
+TRUSTS: dict[Trust, float] = {"published": 0.1, "cad": 0.3, "guess": 1.0, "none": 1.0}
+"""Standard deviation of the mass as a share of it."""
+#: Standard deviation of friction that a file states, as a part of it.
+FRICTION_SHARE = 0.5
+#: Mass per length of a link of unknown mass [kg/m]: more than any robot's.
+_UNKNOWN_KG_PER_M = 100.0
+_USUAL_KG_PER_M = 10.0
+"""Mass of a link that the description gives none, where a scale of torque or inertia is wanted."""
+#: Reach of a joint at least, as a part of the arm's, and where the arm has none [m].
+_LEAST_REACH_SHARE = 0.05
+_NO_REACH_M = 0.1
+#: Coulomb friction that is unknown, as a part of the torque that the joint needs.
+_FRICTION_OF_TORQUE = 0.2
+#: Torque and inertia that a joint is scaled by at least, as a part of the largest of its kind.
+_LEAST_OF_LARGEST = 0.02
+_GRAVITY = 9.81  # m/s^2; of the scale of torque, whatever the arm's own
+_TURNING_SPEED, _SLIDING_SPEED = 1.0, 0.2  # rad/s, m/s
+
+
+class Scales:
+    """Sizes that an arm's links and joints could have.
+
+    Attributes
+    ----------
+    length : ndarray, shape (n,)
+        Characteristic lengths of the links [m].
+    torque : ndarray, shape (n,)
+        Torques that the joints deal with [N m or N].
+    inertia : ndarray, shape (n,)
+        Inertias that the joints move [kg m^2 or kg].
+    viscous, coulomb : ndarray, shape (n,)
+        Standard deviations of friction coefficients that nothing is known of.
+    """
+
+    def __init__(self, chain: SerialChain, inertial: Array) -> None:
+        n, mass = chain.n_joints, inertial[:, 0]
+        known = mass > 0
+        step = np.append(np.linalg.norm(chain.translation[1:], axis=1), 0.0)
+        com, gyration = np.zeros(n), np.zeros(n)
+        for k in np.flatnonzero(known):
+            _, centre, about = about_com(inertial[k])
+            com[k] = np.linalg.norm(centre)
+            gyration[k] = np.sqrt(max(float(np.trace(about)), 0.0) / (2 * mass[k]))
+        reach = float(step.sum() + com[-1])
+        least = _LEAST_REACH_SHARE * reach if reach > 0 else _NO_REACH_M
+        self.length: Array = np.maximum.reduce([step, com, gyration, np.full(n, least)])
+        moving = np.where(known, mass, _USUAL_KG_PER_M * self.length)
+        centre_at = np.where(known, com, 0.5 * self.length)
+        rotary = np.array(chain.rotary)
+        torque, inertia = np.empty(n), np.empty(n)
+        for j in range(n):
+            arm = np.concatenate([[0.0], np.cumsum(step[j:-1])]) + centre_at[j:]
+            m = moving[j:]
+            weight, carried = (m * arm, m * (arm**2 + gyration[j:] ** 2)) if rotary[j] else (m, m)
+            torque[j], inertia[j] = _GRAVITY * weight.sum(), carried.sum()
+        for kind in (rotary, ~rotary):
+            if kind.any():
+                torque[kind] = np.maximum(torque[kind], _LEAST_OF_LARGEST * torque[kind].max())
+                inertia[kind] = np.maximum(inertia[kind], _LEAST_OF_LARGEST * inertia[kind].max())
+        self.torque: Array = np.where(np.isfinite(chain.effort), chain.effort, torque)
+        self.inertia: Array = inertia
+        self.coulomb: Array = _FRICTION_OF_TORQUE * self.torque
+        self.viscous: Array = self.coulomb / np.where(rotary, _TURNING_SPEED, _SLIDING_SPEED)
+
+
+def link_sigma(mass: Array, length: Array, trust: Trust) -> Array:
+    """Return the standard deviations of the links' ten numbers, shape (n, 10).
+
+    Parameters
+    ----------
+    mass, length : ndarray, shape (n,)
+        Masses [kg] and characteristic lengths [m] of the links.
+    trust : {"published", "cad", "guess", "none"}
+        Of the inertial values.
+    """
+    sigma = TRUSTS[trust] * np.abs(mass)
+    unknown = _UNKNOWN_KG_PER_M * length
+    sigma = np.maximum(sigma, unknown) if trust == "none" else np.where(sigma > 0, sigma, unknown)
+    powers = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
+    return np.asarray(np.maximum(sigma[:, None] * length[:, None] ** powers, np.finfo(np.float64).tiny))

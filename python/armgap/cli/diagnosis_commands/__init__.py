@@ -1,0 +1,1 @@
+"""Sub-commands about logs: their diagnosis, and what goes before and follows."""

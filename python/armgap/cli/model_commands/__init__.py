@@ -1,0 +1,1 @@
+"""Sub-commands about models: read, simulated, exported, replayed."""

@@ -1,0 +1,1 @@
+"""The corrected model as a chain of bodies and joints."""

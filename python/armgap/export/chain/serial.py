@@ -1,0 +1,238 @@
+"""Corrected models of serial arms: links that bodies can be, rotors and friction, gravity in the frame of the base."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.arm.arm import Arm
+from armgap.arm.rigid_body import INERTIAL_NAMES, about_axis, about_com, about_origin
+from armgap.arm.serial.chain import SerialChain
+from armgap.diagnosis.result import Cause, Diagnosis, Value
+from armgap.export.chain.bodies import Bodies, nearest_bodies
+from armgap.export.chain.joint import Joint, with_causes
+from armgap.export.chain.model import SimulatorModel
+from armgap.export.chain.motion import any_states, diagnosed_states, positions
+from armgap.export.corrected import LEAST_SIGMA, Corrected, value
+from armgap.export.errors import ExportError
+
+__all__ = ["CorrectedSerial", "correct_serial"]
+
+Array = NDArray[np.float64]
+
+_COM = ("com_x", "com_y", "com_z")
+
+
+@dataclass(frozen=True)
+class CorrectedSerial(Corrected):
+    """A serial arm as a diagnosis found it.
+
+    Attributes
+    ----------
+    chain : SerialChain
+        The chain, with gravity turned by the tilt of the base that was found.
+    tilt : ndarray, shape (3, 3)
+        Rotation of the base by it.
+    exceeded : tuple of str
+        Joints that moved beyond their limits of position.
+    expected : ndarray, shape (11 n_joints,)
+        Nominal ten numbers of each link and rotors, with the payload or the change of a link that was found.
+    regressor : ndarray, shape (n_states, n_joints, 11 n_joints)
+        Torques per unit of each inertial parameter, along the motion that was diagnosed and in random states.
+    bodies : Bodies
+        Links that bodies can be, with the torques of those found, see `nearest_bodies`.
+    """
+
+    chain: SerialChain
+    tilt: Array
+    exceeded: tuple[str, ...]
+    expected: Array
+    regressor: Array
+    bodies: Bodies
+
+    def beside(self, hanging: Array) -> CorrectedSerial:
+        """Return the model with links that are bodies without what hangs on them, shape (n_joints, 10)."""
+        found, n = self.theta[: 11 * self.arm.n_joints], self.arm.n_joints
+        bodies = nearest_bodies(found, self.expected, self.arm.sigma[: 11 * n], self.regressor, hanging)
+        pairs = zip(self.joints, bodies.rotor - self.bodies.rotor, strict=True)
+        joints = tuple(replace(joint, armature=joint.armature + float(more)) for joint, more in pairs)
+        return replace(self, bodies=bodies, joints=joints)
+
+    def simulated(self, form: str) -> SimulatorModel:
+        """Return the arm as MJCF and URDF have it, without limits of position that the logs exceed."""
+        beyond = np.isin(self.chain.joint_names, self.exceeded)
+        low, high = np.where(beyond, -np.inf, self.chain.lower), np.where(beyond, np.inf, self.chain.upper)
+        chain = replace(self.chain, lower=low, upper=high)
+        return SimulatorModel(self.arm.name, chain, self.bodies.inertial, self.joints, self.arm.sample_period)
+
+    def nominal(self) -> Arm:
+        """Return the arm with the values as they were found, whether or not each link by itself is a body."""
+        n, theta = self.arm.n_joints, self.theta.copy()
+        theta[10 * n : 11 * n] += np.array([joint.armature for joint in self.joints]) - self.bodies.rotor
+        # Columns of one kind: the ten numbers of the links, rotors, viscous and Coulomb friction.
+        kinds = np.column_stack([np.abs(theta[: 10 * n]).reshape(n, 10), np.abs(theta[10 * n :]).reshape(3, n).T])
+        scale = np.where(kinds > 0, kinds, np.maximum(kinds.max(axis=0), np.finfo(np.float64).tiny))
+        least = LEAST_SIGMA * np.concatenate([scale[:, :10].ravel(), scale[:, 10:].T.ravel()])
+        sigma = np.maximum(self.sigma, least)
+        return replace(
+            self.arm,
+            name=f"{self.arm.name}, corrected",
+            theta=theta,
+            sigma=sigma,
+            chain=self.chain,
+            sealed=None,
+            notes=(),
+        )
+
+    def remarks(self, form: str, *, original: bool = False) -> tuple[str, ...]:
+        """Return everything to know about the file of a format: what is missing in it, what was chosen, one line each.
+
+        Parameters
+        ----------
+        form : str
+            Key of `FORMATS`.
+        original : bool, default False
+            Whether the values go into the user's own description.
+        """
+        lines = [*self.missing(form), *self.notes]
+        if form == "toml":
+            return tuple(lines)
+        if self.exceeded:
+            what = "they are left as they were" if original else "they are left out"
+            lines.append(f"the arm moves beyond the limits of position of {', '.join(self.exceeded)}: {what}")
+        return (*lines, *_said(self.bodies, self.chain))
+
+    def data(self) -> dict[str, Any]:
+        """Return what the JSON object has of this kind of arm: links that bodies can be, and gravity."""
+        links = []
+        for name, ten in zip(self.chain.link_names, self.bodies.inertial, strict=True):
+            mass, com, inertia = about_com(ten)
+            links.append({"name": name, "mass": mass, "com": com.tolist(), "inertia": inertia.tolist()})
+        changed = [self.chain.link_names[k] for k in self.bodies.changed]
+        return {
+            "links": links,
+            "gravity": self.chain.gravity.tolist(),
+            "projected": {"links": changed, "torque_error": self.bodies.torque_error.tolist()},
+        }
+
+
+def _said(bodies: Bodies, chain: SerialChain) -> tuple[str, ...]:
+    """Return what is to be said about links that were no bodies."""
+    if not bodies.changed:
+        return ()
+    names = ", ".join(f"`{chain.link_names[k]}`" for k in bodies.changed)
+    if bodies.same_torques:
+        worst = 100 * float(np.max(bodies.torque_error))
+        return (
+            f"no body has the values found for {names}: the links are the nearest bodies to the arm file's with the same torques (to {worst:.2g} %)",
+        )
+    errors = ", ".join(f"{100 * error:.2g}" for error in bodies.torque_error)
+    return (
+        f"no body has the values found for {names}, and no bodies have their torques: the links are those that come nearest, "
+        f"their torques differ by (RMS, % of each joint's) {errors}",
+    )
+
+
+def correct_serial(
+    arm: Arm,
+    stage: str,
+    values: Sequence[Value],
+    causes: tuple[Cause, ...],
+    notes: tuple[str, ...],
+    diagnosis: Diagnosis,
+) -> CorrectedSerial:
+    """Turn the values of a serial arm and the causes beside them into a corrected model; see `armgap.correct`."""
+    assert arm.chain is not None
+    n, chain = arm.n_joints, arm.chain
+    theta, sigma = (np.array([getattr(v, name) for v in values]) for name in ("value", "sigma"))
+    expected, tilt = arm.theta[: 11 * n].copy(), np.eye(3)
+    for cause in causes:
+        if cause.effect in _ON_LINK:
+            link, change, variance = _ON_LINK[cause.effect](cause, n)
+            rows = slice(10 * link, 10 * link + 10)
+            theta[rows] += change
+            expected[rows] += change
+            sigma[rows] = np.sqrt(sigma[rows] ** 2 + variance)
+        elif cause.effect == "rotor_inertia" and cause.joint is not None:
+            row = 10 * n + cause.joint - 1
+            sigma[row] = math.hypot(sigma[row], cause.parameters["inertia"].sigma)
+        elif cause.effect == "base_tilt":
+            tilt = tilt @ _turned(cause)
+    viscous, coulomb = theta[11 * n :].reshape(2, n)
+    limits = arm.torque_limit if arm.torque_limit is not None else chain.effort
+    random = any_states(arm)
+    states = diagnosed_states(diagnosis, n)
+    every = random if states is None else tuple(np.concatenate(pair) for pair in zip(states, random, strict=True))
+    rotors = every[2][:, :, None] * np.eye(n)
+    regressor = np.concatenate(
+        [replace(chain, gravity=tilt.T @ chain.gravity).native().regressor(*every), rotors], axis=2
+    )
+    bodies = nearest_bodies(theta[: 11 * n], expected, arm.sigma[: 11 * n], regressor, np.zeros((n, 10)))
+    joints = [
+        Joint(
+            float(viscous[j]),
+            float(coulomb[j]),
+            armature=float(bodies.rotor[j]),
+            limit=float(limits[j]) if math.isfinite(limits[j]) else None,
+        )
+        for j in range(n)
+    ]
+    return CorrectedSerial(
+        arm,
+        stage,
+        theta,
+        sigma,
+        with_causes(joints, causes),
+        causes,
+        notes,
+        diagnosis.verdict,
+        replace(chain, gravity=tilt.T @ chain.gravity),
+        tilt,
+        _exceeded(chain, diagnosis),
+        expected,
+        regressor,
+        bodies,
+    )
+
+
+def _payload(cause: Cause, n: int) -> tuple[int, Array, Array]:
+    """Return link, change of its ten numbers by a point mass, and the variance of that change."""
+    mass, com = value(cause, "mass"), np.array([value(cause, name) for name in _COM])
+    sigma = [cause.parameters[name].sigma for name in ("mass", *_COM)]
+    moved = [about_origin(mass + sigma[0], com, np.zeros((3, 3)))]
+    moved += [
+        about_origin(mass, com + s * axis, np.zeros((3, 3))) for s, axis in zip(sigma[1:], np.eye(3), strict=True)
+    ]
+    change = about_origin(mass, com, np.zeros((3, 3)))
+    return n - 1, change, np.sum((np.array(moved) - change) ** 2, axis=0)
+
+
+def _nominal_link(cause: Cause, n: int) -> tuple[int, Array, Array]:
+    """Return link, change of its ten numbers, and the variance of that change."""
+    if cause.joint is None or not 1 <= cause.joint <= n:
+        raise ExportError(f"the cause nominal_link is of joint {cause.joint}", remedy=f"joints: 1 to {n}")
+    values = [cause.parameters[name] for name in INERTIAL_NAMES]
+    return cause.joint - 1, np.array([v.value for v in values]), np.array([v.sigma for v in values]) ** 2
+
+
+_ON_LINK = {"payload": _payload, "nominal_link": _nominal_link}
+
+
+def _turned(cause: Cause) -> Array:
+    """Return the rotation of a base that is turned about its horizontal axes by a rotation vector."""
+    x, y = value(cause, "x"), value(cause, "y")
+    angle = math.hypot(x, y)
+    return np.eye(3) if angle == 0 else about_axis(np.array([x, y, 0.0]) / angle, angle)
+
+
+def _exceeded(chain: SerialChain, diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Return the joints that the diagnosed motion moves beyond their limits of position."""
+    beyond = np.zeros(chain.n_joints, dtype=bool)
+    for _, q in positions(diagnosis, chain.n_joints):
+        beyond |= (q.min(axis=0) < chain.lower) | (q.max(axis=0) > chain.upper)
+    return tuple(name for name, is_beyond in zip(chain.joint_names, beyond, strict=True) if is_beyond)

@@ -1,0 +1,33 @@
+"""An arm file with the corrected values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from armgap.export.corrected import LEAST_SIGMA
+from armgap.export.formats import header
+
+if TYPE_CHECKING:
+    from armgap.diagnosis.result import Value
+    from armgap.export.corrected import Corrected
+
+__all__ = ["render"]
+
+
+def render(model: Corrected) -> str:
+    """Return an arm file; causes that it has no field for stand in its head as options of ``armgap simulate``."""
+    head = [f"# {line}" for line in header.lines(model, "toml")]
+    head.append(f"# sigma: the estimate's, but at least {LEAST_SIGMA:.0%} of the value")
+    options = [
+        _option(c.effect, c.joint, c.parameters)
+        for c in model.causes
+        if model.field_of(c, "toml") is None and not c.row
+    ]
+    head += [f"# armgap simulate {' '.join(options)}"] if options else []
+    return "\n".join(head) + "\n" + model.nominal().to_toml()
+
+
+def _option(effect: str, joint: int | None, parameters: Mapping[str, Value]) -> str:
+    pairs = ",".join(f"{name}={value.value!r}" for name, value in parameters.items())
+    return f"--effect {effect}:{'' if joint is None else joint}:{pairs}"

@@ -1,0 +1,76 @@
+"""Finding a column by name: as it stands, without its unit, or by the end of its path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from armgap.errors import ColumnError
+from armgap.log.conversion.spellings import stripped, suffixed
+from armgap.log.recording import Recording
+
+__all__ = ["QUANTITIES", "Index"]
+
+# What a ROS message calls the quantity of a standard column; `q1=elbow` finds `/joint_states/elbow/position`.
+QUANTITIES = {
+    "q": "position", "dq": "velocity", "tau": "effort", "q_ref": "reference", "dq_ref": "reference_velocity",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Index:
+    """The columns of a recording, by the names that find them."""
+
+    recording: Recording
+    place: Path | str
+
+    def find(self, name: str, key: str = "", *, within: str | None = None) -> str | None:
+        """Return the column that a name stands for; None if there is none.
+
+        Parameters
+        ----------
+        name : str
+            Name to look for.
+        key : str
+            Standard column it is looked for as, such as ``"q1"``.
+        within : str, optional
+            Column whose clock comes first when several columns fit.
+
+        Raises
+        ------
+        ColumnError
+            If several columns fit equally well.
+        """
+        columns = self.recording.columns
+        if name in columns:
+            return name
+        for fits in (
+            [c for c in columns if stripped(c)[0] == name],
+            [c for c in columns if suffixed(c) != (c, None) and suffixed(c)[0] == name],
+            [c for c in columns if stripped(c)[0].endswith("/" + name)],
+            [c for c in columns if self._quantity(name, key) and c.endswith(self._quantity(name, key))],
+        ):
+            if within is not None and len(fits) > 1:
+                clock = self.recording.stream_of(within).columns
+                fits = [c for c in fits if c in clock] or fits
+            if len(fits) > 1:
+                listed = ", ".join(f"`{c}`" for c in fits[:8])
+                raise ColumnError(
+                    f"fits several columns: {listed}",
+                    remedy=f"say which one with --columns {key or name}=NAME",
+                    file=self.place,
+                    column=name,
+                )
+            if fits:
+                return fits[0]
+        return None
+
+    def unit(self, column: str) -> str | None:
+        """Return the unit that the file states for a column."""
+        stated = self.recording.stream_of(column).units.get(column)
+        return stated or stripped(column)[1] or suffixed(column)[1]
+
+    @staticmethod
+    def _quantity(name: str, key: str) -> str:
+        quantity = QUANTITIES.get(key.rstrip("0123456789"), "")
+        return f"/{name}/{quantity}" if quantity else ""

@@ -1,0 +1,404 @@
+"""Units: conversion of what the user declares, and a look at magnitudes for what nobody declared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap.errors import OptionError, UnitError
+from armgap.log.conversion.columns import Arrays, Names
+from armgap.log.conversion.turns import TURN, unwrapped
+from armgap.log.findings import Finding
+
+if TYPE_CHECKING:
+    from armgap.arm.arm import Arm
+
+__all__ = ["FACTORS", "Scales", "check", "in_file", "recognised", "scaled", "si", "stated"]
+
+_DEGREE = math.pi / 180
+
+FACTORS: dict[str, dict[str, float]] = {
+    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "q": {"rad": 1.0, "deg": _DEGREE, "turns": 2 * math.pi, "m": 1.0, "mm": 1e-3},
+    "dq": {"rad/s": 1.0, "deg/s": _DEGREE, "m/s": 1.0, "mm/s": 1e-3},
+    "tau": {"Nm": 1.0, "mNm": 1e-3, "N": 1.0, "kN": 1e3},
+}
+"""Units that can be declared for a group of columns, as factors to SI."""
+
+WORDS = {"t": "times", "q": "positions", "dq": "velocities", "tau": "torques"}
+
+# Six turns back and forth, and a joint speed beyond that of any arm: degrees taken for radians look like this.
+_FARTHEST_RAD = 12 * math.pi
+_FASTEST_RAD_S = 60.0
+_FARTHEST_M = 40.0
+# Speeds are taken over at least this time, so that the steps of a coarse encoder do not count as motion.
+_SPEED_SPAN_S = 0.02
+# Positions and velocities in different units disagree by 57.3 (degrees) or 1000 (mm), give or take noise.
+_DEGREE_RATIO = (40.0, 80.0)
+# So many samples tell the sample period, and whether positions move in whole encoder counts.
+_ENOUGH = 100_000
+_SURE_RATIO = (52.0, 63.0)
+_MILLI_RATIO = (700.0, 1400.0)
+# An arm's commanded torque does not exceed its limit by this factor, except in another unit.
+_TORQUE_FACTOR = 20.0
+# A unit changes all rows; what this share of them does is a defect of its own, seen later.
+_WILD_SHARE = 0.002
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Factors to SI by column group, and why they are not 1.
+
+    Attributes
+    ----------
+    t, t_tau : float, optional
+        Of the times; None where nothing says it.
+    q, tau, dq, q_ref, dq_ref, tau_meas, q_link : ndarray, shape (n_joints,)
+        Of each column; references, measured torques and positions on the link's side are in the units of positions, velocities and torques
+        unless the file says otherwise.
+    settled : frozenset of str
+        Groups whose unit is stated by the user or by the file.
+    """
+
+    t: float | None
+    t_tau: float | None
+    q: NDArray[np.float64]
+    tau: NDArray[np.float64]
+    dq: NDArray[np.float64] | None
+    q_ref: NDArray[np.float64]
+    dq_ref: NDArray[np.float64] | None
+    tau_meas: NDArray[np.float64] | None
+    q_link: NDArray[np.float64] | None
+    settled: frozenset[str]
+    findings: tuple[Finding, ...]
+
+
+def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Path | str) -> Scales:
+    """Return the factors to SI that the user declares (`declared`, by group), or that the file states, by column.
+
+    Raises
+    ------
+    OptionError
+        If a declared group or its unit is unknown, or does not suit the arm.
+    UnitError
+        If the file states a unit that does not suit the column.
+    """
+    by_user = {group: _factor(group, unit, arm) for group, unit in declared.items()}
+    groups = {"t": (names.t,), "q": names.q, "tau": names.tau, "dq": names.dq or ()}
+    findings: list[Finding] = []
+    settled = set(by_user)
+
+    def of(group: str, columns: tuple[str, ...]) -> NDArray[np.float64]:
+        if group in by_user:  # of an arm with both, a unit of angles leaves the lengths as they are
+            return np.where([_suits(group, declared[group], arm, j) for j in range(len(columns))], by_user[group], 1.0)
+        factors = [_by_file(group, column, names.units.get(column), arm, place, j) for j, column in enumerate(columns)]
+        units = {unit for column in columns if (unit := names.units.get(column)) is not None}
+        if columns and columns is groups[group] and all(column in names.units for column in columns):
+            settled.add(group)
+        if any(factor != 1.0 for factor in factors):
+            findings.append(
+                Finding("units", f"{WORDS[group]} are in {', '.join(sorted(units))}, as the file says; converted")
+            )
+        return np.array(factors, dtype=np.float64)
+
+    q, tau, dq, t = (of(group, groups[group]) for group in ("q", "tau", "dq", "t"))
+    q_ref, dq_ref = of("q", names.q_ref), of("dq", names.dq_ref or ())
+    tau_meas, q_link = of("tau", names.tau_meas or ()), of("q", names.q_link or ())
+    t_tau = names.units.get(names.t_tau or "")
+    return Scales(
+        t=float(t[0]) if "t" in settled else None,
+        t_tau=by_user.get("t", FACTORS["t"].get(t_tau or "")),
+        q=q,
+        tau=tau,
+        dq=dq if names.dq is not None else None,
+        q_ref=q_ref,
+        dq_ref=dq_ref if names.dq_ref is not None else None,
+        tau_meas=tau_meas if names.tau_meas is not None else None,
+        q_link=q_link if names.q_link is not None else None,
+        settled=frozenset(settled),
+        findings=tuple(findings),
+    )
+
+
+def scaled(arrays: Arrays, scales: Scales) -> Arrays:
+    """Return all columns but times in SI units."""
+
+    def by(values: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
+        return values if np.all(factors == 1.0) else values * factors
+
+    def if_there(values: NDArray[np.float64] | None, factors: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+        return None if values is None or factors is None else by(values, factors)
+
+    return replace(
+        arrays,
+        q=by(arrays.q, scales.q),
+        tau=by(arrays.tau, scales.tau),
+        dq=if_there(arrays.dq, scales.dq),
+        q_ref=if_there(arrays.q_ref, scales.q_ref),
+        dq_ref=if_there(arrays.dq_ref, scales.dq_ref),
+        tau_meas=if_there(arrays.tau_meas, scales.tau_meas),
+        q_link=if_there(arrays.q_link, scales.q_link),
+    )
+
+
+def _by_file(group: str, column: str, unit: str | None, arm: Arm | None, place: Path | str, j: int) -> float:
+    if unit is None:
+        return 1.0
+    if unit not in FACTORS[group] or not _suits(group, unit, arm, j):
+        raise UnitError(
+            f"is in {unit}, which is no unit of {WORDS[group]}" + (f" of a {arm.kind}" if arm is not None else ""),
+            remedy=f"correct the file, or declare the unit with --units {group}=…",
+            file=place,
+            column=column,
+        )
+    return FACTORS[group][unit]
+
+
+def _factor(group: str, unit: str, arm: Arm | None) -> float:
+    if group not in FACTORS:
+        raise OptionError(f"`{group}` is not a group of columns", remedy=f"declare units of {', '.join(FACTORS)}")
+    if unit not in FACTORS[group]:
+        known = ", ".join(FACTORS[group])
+        raise OptionError(f"`{unit}` is not a unit of {group}", remedy=f"known: {known}")
+    if arm is not None and not any(_suits(group, unit, arm, j) for j in range(arm.n_joints)):
+        motion = "turns" if arm.rotary else "slides"
+        raise OptionError(f"{group} in {unit} does not suit an arm that {motion}", remedy="declare another unit")
+    return FACTORS[group][unit]
+
+
+def _suits(group: str, unit: str, arm: Arm | None, j: int) -> bool:
+    """Whether a unit can be that of a column of joint `j`, from 0."""
+    angular = unit.startswith(("rad", "deg", "turns")) or unit.endswith("Nm")
+    return arm is None or group == "t" or j >= arm.n_joints or angular == arm.rotary_joints[j]
+
+
+def recognised(arrays: Arrays, names: Names, arm: Arm | None, settled: frozenset[str]) -> tuple[Arrays, list[Finding]]:
+    """Convert degrees that give themselves away: by whole encoder counts, or by a velocity column in radians.
+
+    Nothing is converted where another joint speaks against it, or where the unit is stated; what merely looks large is left to `check`.
+    """
+    findings: list[Finding] = []
+    turned = np.array([1.0 if _slides(arm, j) else _DEGREE for j in range(arrays.q.shape[1])])
+    if "q" not in settled and not np.all(turned == 1.0) and (why := _degrees(arrays, names, arm)):
+        q_ref, q_link = (None if x is None else x * turned for x in (arrays.q_ref, arrays.q_link))
+        arrays = replace(arrays, q=arrays.q * turned, q_ref=q_ref, q_link=q_link)
+        findings.append(Finding("units", f"positions are in degrees: {why}; converted"))
+    if "dq" not in settled and arrays.dq is not None and names.dq is not None and not np.all(turned == 1.0):
+        ratios = [0.0 if _slides(arm, j) else _speed_ratio(arrays, arm, j) for j in range(arrays.q.shape[1])]
+        slow = [r for r in ratios if r > 0]
+        if slow and all(_SURE_RATIO[0] < 1 / r < _SURE_RATIO[1] for r in slow):
+            dq_ref = None if arrays.dq_ref is None else arrays.dq_ref * turned
+            arrays = replace(arrays, dq=arrays.dq * turned, dq_ref=dq_ref)
+            said = f"`{names.dq[ratios.index(slow[0])]}` is {1 / slow[0]:.3g} times faster than the positions move"
+            findings.append(Finding("units", f"velocities are in deg/s: {said}; converted"))
+    return arrays, findings
+
+
+def _degrees(arrays: Arrays, names: Names, arm: Arm | None) -> str:
+    """Return the reason why positions must be in degrees; empty if there is none, or one against it."""
+    reasons = []
+    for j, name in enumerate(names.q):
+        if _slides(arm, j):
+            continue
+        ratio = _speed_ratio(arrays, arm, j) if arrays.dq is not None else 0.0
+        if ratio > 0 and not _SURE_RATIO[0] < ratio < _SURE_RATIO[1]:
+            return ""
+        if _moves_in_counts(arrays, arm, j, 1.0):
+            return ""
+        if _moves_in_counts(arrays, arm, j, _DEGREE):
+            reasons.append(f"`{name}` moves in whole encoder counts only if read so")
+        elif ratio > 0 and names.dq is not None:
+            reasons.append(f"`{name}` moves {ratio:.3g} times faster than `{names.dq[j]}` says")
+    return reasons[0] if reasons else ""
+
+
+def si(rotary: bool | None) -> dict[str, str]:
+    """Return the SI unit of each group of columns; both kinds where it is not known whether the joints turn."""
+    turns = {"t": "s", "q": "rad", "dq": "rad/s", "tau": "N m"}
+    slides = {"t": "s", "q": "m", "dq": "m/s", "tau": "N"}
+    if rotary is None:
+        return {group: unit if unit == slides[group] else f"{unit} or {slides[group]}" for group, unit in turns.items()}
+    return turns if rotary else slides
+
+
+def in_file(
+    names: Names, scales: Scales, ticks: Mapping[str, float], arm: Arm | None, *, degrees: tuple[bool, bool]
+) -> dict[str, str]:
+    """Return the unit that each column had in the file, by standard name.
+
+    Parameters
+    ----------
+    names, scales
+        Columns, and their factors to SI as far as they were declared or stated.
+    ticks : mapping
+        Seconds per unit of the time columns.
+    arm : Arm, optional
+        Says whether joints turn.
+    degrees : tuple of bool
+        Whether positions and velocities were recognised as degrees.
+    """
+    found: dict[str, str] = {}
+    turned = np.array([1.0 if _slides(arm, j) else _DEGREE for j in range(len(scales.q))])
+    q, dq = (turned if recognised else 1.0 for recognised in degrees)
+    groups = {
+        "q": scales.q * q,
+        "tau": scales.tau,
+        "dq": np.empty(0) if scales.dq is None else scales.dq * dq,
+        "q_ref": scales.q_ref * (q if len(scales.q_ref) else 1.0),
+        "dq_ref": np.empty(0) if scales.dq_ref is None else scales.dq_ref * dq,
+        "tau_meas": np.empty(0) if scales.tau_meas is None else scales.tau_meas,
+        "q_link": np.empty(0) if scales.q_link is None else scales.q_link * q,
+    }
+    for key, column in names.pairs:
+        group = key.rstrip("0123456789")
+        j = 0 if key in ticks else int(key[len(group) :]) - 1
+        factor = ticks[key] if key in ticks else float(groups[group][j])
+        found[key] = _named(group.partition("_")[0], factor, names.units.get(column), arm, j)
+    return found
+
+
+def _named(group: str, factor: float, spelt: str | None, arm: Arm | None, j: int) -> str:
+    """Return the unit of a column with this factor: as the file spells it, or those that suit the joint."""
+    fits = [unit for unit, f in FACTORS[group].items() if math.isclose(f, factor) and _suits(group, unit, arm, j)]
+    return spelt if spelt in fits else " or ".join(fits)
+
+
+def check(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None, declared: frozenset[str]) -> None:
+    """Raise `UnitError` where an unstated group of columns has the magnitude of another unit."""
+    if "dq" not in declared:
+        _velocity(arrays, place, names, arm)
+    if "q" not in declared:
+        _position(arrays, place, names, arm)
+    if "tau" not in declared:
+        _torque(arrays, place, names, arm)
+    _reference(arrays, place, names, arm)
+
+
+def _velocity(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
+    if arrays.dq is None or names.dq is None:
+        return
+    for j, name in enumerate(names.dq):
+        low, high = _MILLI_RATIO if _slides(arm, j) else _DEGREE_RATIO
+        unit, group = ("mm", "mm/s") if _slides(arm, j) else ("deg", "deg/s")
+        ratio = _speed_ratio(arrays, arm, j)
+        if low <= ratio <= high:
+            raise UnitError(
+                f"positions move {ratio:.3g} times faster than `{name}` says",
+                remedy=f"positions look like {unit}: add --units q={unit}",
+                file=place,
+                column=names.q[j],
+            )
+        if ratio > 0 and low <= 1 / ratio <= high:
+            raise UnitError(
+                f"is {1 / ratio:.3g} times faster than `{names.q[j]}` moves",
+                remedy=f"velocities look like {group}: add --units dq={group}",
+                file=place,
+                column=name,
+            )
+
+
+def _reference(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
+    """Raise where a reference covers a range that the positions do only in another unit."""
+    if arrays.q_ref is None:
+        return
+    for j, name in enumerate(names.q_ref):
+        low, high = _MILLI_RATIO if _slides(arm, j) else _DEGREE_RATIO
+        wanted, moved = float(np.std(arrays.q_ref[:, j])), float(np.std(arrays.q[:, j]))
+        ratio = wanted / moved if moved > 0 else 0.0
+        if low <= ratio <= high or (ratio > 0 and low <= 1 / ratio <= high):
+            more = f"{ratio:.3g} times farther than" if ratio > 1 else f"{1 / ratio:.3g} times less far than"
+            raise UnitError(
+                f"moves {more} `{names.q[j]}`, which follows it",
+                remedy="bring references and positions to one unit in the file",
+                file=place,
+                column=name,
+            )
+
+
+def _speed_ratio(arrays: Arrays, arm: Arm | None, j: int) -> float:
+    """Return the slope of the differenced position over the velocity column; 0 where there is none."""
+    assert arrays.dq is not None
+    moved = np.diff(_without_turns(arrays, arm, j))
+    said = 0.5 * (arrays.dq[1:, j] + arrays.dq[:-1, j]) * np.diff(arrays.t)
+    power = float(said @ said)
+    return float(moved @ said) / power if power > 0 else 0.0
+
+
+def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
+    for j, name in enumerate(names.q):
+        farthest, fastest, unit = _FARTHEST_RAD, _FASTEST_RAD_S, "deg"
+        if _slides(arm, j):
+            farthest, fastest, unit = _FARTHEST_M, math.inf, "mm"
+        travel, speed = _travel(arrays.q[:, j]), _peak_speed(arrays, arm, j)
+        counts = not _slides(arm, j) and _moves_in_counts(arrays, arm, j, _DEGREE)
+        if travel > farthest or speed > fastest or counts:
+            si = "m" if _slides(arm, j) else "rad"
+            why = f"moves over {travel:.4g} {si} at up to {speed:.4g} {si}/s"
+            why += ", in steps of one encoder count in degrees" if counts else ""
+            raise UnitError(
+                why,
+                remedy=f"it looks like {unit}: add --units q={unit}, or q={si} if it is right",
+                file=place,
+                column=name,
+            )
+
+
+def _peak_speed(arrays: Arrays, arm: Arm | None, j: int) -> float:
+    """Return the speed that is exceeded for 1 % of the log."""
+    stride = max(1, round(_SPEED_SPAN_S / float(np.median(np.diff(arrays.t[:_ENOUGH])))))
+    t, q = arrays.t[::stride], _without_turns(arrays, arm, j)[::stride]
+    return float(np.quantile(np.abs(np.diff(q) / np.diff(t)), 0.99)) if len(t) > 1 else 0.0
+
+
+def _travel(q: NDArray[np.float64]) -> float:
+    """Return the range of positions; a few wild rows do not count."""
+    wild = int(_WILD_SHARE * len(q))
+    ends = np.partition(q, (wild, len(q) - 1 - wild))
+    return float(ends[len(q) - 1 - wild] - ends[wild])
+
+
+def _without_turns(arrays: Arrays, arm: Arm | None, j: int) -> NDArray[np.float64]:
+    """Return positions without the jumps of a wrapped encoder, in radians or in degrees: they are no speed. Lengths do not wrap."""
+    q = arrays.q[:, j]
+    return q if _slides(arm, j) else unwrapped(unwrapped(q, TURN), 360.0)
+
+
+def _moves_in_counts(arrays: Arrays, arm: Arm | None, j: int, factor: float) -> bool:
+    """Whether positions times `factor` change in whole encoder counts."""
+    if arm is None or arm.encoder_step is None:
+        return False
+    moved = np.diff(arrays.q[:_ENOUGH, j])
+    moved = moved[moved != 0]
+    if len(moved) < 20:
+        return False
+    counts = moved * factor / arm.encoder_step[j]
+    whole = np.abs(counts - np.round(counts)) < 0.01
+    return bool(np.mean(whole & (np.round(counts) != 0)) > 0.95)
+
+
+def _torque(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
+    if arm is None or arm.torque_limit is None:
+        return
+    for j, name in enumerate(names.tau):
+        wild = int(_WILD_SHARE * len(arrays.tau))
+        peak = float(np.partition(np.abs(arrays.tau[:, j]), -1 - wild)[-1 - wild])
+        limit = float(arm.torque_limit[j])
+        if peak > _TORQUE_FACTOR * limit:
+            si = "Nm" if arm.rotary_joints[j] else "N"
+            raise UnitError(
+                f"reaches {peak:.4g}, {peak / limit:.3g} times the arm's torque limit of {limit:g}",
+                remedy=f"give the torque at the joint in {si}; add --units tau={si} if it is right",
+                file=place,
+                column=name,
+            )
+
+
+def _slides(arm: Arm | None, j: int) -> bool:
+    """Whether joint `j`, from 0, is known to slide."""
+    return arm is not None and j < arm.n_joints and not arm.rotary_joints[j]

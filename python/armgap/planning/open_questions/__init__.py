@@ -1,0 +1,1 @@
+"""What a diagnosis left open, as pairs of models."""

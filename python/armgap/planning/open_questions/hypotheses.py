@@ -1,0 +1,231 @@
+"""Questions as pairs of models, with the sizes that the effect in question could have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armgap import _native
+from armgap.evidence.hypothesis import EffectInstance, at_motor
+from armgap.planning.criterion import HypothesisPair, PredictedMotion
+from armgap.planning.open_questions.questions import NONE, Question
+from armgap.planning.open_questions.sizes import PLANNED, Scales, Shape, levels, shapes
+
+__all__ = ["HypothesisBuilder", "TestedQuestion"]
+
+Array = NDArray[np.float64]
+Data = dict[str, Any]
+
+#: An effect matters from so many noise floors on.
+SEVERAL = 3.0
+#: Sizes are looked at from the one that matters up to so many times it, where no bound is known; a bound is followed down as far.
+_REACH = 10.0
+#: Sizes that are looked at.
+SIZES = 5
+#: Nodes and weights of the mean over a normal distribution (Gauss-Hermite, three points).
+NODES, WEIGHTS = (-math.sqrt(3.0), 0.0, math.sqrt(3.0)), (1 / 6, 2 / 3, 1 / 6)
+#: A stiffness is no better known than by this factor's logarithm.
+SPREAD = 1.0
+#: An effect may imitate another where, before its shape is fitted, it leaves less than this part of the other's evidence in a usual motion.
+IMITATES = 0.5
+
+
+@dataclass(frozen=True)
+class TestedQuestion:
+    """A question with its models.
+
+    Attributes
+    ----------
+    question : Question
+        The question.
+    pair : HypothesisPair
+        Its models.
+    quick : HypothesisPair
+        The same with few sizes, for the search.
+    consequence : float
+        Prediction error that the largest size would cost on a usual motion, in noise floors.
+    sizes : tuple of (str, float, float), optional
+        Parameter and range of its values that evidence is averaged over.
+    """
+
+    question: Question
+    pair: HypothesisPair
+    quick: HypothesisPair
+    consequence: float
+    sizes: tuple[str, float, float] | None
+
+
+class HypothesisBuilder:
+    """Makes the models of questions from a diagnosis and a usual motion.
+
+    Parameters
+    ----------
+    data : dict
+        JSON object of the diagnosis.
+    usual : PredictedMotion
+        A usual motion within the limits, by which sizes are judged.
+    scales : Scales
+        Typical sizes in it.
+    base : tuple of EffectInstance
+        Effects of the best model.
+    """
+
+    def __init__(self, data: Data, usual: PredictedMotion, scales: Scales, base: tuple[EffectInstance, ...]) -> None:
+        self._data = data
+        self._usual = usual
+        self._scales = scales
+        self._base = base
+        self._specs = {entry["name"]: entry["parameters"] for entry in _native.effects()}
+        self._floor = np.array(data["gap"]["floor"], dtype=np.float64)
+
+    def pose(self, question: Question) -> TestedQuestion | None:
+        """Return a question with its models; None where the limits leave no value that the logs have not covered."""
+        without = tuple(e for e in self._base if (e.effect, e.joint) != question.place)
+        groups = self._alternatives(question, without)
+        if not groups:
+            return None
+        every = [(w, (*without, e)) for w, e in groups]
+        rough = HypothesisPair(tuple(every), without)
+        size = max(self._usual.floors(rough, i, self._floor) for i in range(len(every)))
+        free = None if question.against == NONE else self._rival(question, rough)
+        rival = without if free is None else (*without, free)
+        pair = HypothesisPair(tuple(every), rival, free)
+        quick = HypothesisPair(_few(every), rival, free)
+        return TestedQuestion(question, pair, quick, size, self._range(question, [e for _, e in groups]))
+
+    def look_alikes(self, tested: TestedQuestion) -> list[Question]:
+        """Return an effect's questions against those that may imitate it, the likest first.
+
+        They are of its joint or of the whole arm, and among those that the diagnosis looked for and did not find.
+        """
+        effect, joint = tested.question.place
+        middle = tested.pair.alternatives[len(tested.pair.alternatives) // 2]
+        pair = HypothesisPair(((1.0, middle[1]),), tested.pair.rival)
+        target = self._usual.difference(pair)
+        whole, _ = self._usual.left_of(target)
+        modelled = {(e.effect, e.joint) for e in tested.pair.rival}
+        found = []
+        for entry in self._data["ruled_out"]:
+            place = (entry["effect"], entry["joint"])
+            if place in modelled or place[0] not in PLANNED or place[0] == effect or place[1] not in (None, joint or 1):
+                continue
+            left = [self._left_by(e, tested.pair.rival, target) for e in self._tried(place, tested.pair.rival, target)]
+            if left and min(left) < IMITATES * whole:
+                found.append((min(left), replace(tested.question, against=place[0], against_joint=place[1])))
+        return [question for _, question in sorted(found, key=lambda x: x[0])]
+
+    def _left_by(self, effect: EffectInstance, without: tuple[EffectInstance, ...], target: Array) -> float:
+        """What is left of a difference beside an effect and the arm's own values; infinite where it cannot be computed."""
+        try:
+            made = self._usual.difference(HypothesisPair(((1.0, (*without, effect)),), without))
+        except ValueError:
+            return math.inf
+        return self._usual.left_of(target - made)[0]
+
+    def _alternatives(
+        self, question: Question, without: tuple[EffectInstance, ...]
+    ) -> list[tuple[float, EffectInstance]]:
+        if question.estimate is not None:
+            return self._estimated(question)
+        known = shapes(*question.place, self._scales)
+        if not known:
+            values = levels(*question.place, self._scales)
+            return _even(EffectInstance(*question.place, v) for v in values)
+        return _even(
+            EffectInstance(*question.place, shape.at(size))
+            for shape in known
+            for size in self._sizes(question, shape, without)
+        )
+
+    def _estimated(self, question: Question) -> list[tuple[float, EffectInstance]]:
+        """The effect at the nodes of its estimate's distribution."""
+        assert question.estimate is not None
+        values = {name: value for name, (value, _) in question.estimate.items()}
+        spec = self._specs[question.effect][0]
+        name = spec["name"]
+        value, sigma = question.estimate[name]
+        sides = next((at_motor(c.get("sides")) for c in self._entries(question.place)), {})
+        found = []
+        for node, weight in zip(NODES, WEIGHTS, strict=True):
+            if question.effect == "joint_elasticity":
+                at = value * math.exp(node * min(sigma / max(abs(value), 1e-300), SPREAD))
+            else:
+                at = min(max(value + node * sigma, spec["lower"]), spec["upper"])
+            found.append((weight, EffectInstance(*question.place, {**values, name: at, **sides})))
+        return found
+
+    def _entries(self, place: tuple[str, int | None]) -> list[Data]:
+        entries = (*self._data["causes"], *(self._data.get("candidates") or []), *(self._data.get("ranking") or []))
+        return [e for e in entries if (e["effect"], e["joint"]) == place]
+
+    def _sizes(self, question: Question, shape: Shape, without: tuple[EffectInstance, ...]) -> Array:
+        """Sizes from the one that matters upwards, up to the bound where there is one."""
+        effect = EffectInstance(*question.place, shape.at(shape.typical))
+        floors = self._usual.floors(HypothesisPair(((1.0, (*without, effect)),), without), 0, self._floor)
+        matters = shape.typical * (SEVERAL / floors if floors > 0 else 1.0)
+        matters = min(max(matters, shape.typical / 1e4), shape.typical * _REACH)
+        if question.bound is None or shape.inverse:
+            return np.geomspace(matters, _REACH * matters, SIZES)
+        return np.geomspace(max(min(matters, question.bound), question.bound / _REACH), question.bound, SIZES)
+
+    def _rival(self, question: Question, rough: HypothesisPair) -> EffectInstance:
+        """The rival with the values that the diagnosis has, or with those that follow the effect best over the usual motion."""
+        for entry in self._entries(question.rival):
+            values = {name: float(p["value"]) for name, p in entry["parameters"].items()}
+            return EffectInstance(*question.rival, {**values, **at_motor(entry.get("sides"))})
+        middle = rough.alternatives[len(rough.alternatives) // 2]
+        target = self._usual.difference(HypothesisPair((middle,), rough.rival))
+        best: tuple[float, EffectInstance] | None = None
+        for effect in self._tried(question.rival, rough.rival, target):
+            left = self._left_by(effect, rough.rival, target)
+            if best is None or left < best[0]:
+                best = left, effect
+        assert best is not None
+        return best[1]
+
+    def _tried(
+        self, place: tuple[str, int | None], without: tuple[EffectInstance, ...], target: Array
+    ) -> Iterable[EffectInstance]:
+        """The rival's shapes, each at the size that follows the target best to first order."""
+        spec = self._specs[place[0]][0]
+        for shape in shapes(*place, self._scales):
+            typical = EffectInstance(*place, shape.at(shape.typical))
+            yield typical
+            try:
+                made = self._usual.difference(HypothesisPair(((1.0, (*without, typical)),), without))
+            except ValueError:
+                continue
+            _, factor = self._usual.left_of(target, made)
+            size = factor * shape.typical
+            if shape.inverse and size <= 0:
+                continue
+            values = shape.at(size)
+            if spec["lower"] <= values[shape.main] <= spec["upper"]:
+                yield EffectInstance(*place, values)
+        for level in levels(*place, self._scales) if not shapes(*place, self._scales) else ():
+            yield EffectInstance(*place, level)
+
+    def _range(self, question: Question, effects: list[EffectInstance]) -> tuple[str, float, float] | None:
+        name = self._specs[question.effect][0]["name"]
+        values = [e.parameters[name] for e in effects if name in e.parameters and e.parameters[name] != 0]
+        return (name, float(min(values)), float(max(values))) if values else None
+
+
+def _even(effects: Iterable[EffectInstance]) -> list[tuple[float, EffectInstance]]:
+    found = list(effects)
+    return [(1.0 / len(found), e) for e in found]
+
+
+def _few(
+    models: list[tuple[float, tuple[EffectInstance, ...]]],
+) -> tuple[tuple[float, tuple[EffectInstance, ...]], ...]:
+    """At most four of the models with equal weights, small ones first: the search needs no more."""
+    if len(models) <= len(NODES):
+        return ((1.0, models[len(models) // 2][1]),)
+    picked = [models[i] for first in range(0, len(models), SIZES) for i in (first, first + SIZES // 2)][:4]
+    return tuple((1.0 / len(picked), effects) for _, effects in picked)

@@ -1,0 +1,198 @@
+"""What a diagnosis left open: causes against their equivalents, effects that are undecided or were not excited, candidates."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from armgap import _native
+from armgap.arm.arm import Arm
+from armgap.errors import OptionError
+from armgap.evidence.hypothesis import Hypothesis
+from armgap.planning.open_questions.sizes import PLANNED
+
+__all__ = ["NONE", "Question", "asked", "known_model", "open_questions"]
+
+Data = dict[str, Any]
+NONE = "none"
+"""What stands for the absence of an effect."""
+
+_ORDER = ("equivalents", "candidate", "undecided", "not excited")
+
+
+@dataclass(frozen=True)
+class Question:
+    """An effect against what else it could be.
+
+    Attributes
+    ----------
+    effect, joint : str, int or None
+        The effect.
+    against, against_joint : str, int or None
+        The other effect; ``"none"`` is the effect's absence.
+    origin : {"asked", "equivalents", "candidate", "undecided", "not excited"}
+        Why it is open.
+    estimate : dict of str to (value, sigma), optional
+        What the diagnosis has for the effect's parameters.
+    bound : float, optional
+        Upper 95 % limit of its size.
+    why : str
+        The diagnosis' own words about it.
+    """
+
+    effect: str
+    joint: int | None
+    against: str = NONE
+    against_joint: int | None = None
+    origin: str = "asked"
+    estimate: dict[str, tuple[float, float]] | None = None
+    bound: float | None = None
+    why: str = ""
+
+    @property
+    def place(self) -> tuple[str, int | None]:
+        """Effect and joint."""
+        return self.effect, self.joint
+
+    @property
+    def rival(self) -> tuple[str, int | None]:
+        """The other effect and its joint."""
+        return self.against, self.against_joint
+
+    @property
+    def text(self) -> str:
+        """The question in a line, as ``backlash:2 against none``."""
+        return f"{spelt(*self.place)} against {spelt(*self.rival) if self.against != NONE else NONE}"
+
+
+def spelt(effect: str, joint: int | None) -> str:
+    """Write an effect as an option has it."""
+    return effect if joint is None else f"{effect}:{joint}"
+
+
+def known_model(data: Data, arm: Arm) -> tuple[Hypothesis, tuple[str, ...]]:
+    """Return a diagnosis' model with its causes, as far as they can be simulated, and what was left out of it."""
+    full = Hypothesis.of(data, arm)
+    names = {entry["name"] for entry in _native.effects()}
+    kept = tuple(e for e in full.effects if e.effect in names and e.log is None)
+    gone = [spelt(e.effect, e.joint) for e in full.effects if e not in kept]
+    notes = [f"the planned motion is predicted without {', '.join(dict.fromkeys(gone))}"] if gone else []
+    return full.only(kept), tuple(notes)
+
+
+def open_questions(data: Data) -> tuple[list[Question], list[str]]:
+    """Return the questions that a diagnosis leaves open, and remarks on those that no motion is about.
+
+    Parameters
+    ----------
+    data : dict
+        JSON object of a diagnosis.
+    """
+    found: list[Question] = []
+    remarks: list[str] = []
+    for cause in data["causes"]:
+        for other in cause["equivalents"]:
+            if cause["effect"] in PLANNED and other["effect"] in PLANNED:
+                question = Question(cause["effect"], cause["joint"], other["effect"], other["joint"], "equivalents")
+                found.append(replace(question, estimate=_estimate(cause), why=other.get("why") or ""))
+            else:
+                pair = f"{spelt(cause['effect'], cause['joint'])} against {spelt(other['effect'], other['joint'])}"
+                remarks.append(f"{pair}: {other.get('why') or 'not a matter of the arm'}; no motion is planned for it")
+    for candidate in data.get("candidates") or []:
+        if candidate["effect"] in PLANNED:
+            question = Question(
+                candidate["effect"], candidate["joint"], origin="candidate", estimate=_estimate(candidate)
+            )
+            found.append(replace(question, why=candidate.get("why") or ""))
+    for entry in data["ruled_out"]:
+        if entry["status"] not in ("undecided", "not excited") or entry["effect"] not in PLANNED:
+            continue
+        place, why = (entry["effect"], entry["joint"]), entry.get("why") or ""
+        instead = [c for c in data["causes"] if _would_stand_for(entry, c)]
+        for cause in instead:
+            question = Question(cause["effect"], cause["joint"], *place, "undecided", _estimate(cause))
+            found.append(replace(question, why=why))
+        if entry["status"] == "not excited" or entry.get("bound"):
+            found.append(Question(*place, origin=entry["status"], bound=_bound(entry), why=why))
+        elif not instead:
+            remarks.append(f"{spelt(*place)}: {why}; no motion is planned for it")
+    return _once(found), list(dict.fromkeys(remarks))
+
+
+def _would_stand_for(entry: Data, cause: Data) -> bool:
+    """Whether an undecided effect is said to do nearly as well in the place of a cause, which its reason names by title and joint."""
+    where = "" if cause["joint"] is None else f", joint {cause['joint']}"
+    named = f"in place of {cause.get('title')}{where} "
+    return entry["status"] == "undecided" and cause["effect"] in PLANNED and named in (entry.get("why") or "")
+
+
+def asked(texts: Sequence[str], data: Data, arm: Arm) -> list[Question]:
+    """Return the questions asked for, ``EFFECT:JOINT`` each: the effect against its absence, and against its equivalents.
+
+    Raises
+    ------
+    OptionError
+        If an effect does not exist, or not on that joint, or no motion can be planned for it.
+    """
+    found = []
+    for text in (texts,) if isinstance(texts, str) else texts:
+        effect, joint = _parse(text, arm)
+        pairs = [q for q in open_questions(data)[0] if q.against != NONE]
+        found += [q for q in pairs if q.place == (effect, joint)]
+        found += [
+            Question(effect, joint, q.effect, q.joint, q.origin, why=q.why) for q in pairs if q.rival == (effect, joint)
+        ]
+        found.append(_against_absence(effect, joint, data))
+    return _once(found)
+
+
+def _against_absence(effect: str, joint: int | None, data: Data) -> Question:
+    for entry in (*data["causes"], *(data.get("candidates") or [])):
+        if (entry["effect"], entry["joint"]) == (effect, joint):
+            return Question(effect, joint, estimate=_estimate(entry))
+    bounds = [r for r in data["ruled_out"] if (r["effect"], r["joint"]) == (effect, joint)]
+    return Question(effect, joint, bound=_bound(bounds[0]) if bounds else None)
+
+
+def _parse(text: str, arm: Arm) -> tuple[str, int | None]:
+    match = re.fullmatch(r"([a-z_]+)(?::([0-9]{1,3}))?", str(text).strip())
+    if match is None:
+        raise OptionError(f"`{text}` is not an effect on a joint", remedy="write EFFECT:JOINT such as backlash:2")
+    effect, number = match[1], match[2]
+    scopes = {entry["name"]: entry["scope"] for entry in _native.effects()}
+    if effect not in scopes:
+        raise OptionError(f"`{effect}` is not an effect", remedy=f"known: {', '.join(PLANNED)}")
+    if effect not in PLANNED:
+        raise OptionError(f"`{effect}` comes from outside the arm", remedy="no motion can be planned for it")
+    if scopes[effect] == "arm":
+        if number:
+            raise OptionError(f"`{effect}` is an effect of the whole arm", remedy=f"write {effect}")
+        return effect, None
+    if number is None or not 1 <= int(number) <= arm.n_joints:
+        remedy = f"write {effect}:J with J from 1 to {arm.n_joints}"
+        raise OptionError(f"`{text}` names no joint of this arm", remedy=remedy)
+    return effect, int(number)
+
+
+def _estimate(entry: Data) -> dict[str, tuple[float, float]]:
+    return {name: (float(p["value"]), float(p["sigma"])) for name, p in entry["parameters"].items()}
+
+
+def _bound(entry: Data) -> float | None:
+    bound = entry.get("bound")
+    return float(bound["value"]) if bound else None
+
+
+def _once(questions: list[Question]) -> list[Question]:
+    """Drop what is asked twice; a pair that is asked from both sides counts once."""
+    found: dict[frozenset[tuple[str, int | None]], Question] = {}
+    for question in questions:
+        found.setdefault(frozenset((question.place, question.rival)), question)
+    return list(found.values())
+
+
+def rank(question: Question) -> int:
+    """Return how a question is ordered by its origin: causes against equivalents first."""
+    return _ORDER.index(question.origin) if question.origin in _ORDER else 0

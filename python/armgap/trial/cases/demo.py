@@ -1,0 +1,54 @@
+"""The demo's case: one arm, one hidden effect, two logs; everything from one number.
+
+``python -m armgap.trial --seed 7 -o folder`` makes the case of that seed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from armgap.trial.cases.case import Case, NoMotionError, make_case
+
+#: Seed of the case that comes with the project.
+DEMO_SEED = 1997
+#: Effects the demo may hide.
+DEMO_EFFECTS = (
+    "actuator_delay",
+    "actuator_lag",
+    "base_tilt",
+    "coulomb_asymmetry",
+    "payload",
+    "quadratic_drag",
+    "rotor_inertia",
+    "stribeck",
+    "torque_gain",
+    "torque_offset",
+)
+WHOLE_ARM = ("base_tilt", "payload")
+SAMPLE_PERIOD = 0.0025  # s, as in Reyes and Kelly (1997)
+RETRIES = 10
+
+
+def make_demo_case(seed: int = DEMO_SEED) -> Case:
+    """Make the demo case of a seed: arm, effect, joint, size and motions are all drawn from it.
+
+    Parameters
+    ----------
+    seed : int, default 1997
+        Any number.
+
+    Raises
+    ------
+    NoMotionError
+        No motion was found; rare, take another seed.
+    """
+    rng = np.random.default_rng([seed, 0])
+    effect = str(rng.choice(DEMO_EFFECTS))
+    joint = None if effect in WHOLE_ARM else int(rng.integers(1, 3))
+    size, model = float(rng.uniform(0.3, 0.9)), str(rng.choice(["direct-drive", "geared"], p=[0.7, 0.3]))
+    for attempt in range(1, RETRIES + 1):
+        try:
+            return make_case([seed, attempt], [(effect, joint)], model=model, size=size, sample_period=SAMPLE_PERIOD)
+        except NoMotionError:
+            continue
+    raise NoMotionError(f"no motion for demo seed {seed}; take another")

@@ -1,0 +1,141 @@
+"""A trial on disk: numbered case folders beside one file that says what they are, never what they hide.
+
+Making goes on where it stopped: a case folder appears only when it is whole, and one that is there is left alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from armgap import _native
+from armgap.errors import OptionError, ResultError
+from armgap.files.output import write, write_folder
+from armgap.trial.cases.key import sealed_hash
+from armgap.trial.cases.layout import MANIFEST, case_name
+from armgap.trial.simulation.engine import mujoco
+from armgap.trial.trial import Plan, plan_trial
+
+__all__ = ["MANIFEST", "Manifest", "make_cases", "read_manifest", "seal_of_all"]
+
+SCHEMA = "armgap.trial-cases/1"
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """How a trial was made: with this, and the same versions, it can be made again.
+
+    Attributes
+    ----------
+    seed, cases : int
+        Seed and number of cases.
+    duration : float
+        Length of each log, s.
+    version, engine : str
+        Of armgap and of the physics engine.
+    """
+
+    seed: int
+    cases: int
+    duration: float
+    version: str
+    engine: str
+
+    def to_json(self) -> str:
+        """Return it as JSON."""
+        return json.dumps({"schema": SCHEMA, **self.__dict__}, indent=1) + "\n"
+
+
+def make_cases(folder: Path, seed: int, cases: int, duration: float = 10.0, workers: int = 1) -> Iterator[Path]:
+    """Make the cases of a trial that are not there yet.
+
+    Parameters
+    ----------
+    folder : Path
+        New, empty, or of the same trial.
+    seed, cases : int
+        Seed and number of cases.
+    duration : float, default 10
+        Length of each log [s].
+    workers : int, default 1
+        Processes.
+
+    Yields
+    ------
+    Path
+        Every case's folder, in order.
+
+    Raises
+    ------
+    OptionError
+        The folder holds something else.
+    """
+    wanted = Manifest(seed, cases, duration, _native.__version__, f"mujoco {mujoco().__version__}")
+    _claim(folder, wanted)
+    plans = [replace(p, duration=duration) for p in plan_trial(seed, cases)]
+    targets = [folder / case_name(i) for i in range(cases)]
+    if workers == 1:
+        yield from map(_make, plans, targets)
+        return
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        yield from pool.map(_make, plans, targets)
+
+
+def read_manifest(folder: str | Path) -> Manifest | None:
+    """How the cases of a folder were made; None where it does not say."""
+    path = Path(folder) / MANIFEST
+    if not path.is_file():
+        return None
+    data = _load(path)
+    try:
+        return Manifest(**{key: value for key, value in data.items() if key != "schema"})
+    except TypeError:
+        raise OptionError("is no list of a trial's cases", remedy="make the trial again", file=path) from None
+
+
+def seal_of_all(cases: list[Path]) -> str:
+    """One hash over the seals of all cases."""
+    return hashlib.sha256("".join(sealed_hash(c) for c in cases).encode()).hexdigest()
+
+
+def _claim(folder: Path, wanted: Manifest) -> None:
+    """Take a new or empty folder, or go on in the folder of the same trial."""
+    path = folder / MANIFEST
+    if path.is_file():
+        if _load(path) != json.loads(wanted.to_json()):
+            raise OptionError("holds another trial", remedy="name a new folder", file=folder)
+        return
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise OptionError("exists and is not empty", remedy="name a new folder", file=folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ResultError(f"cannot be made ({error.strerror})", remedy="choose another place", file=folder) from None
+    write(path, wanted.to_json())
+
+
+def _load(path: Path) -> dict[str, Any]:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise OptionError(f"cannot be read ({error})", remedy="name a new folder", file=path) from None
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        raise OptionError("is no list of a trial's cases", remedy="name a new folder", file=path)
+    return data
+
+
+def _make(plan: Plan, target: Path) -> Path:
+    if not target.exists():
+        case = plan.make()
+        try:
+            write_folder(target, case.write)
+        except ResultError:
+            if not target.is_dir():  # else another process has made the same case meanwhile
+                raise
+    return target

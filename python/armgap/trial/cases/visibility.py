@@ -1,0 +1,94 @@
+"""Whether a hidden effect can be seen at all, after the arm's parameters have been estimated again.
+
+An effect may leave a trace in two ways. Either predictions over short windows go on missing after re-estimation, by a
+multiple of what they miss by without it; or re-estimation swallows it, and the parameters end up far from where the
+arm file says they are. An effect that does neither cannot be found by anyone, and its case is counted apart.
+
+The floor is the same prediction made of the same motions without the effect: what encoder steps and the start states
+taken from them leave.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from armgap.trial.cases.armfile import spread
+from armgap.trial.cases.windows import Mechanism, Window, cut, misses, refit
+from armgap.trial.simulation.arms import TrialArm
+from armgap.trial.simulation.simulated_arm import Array, Trace
+
+__all__ = ["MULTIPLE", "VISIBLE_SIGMAS", "Visibility", "visibility"]
+
+#: Visible: the predictions' error is at least this multiple of the floor ...
+MULTIPLE = 2.0
+#: ... or the parameters move by at least this many of the arm file's sigmas.
+VISIBLE_SIGMAS = 5.0
+#: Errors are taken over this share of the windows, those that miss most: contacts and pushes are rare.
+_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Visibility:
+    """How far an effect stands out.
+
+    Attributes
+    ----------
+    above_floor : float
+        RMS error of predictions after re-estimation, as a multiple of the floor: joint and logs as below.
+    moved : float
+        Distance by which re-estimation moves the parameters, in the arm file's sigmas.
+    """
+
+    above_floor: float
+    moved: float
+
+    @property
+    def visible(self) -> bool:
+        """Whether it can be found."""
+        return self.above_floor >= MULTIPLE or self.moved >= VISIBLE_SIGMAS
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {**asdict(self), "visible": self.visible}
+
+
+def visibility(arm: TrialArm, plain: dict[str, Trace], logs: dict[str, Trace], everywhere: bool = True) -> Visibility:
+    """How far one hidden effect stands out in the logs of a case.
+
+    Parameters
+    ----------
+    arm : TrialArm
+        The true arm.
+    plain, logs : dict of str to Trace
+        The logs without and with the effect.
+    everywhere : bool, default True
+        Whether the effect acts in all logs. Then training and holdout must both show it, and the smaller counts; of a
+        push only the training logs, in which it is.
+    """
+    m = Mechanism(arm.kind, arm.gravity, arm.length)
+    theta = np.array(arm.theta)
+    sigma = np.array(spread(arm, arm.theta))
+    without = misses(m, theta, _windows(plain, ""))
+    rounding = np.array(arm.step) / math.sqrt(12.0)  # standard deviation of what rounding to whole steps does
+    noise = np.maximum(np.median(np.sqrt(np.mean(without**2, axis=1)), axis=0), rounding)
+    found = refit(m, theta, sigma, _windows(logs, "train"), noise)
+    judged = ("train", "holdout") if everywhere else ("train",)
+    floor = np.maximum(_worst(without), rounding)
+    with_it = min((_worst(misses(m, found, _windows(logs, part))) / floor).max() for part in judged)
+    moved = float(np.sqrt(np.sum(((found - theta) / sigma) ** 2)))
+    return Visibility(float(f"{with_it:.4g}"), float(f"{moved:.4g}"))
+
+
+def _windows(logs: dict[str, Trace], part: str) -> list[Window]:
+    return [w for name, x in logs.items() if name.startswith(part) for w in cut(x.t, x.q, x.tau)]
+
+
+def _worst(error: Array) -> Array:
+    """RMS per joint over the windows that miss most."""
+    squares = np.sort(np.mean(error**2, axis=1), axis=0)[::-1]
+    rms: Array = np.sqrt(np.mean(squares[: max(1, round(_SHARE * len(squares)))], axis=0))
+    return rms

@@ -1,0 +1,1 @@
+"""The arm of a trial in MuJoCo: plant, actuators, encoders, motions."""

@@ -1,0 +1,226 @@
+"""Motions for trial logs: torques in open loop, and random trajectories tracked by a controller.
+
+Open loop is a multisine with random phases around a constant, or the paper's own torques, equations (31)-(32),
+scaled to the arm. A tracked motion is a random Fourier series followed by a PD controller on the measured positions;
+what is logged is the controller's command.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from armgap.trial.simulation.arms import DIRECT_DRIVE, TrialArm
+from armgap.trial.simulation.simulated_arm import Array, CommandSource, Trace
+
+STYLES = ("multisine", "paper", "tracked")
+#: A tracked motion holds nothing above this frequency, Hz.
+RINGING = 15.0
+#: Time over which torques and references fade in, s.
+FADE_IN = 0.4
+#: Fewest reversals of a useful motion, per joint, 1/s.
+REVERSAL_RATE = 0.6
+
+
+@dataclass(frozen=True)
+class Multisine:
+    """``(1 - exp(-rate t)) bias + sum amplitude sin(omega t + phase)``, per joint, faded in.
+
+    Attributes
+    ----------
+    bias, rate : ndarray, shape (n_joints,)
+        N m and 1/s.
+    amplitude, omega, phase : ndarray, shape (n_joints, n_sines)
+        N m, rad/s, rad.
+    limit : ndarray, shape (n_joints,)
+        The command is clipped here, N m.
+    """
+
+    bias: Array
+    rate: Array
+    amplitude: Array
+    omega: Array
+    phase: Array
+    limit: Array
+
+    def source(self, arm: TrialArm) -> CommandSource:
+        """Commands over time."""
+
+        def command(t: float, _q: list[float]) -> list[float]:
+            waves = np.sum(self.amplitude * np.sin(self.omega * t + self.phase), axis=1)
+            tau = (1 - np.exp(-self.rate * t)) * self.bias + fade(t) * waves
+            return [float(x) for x in np.clip(tau, -self.limit, self.limit)]
+
+        return command
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """A Fourier series around ``centre`` under PD control.
+
+    Attributes
+    ----------
+    centre : ndarray, shape (n_joints,)
+        rad (m).
+    amplitude, omega, phase : ndarray, shape (n_joints, n_sines)
+        rad (m), rad/s, rad.
+    stiffness, damping, limit : ndarray, shape (n_joints,)
+        Controller gains and largest command, SI.
+    """
+
+    centre: Array
+    amplitude: Array
+    omega: Array
+    phase: Array
+    stiffness: Array
+    damping: Array
+    limit: Array
+
+    def reference(self, t: float) -> tuple[Array, Array]:
+        """Wanted positions and velocities."""
+        angle = self.omega * t + self.phase
+        blend, rise = fade(t, 1.0), fade_rate(t, 1.0)
+        wave = self.centre + np.sum(self.amplitude * np.sin(angle), axis=1)
+        rate = np.sum(self.amplitude * self.omega * np.cos(angle), axis=1)
+        return blend * wave, blend * rate + rise * wave
+
+    def source(self, arm: TrialArm) -> CommandSource:
+        """A fresh controller."""
+        last: list[Array] = []
+
+        def command(t: float, q: list[float]) -> list[float]:
+            measured = np.array(q)
+            dq = (measured - last.pop()) / arm.sample_period if last else np.zeros(len(q))
+            last.append(measured)
+            wanted, rate = self.reference(t)
+            tau = self.stiffness * (wanted - measured) + self.damping * (rate - dq)
+            return [float(x) for x in np.clip(tau, -self.limit, self.limit)]
+
+        return command
+
+    def softer(self) -> Tracked:
+        """Return this motion under a controller of half the stiffness."""
+        return replace(self, stiffness=0.5 * self.stiffness, damping=0.6 * self.damping)
+
+
+Excitation = Multisine | Tracked
+
+
+def rings(trace: Trace) -> bool:
+    """Whether a controller oscillates: most of the power of a command lies far above what it has to track."""
+    tau = trace.tau - np.mean(trace.tau, axis=0)
+    power = np.abs(np.fft.rfft(tau, axis=0)) ** 2
+    frequency = np.fft.rfftfreq(len(trace.t), trace.t[1] - trace.t[0])
+    return bool(np.any(np.sum(power[frequency > RINGING], axis=0) > 0.5 * np.sum(power, axis=0)))
+
+
+def fade(t: float, length: float = FADE_IN) -> float:
+    """Rise smoothly from 0 to 1 over ``length`` seconds."""
+    return 0.5 * (1 - math.cos(math.pi * min(t / length, 1.0)))
+
+
+def fade_rate(t: float, length: float = FADE_IN) -> float:
+    """Rate of :func:`fade`."""
+    return 0.5 * math.pi / length * math.sin(math.pi * t / length) if t < length else 0.0
+
+
+def draw_excitation(rng: np.random.Generator, arm: TrialArm, style: str, vigour: float) -> Excitation:
+    """Draw a motion of one of :data:`STYLES`; ``vigour`` scales its amplitude (1 is usual)."""
+    if style == "tracked":
+        return _tracked(rng, arm, vigour)
+    if style == "paper" and arm.kind == "two-link":
+        return _paper(rng, arm, vigour)
+    return _multisine(rng, arm, vigour)
+
+
+def acceptable(trace: Trace, arm: TrialArm) -> tuple[bool, float]:
+    """Whether a motion is of use, and the factor by which to change its vigour if it is not."""
+    reach = np.max(np.abs(trace.q_true), axis=0)
+    limit = np.array([0.9] if arm.kind == "axis" else [2.2, 2.8][: arm.n_joints])
+    speed = np.quantile(np.abs(trace.dq_true), 0.95, axis=0)
+    span = np.ptp(trace.q_true, axis=0)
+    wild = bool(np.any(reach > limit)) or bool(np.any(speed > _fast(arm)))
+    few = reversals(trace.dq_true) < REVERSAL_RATE * trace.t[-1]
+    dull = bool(np.any(span < 0.2 * limit)) or bool(np.any(few))
+    return not (wild or dull), 0.8 if wild else 1.25
+
+
+def reversals(dq: Array) -> Array:
+    """Number of reversals per joint."""
+    return np.array([_sign_changes(column) for column in dq.T])
+
+
+def _sign_changes(dq: Array) -> int:
+    moving = np.sign(dq[np.abs(dq) > 0.02 * np.max(np.abs(dq))])
+    return int(np.sum(moving[1:] != moving[:-1]))
+
+
+def _fast(arm: TrialArm) -> float:
+    return 1.5 if arm.kind == "axis" else 9.0
+
+
+def _gravity(arm: TrialArm) -> Array:
+    t = arm.inertial
+    if arm.kind == "axis":
+        return np.zeros(1)
+    return np.array([t[1]] if arm.kind == "pendulum" else [t[3], t[4]])
+
+
+def _constant_load(arm: TrialArm) -> Array:
+    return np.array([arm.inertial[1]]) if arm.kind == "axis" else np.zeros(arm.n_joints)
+
+
+def _limit(arm: TrialArm) -> Array:
+    return 0.95 * np.array(arm.torque_limit)
+
+
+def _multisine(rng: np.random.Generator, arm: TrialArm, vigour: float) -> Multisine:
+    n, k = arm.n_joints, int(rng.integers(3, 6))
+    omega = np.exp(rng.uniform(math.log(3.0), math.log(28.0), (n, k)))
+    speed = vigour * rng.uniform(0.4, 1.0, (n, 1)) * (0.12 if arm.kind == "axis" else 0.9)
+    shares = rng.uniform(0.4, 1.0, (n, k))
+    inertia, gravity = np.array(arm.joint_inertia)[:, None], _gravity(arm)[:, None]
+    amplitude = speed * shares * np.maximum(inertia * omega, gravity / omega)
+    amplitude += np.array(arm.coulomb)[:, None] * shares / k
+    return Multisine(
+        bias=_constant_load(arm) + rng.uniform(-0.7, 0.7, n) * _gravity(arm),
+        rate=rng.uniform(0.8, 2.0, n) if arm.kind != "axis" else np.full(n, 1e3),
+        amplitude=amplitude,
+        omega=omega,
+        phase=rng.uniform(0, 2 * math.pi, (n, k)),
+        limit=_limit(arm),
+    )
+
+
+def _paper(rng: np.random.Generator, arm: TrialArm, vigour: float) -> Multisine:
+    """Equations (31)-(32), scaled by the arm's gravity and inertia against those of Table I, with random phases."""
+    gravity = _gravity(arm) / _gravity(DIRECT_DRIVE)
+    inertia = np.array(arm.joint_inertia) / np.array(DIRECT_DRIVE.joint_inertia)
+    jitter = rng.uniform(0.85, 1.15, (2, 2))
+    return Multisine(
+        bias=np.array([29.0, 1.2]) * gravity * rng.choice([-1.0, 1.0], 2),
+        rate=np.array([0.8, 1.8]),
+        amplitude=vigour * np.array([[68.0, 9.0], [8.0, 2.0]]) * inertia[:, None],
+        omega=np.array([[16.0, 20.0], [26.0, 12.0]]) * jitter,
+        phase=rng.uniform(0, 2 * math.pi, (2, 2)),
+        limit=_limit(arm),
+    )
+
+
+def _tracked(rng: np.random.Generator, arm: TrialArm, vigour: float) -> Tracked:
+    n, k = arm.n_joints, 6
+    size = 0.45 if arm.kind == "axis" else 1.0
+    omega = 2 * math.pi * rng.uniform(0.15, 0.25, (n, 1)) * np.arange(1, k + 1)
+    amplitude = vigour * size * rng.uniform(0.2, 1.0, (n, k)) / np.sqrt(np.arange(1, k + 1)) * 0.45
+    inertia, bandwidth = np.array(arm.joint_inertia), rng.uniform(10.0, 18.0)
+    return Tracked(
+        centre=size * rng.uniform(-0.5, 0.5, n),
+        amplitude=amplitude,
+        omega=omega,
+        phase=rng.uniform(0, 2 * math.pi, (n, k)),
+        stiffness=inertia * bandwidth**2,
+        damping=1.4 * inertia * bandwidth,
+        limit=_limit(arm),
+    )
