@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from armgap import Arm, Log, seed_torque, simulate
-from armgap.check.data import copied_holdout, data_checks
-from armgap.check.outcome import with_rows
+from armgap.check.log_checks.data import copied_holdout, data_checks
+from armgap.check.log_checks.outcome import with_rows
 
 Array = NDArray[np.float64]
 PERIOD = 0.0025

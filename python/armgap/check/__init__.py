@@ -2,7 +2,7 @@
 
 from armgap.arm.corrections import CORRECTIONS, Corrections
 from armgap.check.check import NAMES, Check, CheckName, Severity
-from armgap.check.data import copied_holdout, data_checks
+from armgap.check.log_checks.data import copied_holdout, data_checks
 from armgap.check.stage import Examined, examine
 
 __all__ = [

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from armgap import _native
 from armgap.arm.arm import Arm
-from armgap.check import (
+from armgap.check.equation_error import EquationError, Fit, Rows, bounds
+from armgap.check.readings import (
     gravity_missing,
     gravity_sign,
     joint_order,
@@ -25,8 +26,7 @@ from armgap.check import (
     relative_angle,
     torque_sign,
 )
-from armgap.check.equation_error import EquationError, Fit, Rows, bounds
-from armgap.check.reading import Reading
+from armgap.check.readings.reading import Reading
 from armgap.log.log import Log
 
 Array = NDArray[np.float64]

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from armgap import _native
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
-from armgap.check import (
+from armgap.check.check import Check
+from armgap.check.readings import (
     gravity_missing,
     gravity_sign,
     joint_order,
@@ -25,8 +26,7 @@ from armgap.check import (
     position_zero,
     torque_sign,
 )
-from armgap.check.check import Check
-from armgap.check.reading import Reading
+from armgap.check.readings.reading import Reading
 from armgap.log.log import Log
 
 __all__ = ["contradictions"]

@@ -12,7 +12,7 @@ from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check import torque_unit
 from armgap.check.check import Check
-from armgap.check.data import copied_holdout, data_checks
+from armgap.check.log_checks.data import copied_holdout, data_checks
 from armgap.check.serial import contradictions
 from armgap.check.stage import examine
 from armgap.diagnosis.provenance import provenance

@@ -9,7 +9,7 @@ from typing import Any
 
 from armgap.arm.arm import Arm
 from armgap.check.check import Check
-from armgap.check.data import data_checks
+from armgap.check.log_checks.data import data_checks
 from armgap.check.stage import examine
 from armgap.errors import LogShapeError, OptionError
 from armgap.inspection.channels import JointChannels, joint

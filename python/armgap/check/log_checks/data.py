@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
-from armgap.check import filtered, quantized, repeated, spike, stamps, wrapped
 from armgap.check.check import Check
-from armgap.check.copied import copied_holdout
-from armgap.check.outcome import Outcome
+from armgap.check.log_checks import filtered, quantized, repeated, spike, stamps, wrapped
+from armgap.check.log_checks.copied import copied_holdout
+from armgap.check.log_checks.outcome import Outcome
 from armgap.log.log import Log
 
 __all__ = ["LOG_CHECKS", "copied_holdout", "data_checks"]

@@ -7,7 +7,7 @@ from itertools import combinations
 
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
-from armgap.check.reading import Reading, reading
+from armgap.check.readings.reading import Reading, reading
 
 __all__ = ["readings"]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armgap.check.check import Check
-from armgap.check.outcome import ranges
+from armgap.check.log_checks.outcome import ranges
 from armgap.log.log import Log
 
 __all__ = ["copied_holdout"]

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
-from armgap.check.reading import Reading, reading
+from armgap.check.readings.reading import Reading, reading
 
 __all__ = ["readings"]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
 from armgap.check.check import Check
-from armgap.check.outcome import NOTHING, Outcome, ranges, seconds, with_rows
+from armgap.check.log_checks.outcome import NOTHING, Outcome, ranges, seconds, with_rows
 from armgap.log.log import Log
 
 __all__ = ["look"]

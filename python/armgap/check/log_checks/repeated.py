@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
 from armgap.check.check import Check
-from armgap.check.numbers import blocks, grid_step, travel_per_row
-from armgap.check.outcome import NOTHING, Outcome, ranges, with_rows
+from armgap.check.log_checks.numbers import blocks, grid_step, travel_per_row
+from armgap.check.log_checks.outcome import NOTHING, Outcome, ranges, with_rows
 from armgap.log.log import Log
 
 __all__ = ["look"]

@@ -13,8 +13,16 @@ from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
 from armgap.check.check import Check
-from armgap.check.numbers import ORDERS, blocks, from_neighbours, grid_step, noise_by_order, rounding, travel_per_row
-from armgap.check.outcome import NOTHING, Outcome
+from armgap.check.log_checks.numbers import (
+    ORDERS,
+    blocks,
+    from_neighbours,
+    grid_step,
+    noise_by_order,
+    rounding,
+    travel_per_row,
+)
+from armgap.check.log_checks.outcome import NOTHING, Outcome
 from armgap.log.log import Log
 
 __all__ = ["look"]

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from armgap.arm.arm import Arm
 from armgap.check.check import Check
-from armgap.check.numbers import blocks, from_neighbours
-from armgap.check.outcome import NOTHING, Outcome
+from armgap.check.log_checks.numbers import blocks, from_neighbours
+from armgap.check.log_checks.outcome import NOTHING, Outcome
 from armgap.log.log import Log
 
 __all__ = ["look"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from armgap.arm.arm import Arm
 from armgap.check.check import Check
-from armgap.check.outcome import NOTHING, Outcome, ranges, seconds
+from armgap.check.log_checks.outcome import NOTHING, Outcome, ranges, seconds
 from armgap.log.conversion.turns import turn_jumps, unwrapped
 from armgap.log.log import Log
 

@@ -1,0 +1,1 @@
+"""Checks of one log by itself, before the equation of motion."""
