@@ -107,7 +107,7 @@ pub struct CachedCoefficients<T> {
 /// Relative change of a decay below which two intervals are as long as each other; the estimates follow it to first order.
 const SAME: f64 = 1e-12;
 /// Relative change of a decay up to which three terms of the series of `exp` suffice: the fourth is 4e-18.
-const NEAR: f64 = 1e-4;
+const NEAR_DECAY: f64 = 1e-4;
 
 impl<T: Real> CachedCoefficients<T> {
     /// An empty cache.
@@ -131,7 +131,7 @@ impl<T: Real> CachedCoefficients<T> {
         if change <= lit::<T>(SAME).max(T::default_epsilon()) && self.h > T::zero() {
             return;
         }
-        let near = change <= lit(NEAR) && self.h > T::zero();
+        let near = change <= lit(NEAR_DECAY) && self.h > T::zero();
         self.step = if near { self.step.near(x) } else { Cutoff { rad_per_s: self.step.lambda }.step(h) };
         self.h = h;
     }

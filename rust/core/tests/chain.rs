@@ -5,7 +5,6 @@ mod common;
 use armgap_core::arm::{Arm, EquationTerms, LinkParameters, TwoLink};
 use armgap_core::chain::{Chain, ChainJoint, JointKind, parameter};
 use armgap_core::cpu::Portable;
-use armgap_core::cpu::Portable;
 use armgap_core::effect::{Active, InputSegment, find};
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::kinematics::JointState;

@@ -186,7 +186,7 @@ fn estimates<const P: usize>(fit: &Fit<P>, description: &ArmDescription) -> Vec<
 
 fn cause(cause: &crate::search::belief::Cause, joints: usize, rotary: bool) -> Cause {
     let spec = cause.effect.law.spec();
-    let equivalents = crate::search::equivalent::all(&cause.effect, &cause.look_alikes, joints);
+    let equivalents = crate::search::rivals::equivalent::all(&cause.effect, &cause.look_alikes, joints);
     Cause {
         effect: spec.name,
         title: spec.title,

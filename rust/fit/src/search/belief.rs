@@ -6,8 +6,8 @@ use crate::search::acceptance::{
     ABOVE_FLOOR, ALIKE_TRUST, Ground, LOOK_ALIKES, REMAINDER_POWER, RESAMPLES, UNEXPLAINED, restores,
 };
 use crate::search::attribute::{Candidate, SearchNode};
-use crate::search::equivalent;
 use crate::search::evidence::Evidence;
+use crate::search::rivals::equivalent;
 
 /// A cause that was accepted.
 #[derive(Debug, Clone)]

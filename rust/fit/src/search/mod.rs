@@ -4,24 +4,20 @@
 //! * `attribute`: one search node: candidates fitted in full, under common weights.
 //! * `belief`: selection probability of a cause.
 //! * `crosswise`: logs cut into stretches that are learnt from and judged on by turns.
-//! * `duel`: pairwise comparison of close rivals, re-weighted.
-//! * `equivalent`: pairs of effects that no log of motion alone tells apart.
 //! * `evidence`: what a cause rests on in the final model.
 //! * `friction_regularisation`: width over which the sign of friction is regularised, a nuisance.
 //! * `model_search`: one cause after another, and causes that become idle.
 //! * `reconsider`: a rival in the place of its cause, once the others are known.
-//! * `rival_law`: a table over a variable of the motion as the rival of a named cause.
+//! * `rivals`: close rivals compared in pairs, look-alikes, a table as the rival of a named cause.
 //! * `together`: two causes of which neither is accepted alone.
 
 pub mod acceptance;
 pub mod attribute;
 pub mod belief;
 pub(crate) mod crosswise;
-pub(crate) mod duel;
-pub mod equivalent;
 pub mod evidence;
 pub(crate) mod friction_regularisation;
 pub mod model_search;
 pub(crate) mod reconsider;
-pub(crate) mod rival_law;
+pub mod rivals;
 pub(crate) mod together;

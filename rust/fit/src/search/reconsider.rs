@@ -12,9 +12,9 @@ use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::search::acceptance::{ABOVE_FLOOR, Ground, MATTERS, is_possible};
 use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::belief::{Cause, name, probability_over};
-use crate::search::equivalent;
 use crate::search::evidence::Evidence;
 use crate::search::model_search::{ModelSearch, added};
+use crate::search::rivals::equivalent;
 use armgap_core::arm::Arm;
 
 /// A rival explains at least this part of what its cause explained when that was added.

@@ -9,7 +9,7 @@ use crate::likelihood::solve::Effort;
 use crate::model::hypothesis::Hypothesis;
 use crate::search::acceptance::MATTERS;
 use crate::search::attribute::{Candidate, SearchNode};
-use crate::search::equivalent;
+use crate::search::rivals::equivalent;
 use armgap_core::arm::Arm;
 
 /// A rival that is worse by less than this, in standard errors of the mean advantage per window, is close.
