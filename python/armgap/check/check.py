@@ -84,7 +84,7 @@ class Check:
         return " or ".join(self.remedies)
 
     def line(self, log: str | None = None) -> str:
-        """Return it in one line for people, of the log with that name where it names none."""
+        """Return the check's result as one line of text; `log` is the log's name where the result has none."""
         place = f"{name}: " if (name := self.log or log) else ""
         remedy = f"; {self.remedy}" if self.remedy else ""
         return f"{self.severity}: {place}{self.message}{remedy}"

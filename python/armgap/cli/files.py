@@ -273,7 +273,7 @@ def _same_input(output: _Named, given: _Named) -> bool:
 
 
 def _same_output(output: _Named, other: _Named) -> bool:
-    """Two results may both be thrown away, and nothing else."""
+    """Whether two results for the same place clash; only those that are thrown away do not."""
     if output.path == other.path == STANDARD_STREAM:
         return True
     null = status_of(os.devnull)

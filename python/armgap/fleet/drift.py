@@ -320,7 +320,7 @@ class _Equations:
     correlation: float
 
     def whitened(self, x: Array) -> Array:
-        """Columns less what the visit before lets expect of them (Prais and Winsten 1954)."""
+        """Return columns without their autocorrelation from visit to visit (Prais and Winsten 1954)."""
         white = x.astype(np.float64)
         white[..., 1:] -= self.correlation * x[..., :-1]
         white[..., 0] *= np.sqrt(1.0 - self.correlation**2)

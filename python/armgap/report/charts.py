@@ -51,7 +51,7 @@ def figure(title: str, x_label: str, y_label: str, **options: Any) -> Any:
 
 
 def _tools(f: Any) -> None:
-    """Drag over a stretch to zoom in; the wheel alone goes on scrolling the page."""
+    """Return the tools of a chart: drag over a stretch to zoom in; the wheel alone goes on scrolling the page."""
     from bokeh.models import BoxZoomTool, PanTool, ResetTool, SaveTool, WheelZoomTool
 
     wheel, box = WheelZoomTool(dimensions="width", modifiers="ctrl"), BoxZoomTool(dimensions="width")

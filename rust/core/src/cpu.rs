@@ -65,10 +65,10 @@ pub struct Level(InstructionSet);
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum InstructionSet {
     Portable,
-    /// Made by [`Level::detect`] alone, where the processor has them.
+    /// AVX2 and FMA, where the processor has them; made by [`Level::detect`] alone.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     Avx2,
-    /// Made by [`Level::widest`] alone, where the processor has them and AVX2.
+    /// AVX-512, where the processor has it and AVX2; made by [`Level::widest`] alone.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     Avx512,
 }

@@ -96,7 +96,7 @@ def _misses(t: Array, even: Array, q: Array) -> tuple[Array, Array, Array]:
 
 
 def _middle(values: Array) -> float:
-    """Return the mean square of all misses but the largest tenth, so that blows do not decide."""
+    """Return the mean square of the smaller nine tenths of the interpolation errors, so that impacts do not decide."""
     values = np.abs(values)
     chosen = values[values <= np.quantile(values, 0.9)]
     return float(chosen @ chosen) / max(len(chosen), 1)

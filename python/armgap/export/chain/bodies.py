@@ -62,7 +62,7 @@ class Bodies:
 
     @property
     def same_torques(self) -> bool:
-        """Whether the torques are those found."""
+        """Whether bodies with these links need the same torques as the parameters that were estimated."""
         return bool(np.all(self.torque_error < BODY_TOLERANCE))
 
 

@@ -178,7 +178,7 @@ def _if_all(
     t: str,
     used: Sequence[str] = (),
 ) -> tuple[str, ...] | None:
-    """Return columns that are used only where all joints have one, on the clock of `t` and not `used` already; those that are asked for must be."""
+    """Return one column per joint if all joints have one on the clock of `t` that is not in `used`; a missing one that `mapping` names is an error."""
     wanted = [f"{prefix}{j}" for j in range(1, n + 1)]
     needed = any(key in mapping for key in wanted)
     found = None

@@ -19,7 +19,7 @@ _AFTER: ModelLabel = ("with causes", "after", charts.AFTER)
 
 
 def model_labels(data: Data) -> tuple[ModelLabel, ...]:
-    """Name, key and colour of each model; without causes the third is the second again and left out."""
+    """Return name, key and colour of the nominal, the re-estimated and the corrected arm; without causes the corrected one is left out."""
     return (_BEFORE, _REFIT, _AFTER) if data.get("causes") else (_BEFORE, _REFIT)
 
 

@@ -76,7 +76,7 @@ class EffectParameter:
 
 
 def answer(case: SealedCase) -> Answer:
-    """Fit everything at once and name what moved."""
+    """Estimate all parameters of the MuJoCo model at once and name those that differ from their nominal values."""
     sysid = _sysid()
     arm, windows = case.arm, _windows(case)
     effect_parameters = _effect_parameters(arm, windows)

@@ -25,7 +25,7 @@ pub(super) struct SpatialInertia<V> {
 }
 
 impl<V: Number> SpatialInertia<V> {
-    /// Of nothing.
+    /// The inertia of a link without mass.
     #[inline(always)]
     pub(super) fn zero() -> Self {
         Self { mass: zero(), first: [zero(); 3], second: [zero(); 6] }

@@ -12,7 +12,7 @@ pub struct InputSegment<T> {
     pub start: T,
     /// Half-way to the next sample.
     pub middle: T,
-    /// Just before the next sample.
+    /// Value just before the next sample.
     pub end: T,
 }
 

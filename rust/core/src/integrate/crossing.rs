@@ -189,7 +189,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         Located { length: s * dt, reached }
     }
 
-    /// Integrates to where a distance vanishes, by Newton's method; `beyond` gives it and its rate.
+    /// Integrates to where a distance, as from a joint limit, vanishes, by Newton's method; `beyond` gives it and its rate.
     pub(super) fn locate_crossing(
         &self,
         &TrialStep { state, x, dt, k1 }: &TrialStep<'_, T, N>,

@@ -11,7 +11,7 @@ use crate::filter::Cutoff;
 use crate::real::Real;
 use nalgebra::{SMatrix, SVector};
 
-/// State of the scheme. Of the matrices over all parameters only the inertial columns are used.
+/// State of the filtered dynamic model: its filters, and the last sample. Of the matrices over all parameters only the inertial columns are used.
 #[derive(Debug, Clone, Copy)]
 pub struct FilteredDynamic<T: Real, const N: usize, const P: usize> {
     steps: SegmentCoefficients<T>,

@@ -8,7 +8,7 @@ use crate::filter::Cutoff;
 use crate::real::{Real, lit};
 use nalgebra::{SMatrix, SVector};
 
-/// State of the scheme. Of the rows over all parameters only the inertial entries are used.
+/// State of the filtered power model: its filters, and the last sample. Of the rows over all parameters only the inertial entries are used.
 #[derive(Debug, Clone, Copy)]
 pub struct FilteredPower<T: Real, const N: usize, const P: usize> {
     steps: SegmentCoefficients<T>,

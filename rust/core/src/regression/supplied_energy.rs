@@ -10,7 +10,7 @@ use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 use nalgebra::{SMatrix, SVector};
 
-/// State of the scheme.
+/// State of the supplied energy model: integrals since the first sample, and the last sample.
 #[derive(Debug, Clone, Copy)]
 pub struct SuppliedEnergy<T: Real, const N: usize, const P: usize> {
     first: SVector<T, P>,

@@ -139,7 +139,7 @@ fn path<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     }
 }
 
-/// Least squares of both phases, for several frequencies that follow each other.
+/// The periodogram of a residual over position: least squares of a sine and a cosine at evenly spaced frequencies.
 struct Spectrum<'a> {
     paths: &'a [Path],
     /// The first frequency, in cycles per radian or metre times 2 pi, and their distance.

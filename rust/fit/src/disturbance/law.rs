@@ -129,8 +129,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         [1.0, -1.0].map(of_side).into_iter().filter(|trial| !trial.guesses.is_empty()).collect()
     }
 
-    /// The law of a trial, if it explains what its pushes explain, and by how much its information criterion is the lower; the others are in
-    /// the logs.
+    /// The law that stands for the pushes of a trial, if it explains the logs as well as they do, and by how much its information criterion is
+    /// lower. Pushes that are not of this trial are taken to have acted in either case.
     fn law_of(&self, trial: &Trial, pushed: &Explanation<N, P>) -> Option<(f64, Cause)> {
         let all = self.of_all_windows();
         let model = &pushed.fit.hypothesis;

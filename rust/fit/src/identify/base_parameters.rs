@@ -107,7 +107,7 @@ struct Basis {
 }
 
 impl Basis {
-    /// Takes the next column.
+    /// Takes the regressor's next column: as an independent one, or with its shares of those before it.
     fn take(&mut self, parameter: usize, column: &[f64]) {
         let (length, mut rest) = (norm(column), column.to_vec());
         let mut along = vec![0.0; self.q.len()];

@@ -25,7 +25,7 @@ pub struct DiagnosisContext<A, const N: usize, const P: usize> {
     pub scales: Scales<N>,
     /// Windows the hypotheses are fitted to.
     pub training: WindowSet<N>,
-    /// Windows they are judged on.
+    /// Windows of the holdout, on which causes are judged.
     pub holdout: WindowSet<N>,
     /// Standard deviation of the position measurement.
     pub noise: [f64; N],

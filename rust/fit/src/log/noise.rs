@@ -20,7 +20,7 @@ const STRIDES: [usize; 6] = [1, 2, 3, 4, 5, 6];
 /// few hundred places, scatter by less.
 const CLEARLY: f64 = 0.75;
 
-/// Places at most: the estimate is then good to three percent.
+/// Samples of a log at most around which its noise is estimated: the estimate is then good to three percent.
 const PLACES: usize = 4000;
 
 /// Rows at which the value changes, at least, for them to be a series of their own.

@@ -31,7 +31,7 @@ pub struct ArmDescription {
 /// A rotor behind a smaller gear ratio than this rides on the joints before it.
 const RIDES: f64 = 2.0;
 
-/// Something to be done with an arm whose size is known at compile time.
+/// A computation with an arm whose numbers of joints and parameters the compiler knows.
 pub trait WithArm {
     /// Result.
     type Output;

@@ -18,7 +18,7 @@ const SLOW_NOISE: f64 = 4.0;
 
 /// Residual torque at one sample.
 pub struct InverseDynamicsResidual<const N: usize> {
-    /// Its time, s.
+    /// Time of the sample, s.
     pub t: f64,
     /// Position, velocity and acceleration.
     pub motion: [SVector<f64, N>; 3],

@@ -40,7 +40,7 @@ pub struct Values {
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 #[serde(untagged)]
 pub enum CauseValue {
-    /// Of a cause on one joint, on a row over two, or on the whole arm.
+    /// Value of a cause on one joint, on two coupled joints, or on the whole arm.
     One(Value),
     /// Of the same law on several joints.
     Each(Values),
@@ -92,7 +92,7 @@ pub struct Diagnosis {
     pub causes: Vec<Cause>,
     /// What was found and is not fit to be named.
     pub candidates: Vec<Candidate>,
-    /// What was looked for and not found.
+    /// Effects that were looked for and not found.
     pub ruled_out: Vec<RuledOut>,
     /// The arm's parameters.
     pub parameters: Parameters,

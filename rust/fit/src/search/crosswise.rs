@@ -13,7 +13,7 @@ use crate::search::belief::left_over;
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 
-/// Stretches per log, if it is long enough.
+/// Stretches that interleaved cross-validation cuts a log into, if it is long enough.
 const STRETCHES: usize = 6;
 
 /// Windows in a stretch at least.

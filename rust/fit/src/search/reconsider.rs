@@ -125,7 +125,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         as_good.min_by_key(|(swapped, _)| size(swapped)).map(|(_, rival)| rival)
     }
 
-    /// The search up to the node in which a rival was passed over, and the node after it instead.
+    /// Takes the search back to the node that chose another candidate than this rival, and continues it with the rival in its place.
     fn back_to(
         &self,
         search: &ModelSearch<N, P>,

@@ -41,7 +41,7 @@ impl RowTerm {
         }
     }
 
-    /// Name for people.
+    /// Name in reports.
     pub fn title(&self) -> &'static str {
         match self.law {
             RowLaw::Transmission(_) => "transmission that couples two joints",
