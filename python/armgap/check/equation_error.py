@@ -157,7 +157,7 @@ class EquationError:
         return self._solve(low, high, self.moment * factors[:, None], square, np.maximum(square, 1e-30))
 
     def of_torques(self, fit: Fit) -> Fit:
-        """Return a fit with its shares taken of the torques alone."""
+        """Return the same fit, its errors relative to the torques alone."""
         return replace(fit, share=fit.share * self.scale / np.maximum(self.square, 1e-30))
 
     def _solve(self, low: Array, high: Array, moment: Array, square: Array, scale: Array) -> Fit:

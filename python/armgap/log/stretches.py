@@ -130,7 +130,7 @@ def _step(values: NDArray[np.float64]) -> float:
 
 
 def _ranges(speeds: Sequence[_Speeds]) -> _Ranges:
-    """Return ranges from a view of the logs that is as thin as the speeds are."""
+    """Return ranges of samples, chosen from speeds that stand for several samples each."""
     tops = [np.quantile(np.abs(s.of(slice(0, len(s.log)))[0]), 0.999, axis=0) for s in speeds]
     q = [s.log.q[:: s.stride] for s in speeds]
     tau = [_load(s.log, slice(None, None, s.stride)) for s in speeds]

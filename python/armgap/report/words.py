@@ -294,7 +294,7 @@ def verdict(data: Data) -> str:
 
 
 def _contradiction(data: Data) -> str:
-    """What contradicts what, and the remedy."""
+    """Say which columns and which lines of the arm file contradict each other, and the remedy."""
     found = _errors(data)
     if not found:
         return _VERDICTS["input"]

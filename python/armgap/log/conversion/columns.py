@@ -178,7 +178,7 @@ def _if_all(
     t: str,
     used: Sequence[str] = (),
 ) -> tuple[str, ...] | None:
-    """Return one column per joint if all joints have one on the clock of `t` that is not in `used`; a missing one that `mapping` names is an error."""
+    """Return one column per joint if all have one on the clock of `t` that is not in `used`; a missing one that `mapping` names is an error."""
     wanted = [f"{prefix}{j}" for j in range(1, n + 1)]
     needed = any(key in mapping for key in wanted)
     found = None

@@ -323,7 +323,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
     }
 
-    /// Resolves lane `l`'s step; returns whether the lane is at the end of its interval.
+    /// Accepts the step that lane `l` has tried, or cuts it at an event; returns whether the lane is at the end of its interval.
     #[inline(never)]
     fn judge(&mut self, l: usize) -> bool {
         let (i, lane) = (l / W, l % W);

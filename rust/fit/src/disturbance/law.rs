@@ -51,7 +51,7 @@ struct PushedMotion<'a> {
     push: [f64; 3],
     /// Sample times from about one duration before to one after it.
     t: &'a [f64],
-    /// The joint's positions then.
+    /// The joint's positions at the times of the pushes.
     q: &'a [f64],
     /// Mean command from each of those samples to the next.
     torque: &'a [f64],

@@ -69,7 +69,7 @@ pub struct Conclusion<const N: usize, const P: usize> {
 }
 
 impl<const N: usize, const P: usize> Conclusion<N, P> {
-    /// The attribution of the logs as they are.
+    /// The attribution without external disturbances.
     pub fn without_disturbances(&self) -> &Attribution<N, P> {
         self.alone.as_ref().unwrap_or(&self.attribution)
     }

@@ -125,7 +125,7 @@ pub struct SearchNode<const N: usize, const P: usize> {
 struct FinalRound<const N: usize, const P: usize> {
     base: Candidate<P>,
     candidates: Vec<Candidate<P>>,
-    /// Weights by the best candidate's residual, where that called for others.
+    /// Weights of the windows under the best candidate, where they differ from those that the candidates were compared under.
     weights: Option<SplitWeighting<N>>,
 }
 

@@ -48,7 +48,7 @@ pub struct Middle<const N: usize> {
     pub ddq: [f64; N],
     /// Mean velocities: differences of positions.
     pub mean_dq: [f64; N],
-    /// Mean torques.
+    /// Mean torques over the interval.
     pub tau: [f64; N],
     /// Whether each joint is at rest.
     pub rest: [bool; N],
