@@ -147,7 +147,7 @@ struct Spectrum<'a> {
     step: f64,
 }
 
-/// One number for each frequency.
+/// One number for each frequency of a batch.
 type Each = [f64; BATCH];
 
 impl Kernel for Spectrum<'_> {

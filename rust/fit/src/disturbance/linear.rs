@@ -44,7 +44,7 @@ pub struct Linear<'a, const N: usize> {
     pub residual: &'a Residual<N>,
     /// Share of the time that each joint moves at each point.
     pub moving: Vec<Vec<f64>>,
-    /// Standard deviation per joint and point.
+    /// Standard deviation of the residual torque, per joint and grid point.
     scatter: Vec<Vec<f64>>,
 }
 

@@ -16,7 +16,7 @@ pub(super) struct Own<'a, A, const N: usize, const P: usize> {
 }
 
 impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> Own<'a, A, N, P> {
-    /// The recording whose pieces lie at `places` of a study.
+    /// The recording whose stretches are the logs at `places` of the diagnosis context `whole`.
     pub fn new(
         whole: &'a DiagnosisContext<A, N, P>,
         places: &'a [Place],

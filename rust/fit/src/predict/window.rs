@@ -256,7 +256,7 @@ pub struct InitialStateOffset<const N: usize> {
 }
 
 impl<const N: usize> InitialStateOffset<N> {
-    /// No offset.
+    /// An initial state without offset.
     pub fn none() -> Self {
         Self { q: SVector::zeros(), dq: SVector::zeros() }
     }
