@@ -39,9 +39,6 @@ _UNPREDICTED = (0.3, 0.4)
 _DRIVEN = 0.1
 # Shifts of the torques under which predictions that come right are no sign of other columns [samples].
 _SHIFTS = (-8, -5, -2, 2, 5, 8)
-# A limit of the drive counts in their place if it leaves less than this of every joint's torque. Drives that are limited leave 0.03 at most, torques
-# played backwards 0.31 and more at their best limit of size or rate (four development cases each).
-_LIMITED = 0.2
 # Turns of a fit beside elastic torques. One that takes most of a torque is found in the first; after five no share changed by more than 0.02 on
 # nine development cases (columns of another arm 0.5 to 1.1, a spring 0.7 before and 0.09 after).
 _TURNS = 5
@@ -171,7 +168,7 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
     """
     worst = int(np.argmax(share))
     logs = [*now.training, *now.holdout]
-    if share[worst] < _UNRELATED[pair] or torque_unit.limited(logs, now.arm, worst).share.max() < _LIMITED:
+    if share[worst] < _UNRELATED[pair] or torque_unit.limited(logs, now.arm, worst).share.max() < torque_unit.LIMITED:
         return []
     period = float(np.median(np.diff(logs[0].t)))
     readings = [Corrections(), *(Corrections(shift={"tau": k * period}) for k in _SHIFTS)]
