@@ -132,6 +132,14 @@ def test_a_drive_that_saturates_far_below_its_command_has_no_other_unit(arm: Arm
     assert not any(c.check == "torque_unit" for c in checked(logs, arm))
 
 
+@pytest.mark.parametrize("level", [0.6, 1.5])
+def test_columns_in_another_unit_before_a_drive_that_saturates(arm: Arm, level: float) -> None:
+    logs = carried(arm, Effect("torque_saturation", 2, {"level": level}), scale=3.0)
+    [check] = checked(read_as(logs, factor={"tau1": 12.5, "tau2": 12.5}), arm)
+    assert (check.check, check.severity) == ("torque_unit", "repaired")
+    assert float(check.remedies[0].removeprefix("--factor tau=")) == pytest.approx(0.08, rel=0.05)
+
+
 def switched(t: np.ndarray, seed: int) -> np.ndarray:
     """Torques that switch between two levels and nothing at random instants, before 0.4 s have passed."""
     rng = np.random.default_rng(seed)
