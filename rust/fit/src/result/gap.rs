@@ -42,8 +42,8 @@ const CONSISTENT: f64 = 1.5;
 const TORQUE_SHARE: f64 = 4.0 * 36.0;
 
 /// Share of the windows that displaced initial states have to explain before any is taken to be: where most are not explained, those that seem to be
-/// are the ones in which the model errs least, and what it misses by there is not what their initial states err by. With 0.7 one joint fewer of 29
-/// has a floor that is right.
+/// are the ones in which the model errs least, and what it misses by there is not what their initial states err by. With 0.7 as many of 42 floors are
+/// right, with 0.9 one fewer.
 const MAJORITY: f64 = 0.5;
 
 /// The three hypotheses a report compares.
