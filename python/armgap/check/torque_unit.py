@@ -47,8 +47,8 @@ _CLEAR_GAIN = 0.5
 # it. Where there is one, predictions have to agree.
 _LEFT = 0.3
 # Where a factor leaves this share of a torque, a limit of the drive is tried before it, and taken where it leaves less than half: sound logs and
-# factors alone leave 0.02 at most, drives that saturate 0.2 to 0.6 and behind their limit 0.01 to 0.05 (five development cases of six; 0.35 in one that
-# is hardly ever below its limit).
+# factors alone leave 0.02 at most, drives that saturate 0.2 to 0.6 and behind their limit 0.01 to 0.05 (five development cases of six; 0.35 in one
+# that is hardly ever below its limit).
 _LIMIT_TRIED = 0.1
 _LIMIT_TAKEN = 0.5
 # Share of a torque below which its factor is known as well as it can be: what is off then are the values of the arm file.
