@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check.check import Check, Severity
+from armgap.check.elastic import beside_elasticity
 from armgap.check.equation_error import EquationError, Fit, Rows, bounds
 from armgap.log.log import Log
 from armgap.several_joints import by_joint
@@ -46,11 +47,11 @@ _CLEAR_GAIN = 0.5
 # A joint of whose torque it leaves more than this share says nothing of a factor: noise that a controller feeds back, or a stop, has made most of
 # it. Where there is one, predictions have to agree.
 _LEFT = 0.3
-# Where a factor leaves this share of a torque, a limit of the drive is tried before it, and taken where it leaves less than half: sound logs and
-# factors alone leave 0.02 at most, drives that saturate 0.2 to 0.6 and behind their limit 0.01 to 0.05 (five development cases of six; 0.35 in one
-# that is hardly ever below its limit).
-_LIMIT_TRIED = 0.1
-_LIMIT_TAKEN = 0.5
+# Where a factor leaves this share of a torque, a limit of the drive or an elastic torque is tried beside it, and taken where it leaves less than half:
+# sound logs and factors alone leave 0.02 at most, drives that saturate 0.2 to 0.6 and behind their limit 0.01 to 0.05 (five development cases of six;
+# 0.35 in one that is hardly ever below its limit), springs and stops 0.1 to 0.4 and less than 0.03 beside the elastic torque (three of five).
+_CHANGE_TRIED = 0.1
+_CHANGE_TAKEN = 0.5
 # Share of a torque below which its factor is known as well as it can be: what is off then are the values of the arm file.
 _LEAST_SHARE = 1e-3
 # Quantiles of a torque's size that a drive's limit may be at: a limit between two of them still explains what no factor does.
@@ -97,8 +98,8 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
     applied = np.where(np.isin(np.arange(len(factors)), odd), factors, 1.0)
     if shared:
         odd = list(range(len(factors)))
-        # Where the limit lies is known to some percent, and the factor behind it no better.
-        says = known & ~read.at_limit if np.any(known & ~read.at_limit) else known
+        # Where a limit lies is known to some percent, and the factor behind it no better.
+        says = known & ~read.changed if np.any(known & ~read.changed) else known
         applied = np.full(len(factors), _common(factors[says], read.share[says]))
     fit = base.with_factors(low, high, applied)
     gain = base.with_factors(low, high, np.ones_like(applied)).cost - fit.cost
@@ -130,34 +131,51 @@ def limited(logs: Sequence[Log], arm: Arm, joint: int) -> Fit:
 
 @dataclass(frozen=True)
 class _Reading:
-    """Factors of torques, the share of each that they leave, and the joints that they are read of behind a limit of the drive."""
+    """Factors of torques, the share of each that they leave, and the joints whose torques were taken otherwise than they are logged."""
 
     errors: EquationError
     factors: NDArray[np.float64]
     share: NDArray[np.float64]
-    at_limit: NDArray[np.bool_]
+    changed: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, errors: EquationError, low: NDArray[np.float64], high: NDArray[np.float64], changed: Any) -> _Reading:
+        """Read the factors off an equation error, parameters within bounds."""
+        factors = _factors(errors, low, high)
+        return cls(errors, factors, errors.with_factors(low, high, factors).share, np.asarray(changed, dtype=bool))
+
+    def explains(self, joint: int, before: _Reading) -> bool:
+        """Whether this leaves so little of a joint's torque that its change is the reason of what was left before."""
+        enough = self.share[joint] < min(LIMITED, _CHANGE_TAKEN * before.share[joint])
+        return bool(enough and np.all(self.factors > 0))
 
 
 def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
     """Return the factors of the torques.
 
-    A column in another unit may stand before a drive that is limited: what such a joint's motion says of a factor shows only behind the limit.
+    A column in another unit may stand before a drive that is limited, or on a joint with a spring or a stop: what such a joint's motion says of a
+    factor shows only behind the limit, or beside the elastic torque.
     """
     low, high = bounds(arm, _TRUST)
 
-    def read(errors: EquationError, at_limit: NDArray[np.bool_]) -> _Reading:
+    def model(errors: EquationError) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         factors = _factors(errors, low, high)
-        return _Reading(errors, factors, errors.with_factors(low, high, factors).share, at_limit)
+        return errors.with_factors(low, high, factors).theta, factors
 
-    now = read(base, np.zeros(arm.n_joints, dtype=bool))
+    now = _Reading.of(base, low, high, np.zeros(arm.n_joints))
     if all(_within(c, _GAIN) for c in now.factors):
         return now
-    for joint in np.flatnonzero(now.share >= _LIMIT_TRIED):
-        at_limit = now.at_limit | (np.arange(arm.n_joints) == joint)
-        tried = [(delivered, read(errors, at_limit)) for delivered, errors in _at_limits(logs, arm, int(joint))]
-        delivered, best = min(tried, key=lambda entry: float(entry[1].share[joint]))
-        if best.share[joint] < min(LIMITED, _LIMIT_TAKEN * now.share[joint]) and np.all(best.factors > 0):
+    for joint in range(arm.n_joints):
+        if now.share[joint] < _CHANGE_TRIED:
+            continue
+        changed = now.changed | (np.arange(arm.n_joints) == joint)
+        at_limits = [(delivered, _Reading.of(e, low, high, changed)) for delivered, e in _at_limits(logs, arm, joint)]
+        delivered, best = min(at_limits, key=lambda entry: float(entry[1].share[joint]))
+        if best.explains(joint, now):
             logs, now = delivered, best
+            continue
+        beside = _Reading.of(beside_elasticity(now.errors, logs, model, [joint]), low, high, changed)
+        now = beside if beside.explains(joint, now) else now
     return now
 
 
