@@ -47,7 +47,7 @@ _CLEAR_GAIN = 0.5
 # A joint of whose torque it leaves more than this share says nothing of a factor: noise that a controller feeds back, or a stop, has made most of
 # it. Where there is one, predictions have to agree.
 _LEFT = 0.3
-# Where a factor leaves this share of a torque, a limit of the drive or an elastic torque is tried beside it, and taken where it leaves less than half:
+# Where a factor leaves this share of a torque, a limit of the drive or an elastic torque is tried beside it, and taken where it halves that share:
 # sound logs and factors alone leave 0.02 at most, drives that saturate 0.2 to 0.6 and behind their limit 0.01 to 0.05 (five development cases of six;
 # 0.35 in one that is hardly ever below its limit), springs and stops 0.1 to 0.4 and less than 0.03 beside the elastic torque (three of five).
 _CHANGE_TRIED = 0.1
