@@ -44,3 +44,13 @@ def sines(t: np.ndarray, seed: int) -> np.ndarray:
     draw = np.random.default_rng(seed)
     speed, phase = 2 * np.pi * draw.uniform(0.4, 2.6, (2, 5)), draw.uniform(0, 6.28, (2, 5))
     return np.sin(t[:, None, None] * speed + phase).sum(axis=2) * [18.0, 2.1]
+
+
+def carried(arm: Arm, *hidden: Effect, scale: float = 1.0) -> list[Log]:
+    """Logs of an arm with strong effects."""
+    t = np.arange(2400) * arm.sample_period
+    torques = [scale * sines(t, seed) for seed in (3, 4)]
+    return [
+        simulate(off(arm), t, tau, effects=list(hidden), noise=2e-5, seed=seed, name=f"run {seed}")
+        for seed, tau in enumerate(torques)
+    ]

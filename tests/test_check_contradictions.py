@@ -9,14 +9,14 @@ import pytest
 
 from armgap import Arm, Log, diagnose, simulate
 from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, time_shift, torque_unit
-from armgap.check.contradiction import READINGS, Refit, screen
+from armgap.check.contradiction import READINGS, Refit
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.check.stage import unexplained_columns
 from armgap.diagnosis.diagnosis import _ambiguous_lag, _hidden_delay
 from armgap.diagnosis.prepared_input import prepare
 from armgap.errors import ColumnError, OptionError
 from armgap.simulation import Effect
-from swings import off, sines, swing
+from swings import carried, off, sines, swing
 
 
 @pytest.fixture(scope="module")
@@ -109,55 +109,6 @@ def test_a_factor_on_a_torque_column(two_links: list[Log], arm: Arm, factor: flo
     assert (check.check, check.severity, check.joint) == ("torque_unit", "repaired", 2)
     found = float(check.remedy.removeprefix("--factor tau2="))
     assert found * factor == pytest.approx(1.0, abs=0.15)
-
-
-def carried(arm: Arm, *hidden: Effect, scale: float = 1.0) -> list[Log]:
-    """Logs of an arm with strong effects."""
-    t = np.arange(2400) * arm.sample_period
-    torques = [scale * sines(t, seed) for seed in (3, 4)]
-    return [
-        simulate(off(arm), t, tau, effects=list(hidden), noise=2e-5, seed=seed, name=f"run {seed}")
-        for seed, tau in enumerate(torques)
-    ]
-
-
-def test_a_drive_that_saturates_far_below_its_command_has_no_other_unit(arm: Arm) -> None:
-    logs = carried(arm, Effect("torque_saturation", 2, {"level": 0.6}), scale=3.0)
-    base = EquationError([Rows.of(log, arm) for log in logs], arm)
-    assert (
-        not 0.5
-        < base.size_of(base.with_factors(*bounds(arm, 2.0), base.expected()).theta)[1] * base.expected()[1]
-        < 2.0
-    )
-    assert not any(c.check == "torque_unit" for c in checked(logs, arm))
-
-
-def switched(t: np.ndarray, seed: int) -> np.ndarray:
-    """Torques that switch between two levels and nothing at random instants, before 0.4 s have passed."""
-    rng = np.random.default_rng(seed)
-    tau = np.zeros((len(t), 2))
-    for j, level in enumerate((45.0, 4.5)):
-        starts = np.cumsum(rng.uniform(0.15, 0.38, 100))
-        tau[:, j] = rng.choice([-level, -0.5 * level, 0.5 * level, level], 101)[np.searchsorted(starts, t)]
-    return tau
-
-
-def test_a_drive_that_slews_far_behind_its_command_has_no_other_columns(arm: Arm) -> None:
-    t = np.arange(2400) * arm.sample_period
-    logs = []
-    for seed in (3, 4):
-        command = switched(t, seed)
-        delivered = command.copy()
-        for k in range(1, len(t)):
-            step = 60.0 * (t[k] - t[k - 1])
-            delivered[k, 0] = delivered[k - 1, 0] + np.clip(command[k, 0] - delivered[k - 1, 0], -step, step)
-        moved = simulate(off(arm), t, delivered, noise=2e-5, seed=seed, name=f"run {seed}")
-        logs.append(replace(moved, tau=command))
-    base = EquationError([Rows.of(log, arm) for log in logs], arm)
-    assert screen(base, logs, arm)[0].share[0] > 0.5
-    assert not any(c.severity in ("error", "repaired") for c in checked(logs, arm))
-    exchanged = [replace(log, tau=-log.tau[::-1].copy()) for log in logs]
-    assert any(c.check == "joint_order" for c in checked(exchanged, arm)), "torques of another run belong to no arm"
 
 
 @pytest.mark.parametrize(

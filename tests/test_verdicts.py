@@ -66,6 +66,19 @@ def test_known_noise_is_the_floor(pendulum: Arm, seed: int) -> None:
     assert 0.7 < floor / before < 1.4
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("off_by", [0.02, 0.04])
+def test_a_model_that_is_wrong_raises_no_floor(pendulum: Arm, seed: int, off_by: float) -> None:
+    """A weight that is off and trusted: most windows are missed by more than their starts, and the others by no less for that."""
+    logs = swing(pendulum, seed), swing(pendulum, seed + 10)
+    trusted = replace(pendulum, sigma=np.full(len(pendulum.theta), 1e-9))
+    wrong = replace(trusted, theta=pendulum.theta * np.where(np.arange(len(pendulum.theta)) == 1, 1.0 + off_by, 1.0))
+    [true] = as_they_stand(trusted, *logs, max_causes=0)["gap"]["before"]
+    gap = as_they_stand(wrong, *logs, max_causes=0)["gap"]
+    assert gap["after"][0] > 3.0 * true
+    assert 0.7 < gap["floor"][0] / true < 1.4
+
+
 @pytest.fixture(scope="module")
 def turned(pendulum: Arm) -> dict[str, Any]:
     """An arm file whose gravity pulls the other way."""

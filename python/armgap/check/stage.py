@@ -13,6 +13,7 @@ from armgap.arm.corrections import Corrections
 from armgap.check import dead_stretch, time_shift, torque_is_position, torque_unit
 from armgap.check.check import Check
 from armgap.check.contradiction import BETTER, EXPLAINS, Found, Refit, Suspect, confirm, screen
+from armgap.check.elastic import beside_elasticity
 from armgap.check.equation_error import EquationError, Fit, Rows, bounds
 from armgap.log.log import Log
 from armgap.progress import report_progress
@@ -39,14 +40,6 @@ _UNPREDICTED = (0.3, 0.4)
 _DRIVEN = 0.1
 # Shifts of the torques under which predictions that come right are no sign of other columns [samples].
 _SHIFTS = (-8, -5, -2, 2, 5, 8)
-# A limit of the drive counts in their place if it leaves less than this of every joint's torque. Drives that are limited leave 0.03 at most, torques
-# played backwards 0.31 and more at their best limit of size or rate (four development cases each).
-_LIMITED = 0.2
-# Turns of a fit beside elastic torques. One that takes most of a torque is found in the first; after five no share changed by more than 0.02 on
-# nine development cases (columns of another arm 0.5 to 1.1, a spring 0.7 before and 0.09 after).
-_TURNS = 5
-# Positions are taken together in so many classes where a torque may be any function of them that does not fall.
-_CLASSES = 50
 
 
 @dataclass(frozen=True)
@@ -171,7 +164,7 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
     """
     worst = int(np.argmax(share))
     logs = [*now.training, *now.holdout]
-    if share[worst] < _UNRELATED[pair] or torque_unit.limited(logs, now.arm, worst).share.max() < _LIMITED:
+    if share[worst] < _UNRELATED[pair] or torque_unit.limited(logs, now.arm, worst).share.max() < torque_unit.LIMITED:
         return []
     period = float(np.median(np.diff(logs[0].t)))
     readings = [Corrections(), *(Corrections(shift={"tau": k * period}) for k in _SHIFTS)]
@@ -187,37 +180,12 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
 
 
 def _beside_elasticity(base: EquationError, logs: Sequence[Log], arm: Arm) -> Fit:
-    """Fit the arm by turns with a torque on every joint that does not fall with its position: an offset, springs, contacts."""
-    q = np.concatenate([log.q[rows.samples] for log, rows in zip(logs, base.rows, strict=True)])
-    ends = np.cumsum([len(rows.y) for rows in base.rows])[:-1]
-    torques = [rows.y for rows in base.rows]
-    for _ in range(_TURNS):
-        theta = base.fit(*bounds(arm), torques).theta
-        left = np.concatenate([rows.y - rows.psi @ theta for rows in base.rows])
-        elastic = np.stack([_rising(x, y) for x, y in zip(q.T, left.T, strict=True)], axis=1)
-        torques = [rows.y - part for rows, part in zip(base.rows, np.split(elastic, ends), strict=True)]
-    return base.fit(*bounds(arm), torques)
+    """Fit the arm beside elastic torques on every joint."""
 
+    def model(errors: EquationError) -> tuple[Array, Array]:
+        return errors.fit(*bounds(arm)).theta, np.ones(arm.n_joints)
 
-def _rising(x: Array, y: Array) -> Array:
-    """Return the function of `x` that never falls and is closest to `y`: isotonic regression by pooling adjacent violators (Barlow et al. 1972)."""
-    edges = np.linspace(x.min(), x.max(), _CLASSES + 1)[1:-1]
-    place = np.searchsorted(edges, x)
-    weight = np.bincount(place, minlength=_CLASSES).astype(float)
-    taken = weight > 0
-    middle = np.bincount(place, x, minlength=_CLASSES)[taken] / weight[taken]
-    pools: list[tuple[float, float, int]] = []
-    for mean, count in zip(
-        np.bincount(place, y, minlength=_CLASSES)[taken] / weight[taken], weight[taken], strict=True
-    ):
-        pool = (float(mean), float(count), 1)
-        while pools and pools[-1][0] > pool[0]:
-            before = pools.pop()
-            total = before[1] + pool[1]
-            pool = ((before[0] * before[1] + pool[0] * pool[1]) / total, total, before[2] + pool[2])
-        pools.append(pool)
-    rising = np.repeat([p[0] for p in pools], [p[2] for p in pools])
-    return np.asarray(np.interp(x, middle, rising))
+    return beside_elasticity(base, logs, model).fit(*bounds(arm))
 
 
 def _doubted(arm: Arm, factors: torque_unit.Factors) -> Arm:

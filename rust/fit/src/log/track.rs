@@ -2,7 +2,7 @@
 
 use crate::log::noise::noise;
 use crate::model::hypothesis::EffectInstance;
-use crate::numeric::smooth::{Local, local_cubic};
+use crate::numeric::smooth::{Local, local_cubic, samples_near};
 use armgap_core::arm::Arm;
 use armgap_core::effect::InputSegment;
 use nalgebra::SVector;
@@ -186,14 +186,14 @@ impl<const N: usize> Track<N> {
     /// Positions of joint `j` for cubics around a sample, from the returned one on: without the distance that these accelerations make from
     /// there.
     fn positions_near(&self, j: usize, at: usize, driven: Option<&[f64]>) -> (usize, [f64; WIDEST]) {
-        let first = at.saturating_sub(WIDEST / 2).min(self.len().saturating_sub(WIDEST));
+        let (first, count) = samples_near(&self.t, at, WIDEST / 2);
         let mut positions = [0.0; WIDEST];
-        for (place, q) in positions.iter_mut().zip(&self.q[first..]) {
+        for (place, q) in positions.iter_mut().zip(&self.q[first..first + count]) {
             *place = q[j];
         }
         let Some(driven) = driven else { return (first, positions) };
         let (mut distance, mut speed) = (0.0, 0.0);
-        for k in at + 1..(first + WIDEST).min(self.len()) {
+        for k in at + 1..first + count {
             let (h, a) = (self.t[k] - self.t[k - 1], driven[k - 1]);
             distance += h * (speed + 0.5 * h * a);
             speed += h * a;

@@ -19,10 +19,23 @@ pub struct Local {
     pub misfit: f64,
 }
 
-/// Fits a cubic to the samples within `half` of `at` (fewer at the ends of the log) and evaluates it there.
+/// A step between samples this many times as long as the mean one is a hole in the log, over which no cubic reaches.
+pub const HOLE: f64 = 10.0;
+
+/// First sample and number of samples of those that a cubic of this half width around `at` rests on: `half` on either side, and where the log ends
+/// or has a hole, those missing on the one side are taken on the other.
+pub fn samples_near(t: &[f64], at: usize, half: usize) -> (usize, usize) {
+    let longest = HOLE * (t[t.len() - 1] - t[0]) / (t.len() - 1).max(1) as f64;
+    let joined = |k: usize| t[k + 1] - t[k] <= longest;
+    let low = (at.saturating_sub(2 * half)..at).rev().take_while(|&k| joined(k)).last().unwrap_or(at);
+    let high = (at..(at + 2 * half).min(t.len() - 1)).take_while(|&k| joined(k)).last().map_or(at, |k| k + 1);
+    let count = (2 * half + 1).min(high + 1 - low);
+    (at.saturating_sub(half).clamp(low, high + 1 - count), count)
+}
+
+/// Fits a cubic to the samples within `half` of `at` (fewer at the ends of the log and beside holes in it) and evaluates it there.
 pub fn local_cubic(t: &[f64], q: impl Fn(usize) -> f64, at: usize, half: usize) -> Local {
-    let count = (2 * half + 1).min(t.len());
-    let first = at.saturating_sub(half).min(t.len() - count);
+    let (first, count) = samples_near(t, at, half);
     let scale = (t[first + count - 1] - t[first]).max(f64::MIN_POSITIVE) / 2.0;
     let place = |k: usize| (t[k] - t[at]) / scale;
     // The normal matrix of powers holds their sums only.
@@ -40,7 +53,7 @@ pub fn local_cubic(t: &[f64], q: impl Fn(usize) -> f64, at: usize, half: usize) 
         }
     }
     let normal = Matrix4::from_fn(|i, j| powers[i + j]);
-    let Some(inverse) = normal.try_inverse() else {
+    let Some(inverse) = normal.try_inverse().filter(|_| count > 3) else {
         return Local {
             q: base,
             dq: 0.0,
@@ -64,5 +77,32 @@ pub fn local_cubic(t: &[f64], q: impl Fn(usize) -> f64, at: usize, half: usize) 
         covariance: [inverse[(0, 0)], inverse[(0, 1)] / scale, inverse[(1, 1)] / (scale * scale)],
         ddq_variance: 4.0 * inverse[(2, 2)] / scale.powi(4),
         misfit: if degrees_of_freedom > 0 { squares / degrees_of_freedom as f64 } else { 0.0 },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_cubic_reaches_over_a_hole() {
+        let t: Vec<f64> = (0..200).map(|k| 0.001 * f64::from(k) + if k < 120 { 0.0 } else { 2.0 }).collect();
+        let motion = |k: usize| if k < 120 { 3.0 * t[k] } else { 1.0 - 5.0 * (t[k] - 2.0) };
+        for half in [3, 27] {
+            for (at, rate) in [(116, 3.0), (119, 3.0), (120, -5.0), (125, -5.0)] {
+                let local = local_cubic(&t, motion, at, half);
+                assert!((local.dq - rate).abs() < 1e-6, "{local:?}");
+                assert!(local.covariance[2] > 0.0, "{local:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn samples_missing_on_one_side_are_taken_on_the_other() {
+        let t: Vec<f64> = (0..40).map(f64::from).collect();
+        assert_eq!(samples_near(&t, 20, 3), (17, 7));
+        assert_eq!(samples_near(&t, 1, 3), (0, 7));
+        assert_eq!(samples_near(&t, 38, 3), (33, 7));
+        assert_eq!(samples_near(&t, 20, 30), (0, 40));
     }
 }

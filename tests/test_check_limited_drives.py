@@ -1,0 +1,66 @@
+"""Drives that are limited in size or in rate: no other unit and no other columns, alone or behind columns in another unit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armgap import Arm, Log, simulate
+from armgap.check import Check, Corrections, examine
+from armgap.check.contradiction import screen
+from armgap.check.equation_error import EquationError, Rows, bounds
+from armgap.simulation import Effect
+from swings import carried, off
+
+
+def checked(logs: list[Log], arm: Arm) -> tuple[Check, ...]:
+    return examine(logs[:1], logs[1:], arm).checks
+
+
+def test_a_drive_that_saturates_far_below_its_command_has_no_other_unit(arm: Arm) -> None:
+    logs = carried(arm, Effect("torque_saturation", 2, {"level": 0.6}), scale=3.0)
+    base = EquationError([Rows.of(log, arm) for log in logs], arm)
+    assert (
+        not 0.5
+        < base.size_of(base.with_factors(*bounds(arm, 2.0), base.expected()).theta)[1] * base.expected()[1]
+        < 2.0
+    )
+    assert not any(c.check == "torque_unit" for c in checked(logs, arm))
+
+
+@pytest.mark.parametrize("level", [0.6, 1.5])
+def test_columns_in_another_unit_before_a_drive_that_saturates(arm: Arm, level: float) -> None:
+    logs = carried(arm, Effect("torque_saturation", 2, {"level": level}), scale=3.0)
+    [check] = checked([Corrections(factor={"tau": 12.5}).on_log(log) for log in logs], arm)
+    assert (check.check, check.severity) == ("torque_unit", "repaired")
+    assert float(check.remedies[0].removeprefix("--factor tau=")) == pytest.approx(0.08, rel=0.05)
+
+
+def switched(t: np.ndarray, seed: int) -> np.ndarray:
+    """Torques that switch between two levels and nothing at random instants, before 0.4 s have passed."""
+    rng = np.random.default_rng(seed)
+    tau = np.zeros((len(t), 2))
+    for j, level in enumerate((45.0, 4.5)):
+        starts = np.cumsum(rng.uniform(0.15, 0.38, 100))
+        tau[:, j] = rng.choice([-level, -0.5 * level, 0.5 * level, level], 101)[np.searchsorted(starts, t)]
+    return tau
+
+
+def test_a_drive_that_slews_far_behind_its_command_has_no_other_columns(arm: Arm) -> None:
+    t = np.arange(2400) * arm.sample_period
+    logs = []
+    for seed in (3, 4):
+        command = switched(t, seed)
+        delivered = command.copy()
+        for k in range(1, len(t)):
+            step = 60.0 * (t[k] - t[k - 1])
+            delivered[k, 0] = delivered[k - 1, 0] + np.clip(command[k, 0] - delivered[k - 1, 0], -step, step)
+        moved = simulate(off(arm), t, delivered, noise=2e-5, seed=seed, name=f"run {seed}")
+        logs.append(replace(moved, tau=command))
+    base = EquationError([Rows.of(log, arm) for log in logs], arm)
+    assert screen(base, logs, arm)[0].share[0] > 0.5
+    assert not any(c.severity in ("error", "repaired") for c in checked(logs, arm))
+    exchanged = [replace(log, tau=-log.tau[::-1].copy()) for log in logs]
+    assert any(c.check == "joint_order" for c in checked(exchanged, arm)), "torques of another run belong to no arm"
