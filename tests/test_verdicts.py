@@ -28,7 +28,7 @@ PUSHES = [Effect("external_pulse", 1, {"impulse": 0.05, "time": time, "duration"
 
 def as_they_stand(arm: Arm, training: Log, holdout: Log, **options: Any) -> dict[str, Any]:
     """The diagnosis of logs as they are, before anything checks or repairs them."""
-    logs = [[(log.name, log.t, np.ascontiguousarray(log.q), log.tau, [], None, None)] for log in (training, holdout)]
+    logs = [[log.to_native()] for log in (training, holdout)]
     return json.loads(_native.diagnose(arm.to_native(), *logs, {"horizon": 0.25, "max_causes": 4, **options}))
 
 

@@ -26,7 +26,7 @@ __version__: str
 
 _Floats = NDArray[np.float64]
 _Reference = tuple[_Floats, _Floats | None]
-_Log = tuple[str, _Floats, _Floats, _Floats, Sequence[_Floats], _Floats | None, _Reference | None]
+_Log = tuple[str, str, _Floats, _Floats, _Floats, Sequence[_Floats], _Floats | None, _Reference | None]
 
 def arm_kinds() -> list[dict[str, Any]]: ...
 def effects() -> list[dict[str, Any]]: ...

@@ -50,6 +50,8 @@ FAMILIES = (
 #: Widths [rad/s] over which the sign of dry friction is rounded, the same on both joints, and in the family "rounding" another on each.
 WIDTHS = (1e-3, 8e-3)
 WIDE = (1e-3, 5e-2)
+#: Standard deviations [rad] of a joint's encoder zero between recordings, in the families "zeros" and "zeros-null".
+ZEROS = (2e-3, 4e-2)
 
 
 @dataclass
@@ -347,7 +349,9 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
         for p in machine.joints:
             p["width"], p["algebraic"] = _log_uniform(rng, WIDE), float(rng.uniform() < 0.5)
     cluttered = family.startswith("clutter")
-    names = ["train-1", "train-2", "holdout-1"] if cluttered else ["train-1", "holdout-1"]
+    with_zeros = family.startswith("zeros")
+    training = 3 if with_zeros else 2 if cluttered else 1
+    names = [*(f"train-{i + 1}" for i in range(training)), "holdout-1"]
     references = [draw_reference(rng, machine, duration) for _ in names]
     seeds = [int(s) for s in rng.integers(0, 2**31, len(names))]
     nothing = np.zeros(2)
@@ -380,6 +384,9 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
                 p["lag"] = loop
         for p in machine.joints:
             p["late"] = float(rng.uniform(0.0, 1.0)) * machine.period
+    if with_zeros:
+        spread = [_log_uniform(rng, ZEROS) for _ in range(2)]
+        zeros = list(rng.normal(0.0, spread, (len(names), 2)))
     without = [run(machine, r, s, z) for r, s, z in zip(references, seeds, zeros, strict=True)]
     effects: list[dict[str, Any]] = []
     for name, joint in mains:
@@ -402,6 +409,7 @@ def _make(rng: np.random.Generator, family: str, folder: Path, duration: float) 
     _write(folder, names, runs)
     key = {
         "family": family, "design": machine.design, "effects": effects, "clutter": small, "exact": exact,
+        "zeros": np.round(zeros, 6).tolist(),
         "rounding": [{k: p[k] for k in ("width", "algebraic") if k in p} for p in machine.joints],
     }  # fmt: skip
     if cluttered and mains:
@@ -417,6 +425,7 @@ def _draw_mains(rng: np.random.Generator, family: str) -> list[tuple[str, int | 
         "single": known,
         "pair": known,
         "clutter": known,
+        "zeros": known,
         "hidden-state": requests(HIDDEN_STATES),
         "presliding": requests(("presliding",)),
         "outside": requests(OUTSIDE),

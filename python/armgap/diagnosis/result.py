@@ -68,6 +68,22 @@ class GapAtHorizon:
 
 
 @dataclass(frozen=True)
+class SecondHalves:
+    """RMS position error per joint on the second half of each holdout log, with the named causes added.
+
+    Attributes
+    ----------
+    after : tuple of float
+        With positions as they were measured [rad or m].
+    with_zeros : tuple of float
+        With the encoder zeros that the first half of each log shows [rad or m].
+    """
+
+    after: tuple[float, ...]
+    with_zeros: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Gap:
     """How far predictions miss on the holdout: RMS position error per joint.
 
@@ -90,6 +106,8 @@ class Gap:
         RMS displacement over the horizon [rad or m].
     unexplained : float
         Share of the gap above the floor with parameters re-estimated that the named causes leave, from 0 to 1.
+    second_halves : SecondHalves, optional
+        What encoder zeros that differ between recordings make of the gap; none of a single training recording.
     """
 
     horizon_s: float
@@ -104,6 +122,7 @@ class Gap:
     horizons: tuple[GapAtHorizon, ...] = ()
     motion: tuple[float, ...] = ()
     unexplained: float = 0.0
+    second_halves: SecondHalves | None = None
 
 
 @dataclass(frozen=True)
@@ -359,6 +378,9 @@ class Diagnosis(NotebookDisplay):
                 tuple(GapAtHorizon.read(h) for h in gap.get("horizons", ())),
                 tuple(gap.get("motion", ())),
                 gap.get("unexplained", 0.0),
+                SecondHalves(**{key: tuple(x) for key, x in halves.items()})
+                if (halves := gap.get("second_halves"))
+                else None,
             ),
             where=tuple(_location(p) for p in data["where"]),
             causes=tuple(_cause(c) for c in data["causes"]),

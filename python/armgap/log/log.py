@@ -338,7 +338,16 @@ class Log:
         fix = np.ascontiguousarray
         moment, dq_ref = (None if x is None else fix(x) for x in (self.moment, self.dq_ref))
         reference = None if self.q_ref is None or self.has_torques else (fix(self.q_ref), dq_ref)
-        return (self.name, fix(self.t), fix(self.q), fix(self.tau), list(tables), moment, reference)
+        return (
+            self.name,
+            str(self.path or self.part_of or self.name),
+            fix(self.t),
+            fix(self.q),
+            fix(self.tau),
+            list(tables),
+            moment,
+            reference,
+        )
 
     def to_polars(self) -> pl.DataFrame:
         """Return the log as a table with the columns ``t, q1 …, tau1 …`` and those of the other groups that there are, such as ``dq1 …``."""

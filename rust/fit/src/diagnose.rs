@@ -160,6 +160,7 @@ impl Request<'_> {
         let track = |log: &LogData<'_>| {
             let tables = log.tables.iter().map(|table| table.to_vec()).collect();
             Track::new(&log.name, log.t, log.q, log.tau, steps)
+                .of_source(&log.source)
                 .with_moments(log.moment)
                 .with_tables(tables)
                 .smoothed_beside_torque(arm, theta)

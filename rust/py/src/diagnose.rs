@@ -20,6 +20,7 @@ type PyReference<'py> = (PyReadonlyArray2<'py, f64>, Option<PyReadonlyArray2<'py
 /// one in place of torques.
 type PyLog<'py> = (
     String,
+    String,
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
@@ -31,6 +32,7 @@ type PyLog<'py> = (
 /// A log's own copy of its numbers, for a thread that may outlive the caller.
 struct Owned {
     name: String,
+    source: String,
     t: Vec<f64>,
     q: Vec<f64>,
     tau: Vec<f64>,
@@ -143,12 +145,13 @@ impl AnyArm {
 }
 
 fn copy(log: &PyLog<'_>, n: usize) -> PyResult<Owned> {
-    let (name, t, q, tau, tables, moment, reference) = log;
+    let (name, source, t, q, tau, tables, moment, reference) = log;
     let t = vector(t, "t")?;
     let rows =
         |x: &PyReadonlyArray2<'_, f64>, name: &str| Ok::<_, PyErr>(matrix(x, name, t.len(), n)?.to_vec());
     Ok(Owned {
         name: name.clone(),
+        source: source.clone(),
         t: t.to_vec(),
         q: rows(q, "q")?,
         tau: if reference.is_some() { Vec::new() } else { rows(tau, "tau")? },
@@ -166,6 +169,7 @@ fn copy(log: &PyLog<'_>, n: usize) -> PyResult<Owned> {
 fn views<'a>(logs: &'a [Owned]) -> Vec<LogData<'a>> {
     let view = |log: &'a Owned| LogData {
         name: log.name.clone(),
+        source: log.source.clone(),
         t: &log.t,
         q: &log.q,
         tau: &log.tau,

@@ -14,19 +14,31 @@ __all__ = ["data_quality", "method"]
 
 def data_quality(data: Data) -> Section:
     """The logs, what was noticed in them, and remarks."""
+    logs = [(log, use) for use in ("training", "holdout") for log in data.get(use) or []]
+    has_zeros = any(log.get("encoder_zero") for log, _ in logs)
     rows = [
         (log["name"], use, str(log["samples"]), f"{log['duration_s']:.2f}", str(log["windows"]))
-        for use in ("training", "holdout")
-        for log in data.get(use) or []
+        + ((_zero(log),) if has_zeros else ())
+        for log, use in logs
     ]
     found = [(f["log"], f["kind"], f["message"]) for f in data.get("log_findings") or []]
-    tables = [Table(("log", "use", "samples", "duration [s]", "windows"), rows)]
+    header = ("log", "use", "samples", "duration [s]", "windows")
+    tables = [Table(header + ((f"encoder zeros [{small_unit(data)}]",) if has_zeros else ()), rows)]
     if found:
         tables.append(Table(("log", "noticed", "what"), found))
     remarks = [f"Note: {note}." for note in data.get("notes") or []]
     if not found:
         remarks.append("Nothing unusual was noticed in the logs.")
     return Section("The logs and their quality", text=_noise(data), tables=tables, notes=remarks)
+
+
+def _zero(log: Data) -> str:
+    """What a log's encoders show where the model's positions are zero, joint by joint."""
+    zero = log.get("encoder_zero")
+    if not zero:
+        return ""
+    pairs = zip(zero["value"], zero["sigma"], strict=True)
+    return ", ".join(f"{1e3 * value:.2f} ± {error_text(1e3 * sigma)}" for value, sigma in pairs)
 
 
 def _noise(data: Data) -> list[str]:

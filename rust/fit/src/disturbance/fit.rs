@@ -6,7 +6,7 @@ use crate::likelihood::context::{DiagnosisContext, WindowSet};
 use crate::likelihood::solve::scaled_inverse;
 use crate::likelihood::weighting::Weighting;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
-use crate::predict::window::{Dataset, InitialStateOffset};
+use crate::predict::window::Dataset;
 use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -70,9 +70,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
     /// Weights around the model, every window from its measured start, and what it predicts.
     fn at_measured_starts(&self, data: &Dataset<N>, state: &PushState<'_, N, P>) -> (Weighting<N>, Vec<f64>) {
-        let offsets = vec![InitialStateOffset::none(); data.windows.len()];
+        let offsets = state.zeros.offsets(data);
         let predicted = data.predict(&self.arm, state.model, &offsets);
-        (Weighting::new(data, &self.arm, state.model, state.scale, offsets, &predicted), predicted)
+        let weighting = Weighting::new(data, &self.arm, state.model, state.scale, offsets, &predicted);
+        (weighting.with_zeros(state.zeros.clone()), predicted)
     }
 
     /// The push with the values that output error gives it, and what it explains.
@@ -94,7 +95,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             return state.remainder.then_some(rough);
         }
         let least = least_gain(&sample, state);
-        let usual = self.weighting(&sample, state.model, state.scale).typical * data.windows.len() as f64;
+        let usual = self.weighting(&sample, state.model, state.scale, state.zeros).typical
+            * data.windows.len() as f64;
         let (weighting, _) = self.at_measured_starts(&data, state);
         let sample = WindowSet::new(data);
         let here: Vec<EffectInstance> =
@@ -115,7 +117,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if believed && close(&fitted, &p, state.remainder) {
             for _ in 0..ROUNDS {
                 touched.sample.data.tracks[0].pushes = touched.with(&fitted);
-                touched.weighting = self.weighting(&touched.sample, state.model, state.scale);
+                touched.weighting = self.weighting(&touched.sample, state.model, state.scale, state.zeros);
                 (fitted, _) = touched.minimise(fitted);
             }
             let push = EffectInstance { p: fitted.into(), ..rough.push };
@@ -173,7 +175,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         let mut data = self.sample.data.clone();
         data.tracks[0].pushes = self.with(p);
         let sample = WindowSet { data, measured: self.sample.measured.clone() };
-        let weighting = context.weighting(&sample, own, self.weighting.scale);
+        let weighting = context.weighting(&sample, own, self.weighting.scale, &self.weighting.zeros);
         let there =
             Touched { arm: self.arm, model: own, sample, weighting, known: self.known, push: self.push };
         let residual = there.residual_of(p);

@@ -177,10 +177,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     fn explanation(&self, fit: Fit<P>, given: &Weighting<N>, rounds: usize) -> Explanation<N, P> {
         let mut fit = fit;
         for _ in 0..rounds {
-            let around = self.weighting(&self.training, &fit.hypothesis, given.scale);
+            let around = self.weighting(&self.training, &fit.hypothesis, given.scale, &given.zeros);
             fit = self.problem(&around).solve(&fit.hypothesis, Effort::FULL);
         }
-        let mut weighting = self.weighting(&self.training, &fit.hypothesis, given.scale);
+        let mut weighting = self.weighting(&self.training, &fit.hypothesis, given.scale, &given.zeros);
         weighting.typical = given.typical;
         let costs = self.problem(&weighting).raw_costs(&fit.hypothesis);
         let cost = costs.iter().map(|c| weighting.student_t_cost(*c)).sum::<f64>() + fit.prior_cost;

@@ -68,7 +68,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let mut data = whole.data.of_track(place.1, |w| wanted(w.first));
             data.tracks[0].pushes.clone_from(&known);
             let sample = WindowSet::new(data);
-            let weighting = self.weighting(&sample, state.model, state.scale);
+            let weighting = self.weighting(&sample, state.model, state.scale, state.zeros);
             let predicted = sample.data.predict(&self.arm, state.model, &weighting.offsets);
             let residual = weighting.residual(&sample.measured, &predicted);
             (sample, weighting, residual)

@@ -9,6 +9,7 @@ use super::own::Own;
 use super::residual::Residual;
 use super::search::{MAX_PUSHES, search};
 use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::log::track::Track;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::progress::Phase;
@@ -87,6 +88,8 @@ pub(super) struct PushState<'a, const N: usize, const P: usize> {
     pub(super) covariance: &'a DMatrix<f64>,
     /// Scales of the residuals under it.
     pub(super) scale: [f64; N],
+    /// Zeros of the recordings' encoders.
+    pub(super) zeros: &'a EncoderZeros<N>,
     /// Whether it leaves more unexplained than noise.
     pub(super) remainder: bool,
     /// Improvement relative to the motion below which nothing is worth a name.
@@ -148,6 +151,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             model: &attribution.model.hypothesis,
             covariance: &attribution.model.covariance.matrix,
             scale: last.weights.training.scale,
+            zeros: &last.weights.holdout.zeros,
             remainder: attribution.is_unexplained(),
             min_relevance: min_relevance(first.relative_error()),
             faintest: if faint { FAINTEST } else { min_relevance(first.relative_error()) },

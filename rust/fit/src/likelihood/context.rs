@@ -1,8 +1,9 @@
 //! The context of a diagnosis: arm, prior, scales, training and holdout windows; and the weighting of their residuals.
 
+use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::likelihood::scale::Scales;
 use crate::likelihood::solve::{Effort, Fit, FitProblem, Prior};
-use crate::likelihood::weighting::Weighting;
+use crate::likelihood::weighting::{Gram, Weighting, initial_state_sensitivities};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::predict::window::{Dataset, InitialStateOffset, Window};
 use crate::progress::{Phase, ProgressReporter};
@@ -14,6 +15,12 @@ const MAX_ROUNDS: usize = 5;
 
 /// A round that changes every joint's scale by less than this factor is the last.
 const SETTLED: f64 = 1.1;
+
+/// Rounds in which zeros and parameters are estimated by turns to see what zeros explain.
+const ZERO_ROUNDS: usize = 2;
+
+/// Steps by which the zeros of holdout recordings are fitted; the training recordings' go on from round to round.
+const HOLDOUT_ROUNDS: usize = 2;
 
 /// What a diagnosis works with: the arm, its prior, scales, and windows.
 pub struct DiagnosisContext<A, const N: usize, const P: usize> {
@@ -71,6 +78,12 @@ impl<const N: usize> WindowSet<N> {
     }
 }
 
+/// Encoder zeros, and the windows' offsets with them and with initial states fitted beside them.
+struct FittedZeros<const N: usize> {
+    zeros: EncoderZeros<N>,
+    offsets: Vec<InitialStateOffset<N>>,
+}
+
 /// Weightings of training and holdout windows around one hypothesis.
 #[derive(Debug, Clone)]
 pub struct SplitWeighting<const N: usize> {
@@ -118,40 +131,148 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Weightings around a hypothesis: initial states are fitted to it and the scales are those given.
-    pub fn weights(&self, hypothesis: &Hypothesis<P>, scale: [f64; N]) -> SplitWeighting<N> {
-        let around = |sample| self.weighting(sample, hypothesis, scale);
-        let (training, holdout) = rayon::join(|| around(&self.training), || around(&self.holdout));
+    /// The training recordings' zeros, and those of a sample's other recordings, fitted to a hypothesis.
+    pub(crate) fn zeros_beside(
+        &self,
+        sample: &WindowSet<N>,
+        hypothesis: &Hypothesis<P>,
+        scale: [f64; N],
+        training: &EncoderZeros<N>,
+    ) -> EncoderZeros<N> {
+        let mut zeros = training.clone();
+        if zeros.spread == [0.0; N] {
+            return zeros;
+        }
+        let known = training.recordings.len();
+        let others = |gram: &Gram, zeros: &EncoderZeros<N>| zeros.and_of_others(&sample.data, gram, known);
+        for _ in 0..HOLDOUT_ROUNDS {
+            zeros = self.fitting_zeros(sample, hypothesis, scale, &zeros, others).zeros;
+        }
+        zeros
+    }
+
+    /// Weightings around a hypothesis, beside which initial states are fitted; scales are those given, encoder zeros those of `given`.
+    pub fn reweighted(
+        &self,
+        hypothesis: &Hypothesis<P>,
+        scale: [f64; N],
+        given: &SplitWeighting<N>,
+    ) -> SplitWeighting<N> {
+        let around = |sample, given: &Weighting<N>| self.weighting(sample, hypothesis, scale, &given.zeros);
+        let (training, holdout) =
+            rayon::join(|| around(&self.training, &given.training), || around(&self.holdout, &given.holdout));
         SplitWeighting { training, holdout }
     }
 
-    /// The weighting whose initial states have been fitted to the hypothesis once and relinearised there.
+    /// The weighting of the training windows, beside which initial states and, where wanted, encoder zeros, from `zeros`, are fitted.
+    fn training_weighting(
+        &self,
+        hypothesis: &Hypothesis<P>,
+        scale: [f64; N],
+        zeros: &EncoderZeros<N>,
+        with_zeros: bool,
+    ) -> Weighting<N> {
+        let sample = &self.training;
+        if !with_zeros {
+            return self.weighting(sample, hypothesis, scale, zeros);
+        }
+        let of_training = |gram: &Gram, zeros: &EncoderZeros<N>| zeros.of_training(&sample.data, gram);
+        let FittedZeros { zeros, offsets } =
+            self.fitting_zeros(sample, hypothesis, scale, zeros, of_training);
+        let (weighting, residual, _) = self.linearised(sample, hypothesis, scale, offsets);
+        weighting.robust(&sample.data, &residual).with_zeros(zeros)
+    }
+
+    /// The weighting whose initial states have been fitted to the hypothesis once and relinearised there, with given encoder zeros.
     pub fn weighting(
         &self,
         sample: &WindowSet<N>,
         hypothesis: &Hypothesis<P>,
         scale: [f64; N],
+        zeros: &EncoderZeros<N>,
     ) -> Weighting<N> {
-        self.progress.check();
-        let around = |offsets: Vec<InitialStateOffset<N>>| {
-            let predicted = sample.data.predict(&self.arm, hypothesis, &offsets);
-            let weighting = Weighting::new(&sample.data, &self.arm, hypothesis, scale, offsets, &predicted);
-            let residual = weighting.residual(&sample.measured, &predicted);
-            (weighting, residual)
-        };
-        let (rough, residual) = around(sample.data.zero_offsets());
+        let (rough, residual, _) = self.linearised(sample, hypothesis, scale, zeros.offsets(&sample.data));
         let offsets = bounded(&sample.data, rough.refit_initial_states(&sample.data, &residual));
-        let (weighting, residual) = around(offsets);
-        weighting.robust(&sample.data, &residual)
+        let (weighting, residual, _) = self.linearised(sample, hypothesis, scale, offsets);
+        weighting.robust(&sample.data, &residual).with_zeros(zeros.clone())
     }
 
-    /// Fits with scales that follow the residual, from rough scales down to the residual's own.
+    /// The weighting around encoder zeros that have been fitted to the hypothesis once, from `zeros`, and initial states that were fitted beside them;
+    /// `fitted` are the zeros by the products of their columns.
+    fn fitting_zeros(
+        &self,
+        sample: &WindowSet<N>,
+        hypothesis: &Hypothesis<P>,
+        scale: [f64; N],
+        zeros: &EncoderZeros<N>,
+        fitted: impl Fn(&Gram, &EncoderZeros<N>) -> EncoderZeros<N>,
+    ) -> FittedZeros<N> {
+        let data = &sample.data;
+        let (rough, mut residual, sensitivities) =
+            self.linearised(sample, hypothesis, scale, zeros.offsets(data));
+        let rough = rough.robust(data, &residual);
+        let columns = rough.zero_columns(&sensitivities);
+        let views: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let zeros = fitted(&rough.gram(data, &views, &residual), zeros);
+        let mut offsets = zeros.offsets(data);
+        for ((window, new), old) in data.windows.iter().zip(&offsets).zip(&rough.offsets) {
+            for (j, column) in columns.iter().enumerate() {
+                let change = new.zero[j] - old.zero[j];
+                let rows = residual[window.range()].iter_mut().zip(&column[window.range()]);
+                rows.for_each(|(r, c)| *r -= change * c);
+            }
+        }
+        let refitted = bounded(data, rough.refit_initial_states(data, &residual));
+        for (offset, refitted) in offsets.iter_mut().zip(refitted) {
+            *offset = InitialStateOffset { zero: offset.zero, ..refitted };
+        }
+        FittedZeros { zeros, offsets }
+    }
+
+    /// The weighting around predictions with these offsets, their residual, and their derivatives by initial positions and velocities.
+    fn linearised(
+        &self,
+        sample: &WindowSet<N>,
+        hypothesis: &Hypothesis<P>,
+        scale: [f64; N],
+        offsets: Vec<InitialStateOffset<N>>,
+    ) -> (Weighting<N>, Vec<f64>, Vec<Vec<f64>>) {
+        self.progress.check();
+        let predicted = sample.data.predict(&self.arm, hypothesis, &offsets);
+        let sensitivities =
+            initial_state_sensitivities(&sample.data, &self.arm, hypothesis, &offsets, &predicted);
+        let weighting = Weighting::from_sensitivities(&sample.data, &sensitivities, scale, offsets);
+        let residual = weighting.residual(&sample.measured, &predicted);
+        (weighting, residual, sensitivities)
+    }
+
+    /// Fits with scales that follow the residual, from rough scales down to the residual's own, beside encoder zeros that differ between recordings.
     pub fn settle(&self, start: &Hypothesis<P>, scale: [f64; N]) -> (Fit<P>, SplitWeighting<N>) {
+        self.settled(start, scale, EncoderZeros::can_be_told_from(&self.training.data))
+    }
+
+    /// The same with encoder zeros that are those of the model in every recording.
+    pub(crate) fn settle_without_zeros(
+        &self,
+        start: &Hypothesis<P>,
+        scale: [f64; N],
+    ) -> (Fit<P>, SplitWeighting<N>) {
+        self.settled(start, scale, false)
+    }
+
+    fn settled(
+        &self,
+        start: &Hypothesis<P>,
+        scale: [f64; N],
+        with_zeros: bool,
+    ) -> (Fit<P>, SplitWeighting<N>) {
         self.progress.begin(Phase::Refit, MAX_ROUNDS + 1);
         let mut scale = scale;
         let mut hypothesis = start.clone();
+        let mut zeros = EncoderZeros::none();
         loop_rounds(|round| {
-            let weighting = self.weighting(&self.training, &hypothesis, scale);
+            let weighting = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
+            zeros.clone_from(&weighting.zeros);
             let fit = self.problem(&weighting).solve(&hypothesis, Effort::ROUGH);
             let next = self.residual_scale(&weighting, &fit.hypothesis);
             hypothesis = fit.hypothesis.clone();
@@ -159,9 +280,25 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             scale = next;
             change < SETTLED || round == MAX_ROUNDS
         });
-        let weights = self.weights(&hypothesis, scale);
+        let training = self.training_weighting(&hypothesis, scale, &zeros, with_zeros);
+        let zeros = self.zeros_beside(&self.holdout, &hypothesis, scale, &training.zeros);
+        let holdout = self.weighting(&self.holdout, &hypothesis, scale, &zeros);
+        let weights = SplitWeighting { training, holdout };
         let fit = self.problem(&weights.training).solve(&hypothesis, Effort::FULL);
         (fit, weights)
+    }
+
+    /// Cost of the training windows once parameters are estimated beside encoder zeros that differ between recordings, in the scales and by the typical
+    /// window of a weighting without them.
+    pub(crate) fn cost_with_zeros(&self, fit: &Fit<P>, weighting: &Weighting<N>) -> f64 {
+        let mut beside = weighting.clone();
+        let mut hypothesis = fit.hypothesis.clone();
+        for _ in 0..ZERO_ROUNDS {
+            beside = self.training_weighting(&hypothesis, weighting.scale, &beside.zeros, true);
+            hypothesis = self.problem(&beside).solve(&hypothesis, Effort::ROUGH).hypothesis;
+        }
+        let costs = self.problem(&beside).raw_costs(&hypothesis);
+        costs.into_iter().map(|cost| weighting.student_t_cost(cost)).sum()
     }
 
     /// Scale of each joint's residual under a hypothesis: its RMS once initial states are fitted, widened by its correlation in time,

@@ -12,6 +12,7 @@
 pub mod context;
 pub mod covariance;
 pub(crate) mod dispersion;
+pub mod encoder_zero;
 pub mod holdout;
 pub(crate) mod jacobian;
 pub mod scale;

@@ -10,6 +10,7 @@
 //! where `Q` is an orthonormal basis of `[W^(1/2) X; L']` and `c` the offset of the initial state that the prediction already has (variable
 //! projection, Golub and Pereyra 1973).
 
+use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::log::track::InitialState;
 use crate::model::hypothesis::Hypothesis;
 use crate::numeric::products::{cross, squares};
@@ -100,6 +101,8 @@ pub struct Weighting<const N: usize> {
     pub scale: [f64; N],
     /// Offset of each window's initial state that the predictions are made with.
     pub offsets: Vec<InitialStateOffset<N>>,
+    /// Encoder zeros that the predictions are made with.
+    pub zeros: EncoderZeros<N>,
     /// Robust weight of each window; less than one where the model fails far beyond what is typical.
     pub robust_weight: Vec<f64>,
     /// Cost of a typical window under the hypothesis the weighting was made for.
@@ -150,6 +153,16 @@ impl<const N: usize> Weighting<N> {
         predicted: &[f64],
     ) -> Self {
         let sensitivities = initial_state_sensitivities(data, arm, hypothesis, &offsets, predicted);
+        Self::from_sensitivities(data, &sensitivities, scale, offsets)
+    }
+
+    /// The weighting from the derivatives of the predictions by initial positions and velocities.
+    pub fn from_sensitivities(
+        data: &Dataset<N>,
+        sensitivities: &[Vec<f64>],
+        scale: [f64; N],
+        offsets: Vec<InitialStateOffset<N>>,
+    ) -> Self {
         let project = |(index, shift): (usize, &InitialStateOffset<N>)| {
             let window = &data.windows[index];
             let columns: Vec<&[f64]> = sensitivities.iter().map(|c| &c[window.range()]).collect();
@@ -157,7 +170,24 @@ impl<const N: usize> Weighting<N> {
         };
         let projections = offsets.par_iter().enumerate().map(project).collect();
         let robust_weight = vec![1.0; offsets.len()];
-        Self { scale, offsets, robust_weight, typical: 1.0, projections }
+        Self { scale, offsets, zeros: EncoderZeros::none(), robust_weight, typical: 1.0, projections }
+    }
+
+    /// Whitened derivatives of the residual's predictions by the zeros of the encoders, from those by the initial positions: the arm starts the other way,
+    /// and all that is shown moves along.
+    pub fn zero_columns(&self, sensitivities: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let column = |j: usize| {
+            let mut column: Vec<f64> = sensitivities[j].iter().map(|s| -s).collect();
+            column.iter_mut().skip(j).step_by(N).for_each(|value| *value += 1.0);
+            self.whiten(&mut column);
+            column
+        };
+        (0..N).map(column).collect()
+    }
+
+    /// Says which encoder zeros its offsets count from.
+    pub fn with_zeros(self, zeros: EncoderZeros<N>) -> Self {
+        Self { zeros, ..self }
     }
 
     /// Sets the robust weights of the windows by how well a hypothesis of this residual explains them.
@@ -277,6 +307,7 @@ impl<const N: usize> Weighting<N> {
                 InitialStateOffset {
                     q: shift.q + SVector::from_fn(|j, _| change[j]),
                     dq: shift.dq + SVector::from_fn(|j, _| change[N + j]),
+                    zero: shift.zero,
                 }
             })
             .collect()

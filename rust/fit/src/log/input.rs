@@ -8,6 +8,8 @@ use armgap_core::arm::ArmKind;
 pub struct LogData<'a> {
     /// Name in results.
     pub name: String,
+    /// Recording that it is the whole or a part of: its parts share the encoders' zeros.
+    pub source: String,
     /// Sample times, s, increasing.
     pub t: &'a [f64],
     /// Positions, one row per sample.

@@ -31,6 +31,8 @@ const ASKED: usize = 7;
 pub struct Track<const N: usize> {
     /// Name in results.
     pub name: String,
+    /// Recording that it is the whole or a part of.
+    pub source: String,
     /// Sample times, s, increasing; starts where the log starts.
     pub t: Vec<f64>,
     /// Measured positions.
@@ -108,6 +110,7 @@ impl<const N: usize> Track<N> {
         };
         let mut track = Self {
             name: name.to_owned(),
+            source: name.to_owned(),
             t: t.to_vec(),
             q: rows(q).into_iter().map(SVector::from).collect(),
             held: rows(tau).into_iter().map(|row| row.map(InputSegment::held)).collect(),
@@ -128,6 +131,11 @@ impl<const N: usize> Track<N> {
             (track.noise[j], track.is_held[j]) = (found.sigma, found.is_held);
         }
         track
+    }
+
+    /// Says which recording it is a part of.
+    pub fn of_source(self, source: &str) -> Self {
+        Self { source: source.to_owned(), ..self }
     }
 
     /// Replaces held torques by straight lines of the same mean and these first moments about the middle of each interval.

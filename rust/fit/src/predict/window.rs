@@ -187,8 +187,8 @@ impl<const N: usize> Dataset<N> {
             rest = after;
             let track = &self.tracks[window.track];
             let torque = commands[window.track].as_deref().unwrap_or(&track.held);
-            let mut state = hypothesis
-                .initial_state(window.initial_state.q + shift.q, window.initial_state.dq + shift.dq);
+            let shown = window.initial_state.q + shift.q - shift.zero;
+            let mut state = hypothesis.initial_state(shown, window.initial_state.dq + shift.dq);
             if let Some(states) = &latent[window.track] {
                 enter(&plant, &mut state, &states[window.first]);
             }
@@ -207,6 +207,16 @@ impl<const N: usize> Dataset<N> {
             for row in predicted.chunks_exact_mut(N) {
                 for (j, q) in row.iter_mut().enumerate().filter(|(_, q)| **q < DIVERGED) {
                     *q = hypothesis.measured(j, *q);
+                }
+            }
+        }
+        for (window, shift) in self.windows.iter().zip(offsets) {
+            if shift.zero.iter().all(|zero| *zero == 0.0) {
+                continue;
+            }
+            for row in predicted[window.range()].chunks_exact_mut(N) {
+                for (q, zero) in row.iter_mut().zip(&shift.zero).filter(|(q, _)| **q < DIVERGED) {
+                    *q += zero;
                 }
             }
         }
@@ -246,19 +256,21 @@ impl<const N: usize> Dataset<N> {
     }
 }
 
-/// An offset of a window's initial state.
+/// An offset of a window's initial state, and of the zero that its log's encoders count from.
 #[derive(Debug, Clone, Copy)]
 pub struct InitialStateOffset<const N: usize> {
     /// Added to the positions.
     pub q: SVector<f64, N>,
     /// Added to the velocities.
     pub dq: SVector<f64, N>,
+    /// What the encoders show where the model's angles are zero.
+    pub zero: SVector<f64, N>,
 }
 
 impl<const N: usize> InitialStateOffset<N> {
     /// An initial state without offset.
     pub fn none() -> Self {
-        Self { q: SVector::zeros(), dq: SVector::zeros() }
+        Self { q: SVector::zeros(), dq: SVector::zeros(), zero: SVector::zeros() }
     }
 }
 

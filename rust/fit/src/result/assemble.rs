@@ -3,6 +3,7 @@
 use crate::disturbance::intensity::shares;
 use crate::disturbance::push::Disturbance;
 use crate::likelihood::context::{DiagnosisContext, WindowSet};
+use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::likelihood::solve::Fit;
 use crate::likelihood::weighting::Weighting;
 use crate::locate::energy::energy;
@@ -13,8 +14,9 @@ use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::result::gap::{Compared, Errors, FreeRuns, gap, rms};
 use crate::result::headline::Headline;
 use crate::result::report::{
-    self, ArmSummary, Cause, CauseValue, Diagnosis, EquivalentSummary, LogSummary, Named, Noise,
-    OptionSummary, Parameters, Ranked, SeveralJoints, SidesSummary, StageSummary, Value,
+    self, ArmSummary, Cause, CauseValue, Diagnosis, EquivalentSummary, Gap, LogSummary, Named, Noise,
+    OptionSummary, Parameters, Ranked, SecondHalves, SeveralJoints, SidesSummary, StageSummary, Value,
+    Values,
 };
 use crate::result::ruled_out::ruled_out;
 use crate::result::sanity::{Estimate, Sanity, bounded_sigma, sanity};
@@ -27,6 +29,9 @@ use rayon::prelude::*;
 
 /// A part of the gap that is not worth a search for the joint it lies on.
 const NEGLIGIBLE: f64 = 1e-3;
+
+/// Part of a joint's error that known encoder zeros take away where they are worth a remark.
+const ZEROS_MATTER: f64 = 0.1;
 
 /// The diagnosis as data.
 pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
@@ -43,9 +48,12 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     };
     let rotary = description.kind.rotary();
     let figures = || {
-        let (errors, free) =
-            (Errors::new(context, &compared, options.seed), FreeRuns::new(context, &compared));
-        (gap(context, &compared, &errors, &free, description, options), errors.series(context), free.series())
+        let weights = &headline.weights;
+        let errors = Errors::new(context, &compared, &weights.holdout.zeros, options.seed);
+        let free = FreeRuns::new(context, &compared);
+        let beside_zeros = errors.beside_zeros(&context.holdout.measured);
+        let gap = gap(context, &compared, &errors, &free, weights, description, options);
+        (gap, beside_zeros, errors.series(context), free.series())
     };
     let residual = || {
         let residuals = residual_torques(context, &compared, &headline.weights.holdout);
@@ -53,14 +61,14 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         (residuals, regimes)
     };
     let candidates = || (ruled_out(context, attribution, rotary), ranking(context, attribution, rotary));
-    let ((absent, ranking), ((gap, series, free_run_series), (residuals, regimes))) =
+    let ((absent, ranking), ((gap, beside_zeros, series, free_run_series), (residuals, regimes))) =
         rayon::join(candidates, || rayon::join(figures, residual));
     let evidence = Evidence {
         named: !headline.causes.is_empty() || !disturbances.is_empty(),
         open: headline.open,
         before: &gap.before,
         refit: &gap.refit,
-        after: &gap.after,
+        after: &beside_zeros,
         floor: &gap.floor,
         motion: &gap.motion,
     };
@@ -68,6 +76,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     let laws =
         if remains { context.laws_beside(&headline.model, &headline.weights, rotary) } else { Vec::new() };
     let sanity = sanity(description.kind, &estimates(&headline.model, description), remains);
+    let notes = notes(headline, options.max_causes, remains, &sanity, &gap, description);
     Diagnosis {
         schema: "armgap.diagnosis/1",
         verdict,
@@ -96,8 +105,8 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             with_causes: values(&headline.model, description),
         },
         arm: arm_summary(description),
-        training: logs(&context.training),
-        holdout: logs(&context.holdout),
+        training: logs(&context.training, &headline.weights.training.zeros, rotary),
+        holdout: logs(&context.holdout, &headline.weights.holdout.zeros, rotary),
         ranking,
         stages: nodes(context, attribution),
         regimes,
@@ -114,7 +123,7 @@ pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         },
         version: env!("CARGO_PKG_VERSION"),
         seconds: 0.0,
-        notes: notes(headline, options.max_causes, remains, &sanity, description),
+        notes,
         sanity,
     }
 }
@@ -337,7 +346,12 @@ fn arm_summary(description: &ArmDescription) -> ArmSummary {
     }
 }
 
-fn logs<const N: usize>(sample: &WindowSet<N>) -> Vec<LogSummary> {
+fn logs<const N: usize>(sample: &WindowSet<N>, zeros: &EncoderZeros<N>, rotary: bool) -> Vec<LogSummary> {
+    let zero = |source: &str| {
+        let found = zeros.recordings.iter().find(|r| r.source == source)?;
+        let (value, sigma) = (found.zero.as_slice().to_vec(), found.sigma.as_slice().to_vec());
+        Some(Values { value, sigma, unit: if rotary { "rad" } else { "m" } })
+    };
     let windows = |i: usize| sample.data.windows.iter().filter(|w| w.track == i).count();
     let tracks = sample.data.tracks.iter().enumerate();
     tracks
@@ -346,6 +360,7 @@ fn logs<const N: usize>(sample: &WindowSet<N>) -> Vec<LogSummary> {
             samples: track.len(),
             duration_s: track.t[track.len() - 1] - track.t[0],
             windows: windows(i),
+            encoder_zero: zero(&track.source),
         })
         .collect()
 }
@@ -361,6 +376,7 @@ fn notes<const N: usize, const P: usize>(
     max_causes: usize,
     remains: bool,
     sanity: &[Sanity],
+    gap: &Gap,
     description: &ArmDescription,
 ) -> Vec<String> {
     let mut notes = Vec::new();
@@ -381,8 +397,33 @@ fn notes<const N: usize, const P: usize>(
             notes.push(found.message.clone());
         }
     }
+    notes.extend(
+        gap.second_halves
+            .as_ref()
+            .and_then(|halves| zeros_matter(halves, &headline.weights.holdout.zeros, gap.unit)),
+    );
     notes.extend(narrowed(description));
     notes
+}
+
+/// What encoder zeros that differ between recordings make of the gap, where that matters.
+fn zeros_matter<const N: usize>(
+    halves: &SecondHalves,
+    zeros: &EncoderZeros<N>,
+    unit: &str,
+) -> Option<String> {
+    let fall = |(after, with_zeros): (&f64, &f64)| *with_zeros < (1.0 - ZEROS_MATTER) * after;
+    let list =
+        |values: &[f64]| values.iter().map(|x| format!("{:.2}", x * 1e3)).collect::<Vec<_>>().join(" and ");
+    halves.after.iter().zip(&halves.with_zeros).any(fall).then(|| {
+        format!(
+            "the encoders' zeros differ between recordings, by {} m{unit} (standard deviation, joint by joint), which was fitted beside the arm: \
+             with the zeros that its first half shows, the second half of each holdout log is missed by {} in place of {} m{unit}",
+            list(&zeros.spread),
+            list(&halves.with_zeros),
+            list(&halves.after)
+        )
+    })
 }
 
 /// Which standard deviations of the arm file were taken for smaller ones.

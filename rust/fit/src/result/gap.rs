@@ -1,15 +1,16 @@
 //! How far predictions miss on the holdout: windows from measured initial states, and whole logs from their first sample.
 
-use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::context::{DiagnosisContext, SplitWeighting, WindowSet};
+use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::likelihood::weighting::Weighting;
 use crate::log::input::Options;
-use crate::log::track::InitialState;
+use crate::log::track::{InitialState, Track};
 use crate::model::arm::ArmDescription;
 use crate::model::hypothesis::Hypothesis;
 use crate::numeric::products::squares;
 use crate::numeric::random::Random;
 use crate::predict::window::{Dataset, InitialStateOffset, Window};
-use crate::result::report::{AtHorizon, FreeRun, FreeRunSeries, Gap, Series};
+use crate::result::report::{AtHorizon, FreeRun, FreeRunSeries, Gap, SecondHalves, Series};
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
 
@@ -61,6 +62,8 @@ pub struct Errors<const N: usize> {
     before: Vec<f64>,
     refit: Vec<f64>,
     after: Vec<f64>,
+    /// The last with encoder zeros of the holdout's recordings.
+    with_zeros: Vec<f64>,
     /// Mean square that measured initial states and the measurement itself put into the errors, per joint.
     floor: [f64; N],
 }
@@ -70,6 +73,7 @@ impl<const N: usize> Errors<N> {
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         context: &DiagnosisContext<A, N, P>,
         compared: &Compared<P>,
+        zeros: &EncoderZeros<N>,
         seed: u64,
     ) -> Self {
         let data = &context.holdout.data;
@@ -80,8 +84,14 @@ impl<const N: usize> Errors<N> {
             before: bare.predict(&context.arm, &compared.before, &offsets),
             refit: bare.predict(&context.arm, &compared.refit, &offsets),
             floor: floor(context, data, &compared.after, &after, seed),
+            with_zeros: data.predict(&context.arm, &compared.after, &zeros.offsets(data)),
             after,
         }
+    }
+
+    /// RMS error per joint of the model with causes, with encoder zeros of the holdout's recordings: what their own scatter does not explain.
+    pub fn beside_zeros(&self, measured: &[f64]) -> Vec<f64> {
+        rms::<N>(measured, &self.with_zeros)
     }
 
     /// Measured and predicted positions for drawing.
@@ -214,6 +224,7 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     compared: &Compared<P>,
     errors: &Errors<N>,
     free: &FreeRuns<N>,
+    weights: &SplitWeighting<N>,
     description: &ArmDescription,
     options: &Options,
 ) -> Gap {
@@ -238,10 +249,41 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
             before: rms::<N>(&free.measured, &free.before),
             after: rms::<N>(&free.measured, &free.after),
         },
+        second_halves: second_halves(context, &compared.after, weights),
         before,
         after,
         floor,
     }
+}
+
+/// Errors of a model on the second halves of the holdout logs, without and with the encoder zeros that the first halves show; none where recordings do not
+/// differ or a half has no window.
+fn second_halves<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    model: &Hypothesis<P>,
+    weights: &SplitWeighting<N>,
+) -> Option<SecondHalves> {
+    let data = &context.holdout.data;
+    if weights.holdout.zeros.recordings.len() == weights.training.zeros.recordings.len() {
+        return None;
+    }
+    let half = |second: bool| {
+        let of = |(index, track): (usize, &Track<N>)| {
+            let middle = 0.5 * (track.t[0] + track.t[track.len() - 1]);
+            data.of_track(index, |w| (track.t[w.first] > middle) == second)
+        };
+        data.tracks.iter().enumerate().map(of).reduce(Dataset::and)
+    };
+    let [first, second] = [half(false)?, half(true)?].map(WindowSet::new);
+    if first.data.windows.is_empty() || second.data.windows.is_empty() {
+        return None;
+    }
+    let zeros = context.zeros_beside(&first, model, weights.holdout.scale, &weights.training.zeros);
+    let missed = |offsets: &[InitialStateOffset<N>]| {
+        rms::<N>(&second.measured, &second.data.predict(&context.arm, model, offsets))
+    };
+    let (after, with_zeros) = (missed(&second.data.zero_offsets()), missed(&zeros.offsets(&second.data)));
+    Some(SecondHalves { after, with_zeros })
 }
 
 /// The gap at another prediction horizon; none where the logs are shorter than two of it.

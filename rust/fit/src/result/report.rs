@@ -162,6 +162,20 @@ pub struct Gap {
     pub horizons: Vec<AtHorizon>,
     /// Over the whole holdout from its first sample.
     pub free_run: FreeRun,
+    /// What encoder zeros that differ between recordings make of the gap; where they do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_halves: Option<SecondHalves>,
+}
+
+/// RMS position errors, over the horizon, on the second half of each holdout log, with the named causes added.
+#[derive(Debug, Clone, JsonSchema, Serialize)]
+pub struct SecondHalves {
+    /// With positions as they were measured.
+    #[schemars(inner(range(min = 0)))]
+    pub after: Vec<f64>,
+    /// With the encoder zeros that the first half of each log shows.
+    #[schemars(inner(range(min = 0)))]
+    pub with_zeros: Vec<f64>,
 }
 
 /// RMS errors at one prediction horizon, per joint.
@@ -356,6 +370,9 @@ pub struct LogSummary {
     pub duration_s: f64,
     /// Windows.
     pub windows: usize,
+    /// What its encoders show where the model's positions are zero, beside what all recordings share; where there are several training recordings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub encoder_zero: Option<Values>,
 }
 
 /// A fitted candidate.

@@ -289,7 +289,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             let scale = self.residual_scale(&weights.training, &best.fit.hypothesis);
             let shrunk = (0..N).map(|j| weights.training.scale[j] / scale[j]).fold(0.0, f64::max);
             if shrunk > SHRUNK {
-                heavier = Some(self.weights(&best.fit.hypothesis, scale));
+                heavier = Some(self.reweighted(&best.fit.hypothesis, scale, given));
             }
             let weights = heavier.as_ref().unwrap_or(given);
             let last = shrunk <= SHRUNK || round == MAX_REWEIGHTINGS;

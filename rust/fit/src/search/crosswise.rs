@@ -74,6 +74,7 @@ fn stretch<'a>(log: &LogData<'a>, range: std::ops::Range<usize>) -> LogData<'a> 
     };
     LogData {
         name: format!("{whole} ({} to {} s)", millis(t[0]), millis(t[t.len() - 1])),
+        source: log.source.clone(),
         t,
         q: &log.q[rows.clone()],
         moment: log.moment.map(|moment| &moment[rows.clone()]),
@@ -108,6 +109,7 @@ mod tests {
         let values: Vec<f64> = (0..4000).map(f64::from).collect();
         let log = |name: &str| LogData {
             name: name.to_owned(),
+            source: name.to_owned(),
             t: &t,
             q: &values,
             tau: &values,

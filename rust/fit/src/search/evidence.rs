@@ -58,17 +58,22 @@ pub struct Evidence {
     /// Standard deviation of that.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio_sigma: Option<f64>,
+    /// Of an offset of the encoder's zero, or what is alike: odds that the recordings' zeros have a mean, rather than scatter around none; none where
+    /// recordings do not differ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub beyond_scatter: Option<f64>,
 }
 
 impl Evidence {
     /// Probability that the effect, or a listed look-alike, is in the arm.
     pub fn probability(&self) -> f64 {
-        let Some(gain) = self.gain else { return self.selected };
+        let beyond = self.beyond_scatter.map_or(1.0, |odds| 1.0 / (1.0 + 1.0 / odds));
+        let Some(gain) = self.gain else { return beyond * self.selected };
         let odds = PRIOR_ODDS
             * gain.max(0.0).powf(GAIN_POWER)
             * self.agreement()
             * self.left_by_rival().powi(RIVAL_POWER);
-        self.selected * odds / (1.0 + odds)
+        beyond * self.selected * odds / (1.0 + odds)
     }
 
     /// What a law without a name in the cause's place leaves, relative to what the cause leaves: 0 to 1.
@@ -123,11 +128,25 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             if let Some((ratio, sigma)) = size_ratio(place, model, on_holdout) {
                 (cause.evidence.size_ratio, cause.evidence.size_ratio_sigma) = (Some(ratio), Some(sigma));
             }
+            cause.evidence.beyond_scatter = zero_of(&model.hypothesis.effects[place])
+                .and_then(|(joint, shared)| last.weights.holdout.zeros.odds_of_shared(joint, shared));
             if cause.ground == Ground::Motion {
                 cause.probability = cause.evidence.probability();
             }
         }
     }
+}
+
+/// The joint whose encoder an effect makes count from another zero, and that zero; a tilted base does the same to the first joint of an arm in a
+/// plane.
+fn zero_of(effect: &EffectInstance) -> Option<(usize, f64)> {
+    let [at_zero, at_one] = [0.0, 1.0].map(|q| effect.law.measured(&effect.p, q));
+    let tilt = effect.law.tilt(&effect.p);
+    if tilt != 0.0 {
+        return Some((0, tilt));
+    }
+    let shifts = effect.law.spec().hooks.measured && (at_one - at_zero - 1.0).abs() < 1e-12;
+    shifts.then_some((effect.joint, at_zero))
 }
 
 /// By how much the cost of every window lies higher in one model than in another.
@@ -171,6 +190,7 @@ fn size_ratio<const P: usize>(place: usize, of: &Fit<P>, other: &Fit<P>) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+    use armgap_core::effect::find;
 
     fn evidence(gain: f64, ratio: Option<f64>) -> Evidence {
         Evidence {
@@ -180,6 +200,7 @@ mod tests {
             rival_gain: None,
             size_ratio: ratio,
             size_ratio_sigma: ratio.map(|_| 0.05),
+            beyond_scatter: None,
         }
     }
 
@@ -207,6 +228,18 @@ mod tests {
         let odds = PRIOR_ODDS * 0.5_f64.powi(RIVAL_POWER);
         assert!((beside(1.5) - odds / (1.0 + odds)).abs() < 1e-12);
         assert_eq!(beside(2.5), 0.0);
+    }
+
+    #[test]
+    fn a_zero_that_scatters_is_no_offset() {
+        let with = |odds: f64| Evidence { beyond_scatter: Some(odds), ..evidence(1.0, None) }.probability();
+        let alone = evidence(1.0, None).probability();
+        assert!((with(1.0) - 0.5 * alone).abs() < 1e-12 && with(0.1) < 0.1 && with(1e9) > 0.999 * alone);
+        let effect = |name: &str, p| EffectInstance::new(find::<f64>(name).unwrap(), 1, p);
+        assert_eq!(zero_of(&effect("encoder_offset", [0.02, 0.0, 0.0])), Some((1, 0.02)));
+        assert_eq!(zero_of(&effect("base_tilt", [0.02, 0.0, 0.0])), Some((0, 0.02)));
+        assert_eq!(zero_of(&effect("torque_offset", [0.02, 0.0, 0.0])), None);
+        assert_eq!(zero_of(&effect("encoder_eccentricity", [0.02, 0.3, 0.0])), None);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! After every addition all causes are fitted together again, and one that has become idle is dropped.
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
+use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::likelihood::solve::{Effort, Fit};
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
 use crate::search::acceptance::{
@@ -84,8 +85,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     pub fn attribute(&self, max_causes: usize, seed: u64, known: Option<Cause>) -> Attribution<N, P> {
         let nominal = Hypothesis::rigid(self.prior.theta);
         let scale = self.rough_scale(&nominal);
-        let settled = self.settle(&nominal, scale);
-        let mut node = self.node_around(settled.clone(), RELEVANT);
+        let (settled, mut node) = self.first_node(&nominal, scale);
         let refit = node.settled.clone();
         let min_relevance = min_relevance(node.relative_error());
         let threshold = self.look_closer(&mut node, settled, min_relevance, CLEAR);
@@ -116,6 +116,34 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         nodes.push(node);
         refresh(&model, &mut causes);
         Attribution { refit, model, on_holdout, causes, nodes }
+    }
+
+    /// The node around the arm with its parameters re-estimated, with or without encoder zeros that differ between recordings.
+    ///
+    /// Zeros take up what a recording misses by on average, a large missing effect's part too, and then other effects fit what is left. So the first cause
+    /// is sought beside zeros where these explain more than it would, or where there is none; later nodes always have them.
+    fn first_node(
+        &self,
+        nominal: &Hypothesis<P>,
+        scale: [f64; N],
+    ) -> ((Fit<P>, SplitWeighting<N>), SearchNode<N, P>) {
+        let with_zeros = || {
+            let settled = self.settle(nominal, scale);
+            (settled.clone(), self.node_around(settled, RELEVANT))
+        };
+        if !EncoderZeros::can_be_told_from(&self.training.data) {
+            return with_zeros();
+        }
+        let settled = self.settle_without_zeros(nominal, scale);
+        let node = self.node_around(settled.clone(), RELEVANT);
+        let explained = self.cost_with_zeros(&settled.0, &settled.1.training);
+        let least = node.field.iter().map(|(candidate, _)| candidate.training.iter().sum::<f64>());
+        let is_cause = choose(&node, false, min_relevance(node.relative_error())).is_some();
+        if is_cause && least.fold(f64::INFINITY, f64::min) < explained {
+            (settled, node)
+        } else {
+            with_zeros()
+        }
     }
 
     /// Adds one cause after another, or two at once, until no candidate is accepted.

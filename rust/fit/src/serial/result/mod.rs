@@ -196,6 +196,7 @@ fn gap<const N: usize, const P: usize>(
         motion: rms::<N>(&compared.measured, &still),
         horizons: HORIZONS.iter().filter_map(|h| at_horizon(compared, data, *h)).collect(),
         free_run: FreeRun { before: Vec::new(), after: Vec::new() },
+        second_halves: None,
         before,
         refit,
         after,
@@ -308,6 +309,7 @@ fn logs<const N: usize>(data: &Dataset<N>) -> Vec<LogSummary> {
         samples: track.len(),
         duration_s: track.t[track.len() - 1] - track.t[0],
         windows: data.windows.iter().filter(|w| w.track == i).count(),
+        encoder_zero: None,
     };
     data.tracks.iter().enumerate().map(of).collect()
 }
