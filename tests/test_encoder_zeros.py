@@ -64,7 +64,8 @@ def test_what_all_recordings_share_is_a_cause(pendulum: Arm) -> None:
     first = asked(pendulum, 0.06).causes[0]
     assert first.effect in ("encoder_offset", "base_tilt")
     [turned] = first.parameters.values()
-    assert abs(turned.value) == pytest.approx(0.06, abs=5e-3)
+    # The mean of three zeros is known to their scatter over the root of three.
+    assert abs(turned.value) == pytest.approx(0.06, abs=np.std(ZEROS_RAD, ddof=1) / np.sqrt(3))
 
 
 def test_one_recording_has_no_zeros_of_its_own(pendulum: Arm) -> None:
