@@ -405,7 +405,7 @@ def test_every_check_is_offered_somewhere(arm: Arm, pendulum: Arm) -> None:
 
     import armgap.check
 
-    sources = "".join(p.read_text() for p in Path(armgap.check.__file__).parent.glob("*.py") if p.name != "check.py")
+    sources = "".join(p.read_text() for p in Path(armgap.check.__file__).parent.rglob("*.py") if p.name != "check.py")
     assert [name for name in NAMES if f'"{name}"' not in sources] == []
 
     def turned(a: Arm) -> Arm:
