@@ -19,7 +19,7 @@ const LARGEST_SPREAD: f64 = 0.1;
 const ROUNDS: usize = 300;
 
 /// Odds that encoders whose zeros scatter have an offset besides. At 1, the mean of three or four recordings' zeros is named as an offset at 0.67 and 0.75 on
-/// arms without one; at 0.01 true offsets of four times the scatter are doubtful.
+/// arms without one; at 0.01 an offset of four times the scatter of three recordings is doubtful.
 const SHARED: f64 = 0.1;
 
 /// The zeros of the recordings' encoders, and the distribution that they were drawn from.
