@@ -11,7 +11,7 @@ use crate::likelihood::solve::{Fit, neutral};
 use crate::model::hypothesis::EffectInstance;
 use crate::search::acceptance::{ABOVE_FLOOR, Ground, UNEXPLAINED};
 use crate::search::attribute::SearchNode;
-use crate::search::belief::Cause;
+use crate::search::belief::strongest_first;
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
@@ -135,11 +135,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 cause.probability = cause.evidence.probability();
             }
         }
-        if attribution.causes.iter().all(|cause| cause.evidence.gain.is_some()) {
-            // What predictions miss most without is the strongest, whichever was found first.
-            let gain = |cause: &Cause| cause.evidence.gain.unwrap_or_default();
-            attribution.causes.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
-        }
+        strongest_first(&mut attribution.causes);
     }
 }
 
