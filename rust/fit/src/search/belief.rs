@@ -30,14 +30,6 @@ pub struct Cause {
     pub ground: Ground,
 }
 
-/// Orders causes by what predictions of the holdout miss most without, whichever was found first; by what each took off when it was found, where no more
-/// than noise stays beside one of them and nothing can be said of the final model.
-pub fn strongest_first(causes: &mut [Cause]) {
-    let all_known = causes.iter().all(|cause| cause.evidence.gain.is_some());
-    let strength = |cause: &Cause| cause.evidence.gain.filter(|_| all_known).unwrap_or(cause.relevance);
-    causes.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
-}
-
 impl<const N: usize, const P: usize> SearchNode<N, P> {
     /// Whether no log of motion tells the effects of two candidates apart.
     fn are_equivalent(&self, a: usize, b: usize) -> bool {
@@ -181,41 +173,4 @@ fn left_of<const N: usize, const P: usize>(earlier: &SearchNode<N, P>, last: &Se
 /// What a probability is multiplied by beside a part `left` of the gap that nothing explains: one for none, `least` for all of it.
 pub fn belief_beside(left: f64, least: f64) -> f64 {
     least + (1.0 - least) * (1.0 - left).powi(REMAINDER_POWER)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use armgap_core::effect::find;
-
-    fn cause(name: &str, relevance: f64, gain: Option<f64>) -> Cause {
-        Cause {
-            effect: EffectInstance::new(find::<f64>(name).unwrap(), 0, [0.1, 0.0, 0.0]),
-            sigma: Vec::new(),
-            probability: 0.9,
-            share: 0.5,
-            relevance,
-            look_alikes: Vec::new(),
-            evidence: Evidence { gain, ..Evidence::default() },
-            ground: Ground::Motion,
-        }
-    }
-
-    fn first(mut causes: Vec<Cause>) -> &'static str {
-        strongest_first(&mut causes);
-        causes[0].effect.law.spec().name
-    }
-
-    #[test]
-    fn the_strongest_cause_is_the_one_that_is_missed_most() {
-        let found_first = |gain| cause("joint_spring", 0.3, gain);
-        let found_second = |gain| cause("stribeck", 0.2, gain);
-        assert_eq!(first(vec![found_first(Some(1.2)), found_second(Some(1.8))]), "stribeck");
-        assert_eq!(first(vec![found_second(Some(1.1)), found_first(Some(1.2))]), "joint_spring");
-        assert_eq!(
-            first(vec![found_second(Some(1.8)), found_first(None)]),
-            "joint_spring",
-            "one has no gain"
-        );
-    }
 }

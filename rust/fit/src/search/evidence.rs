@@ -11,7 +11,6 @@ use crate::likelihood::solve::{Fit, neutral};
 use crate::model::hypothesis::EffectInstance;
 use crate::search::acceptance::{ABOVE_FLOOR, Ground, UNEXPLAINED};
 use crate::search::attribute::SearchNode;
-use crate::search::belief::strongest_first;
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
@@ -135,7 +134,6 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
                 cause.probability = cause.evidence.probability();
             }
         }
-        strongest_first(&mut attribution.causes);
     }
 }
 

@@ -10,7 +10,7 @@ use crate::search::acceptance::{
     CERTAIN, CLEAR, FAINTEST, RELEVANT, TRUST_GAIN, UNEXPLAINED, choose, min_relevance,
 };
 use crate::search::attribute::{Candidate, SearchNode};
-use crate::search::belief::{Cause, name, strongest_first};
+use crate::search::belief::{Cause, name};
 use crate::search::together::Both;
 use armgap_core::arm::Arm;
 
@@ -291,5 +291,5 @@ pub(crate) fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
             first += effect.len();
         }
     }
-    strongest_first(causes);
+    causes.sort_by(|a, b| b.relevance.total_cmp(&a.relevance));
 }
