@@ -140,7 +140,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         training: &EncoderZeros<N>,
     ) -> EncoderZeros<N> {
         let mut zeros = training.clone();
-        if zeros.spread == [0.0; N] {
+        if training.recordings.is_empty() || training.knows_all(&sample.data) {
             return zeros;
         }
         let known = training.recordings.len();

@@ -76,6 +76,11 @@ impl<const N: usize> EncoderZeros<N> {
         data.tracks.iter().any(|track| track.source != data.tracks[0].source)
     }
 
+    /// Whether all recordings of a dataset are among these.
+    pub fn knows_all(&self, data: &Dataset<N>) -> bool {
+        data.tracks.iter().all(|track| self.recordings.iter().any(|r| r.source == track.source))
+    }
+
     /// Zeros of the training recordings, and the distribution that they come from, by the products `gram` of the zeros' columns around these zeros.
     ///
     /// A mean that does not stand out of their scatter is a part of it: only one that does is left to the candidates.
@@ -250,6 +255,7 @@ mod tests {
         let seen_at = [0.03, -0.01, 0.02];
         let found = seen(&seen_at, 1e-4);
         assert_eq!(found.common[0], 0.0);
+        assert_eq!(found.recordings.len(), 3);
         for (recording, wanted) in found.recordings.iter().zip(seen_at) {
             assert!((recording.zero[0] - wanted).abs() < 1e-4, "{recording:?}");
         }
