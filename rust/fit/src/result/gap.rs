@@ -2,14 +2,13 @@
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting, WindowSet};
 use crate::likelihood::encoder_zero::EncoderZeros;
-use crate::likelihood::weighting::Weighting;
 use crate::log::input::Options;
-use crate::log::track::{InitialState, Track};
+use crate::log::track::Track;
 use crate::model::arm::ArmDescription;
 use crate::model::hypothesis::Hypothesis;
-use crate::numeric::products::squares;
 use crate::numeric::random::Random;
 use crate::predict::window::{Dataset, InitialStateOffset, Window};
+use crate::result::floor::floor;
 use crate::result::report::{AtHorizon, FreeRun, FreeRunSeries, Gap, SecondHalves, Series};
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
@@ -28,24 +27,6 @@ pub(crate) const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
 
 /// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
 const FREE_RUN_LIMIT: f64 = 100.0;
-
-/// Displaced initial states from which a perfect model's errors are estimated: the mean square of one window is then known to some 40 %, that
-/// of forty windows to 6 %.
-const DISPLACED: usize = 6;
-
-/// A window is consistent with its noise and its measured initial state up to this cost per sample and joint: the noise is known to 3 %, and
-/// of some hundred values the mean square scatters by 15 %.
-const CONSISTENT: f64 = 1.5;
-
-/// A torque that the model lacks leaves 1/36 of the squared errors it makes once the initial state is fitted, if it is constant over the window, and
-/// more if it is not. What is left beyond noise, with two standard deviations of it, times this may be a quarter of the squared errors at most in a
-/// window that a displaced initial state explains.
-const TORQUE_SHARE: f64 = 4.0 * 36.0;
-
-/// Share of the windows that displaced initial states have to explain before any is taken to be: where most are not explained, those that seem to be
-/// are the ones in which the model errs least, and what it misses by there is not what their initial states err by. With 0.7 as many of 42 floors are
-/// right, with 0.9 one fewer.
-const MAJORITY: f64 = 0.5;
 
 /// The three hypotheses a report compares.
 pub struct Compared<const P: usize> {
@@ -105,108 +86,6 @@ impl<const N: usize> Errors<N> {
             [&self.before, &self.refit, &self.after],
         )
     }
-}
-
-/// Mean square of a perfect model's errors: noise of the sample itself, and the error of the measured initial state carried along the
-/// window.
-///
-/// What the model misses by in a window is a perfect model's error where noise and a displaced initial state explain it: one within the
-/// covariance of the measured state, or one that leaves so little of the errors that no torque could have made them. Elsewhere that
-/// error is what displacements drawn from the measured state's covariance make, times what the errors of explained windows are of theirs, and
-/// no more than what the model misses by. Where most windows are not explained, none is taken to be.
-fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    context: &DiagnosisContext<A, N, P>,
-    data: &Dataset<N>,
-    model: &Hypothesis<P>,
-    predicted: &[f64],
-    seed: u64,
-) -> [f64; N] {
-    let measured = data.measured();
-    let missed = window_squares(data, &measured, predicted);
-    let carried = carried(context, data, model, predicted, seed);
-    let weighting = Weighting::new(data, &context.arm, model, context.noise, data.zero_offsets(), predicted);
-    let residual = weighting.residual(&measured, predicted);
-    let costs = weighting.costs(data, &residual);
-    let left = weighting.beside_free_states(data, &residual);
-    let mut explained: Vec<bool> = data
-        .windows
-        .iter()
-        .zip(costs.iter().zip(&left))
-        .map(|(w, (cost, left))| {
-            let samples = (w.rows() * N) as f64;
-            let beyond_noise = left - samples + 2.0 * (2.0 * samples).sqrt();
-            let missed = squares(&[&residual[w.range()]])[0];
-            *cost < CONSISTENT * samples
-                || (*left < CONSISTENT * samples && TORQUE_SHARE * beyond_noise < missed)
-        })
-        .collect();
-    let carried = |index: usize, j: usize| context.noise[j].powi(2) + carried[index][j];
-    let count = explained.iter().filter(|e| **e).count();
-    if (count as f64) < MAJORITY * explained.len() as f64 {
-        explained.fill(false);
-    }
-    std::array::from_fn(|j| {
-        let of_explained = |square: &dyn Fn(usize) -> f64| -> f64 {
-            (0..explained.len()).filter(|&i| explained[i]).map(square).sum()
-        };
-        let ratio = of_explained(&|i| missed[i][j]) / of_explained(&|i| carried(i, j));
-        // Without any explained window the ratio is none, and the larger number is one.
-        let beyond = ratio.max(1.0);
-        let square =
-            |i: usize| if explained[i] { missed[i][j] } else { missed[i][j].min(beyond * carried(i, j)) };
-        (0..explained.len()).map(square).sum::<f64>() / explained.len() as f64
-    })
-}
-
-/// Mean square, window by window, of what displaced initial states change in the predictions.
-fn carried<A: Arm<f64, N, P>, const N: usize, const P: usize>(
-    context: &DiagnosisContext<A, N, P>,
-    data: &Dataset<N>,
-    model: &Hypothesis<P>,
-    predicted: &[f64],
-    seed: u64,
-) -> Vec<[f64; N]> {
-    let mut random = Random(seed);
-    let mut sum = vec![[0.0; N]; data.windows.len()];
-    for _ in 0..DISPLACED {
-        let offsets: Vec<InitialStateOffset<N>> =
-            data.windows.iter().map(|w| displaced(&w.initial_state, &mut random)).collect();
-        let there = data.predict(&context.arm, model, &offsets);
-        for (total, square) in sum.iter_mut().zip(window_squares(data, predicted, &there)) {
-            for j in 0..N {
-                total[j] += square[j] / DISPLACED as f64;
-            }
-        }
-    }
-    sum
-}
-
-/// An error of a measured initial state, drawn from its covariance and its bias.
-fn displaced<const N: usize>(state: &InitialState<N>, random: &mut Random) -> InitialStateOffset<N> {
-    let mut offset = InitialStateOffset::none();
-    for j in 0..N {
-        let [vq, cov, vdq] = state.covariance[j];
-        let [bias_q, bias_dq] = state.mean_square[j];
-        let (a, b) = (random.normal(), random.normal());
-        let given_q = (vdq - cov * cov / vq).max(0.0).sqrt();
-        offset.q[j] = (bias_q * vq).sqrt() * a;
-        offset.dq[j] = bias_dq.sqrt() * (cov / vq.sqrt() * a + given_q * b);
-    }
-    offset
-}
-
-/// Mean square difference of each joint, window by window.
-fn window_squares<const N: usize>(data: &Dataset<N>, one: &[f64], other: &[f64]) -> Vec<[f64; N]> {
-    let of = |window: &Window<N>| -> [f64; N] {
-        let mut sum = [0.0; N];
-        for (a, b) in one[window.range()].chunks_exact(N).zip(other[window.range()].chunks_exact(N)) {
-            for (total, (a, b)) in sum.iter_mut().zip(a.iter().zip(b)) {
-                *total += (a - b).powi(2);
-            }
-        }
-        sum.map(|x| x / window.rows() as f64)
-    };
-    data.windows.iter().map(of).collect()
 }
 
 /// RMS difference of each joint.

@@ -1,0 +1,163 @@
+//! The floor of a gap: by how much a perfect model's predictions miss, as they start from measured states and are held against measured positions.
+
+use crate::likelihood::context::DiagnosisContext;
+use crate::likelihood::weighting::Weighting;
+use crate::log::track::InitialState;
+use crate::model::hypothesis::Hypothesis;
+use crate::numeric::products::squares;
+use crate::numeric::random::Random;
+use crate::predict::window::{Dataset, InitialStateOffset, Window};
+use armgap_core::arm::Arm;
+
+/// Displaced initial states from which a perfect model's errors are estimated: the mean square of one window is then known to some 40 %, that
+/// of forty windows to 6 %.
+const DISPLACED: usize = 6;
+
+/// A window is consistent with its noise and its measured initial state up to this cost per sample and joint: the noise is known to 3 %, and
+/// of some hundred values the mean square scatters by 15 %.
+const CONSISTENT: f64 = 1.5;
+
+/// A torque that the model lacks leaves 1/36 of the squared errors it makes once the initial state is fitted, if it is constant over the window, and
+/// more if it is not. What is left beyond noise, with two standard deviations of it, times this may be a quarter of the squared errors at most in a
+/// window that a displaced initial state explains.
+const TORQUE_SHARE: f64 = 4.0 * 36.0;
+
+/// Share of the windows that displaced initial states have to explain before any is taken to be: where most are not explained, those that seem to be
+/// are the ones in which the model errs least, and what it misses by there is not what their initial states err by. With 0.7 as many of 42 floors are
+/// right, with 0.9 one fewer.
+const MAJORITY: f64 = 0.5;
+
+/// Mean square of a perfect model's errors: noise of the sample itself, and the error of the measured initial state carried along the
+/// window.
+pub(crate) fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    data: &Dataset<N>,
+    model: &Hypothesis<P>,
+    predicted: &[f64],
+    seed: u64,
+) -> [f64; N] {
+    let measured = data.measured();
+    let missed = window_squares(data, &measured, predicted);
+    let mut expected = carried(context, data, model, predicted, seed);
+    for square in &mut expected {
+        square.iter_mut().zip(context.noise).for_each(|(s, noise)| *s += noise.powi(2));
+    }
+    let weighting = Weighting::new(data, &context.arm, model, context.noise, data.zero_offsets(), predicted);
+    let residual = weighting.residual(&measured, predicted);
+    let costs = weighting.costs(data, &residual);
+    let left = weighting.beside_free_states(data, &residual);
+    let is_explained = |((w, cost), left): ((&Window<N>, &f64), &f64)| {
+        explained(w.rows() * N, squares(&[&residual[w.range()]])[0], *cost, *left)
+    };
+    let explained: Vec<bool> = data.windows.iter().zip(&costs).zip(&left).map(is_explained).collect();
+    std::array::from_fn(|j| {
+        let of = |table: &[[f64; N]]| -> Vec<f64> { table.iter().map(|square| square[j]).collect() };
+        perfect_error(&of(&missed), &of(&expected), &explained)
+    })
+}
+
+/// Whether noise and a displaced initial state explain what the model misses by in a window of so many `values`: the displacement is within the covariance
+/// of the measured state (`cost`), or leaves so little of the squared errors (`left` of `square`, in units of the noise) that no torque can have made them.
+fn explained(values: usize, square: f64, cost: f64, left: f64) -> bool {
+    let values = values as f64;
+    let beyond_noise = left - values + 2.0 * (2.0 * values).sqrt();
+    cost < CONSISTENT * values || TORQUE_SHARE * beyond_noise < square
+}
+
+/// Mean square error of a perfect model from the mean squares that the model missed window by window, and those that noise and the covariance of initial
+/// states make one expect.
+///
+/// In an explained window a perfect model misses by as much. Elsewhere it misses by what is expected, times what the errors of explained windows are of theirs,
+/// and by no more than the model. Where most windows are not explained, none is taken to be.
+fn perfect_error(missed: &[f64], expected: &[f64], explained: &[bool]) -> f64 {
+    let count = explained.iter().filter(|e| **e).count() as f64;
+    let most = count >= MAJORITY * explained.len() as f64;
+    let is_explained = |i: usize| most && explained[i];
+    let of_explained = |of: &[f64]| (0..of.len()).filter(|&i| is_explained(i)).map(|i| of[i]).sum::<f64>();
+    // Without any explained window the ratio is none, and the larger number is one.
+    let beyond = (of_explained(missed) / of_explained(expected)).max(1.0);
+    let square = |i: usize| if is_explained(i) { missed[i] } else { missed[i].min(beyond * expected[i]) };
+    (0..missed.len()).map(square).sum::<f64>() / missed.len() as f64
+}
+
+/// Mean square, window by window, of what displaced initial states change in the predictions.
+fn carried<A: Arm<f64, N, P>, const N: usize, const P: usize>(
+    context: &DiagnosisContext<A, N, P>,
+    data: &Dataset<N>,
+    model: &Hypothesis<P>,
+    predicted: &[f64],
+    seed: u64,
+) -> Vec<[f64; N]> {
+    let mut random = Random(seed);
+    let mut sum = vec![[0.0; N]; data.windows.len()];
+    for _ in 0..DISPLACED {
+        let offsets: Vec<InitialStateOffset<N>> =
+            data.windows.iter().map(|w| displaced(&w.initial_state, &mut random)).collect();
+        let there = data.predict(&context.arm, model, &offsets);
+        for (total, square) in sum.iter_mut().zip(window_squares(data, predicted, &there)) {
+            for j in 0..N {
+                total[j] += square[j] / DISPLACED as f64;
+            }
+        }
+    }
+    sum
+}
+
+/// An error of a measured initial state, drawn from its covariance and its bias.
+fn displaced<const N: usize>(state: &InitialState<N>, random: &mut Random) -> InitialStateOffset<N> {
+    let mut offset = InitialStateOffset::none();
+    for j in 0..N {
+        let [vq, cov, vdq] = state.covariance[j];
+        let [bias_q, bias_dq] = state.mean_square[j];
+        let (a, b) = (random.normal(), random.normal());
+        let given_q = (vdq - cov * cov / vq).max(0.0).sqrt();
+        offset.q[j] = (bias_q * vq).sqrt() * a;
+        offset.dq[j] = bias_dq.sqrt() * (cov / vq.sqrt() * a + given_q * b);
+    }
+    offset
+}
+
+/// Mean square difference of each joint, window by window.
+fn window_squares<const N: usize>(data: &Dataset<N>, one: &[f64], other: &[f64]) -> Vec<[f64; N]> {
+    let of = |window: &Window<N>| -> [f64; N] {
+        let mut sum = [0.0; N];
+        for (a, b) in one[window.range()].chunks_exact(N).zip(other[window.range()].chunks_exact(N)) {
+            for (total, (a, b)) in sum.iter_mut().zip(a.iter().zip(b)) {
+                *total += (a - b).powi(2);
+            }
+        }
+        sum.map(|x| x / window.rows() as f64)
+    };
+    data.windows.iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_is_explained_by_a_start_within_its_covariance_or_one_that_leaves_next_to_nothing() {
+        assert!(explained(100, 1e6, 120.0, 90.0), "within the covariance");
+        assert!(!explained(100, 1e6, 1e5, 1e5), "neither");
+        assert!(
+            explained(100, 1e6, 4e5, 300.0),
+            "no torque leaves so little, several times the noise though it is"
+        );
+        assert!(!explained(100, 1e4, 5e3, 300.0), "a torque may have left as much");
+    }
+
+    #[test]
+    fn the_floor_of_a_right_model_is_what_it_misses_by() {
+        let (missed, expected) = ([4.0, 9.0, 1.0, 100.0], [1.0, 3.0, 1.0, 2.0]);
+        let floor = perfect_error(&missed, &expected, &[true, true, true, false]);
+        // Explained windows miss by 14/5 of what is expected, and so would the fourth.
+        assert!((floor - (14.0 + 2.0 * 2.8) / 4.0).abs() < 1e-12, "{floor}");
+    }
+
+    #[test]
+    fn where_most_windows_are_not_explained_the_floor_is_what_initial_states_make() {
+        let (missed, expected) = ([4.0, 90.0, 1.0, 100.0], [1.0, 3.0, 2.0, 2.0]);
+        let floor = perfect_error(&missed, &expected, &[true, false, false, false]);
+        assert!((floor - (1.0 + 3.0 + 1.0 + 2.0) / 4.0).abs() < 1e-12, "{floor}");
+    }
+}
