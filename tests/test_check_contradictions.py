@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armgap import Arm, Log, diagnose, simulate
-from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, time_shift, torque_unit
+from armgap.check import CORRECTIONS, NAMES, Check, Corrections, dead_stretch, examine, stage, time_shift, torque_unit
 from armgap.check.contradiction import READINGS, Refit
 from armgap.check.equation_error import EquationError, Rows, bounds
 from armgap.check.stage import unexplained_columns
@@ -200,6 +200,41 @@ def test_a_diagnosis_that_still_misses_the_motion_asks_for_the_columns_again(two
     assert (check.check, check.severity) == ("joint_order", "error")
     assert unexplained_columns(backwards[:1], backwards[1:], arm, 0.25, 0.1) == []
     assert unexplained_columns(two_links[:1], two_links[1:], arm, 0.25, 0.9) == []
+
+
+def test_a_size_of_all_torques_that_predictions_refute_is_not_said(two_links: list[Log], arm: Arm) -> None:
+    corrections = Corrections(factor={"tau": 3.0})
+    checks = tuple(torque_unit.said(corrections.factor, "warning", shared=True))
+    factors = torque_unit.Factors(corrections, -5.0, checks, doubtful=True)
+    for scale, said in ((1.0, False), (3.0, True)):
+        file = replace(arm, theta=scale * arm.theta)
+        base = EquationError([Rows.of(log, file) for log in two_links], file)
+        now = stage.Examined(two_links[:1], two_links[1:], file, (), Corrections())
+        assert stage._prefers(factors, [], base, now, 0.25) is said
+
+
+def test_what_a_factor_leaves_unexplained_is_left_to_predictions(two_links: list[Log], arm: Arm) -> None:
+    amperes = [replace(log, tau=log.tau / 12.0) for log in two_links]
+    rng = np.random.default_rng(7)
+    noisy = [replace(log, tau=log.tau + 0.4 * log.tau.std(axis=0) * smooth(rng, len(log))) for log in amperes]
+    for logs, doubtful in ((amperes, False), (noisy, True)):
+        found = torque_unit.find(EquationError([Rows.of(log, arm) for log in logs], arm), logs, arm)
+        assert found is not None
+        assert found.doubtful is doubtful
+
+
+def smooth(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Two columns of slow noise of variance one."""
+    x = np.cumsum(rng.standard_normal((n + 100, 2)), axis=0)
+    x = x[100:] - x[:-100]
+    return np.asarray((x - x.mean(axis=0)) / x.std(axis=0))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_joint_that_was_not_driven_has_no_factor(two_links: list[Log], arm: Arm) -> None:
+    idle = [replace(log, tau=log.tau * [0.0, 1.0]) for log in two_links]
+    found = torque_unit.find(EquationError([Rows.of(log, arm) for log in idle], arm), idle, arm)
+    assert found is None or "tau1" not in found.corrections.factor
 
 
 def test_columns_share_the_factor_of_the_joint_that_knows_it() -> None:

@@ -31,7 +31,7 @@ from armgap.log.log import Log
 
 Array = NDArray[np.float64]
 
-__all__ = ["BETTER", "EXPLAINS", "READINGS", "Found", "Refit", "Suspect", "confirm", "screen"]
+__all__ = ["AS_GOOD", "BETTER", "EXPLAINS", "READINGS", "Found", "Refit", "Suspect", "confirm", "screen"]
 
 READINGS: tuple[Callable[[Arm, float], Iterable[Reading]], ...] = (
     torque_sign.readings,
@@ -53,8 +53,9 @@ _MOST_SUSPECTS = 3
 # A reading is right if predictions miss by less than this part of what they miss with the log as it stands. Unmodelled effects seldom
 # change the RMS of wrong readings by less than a factor of two.
 BETTER = 0.7
-# With parameters that no arm has the log as it stands explains nothing; the other reading must then do about as well.
-_AS_GOOD = 1.3
+# With parameters that no arm has the log as it stands explains nothing; the other reading must then do about as well. So must a size of all torques that
+# the arm file's values may as well be off by.
+AS_GOOD = 1.3
 # A reading that explains a log predicts it: errors stay below this part of the motion. Unmodelled effects leave up to a tenth.
 EXPLAINS = 0.3
 # Errors below this part of the motion are as good as none.
@@ -187,7 +188,7 @@ def confirm(
     if not suspects:
         return None
     as_is = Refit.of(arm, training, holdout, horizon)
-    limit = BETTER if as_is.possible(arm) else _AS_GOOD
+    limit = BETTER if as_is.possible(arm) else AS_GOOD
     tried = []
     for suspect in suspects[:_MOST_SUSPECTS]:
         corrections = suspect.reading.corrections

@@ -37,19 +37,20 @@ def beside_elasticity(
     logs : sequence of Log
         The logs.
     model : callable
-        What a fit makes of an equation error: the parameters, and the factors that belong on the torques.
+        What a fit makes of an equation error: the parameters, and the factors that belong on the torques, not zero on the joints asked for.
     joints : sequence of int, optional
         Joints that elastic torques are looked for on; all by default.
     """
     q = np.concatenate([log.q[rows.samples] for log, rows in zip(logs, base.rows, strict=True)])
     ends = np.cumsum([len(rows.y) for rows in base.rows])[:-1]
+    asked = list(range(q.shape[1]) if joints is None else joints)
     now = base
     for _ in range(_TURNS):
         theta, factors = model(now)
-        left = np.concatenate([rows.y - rows.psi @ theta / factors for rows in base.rows])
-        elastic = np.zeros_like(left)
-        for j in range(left.shape[1]) if joints is None else joints:
-            elastic[:, j] = _rising(q[:, j], left[:, j])
+        left = np.concatenate([rows.y[:, asked] - rows.psi[:, asked] @ theta / factors[asked] for rows in base.rows])
+        elastic = np.zeros_like(q)
+        for j, torque in zip(asked, left.T, strict=True):
+            elastic[:, j] = _rising(q[:, j], torque)
         parts = np.split(elastic, ends)
         rows = [replace(r, y=r.y - part) for r, part in zip(base.rows, parts, strict=True)]
         now = EquationError(rows, base.arm, base.scale)

@@ -12,7 +12,7 @@ from armgap.arm.arm import Arm
 from armgap.arm.corrections import Corrections
 from armgap.check import dead_stretch, time_shift, torque_is_position, torque_unit
 from armgap.check.check import Check
-from armgap.check.contradiction import BETTER, EXPLAINS, Found, Refit, Suspect, confirm, screen
+from armgap.check.contradiction import AS_GOOD, BETTER, EXPLAINS, Found, Refit, Suspect, confirm, screen
 from armgap.check.elastic import beside_elasticity
 from armgap.check.equation_error import EquationError, Fit, Rows, bounds
 from armgap.log.log import Log
@@ -204,15 +204,16 @@ def _prefers(
     if not rivals and not factors.doubtful:
         return True
     with_factors = _predicted(factors.corrections, now, horizon)
-    if factors.doubtful and not _confirmed(with_factors, now, horizon):
+    limit = AS_GOOD if factors.checks[0].severity == "warning" else BETTER
+    if factors.doubtful and not _confirmed(with_factors, now, horizon, limit):
         return False
     readings = [s.reading.corrections for s in rivals[:2]]
     return all(with_factors.against(_predicted(r, now, horizon), rescaled=bool(r.unit)) <= 1.0 for r in readings)
 
 
-def _confirmed(read: Refit, now: Examined, horizon: float) -> bool:
-    """Return whether predictions say that logs that are read otherwise are right and as they stand are not."""
-    return read.relative < EXPLAINS and read.against(_predicted(Corrections(), now, horizon)) < BETTER
+def _confirmed(read: Refit, now: Examined, horizon: float, limit: float) -> bool:
+    """Return whether predictions of logs that are read otherwise are right, and miss by less than `limit` times what they miss as the logs stand."""
+    return read.relative < EXPLAINS and read.against(_predicted(Corrections(), now, horizon)) < limit
 
 
 def _predicted(corrections: Corrections, now: Examined, horizon: float) -> Refit:
