@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import tempfile
 import time
 import zlib
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,8 @@ Record = dict[str, Any]
 WHOLE = "none"
 #: Least and largest white noise beside an encoder's rounding [counts].
 NOISE = (0.5, 10.0)
+#: Differences from the schema, and losses in reading, that a record keeps at most.
+PROBLEMS = 10
 CAUSE = ("effect", "joint", "probability", "equivalents")
 
 
@@ -114,11 +118,21 @@ def diagnosed(inputs: Inputs) -> tuple[Record, dict[str, Starts]]:
         arm, groups = _write(inputs, Path(place))
         start = time.perf_counter()
         try:
-            found = armgap.diagnose(groups[0], arm, holdout=groups[1]).to_dict()
+            answered = armgap.diagnose(groups[0], arm, holdout=groups[1])
         except armgap.ArmgapError as error:
             refused = {"type": type(error).__name__, "message": str(error).replace(place, "")}
             return {"verdict": "refused", "refused": refused, "seconds": time.perf_counter() - start}, {}
-        return {**_kept(found), "seconds": time.perf_counter() - start}, _starts(found["series"])
+        seconds, text = time.perf_counter() - start, answered.to_json(indent=None)
+        found = json.loads(text)
+        problems = [*_schema().misfits(found), *_schema().losses(text)]
+        return {**_kept(found), "seconds": seconds, "schema": problems[:PROBLEMS]}, _starts(found["series"])
+
+
+@cache
+def _schema() -> Any:
+    """What holds a diagnosis against its schema: a package beside this one, wherever both are imported from."""
+    beside = (__package__ or "").rpartition(".")[0]
+    return import_module(f"{beside}.diagnosis_schema.checking" if beside else "diagnosis_schema.checking")
 
 
 def _write(inputs: Inputs, place: Path) -> tuple[Path, tuple[list[Path], list[Path]]]:

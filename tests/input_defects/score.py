@@ -69,7 +69,16 @@ def page(records: list[Record]) -> str:
         of_mode = [r for r in records if r["mode"] in READ_FROM.get(mode, (mode,))]
         if of_mode:
             parts.append(section(of_mode))
+    parts += [schema_section(records)] if any("schema" in r for r in records) else []
     return "\n\n".join(parts) + "\n"
+
+
+def schema_section(records: list[Record]) -> str:
+    """How many of the diagnoses fit their schema and read and written are the same."""
+    asked = [r for r in records if "schema" in r]
+    wrong = [[r["case"], r["defect"], "; ".join(r["schema"])] for r in asked if r["schema"]]
+    text = f"{len(asked) - len(wrong)} of {len(asked)} diagnoses are as the JSON schema says, and the same text after reading and writing."
+    return "\n\n".join(["## Schema", text] + ([table(["case", "defect", "what differs"], wrong)] if wrong else []))
 
 
 def _made(records: list[Record]) -> str:
