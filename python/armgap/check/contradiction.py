@@ -53,8 +53,8 @@ _MOST_SUSPECTS = 3
 # A reading is right if predictions miss by less than this part of what they miss with the log as it stands. Unmodelled effects seldom
 # change the RMS of wrong readings by less than a factor of two.
 BETTER = 0.7
-# With parameters that no arm has the log as it stands explains nothing; the other reading must then do about as well. So must a size of all torques that
-# the arm file's values may as well be off by.
+# With parameters that no arm has the log as it stands explains nothing; the other reading must then do about as well. So must a size of all torques
+# that the arm file's values may as well be off by.
 AS_GOOD = 1.3
 # A reading that explains a log predicts it: errors stay below this part of the motion. Unmodelled effects leave up to a tenth.
 EXPLAINS = 0.3

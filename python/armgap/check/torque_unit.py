@@ -48,9 +48,9 @@ _CLEAR_GAIN = 0.5
 _LEFT = 0.3
 # Where a factor leaves this share of a torque, a limit of the drive or an elastic torque is tried beside it, and taken where it halves that share:
 # sound logs and factors alone leave 0.02 at most, drives that saturate 0.2 to 0.6 and behind their limit 0.01 to 0.05 (five development cases of six;
-# 0.35 in one that is hardly ever below its limit), springs and stops 0.1 to 0.4 and less than 0.03 beside the elastic torque (three of five). Where that
-# share stays, predictions have to agree: friction without bound and another size of all torques have left 0.14 to 0.25 of two runs of a real arm whose
-# torques were in newton metres.
+# 0.35 in one that is hardly ever below its limit), springs and stops 0.1 to 0.4 and less than 0.03 beside the elastic torque (three of five). Where
+# that share stays, predictions have to agree: friction without bound and another size of all torques have left 0.14 to 0.25 of two runs of a real arm
+# whose torques were in newton metres.
 _CHANGE_TRIED = 0.1
 _CHANGE_TAKEN = 0.5
 # Share of a torque below which its factor is known as well as it can be: what is off then are the values of the arm file.
