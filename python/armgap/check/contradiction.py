@@ -77,9 +77,15 @@ class Refit:
 
     @classmethod
     def of(cls, arm: Arm, training: Sequence[Log], holdout: Sequence[Log], horizon: float) -> Refit:
-        """Fit the parameters of the arm in the trust that it states."""
+        """Fit the parameters of the arm in the trust that it states, from its file and from what the equation of motion says of the logs."""
+        errors = EquationError([Rows.of(log, arm) for log in training], arm)
+        start = errors.fit(*bounds(arm)).theta if len(errors) else arm.theta
         found = _native.refit(
-            arm.to_native(), [log.to_native() for log in training], [log.to_native() for log in holdout], horizon
+            arm.to_native(),
+            start.tolist(),
+            [log.to_native() for log in training],
+            [log.to_native() for log in holdout],
+            horizon,
         )
         theta, sigma, error, motion = (np.asarray(found[key]) for key in ("theta", "sigma", "refit", "motion"))
         return cls(theta, sigma, error, motion)

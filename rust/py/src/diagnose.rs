@@ -42,11 +42,12 @@ struct Owned {
 }
 
 /// The arm's parameters estimated again without any effect: `theta`, `sigma`, and per joint the RMS errors `before` and `refit` and
-/// the RMS displacement `motion` on the holdout.
+/// the RMS displacement `motion` on the holdout. It is fitted from the arm file's parameters and from `start`.
 #[pyfunction]
 pub fn refit<'py>(
     py: Python<'py>,
     arm: &Bound<'py, PyDict>,
+    start: Vec<f64>,
     training: Vec<PyLog<'py>>,
     holdout: Vec<PyLog<'py>>,
     horizon: f64,
@@ -57,7 +58,7 @@ pub fn refit<'py>(
     let holdout = holdout.iter().map(|log| copy(log, n)).collect::<PyResult<Vec<_>>>()?;
     let options = Options { horizon, ..Options::default() };
     let found = with_progress(py, None, move |observer| {
-        rigid_fit(&arm, &views(&training), &views(&holdout), &options, observer).map_err(|e| e.to_string())
+        rigid_fit(&arm, &start, &views(&training), &views(&holdout), &options, observer).map_err(|e| e.to_string())
     })?
     .map_err(PyValueError::new_err)?;
     let result = PyDict::new(py);

@@ -1,8 +1,11 @@
 //! The arm's parameters estimated again without any effect, under the arm file's sigmas as prior.
 //!
-//! What the plausibility checks of the input compare: a log read as it stands, and read with a defect corrected.
+//! What the plausibility checks of the input compare: a log read as it stands, and read with a defect corrected. Scales follow the residual, so the cost
+//! has several minima: far from the logs the residual is large, the prior holds the parameters there, and the residual stays large. An arm that
+//! carries what its file does not know, or whose file is far off, is found from parameters that the logs say themselves.
 
 use crate::diagnose::Request;
+use crate::likelihood::context::WindowSet;
 use crate::log::input::{DiagnoseError, LogData, Options, validate};
 use crate::model::arm::{ArmDescription, WithArm};
 use crate::model::hypothesis::Hypothesis;
@@ -25,25 +28,29 @@ pub struct Refit {
     pub motion: Vec<f64>,
 }
 
-/// Estimates the arm's parameters again.
+/// Estimates the arm's parameters again, from the arm file and from `start`; of the two the fit counts that predicts the training logs better.
 ///
 /// # Errors
 ///
 /// As `diagnose`.
 pub fn refit(
     arm: &ArmDescription,
+    start: &[f64],
     training: &[LogData<'_>],
     holdout: &[LogData<'_>],
     options: &Options,
     observer: &Observer,
 ) -> Result<Refit, DiagnoseError> {
     validate(arm.kind.joints(), training, holdout, options)?;
-    let work = RigidFit(Request { arm, training, holdout, options, observer });
+    let work = RigidFit { request: Request { arm, training, holdout, options, observer }, start };
     let ended = guarded(|| arm.dispatch(work)).ok_or(DiagnoseError::Stopped)?;
     ended.ok_or(DiagnoseError::Parameters(arm.kind))?
 }
 
-struct RigidFit<'a>(Request<'a>);
+struct RigidFit<'a> {
+    request: Request<'a>,
+    start: &'a [f64],
+}
 
 impl WithArm for RigidFit<'_> {
     type Output = Result<Refit, DiagnoseError>;
@@ -53,20 +60,31 @@ impl WithArm for RigidFit<'_> {
         arm: A,
         theta: [f64; P],
     ) -> Self::Output {
-        let Self(request) = self;
+        let Self { request, start } = self;
+        let start: [f64; P] = start.try_into().map_err(|_| DiagnoseError::Parameters(request.arm.kind))?;
         let context = request.context::<A, N, P>(arm, theta, request.training, request.holdout)?;
         let nominal = Hypothesis::rigid(theta);
-        let (fit, _) = context.settle(&nominal, context.rough_scale(&nominal));
-        let (data, measured) = (&context.holdout.data, &context.holdout.measured);
-        let missed = |hypothesis: &Hypothesis<P>| {
-            rms::<N>(measured, &data.predict(&context.arm, hypothesis, &data.zero_offsets()))
+        let missed = |sample: &WindowSet<N>, hypothesis: &Hypothesis<P>| {
+            rms::<N>(&sample.measured, &sample.data.predict(&context.arm, hypothesis, &sample.data.zero_offsets()))
         };
+        let fitted = |from: &Hypothesis<P>| {
+            let (fit, _) = context.settle(from, context.rough_scale(from));
+            let left: f64 = missed(&context.training, &fit.hypothesis).iter().map(|error| error.ln()).sum();
+            (fit, left)
+        };
+        let (mut fit, left) = fitted(&nominal);
+        if start != theta {
+            let (other, less) = fitted(&Hypothesis::rigid(start));
+            if less < left {
+                fit = other;
+            }
+        }
         Ok(Refit {
             theta: fit.hypothesis.theta.to_vec(),
             sigma: (0..P).map(|i| fit.sigma(i)).collect(),
-            before: missed(&nominal),
-            refit: missed(&fit.hypothesis),
-            motion: rms::<N>(measured, &context.holdout.still()),
+            before: missed(&context.holdout, &nominal),
+            refit: missed(&context.holdout, &fit.hypothesis),
+            motion: rms::<N>(&context.holdout.measured, &context.holdout.still()),
         })
     }
 }
