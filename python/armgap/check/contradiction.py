@@ -58,6 +58,10 @@ BETTER = 0.7
 AS_GOOD = 1.3
 # A reading that explains a log predicts it: errors stay below this part of the motion. Unmodelled effects leave up to a tenth.
 EXPLAINS = 0.3
+# Or its equation of motion leaves less than this share of every joint's torque: torques that a drive limits, or a dead zone takes, act for the whole of
+# a window, and predictions miss by half of the motion where the equation leaves 0.06 (a drive that saturates; wrong readings of it leave 0.04 to 1.2
+# and more, so that the comparison of predictions decides there too).
+_ACCOUNTS_FOR = 0.1
 # Errors below this part of the motion are as good as none.
 _NEGLIGIBLE = 1e-3
 # Other readings whose predictions are as good to this part are named beside it.
@@ -200,7 +204,8 @@ def confirm(
         corrections = suspect.reading.corrections
         read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
         refit = Refit.of(corrections.on_arm(arm), read[0], read[1], horizon)
-        if refit.possible(corrections.on_arm(arm)) and refit.relative < EXPLAINS:
+        explains = refit.relative < EXPLAINS or suspect.fit.share.max() < _ACCOUNTS_FOR
+        if refit.possible(corrections.on_arm(arm)) and explains:
             tried.append((refit.against(as_is, rescaled=bool(corrections.unit)), suspect, refit))
     tried.sort(key=lambda entry: entry[0])
     if not tried or tried[0][0] > limit:

@@ -100,7 +100,8 @@ def confirmed(
 
     From there the shift moves on, a sample at a time, for as long as predictions clearly gain. Beside a large unmodelled effect they hardly
     change with a shift, so they need not gain where the equation of motion has found several samples: only not lose. A single sample may be the
-    doing of an effect, so there predictions decide, and only where they are clearly worse on either side.
+    doing of an effect, so there predictions decide, and only where they are clearly worse on either side. A shift with which the log wants
+    parameters that no arm has explains nothing.
     """
     period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
     as_is = Refit.of(arm, training, holdout, horizon)
@@ -111,7 +112,8 @@ def confirmed(
             return 1.0 if k == 0 else math.inf
         corrections = Corrections(shift={"tau": -k * period})
         read = [[corrections.on_log(log) for log in group] for group in (training, holdout)]
-        return Refit.of(arm, read[0], read[1], horizon).against(as_is)
+        refit = Refit.of(arm, read[0], read[1], horizon)
+        return refit.against(as_is) if refit.possible(arm) else math.inf
 
     best = samples if samples > 1 else 0
     while error(k := min((best - 1, best + 1), key=error)) < (_CLEARLY if best else _AT_FIRST) * error(best):
