@@ -7,6 +7,7 @@ it stands with the log as it would be without the defect; neither knows anything
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -58,13 +59,13 @@ BETTER = 0.7
 AS_GOOD = 1.3
 # A reading that explains a log predicts it: errors stay below this part of the motion. Unmodelled effects leave up to a tenth.
 EXPLAINS = 0.3
-# Or its equation of motion leaves less than this share of every joint's torque: torques that a drive limits, or a dead zone takes, act for the whole of
-# a window, and predictions miss by half of the motion where the equation leaves 0.06 (a drive that saturates; wrong readings of it leave 0.04 to 1.2
-# and more, so that the comparison of predictions decides there too).
+# Or its equation of motion leaves less than this share of every joint's torque: where a drive saturates or has a dead zone for whole windows,
+# predictions of right readings miss by 0.35 and 0.58 of the motion and the equation leaves 0.016 and 0.063 (two cases). Wrong readings of them leave
+# 0.07 to 1.2, so predictions have to be better than as the log stands here too.
 _ACCOUNTS_FOR = 0.1
 # Errors below this part of the motion are as good as none.
 _NEGLIGIBLE = 1e-3
-# Other readings whose predictions are as good to this part are named beside it.
+# Other readings whose predictions are as good to this part, and that lower the equation error as far (to `_SUSPICIOUS`), are named beside it.
 _ALIKE = 1.05
 # Parameters count as impossible beyond the bounds by so many standard deviations.
 _SURE = 3.0
@@ -194,7 +195,11 @@ def confirm(
     arm: Arm,
     horizon: float,
 ) -> Found | None:
-    """Return the reading that predictions confirm, or none."""
+    """Return the reading that predictions confirm, or none.
+
+    Of several the one counts by which predictions and torques together say most: where something hidden makes up most of what predictions miss, they
+    hardly tell readings apart.
+    """
     if not suspects:
         return None
     as_is = Refit.of(arm, training, holdout, horizon)
@@ -206,11 +211,13 @@ def confirm(
         refit = Refit.of(corrections.on_arm(arm), read[0], read[1], horizon)
         explains = refit.relative < EXPLAINS or suspect.fit.share.max() < _ACCOUNTS_FOR
         if refit.possible(corrections.on_arm(arm)) and explains:
-            tried.append((refit.against(as_is, rescaled=bool(corrections.unit)), suspect, refit))
-    tried.sort(key=lambda entry: entry[0])
-    if not tried or tried[0][0] > limit:
+            ratio = refit.against(as_is, rescaled=bool(corrections.unit))
+            if ratio <= limit:
+                tried.append((ratio, suspect, refit))
+    if not tried:
         return None
+    tried.sort(key=lambda entry: math.log(entry[0]) - entry[1].gain)
     ratio, best, refit = tried[0]
-    alike = tuple(s.reading for part, s, _ in tried[1:] if part <= _ALIKE * ratio)
+    alike = tuple(s.reading for part, s, _ in tried[1:] if part <= _ALIKE * ratio and best.gain - s.gain <= _SUSPICIOUS)
     shares = (float(stands.share.max()), float(best.fit.share.max()))
     return Found(best.reading, alike, shares, (as_is.error, refit.error))
