@@ -58,7 +58,8 @@ pub fn refit<'py>(
     let holdout = holdout.iter().map(|log| copy(log, n)).collect::<PyResult<Vec<_>>>()?;
     let options = Options { horizon, ..Options::default() };
     let found = with_progress(py, None, move |observer| {
-        rigid_fit(&arm, &start, &views(&training), &views(&holdout), &options, observer).map_err(|e| e.to_string())
+        rigid_fit(&arm, &start, &views(&training), &views(&holdout), &options, observer)
+            .map_err(|e| e.to_string())
     })?
     .map_err(PyValueError::new_err)?;
     let result = PyDict::new(py);

@@ -65,7 +65,10 @@ impl WithArm for RigidFit<'_> {
         let context = request.context::<A, N, P>(arm, theta, request.training, request.holdout)?;
         let nominal = Hypothesis::rigid(theta);
         let missed = |sample: &WindowSet<N>, hypothesis: &Hypothesis<P>| {
-            rms::<N>(&sample.measured, &sample.data.predict(&context.arm, hypothesis, &sample.data.zero_offsets()))
+            rms::<N>(
+                &sample.measured,
+                &sample.data.predict(&context.arm, hypothesis, &sample.data.zero_offsets()),
+            )
         };
         let fitted = |from: &Hypothesis<P>| {
             let (fit, _) = context.settle(from, context.rough_scale(from));
