@@ -92,6 +92,15 @@ def test_a_reader_that_changes_something_is_found(data: Any, monkeypatch: pytest
     assert any("ruled_out" in line for line in losses(json.dumps(data)))
 
 
+def test_fields_of_one_name_have_places_of_their_own(data: Any) -> None:
+    range_ = {"variable": "dq1", "from": 0.5, "to": 1.5}
+    place = {"joint": 1, "share": 0.5, "regime": "fast", "detail": "", "range": range_}
+    law = {"x": [0.0, 1.0], "torque": [0.0, 0.1], "sigma": [0.1, 0.1]}
+    unnamed = {"joint": 1, "variable": "q1", "unit": "rad", "share": 0.5, "law": law}
+    found = losses(json.dumps(data | {"where": [place], "unnamed": [unnamed]}))
+    assert not [line for line in found if "variable" in line]
+
+
 class Inner(TypedDict):
     """Within."""
 

@@ -11,13 +11,13 @@ import pytest
 
 from armgap.diagnosis import Cause, Diagnosis, diagnosis_schema
 
-#: Fields of the typed result whose keys are elsewhere in the JSON object: field, and the path of keys to it.
+#: Fields of the typed result whose keys are elsewhere in the JSON object: class and field, and the path of keys to it.
 ELSEWHERE = {
-    "free_run_before": ("free_run", "before"),
-    "free_run_after": ("free_run", "after"),
-    "variable": ("range", "variable"),
-    "low": ("range", "from"),
-    "high": ("range", "to"),
+    ("Gap", "free_run_before"): ("free_run", "before"),
+    ("Gap", "free_run_after"): ("free_run", "after"),
+    ("Location", "variable"): ("range", "variable"),
+    ("Location", "low"): ("range", "from"),
+    ("Location", "high"): ("range", "to"),
 }
 
 
@@ -65,7 +65,7 @@ def _differences(typed: Any, data: Any, place: str) -> list[str]:
                 found += [f"{place}.{k}: lost" for k in data if k not in value and k not in _own(typed) | {"schema"}]
                 continue
             inner: Any = data
-            for key in ELSEWHERE.get(field.name, (field.name,)):
+            for key in ELSEWHERE.get((type(typed).__name__, field.name), (field.name,)):
                 inner = (inner or {}).get(key)
             found += _differences(value, inner, f"{place}.{field.name}")
         return found
