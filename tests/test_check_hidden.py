@@ -86,6 +86,7 @@ def test_what_is_hidden_may_leave_a_right_reading_without_predictions(
     assert said(("tau1", 1.5, 0.2, 0.25)) == ["tau1"], "the motion is predicted"
     assert said(("tau1", 1.5, 0.2, 0.55)) == [], "neither"
     assert said(("tau1", 1.5, 0.06, 0.7)) == [], "no better than the log as it stands"
+    assert said(("tau1", 0.5, 0.06, 0.6)) == [], "predictions and torques together say too little"
     standing = found_among(monkeypatch, two_links, arm, 7.0, ("tau1", 1.5, 0.06, 1.8))
     assert standing == [], "worse than an arm that stands still"
 
