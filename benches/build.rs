@@ -1,4 +1,4 @@
-//! Compiles the plain C of `baselines` twice: portable, and for this machine's processor.
+//! Compiles the plain C baselines of `baselines` twice: for any processor, and for this machine's.
 
 const FUNCTIONS: [&str; 9] = [
     "baseline_start",

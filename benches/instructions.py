@@ -1,7 +1,7 @@
-"""Instructions per sample: median, extremes, and the share of samples within 10 % of the median.
+"""Instructions per sample of online estimators: median, extremes, and the share of samples within 10 % of the median.
 
-Of the code for any processor they are counted by valgrind, which does not know every instruction of newer ones. Of the code that this
-processor runs they are counted by single steps, as in a debugger, from the first call of ``one_sample`` on.
+In code for any processor instructions are counted by valgrind, which does not know every instruction of newer processors. In code for
+this machine's processor they are counted by single steps, as in a debugger, from the first call of ``one_sample`` on.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 VALGRIND_SAMPLES, STEP_SAMPLES = 600, 200
-# The first samples, in which an estimator starts, are left out.
+# Number of first samples that are left out, in which an estimator starts.
 START = 3
 SCHEMES = ("filtered-dynamic", "supplied-energy", "filtered-power")
 FORMS = ("plain", "factorized")
-# Arm, scheme, filters, form.
+# Arm, scheme, filters and form of the covariance of each measured estimator.
 CASES = [
     *itertools.product(["two-link"], SCHEMES, ["paper", "exact"], FORMS),
     *itertools.product(["serial"], SCHEMES, ["exact"], FORMS),
 ]
 TRACE_ME, PEEK, PEEK_USER, POKE, POKE_USER, CONTINUE, STEP = 0, 1, 3, 4, 6, 7, 9
-# Offsets in the registers of <sys/user.h>, x86-64.
+# Offsets of the registers RIP and RSP in the structure of <sys/user.h>, x86-64, bytes.
 RIP, RSP = 16 * 8, 19 * 8
 BREAKPOINT = 0xCC
 
@@ -41,7 +41,7 @@ _ptrace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void
 
 
 def ask(request: int, pid: int, address: int = 0, data: int = 0) -> int:
-    """One request to the kernel; an error where it refuses."""
+    """Make one ptrace request to the kernel; an error if it refuses."""
     ctypes.set_errno(0)
     answer = int(_ptrace(request, pid, address, data))
     if ctypes.get_errno():
@@ -50,14 +50,14 @@ def ask(request: int, pid: int, address: int = 0, data: int = 0) -> int:
 
 
 def wait(pid: int) -> None:
-    """Until the next stop, which has to be one of ours."""
+    """Wait for the next stop of the traced program, which must be a trap."""
     _, status = os.waitpid(pid, 0)
     if not os.WIFSTOPPED(status) or os.WSTOPSIG(status) != signal.SIGTRAP:
         raise RuntimeError(f"the program ended or stopped by itself: status {status:#x}")
 
 
 def offset(program: str) -> int:
-    """Where ``one_sample`` begins in the file."""
+    """Offset of the function ``one_sample`` in the program's file [bytes]."""
     for line in subprocess.run(["nm", program], check=True, capture_output=True, text=True).stdout.splitlines():
         if re.search(r"instructions.*one_sample", line):
             return int(line.split()[0], 16)
@@ -65,7 +65,7 @@ def offset(program: str) -> int:
 
 
 def by_valgrind(program: str, *case: str) -> list[int]:
-    """Instructions of each call of ``one_sample``, code for any processor."""
+    """Instructions of each call of ``one_sample`` in code for any processor, by valgrind."""
     with tempfile.TemporaryDirectory() as folder:
         tool = [
             "valgrind",
@@ -82,7 +82,7 @@ def by_valgrind(program: str, *case: str) -> list[int]:
 
 
 def by_steps(program: str, *case: str) -> list[int]:
-    """Instructions of each call of ``one_sample``, code for this processor."""
+    """Instructions of each call of ``one_sample`` in code for this processor, by single steps."""
     pid = os.fork()
     if pid == 0:
         ask(TRACE_ME, 0)
@@ -101,7 +101,7 @@ def by_steps(program: str, *case: str) -> list[int]:
 
 
 def run_to(pid: int, address: int) -> None:
-    """At full speed to an address."""
+    """Run the traced program at full speed to an address."""
     word = ask(PEEK, pid, address)
     ask(POKE, pid, address, (word & ~0xFF) | BREAKPOINT)
     ask(CONTINUE, pid)
@@ -111,7 +111,7 @@ def run_to(pid: int, address: int) -> None:
 
 
 def one_call(pid: int, entry: int) -> int:
-    """From the entry to the return, counted, and on to the next entry."""
+    """Number of instructions of a call from its entry to its return; runs on to the next entry."""
     back, stack = ask(PEEK, pid, ask(PEEK_USER, pid, RSP)), ask(PEEK_USER, pid, RSP)
     count = 0
     while True:
@@ -127,7 +127,7 @@ def one_call(pid: int, entry: int) -> int:
 
 
 def tools() -> dict[str, Callable[..., list[int]]]:
-    """What can be counted here."""
+    """Methods of counting that work on this machine, by the code they count."""
     found: dict[str, Callable[..., list[int]]] = {}
     if sys.platform == "linux" and platform.machine() == "x86_64" and shutil.which("nm"):
         found["this processor's"] = by_steps

@@ -1,7 +1,7 @@
-"""The estimator and the simulation beside well-known packages: time, ratio, and how far results differ. Markdown on standard output.
+"""Times of armgap's estimator and simulation and of well-known packages, with ratios and differences of results. Markdown on standard output.
 
-Estimation: filtered power with the paper's filters on the seed's run; the others get regressor rows that numpy and scipy filtered for
-them, so they do less. Simulation: the same arm without dry friction, two seconds; differences are to scipy's DOP853 at 1e-12.
+Estimation: filtered power with the filters of Reyes and Kelly (1997) on their run; other packages get regressor rows filtered by numpy
+and scipy, so they do less. Simulation: two seconds of the arm without dry friction; differences are to scipy's DOP853 at 1e-12.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def arm(coulomb: tuple[float, float]) -> Arm:
 
 
 def timed(work: Callable[[], object]) -> float:
-    """Median time of a call [s]."""
+    """Median time of a call of ``work`` [s]."""
     times = []
     for _ in range(ROUNDS):
         start = time.perf_counter()
@@ -60,7 +60,7 @@ def present(*names: str) -> bool:
 
 
 def regressors(q: np.ndarray, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and outputs of equation (30) with the paper's filters."""
+    """Regressor rows and outputs of the filtered power model, Reyes and Kelly (1997), equation (30), with their filters."""
     from scipy.signal import lfilter
 
     dq = np.vstack([np.zeros(2), np.diff(q, axis=0) / H])
@@ -219,7 +219,7 @@ def with_pinocchio(tau: np.ndarray) -> tuple[Callable[[], np.ndarray], Callable[
 
 
 def reference(tau: np.ndarray, method: str, tolerance: float) -> np.ndarray:
-    """The motion by scipy, restarted at every sample because the torque jumps there."""
+    """Positions by a solver of scipy, restarted at every sample because the torque jumps there [rad]."""
     from scipy.integrate import solve_ivp
 
     p1, p2, p3, p4, p5 = exact_theta()

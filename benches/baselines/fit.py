@@ -1,7 +1,7 @@
-"""Nine parameters fitted by output error, by several packages on the same log: time, rollouts, and how far the result is from the truth.
+"""Nine parameters fitted by output error, by several packages on one log: time, rollouts, and distance of the result from the truth.
 
-The log is ten seconds of the seed's run with dry friction, positions of the exact integrator, cut into windows of 0.25 s whose first states
-are given; everybody starts 20 % away from the truth and predicts the positions of every window. Markdown on standard output.
+The log is the run of ten seconds of Reyes and Kelly (1997) with dry friction, positions of the exact integrator, cut into windows of 0.25 s
+with known initial states; every fit starts 20 % away from the truth and predicts the positions of all windows. Markdown on standard output.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from armgap import Arm, identify, seed_torque, simulate
 TRUTH = np.array([2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6095, 1.734])
 START = TRUTH * (1.0 + 0.2 * np.resize([1.0, -1.0], 9))
 SAMPLES, WINDOW = 4000, 100
-#: Of how many windows the slowest takes one.
+#: Number of windows of which the slowest solver is given one.
 FEW = 8
-#: Width of the smoothed sign where a solver cannot take a jump [rad/s].
+#: Width of the smooth sign of the velocity for solvers that cannot take a jump of friction [rad/s].
 SMOOTHING = 0.01
 Rollout = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
 class Case:
-    """The log in windows."""
+    """A log cut into windows, of which each ``every``-th is used: times [s], positions, velocities and torques."""
 
     t: np.ndarray
     q: np.ndarray
@@ -53,13 +53,13 @@ class Case:
 
     @property
     def measured(self) -> np.ndarray:
-        """Positions after every period of every window."""
+        """Positions after every period of every window [rad]."""
         return np.concatenate([self.q[k + 1 : k + 1 + WINDOW] for k in self.starts])
 
 
 @dataclass(frozen=True)
 class Fit:
-    """What a package gave."""
+    """Result of one package: parameters, time [s], and number of rollouts where it does any."""
 
     theta: np.ndarray
     seconds: float
@@ -77,7 +77,7 @@ def make_case() -> Case:
 
 
 def plain_c(case: Case, folder: str) -> Rollout | None:
-    """All windows by ``rollout.c`` beside this file, called through ctypes."""
+    """Function that predicts the positions of all windows by ``rollout.c``, called through ctypes."""
     source = Path(__file__).with_name("rollout.c")
     if not source.exists() or shutil.which("cc") is None:
         print(f"skipped: {source.name} or cc is missing", file=sys.stderr)
@@ -100,7 +100,7 @@ def plain_c(case: Case, folder: str) -> Rollout | None:
 
 
 def with_solve_ivp(case: Case) -> Rollout:
-    """All windows by scipy's Runge-Kutta, sign of the velocity smoothed, restarted where the torque jumps."""
+    """Function that predicts the positions of all windows by scipy's Runge-Kutta, with smooth friction, restarted where the torque jumps."""
     from scipy.integrate import solve_ivp
 
     def slope(_: float, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> list[float]:
@@ -129,7 +129,7 @@ def with_solve_ivp(case: Case) -> Rollout:
 
 
 def by_scipy(case: Case, predict: Rollout) -> Fit:
-    """``scipy.optimize.least_squares`` over shares of the start, so that all parameters are of one size."""
+    """Fit by ``scipy.optimize.least_squares`` of factors of the initial parameters, so that all are of one size."""
     from scipy.optimize import least_squares
 
     count = 0
@@ -146,7 +146,7 @@ def by_scipy(case: Case, predict: Rollout) -> Fit:
 
 
 def by_sysid(case: Case) -> Fit:
-    """``mujoco.sysid.optimize`` with its own optimiser."""
+    """Fit by ``mujoco.sysid.optimize`` with its own optimiser."""
     from armgap.trial.baselines.mujoco_model import build_spec, set_coulomb, set_inertial
 
     sysid = importlib.import_module("mujoco.sysid")
@@ -196,7 +196,7 @@ def by_sysid(case: Case) -> Fit:
 
 
 def by_armgap(case: Case) -> Fit:
-    """The package's own fit; it takes the windows' first states from positions alone."""
+    """Fit by armgap, which takes the initial states of windows from positions alone."""
     arm = Arm("arm", "two-link", 9.81, H, START, 0.1 * START)
     log = simulate(Arm("arm", "two-link", 9.81, H, TRUTH, 0.1 * TRUTH), case.t, case.tau)
     begin = time.perf_counter()
@@ -205,7 +205,7 @@ def by_armgap(case: Case) -> Fit:
 
 
 def by_least_squares(case: Case) -> Fit:
-    """Filtered power, recursive: no rollouts, so another method; what it gives from the same positions."""
+    """Estimate from the positions by armgap's recursive filtered power model, which does no rollouts."""
     arm = Arm("arm", "two-link", 9.81, H, START, 0.1 * START)
     log = simulate(Arm("arm", "two-link", 9.81, H, TRUTH, 0.1 * TRUTH), case.t, case.tau)
     begin = time.perf_counter()

@@ -1,4 +1,4 @@
-"""The fit of `fit.rs` by scipy around the plain C rollout: does it end at the same parameters, and how long does it take?
+"""The output-error fit of `fit.rs` by scipy around the plain C rollout: differences of the parameters, and time.
 
 cargo run --release -p armgap-benches --bin fit -- problem.json
 python benches/baselines/output_error.py problem.json
@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 HERE = Path(__file__).parent
-#: Forward differences like ours; scipy's own step of 1.5e-8 is too short beside events located to 1e-10.
+#: Relative step of forward differences, as in armgap's fit; scipy's default of 1.5e-8 is too short beside events located to 1e-10.
 STEP = 1e-6
 
 
 def library(folder: str) -> Any:
-    """The C rollouts as a shared library."""
+    """Function ``baseline_rollout`` of ``rollout.c``, compiled as a shared library in ``folder``."""
     built = Path(folder) / "rollout.so"
     subprocess.run(["cc", "-O3", "-shared", "-fPIC", "-o", built, HERE / "rollout.c", "-lm"], check=True)
     function = ctypes.CDLL(str(built)).baseline_rollout
@@ -34,12 +34,12 @@ def library(folder: str) -> Any:
 
 
 def pointer(x: NDArray[np.float64]) -> Any:
-    """Address of an array for C."""
+    """Address of an array of doubles, for C."""
     return x.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
 
 def main(path: str) -> None:
-    """Fit and print the comparison."""
+    """Fit the problem of a JSON file by scipy and print the comparison with armgap."""
     problem = json.loads(Path(path).read_text())
     q, tau = (np.array(problem[name]).reshape(-1, 2) for name in ("q", "tau"))
     first, ours = np.array(problem["first"]), np.array(problem["theta"])

@@ -1,4 +1,4 @@
-//! Cost per sample of the online estimators, filters to covariance: schemes, filters, precisions, forms.
+//! Benchmark of the online estimator's time per sample, filters to covariance, by scheme, filters, precision and form of the covariance.
 
 use armgap_bench::cost::{fresh, readings};
 use armgap_bench::run::{PERIOD, SAMPLES};

@@ -1,4 +1,4 @@
-//! Cost of simulating the seed paper's 10 s: steps per period, and what each effect adds.
+//! Benchmark of simulating the 10 s run of Reyes and Kelly (1997), by number of steps per period and by effect.
 
 use armgap_bench::run::{PERIOD, SAMPLES, THETA, arm, rollout, torque};
 use armgap_core::effect::{Active, InputSegment, catalogue};
@@ -16,7 +16,7 @@ fn rollouts(c: &mut Criterion) {
     group.finish();
 }
 
-/// The run with an effect on joint 2, one step per period.
+/// Simulates the 10 s run with the effects of `plant`, one step per period, and returns the last state.
 fn with_effect(plant: &Plant<f64, armgap_core::arm::TwoLink<f64>, 2, 9>) -> State<f64, 2> {
     let mut state = State::new(Vector2::zeros(), Vector2::zeros());
     for k in 0..SAMPLES {

@@ -1,4 +1,4 @@
-//! The plain C estimator of `baselines/online.c`.
+//! Interface to the plain C online estimator of the two-link arm, `baselines/online.c`.
 
 // The only unsafe code of the benchmarks: calls into C.
 #![allow(unsafe_code)]
@@ -7,9 +7,9 @@ use armgap_core::identify::Sample;
 use armgap_core::regression::{Scheme, Variant};
 use std::ffi::{c_int, c_long, c_uint};
 
-/// Room for the C structure.
+/// Number of doubles reserved for the state of the C estimator.
 const WORDS: usize = 256;
-/// Parameters, which come first in it.
+/// Number of estimated parameters, which come first in the state of the C estimator.
 const PARAMETERS: usize = 9;
 
 type Start = unsafe extern "C" fn(*mut f64, c_uint, c_int, f64, f64, f64, f64);
@@ -39,12 +39,12 @@ unsafe extern "C" {
     fn baseline_size() -> c_long;
 }
 
-/// How the C was compiled.
+/// Compiler options of the plain C baselines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Build {
-    /// `cc -O3`.
+    /// `cc -O3`: for any processor.
     Portable,
-    /// `cc -O3 -march=native`.
+    /// `cc -O3 -march=native`: for this machine's processor.
     Native,
 }
 
@@ -57,7 +57,7 @@ impl Build {
     }
 }
 
-/// A run as the C code takes it.
+/// Positions, rad, and torques, N m, of a run as arrays for the C estimator.
 #[derive(Debug, Clone)]
 pub struct Arrays {
     q: Vec<f64>,
@@ -65,13 +65,13 @@ pub struct Arrays {
 }
 
 impl Arrays {
-    /// The samples of a run as arrays.
+    /// Positions and torques of a run's samples as arrays.
     pub fn of(samples: &[Sample<f64, 2>]) -> Self {
         let flat = |of: fn(&Sample<f64, 2>) -> [f64; 2]| samples.iter().flat_map(of).collect();
         Self { q: flat(|s| s.q.into()), tau: flat(|s| s.tau.into()) }
     }
 
-    /// The estimate after the run, equation (21) in plain C.
+    /// Parameters estimated over the whole run by the C estimator, which keeps its covariance by equation (21) of Reyes and Kelly (1997).
     pub fn estimate(&self, build: Build, scheme: Scheme, variant: Variant, h: f64) -> [f64; PARAMETERS] {
         let mut state = [0.0_f64; WORDS];
         let (start, run) = build.functions();

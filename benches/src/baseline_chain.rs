@@ -1,4 +1,4 @@
-//! The plain C estimator of serial arms of `baselines/online_chain.c`.
+//! Interface to the plain C online estimator of serial arms, `baselines/online_chain.c`.
 
 // Calls into C.
 #![allow(unsafe_code)]
@@ -40,7 +40,7 @@ unsafe extern "C" {
     fn chain_size() -> c_long;
 }
 
-/// A motion of an arm as the C code takes it.
+/// Joints, gravity, estimated parameters, and positions, rad, and torques, N m, of a motion as arrays for the C estimator.
 #[derive(Debug, Clone)]
 pub struct ChainArrays {
     joints: Vec<f64>,
@@ -51,7 +51,7 @@ pub struct ChainArrays {
 }
 
 impl ChainArrays {
-    /// The samples of a motion of an arm of rotary joints as arrays, and which parameters are estimated.
+    /// Arrays from an arm of rotary joints, indices of estimated parameters, and the samples of a motion.
     pub fn of(chain: &Chain<f64, JOINTS>, columns: &[usize], samples: &[Sample]) -> Self {
         let numbers = |j: usize| {
             let joint = &chain.joints()[j];
@@ -66,7 +66,7 @@ impl ChainArrays {
         }
     }
 
-    /// The estimate after the motion by the filtered power model, or the filtered dynamic one.
+    /// Parameters estimated over the whole motion with the period `h`, s, by the filtered power model, or without `power` by the filtered dynamic one.
     pub fn estimate(&self, build: Build, power: bool, h: f64) -> Vec<f64> {
         let (start, run): (Start, Run) = match build {
             Build::Portable => (chain_start, chain_run),

@@ -1,4 +1,4 @@
-//! The plain C rollout of `baselines/rollout.c`.
+//! Interface to the plain C rollout of the two-link arm, `baselines/rollout.c`.
 
 // Calls into C.
 #![allow(unsafe_code)]
@@ -43,8 +43,8 @@ unsafe extern "C" {
     );
 }
 
-/// Positions after every period of `h` seconds, from positions and velocities `x`, under torques that are held, two for each period;
-/// with dry friction, or, if it has none, without its modes.
+/// Positions, rad, after every period of `h` seconds, from positions and velocities `x`, under held torques, N m, two for each period; with dry friction, or,
+/// if `theta` has none, without friction modes.
 pub fn rollout(build: Build, theta: &[f64; 9], x: &[f64; 4], tau: &[f64], h: f64, q: &mut [f64]) {
     let dry = theta[7] > 0.0 || theta[8] > 0.0;
     let function: Rollout = match (build, dry) {

@@ -1,4 +1,4 @@
-//! Baselines: plain C that computes the same as the core.
+//! Baselines of the benchmarks: plain C that computes the results of `armgap-core`.
 
 pub mod baseline;
 pub mod baseline_chain;

@@ -1,5 +1,5 @@
-//! Two seconds of the same arm without dry friction, Runge-Kutta with one step per period: the core's, and around ferromotion's
-//! articulated-body algorithm. Markdown on standard output.
+//! Times of two seconds of the two-link arm without dry friction, by Runge-Kutta with one step per period: `armgap-core`'s, and one around
+//! ferromotion's articulated-body algorithm. Markdown on standard output.
 
 use armgap_bench::run::{PERIOD, torque};
 use armgap_core::arm::{LinkParameters, TwoLink};
@@ -81,7 +81,7 @@ fn ours(plant: &Plant<f64, TwoLink<f64>, 2, 9>) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Median time per sample, ns.
+/// Median time of `work` per sample, ns.
 fn timed<R>(mut work: impl FnMut() -> R) -> f64 {
     let mut times: Vec<f64> = (0..ROUNDS)
         .map(|_| {

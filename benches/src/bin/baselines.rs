@@ -1,6 +1,7 @@
-//! The core beside plain C doing the same work: times, ratios, and by how much the estimates differ. Markdown on standard output.
+//! Times of the online estimator of `armgap-core` and of plain C doing equal work, with ratios and differences of the estimates. Markdown on
+//! standard output.
 //!
-//! All columns of a row are measured in turn, over and over, so that whatever else the machine does falls on all of them alike.
+//! All columns of a row are measured in turn, over and over, so that disturbances of the machine fall on all of them alike.
 
 use armgap_bench::cost::{fresh, readings};
 use armgap_bench::run::{PERIOD, samples};
@@ -16,10 +17,10 @@ use std::io::Write;
 use std::time::Instant;
 
 const ROUNDS: usize = 301;
-/// Relative difference of the estimates beyond which the work was not the same.
+/// Relative difference of the estimates of `armgap-core` and plain C beyond which their work was not equal.
 const SAME: f64 = 1e-9;
 
-/// The estimate after the whole run.
+/// Parameters estimated by `armgap-core` over the whole run.
 fn ours<T: Real>(
     data: &[Reading<T, 2>],
     scheme: Scheme,
@@ -40,7 +41,7 @@ fn median(times: &mut [f64]) -> f64 {
     times[times.len() / 2]
 }
 
-/// What a column measures.
+/// Headings of the measured columns: compiler options of plain C, or form of the covariance and precision.
 const COLUMNS: [&str; 7] = [
     "C -O3",
     "C -O3 -march=native",
@@ -51,7 +52,7 @@ const COLUMNS: [&str; 7] = [
     "factorized f32",
 ];
 
-/// Median times per sample [ns], one per column, and the largest relative difference between C and ours in double precision.
+/// Median times per sample, ns, one per column, and the largest relative difference of estimates between plain C and `armgap-core` in double precision.
 fn compare(scheme: Scheme, variant: Variant) -> ([f64; COLUMNS.len()], f64) {
     let (double, single) = (readings::<f64>(), readings::<f32>());
     let arrays = Arrays::of(&samples::<f64>());

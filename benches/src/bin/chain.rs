@@ -1,5 +1,5 @@
-//! Time of a chain's acceleration and torque regressor per state, for six and seven revolute joints: one state at a time with the
-//! instructions of any processor, and several side by side with those this one has.
+//! Times of a chain's acceleration and torque regressor per state, for six and seven revolute joints: one state at a time with the
+//! instructions of any processor, and several side by side with the instructions of this machine's processor.
 
 use armgap_bench::serial::arm;
 use armgap_core::cpu::{Cpu, Kernel, Level};
@@ -8,11 +8,11 @@ use armgap_core::number::Number;
 use std::hint::black_box;
 use std::time::Instant;
 
-/// States per measurement, and measurements of which the shortest counts.
+/// Number of states per measurement, and number of measurements (`REPEATS`) of which the shortest counts.
 const STATES: usize = 4096;
 const REPEATS: usize = 30;
 
-/// Shortest time per pass of a body, ns. A macro: a closure would not be compiled for the instructions of its surroundings.
+/// Shortest time per pass of a loop body, ns. A macro: a closure would not be compiled for the instructions of its surroundings.
 macro_rules! shortest {
     ($i:ident, $body:block) => {{
         let mut shortest = f64::INFINITY;
@@ -32,7 +32,7 @@ fn state<const N: usize>(i: usize) -> [[f64; N]; 3] {
     [of(0.71), of(1.13), of(1.77)]
 }
 
-/// Times of acceleration and regressor, ns per state, with `W` states side by side.
+/// Times of acceleration and regressor, ns per state, with `V::WIDTH` states side by side.
 #[inline(always)]
 fn times<V: Number<Real = f64>, const N: usize>(of: impl Fn(f64) -> V) -> [f64; 2] {
     let (chain, links) = arm::<N>();
@@ -52,7 +52,7 @@ fn times<V: Number<Real = f64>, const N: usize>(of: impl Fn(f64) -> V) -> [f64; 
     [acceleration, regressor].map(|time| time / V::WIDTH as f64)
 }
 
-/// The widest vectors that the processor has.
+/// Kernel that measures with the widest vectors of the processor.
 struct Wide<const N: usize>;
 
 impl<const N: usize> Kernel for Wide<N> {

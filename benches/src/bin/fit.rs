@@ -1,5 +1,5 @@
-//! The nine parameters of the two-link arm from 10 s of motion with dry friction, by output error over windows of 0.2 s. Markdown on
-//! standard output; with a file's name, the same problem as JSON for other solvers (`baselines/output_error.py`).
+//! Fit of the two-link arm's nine parameters to 10 s of motion with dry friction, by output error over windows of 0.2 s. Markdown on
+//! standard output; with a file's name as argument, also writes the problem as JSON for other solvers (`baselines/output_error.py`).
 
 use armgap_bench::run::{PERIOD, SAMPLES, THETA, rollout, torque};
 use armgap_core::arm::ArmKind;
@@ -12,11 +12,11 @@ use std::io::Write;
 use std::time::Instant;
 
 const ROUNDS: usize = 51;
-/// Counts per turn of the seed paper's encoders.
+/// Counts per turn of the encoders of Reyes and Kelly (1997), joints 1 and 2.
 const COUNTS: [f64; 2] = [1_024_000.0, 655_360.0];
-/// Length of a window, s.
+/// Length of a window of the output-error fit, s.
 const HORIZON: f64 = 0.2;
-/// First values, relative to the true ones.
+/// Initial values of the nine fitted parameters relative to the true ones.
 const FIRST: [f64; 9] = [1.1, 0.8, 1.2, 0.9, 1.15, 1.3, 0.7, 0.85, 1.2];
 
 struct Log {
@@ -44,7 +44,7 @@ fn fitted(log: &Log) -> Option<Estimate> {
     arm.dispatch(work).flatten()
 }
 
-/// The problem as other solvers need it: first sample, last sample and start of every window.
+/// The fit's problem as JSON for other solvers, with first sample, last sample and initial state of every window.
 fn problem(log: &Log, estimate: &Estimate, milliseconds: f64) -> String {
     let data = Dataset::new(vec![Track::<2>::new("", &log.t, &log.q, &log.tau, Some(log.steps))], HORIZON);
     let mut windows = String::new();

@@ -1,5 +1,5 @@
-//! One call of `one_sample` per sample, for a tool that counts instructions: `instructions SCHEME paper|exact plain|factorized SAMPLES
-//! best|portable two-link|serial`. The serial arm has seven joints and consistent filters.
+//! Program with one call of `one_sample` per sample, for tools that count instructions: `instructions SCHEME paper|exact plain|factorized
+//! SAMPLES best|portable two-link|serial`. The serial arm has seven joints and consistent filters.
 
 use armgap_bench::cost::{fresh, readings};
 use armgap_bench::run::PERIOD;
@@ -13,7 +13,7 @@ use armgap_fit::identify::base_parameters::AmongParameters;
 use armgap_fit::model::chain::ChainDescription;
 use std::hint::black_box;
 
-/// What is counted.
+/// Lets the estimator take sample `k`; the function whose instructions are counted.
 #[inline(never)]
 fn one_sample(take: &mut dyn FnMut(usize), k: usize) {
     take(k);

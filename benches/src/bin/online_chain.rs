@@ -1,7 +1,7 @@
-//! Online estimators of a seven-joint arm, of all base parameters with rotors and friction, beside plain C doing the same work. Markdown on
-//! standard output.
+//! Times of the online estimator of a seven-joint arm, of all base parameters with rotors and friction, and of plain C doing equal work.
+//! Markdown on standard output.
 //!
-//! All columns of a row are measured in turn, over and over, so that whatever else the machine does falls on all of them alike.
+//! All columns of a row are measured in turn, over and over, so that disturbances of the machine fall on all of them alike.
 
 use armgap_bench::run::PERIOD;
 use armgap_bench::serial::{JOINTS, Sample, arm, fresh, samples};
@@ -19,12 +19,12 @@ use std::time::Instant;
 
 const SAMPLES: usize = 2000;
 const ROUNDS: usize = 31;
-/// Relative difference of the estimates beyond which the work was not the same.
+/// Difference of the estimates of `armgap-core` and plain C, relative to the largest estimate, beyond which their work was not equal.
 const SAME: f64 = 1e-8;
 
 const COLUMNS: [&str; 5] = ["C -O3", "C -O3 -march=native", "plain", "factorized", "plain, without AVX2"];
 
-/// The estimate after the whole motion.
+/// Parameters estimated by `armgap-core` over the whole motion.
 fn ours(data: &[Sample], scheme: Scheme, form: Form, level: Level, columns: &[usize]) -> Vec<f64> {
     let mut estimator = fresh(scheme, form, columns).with_level(level);
     for (q, tau) in data {

@@ -1,6 +1,6 @@
-//! Rollouts of the two-link arm beside plain C: one run, 64 runs, and the windows of one log. Markdown on standard output.
+//! Times of rollouts of the two-link arm by `armgap-core` and by plain C: one run, 64 runs, and the windows of one log. Markdown on standard output.
 //!
-//! All columns of a row are measured in turn, over and over, so that whatever else the machine does falls on all of them alike.
+//! All columns of a row are measured in turn, over and over, so that disturbances of the machine fall on all of them alike.
 
 use armgap_bench::run::{PERIOD, SAMPLES, THETA, arm, torque};
 use armgap_benches::baseline::Build;
@@ -17,19 +17,19 @@ use std::io::Write;
 use std::time::Instant;
 
 const ROUNDS: usize = 21;
-/// Largest difference of positions, rad, at which the work was the same.
+/// Largest difference of positions between `armgap-core` and plain C, rad, at which their work was equal.
 const SAME: f64 = 1e-6;
 
 type Seed = Plant<f64, TwoLink<f64>, 2, 9>;
 
-/// Runs of one arm: their initial states, and their parts of one row of torques.
+/// Runs of one arm under parts of one sequence of torques, with their initial states.
 struct Case {
     name: &'static str,
     plant: Seed,
     tau: Vec<f64>,
     torque: Vec<[InputSegment<f64>; 2]>,
     t: Vec<f64>,
-    /// First period and state of every run.
+    /// First period of every run, and positions and velocities at its start, rad and rad/s.
     initial_states: Vec<(usize, [f64; 4])>,
     periods: usize,
 }
@@ -52,14 +52,14 @@ impl Case {
         }
     }
 
-    /// So many runs from different states.
+    /// Case of `count` runs of `periods` periods from different initial states.
     fn many(mut self, name: &'static str, count: u32, periods: usize) -> Self {
         let start = |l: u32| (0, [0.002 * f64::from(l), -0.003 * f64::from(l), 0.1, -0.2]);
         (self.name, self.initial_states, self.periods) = (name, (0..count).map(start).collect(), periods);
         self
     }
 
-    /// The run cut into windows of so many periods, each from where the run is then.
+    /// Case of the run cut into windows of `periods` periods, each from the state of the run at its start.
     fn windows(mut self, name: &'static str, periods: usize) -> Self {
         let mut state = State::new(Vector2::zeros(), Vector2::zeros());
         self.initial_states.clear();
@@ -120,9 +120,8 @@ fn median(times: &mut [f64]) -> f64 {
     times[times.len() / 2]
 }
 
-/// Median times per step [ns] of C, C for this processor, ours one by one, together portably, with AVX2, and with the most there is;
-/// and
-/// the largest difference of positions from C's.
+/// Median times per step, ns, of portable C, C for this processor, `armgap-core` one run at a time, and in batches with portable code, with AVX2, and with
+/// the widest vectors; and the largest difference of positions from C's, rad.
 fn compare(case: &Case) -> ([f64; 6], f64) {
     let mut q: [Vec<f64>; 6] = std::array::from_fn(|_| vec![0.0; 2 * case.steps()]);
     let mut times: [Vec<f64>; 6] = Default::default();
@@ -145,7 +144,7 @@ fn compare(case: &Case) -> ([f64; 6], f64) {
     (times.each_mut().map(|t| median(t)), q[1..].iter().map(|q| apart(q)).fold(0.0, f64::max))
 }
 
-/// Runs that are compared.
+/// Cases whose rollouts are timed: one run, many runs and windows, with and without dry friction.
 fn cases() -> Vec<Case> {
     vec![
         Case::new("one of 10 s, dry friction", true),

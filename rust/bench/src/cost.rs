@@ -1,8 +1,8 @@
-//! Cost per sample as a controller meets it: how long each single call takes, and what the machine adds by itself.
+//! Time per sample of online estimators as a controller meets it: of each single call, and how much of it the machine adds.
 //!
-//! Every call is timed on its own, less what reading the clock takes; the typical cost comes from whole runs, in which the clock is
-//! read once. The noise is the same measurement around a fixed piece of arithmetic: what its slowest call takes longer than its
-//! typical one is the machine's doing (interrupts, other programs), and so is that much of the slowest sample.
+//! Every call is timed on its own, less the time of reading the clock; the typical time comes from whole runs, in which the clock is
+//! read once. The noise is measured by fixed arithmetic: the time by which its slowest call exceeds its typical one is due to the machine
+//! (interrupts, other programs), and the slowest sample includes as much of it.
 
 use crate::run::{PERIOD, arm, samples};
 use armgap_core::filter::Cutoff;
@@ -14,25 +14,25 @@ use nalgebra::SVector;
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Distribution of the time of one call, ns.
+/// Distribution of the time of one call of a function, ns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
-    /// Median over whole runs of the time per call.
+    /// Time per call from whole runs, median over the runs, ns.
     pub typical: f64,
-    /// Median of single calls.
+    /// Median time of single calls, ns.
     pub median: f64,
-    /// 99 of 100 calls take at most this.
+    /// Time that 99 of 100 calls do not exceed, ns.
     pub p99: f64,
-    /// 9999 of 10000 calls take at most this.
+    /// Time that 9999 of 10000 calls do not exceed, ns.
     pub p9999: f64,
-    /// The slowest call.
+    /// Time of the slowest call, ns.
     pub max: f64,
 }
 
-/// The estimator of the two-link arm with nine parameters.
+/// Online estimator of the two-link arm with nine parameters.
 pub type Online<T> = Estimator<T, armgap_core::arm::TwoLink<T>, 2, 9, 9>;
 
-/// A fresh estimator at the paper's settings.
+/// Online estimator of the two-link arm before its first sample, at the settings of Reyes and Kelly (1997).
 pub fn fresh<T: Real>(scheme: Scheme, variant: Variant, form: Form) -> Online<T> {
     let settings = Settings {
         scheme,
@@ -45,12 +45,12 @@ pub fn fresh<T: Real>(scheme: Scheme, variant: Variant, form: Form) -> Online<T>
     Online::<T>::new(arm(), settings).with_form(form)
 }
 
-/// The seed's run as readings a period apart.
+/// Positions and torques of the two-link arm's run, one sample every [`PERIOD`].
 pub fn readings<T: Real>() -> Vec<Reading<T, 2>> {
     samples().into_iter().map(|s| Reading { q: s.q, dq: None, tau: s.tau }).collect()
 }
 
-/// Cost of one sample, over at least `count` of them.
+/// Time of one sample of the online estimator of the two-link arm, from at least `count` samples.
 pub fn online<T: Real>(scheme: Scheme, variant: Variant, form: Form, count: usize) -> Cost {
     let data = readings::<T>();
     let start = fresh::<T>(scheme, variant, form);
@@ -65,7 +65,7 @@ pub fn online<T: Real>(scheme: Scheme, variant: Variant, form: Form, count: usiz
     )
 }
 
-/// Cost of a fixed piece of arithmetic of about fifty nanoseconds.
+/// Time of fixed arithmetic of about fifty nanoseconds, from at least `count` calls: the noise of the machine.
 pub fn noise(count: usize) -> Cost {
     measured(
         count,
@@ -79,7 +79,7 @@ pub fn noise(count: usize) -> Cost {
     )
 }
 
-/// The distribution of `call` on a fresh state per run of `length` calls.
+/// Distribution of the time of `call`, from at least `count` calls in runs of `length` calls, each run on a new state.
 fn measured<S>(
     count: usize,
     length: usize,
@@ -111,7 +111,7 @@ fn measured<S>(
     Cost { typical: whole[runs / 2], median: at(0.5), p99: at(0.99), p9999: at(0.9999), max: at(1.0) }
 }
 
-/// What two readings of the clock take between them, ns.
+/// Time between two immediate readings of the clock, ns.
 fn clock() -> f64 {
     let mut times: Vec<f64> = (0..20_001).map(|_| Instant::now().elapsed().as_nanos() as f64).collect();
     times.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! What the core costs on the machine it runs on.
+//! Measurements of the speed of `armgap-core` on the machine at hand.
 
 pub mod cost;
 pub mod run;

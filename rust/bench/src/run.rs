@@ -1,4 +1,4 @@
-//! The run that the benchmarks share: Table I's arm under the torques (31) and (32) of Reyes and Kelly (1997).
+//! Simulated run of the benchmarks: the arm of Table I under the torques (31) and (32) of Reyes and Kelly (1997).
 
 use armgap_core::arm::TwoLink;
 use armgap_core::effect::InputSegment;
@@ -8,15 +8,15 @@ use armgap_core::plant::Plant;
 use armgap_core::real::{Real, lit};
 use nalgebra::Vector2;
 
-/// Sample period, s.
+/// Sample period of the benchmarks, s.
 pub const PERIOD: f64 = 0.0025;
-/// Samples of 10 s.
+/// Number of samples of the run of 10 s.
 pub const SAMPLES: u32 = 4000;
 
-/// The arm's parameters.
+/// Parameters of the two-link arm of Reyes and Kelly (1997), Table I, SI: theta1 to theta5, viscous 1 and 2, Coulomb 1 and 2.
 pub const THETA: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6095, 1.734];
 
-/// The torques at a time.
+/// Torques (31) and (32) of Reyes and Kelly (1997) at the time `t`, s, in N m.
 pub fn torque(t: f64) -> [f64; 2] {
     [
         (1.0 - (-0.8 * t).exp()) * 29.0 + 68.0 * (16.0 * t + 0.1).sin() + 9.0 * (20.0 * t + 0.15).sin(),
@@ -24,12 +24,12 @@ pub fn torque(t: f64) -> [f64; 2] {
     ]
 }
 
-/// The arm.
+/// Two-link arm of Reyes and Kelly (1997), Table I.
 pub fn arm<T: Real>() -> TwoLink<T> {
     TwoLink::new(lit(9.81), Some(lit(0.45)), &THETA.map(lit))
 }
 
-/// The run from rest, one state per sample, with `substeps` steps per period.
+/// Simulates the run from rest with `substeps` steps per period; one state per sample.
 pub fn rollout(substeps: usize) -> Vec<State<f64, 2>> {
     let plant = Plant::new(arm::<f64>(), THETA);
     let mut state = State::new(Vector2::zeros(), Vector2::zeros());
@@ -43,7 +43,7 @@ pub fn rollout(substeps: usize) -> Vec<State<f64, 2>> {
         .collect()
 }
 
-/// The run as an online estimator sees it: positions and torques.
+/// Simulated run as an online estimator takes it: times, positions and torques.
 pub fn samples<T: Real>() -> Vec<Sample<T, 2>> {
     let states = rollout(4);
     (0..SAMPLES)

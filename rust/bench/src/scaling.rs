@@ -1,4 +1,4 @@
-//! Cost of least squares alone with synthetic regressors: parameters 2 to 60, joints 1 to 6.
+//! Time of recursive least squares alone with synthetic regressors: 2 to 60 parameters, 1 to 6 errors per sample.
 
 use armgap_core::real::{Real, lit};
 use armgap_core::rls::{Form, Rls};
@@ -6,11 +6,11 @@ use nalgebra::{SMatrix, SVector};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Samples per run, and runs of which the median counts.
+/// Number of samples per run, and number of runs (`RUNS`) whose median time counts.
 const SAMPLES: usize = 400;
 const RUNS: usize = 15;
 
-/// Median time of an update of `R` parameters from `M` errors, ns.
+/// Median time of an update of recursive least squares with `R` parameters and `M` errors, ns.
 pub fn update<T: Real, const M: usize, const R: usize>(form: Form) -> f64 {
     let mut state = 11_u64;
     let mut noise = || {
@@ -35,14 +35,14 @@ pub fn update<T: Real, const M: usize, const R: usize>(form: Form) -> f64 {
     times[RUNS / 2]
 }
 
-/// Parameters, joints, and the time with the plain and with the factorized form.
+/// Numbers of parameters and of errors per sample, and times of an update with the plain and with the factorized form, ns.
 pub type Row = (usize, usize, f64, f64);
 
 fn row<T: Real, const M: usize, const R: usize>() -> Row {
     (R, M, update::<T, M, R>(Form::Plain), update::<T, M, R>(Form::Factorized))
 }
 
-/// Scalar errors with more and more parameters, then ten parameters per joint with one error per joint.
+/// Times of an update: with one error and 2 to 60 parameters, then with one error and ten parameters for each of 1 to 6 joints.
 pub fn table<T: Real>() -> Vec<Row> {
     vec![
         row::<T, 1, 2>(),

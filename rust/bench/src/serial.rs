@@ -1,4 +1,4 @@
-//! A serial arm that moves all of its joints, as an online estimator sees it.
+//! Simulated motion of a serial arm of seven joints, for benchmarks of online estimators.
 
 use crate::run::PERIOD;
 use armgap_core::chain::{Chain, ChainJoint, JointKind, point_mass};
@@ -6,12 +6,12 @@ use armgap_core::online::{ChainSettings, EstimatorSettings, LargeChain};
 use armgap_core::regression::Scheme;
 use armgap_core::rls::Form;
 
-/// Joints of the arm.
+/// Number of joints of the serial arm of the benchmarks.
 pub const JOINTS: usize = 7;
-/// Rotor inertia, viscous and Coulomb friction of each joint.
+/// Rotor inertia, kg m^2, viscous, N m s/rad, and Coulomb coefficient, N m, of each joint of the serial arm.
 const DRIVE: [f64; 3] = [0.3, 0.8, 1.5];
 
-/// A chain like a six- or seven-axis arm: axes in turn across and along, links of a third of a metre.
+/// Serial arm like one of six or seven axes: successive axes perpendicular, links of a third of a metre; with the inertial parameters of its links.
 pub fn arm<const N: usize>() -> (Chain<f64, N>, [[f64; 10]; N]) {
     let joints = std::array::from_fn(|j| {
         let across = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
@@ -36,10 +36,10 @@ pub fn arm<const N: usize>() -> (Chain<f64, N>, [[f64; 10]; N]) {
     (Chain::new(joints, [0.0, 0.0, -9.81]), link)
 }
 
-/// Positions and torques.
+/// Joint positions, rad, and torques, N m, of one sample.
 pub type Sample = ([f64; JOINTS], [f64; JOINTS]);
 
-/// A motion of two sines per joint, sampled for some seconds, with the torques that it needs half a period later.
+/// The first `count` samples of a motion of two sines per joint, each with the torques that the motion needs half a period later.
 pub fn samples(count: usize) -> Vec<Sample> {
     let (chain, links) = arm::<JOINTS>();
     let wave = |t: f64, order: i32| -> [f64; JOINTS] {
@@ -64,7 +64,7 @@ pub fn samples(count: usize) -> Vec<Sample> {
         .collect()
 }
 
-/// A fresh estimator of these parameters of the arm, with consistent filters.
+/// Online estimator of the serial arm's parameters `columns`, with consistent filters, before its first sample.
 ///
 /// # Panics
 /// If there are more columns than the estimator has room for, or they do not ascend.

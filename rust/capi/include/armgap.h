@@ -17,12 +17,12 @@
 #include <stdint.h>
 
 /*
- Version of the functions and types of serial arms.
+ Version of the C functions and types of serial arms.
  */
 #define ARMGAP_CHAIN_VERSION 2
 
 /*
- What a call answers.
+ Status that a function of the C interface returns.
  */
 enum armgap_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -30,7 +30,7 @@ enum armgap_status
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   Done; an update has moved the estimate.
+   The call succeeded; an update has moved the estimate.
    */
   ARMGAP_OK = 0,
   /*
@@ -62,7 +62,7 @@ enum armgap_status
    */
   ARMGAP_NOT_STARTED = -5,
   /*
-   The caller was compiled with another version of the header.
+   The caller was compiled with another version of armgap.h.
    */
   ARMGAP_VERSION = -6,
 };
@@ -75,7 +75,7 @@ typedef int32_t armgap_status;
 #endif // __cplusplus
 
 /*
- Kinds of arm.
+ Kind of arm with dynamics in closed form, with the order of its parameters.
  */
 enum armgap_arm
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -83,15 +83,15 @@ enum armgap_arm
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   One linear joint: moving mass, weight along the axis, viscous, Coulomb.
+   One linear joint; parameters: moving mass, weight along the axis, viscous, Coulomb.
    */
   ARMGAP_AXIS = 0,
   /*
-   One rotary joint under gravity: inertia, gravity torque, viscous, Coulomb.
+   One rotary joint under gravity; parameters: inertia, largest gravity torque, viscous, Coulomb.
    */
   ARMGAP_PENDULUM = 1,
   /*
-   The vertical two-link arm of Reyes and Kelly (1997): theta1 to theta5, viscous 1 and 2, Coulomb 1 and 2.
+   The vertical two-link arm of Reyes and Kelly (1997); parameters: theta1 to theta5, viscous 1 and 2, Coulomb 1 and 2.
    */
   ARMGAP_TWO_LINK = 2,
 };
@@ -104,7 +104,7 @@ typedef uint32_t armgap_arm;
 #endif // __cplusplus
 
 /*
- Regression models.
+ Regression model of an estimator, after Reyes and Kelly (1997).
  */
 enum armgap_scheme
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -112,15 +112,15 @@ enum armgap_scheme
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   Equation (24): filtered torques, one error per joint.
+   Filtered dynamic model, Reyes and Kelly (1997), equation (24): one prediction error per joint [N m or N].
    */
   ARMGAP_FILTERED_DYNAMIC = 0,
   /*
-   Equation (28): supplied energy.
+   Supplied energy model, Reyes and Kelly (1997), equation (28): one prediction error [J].
    */
   ARMGAP_SUPPLIED_ENERGY = 1,
   /*
-   Equation (30): filtered power.
+   Filtered power model, Reyes and Kelly (1997), equation (30): one prediction error [W].
    */
   ARMGAP_FILTERED_POWER = 2,
 };
@@ -133,7 +133,7 @@ typedef uint32_t armgap_scheme;
 #endif // __cplusplus
 
 /*
- Filters.
+ Filters of an estimator.
  */
 enum armgap_filters
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -141,11 +141,11 @@ enum armgap_filters
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   Consistent with each other and with held torques.
+   Filters consistent with each other and with held torques.
    */
   ARMGAP_EXACT = 0,
   /*
-   As printed in the paper.
+   Filters as printed by Reyes and Kelly (1997).
    */
   ARMGAP_PAPER = 1,
 };
@@ -158,7 +158,7 @@ typedef uint32_t armgap_filters;
 #endif // __cplusplus
 
 /*
- How the covariance is kept.
+ Form in which an estimator keeps its covariance.
  */
 enum armgap_form
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -166,15 +166,15 @@ enum armgap_form
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   Plain in double precision with p0 up to 1e6, factorized otherwise.
+   Full matrix in double precision with p0 up to 1e6, factors U D U' otherwise.
    */
   ARMGAP_DEFAULT_FORM = 0,
   /*
-   Equation (21) as printed.
+   Full matrix, updated by equation (21) of Reyes and Kelly (1997) as printed.
    */
   ARMGAP_PLAIN = 1,
   /*
-   U D U'.
+   Factors U D U' of the covariance, positive definite whatever the rounding.
    */
   ARMGAP_FACTORIZED = 2,
 };
@@ -187,7 +187,7 @@ typedef uint32_t armgap_form;
 #endif // __cplusplus
 
 /*
- Kinds of joint.
+ Kind of a joint: revolute or prismatic.
  */
 enum armgap_joint_kind
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -195,11 +195,11 @@ enum armgap_joint_kind
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   Turns about its axis: rad, N m.
+   The joint turns about its axis: rad, N m.
    */
   ARMGAP_REVOLUTE = 0,
   /*
-   Slides along its axis: m, N.
+   The joint slides along its axis: m, N.
    */
   ARMGAP_PRISMATIC = 1,
 };
@@ -212,39 +212,39 @@ typedef uint32_t armgap_joint_kind;
 #endif // __cplusplus
 
 /*
- Settings; `armgap_settings_default` fills them.
+ Settings of an online estimator; `armgap_settings_default` fills them.
  */
 typedef struct {
   /*
-   An `armgap_arm`.
+   Kind of arm, an `armgap_arm`.
    */
   uint32_t arm;
   /*
-   An `armgap_scheme`.
+   Regression model, an `armgap_scheme`.
    */
   uint32_t scheme;
   /*
-   An `armgap_filters`.
+   Filters, an `armgap_filters`.
    */
   uint32_t filters;
   /*
-   An `armgap_form`.
+   Form in which the covariance is kept, an `armgap_form`.
    */
   uint32_t form;
   /*
-   Whether one constant torque per joint is estimated too, after all other parameters: 0 or 1.
+   Whether one constant torque per joint is estimated after all other parameters: 0 or 1.
    */
   uint32_t asymmetry;
   /*
-   Samples used before the alarm begins to learn.
+   Number of samples used before the alarm begins to learn.
    */
   uint32_t settling;
   /*
-   Samples from which the alarm learns the errors' sizes, at least 2.
+   Number of samples from which the alarm learns the sizes of the prediction errors, at least 2.
    */
   uint32_t learning;
   /*
-   Not used; 0.
+   Unused field, must be 0.
    */
   uint32_t reserved;
   /*
@@ -252,111 +252,111 @@ typedef struct {
    */
   double cutoff;
   /*
-   Forgetting factor, above 0 and at most 1.
+   Forgetting factor of recursive least squares, above 0 and at most 1.
    */
   double forgetting;
   /*
-   Initial covariance, times the unit matrix; forgetting lifts no variance above it.
+   Initial variance of every parameter, at an error of unit variance; forgetting lifts no variance above it.
    */
   double p0;
   /*
-   Samples over which spread and excitation are averaged, at least 1.
+   Number of samples over which mean square error and excitation are averaged, at least 1.
    */
   double memory;
   /*
-   Mean samples between false alarms, at least 10.
+   Mean number of samples between false alarms, at least 10.
    */
   double between;
   /*
-   Smallest standard deviation of an error that matters, in the error's unit.
+   Smallest standard deviation of a prediction error that matters, in the unit of the error.
    */
   double floor;
 } armgap_settings;
 
 /*
- An estimator in double precision; its contents are nobody's business.
+ Online estimator in double precision; opaque memory of the caller.
  */
 typedef struct {
   /*
-   Not to be touched.
+   Opaque contents of the estimator, not to be read or written.
    */
   uint64_t opaque[512];
 } armgap_estimator;
 
 /*
- What an estimator says about itself.
+ Counts of samples, excitation and alarm of an estimator.
  */
 typedef struct {
   /*
-   Samples used.
+   Number of samples used.
    */
   uint64_t updates;
   /*
-   Samples rejected.
+   Number of samples rejected.
    */
   uint64_t rejected;
   /*
-   Near 1 while the motion excites every parameter, near 0 while it teaches nothing new.
+   Excitation: near 1 while the motion excites every parameter, near 0 while it teaches nothing new.
    */
   double excitation;
   /*
-   Above 1 the model no longer explains the arm.
+   Alarm level: above 1 the model no longer explains the arm.
    */
   double alarm;
   /*
-   Parameters that are estimated.
+   Number of estimated parameters.
    */
   uint32_t parameters;
   /*
-   Prediction errors per sample.
+   Number of prediction errors per sample.
    */
   uint32_t outputs;
 } armgap_report;
 
 /*
- An estimator in single precision; its contents are nobody's business.
+ Online estimator in single precision; opaque memory of the caller.
  */
 typedef struct {
   /*
-   Not to be touched.
+   Opaque contents of the estimator, not to be read or written.
    */
   uint64_t opaque[256];
 } armgap_estimator_f32;
 
 /*
- Settings of an estimator of a serial arm; `armgap_chain_settings_default` fills them.
+ Settings of an online estimator of a serial arm; `armgap_chain_settings_default` fills them.
  */
 typedef struct {
   /*
-   `ARMGAP_CHAIN_VERSION`.
+   Version of the interface, `ARMGAP_CHAIN_VERSION`.
    */
   uint32_t version;
   /*
-   Number of joints, 1 to 7.
+   Number of joints of the arm, 1 to 7.
    */
   uint32_t joints;
   /*
-   Number of parameters that are estimated, 1 to 72.
+   Number of estimated parameters, 1 to 72.
    */
   uint32_t parameters;
   /*
-   An `armgap_scheme`.
+   Regression model, an `armgap_scheme`.
    */
   uint32_t scheme;
   /*
-   An `armgap_filters`.
+   Filters, an `armgap_filters`.
    */
   uint32_t filters;
   /*
-   An `armgap_form`.
+   Form in which the covariance is kept, an `armgap_form`.
    */
   uint32_t form;
   /*
-   Samples used before the alarm begins to learn.
+   Number of samples used before the alarm begins to learn.
    */
   uint32_t settling;
   /*
-   Samples from which the alarm learns the errors' sizes, at least 2.
+   Number of samples from which the alarm learns the sizes of the prediction errors, at least 2.
    */
   uint32_t learning;
   /*
@@ -368,49 +368,49 @@ typedef struct {
    */
   double cutoff;
   /*
-   Forgetting factor, above 0 and at most 1.
+   Forgetting factor of recursive least squares, above 0 and at most 1.
    */
   double forgetting;
   /*
-   Initial covariance, times the unit matrix; forgetting lifts no variance above it.
+   Initial variance of every parameter, at an error of unit variance; forgetting lifts no variance above it.
    */
   double p0;
   /*
-   Samples over which spread and excitation are averaged, at least 1.
+   Number of samples over which mean square error and excitation are averaged, at least 1.
    */
   double memory;
   /*
-   Mean samples between false alarms, at least 10.
+   Mean number of samples between false alarms, at least 10.
    */
   double between;
   /*
-   Smallest standard deviation of an error that matters, in the error's unit.
+   Smallest standard deviation of a prediction error that matters, in the unit of the error.
    */
   double floor;
 } armgap_chain_settings;
 
 /*
- A joint of a serial arm, in the frame of the link before it, or of the base. The link's frame is the joint's, moved by the joint.
+ Joint of a serial arm, in the frame of the previous link, or of the base. At position 0 the link's frame is the joint's frame.
  */
 typedef struct {
   /*
-   An `armgap_joint_kind`.
+   Kind of the joint, an `armgap_joint_kind`.
    */
   uint32_t kind;
   /*
-   Not used; 0.
+   Unused field, must be 0.
    */
   uint32_t reserved;
   /*
-   Rotation matrix, row by row, from the joint's frame into that of the link before, at position 0.
+   Rotation matrix, row by row, from the joint's frame into the frame of the previous link, at position 0.
    */
   double rotation[9];
   /*
-   Origin of the joint's frame in that of the link before [m].
+   Origin of the joint's frame in the frame of the previous link [m].
    */
   double translation[3];
   /*
-   Unit vector along the axis, in the joint's frame.
+   Unit vector along the joint's axis, in the joint's frame.
    */
   double axis[3];
 } armgap_joint;
@@ -420,29 +420,29 @@ extern "C" {
 #endif // __cplusplus
 
 /*
- Fills `settings` with the defaults for an `armgap_arm`: filtered power, exact filters at 50 rad/s, no forgetting.
+ Fills `settings` with the defaults for an `armgap_arm`: filtered power model, exact filters at 50 rad/s, no forgetting.
  */
 armgap_status armgap_settings_default(armgap_settings *settings,
                                       uint32_t arm);
 
 /*
- Number of joints of an `armgap_arm`; 0 for no known one.
+ Number of joints of an `armgap_arm`; 0 if `arm` is not one.
  */
 size_t armgap_joints(uint32_t arm);
 
 /*
- Number of parameters of an `armgap_arm` without asymmetries; 0 for no known one.
+ Number of parameters of an `armgap_arm` without constant torques; 0 if `arm` is not one.
  */
 size_t armgap_parameters(uint32_t arm);
 
 /*
- One line about an `armgap_status`, never null.
+ Message of one line for an `armgap_status`, never null.
  */
 const char *armgap_message(int32_t status);
 
 /*
- Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` entries, one per parameter, or is
- optional with `count` 0, which means zeros. Starting again is allowed at any time.
+ Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` start values, SI, one per parameter, or is optional with
+ `count` 0, which means zeros. Starting again is allowed at any time.
  */
 armgap_status armgap_start(armgap_estimator *estimator,
                            size_t size,
@@ -451,8 +451,8 @@ armgap_status armgap_start(armgap_estimator *estimator,
                            size_t count);
 
 /*
- Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, each of `joints`
- entries. Whether velocities are given is settled by the first sample.
+ Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints` entries. Whether
+ velocities are given is settled by the first sample.
  */
 armgap_status armgap_update(armgap_estimator *estimator,
                             double t,
@@ -473,28 +473,28 @@ armgap_status armgap_update_after(armgap_estimator *estimator,
                                   size_t joints);
 
 /*
- Copies the estimate; `count` is the number of parameters.
+ Copies the estimated parameters, SI; `count` is their number.
  */
 armgap_status armgap_theta(const armgap_estimator *estimator, double *theta, size_t count);
 
 /*
- Copies the standard deviations of the estimate, as if errors were white.
+ Copies the `count` standard deviations of the estimated parameters, SI, as if prediction errors were white.
  */
 armgap_status armgap_sigma(const armgap_estimator *estimator, double *sigma, size_t count);
 
 /*
- Copies the prediction errors of the last sample that was used; `count` is the number of outputs.
+ Copies the prediction errors of the last sample that was used, N m, J or W by scheme; `count` is `outputs` of the report.
  */
 armgap_status armgap_errors(const armgap_estimator *estimator, double *errors, size_t count);
 
 /*
- Fills `report`.
+ Fills `report` with counts of samples, excitation and alarm of an estimator.
  */
 armgap_status armgap_report_of(const armgap_estimator *estimator, armgap_report *report);
 
 /*
- Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` entries, one per parameter, or is
- optional with `count` 0, which means zeros. Starting again is allowed at any time.
+ Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` start values, SI, one per parameter, or is optional with
+ `count` 0, which means zeros. Starting again is allowed at any time.
  */
 armgap_status armgap_start_f32(armgap_estimator_f32 *estimator,
                                size_t size,
@@ -503,8 +503,8 @@ armgap_status armgap_start_f32(armgap_estimator_f32 *estimator,
                                size_t count);
 
 /*
- Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, each of `joints`
- entries. Whether velocities are given is settled by the first sample.
+ Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints` entries. Whether
+ velocities are given is settled by the first sample.
  */
 armgap_status armgap_update_f32(armgap_estimator_f32 *estimator,
                                 float t,
@@ -525,27 +525,27 @@ armgap_status armgap_update_after_f32(armgap_estimator_f32 *estimator,
                                       size_t joints);
 
 /*
- Copies the estimate; `count` is the number of parameters.
+ Copies the estimated parameters, SI; `count` is their number.
  */
 armgap_status armgap_theta_f32(const armgap_estimator_f32 *estimator, float *theta, size_t count);
 
 /*
- Copies the standard deviations of the estimate, as if errors were white.
+ Copies the `count` standard deviations of the estimated parameters, SI, as if prediction errors were white.
  */
 armgap_status armgap_sigma_f32(const armgap_estimator_f32 *estimator, float *sigma, size_t count);
 
 /*
- Copies the prediction errors of the last sample that was used; `count` is the number of outputs.
+ Copies the prediction errors of the last sample that was used, N m, J or W by scheme; `count` is `outputs` of the report.
  */
 armgap_status armgap_errors_f32(const armgap_estimator_f32 *estimator, float *errors, size_t count);
 
 /*
- Fills `report`.
+ Fills `report` with counts of samples, excitation and alarm of an estimator.
  */
 armgap_status armgap_report_of_f32(const armgap_estimator_f32 *estimator, armgap_report *report);
 
 /*
- Moves an arm with parameters `theta` of an `armgap_arm` by `h` seconds under held torques; `q` and `dq` are read and written.
+ Moves an `armgap_arm` with the parameters `theta` by `h` seconds under held torques `tau`, SI; positions `q` and velocities `dq` are read and written.
  */
 armgap_status armgap_advance(uint32_t arm,
                              const double *theta,
@@ -557,25 +557,25 @@ armgap_status armgap_advance(uint32_t arm,
                              size_t joints);
 
 /*
- Fills `settings` for an arm with so many joints and estimated parameters on a level base: filtered power, exact filters at 50 rad/s, no
- forgetting, gravity of 9.81 against z.
+ Fills `settings` for an arm with this number of joints and estimated parameters on a level base: filtered power model, exact filters at 50 rad/s, no
+ forgetting, gravity of 9.81 m/s^2 against z.
  */
 armgap_status armgap_chain_settings_default(armgap_chain_settings *settings,
                                             uint32_t joints,
                                             uint32_t parameters);
 
 /*
- Bytes of memory that an estimator in double precision needs, aligned to 8; 0 if there is none of so many joints and parameters.
+ Bytes of memory, aligned to 8, of an estimator of a serial arm in double precision; 0 if there is none for this number of joints and parameters.
  */
 size_t armgap_chain_size(uint32_t joints,
                          uint32_t parameters);
 
 /*
- Starts an estimator in `size` bytes of the caller's memory, at least `armgap_chain_size`. `joints` has one entry per joint, `columns` one per
- estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx,
- xy, yy, xz, yz, zz about the origin of its frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known`
- holds the values of the first 13 numbers per joint, of which those count that are not estimated; optional, zeros by default. `theta0`
- holds one start value per estimated parameter; optional, zeros by default. Starting again is allowed at any time.
+ Starts an estimator of a serial arm in `size` bytes of the caller's memory, at least `armgap_chain_size`. `joints` has one entry per joint, `columns` one
+ per estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx, xy, yy, xz, yz,
+ zz about the origin of the link's frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known` holds values of the first 13
+ numbers per joint, SI, used for those that are not estimated; optional, zeros by default. `theta0` holds one start value per estimated parameter;
+ optional, zeros by default. Starting again is allowed at any time.
  */
 armgap_status armgap_chain_start(void *memory,
                                  size_t size,
@@ -586,7 +586,7 @@ armgap_status armgap_chain_start(void *memory,
                                  const double *theta0);
 
 /*
- Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, each of `joints`
+ Takes one sample of a serial arm at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints`
  entries. Whether velocities are given is settled by the first sample.
  */
 armgap_status armgap_chain_update(void *memory,
@@ -597,7 +597,7 @@ armgap_status armgap_chain_update(void *memory,
                                   size_t joints);
 
 /*
- Takes one sample `h` seconds after the last one. Arguments as for `armgap_chain_update`.
+ Takes one sample of a serial arm `h` seconds after the last one. Arguments as for `armgap_chain_update`.
  */
 armgap_status armgap_chain_update_after(void *memory,
                                         double h,
@@ -607,42 +607,42 @@ armgap_status armgap_chain_update_after(void *memory,
                                         size_t joints);
 
 /*
- Copies the estimate; `count` is the number of estimated parameters.
+ Copies the estimated parameters of a serial arm, SI; `count` is their number.
  */
 armgap_status armgap_chain_theta(const void *memory, double *theta, size_t count);
 
 /*
- Copies the diagonal of the covariance for an error of unit variance.
+ Copies the `count` diagonal entries of the covariance of the estimate, for a prediction error of unit variance.
  */
 armgap_status armgap_chain_variances(const void *memory, double *variances, size_t count);
 
 /*
- Copies the standard deviations of the estimate, as if errors were white.
+ Copies the `count` standard deviations of the estimated parameters, SI, as if prediction errors were white.
  */
 armgap_status armgap_chain_sigma(const void *memory, double *sigma, size_t count);
 
 /*
- Copies the prediction errors of the last sample that was used; `count` is the number of outputs.
+ Copies the prediction errors of the last sample that was used, N m, J or W by scheme; `count` is `outputs` of the report.
  */
 armgap_status armgap_chain_errors(const void *memory, double *errors, size_t count);
 
 /*
- Fills `report`.
+ Fills `report` with counts of samples, excitation and alarm of an estimator of a serial arm.
  */
 armgap_status armgap_chain_report_of(const void *memory, armgap_report *report);
 
 /*
- Bytes of memory that an estimator in single precision needs, aligned to 8; 0 if there is none of so many joints and parameters.
+ Bytes of memory, aligned to 8, of an estimator of a serial arm in single precision; 0 if there is none for this number of joints and parameters.
  */
 size_t armgap_chain_size_f32(uint32_t joints,
                              uint32_t parameters);
 
 /*
- Starts an estimator in `size` bytes of the caller's memory, at least `armgap_chain_size_f32`. `joints` has one entry per joint, `columns` one per
- estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx,
- xy, yy, xz, yz, zz about the origin of its frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known`
- holds the values of the first 13 numbers per joint, of which those count that are not estimated; optional, zeros by default. `theta0`
- holds one start value per estimated parameter; optional, zeros by default. Starting again is allowed at any time.
+ Starts an estimator of a serial arm in `size` bytes of the caller's memory, at least `armgap_chain_size_f32`. `joints` has one entry per joint, `columns`
+ one per estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx, xy, yy, xz,
+ yz, zz about the origin of the link's frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known` holds values of the first
+ 13 numbers per joint, SI, used for those that are not estimated; optional, zeros by default. `theta0` holds one start value per estimated parameter;
+ optional, zeros by default. Starting again is allowed at any time.
  */
 armgap_status armgap_chain_start_f32(void *memory,
                                      size_t size,
@@ -653,7 +653,7 @@ armgap_status armgap_chain_start_f32(void *memory,
                                      const float *theta0);
 
 /*
- Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, each of `joints`
+ Takes one sample of a serial arm at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints`
  entries. Whether velocities are given is settled by the first sample.
  */
 armgap_status armgap_chain_update_f32(void *memory,
@@ -664,7 +664,7 @@ armgap_status armgap_chain_update_f32(void *memory,
                                       size_t joints);
 
 /*
- Takes one sample `h` seconds after the last one. Arguments as for `armgap_chain_update_f32`.
+ Takes one sample of a serial arm `h` seconds after the last one. Arguments as for `armgap_chain_update_f32`.
  */
 armgap_status armgap_chain_update_after_f32(void *memory,
                                             float h,
@@ -674,27 +674,27 @@ armgap_status armgap_chain_update_after_f32(void *memory,
                                             size_t joints);
 
 /*
- Copies the estimate; `count` is the number of estimated parameters.
+ Copies the estimated parameters of a serial arm, SI; `count` is their number.
  */
 armgap_status armgap_chain_theta_f32(const void *memory, float *theta, size_t count);
 
 /*
- Copies the diagonal of the covariance for an error of unit variance.
+ Copies the `count` diagonal entries of the covariance of the estimate, for a prediction error of unit variance.
  */
 armgap_status armgap_chain_variances_f32(const void *memory, float *variances, size_t count);
 
 /*
- Copies the standard deviations of the estimate, as if errors were white.
+ Copies the `count` standard deviations of the estimated parameters, SI, as if prediction errors were white.
  */
 armgap_status armgap_chain_sigma_f32(const void *memory, float *sigma, size_t count);
 
 /*
- Copies the prediction errors of the last sample that was used; `count` is the number of outputs.
+ Copies the prediction errors of the last sample that was used, N m, J or W by scheme; `count` is `outputs` of the report.
  */
 armgap_status armgap_chain_errors_f32(const void *memory, float *errors, size_t count);
 
 /*
- Fills `report`.
+ Fills `report` with counts of samples, excitation and alarm of an estimator of a serial arm.
  */
 armgap_status armgap_chain_report_of_f32(const void *memory, armgap_report *report);
 

@@ -1,4 +1,4 @@
-//! Estimators of serial arms in single precision.
+//! Online estimators of serial arms in C: functions in single precision.
 
 use crate::chain::{armgap_chain_settings, armgap_joint};
 use crate::chain_slot as slot;
@@ -6,17 +6,17 @@ use crate::settings::{armgap_report, armgap_status};
 use armgap_core::online::When;
 use core::ffi::c_void;
 
-/// Bytes of memory that an estimator in single precision needs, aligned to 8; 0 if there is none of so many joints and parameters.
+/// Bytes of memory, aligned to 8, of an estimator of a serial arm in single precision; 0 if there is none for this number of joints and parameters.
 #[unsafe(no_mangle)]
 pub extern "C" fn armgap_chain_size_f32(joints: u32, parameters: u32) -> usize {
     slot::size::<f32>(joints, parameters)
 }
 
-/// Starts an estimator in `size` bytes of the caller's memory, at least `armgap_chain_size_f32`. `joints` has one entry per joint, `columns` one per
-/// estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx,
-/// xy, yy, xz, yz, zz about the origin of its frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known`
-/// holds the values of the first 13 numbers per joint, of which those count that are not estimated; optional, zeros by default. `theta0`
-/// holds one start value per estimated parameter; optional, zeros by default. Starting again is allowed at any time.
+/// Starts an estimator of a serial arm in `size` bytes of the caller's memory, at least `armgap_chain_size_f32`. `joints` has one entry per joint, `columns`
+/// one per estimated parameter, strictly ascending: indices from 0 into ten numbers of each link (mass, first moments x, y, z, second moments xx, xy, yy, xz,
+/// yz, zz about the origin of the link's frame), then rotor inertias, viscous, Coulomb, and constant torques of all joints. `known` holds values of the first
+/// 13 numbers per joint, SI, used for those that are not estimated; optional, zeros by default. `theta0` holds one start value per estimated parameter;
+/// optional, zeros by default. Starting again is allowed at any time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_start_f32(
     memory: *mut c_void,
@@ -30,7 +30,7 @@ pub unsafe extern "C" fn armgap_chain_start_f32(
     unsafe { slot::start::<f32>(memory, size, settings, joints, columns, known, theta0) }
 }
 
-/// Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, each of `joints`
+/// Takes one sample of a serial arm at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints`
 /// entries. Whether velocities are given is settled by the first sample.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_update_f32(
@@ -44,7 +44,7 @@ pub unsafe extern "C" fn armgap_chain_update_f32(
     unsafe { slot::update(memory, When::At(t), q, dq, tau, joints) }
 }
 
-/// Takes one sample `h` seconds after the last one. Arguments as for `armgap_chain_update_f32`.
+/// Takes one sample of a serial arm `h` seconds after the last one. Arguments as for `armgap_chain_update_f32`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_update_after_f32(
     memory: *mut c_void,
@@ -57,7 +57,7 @@ pub unsafe extern "C" fn armgap_chain_update_after_f32(
     unsafe { slot::update(memory, When::After(h), q, dq, tau, joints) }
 }
 
-/// Copies the estimate; `count` is the number of estimated parameters.
+/// Copies the estimated parameters of a serial arm, SI; `count` is their number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_theta_f32(
     memory: *const c_void,
@@ -67,7 +67,7 @@ pub unsafe extern "C" fn armgap_chain_theta_f32(
     unsafe { slot::theta(memory, theta, count) }
 }
 
-/// Copies the diagonal of the covariance for an error of unit variance.
+/// Copies the `count` diagonal entries of the covariance of the estimate, for a prediction error of unit variance.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_variances_f32(
     memory: *const c_void,
@@ -77,7 +77,7 @@ pub unsafe extern "C" fn armgap_chain_variances_f32(
     unsafe { slot::variances(memory, variances, count) }
 }
 
-/// Copies the standard deviations of the estimate, as if errors were white.
+/// Copies the `count` standard deviations of the estimated parameters, SI, as if prediction errors were white.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_sigma_f32(
     memory: *const c_void,
@@ -87,7 +87,7 @@ pub unsafe extern "C" fn armgap_chain_sigma_f32(
     unsafe { slot::sigma(memory, sigma, count) }
 }
 
-/// Copies the prediction errors of the last sample that was used; `count` is the number of outputs.
+/// Copies the prediction errors of the last sample that was used, N m, J or W by scheme; `count` is `outputs` of the report.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_errors_f32(
     memory: *const c_void,
@@ -97,7 +97,7 @@ pub unsafe extern "C" fn armgap_chain_errors_f32(
     unsafe { slot::errors(memory, errors, count) }
 }
 
-/// Fills `report`.
+/// Fills `report` with counts of samples, excitation and alarm of an estimator of a serial arm.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_chain_report_of_f32(
     memory: *const c_void,

@@ -1,4 +1,4 @@
-//! An estimator of a serial arm in memory of the caller's, of the smallest size that has room for it.
+//! Estimator of a serial arm in memory of the caller's, of the smallest [`ChainSize`] that has room for it.
 
 use crate::chain::{ARMGAP_CHAIN_VERSION, armgap_chain_settings, armgap_joint};
 use crate::settings::{armgap_report, armgap_status, status_of};
@@ -11,29 +11,29 @@ use armgap_core::real::{Real, lit};
 use armgap_status::{ARMGAP_LENGTH, ARMGAP_NOT_STARTED, ARMGAP_OK, ARMGAP_RANGE, ARMGAP_VERSION};
 use core::ffi::c_void;
 
-/// Most parameters.
+/// Largest number of estimated parameters of a serial arm.
 const MOST: usize = ChainSize::Large.room()[1];
-/// Marks memory that holds an estimator of a serial arm of this version.
+/// First word of memory that holds an estimator of a serial arm of this version, before size and precision are mixed in.
 const MARK: u64 = 0x4d47_5241_0002_0000;
 
-/// What the caller's memory holds.
+/// Contents of the caller's memory: a mark and an estimator of a serial arm.
 #[repr(C)]
 struct Slot<E> {
     mark: u64,
     estimator: E,
 }
 
-/// The mark of a size in a precision.
+/// Mark by which memory with an estimator of this size, in the precision of `T`, is recognised.
 const fn mark<T>(size: ChainSize) -> u64 {
     MARK ^ ((size_of::<T>() as u64) << 8) ^ (size as u64)
 }
 
-/// The size for so many joints and parameters.
+/// Smallest size of estimator for this number of joints and parameters; `None` if there is none.
 fn size_of_chain(joints: u32, parameters: u32) -> Option<ChainSize> {
     if joints == 0 || parameters == 0 { None } else { ChainSize::of(joints as usize, parameters as usize) }
 }
 
-/// Bytes for so many joints and parameters, or 0.
+/// Bytes of an estimator for this number of joints and parameters in the precision of `T`; 0 if there is none.
 pub(crate) fn size<T: Real>(joints: u32, parameters: u32) -> usize {
     match size_of_chain(joints, parameters) {
         Some(ChainSize::Small) => size_of::<Slot<SmallChain<T>>>(),
@@ -43,14 +43,14 @@ pub(crate) fn size<T: Real>(joints: u32, parameters: u32) -> usize {
     }
 }
 
-/// The caller's memory as a slot of some size; all of them have the same alignment.
+/// The caller's memory as a slot of the largest size, checked for null and alignment; all sizes have the same alignment.
 fn slot_in<T: Real>(memory: *const c_void) -> Result<*const Slot<LargeChain<T>>, armgap_status> {
     let slot = memory.cast::<Slot<LargeChain<T>>>();
     usable(slot)?;
     Ok(slot)
 }
 
-/// A joint as the core takes it.
+/// Joint of the C interface as `armgap-core` takes it; `None` if its kind is unknown.
 fn joint_of<T: Real>(joint: &armgap_joint) -> Option<ChainJoint<T>> {
     let kind = *[JointKind::Revolute, JointKind::Prismatic].get(joint.kind as usize)?;
     let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = joint.rotation;
@@ -121,7 +121,7 @@ pub(crate) unsafe fn start<T: Real>(
     })())
 }
 
-/// Writes an estimator that has seen nothing.
+/// Writes an estimator that has taken no sample, with its mark, into the caller's memory.
 #[inline(never)]
 unsafe fn write<T: Real, const N: usize, const P: usize, const R: usize>(
     memory: *mut c_void,
@@ -134,7 +134,7 @@ unsafe fn write<T: Real, const N: usize, const P: usize, const R: usize>(
     Ok(ARMGAP_OK)
 }
 
-/// The size that memory is marked with.
+/// Size of the estimator in the caller's memory by its mark, or the status if there is no estimator.
 unsafe fn marked<T: Real>(memory: *const c_void) -> Result<ChainSize, armgap_status> {
     let slot = slot_in::<T>(memory)?;
     // SAFETY: the mark is read alone first, from memory that is large enough for it.
@@ -142,7 +142,7 @@ unsafe fn marked<T: Real>(memory: *const c_void) -> Result<ChainSize, armgap_sta
     ChainSize::ALL.into_iter().find(|size| mark::<T>(*size) == found).ok_or(ARMGAP_NOT_STARTED)
 }
 
-/// The estimator in the caller's memory, if there is one.
+/// Estimator in the caller's memory, or the status if there is none.
 unsafe fn opened<'a, T: Real>(memory: *const c_void) -> Result<&'a dyn OnlineEstimator<T>, armgap_status> {
     // SAFETY: marked memory was written by `start` with a slot of the size that the mark says.
     unsafe {
@@ -154,7 +154,7 @@ unsafe fn opened<'a, T: Real>(memory: *const c_void) -> Result<&'a dyn OnlineEst
     }
 }
 
-/// The same, to take a sample.
+/// Estimator in the caller's memory to take a sample, or the status if there is none.
 unsafe fn opened_mut<'a, T: Real>(
     memory: *mut c_void,
 ) -> Result<&'a mut dyn OnlineEstimator<T>, armgap_status> {

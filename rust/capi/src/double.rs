@@ -1,18 +1,18 @@
-//! The functions in double precision.
+//! Online estimators of arms of one or two joints in C: functions in double precision.
 
 use crate::settings::{armgap_report, armgap_settings, armgap_status};
 use crate::slot;
 use armgap_core::online::When;
 
-/// An estimator in double precision; its contents are nobody's business.
+/// Online estimator in double precision; opaque memory of the caller.
 #[repr(C)]
 pub struct armgap_estimator {
-    /// Not to be touched.
+    /// Opaque contents of the estimator, not to be read or written.
     pub opaque: [u64; 512],
 }
 
-/// Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` entries, one per parameter, or is
-/// optional with `count` 0, which means zeros. Starting again is allowed at any time.
+/// Starts an estimator in the caller's memory; `size` is `sizeof(*estimator)`. `theta0` has `count` start values, SI, one per parameter, or is optional with
+/// `count` 0, which means zeros. Starting again is allowed at any time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_start(
     estimator: *mut armgap_estimator,
@@ -24,8 +24,8 @@ pub unsafe extern "C" fn armgap_start(
     unsafe { slot::start::<f64, _>(estimator, size, settings, theta0, count) }
 }
 
-/// Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, each of `joints`
-/// entries. Whether velocities are given is settled by the first sample.
+/// Takes one sample at time `t` [s]: positions, optional velocities, and the torques that act until the next sample, SI, each of `joints` entries. Whether
+/// velocities are given is settled by the first sample.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_update(
     estimator: *mut armgap_estimator,
@@ -52,7 +52,7 @@ pub unsafe extern "C" fn armgap_update_after(
     unsafe { slot::update(estimator, When::After(h), q, dq, tau, joints) }
 }
 
-/// Copies the estimate; `count` is the number of parameters.
+/// Copies the estimated parameters, SI; `count` is their number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_theta(
     estimator: *const armgap_estimator,
@@ -62,7 +62,7 @@ pub unsafe extern "C" fn armgap_theta(
     unsafe { slot::theta(estimator, theta, count) }
 }
 
-/// Copies the standard deviations of the estimate, as if errors were white.
+/// Copies the `count` standard deviations of the estimated parameters, SI, as if prediction errors were white.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_sigma(
     estimator: *const armgap_estimator,
@@ -72,7 +72,7 @@ pub unsafe extern "C" fn armgap_sigma(
     unsafe { slot::sigma(estimator, sigma, count) }
 }
 
-/// Copies the prediction errors of the last sample that was used; `count` is the number of outputs.
+/// Copies the prediction errors of the last sample that was used, N m, J or W by scheme; `count` is `outputs` of the report.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_errors(
     estimator: *const armgap_estimator,
@@ -82,7 +82,7 @@ pub unsafe extern "C" fn armgap_errors(
     unsafe { slot::errors(estimator, errors, count) }
 }
 
-/// Fills `report`.
+/// Fills `report` with counts of samples, excitation and alarm of an estimator.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_report_of(
     estimator: *const armgap_estimator,

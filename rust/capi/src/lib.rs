@@ -1,7 +1,7 @@
 //! The online estimator for C and C++.
 //!
-//! This crate only converts: pointers are checked for null and alignment, lengths for the arm's, and everything else is
-//! [`armgap_core::online`]. `include/armgap.h` is made from these files; a test compares them.
+//! This crate only converts: pointers are checked for null and alignment, lengths against the arm's, and all computation is that of
+//! [`armgap_core::online`]. `include/armgap.h` is made from the files of this crate; a test compares it with them.
 #![cfg_attr(not(feature = "std"), no_std)]
 // Units in brackets are for the header, which is made from these comments.
 #![allow(non_camel_case_types, rustdoc::broken_intra_doc_links)]

@@ -1,4 +1,4 @@
-//! What is chosen before the first sample, and what a call may answer.
+//! Settings of online estimators in C, reports, and status codes.
 
 use armgap_core::arm::ArmKind;
 use armgap_core::monitor::MonitorSettings;
@@ -7,11 +7,11 @@ use armgap_core::real::{Real, lit};
 use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::Form;
 
-/// What a call answers.
+/// Status that a function of the C interface returns.
 #[repr(i32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum armgap_status {
-    /// Done; an update has moved the estimate.
+    /// The call succeeded; an update has moved the estimate.
     ARMGAP_OK = 0,
     /// The sample was taken; there are not enough samples for an estimate yet.
     ARMGAP_STARTING = 1,
@@ -27,110 +27,110 @@ pub enum armgap_status {
     ARMGAP_RANGE = -4,
     /// The estimator was never started, or its memory was overwritten.
     ARMGAP_NOT_STARTED = -5,
-    /// The caller was compiled with another version of the header.
+    /// The caller was compiled with another version of armgap.h.
     ARMGAP_VERSION = -6,
 }
 
-/// Kinds of arm.
+/// Kind of arm with dynamics in closed form, with the order of its parameters.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum armgap_arm {
-    /// One linear joint: moving mass, weight along the axis, viscous, Coulomb.
+    /// One linear joint; parameters: moving mass, weight along the axis, viscous, Coulomb.
     ARMGAP_AXIS = 0,
-    /// One rotary joint under gravity: inertia, gravity torque, viscous, Coulomb.
+    /// One rotary joint under gravity; parameters: inertia, largest gravity torque, viscous, Coulomb.
     ARMGAP_PENDULUM = 1,
-    /// The vertical two-link arm of Reyes and Kelly (1997): theta1 to theta5, viscous 1 and 2, Coulomb 1 and 2.
+    /// The vertical two-link arm of Reyes and Kelly (1997); parameters: theta1 to theta5, viscous 1 and 2, Coulomb 1 and 2.
     ARMGAP_TWO_LINK = 2,
 }
 
-/// Regression models.
+/// Regression model of an estimator, after Reyes and Kelly (1997).
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum armgap_scheme {
-    /// Equation (24): filtered torques, one error per joint.
+    /// Filtered dynamic model, Reyes and Kelly (1997), equation (24): one prediction error per joint [N m or N].
     ARMGAP_FILTERED_DYNAMIC = 0,
-    /// Equation (28): supplied energy.
+    /// Supplied energy model, Reyes and Kelly (1997), equation (28): one prediction error [J].
     ARMGAP_SUPPLIED_ENERGY = 1,
-    /// Equation (30): filtered power.
+    /// Filtered power model, Reyes and Kelly (1997), equation (30): one prediction error [W].
     ARMGAP_FILTERED_POWER = 2,
 }
 
-/// Filters.
+/// Filters of an estimator.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum armgap_filters {
-    /// Consistent with each other and with held torques.
+    /// Filters consistent with each other and with held torques.
     ARMGAP_EXACT = 0,
-    /// As printed in the paper.
+    /// Filters as printed by Reyes and Kelly (1997).
     ARMGAP_PAPER = 1,
 }
 
-/// How the covariance is kept.
+/// Form in which an estimator keeps its covariance.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum armgap_form {
-    /// Plain in double precision with p0 up to 1e6, factorized otherwise.
+    /// Full matrix in double precision with p0 up to 1e6, factors U D U' otherwise.
     ARMGAP_DEFAULT_FORM = 0,
-    /// Equation (21) as printed.
+    /// Full matrix, updated by equation (21) of Reyes and Kelly (1997) as printed.
     ARMGAP_PLAIN = 1,
-    /// U D U'.
+    /// Factors U D U' of the covariance, positive definite whatever the rounding.
     ARMGAP_FACTORIZED = 2,
 }
 
-/// Settings; `armgap_settings_default` fills them.
+/// Settings of an online estimator; `armgap_settings_default` fills them.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct armgap_settings {
-    /// An `armgap_arm`.
+    /// Kind of arm, an `armgap_arm`.
     pub arm: u32,
-    /// An `armgap_scheme`.
+    /// Regression model, an `armgap_scheme`.
     pub scheme: u32,
-    /// An `armgap_filters`.
+    /// Filters, an `armgap_filters`.
     pub filters: u32,
-    /// An `armgap_form`.
+    /// Form in which the covariance is kept, an `armgap_form`.
     pub form: u32,
-    /// Whether one constant torque per joint is estimated too, after all other parameters: 0 or 1.
+    /// Whether one constant torque per joint is estimated after all other parameters: 0 or 1.
     pub asymmetry: u32,
-    /// Samples used before the alarm begins to learn.
+    /// Number of samples used before the alarm begins to learn.
     pub settling: u32,
-    /// Samples from which the alarm learns the errors' sizes, at least 2.
+    /// Number of samples from which the alarm learns the sizes of the prediction errors, at least 2.
     pub learning: u32,
-    /// Not used; 0.
+    /// Unused field, must be 0.
     pub reserved: u32,
     /// Cut-off of the filters, rad/s.
     pub cutoff: f64,
-    /// Forgetting factor, above 0 and at most 1.
+    /// Forgetting factor of recursive least squares, above 0 and at most 1.
     pub forgetting: f64,
-    /// Initial covariance, times the unit matrix; forgetting lifts no variance above it.
+    /// Initial variance of every parameter, at an error of unit variance; forgetting lifts no variance above it.
     pub p0: f64,
-    /// Samples over which spread and excitation are averaged, at least 1.
+    /// Number of samples over which mean square error and excitation are averaged, at least 1.
     pub memory: f64,
-    /// Mean samples between false alarms, at least 10.
+    /// Mean number of samples between false alarms, at least 10.
     pub between: f64,
-    /// Smallest standard deviation of an error that matters, in the error's unit.
+    /// Smallest standard deviation of a prediction error that matters, in the unit of the error.
     pub floor: f64,
 }
 
-/// What an estimator says about itself.
+/// Counts of samples, excitation and alarm of an estimator.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct armgap_report {
-    /// Samples used.
+    /// Number of samples used.
     pub updates: u64,
-    /// Samples rejected.
+    /// Number of samples rejected.
     pub rejected: u64,
-    /// Near 1 while the motion excites every parameter, near 0 while it teaches nothing new.
+    /// Excitation: near 1 while the motion excites every parameter, near 0 while it teaches nothing new.
     pub excitation: f64,
-    /// Above 1 the model no longer explains the arm.
+    /// Alarm level: above 1 the model no longer explains the arm.
     pub alarm: f64,
-    /// Parameters that are estimated.
+    /// Number of estimated parameters.
     pub parameters: u32,
-    /// Prediction errors per sample.
+    /// Number of prediction errors per sample.
     pub outputs: u32,
 }
 
 impl armgap_settings {
-    /// The defaults for a kind of arm.
+    /// Default settings for a kind of arm.
     pub(crate) fn of(kind: ArmKind) -> Self {
         let defaults = OnlineSettings::<f64>::new(kind);
         Self {
@@ -151,7 +151,7 @@ impl armgap_settings {
         }
     }
 
-    /// The settings as the core takes them.
+    /// Settings as `armgap-core` takes them; `None` if a choice is unknown.
     pub(crate) fn online_settings<T: Real>(&self) -> Option<OnlineSettings<T>> {
         let kind = kind_of(self.arm)?;
         Some(OnlineSettings {
@@ -174,12 +174,12 @@ impl armgap_settings {
     }
 }
 
-/// A kind of arm by its number.
+/// Kind of arm by the number of an `armgap_arm`.
 pub(crate) fn kind_of(arm: u32) -> Option<ArmKind> {
     ArmKind::ALL.get(arm as usize).copied()
 }
 
-/// The status code of an error of the core.
+/// Status code for an error of `armgap-core`.
 pub(crate) fn status_of(error: OnlineError) -> armgap_status {
     match error {
         OnlineError::Range(_) => armgap_status::ARMGAP_RANGE,
@@ -187,7 +187,7 @@ pub(crate) fn status_of(error: OnlineError) -> armgap_status {
     }
 }
 
-/// Fills `settings` with the defaults for an `armgap_arm`: filtered power, exact filters at 50 rad/s, no forgetting.
+/// Fills `settings` with the defaults for an `armgap_arm`: filtered power model, exact filters at 50 rad/s, no forgetting.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_settings_default(settings: *mut armgap_settings, arm: u32) -> armgap_status {
     if settings.is_null() {
@@ -204,19 +204,19 @@ pub unsafe extern "C" fn armgap_settings_default(settings: *mut armgap_settings,
     armgap_status::ARMGAP_OK
 }
 
-/// Number of joints of an `armgap_arm`; 0 for no known one.
+/// Number of joints of an `armgap_arm`; 0 if `arm` is not one.
 #[unsafe(no_mangle)]
 pub extern "C" fn armgap_joints(arm: u32) -> usize {
     kind_of(arm).map_or(0, ArmKind::joints)
 }
 
-/// Number of parameters of an `armgap_arm` without asymmetries; 0 for no known one.
+/// Number of parameters of an `armgap_arm` without constant torques; 0 if `arm` is not one.
 #[unsafe(no_mangle)]
 pub extern "C" fn armgap_parameters(arm: u32) -> usize {
     kind_of(arm).map_or(0, |kind| kind.parameters().len())
 }
 
-/// One line about an `armgap_status`, never null.
+/// Message of one line for an `armgap_status`, never null.
 #[unsafe(no_mangle)]
 pub extern "C" fn armgap_message(status: i32) -> *const core::ffi::c_char {
     let text = match status {

@@ -1,4 +1,4 @@
-//! One sample of simulated motion, for tests of a controller without its arm.
+//! Simulation of an arm by one sample, for tests of a controller without its arm.
 
 use crate::settings::{armgap_status, kind_of};
 use armgap_core::arm::{Arm, ArmKind, Axis, Pendulum, TwoLink};
@@ -8,7 +8,7 @@ use armgap_core::plant::Plant;
 use armgap_status::{ARMGAP_LENGTH, ARMGAP_NULL, ARMGAP_OK, ARMGAP_RANGE, ARMGAP_UNALIGNED};
 use nalgebra::SVector;
 
-/// Moves an arm with parameters `theta` of an `armgap_arm` by `h` seconds under held torques; `q` and `dq` are read and written.
+/// Moves an `armgap_arm` with the parameters `theta` by `h` seconds under held torques `tau`, SI; positions `q` and velocities `dq` are read and written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armgap_advance(
     arm: u32,

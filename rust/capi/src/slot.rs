@@ -1,4 +1,4 @@
-//! An estimator in memory of the caller's.
+//! Estimator of an arm of one or two joints in memory of the caller's.
 
 use crate::settings::{armgap_report, armgap_settings, armgap_status, status_of};
 use armgap_core::online::{MOST_JOINTS, MOST_PARAMETERS, Online, OnlineEstimator, SampleStatus, When};
@@ -8,10 +8,10 @@ use armgap_status::{
     ARMGAP_STARTING, ARMGAP_UNALIGNED, ARMGAP_VERSION,
 };
 
-/// Marks memory that holds an estimator of this version and size.
+/// First word of memory that holds an estimator of this version, before size and precision are mixed in.
 const MARK: u64 = 0x4d47_5241_0001_0000;
 
-/// What the caller's memory holds.
+/// Contents of the caller's memory: a mark and an estimator.
 #[repr(C)]
 pub(crate) struct Slot<T: Real> {
     mark: u64,
@@ -22,7 +22,7 @@ impl<T: Real> Slot<T> {
     const MARKED: u64 = MARK ^ ((size_of::<Self>() as u64) << 1) ^ (size_of::<T>() as u64);
 }
 
-/// Whether a pointer can be read or written.
+/// Error if a pointer is null or not aligned for `T`.
 pub(crate) fn usable<T>(pointer: *const T) -> Result<(), armgap_status> {
     if pointer.is_null() {
         Err(ARMGAP_NULL)
@@ -33,7 +33,7 @@ pub(crate) fn usable<T>(pointer: *const T) -> Result<(), armgap_status> {
     }
 }
 
-/// A slice of the caller's numbers, at most so many.
+/// The caller's array of `count` numbers as a slice; error if `count` is larger than `most`.
 pub(crate) unsafe fn slice<'a, T>(
     pointer: *const T,
     count: usize,
@@ -84,7 +84,7 @@ pub(crate) unsafe fn start<T: Real, M>(
     })())
 }
 
-/// The estimator in the caller's memory, if there is one.
+/// Estimator in the caller's memory, or the status if there is none.
 unsafe fn opened<'a, T: Real, M>(memory: *const M) -> Result<&'a Slot<T>, armgap_status> {
     usable(memory)?;
     let slot = memory.cast::<Slot<T>>();
@@ -114,7 +114,7 @@ pub(crate) unsafe fn update<T: Real, M>(
     })())
 }
 
-/// The status code of what became of a sample.
+/// Status code for what the estimator did with a sample.
 pub(crate) fn outcome(status: SampleStatus) -> armgap_status {
     match status {
         SampleStatus::Updated => ARMGAP_OK,
@@ -123,7 +123,7 @@ pub(crate) fn outcome(status: SampleStatus) -> armgap_status {
     }
 }
 
-/// Copies numbers of the estimator to the caller, who has to have room for exactly as many.
+/// Copies numbers of the estimator to the caller's array, whose length `count` must be theirs.
 pub(crate) unsafe fn give<T: Real>(
     from: &[T],
     to: *mut T,
@@ -160,7 +160,7 @@ pub(crate) unsafe fn report<T: Real, M>(memory: *const M, to: *mut armgap_report
     answer((|| unsafe { fill_report(opened::<T, M>(memory)?.online.estimator(), to) })())
 }
 
-/// What an estimator says about itself.
+/// Fills a report with counts of samples, excitation and alarm of the estimator.
 pub(crate) unsafe fn fill_report<T: Real>(
     estimator: &dyn OnlineEstimator<T>,
     to: *mut armgap_report,

@@ -1,16 +1,16 @@
-//! The C interface as a controller's programmer meets it: compiled as C and as C++, with sanitizers, and under valgrind.
+//! Tests of the C interface from C programs: compiled as C and as C++, with sanitizers, and under valgrind.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Largest relative error of an estimate of the example; encoders are exact there, so what is left is the sampled torque.
+/// Largest relative error of an estimate of the C example; its encoders are exact, so the error is that of sampled torques.
 const ACCURACY: f64 = 0.01;
 
 fn here(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
-/// The static library that cargo built with these tests.
+/// Path of the static library that cargo built with the tests of the C interface.
 fn library() -> PathBuf {
     let folder = std::env::current_exe().expect("a path").parent().expect("a folder").to_path_buf();
     let built =
@@ -31,7 +31,7 @@ fn text(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
-/// Compiles a source with all warnings as errors; what the compiler says where it fails.
+/// Compiles a C source with all warnings as errors; returns the compiler's message if it fails.
 fn compile(compiler: &str, source: &Path, program: &Path, more: &[&str]) -> Result<(), String> {
     let mut command = Command::new(compiler);
     command.args(["-O2", "-g", "-Wall", "-Wextra", "-Werror"]).args(more);

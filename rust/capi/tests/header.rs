@@ -1,4 +1,4 @@
-//! The committed header is the one that the sources give.
+//! Test that the committed header `armgap.h` is what cbindgen makes of the sources.
 
 use std::path::Path;
 

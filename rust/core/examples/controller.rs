@@ -1,6 +1,6 @@
-//! A controller that identifies its arm while it moves it: 400 Hz, two links, no allocation.
+//! Example of a controller that identifies its arm while it moves it: 400 Hz, two links, no allocation.
 //!
-//! The arm is simulated here; in a real controller encoders and motors take its place, and nothing else changes.
+//! The arm is simulated; in a real controller encoders and motors take its place, and nothing else changes.
 
 use armgap_core::arm::{Arm, TwoLink};
 use armgap_core::effect::InputSegment;
@@ -12,7 +12,7 @@ use nalgebra::Vector2;
 const PERIOD: f64 = 0.0025;
 const TRUTH: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6095, 1.734];
 
-/// The torques (31) and (32) of Reyes and Kelly (1997).
+/// Torques (31) and (32) of Reyes and Kelly (1997) at the time `t`, s, in N m.
 fn excite(t: f64) -> [f64; 2] {
     [
         (1.0 - (-0.8 * t).exp()) * 29.0 + 68.0 * (16.0 * t + 0.1).sin() + 9.0 * (20.0 * t + 0.15).sin(),

@@ -1,27 +1,27 @@
-//! Which of the processor's instructions the online estimator uses, found out when it is made.
+//! Choice of the processor's instructions that the online estimator uses, made when the estimator is made.
 //!
-//! One wheel and one library run on every processor of their kind, while four doubles at once and `a b + c` with one rounding take a
+//! One Python wheel and one library run on every x86-64 processor, while four doubles at once and `a b + c` with one rounding take a
 //! third off the cost of a sample. So the hot code is written once over a [`Cpu`] and compiled twice on x86-64: for every processor, and
-//! for those with AVX2 and FMA. A [`Level`] says which, and one call without a branch in between enters the code.
+//! for processors with AVX2 and FMA. A [`Level`] says which, and one call without a branch in between enters the code.
 //!
 //! `a b + c` goes through [`Cpu::fused`], because a compiler does not join the two on its own, and because the standard library's
 //! `mul_add` is a function call where the instruction is missing. Everything below [`Kernel::run`] has to be inlined: a function that
 //! stays outside is compiled for every processor.
 //!
-//! Without the feature `std` there is nothing to find out: what the builder's `target-cpu` has is known, and there is no unsafe code.
+//! Without the feature `std` only the instructions of the builder's `target-cpu` are used, and there is no unsafe code.
 
 use crate::real::Real;
 
-/// Arithmetic of a kind of processor.
+/// Arithmetic of one kind of processor.
 pub trait Cpu: Copy {
-    /// Doubles that it takes together.
+    /// Number of doubles that a vector instruction of the processor takes together.
     const DOUBLES: usize;
 
-    /// `a b + c`, rounded once where that is one instruction.
+    /// `a b + c`, rounded once where the processor has one instruction for it.
     fn fused<T: Real>(a: T, b: T, c: T) -> T;
 }
 
-/// Any processor the code was compiled for.
+/// Any processor that the code was compiled for.
 #[derive(Debug, Clone, Copy)]
 pub struct Portable;
 
@@ -34,7 +34,7 @@ impl Cpu for Portable {
     }
 }
 
-/// A processor that multiplies and adds in one instruction, so many doubles at once.
+/// Processor with fused multiply-add and vectors of `DOUBLES` doubles.
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[derive(Debug, Clone, Copy)]
 struct Fused<const DOUBLES: usize>;
@@ -49,35 +49,35 @@ impl<const DOUBLES: usize> Cpu for Fused<DOUBLES> {
     }
 }
 
-/// A computation that is compiled for each level.
+/// Computation that is compiled once for each instruction set.
 pub trait Kernel {
-    /// Result of the computation.
+    /// Type of the result of the computation.
     type Output;
 
-    /// Runs the computation; the implementation is `#[inline(always)]`, and so is all that it calls and that has to be fast.
+    /// Runs the computation; the implementation, and all it calls that has to be fast, must be `#[inline(always)]`.
     fn run<C: Cpu>(self) -> Self::Output;
 }
 
-/// Instructions that may be used.
+/// Instruction set that code may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Level(InstructionSet);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum InstructionSet {
     Portable,
-    /// AVX2 and FMA, where the processor has them; made by [`Level::detect`] alone.
+    /// AVX2 and FMA; made by [`Level::detect`] alone, where the processor has both.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     Avx2,
-    /// AVX-512, where the processor has it and AVX2; made by [`Level::widest`] alone.
+    /// AVX-512 besides AVX2; made by [`Level::widest`] alone, where the processor has both.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     Avx512,
 }
 
 impl Level {
-    /// Instructions that the code was compiled for.
+    /// Instruction set that the code was compiled for.
     pub const PORTABLE: Self = Self(InstructionSet::Portable);
 
-    /// The most that the processor has, or, without the standard library, [`Level::PORTABLE`].
+    /// AVX2 and FMA where the processor has both, else, or without the standard library, [`Level::PORTABLE`].
     #[inline]
     pub fn detect() -> Self {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
@@ -91,7 +91,7 @@ impl Level {
         Self::PORTABLE
     }
 
-    /// Like [`Level::detect`], and eight doubles at once, where the processor has AVX-512, for kernels run by [`Level::run_wide`].
+    /// AVX-512, eight doubles at once, where the processor has it, else [`Level::detect`]; for kernels run by [`Level::run_wide`].
     #[inline]
     pub fn widest() -> Self {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
@@ -101,7 +101,7 @@ impl Level {
         Self::detect()
     }
 
-    /// Name in tables.
+    /// Name of the instruction set in tables.
     pub const fn name(self) -> &'static str {
         match self.0 {
             InstructionSet::Portable => "portable",
@@ -112,7 +112,7 @@ impl Level {
         }
     }
 
-    /// Runs a kernel with these instructions.
+    /// Runs a kernel with the instructions of this level, AVX2 at most.
     #[inline(always)]
     pub fn run<W: Kernel>(self, kernel: W) -> W::Output {
         match self.0 {
@@ -122,7 +122,7 @@ impl Level {
         }
     }
 
-    /// Runs a kernel that has eight doubles side by side.
+    /// Runs a kernel that works on eight doubles side by side, with AVX-512 where this level has it.
     #[inline(always)]
     pub fn run_wide<W: Kernel>(self, kernel: W) -> W::Output {
         match self.0 {
@@ -133,7 +133,7 @@ impl Level {
     }
 }
 
-/// Runs a kernel compiled for every processor; a function of its own, so that there is one copy of it.
+/// Runs a kernel compiled for every processor; not inlined, so that there is one copy of the kernel.
 #[inline(never)]
 fn portable<W: Kernel>(kernel: W) -> W::Output {
     kernel.run::<Portable>()
@@ -175,7 +175,7 @@ fn avx512<W: Kernel>(kernel: W) -> W::Output {
 mod tests {
     use super::*;
 
-    /// What rounding takes off a square.
+    /// Kernel that returns the rounding error of the square of its number.
     struct Rounding(f64);
 
     impl Kernel for Rounding {

@@ -1,7 +1,7 @@
 //! The transmissions of all joints: the torques that reach the links, and the motion of the rotors.
 //!
-//! Backlash is open or closed. Open, rotor and link move independently; closed, they move as one body for as long as the flank
-//! pushes. At an impact they stay together, and the rotor's momentum goes over to the arm at once (a plastic impact,
+//! While backlash is open, rotor and link move independently; while it is closed, they move as one body for as long as the flank
+//! pushes. At an impact rotor and link stay together, and the rotor's momentum goes over to the arm at once (a plastic impact,
 //! Brogliato 1999, chapter 4).
 
 use crate::linear::solve_positive_definite;
@@ -9,10 +9,10 @@ use crate::real::Real;
 use crate::transmission::{LatentState, Sides, Transmission};
 use nalgebra::SVector;
 
-/// An inertia matrix, by rows.
+/// Inertia matrix of an arm, by rows.
 type InertiaMatrix<T, const N: usize> = [[T; N]; N];
 
-/// The transmissions of all joints; a rigid joint has none. Loops count joints by their index, so that compilers see none out of range.
+/// Transmissions of all joints; a rigid joint has none. Loops count joints by index so that compilers leave out range checks.
 #[derive(Debug, Clone, Copy)]
 pub struct Drivetrain<T, const N: usize> {
     of: [Option<Transmission<T>>; N],
@@ -23,12 +23,13 @@ pub struct Drivetrain<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Drivetrain<T, N> {
-    /// All joints rigid.
+    /// Drivetrain of an arm whose joints are all rigid.
     pub(crate) fn none() -> Self {
         Self { of: [None; N], sides: [Sides::LINK; N], any: false, has_backlash: false, brakes_motors: false }
     }
 
-    /// Puts a transmission on joint `j`, if there is such a joint, and takes the rotor's inertia out of the link's if it is a part of that.
+    /// Puts a transmission on joint `j`, and takes the rotor's inertia out of `inertia` if it is part of the link's; `None` without such a
+    /// joint.
     pub(crate) fn add(
         &mut self,
         j: usize,
@@ -44,7 +45,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         Some(())
     }
 
-    /// Says where encoder and friction of joint `j` sit, if there is such a joint; without a transmission it makes no difference.
+    /// Sets where encoder and friction of joint `j` sit, which matters only with a transmission; `None` without such a joint.
     pub(crate) fn set_sides(&mut self, j: usize, sides: Sides) -> Option<()> {
         *self.sides.get_mut(j)? = sides;
         self.brakes_motors |= sides.friction_at_motor;
@@ -54,7 +55,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         Some(())
     }
 
-    /// Where encoder and friction of joint `j` sit.
+    /// Whether encoder and friction of joint `j` sit on the link's or the motor's side of its transmission.
     #[inline]
     pub fn sides(&self, j: usize) -> Sides {
         if self.get(j).is_some() { self.sides[j] } else { Sides::LINK }
@@ -65,7 +66,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         (0..N).any(|j| self.sides(j).encoder_at_motor)
     }
 
-    /// Whether friction of any joint acts on its motor.
+    /// Whether friction of any joint acts on its motor rather than on its link.
     #[inline]
     pub fn brakes_motors(&self) -> bool {
         self.brakes_motors
@@ -77,13 +78,13 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         self.brakes_motors && self.sides(j).friction_at_motor && latent.side[j] == T::zero()
     }
 
-    /// Velocity on which the friction of joint `j` acts, given the joints'.
+    /// Velocity, rad/s or m/s, on which the friction of joint `j` acts: of the motor or of the joint, which moves at `dq`.
     #[inline]
     pub fn friction_velocity(&self, j: usize, dq: T, latent: &LatentState<T, N>) -> T {
         if self.brakes_motor(j, latent) { dq + latent.deflection_rate[j] } else { dq }
     }
 
-    /// Torque that joint `j`'s transmission passes on while backlash is open or there is none.
+    /// Torque that the shaft of joint `j` passes on to the link, N m (N); 0 for rigid joints and for backlash.
     #[inline]
     pub(crate) fn transmitted(&self, j: usize, latent: &LatentState<T, N>) -> T {
         match self.get(j) {
@@ -94,7 +95,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         }
     }
 
-    /// Positions that the encoders measure when the joints are at `q`.
+    /// Positions that the encoders measure when the joints are at `q`, rad or m.
     #[inline]
     pub fn shown(&self, q: &SVector<T, N>, latent: &LatentState<T, N>) -> SVector<T, N> {
         SVector::from_fn(
@@ -102,7 +103,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         )
     }
 
-    /// Whether any joint has a transmission.
+    /// Whether any joint has a transmission, elastic or with backlash.
     #[inline]
     pub fn any(&self) -> bool {
         self.any
@@ -114,20 +115,20 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         self.has_backlash
     }
 
-    /// The transmission of joint `j`.
+    /// Transmission of joint `j`, `None` for a rigid joint.
     #[inline]
     pub fn get(&self, j: usize) -> Option<&Transmission<T>> {
         self.of.get(j)?.as_ref()
     }
 
-    /// Joints with a transmission.
+    /// Joints that have a transmission, by index, with it.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (usize, &Transmission<T>)> {
         self.of.iter().enumerate().filter_map(|(j, transmission)| Some((j, transmission.as_ref()?)))
     }
 
-    /// Part of joint `j`'s motor torque that accelerates the rotor instead of reaching the link; zero with closed backlash, where rotor and
-    /// link move as one.
+    /// Part of the motor torque `tau` of joint `j` that accelerates the rotor instead of reaching the link, N m (N); 0 with closed backlash,
+    /// where rotor and link move as one.
     #[inline]
     fn retained(j: usize, transmission: &Transmission<T>, tau: T, latent: &LatentState<T, N>) -> T {
         if transmission.backlash > T::zero() {
@@ -136,7 +137,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         tau - transmission.transmitted(latent.deflection[j], latent.deflection_rate[j])
     }
 
-    /// Torques that reach the joints when the motors give `tau`.
+    /// Torques that reach the joints when the motors give `tau`, N m (N).
     #[inline]
     pub fn torque_at_joints(&self, tau: &SVector<T, N>, latent: &LatentState<T, N>) -> SVector<T, N> {
         let mut torque_at_joints = *tau;
@@ -150,7 +151,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         torque_at_joints
     }
 
-    /// Adds the inertia of rotors that move with their links because their backlash is closed.
+    /// Adds to an inertia matrix the rotors that move with their links because their backlash is closed.
     #[inline]
     pub(crate) fn add_closed_rotors(&self, inertia: &mut InertiaMatrix<T, N>, latent: &LatentState<T, N>) {
         for j in 0..N {
@@ -161,14 +162,14 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         }
     }
 
-    /// Adds the inertia of all rotors, as if they moved with their links.
+    /// Adds to an inertia matrix all rotors, as if each moved with its link.
     pub(crate) fn add_rotors(&self, inertia: &mut InertiaMatrix<T, N>) {
         for (j, transmission) in self.iter() {
             add_rotor_inertia(inertia, transmission.inertia, &transmission.rotor_jacobian(j));
         }
     }
 
-    /// Accelerations of the transmissions' deflections, given those of the joints.
+    /// Accelerations of the transmissions' deflections for the motor torques `tau` and the joint accelerations `ddq`, SI.
     #[inline]
     pub(crate) fn deflection_accelerations(
         &self,
@@ -188,7 +189,8 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         deflection_acceleration
     }
 
-    /// Force by which the flank of joint `j`'s closed backlash would have to pull; positive where it opens. None for other joints.
+    /// Force by which the flank of joint `j`'s closed backlash would have to pull, N m (N); positive where the backlash opens. `None` if it is
+    /// not closed.
     #[inline]
     pub(crate) fn flank_tension(
         &self,
@@ -204,7 +206,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         )
     }
 
-    /// Depth of joint `j`'s rotor behind the nearer flank of its open backlash. None for other joints.
+    /// Depth of joint `j`'s rotor behind the nearer flank of its open backlash, rad or m, negative between the flanks. `None` if it is not open.
     #[inline]
     pub(crate) fn depth(&self, j: usize, latent: &LatentState<T, N>) -> Option<T> {
         let transmission = self.get(j).filter(|d| d.backlash > T::zero())?;
@@ -212,7 +214,8 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
         open.then(|| latent.deflection[j].abs() - transmission.half_backlash())
     }
 
-    /// Plastic impact of joint `j`'s rotor on the flank it is at, in an arm with this inertia: velocities and deflection rates jump.
+    /// Plastic impact of joint `j`'s rotor on the nearer flank of its backlash, in an arm of this `inertia`: velocities and deflection rates
+    /// jump.
     pub(crate) fn impact(
         &self,
         j: usize,
@@ -242,7 +245,7 @@ impl<T: Real, const N: usize> Drivetrain<T, N> {
     }
 }
 
-/// Adds the inertia of a rotor whose velocity is `rotor_jacobian . dq`.
+/// Adds to an inertia matrix a rotor of `inertia`, kg m^2 (kg), whose velocity is `rotor_jacobian . dq`.
 #[inline]
 fn add_rotor_inertia<T: Real, const N: usize>(
     matrix: &mut InertiaMatrix<T, N>,

@@ -2,9 +2,9 @@
 //!
 //! Two pairs, with `a = exp(-h lambda)`:
 //!
-//! * **paper**, as printed in section 5.1: `F(z) = (1 - a) z^-1 / (1 - a z^-1)` and `D(z) = lambda (1 - z^-1) / (1 - a z^-1)`. Their
-//!   ratio is `lambda (z - 1)/(1 - a)` where a derivative has `(z - 1)/h`: whatever passes `D` is too large by `lambda h/(1 - a)`
-//!   relative to what passes `F`, and its parameter too small by the inverse (0.940 at 50 rad/s and 2.5 ms, 0.692 at 314 rad/s).
+//! * **paper**, as printed by Reyes and Kelly (1997), section 5.1: `F(z) = (1 - a) z^-1 / (1 - a z^-1)` and
+//!   `D(z) = lambda (1 - z^-1) / (1 - a z^-1)`. Their ratio is `lambda (z - 1)/(1 - a)` where a derivative has `(z - 1)/h`: an output of `D`
+//!   is too large by `lambda h/(1 - a)` against one of `F`, its parameter too small by the inverse (0.940 at 50 rad/s, 2.5 ms, 0.692 at 314 rad/s).
 //! * **exact**: `F` for signals that are linear between samples (first-order hold), `F` for signals that are held (zero-order hold:
 //!   the torque), and `D = lambda (1 - F)`, which makes the pair consistent by construction. Energies are quadratic in the velocity:
 //!   for them `D` also takes the value half-way, because a chord lies above a convex curve at every sample, which adds up to a bias.
@@ -17,32 +17,32 @@
 use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 
-/// Cut-off `lambda`.
+/// Cut-off `lambda` of the first-order filters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cutoff<T> {
-    /// rad/s.
+    /// Cut-off, rad/s.
     pub rad_per_s: T,
 }
 
-/// Coefficients for a sample interval of one length.
+/// Coefficients of the first-order filters for a sample interval of length `h`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilterCoefficients<T> {
-    /// `exp(-h lambda)`.
+    /// Decay of a filter's output over the interval, `exp(-h lambda)`.
     pub decay: T,
-    /// Weight of the input at the start of the interval, input linear over it.
+    /// Weight of the input at the start of the interval, for an input that is linear over the interval.
     pub first: T,
-    /// Weight of the input at its end.
+    /// Weight of the input at the end of the interval, for an input that is linear over the interval.
     pub last: T,
-    /// Weight of the height by which the input's middle lies above the chord, input quadratic over the interval.
+    /// Weight of the height of the input above its chord at the middle of the interval, for an input that is quadratic over the interval.
     pub bulge: T,
-    /// `h lambda`.
+    /// Length of the interval in time constants of the filter, `h lambda`.
     pub x: T,
-    /// Cut-off, rad/s.
+    /// Cut-off of the filter, rad/s.
     pub lambda: T,
 }
 
 impl<T: Real> Cutoff<T> {
-    /// Coefficients for an interval of `h` seconds.
+    /// Coefficients of the filters for an interval of `h` seconds.
     #[inline]
     pub fn step(&self, h: T) -> FilterCoefficients<T> {
         let x = self.rad_per_s * h;
@@ -62,7 +62,7 @@ impl<T: Real> FilterCoefficients<T> {
         Self { decay, first: mean - decay, last: T::one() - mean, bulge: bulge(x, decay), x, lambda }
     }
 
-    /// The coefficients of an interval that is nearly this one: `exp` from its series around the known value.
+    /// Coefficients for an interval of slightly different length, `x = h lambda`, by the series of `exp` around the known decay.
     #[inline]
     fn near(&self, x: T) -> Self {
         let d = self.x - x;
@@ -70,53 +70,54 @@ impl<T: Real> FilterCoefficients<T> {
         Self::with_decay(self.lambda, x, self.decay * change)
     }
 
-    /// `F`, one interval after `y`, of an input held at `held`.
+    /// Output of the low-pass filter `F` one interval after its output `y`, for an input held at `held`.
     #[inline(always)]
     pub fn held<C: Cpu>(&self, y: T, held: T) -> T {
         C::fused(self.decay, y, (T::one() - self.decay) * held)
     }
 
-    /// `F`, one interval after `y`, of an input that goes linearly from `from` to `to`.
+    /// Output of the low-pass filter `F` one interval after its output `y`, for an input that goes linearly from `from` to `to`.
     #[inline(always)]
     pub fn ramp<C: Cpu>(&self, y: T, from: T, to: T) -> T {
         C::fused(self.last, to, C::fused(self.decay, y, self.first * from))
     }
 
-    /// `F`, one interval after `y`, of a parabola from `from` to `to` that half-way lies `height` above the chord.
+    /// Output of the low-pass filter `F` one interval after its output `y`, for a parabola from `from` to `to` that lies `height` above its chord at the
+    /// middle.
     #[inline(always)]
     pub fn curve<C: Cpu>(&self, y: T, from: T, to: T, height: T) -> T {
         C::fused(self.bulge, height, self.ramp::<C>(y, from, to))
     }
 
-    /// The paper's `D`, one interval after `y`.
+    /// Output of the derivative filter `D` as Reyes and Kelly (1997) print it, one interval after its output `y`, for an input that goes from `from` to `to`.
     #[inline(always)]
     pub fn paper_derivative<C: Cpu>(&self, y: T, from: T, to: T) -> T {
         C::fused(self.lambda, to - from, self.decay * y)
     }
 }
 
-/// Coefficients of the last interval, reused while the intervals have the same length.
+/// Filter coefficients of the last interval, reused while intervals have the same length.
 ///
-/// Lengths that differ by rounding of the clock count as equal; those that differ a little more take `exp` from its series.
+/// Lengths that differ by rounding of the clock count as equal; for lengths that differ a little more, `exp` is taken from its series.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CachedCoefficients<T> {
     h: T,
     step: FilterCoefficients<T>,
 }
 
-/// Relative change of a decay below which two intervals are as long as each other; the estimates follow it to first order.
+/// Relative change of a filter's decay below which two sample intervals count as equally long; the estimates follow the decay to first order.
 const SAME: f64 = 1e-12;
-/// Relative change of a decay up to which three terms of the series of `exp` suffice: the fourth is 4e-18.
+/// Relative change of a filter's decay up to which three terms of the series of `exp` suffice: the fourth is 4e-18.
 const NEAR_DECAY: f64 = 1e-4;
 
 impl<T: Real> CachedCoefficients<T> {
-    /// An empty cache.
+    /// Empty cache of coefficients of filters with this cut-off.
     #[inline]
     pub fn new(cutoff: &Cutoff<T>) -> Self {
         Self { h: T::zero(), step: cutoff.step(T::zero()) }
     }
 
-    /// Coefficients for an interval of `h` seconds.
+    /// Coefficients of the filters for an interval of `h` seconds, computed anew if the length has changed.
     #[inline(always)]
     pub fn step(&mut self, h: T) -> FilterCoefficients<T> {
         if h != self.h {
@@ -137,7 +138,7 @@ impl<T: Real> CachedCoefficients<T> {
     }
 }
 
-/// `F`, at the end of an interval, of the parabola `4 s (1 - s)`; `x = lambda h`, `decay = exp(-x)`.
+/// Output of the low-pass filter `F` at the end of an interval for the parabola `4 s (1 - s)`, `s` from 0 to 1; `x = lambda h`, `decay = exp(-x)`.
 #[inline]
 fn bulge<T: Real>(x: T, decay: T) -> T {
     let four: T = lit(4.0);

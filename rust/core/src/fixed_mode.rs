@@ -1,7 +1,7 @@
 //! One Runge-Kutta step with fixed friction modes: every joint slides in one direction or is stuck throughout.
 //!
 //! Classical Runge-Kutta on `M(q) ddq = tau - C dq - g - f` with the direction of every joint's dry friction given as a number, -1, 0
-//! (stuck) or 1. What couples a stuck joint to others is taken out by factors of zero, so one and the same arithmetic serves every
+//! (stuck) or 1. The coupling of a stuck joint to others is taken out by factors of zero, so one arithmetic serves every
 //! mode, one arm or several side by side. [`rk4_fixed_mode`] also checks whether the given modes agree with the motion ([`ModeCheck`]); if they do
 //! not, the step is discarded and [`crate::integrate`] finds the instant of the mode change.
 
@@ -11,35 +11,35 @@ use crate::number::Number;
 use crate::real::lit;
 use crate::trig::{Rotation, SinCos};
 
-/// An instant of a step.
+/// Time, kinematic state and motor torques at an instant of a step.
 #[derive(Debug, Clone, Copy)]
 pub struct Instant<'a, V, const N: usize> {
-    /// Time, s.
+    /// Time of the instant, s.
     pub t: V,
     /// Kinematic state of the arm.
     pub kinematics: &'a KinematicState<V, N>,
-    /// Torques of the motors.
+    /// Torques of the motors, N m (N).
     pub tau: &'a [V; N],
 }
 
 /// Dynamics of an arm with its friction and effects, or of several arms side by side.
 pub trait Dynamics<V: Number, const N: usize> {
-    /// Rotations of the arm's angles for these joint displacements, and the largest of these angles.
+    /// Rotations by which the arm's angles change when the joints move by `by`, rad or m, and the largest of the angles, rad.
     fn rotations(&self, by: &[V; N], reach: AngleRange) -> ([Rotation<V>; N], V);
 
-    /// Kinematic state of these joints, given the sines and cosines of the arm's angles.
+    /// Kinematic state at the joint state `joints`, given the sines and cosines of the arm's angles.
     fn rotated(&self, joints: &JointState<V, N>, sincos: [SinCos<V>; N]) -> KinematicState<V, N>;
 
-    /// Generalized force `tau - C dq - g - f` with the effects' torques, dry friction in these directions.
+    /// Generalized force `tau - C dq - g - f`, N m (N), with the effects' torques, and dry friction against `direction`.
     fn generalized_force(&self, at: &Instant<'_, V, N>, direction: &[V; N]) -> [V; N];
 
-    /// Whether any joint is stuck in these modes.
+    /// Whether any joint is stuck in the friction modes `modes`.
     #[inline(always)]
     fn any_stuck(&self, modes: &Modes<V, N>) -> bool {
         modes.any_stuck
     }
 
-    /// Stiction violation of each stuck joint: friction torque at rest less the Coulomb level. Not positive for sliding joints.
+    /// Stiction violation of each stuck joint, N m (N): friction torque at rest less the Coulomb level. Not positive for sliding joints.
     fn stiction_violation(
         &self,
         at: &Instant<'_, V, N>,
@@ -48,25 +48,25 @@ pub trait Dynamics<V: Number, const N: usize> {
     ) -> [V; N];
 }
 
-/// Friction modes during a step.
+/// Friction modes of all joints during a step.
 #[derive(Debug, Clone, Copy)]
 pub struct Modes<V, const N: usize> {
-    /// The direction in which each joint slides: -1, 0 (stuck) or 1.
+    /// Direction in which each joint slides: -1, 0 (stuck) or 1.
     pub direction: [V; N],
-    /// 1 for joints that slide, 0 for those that are stuck.
+    /// 1 for joints that slide, 0 for stuck joints.
     slides: [V; N],
     /// 1 for joints with dry friction, 0 for joints without.
     dry: [V; N],
-    /// `-direction` for joints with dry friction, 0 for others.
+    /// `-direction` for joints with dry friction, 0 for joints without.
     against: [V; N],
     /// Whether any joint is stuck.
     pub(crate) any_stuck: bool,
-    /// Whether the modes changed since the last step, so that its end does not vouch for them.
+    /// Whether the modes have changed since the last step, so that the check at the end of the last step does not hold for them.
     pub(crate) fresh: bool,
 }
 
 impl<V: Number, const N: usize> Modes<V, N> {
-    /// Modes of these directions; `dry` is 1 for joints with dry friction, 0 for joints without.
+    /// Friction modes for sliding in `direction`; `dry` is 1 for joints with dry friction, 0 for joints without.
     #[inline(always)]
     pub fn new(direction: [V; N], dry: [V; N]) -> Self {
         let (mut slides, mut against, mut any_stuck) = (direction, direction, false);
@@ -79,32 +79,32 @@ impl<V: Number, const N: usize> Modes<V, N> {
     }
 }
 
-/// A sample interval, or a part of it.
+/// A sample interval, or a part of one, with the motor torques over it.
 #[derive(Debug, Clone, Copy)]
 pub struct Span<V, const N: usize> {
-    /// Start time, s.
+    /// Start time of the span, s.
     pub t: V,
-    /// Length, s.
+    /// Length of the span, s.
     pub h: V,
-    /// Torques at its start, its middle and its end.
+    /// Motor torques at the start, the middle and the end of the span, N m (N).
     pub tau: [[V; N]; 3],
 }
 
-/// Check of the assumed friction modes after a step, with the quantities that tell which mode changed.
+/// Check of the assumed friction modes after a step, with the quantities from which the changed mode is found.
 #[derive(Debug, Clone, Copy)]
 pub struct ModeCheck<V, const N: usize> {
-    /// > 0 or NaN if an assumed friction mode is violated or `range_violation` is.
+    /// > 0 or NaN if the motion contradicts an assumed friction mode, or if `range_violation` is > 0 or NaN.
     pub mode_violation: V,
-    /// > 0 or NaN if the motion is not finite or exceeds the angle range of one step.
+    /// > 0 or NaN if the motion is not finite or turns the arm beyond the angle range of one step.
     pub range_violation: V,
-    /// Accelerations at the start and, in the last stage's approximation, at the end.
+    /// Joint accelerations, rad/s^2 (m/s^2), at the start of the step and, as the last Runge-Kutta stage has them, at the end.
     pub ddq: [[V; N]; 2],
-    /// Static friction at the same two instants; meaningless if no joint is stuck.
+    /// Static friction at the start and the end of the step; meaningless if no joint is stuck.
     pub static_friction: [StaticFriction<V, N>; 2],
 }
 
 impl<V: Number, const N: usize> ModeCheck<V, N> {
-    /// All zero.
+    /// Mode check of zeros, to be overwritten by a step.
     #[inline(always)]
     pub fn none() -> Self {
         let zero = V::of(lit(0.0));
@@ -118,12 +118,12 @@ impl<V: Number, const N: usize> ModeCheck<V, N> {
     }
 }
 
-/// Static friction of stuck joints.
+/// Static friction of stuck joints at an instant.
 #[derive(Debug, Clone, Copy)]
 pub struct StaticFriction<V, const N: usize> {
-    /// Friction torque that keeps a stuck joint at rest.
+    /// Friction torque that keeps a stuck joint at rest, N m (N).
     pub friction_at_rest: [V; N],
-    /// Excess of `friction_at_rest` over the Coulomb level; not positive for sliding joints.
+    /// Size of `friction_at_rest` less the Coulomb level, N m (N); not positive for sliding joints.
     pub stiction_violation: [V; N],
 }
 
@@ -176,7 +176,7 @@ fn static_friction<V: Number, B: Dynamics<V, N>, const N: usize>(
     }
 }
 
-/// `joints` moved on by `dt` at these rates.
+/// Joint state after `dt` seconds at the velocities `dq` and accelerations `ddq`.
 #[inline(always)]
 fn moved<V: Number, const N: usize>(
     joints: &JointState<V, N>,
@@ -192,7 +192,7 @@ fn moved<V: Number, const N: usize>(
     next
 }
 
-/// `x` times all of these.
+/// Product of the number `x` and the vector `y`.
 #[inline(always)]
 fn times<V: Number, const N: usize>(x: V, y: &[V; N]) -> [V; N] {
     let mut product = *y;
@@ -202,7 +202,7 @@ fn times<V: Number, const N: usize>(x: V, y: &[V; N]) -> [V; N] {
     product
 }
 
-/// Positive where a joint's mode contradicts its velocity or its acceleration.
+/// > 0 if a joint's velocity `dq`, or at rest its acceleration `ddq`, contradicts the `direction` of its friction mode.
 #[inline(always)]
 fn contradiction<V: Number>(dq: V, ddq: V, direction: V, slides: V) -> V {
     // A joint that was just released stays at rest only if it is pulled back; `slides` is 1 there.
@@ -217,7 +217,7 @@ struct RkStage<V, const N: usize> {
     motion: StageMotion<V, N>,
 }
 
-/// Runge-Kutta stage at `dt` after the start, from the velocities and accelerations of the previous stage, under the `tau`-th torques of the span.
+/// Runge-Kutta stage `dt` seconds after the start, from velocities and accelerations of the previous stage; `tau` is the index of the torques in the span.
 #[inline(always)]
 fn rk_stage<V: Number, B: Dynamics<V, N>, const N: usize>(
     step: &FixedModeStep<'_, V, B, N>,
@@ -233,22 +233,22 @@ fn rk_stage<V: Number, B: Dynamics<V, N>, const N: usize>(
     RkStage { kinematics, motion }
 }
 
-/// Input of one step.
+/// Input of one Runge-Kutta step with fixed friction modes.
 pub struct FixedModeStep<'a, V, B, const N: usize> {
     /// Dynamics of the arm.
     pub dynamics: &'a B,
-    /// Kinematic state at the start.
+    /// Kinematic state at the start of the step.
     pub start: &'a KinematicState<V, N>,
-    /// Friction modes.
+    /// Friction modes assumed during the step.
     pub modes: &'a Modes<V, N>,
-    /// Times and torques.
+    /// Times and motor torques of the step.
     pub span: &'a Span<V, N>,
 }
 
 /// One classical Runge-Kutta step with fixed friction modes; returns the kinematic state at its end and overwrites `mode_check`.
 ///
-/// From the start to the second stage, and from the third to the fourth, the arm turns by half a step at the velocity it starts with; the
-/// rest of the ways between them follows from accelerations, and is short.
+/// From the start to the second stage, and from the third to the fourth, the arm turns by half a step at its initial velocity; further
+/// rotations between stages follow from accelerations, and are small.
 #[inline(always)]
 pub fn rk4_fixed_mode<V: Number, B: Dynamics<V, N>, const N: usize>(
     step: &FixedModeStep<'_, V, B, N>,
@@ -285,7 +285,8 @@ pub fn rk4_fixed_mode<V: Number, B: Dynamics<V, N>, const N: usize>(
     end(step, &s1, [&s2, &s3, &s4], far, mode_check)
 }
 
-/// The end of a step with these stages, between which the longest way is so far, and the longest that has to be short.
+/// End of a Runge-Kutta step from its stages; `far` is the largest angle between stages, `aside_far` the largest that has to be small, as parts of their
+/// ranges.
 #[inline(always)]
 fn end<V: Number, B: Dynamics<V, N>, const N: usize>(
     step: &FixedModeStep<'_, V, B, N>,

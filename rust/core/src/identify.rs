@@ -1,8 +1,8 @@
-//! The online estimator: a sample in, an estimate out.
+//! Online estimator of an arm's parameters, sample by sample.
 //!
-//! Each call takes the position read at a sample and the torque that acts from it on. The velocity is the caller's, or comes from the
-//! positions: the paper's variant takes the backward difference as the velocity of the sample, half a period late; the exact variant
-//! takes it for what it is, the velocity half-way between the two samples, and aligns everything else with that instant. Whether
+//! Each call takes the position read at a sample and the torque that acts from the sample on. The velocity is the caller's, or comes from
+//! the positions: [`Variant::Paper`] takes the backward difference as the velocity of the sample, half a period late; [`Variant::Exact`]
+//! takes it as the velocity half-way between two samples, and aligns position and torque with the same instant. Whether
 //! velocities are given is settled by the first sample.
 //!
 //! A sample comes with its time ([`Estimator::update`]), or with the period since the last one ([`Estimator::update_after`]), which in
@@ -19,62 +19,63 @@ use crate::regression::{
 use crate::rls::{Form, Rls, Update};
 use nalgebra::SVector;
 
-/// Positions, velocities, torques and intervals beyond this belong to no arm, and their squares would stay in filters and integrals for good.
+/// Largest size, in SI units, of positions, velocities, torques and intervals that the online estimator takes: larger ones belong to no arm, and their
+/// squares would stay in filters and integrals for good.
 const LARGEST: f64 = 1e9;
-/// Times beyond this are rejected, s; seconds since any epoch stay below.
+/// Largest time of a sample that the online estimator takes, s; seconds since any epoch stay below.
 const LATEST: f64 = 1e11;
 
-/// Settings of an estimator of `R` parameters.
+/// Settings of an online estimator of `R` parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings<T, const R: usize> {
-    /// Regression model.
+    /// Regression model: filtered dynamic, supplied energy or filtered power.
     pub scheme: Scheme,
-    /// Filters and alignment.
+    /// Filters and alignment of signals: as in Reyes and Kelly (1997), or consistent.
     pub variant: Variant,
-    /// Cut-off of the filters.
+    /// Cut-off of the first-order filters.
     pub cutoff: Cutoff<T>,
-    /// Forgetting factor in `(0, 1]`.
+    /// Forgetting factor of recursive least squares, in `(0, 1]`.
     pub forgetting: T,
-    /// `theta(0)`.
+    /// Initial estimate `theta(0)`, SI.
     pub theta0: SVector<T, R>,
-    /// `P(0) = p0 I`.
+    /// Initial variance of every parameter: `P(0) = p0 I`.
     pub p0: T,
 }
 
-/// One sample with its time.
+/// Sample of a motion with its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample<T, const N: usize> {
-    /// Time, s.
+    /// Time of the sample, s.
     pub t: T,
-    /// Positions read at `t`.
+    /// Joint positions read at `t`, rad or m.
     pub q: SVector<T, N>,
-    /// Velocities at `t`, where they are known.
+    /// Joint velocities at `t`, rad/s or m/s, where they are known.
     pub dq: Option<SVector<T, N>>,
-    /// Torques that act from `t` until the next sample.
+    /// Joint torques that act from `t` until the next sample, N m (N).
     pub tau: SVector<T, N>,
 }
 
-/// One sample without its time.
+/// Sample of a motion without its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading<T, const N: usize> {
-    /// Positions.
+    /// Joint positions, rad or m.
     pub q: SVector<T, N>,
-    /// Velocities, where they are known.
+    /// Joint velocities, rad/s or m/s, where they are known.
     pub dq: Option<SVector<T, N>>,
-    /// Torques that act until the next sample.
+    /// Joint torques that act until the next sample, N m (N).
     pub tau: SVector<T, N>,
 }
 
-/// What became of a sample.
+/// What an online estimator did with a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome<T, const N: usize> {
-    /// Taken, but there are not enough samples yet for a regression.
+    /// The sample was taken, but there are not enough samples yet for a regression.
     Starting,
-    /// The estimate was updated; the prediction error, its first entry only for scalar schemes.
+    /// The estimate was updated; holds the prediction error, N m, J or W by scheme, in the first entry only for scalar schemes.
     Updated(SVector<T, N>),
-    /// The sample is not finite, of impossible size, not later than the last, or has a velocity where the first had none or the other
-    /// way round; nothing but the count has changed. Or least squares rejected the regressor that it led to; then the estimate has not
-    /// changed, and filters and integrals start again at this sample.
+    /// Either the sample is not finite, of impossible size, not later than the last, or has a velocity where the first had none, or none where the first had
+    /// one; nothing but the count of rejected samples has changed. Or least squares rejected its regressor; the estimate is unchanged, and filters and
+    /// integrals start again at this sample.
     Rejected,
 }
 
@@ -85,7 +86,7 @@ enum Regression<T: Real, const N: usize, const P: usize> {
     Power(FilteredPower<T, N, P>),
 }
 
-/// The last sample, and what is still needed of the one before; `seen` tells what of it holds.
+/// Last sample, and what is needed of the sample before it; `seen` says which of the fields are set.
 #[derive(Debug, Clone, Copy)]
 struct Past<T, const N: usize> {
     seen: Seen,
@@ -93,7 +94,7 @@ struct Past<T, const N: usize> {
     q: SVector<T, N>,
     tau: SVector<T, N>,
     sensor: bool,
-    /// Interval that ended with the last sample, its reciprocal, and the torque over it.
+    /// Length of the interval that ended with the last sample, s; `inverse` is its reciprocal, `tau_before` the torque over it.
     h: T,
     inverse: T,
     tau_before: SVector<T, N>,
@@ -106,7 +107,7 @@ enum Seen {
     More,
 }
 
-/// A running estimator: settings, arm, and state in one value without allocation. `S` says which of the arm's parameters it estimates.
+/// Online estimator of an arm's parameters, without allocation; `S` says which of the `P` parameters are estimated.
 #[derive(Debug, Clone, Copy)]
 pub struct Estimator<T: Real, A, const N: usize, const P: usize, const R: usize, S = AllColumns>
 where
@@ -122,7 +123,7 @@ where
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> Estimator<T, A, N, P, R> {
-    /// An estimator of all parameters that has seen nothing yet.
+    /// Estimator of all parameters of `arm`, before its first sample.
     pub fn new(arm: A, settings: Settings<T, R>) -> Self {
         Self::of_columns(arm, AllColumns, settings)
     }
@@ -131,7 +132,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize> E
 impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: usize, const R: usize>
     Estimator<T, A, N, P, R, S>
 {
-    /// An estimator of some parameters that has seen nothing yet.
+    /// Estimator of the parameters `columns` of `arm`, before its first sample.
     pub fn of_columns(arm: A, columns: S, settings: Settings<T, R>) -> Self {
         let rls = Rls::new(settings.theta0, settings.p0, settings.forgetting).with_count(columns.count());
         let (zero, none) = (SVector::zeros(), T::zero());
@@ -148,30 +149,30 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         Self { arm, columns, settings, rls, past, regression: None, rejected: 0 }
     }
 
-    /// Keeps the covariance in another form than the default of its precision.
+    /// Changes the form in which the covariance is kept; the default depends on precision and `p0`.
     pub fn with_form(mut self, form: Form) -> Self {
         self.rls = self.rls.with_form(form);
         self
     }
 
-    /// Uses other instructions than the widest that the processor has.
+    /// Changes the instruction set; the default is the widest that the processor has.
     pub fn with_level(mut self, level: Level) -> Self {
         self.rls = self.rls.with_level(level);
         self
     }
 
-    /// Estimate and covariance.
+    /// Recursive least squares of the estimator: estimate and covariance.
     #[inline]
     pub fn rls(&self) -> &Rls<T, R, S::Count> {
         &self.rls
     }
 
-    /// Samples rejected so far.
+    /// Number of samples rejected so far.
     pub fn rejected(&self) -> u64 {
         self.rejected + self.rls.rejected()
     }
 
-    /// Takes one sample with its time.
+    /// Takes one sample of the arm's motion with its time, and updates the estimate.
     #[inline]
     pub fn update(&mut self, sample: &Sample<T, N>) -> Outcome<T, N> {
         let Sample { t, q, dq, tau } = sample;
@@ -179,7 +180,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         self.rls.level().run(SampleKernel { estimator: self, t: *t, h, q, dq: dq.as_ref(), tau })
     }
 
-    /// Takes one sample `h` seconds after the last one; for the first sample any positive number will do.
+    /// Takes one sample of the arm's motion `h` seconds after the last one, and updates the estimate; `h` of the first sample may be any positive number.
     #[inline]
     pub fn update_after(&mut self, h: T, reading: &Reading<T, N>) -> Outcome<T, N> {
         let Reading { q, dq, tau } = reading;
@@ -220,7 +221,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         outcome
     }
 
-    /// Whether a sample can be used: finite, of possible size, later than the last and reachable from it.
+    /// Whether a sample can be used: finite, of possible size, later than the last sample, and reachable from it.
     #[inline(always)]
     fn acceptable(
         &self,
@@ -243,7 +244,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         fine
     }
 
-    /// Takes its own copies, so that those of the hot code can stay in registers.
+    /// Starts the scheme at a state. Arguments are copied, so that hot code can keep its own in registers.
     #[cold]
     #[inline(never)]
     fn start(&mut self, now: Snapshot<T, N>, tau: SVector<T, N>) {
@@ -327,7 +328,7 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
     }
 }
 
-/// One call of [`Estimator::update`].
+/// Arguments of one call of [`Estimator::update`], compiled for each instruction set.
 struct SampleKernel<'a, T: Real, A, S: Columns<T, N, P, R>, const N: usize, const P: usize, const R: usize> {
     estimator: &'a mut Estimator<T, A, N, P, R, S>,
     t: T,

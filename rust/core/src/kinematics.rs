@@ -1,37 +1,37 @@
 //! Kinematic state of an arm, and the terms of its equation of motion that follow from it.
 //!
-//! Sines and cosines near a known state follow from those of the known state by the addition theorems ([`crate::trig::Rotation`]).
+//! Sines and cosines near a known state are those of the known state, rotated by the addition theorems ([`crate::trig::Rotation`]).
 
 use crate::arm::{Arm, EquationTerms};
 use crate::number::Number;
 use crate::real::{Real, lit};
 use crate::trig::{NEAR, Rotation, SLIGHT, SinCos};
 
-/// A rigid arm with parameter values in the form its equation of motion needs.
+/// Rigid arm with parameter values in the form that its equation of motion needs.
 #[derive(Debug, Clone, Copy)]
 pub struct RigidArm<V, A, const N: usize, const P: usize> {
-    /// The arm.
+    /// Kind of arm, with its gravity and geometry.
     pub arm: A,
-    /// Parameters, payloads included.
+    /// Parameters of the arm, payloads included, SI.
     pub theta: [V; P],
-    /// Viscous coefficients.
+    /// Viscous coefficients of the joints, N m s/rad (N s/m).
     pub viscous: [V; N],
-    /// Coulomb coefficients.
+    /// Coulomb coefficients of the joints, N m (N).
     pub coulomb: [V; N],
-    /// Part of the inertia matrix that does not depend on `q`, including what effects add.
+    /// Part of the inertia matrix that does not depend on `q`, inertia added by effects included, by rows, kg m^2 (kg).
     pub constant_inertia: [[V; N]; N],
-    /// Angle by which the base is turned.
+    /// Angle by which the base is turned in the plane of motion, rad.
     pub tilt: V,
 }
 
 impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<V, A, N, P> {
-    /// Inertia and `C dq + g`.
+    /// Inertia matrix and bias `C dq + g` at the joint state `joints`.
     #[inline(always)]
     pub fn equation_terms(&self, joints: &JointState<V, N>) -> EquationTerms<V, N> {
         self.kinematics(joints).equation_terms
     }
 
-    /// Kinematic state of these joints.
+    /// Kinematic state at the joint state `joints`.
     #[inline(always)]
     pub fn kinematics(&self, joints: &JointState<V, N>) -> KinematicState<V, N> {
         let angles = self.arm.angles(&joints.q, self.tilt);
@@ -42,7 +42,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<
         self.rotated(joints, sincos)
     }
 
-    /// Rotations of the arm's angles for these joint displacements, and the largest of these angles.
+    /// Rotations by which the arm's angles change when the joints move by `by`, rad or m, and the largest of the angles, rad.
     #[inline(always)]
     pub fn rotations(&self, by: &[V; N], reach: AngleRange) -> ([Rotation<V>; N], V) {
         // Adding -0 is the one sum that a compiler may leave out.
@@ -55,7 +55,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<
         (rotations, far)
     }
 
-    /// Kinematic state of these joints, given the sines and cosines of the arm's angles.
+    /// Kinematic state at the joint state `joints`, given the sines and cosines of the arm's angles.
     #[inline(always)]
     pub fn rotated(&self, joints: &JointState<V, N>, sincos: [SinCos<V>; N]) -> KinematicState<V, N> {
         let equation_terms =
@@ -65,7 +65,7 @@ impl<V: Number, A: Arm<V::Real, N, P>, const N: usize, const P: usize> RigidArm<
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> RigidArm<T, A, N, P> {
-    /// Kinematic state of these joints, from positions with known sines and cosines if they are within the angle range.
+    /// Kinematic state at the joint state `joints`, from sines and cosines known at the positions `q` if the angles between are within the range `reach`.
     #[inline(always)]
     pub fn near(
         &self,
@@ -89,25 +89,25 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> RigidArm<T, A, N,
 /// Positions and velocities of all joints.
 #[derive(Debug, Clone, Copy)]
 pub struct JointState<V, const N: usize> {
-    /// Positions.
+    /// Joint positions, rad or m.
     pub q: [V; N],
-    /// Velocities.
+    /// Joint velocities, rad/s or m/s.
     pub dq: [V; N],
 }
 
-/// Joint state, sines and cosines, and the terms of the equation of motion at it.
+/// Joint state with sines and cosines of the arm's angles, inertia matrix and bias.
 #[derive(Debug, Clone, Copy)]
 pub struct KinematicState<V, const N: usize> {
-    /// Positions and velocities.
+    /// Positions and velocities of all joints.
     pub joints: JointState<V, N>,
-    /// Sines and cosines of the angles that the arm's equation depends on.
+    /// Sines and cosines of the angles that the arm's equation of motion depends on.
     pub sincos: [SinCos<V>; N],
-    /// Inertia and `C dq + g`.
+    /// Inertia matrix and bias `C dq + g`.
     pub equation_terms: EquationTerms<V, N>,
 }
 
 impl<V: Number, const N: usize> KinematicState<V, N> {
-    /// All zero.
+    /// Kinematic state of zeros, to be overwritten.
     #[inline(always)]
     pub(crate) fn none() -> Self {
         let zero = V::of(lit(0.0));
@@ -120,7 +120,7 @@ impl<V: Number, const N: usize> KinematicState<V, N> {
     }
 }
 
-/// Sines and cosines of rotated angles.
+/// Sines and cosines of angles after the rotations `by`.
 #[inline(always)]
 pub fn rotated<V: Number, const N: usize>(sincos: &[SinCos<V>; N], by: &[Rotation<V>; N]) -> [SinCos<V>; N] {
     let mut rotated = *sincos;
@@ -130,17 +130,17 @@ pub fn rotated<V: Number, const N: usize>(sincos: &[SinCos<V>; N], by: &[Rotatio
     rotated
 }
 
-/// Range of angle differences that a rotation series covers; a smaller range needs fewer terms.
+/// Range of angles that a series of [`Rotation`] covers; a smaller range needs fewer terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AngleRange {
-    /// Up to the rotation in half a step.
+    /// Up to the rotation in half an integration step, 0.1 rad.
     Near,
-    /// Up to the difference between Runge-Kutta stages at the same time.
+    /// Up to the angle between two Runge-Kutta stages at one time, 0.0125 rad.
     Slight,
 }
 
 impl AngleRange {
-    /// Largest difference of angles, rad.
+    /// Largest angle of the range, rad.
     #[inline(always)]
     fn largest(self) -> f64 {
         match self {
@@ -149,13 +149,13 @@ impl AngleRange {
         }
     }
 
-    /// An angle relative to the largest: beyond 1 the series does not hold.
+    /// An angle, rad, divided by the largest of the range: above 1 the series does not hold.
     #[inline(always)]
     pub fn part<V: Number>(self, angle: V) -> V {
         angle * V::of(lit(1.0 / self.largest()))
     }
 
-    /// Rotation by an angle within the range.
+    /// Rotation by an angle within the range, rad.
     #[inline(always)]
     fn rotation<V: Number>(self, angle: V) -> Rotation<V> {
         match self {

@@ -1,7 +1,7 @@
 //! Several numbers side by side, which a processor's vector unit takes together.
 //!
-//! Nothing but arrays and plain loops, which compilers turn into vector instructions wherever a function is compiled for them (see
-//! [`crate::cpu`]). Everything is inlined: a function that stays outside is compiled for every processor.
+//! They are arrays and plain loops, which compilers turn into vector instructions wherever a function is compiled for them (see
+//! [`crate::cpu`]). All functions are inlined: one that is not would be compiled for every processor.
 
 use crate::cpu::Cpu;
 use crate::number::Number;
@@ -9,7 +9,7 @@ use crate::real::{Real, lit};
 use core::marker::PhantomData;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// `W` numbers; `C` says how products are added.
+/// `W` numbers side by side, one per lane; `C` is the processor whose multiply-add they use.
 #[derive(Debug)]
 #[repr(C, align(64))]
 pub struct Lanes<T, C, const W: usize>(pub [T; W], PhantomData<C>);
@@ -24,7 +24,7 @@ impl<T: Copy, C, const W: usize> Clone for Lanes<T, C, W> {
 impl<T: Copy, C, const W: usize> Copy for Lanes<T, C, W> {}
 
 impl<T: Copy, C, const W: usize> Lanes<T, C, W> {
-    /// These numbers.
+    /// Lanes with the numbers `x`.
     #[inline(always)]
     pub fn new(x: [T; W]) -> Self {
         Self(x, PhantomData)
@@ -43,7 +43,7 @@ impl<T: Real, C, const W: usize> Lanes<T, C, W> {
     }
 }
 
-/// One operation, lane by lane.
+/// Implements binary operators on lanes, lane by lane.
 macro_rules! lane_by_lane {
     ($($operation:ident $function:ident),*) => {
         $(impl<T: Real, C: Cpu, const W: usize> $operation for Lanes<T, C, W> {

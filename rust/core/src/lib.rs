@@ -1,4 +1,4 @@
-//! armgap-core: what a controller embeds.
+//! armgap-core: dynamics, simulation and online estimation of robot arms, for controllers to embed.
 //!
 //! Arm dynamics, a dry-friction integrator, the discrete filters and the recursive least squares of Reyes and
 //! Kelly (1997), *Experimental evaluation of identification schemes on a direct drive robot*, Robotica 15,

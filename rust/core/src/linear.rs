@@ -30,7 +30,7 @@ pub fn solve_positive_definite<V: Number, const N: usize>(mut a: [[V; N]; N], mu
     b
 }
 
-/// Inertia of joint `j` with all other joints free to move, the Schur complement `1 / (M^-1)_jj` of an inertia matrix.
+/// Inertia of joint `j` with all other joints free to move, kg m^2 (kg): the Schur complement `1 / (M^-1)_jj` of the inertia matrix.
 #[inline]
 pub fn free_inertia<T: Real, const N: usize>(inertia: &[[T; N]; N], j: usize) -> T {
     if N <= 2 {
@@ -47,7 +47,7 @@ pub fn free_inertia<T: Real, const N: usize>(inertia: &[[T; N]; N], j: usize) ->
     T::one() / solve_positive_definite(*inertia, unit)[j]
 }
 
-/// Two equations by Cramer's rule, which divides once.
+/// Solves two equations `a x = b` by Cramer's rule, which divides once.
 #[inline(always)]
 fn cramer<V: Number, const N: usize>(a: &[[V; N]; N], b: &[V; N]) -> [V; N] {
     let (i, j) = (0, N - 1);

@@ -1,10 +1,10 @@
-//! Monitor of an online estimator: size of its errors, excitation by the motion, and an alarm when the model no longer explains the
-//! arm.
+//! Monitor of an online estimator: size of its prediction errors, excitation by the motion, and an alarm when the model no longer explains
+//! the arm.
 //!
 //! **Spread.** Mean square of each prediction error over the last `memory` samples; with the diagonal of `P` it gives standard deviations.
 //!
-//! **Excitation.** The leverage of a sample, averaged over `memory` samples, as a share of what an equally exciting sample would have at
-//! this age: near 1 while every parameter keeps being excited, near 0 while the arm rests or repeats what is known.
+//! **Excitation.** The leverage of a sample, averaged over `memory` samples, as a share of the leverage that every sample would have if all
+//! excited alike: near 1 while every parameter keeps being excited, near 0 while the arm rests or repeats known motion.
 //!
 //! **Alarm.** A cumulative sum test (Page 1954) on the normalised error. While learning, the variance of each error and its correlation
 //! from one sample to the next are measured; afterwards `u = (e - rho e_last)/sigma` is tested for a standard deviation that has grown
@@ -14,42 +14,42 @@
 //! S <- max(0, S + min(u^2, 25) (1 - 1/r^2)/2 - ln r),  r = 1.5;      alarm while S > ln(n between)
 //! ```
 //!
-//! The mean number of samples between false alarms is at least `between` if the `n` errors stay Gaussian with the variance that was
-//! learned (Lorden 1971: the increments are at most a log-likelihood ratio; the cut at 25 makes them smaller, so that single
-//! outliers raise no alarm). The errors of the filtered dynamic model are torques and meet that best; those of the energy and power models
-//! grow with the speed and must be learned on motion as fast as what follows.
+//! The mean number of samples between false alarms is at least `between` if the `n` errors stay Gaussian with the learned variance
+//! (Lorden 1971: the increments are at most a log-likelihood ratio; the cut at 25 makes them smaller, so that single
+//! outliers raise no alarm). Errors of the filtered dynamic model are torques and meet the condition best; errors of the energy and power
+//! models grow with the speed and must be learned on motion as fast as the motion that is monitored.
 
 use crate::real::{Real, lit};
 use nalgebra::SVector;
 
-/// Growth of the standard deviation that the alarm looks for.
+/// Growth of the standard deviation of prediction errors that the alarm of the online monitor looks for.
 const GROWTH: f64 = 1.5;
-/// Largest squared error in units of its variance.
+/// Largest squared prediction error, in units of its variance, that counts in the alarm of the online monitor: larger ones are cut to it.
 const OUTLIER: f64 = 25.0;
 
-/// Settings of a monitor.
+/// Settings of the monitor of an online estimator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MonitorSettings<T> {
-    /// Samples over which spread and excitation are averaged.
+    /// Number of samples over which mean square error and excitation are averaged.
     pub memory: T,
-    /// Samples used before learning begins, while estimate and filters settle.
+    /// Number of samples before learning begins, while estimate and filters settle.
     pub settling: u32,
-    /// Samples over which the errors' variances and correlations are learned; no alarm before.
+    /// Number of samples over which variances and correlations of the prediction errors are learned; there is no alarm before.
     pub learning: u32,
-    /// Mean samples between false alarms.
+    /// Mean number of samples between false alarms.
     pub between: T,
-    /// Least standard deviation of an error, in its unit: smaller ones are not worth an alarm.
+    /// Least standard deviation of a prediction error, in the unit of the error: smaller errors are not worth an alarm.
     pub floor: T,
 }
 
 impl<T: Real> Default for MonitorSettings<T> {
-    /// For a period of some milliseconds: a second of memory, one of settling, four of learning, a false alarm in a million samples.
+    /// Settings for a period of some milliseconds: memory and settling of 400 samples, learning of 1600, a false alarm in a million samples.
     fn default() -> Self {
         Self { memory: lit(400.0), settling: 400, learning: 1600, between: lit(1e6), floor: T::zero() }
     }
 }
 
-/// State of a monitor of `N` errors.
+/// Monitor of an online estimator with `N` prediction errors per sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Monitor<T, const N: usize> {
     settings: MonitorSettings<T>,
@@ -66,7 +66,7 @@ pub struct Monitor<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Monitor<T, N> {
-    /// A monitor that has seen nothing yet.
+    /// Monitor before its first sample.
     pub fn new(settings: MonitorSettings<T>) -> Self {
         let zero = SVector::zeros();
         Self {
@@ -84,7 +84,8 @@ impl<T: Real, const N: usize> Monitor<T, N> {
         }
     }
 
-    /// Takes the errors of a sample that was used, its leverage, and the number of `parameters` with the memory of the estimate.
+    /// Takes the prediction `error` of a used sample, its `leverage`, the number of estimated `parameters`, and the `age` of the estimate in samples, at most
+    /// its memory.
     #[inline]
     pub fn update(&mut self, error: &SVector<T, N>, leverage: T, parameters: usize, age: T) {
         self.samples = self.samples.saturating_add(1);
@@ -137,22 +138,22 @@ impl<T: Real, const N: usize> Monitor<T, N> {
         }
     }
 
-    /// Mean square of each error over the memory.
+    /// Mean square of each prediction error over the memory, N m, J or W squared by scheme.
     pub fn mean_square(&self) -> &SVector<T, N> {
         &self.mean_square
     }
 
-    /// Share of a full excitation, from 0 to about 1.
+    /// Excitation by the recent motion, from 0 (none) to about 1 (every parameter).
     pub fn excitation(&self) -> T {
         self.excitation
     }
 
-    /// Which errors no longer look like those that were learned.
+    /// Whether each prediction error is larger than its learned standard deviation explains.
     pub fn alarms(&self) -> [bool; N] {
         core::array::from_fn(|j| self.sum[j] > self.limit)
     }
 
-    /// Largest cumulative sum as a share of its limit; above 1 there is an alarm.
+    /// Largest cumulative sum of the alarm test as a share of its limit; above 1 there is an alarm.
     pub fn alarm_level(&self) -> T {
         self.sum.iter().fold(T::zero(), |most, sum| most.max(*sum)) / self.limit
     }

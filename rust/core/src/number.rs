@@ -1,41 +1,41 @@
-//! What the equations of motion are written in: one real number, or several side by side.
+//! Number type of the equations of motion: one real number, or several side by side.
 //!
 //! An arm's equation is written once over [`Number`]; with a [`Real`] it moves one arm, with [`crate::lanes::Lanes`] several at once.
-//! There are no comparisons to branch on: what differs from lane to lane is arithmetic, or a choice between two computed values.
+//! There are no comparisons to branch on: lanes differ by arithmetic, or by a choice between two computed values.
 
 use crate::cpu::{Cpu, Portable};
 use crate::real::Real;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// One or several real numbers.
+/// One real number, or several side by side (lanes).
 pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// One of them.
+    /// Type of one of the numbers, `f32` or `f64`.
     type Real: Real;
 
-    /// How many there are.
+    /// How many numbers lie side by side.
     const WIDTH: usize;
 
-    /// `x` in every lane.
+    /// The number `x` in every lane.
     fn of(x: Self::Real) -> Self;
 
-    /// `self a + b`, rounded once where that is one instruction.
+    /// `self a + b`, rounded once where the processor has one instruction for it.
     fn fused(self, a: Self, b: Self) -> Self;
 
-    /// Sine and cosine; lanes may give NaN beyond [`crate::trig::LARGEST`].
+    /// Sine and cosine of an angle, rad; lanes may give NaN beyond [`crate::trig::LARGEST`].
     fn sine_cosine(self) -> (Self, Self);
 
-    /// Without the sign.
+    /// Absolute value.
     fn size(self) -> Self;
 
-    /// The larger of the two; `other` where `self` is NaN.
+    /// The larger of `self` and `other`; `other` where `self` is NaN.
     fn larger(self, other: Self) -> Self;
 
     /// `zero` where `self` is zero, `other` where it is not.
     fn where_zero(self, zero: Self, other: Self) -> Self;
 
-    /// Whether any of them is zero.
+    /// Whether the number in any lane is zero.
     fn any_zero(self) -> bool;
 }
 

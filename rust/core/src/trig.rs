@@ -1,8 +1,8 @@
 //! Sine and cosine together, with the same few instructions for every angle an arm can have.
 //!
-//! A library's take another path for small, middling and large angles and, without a platform's mathematics, cost more than all of the
+//! Library functions take another path for small, middling and large angles and, without a platform's mathematics, cost more than all of the
 //! least squares. Here the angle is brought into half a turn around zero by Cody and Waite's subtraction of `k pi` in three parts,
-//! whose products with `k` are exact; both series are evaluated at once, in pairs of terms, and `k` being odd changes both signs. Larger
+//! whose products with `k` are exact; both series are evaluated at once, in pairs of terms, and an odd `k` changes both signs. Larger
 //! angles and NaN go to the library. Errors stay below 1.5 rounding units of 1.
 //!
 //! W. J. Cody and W. Waite 1980, *Software manual for the elementary functions*, chapter 8. The coefficients interpolate the series at
@@ -13,17 +13,17 @@ use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::real::{Real, lit};
 
-/// What depends on the precision.
+/// Constants of the series of sine and cosine for one precision.
 struct Constants {
-    /// Largest angle taken here; up to it `k` has few enough bits.
+    /// Largest angle, rad, that the series is used for; up to it `k`, the number of half turns, has few enough bits.
     largest: f64,
-    /// Added and taken away again, rounds to an integer.
+    /// Number that rounds to an integer when it is added and subtracted again.
     rounder: f64,
-    /// `pi` in three parts.
+    /// `pi` as a sum of three parts.
     parts: [f64; 3],
-    /// `(sin r - r)/r^3` in powers of `r^2`.
+    /// Coefficients of `(sin r - r)/r^3` in powers of `r^2`.
     sine: [f64; 8],
-    /// `(cos r - 1 + r^2/2)/r^4` in powers of `r^2`.
+    /// Coefficients of `(cos r - 1 + r^2/2)/r^4` in powers of `r^2`.
     cosine: [f64; 8],
 }
 
@@ -79,7 +79,7 @@ const SINGLE: Constants = Constants {
     ],
 };
 
-/// Angles up to this take the series, rad.
+/// Largest angle whose sine and cosine are taken by the series in double precision, rad; the library takes larger ones.
 pub const LARGEST: f64 = DOUBLE.largest;
 
 #[inline(always)]
@@ -87,13 +87,13 @@ fn constants<T: Real>() -> (&'static Constants, bool) {
     if T::default_epsilon() < lit(1e-12) { (&DOUBLE, true) } else { (&SINGLE, false) }
 }
 
-/// [`LARGEST`] for this precision.
+/// Largest angle, rad, whose sine and cosine are taken by the series in the precision of `T`.
 #[inline(always)]
 pub(crate) fn largest<T: Real>() -> f64 {
     constants::<T>().0.largest
 }
 
-/// Sine and cosine of `x` rad.
+/// Sine and cosine of the angle `x`, rad.
 #[inline(always)]
 pub fn sin_cos<T: Real>(x: T) -> (T, T) {
     if x.abs() <= lit(largest::<T>()) { series_of(x) } else { x.sin_cos() }
@@ -116,7 +116,7 @@ pub fn sines_cosines<C: Cpu, T: Real, const N: usize>(angles: [T; N]) -> [SinCos
     })
 }
 
-/// Sine and cosine of `x` rad by the series alone; valid up to [`largest`].
+/// Sine and cosine of the angle `x`, rad, by the series alone; valid up to [`largest`].
 #[inline(always)]
 pub(crate) fn series_of<V: Number>(x: V) -> (V, V) {
     let (constants, double) = constants::<V::Real>();
@@ -133,7 +133,7 @@ pub(crate) fn series_of<V: Number>(x: V) -> (V, V) {
     (sine * sign, cosine * sign)
 }
 
-/// A polynomial by pairs of terms, which need not wait for each other; all eight, or the first five.
+/// Polynomial in `z` by pairs of terms, which need not wait for each other; all eight coefficients, or the first five unless `whole`.
 #[inline(always)]
 fn series<V: Number>(z: V, c: &[f64; 8], whole: bool) -> V {
     let c = |i: usize| V::of(lit(c[i]));
@@ -144,22 +144,22 @@ fn series<V: Number>(z: V, c: &[f64; 8], whole: bool) -> V {
     if whole { z4.fused(z2.fused(pair(6), pair(4)), low) } else { z4.fused(c(4), low) }
 }
 
-/// Sine and cosine of an angle.
+/// Sine and cosine of one angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SinCos<V> {
-    /// Sine.
+    /// Sine of the angle.
     pub sine: V,
-    /// Cosine.
+    /// Cosine of the angle.
     pub cosine: V,
 }
 
-/// Angles up to this, rad, have a [`Rotation::near`] with errors below 1e-16; half a step of 2.5 ms at 80 rad/s.
+/// Largest angle of [`Rotation::near`], rad, with errors below 1e-16; half a step of 2.5 ms at 80 rad/s.
 pub const NEAR: f64 = 0.1;
 
-/// Angles up to this, rad, have a [`Rotation::slight`] with errors below 7e-16.
+/// Largest angle of [`Rotation::slight`], rad, with errors below 7e-16.
 pub const SLIGHT: f64 = 0.0125;
 
-/// `(sin r - r)/r^3` and `(cos r - 1)/r^2` in powers of `r^2`, up to [`NEAR`] and up to [`SLIGHT`].
+/// Coefficients of `(sin r - r)/r^3` and `(cos r - 1)/r^2` in powers of `r^2`, up to [`NEAR`] and up to [`SLIGHT`].
 const NEAR_SINE: [f64; 3] =
     [-0.166_666_666_666_580_56, 0.008_333_333_178_343_767, -0.000_198_371_366_661_129_7];
 const NEAR_COSINE: [f64; 4] =
@@ -175,7 +175,7 @@ pub struct Rotation<V> {
 }
 
 impl<V: Number> Rotation<V> {
-    /// By `d` rad, at most [`NEAR`].
+    /// Rotation by `d` rad, at most [`NEAR`].
     #[inline(always)]
     pub fn near(d: V) -> Self {
         let (z, [s0, s1, s2], [c0, c1, c2, c3]) = (d * d, NEAR_SINE, NEAR_COSINE);
@@ -186,7 +186,7 @@ impl<V: Number> Rotation<V> {
         Self { sine: (d * z).fused(sine, d), less: z * cosine }
     }
 
-    /// By `d` rad, at most [`SLIGHT`].
+    /// Rotation by `d` rad, at most [`SLIGHT`].
     #[inline(always)]
     pub fn slight(d: V) -> Self {
         let ([s0, s1], [c0, c1], z) = (SLIGHT_SINE, SLIGHT_COSINE, d * d);
@@ -196,14 +196,14 @@ impl<V: Number> Rotation<V> {
 }
 
 impl<V: Number> SinCos<V> {
-    /// Of an angle, rad.
+    /// Sine and cosine of an angle, rad.
     #[inline(always)]
     pub fn of(angle: V) -> Self {
         let (sine, cosine) = angle.sine_cosine();
         Self { sine, cosine }
     }
 
-    /// Of the angle plus a rotation, by the addition theorems: only the change is rounded anew.
+    /// Sine and cosine of the angle plus a rotation, by the addition theorems: only the change is rounded anew.
     #[inline(always)]
     pub fn by(&self, rotation: &Rotation<V>) -> Self {
         let Rotation { sine, less } = *rotation;
@@ -218,7 +218,7 @@ impl<V: Number> SinCos<V> {
 mod tests {
     use super::*;
 
-    /// Rounding of the reduced angle, of its square, and of the sum.
+    /// Bound of the error of sine and cosine in rounding units: of the reduced angle, of its square, and of the sum.
     const ROUNDINGS: f64 = 1.5;
 
     #[test]

@@ -1,4 +1,4 @@
-//! The online path and the integrator never ask for memory.
+//! Test that the online estimator and the integrator never allocate memory.
 
 use armgap_core::arm::TwoLink;
 use armgap_core::effect::{Active, InputSegment, find};

@@ -1,4 +1,4 @@
-//! Chains as mechanics: identities of every chain, and the two-link arm as a chain.
+//! Tests of chains: identities of mechanics for random chains, and the two-link arm as a chain.
 
 mod common;
 
@@ -14,13 +14,13 @@ use armgap_core::trig::SinCos;
 use common::seed_torque;
 use nalgebra::{Rotation3, SMatrix, SVector, Unit, Vector3};
 
-/// Finite-difference step of directional derivatives.
+/// Step of finite differences for directional derivatives, rad or m.
 const STEP: f64 = 1e-6;
 
-/// Rounding of a few hundred operations, relative to the largest torque.
+/// Largest relative error of torques by rounding in a few hundred operations, relative to the largest torque.
 const ROUNDING: f64 = 1e-12;
 
-/// Numbers from -1 to 1 that are the same in every run (Knuth's linear congruential generator).
+/// Source of numbers from -1 to 1, equal in every run (Knuth's linear congruential generator).
 struct Numbers(u64);
 
 impl Numbers {
@@ -42,7 +42,7 @@ impl Numbers {
         std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]))
     }
 
-    /// A chain of random joints, one in three of them prismatic.
+    /// Random chain, about one in three of its joints prismatic.
     fn chain<const N: usize>(&mut self) -> Chain<f64, N> {
         let joints = std::array::from_fn(|_| ChainJoint {
             kind: if self.next() > 0.3 { JointKind::Prismatic } else { JointKind::Revolute },
@@ -53,7 +53,7 @@ impl Numbers {
         Chain::new(joints, (self.vector() * 9.81).into())
     }
 
-    /// Ten parameters of a random body: three points with masses.
+    /// Ten inertial parameters of a random body: four points with masses.
     fn link(&mut self) -> [f64; 10] {
         let mut link = [0.0; 10];
         for _ in 0..4 {
@@ -70,7 +70,7 @@ impl Numbers {
     }
 }
 
-/// `h`-independent identities of one chain at one state.
+/// Checks identities of mechanics for a random chain at a random state.
 fn check<const N: usize, const P: usize>(numbers: &mut Numbers) {
     let chain: Chain<f64, N> = numbers.chain();
     let theta: [f64; P] = numbers.theta::<N, P>();
@@ -202,7 +202,7 @@ const VISCOUS: [f64; 2] = [2.288, 0.175];
 const COULOMB: [f64; 2] = [7.6, 1.734];
 const GRAVITY: f64 = 9.81;
 
-/// The two-link arm, and the same arm as a chain in the plane z = 0 with gravity along x.
+/// Two-link arm with its parameters, and the equivalent chain in the plane z = 0 with gravity along x, with its parameters.
 fn both() -> (TwoLink<f64>, [f64; 9], Chain<f64, 2>, [f64; 26]) {
     let inertial = TwoLink::inertial_from_links(&LINKS, GRAVITY);
     let mut theta = [0.0; 9];
@@ -228,8 +228,8 @@ fn both() -> (TwoLink<f64>, [f64; 9], Chain<f64, 2>, [f64; 26]) {
     (TwoLink::new(GRAVITY, Some(LINKS.length[0]), &theta), theta, chain, of_chain)
 }
 
-/// Which parameter of the two-link arm each of these of the chain changes, and by how much: `m c_x` and `I_zz` of both links, the mass of
-/// the second link, friction.
+/// Index of a chain's parameter, and the change of the two-link arm's parameters per unit of it: for `m c_x` and `I_zz` of both links, the mass
+/// of the second link, and friction.
 fn changes() -> [(usize, SVector<f64, 9>); 9] {
     let l = LINKS.length[0];
     let change = |at: &[(usize, f64)]| {
@@ -271,7 +271,7 @@ fn a_two_link_arm_is_a_chain_too() {
     }
 }
 
-/// Positions after every sample of 2 s under the seed's torques, which reverse every joint some thirty times.
+/// Positions after every sample of 2 s under the torques of Reyes and Kelly (1997), which reverse every joint some thirty times.
 fn run<A: Arm<f64, 2, P>, const P: usize>(plant: &Plant<f64, A, 2, P>) -> Vec<SVector<f64, 2>> {
     let (h, mut state) = (0.0025, State::new(SVector::zeros(), SVector::zeros()));
     let step = |k: usize| {
@@ -338,7 +338,7 @@ fn a_payload_is_a_point_mass_on_the_last_axis() {
     }
 }
 
-/// A plant of a random chain at rest with friction, torques near its Coulomb levels, and its state.
+/// Plant of a random chain with friction, its state at rest, and torques near its Coulomb levels.
 fn at_rest<const N: usize, const P: usize>(
     numbers: &mut Numbers,
 ) -> (Plant<f64, Chain<f64, N>, N, P>, State<f64, N>, SVector<f64, N>) {
@@ -349,7 +349,7 @@ fn at_rest<const N: usize, const P: usize>(
     (Plant::new(chain, theta), state, numbers.many(2.0))
 }
 
-/// Accelerations of a plant at rest with these modes, and whether friction agrees with them.
+/// Accelerations of a plant at rest with these friction modes, and whether friction agrees with them.
 fn agrees<const N: usize, const P: usize>(
     plant: &Plant<f64, Chain<f64, N>, N, P>,
     state: &State<f64, N>,
@@ -365,7 +365,7 @@ fn agrees<const N: usize, const P: usize>(
     (motion, (0..N).all(holds))
 }
 
-/// Modes by releasing the joint with the largest violation, one at a time, and holding it for good where it is pulled back.
+/// Friction modes by a simple method: the joint with the largest stiction violation is released, one at a time, and held for good if it is pulled back.
 fn one_at_a_time<const N: usize, const P: usize>(
     plant: &Plant<f64, Chain<f64, N>, N, P>,
     state: &State<f64, N>,
@@ -387,8 +387,8 @@ fn one_at_a_time<const N: usize, const P: usize>(
     modes
 }
 
-/// Modes of plants at rest by the integrator, which must be those of an enumeration of all. Returns how many have three joints or more that
-/// break away at once, and in how many of them one at a time goes wrong.
+/// Checks the integrator's friction modes of plants at rest against an enumeration of all modes. Returns in how many plants three joints or more
+/// break away at once, and in how many of those plants [`one_at_a_time`] is wrong.
 fn break_away<const N: usize, const P: usize>(cases: usize) -> [usize; 2] {
     let (mut numbers, mut counts) = (Numbers(N as u64), [0; 2]);
     for _ in 0..cases {

@@ -1,4 +1,4 @@
-//! Estimators of serial arms: the arm in a larger size, known parameters, and single precision, on motion of an arm with friction.
+//! Tests of online estimators of serial arms: in a larger memory size, with known parameters, and in single precision, on an arm with friction.
 
 use armgap_core::chain::{Chain, ChainJoint, JointKind, point_mass};
 use armgap_core::effect::InputSegment;
@@ -18,12 +18,12 @@ const SAMPLES: usize = 3000;
 const GRAVITY: [f64; 3] = [0.0, 0.3, -9.8];
 const P: usize = 39;
 
-/// Rounding of least squares over some thousand samples, relative to the largest entry.
+/// Largest difference of estimates by rounding in least squares over some thousand samples, relative to the largest entry.
 const ROUNDING: f64 = 1e-7;
-/// Error of the estimates: differences of positions for velocities, and torques that are held.
+/// Largest relative error of the estimates, whose velocities are differences of positions and whose torques are held.
 const ACCURACY: f64 = 0.02;
 
-/// Two rotary joints across each other, and a linear one.
+/// Joints of the tested arm: two rotary ones with perpendicular axes, and a linear one.
 fn joints() -> [ChainJoint<f64>; 3] {
     let place = |kind, turn: [f64; 3], translation, axis| {
         let m = *Rotation3::new(Vector3::from(turn)).matrix();
@@ -50,7 +50,7 @@ fn theta() -> [f64; P] {
     theta
 }
 
-/// Positions and torques of a motion under position control.
+/// Positions, rad or m, and torques, N m or N, of a motion under position control.
 fn motion() -> Vec<([f64; 3], [f64; 3])> {
     let plant = Plant::new(Chain::new(joints(), GRAVITY), theta());
     let mut state = State::<f64, 3>::new(SVector::zeros(), SVector::zeros());
@@ -83,7 +83,7 @@ fn run<E: OnlineEstimator<f64>>(mut estimator: E, data: &[([f64; 3], [f64; 3])])
     estimator
 }
 
-/// Rows of torques over all parameters at states of the motion are what both estimates are compared in.
+/// Torques at twenty states for the parameters `theta`, in which two estimates are compared.
 fn torques(theta: &[f64]) -> Vec<f64> {
     let chain = Chain::new(joints(), GRAVITY);
     let theta = SVector::<f64, P>::from_column_slice(theta);

@@ -1,4 +1,4 @@
-//! The arms as mechanics: identities that hold for every arm and every state.
+//! Tests of the arms' dynamics: identities of mechanics that hold for every arm and every state.
 
 use armgap_core::arm::{Arm, ArmKind, Axis, EquationTerms, Pendulum, TwoLink};
 use armgap_core::cpu::Portable;
@@ -6,7 +6,7 @@ use armgap_core::trig::SinCos;
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
-/// Finite-difference step of the directional derivative of `M`.
+/// Step of finite differences for the directional derivative of the inertia matrix, rad or m.
 const STEP: f64 = 1e-6;
 
 fn check<A: Arm<f64, N, P>, const N: usize, const P: usize>(arm: &A, theta: [f64; P], x: [f64; 6]) {

@@ -1,4 +1,4 @@
-//! Events at an instant: backlash that closes and opens, impacts on joint limits, disturbances that begin and end between samples.
+//! Tests of events between samples: backlash that closes and opens, impacts on joint limits, disturbances that begin and end.
 
 use armgap_core::arm::{Axis, TwoLink};
 use armgap_core::effect::{Active, Effect, InputSegment, MAX_PARAMETERS, find};
@@ -35,7 +35,7 @@ fn swing(t: f64) -> [f64; 2] {
     [38.0 * (5.0 * t).sin() + 20.0 * (11.0 * t).sin(), 4.0 * (9.0 * t).sin() + 2.0 * (17.0 * t + 0.3).sin()]
 }
 
-/// The way of an arm over a time, in so many steps per sample.
+/// Positions of the two-link arm over `seconds`, rad, integrated with `steps` steps per sample.
 fn path(plant: &Plant<f64, TwoLink<f64>, 2, 9>, seconds: f64, steps: usize) -> Vec<Vector2<f64>> {
     let mut state = State::new(Vector2::zeros(), Vector2::zeros());
     (0..(seconds / H).round() as usize)

@@ -1,4 +1,4 @@
-//! The integrator against what mechanics demands of it.
+//! Tests of the integrator against laws of mechanics.
 
 mod common;
 
@@ -205,7 +205,7 @@ fn a_delayed_command_keeps_its_impulse_and_its_moment() {
     }
 }
 
-/// A shift in time grows from nothing: no step where it begins.
+/// Test that a short actuator lag and an equal delay shift the torque alike, without a step in the limit of zero.
 #[test]
 fn a_short_lag_is_like_a_short_delay() {
     let t: Vec<f64> = (0..20).map(|k| f64::from(k) * H).collect();

@@ -1,4 +1,4 @@
-//! Laws of the filters, the least squares and the online estimator under any input.
+//! Tests of laws that filters, least squares and the online estimator obey for any input.
 
 use armgap_core::arm::{Axis, TwoLink};
 use armgap_core::cpu::Portable;
@@ -13,7 +13,7 @@ fn cases(cases: u32) -> ProptestConfig {
     ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
 }
 
-/// Any number a broken sensor may deliver.
+/// Strategy for any number that a broken sensor may deliver, NaN included.
 fn anything() -> impl Strategy<Value = f64> {
     prop_oneof![6 => -10.0..10.0_f64, 1 => any::<f64>(), 1 => Just(f64::NAN), 1 => Just(f64::MAX), 1 => Just(0.0)]
 }

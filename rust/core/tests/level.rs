@@ -1,4 +1,4 @@
-//! Whatever instructions a processor has, the estimates are the same but for rounding, and so is what is rejected.
+//! Tests that estimates agree up to rounding, and rejected samples exactly, whatever instruction set is used.
 
 #[path = "../../bench/src/run.rs"]
 mod run;
@@ -10,7 +10,7 @@ use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::{Form, Rls};
 use nalgebra::{SMatrix, SVector};
 
-/// Largest relative difference of an estimate over the run; 9e-12 is the largest seen.
+/// Largest relative difference of an estimate between instruction sets over the run; 9e-12 is the largest seen.
 const ROUNDING: f64 = 1e-10;
 
 fn estimates(scheme: Scheme, variant: Variant, form: Form, level: Level) -> Vec<SVector<f64, 9>> {

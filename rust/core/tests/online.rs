@@ -1,4 +1,4 @@
-//! The estimator on its own: excitation, alarm, forgetting while the arm rests, and periods instead of times.
+//! Tests of the online estimator: excitation, alarm, forgetting while the arm rests, and periods instead of times.
 
 #[path = "../../bench/src/run.rs"]
 mod run;
@@ -12,7 +12,7 @@ use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::{Form, Rls};
 use nalgebra::{SMatrix, SVector, Vector1, Vector2};
 
-/// A repeatable source of Gaussian numbers.
+/// Repeatable source of Gaussian random numbers.
 struct Noise(u64);
 
 impl Noise {
@@ -29,7 +29,7 @@ impl Noise {
 const WATCH: MonitorSettings<f64> =
     MonitorSettings { memory: 400.0, settling: 100, learning: 20_000, between: 1e4, floor: 0.0 };
 
-/// Alarms raised over white or correlated errors whose standard deviation is `sigma` after learning.
+/// Number of alarms, and sample of the first, over `samples` errors of correlation `rho` whose standard deviation is `sigma` times that learned.
 fn alarms(sigma: f64, rho: f64, samples: u32) -> (u32, Option<u32>) {
     let (mut noise, mut monitor) = (Noise(5), Monitor::<f64, 2>::new(WATCH));
     let (mut e, mut raised, mut first, mut before) = (Vector2::zeros(), 0, None, false);

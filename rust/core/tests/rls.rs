@@ -1,9 +1,9 @@
-//! Recursive least squares against batch least squares, and over a long life.
+//! Tests of recursive least squares against batch least squares, and over very many samples.
 
 use armgap_core::rls::{Form, Rls, Update};
 use nalgebra::{SMatrix, SVector};
 
-/// A repeatable source of numbers in (-1, 1).
+/// Repeatable source of random numbers from -1 to 1.
 struct Noise(u64);
 
 impl Noise {
@@ -26,7 +26,7 @@ fn rows(count: usize) -> Vec<(SMatrix<f64, 3, 6>, SVector<f64, 3>)> {
         .collect()
 }
 
-/// The minimum of the cost (17).
+/// Batch least squares: the minimum of the cost of Reyes and Kelly (1997), equation (17), from `P(0) = p0 I`.
 fn batch(rows: &[(SMatrix<f64, 3, 6>, SVector<f64, 3>)], p0: f64) -> SVector<f64, 6> {
     let mut normal = SMatrix::<f64, 6, 6>::identity() / p0;
     let mut right = SVector::<f64, 6>::zeros();

@@ -1,4 +1,4 @@
-//! Batch rollouts against the scalar integrator.
+//! Tests of batch rollouts against the scalar integrator.
 
 use armgap_core::arm::TwoLink;
 use armgap_core::cpu::Level;
@@ -22,7 +22,7 @@ fn times() -> Vec<f64> {
     (0..=ROWS).map(|k| H * k as f64 + 2e-4 * (k % 3) as f64).collect()
 }
 
-/// Torques under which joints slide, reverse, stick and break away, by `l` different ones.
+/// Torques, N m, under which joints slide, reverse, stick and break away, different for every `l`.
 fn torques(l: usize) -> Vec<[InputSegment<f64>; 2]> {
     let size = 1.0 / (1.0 + l as f64);
     let at = |t: f64| {
@@ -54,7 +54,7 @@ fn alone(plant: &Seed, l: usize) -> Vec<f64> {
     out
 }
 
-/// The run of each plant, in lanes with the instructions of a level.
+/// Positions of each plant's run in a batch rollout with the instruction set `level`.
 fn together(plants: &[Seed], level: Level) -> Vec<Vec<f64>> {
     let t = times();
     let torques: Vec<_> = (0..plants.len()).map(torques).collect();

@@ -1,4 +1,4 @@
-//! The seed's run: what each scheme, filter pair and velocity makes of the arm of Table I.
+//! Tests of estimates for the arm and run of Reyes and Kelly (1997), Table I, by scheme, filters and velocities.
 
 mod common;
 
@@ -25,7 +25,7 @@ fn theta() -> [f64; 9] {
     [a, b, c, d, e, 2.288, 0.175, f64::midpoint(7.17, 8.049), 1.734]
 }
 
-/// The run: samples with true velocities. `asymmetry` turns on Table I's two Coulomb levels.
+/// Samples of the run of Reyes and Kelly (1997) with true velocities and encoders of `counts` per turn; `asymmetry` turns on Table I's two Coulomb levels.
 fn run(asymmetry: bool, counts: Option<[f64; 2]>) -> Vec<Sample<f64, 2>> {
     let theta = theta();
     let arm = TwoLink::new(9.81, Some(0.45), &theta);
@@ -51,7 +51,7 @@ fn run(asymmetry: bool, counts: Option<[f64; 2]>) -> Vec<Sample<f64, 2>> {
         .collect()
 }
 
-/// Velocities by central differences of the positions read.
+/// Samples with velocities by central differences of the measured positions.
 fn with_central_differences(mut samples: Vec<Sample<f64, 2>>) -> Vec<Sample<f64, 2>> {
     let q: Vec<_> = samples.iter().map(|s| s.q).collect();
     let last = q.len() - 1;
@@ -62,7 +62,7 @@ fn with_central_differences(mut samples: Vec<Sample<f64, 2>>) -> Vec<Sample<f64,
     samples
 }
 
-/// Samples of the run without velocities.
+/// The samples of a run without their velocities.
 fn positions_only(samples: &[Sample<f64, 2>]) -> Vec<Sample<f64, 2>> {
     samples.iter().map(|s| Sample { dq: None, ..*s }).collect()
 }
@@ -120,7 +120,7 @@ fn papers_filters_bias_inertias_as_their_ratio_says() {
     assert!((ratio - 0.940).abs() < 0.005, "theta4 ratio {ratio}");
 }
 
-/// All nine parameters come out within 1 % by every scheme with exact filters.
+/// Checks that every scheme with exact filters estimates all nine parameters within 1 %.
 fn all_are_recovered(samples: &[Sample<f64, 2>]) {
     for scheme in Scheme::ALL {
         let found = estimate::<11>(samples, scheme, Variant::Exact);

@@ -1,4 +1,4 @@
-//! What single precision does to recursive least squares: the figures of `docs/decisions/006-least-squares-form.md`.
+//! Tests of recursive least squares in single precision, with the figures of `docs/decisions/006-least-squares-form.md`.
 
 #[path = "../../bench/src/run.rs"]
 mod run;
@@ -10,7 +10,7 @@ use armgap_core::regression::{Scheme, Variant};
 use armgap_core::rls::{Form, Rls};
 use nalgebra::{SMatrix, SVector};
 
-/// Share by which single precision may differ from double on the seed's run; 1.1e-3 is the largest seen.
+/// Largest relative difference of estimates in single and double precision on the run of Reyes and Kelly (1997); 1.1e-3 is the largest seen.
 const SINGLE_AGAINST_DOUBLE: f64 = 0.005;
 
 fn double<T: Real>(x: T) -> f64 {
@@ -30,7 +30,7 @@ fn is_positive_definite<T: Real, const R: usize>(p: &SMatrix<T, R, R>) -> bool {
     })
 }
 
-/// The last estimate of the seed's run; P is judged after every sample.
+/// Estimate after the run of Reyes and Kelly (1997); the covariance is checked after every sample.
 fn seed_estimate<T: Real>(scheme: Scheme, variant: Variant) -> SVector<f64, 9> {
     let settings = Settings {
         scheme,
@@ -68,8 +68,8 @@ fn the_seeds_run_in_single_precision() {
 const TRUTH: [f64; 6] = [2.0, -0.1, 0.3, 38.0, 1.8, 7.6];
 const SIZES: [f64; 6] = [1.0, 1e-2, 10.0, 1.0, 0.3, 5.0];
 
-/// A million random updates of sizes that differ by a thousand: samples after which P was found not positive definite, and the relative
-/// error of the estimate at the end.
+/// Result of a million random updates whose sizes differ by a factor of a thousand: samples after which `P` was not positive definite, and the
+/// relative error of the estimate at the end.
 fn life<T: Real>(p0: f64) -> (Vec<u32>, f64) {
     let mut state = 3_u64;
     let mut noise = || {
@@ -101,8 +101,8 @@ fn a_million_random_updates() {
     }
 }
 
-/// A million samples of a motion that hardly excites one of three directions: the estimate, its distance from the truth, and whether the
-/// covariance was found positive definite at every thousandth sample.
+/// Result of a million samples of a motion that hardly excites one of three directions: the estimate, and whether the covariance was positive
+/// definite at every thousandth sample.
 fn weakly_excited<T: Real>(form: Form) -> (SVector<f64, 3>, bool) {
     let mut rls = Rls::<T, 3>::new(SVector::zeros(), lit(1000.0), T::one()).with_form(form);
     let mut definite = true;

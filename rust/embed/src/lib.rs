@@ -1,7 +1,7 @@
-//! Proof that the core runs where there is nothing but a processor: `no_std`, no allocator, and no path that can panic.
+//! Proof that `armgap-core` runs without an operating system: `no_std`, no allocator, and no path that can panic.
 //!
-//! Any reachable panic would need `armgap_panicked`, which nobody defines; any allocation an allocator, which this library does not
-//! have. `check.sh` links the exported functions with everything unreachable removed and looks for such symbols.
+//! Any reachable panic would need `armgap_panicked`, which is nowhere defined; any allocation would need an allocator, which this library
+//! does not have. `check.sh` links the exported functions with all unreachable code removed and looks for symbols of both kinds.
 #![no_std]
 
 use armgap_core::arm::TwoLink;
@@ -27,7 +27,7 @@ type Online<T> = Estimator<T, TwoLink<T>, 2, 9, 9>;
 
 macro_rules! controller {
     ($real:ty, $start:ident, $update:ident) => {
-        /// Writes an estimator that has seen nothing into the caller's memory.
+        /// Writes an online estimator of the two-link arm, before its first sample, into the caller's memory.
         ///
         /// # Safety
         /// `at` points to writable memory of the estimator's size and alignment.
@@ -48,7 +48,7 @@ macro_rules! controller {
             unsafe { at.write(Estimator::new(TwoLink { gravity: 9.81, length1: 0.45 }, settings)) };
         }
 
-        /// Takes one sample and writes the estimate; the result is 1 if it was used.
+        /// Takes one sample of the two-link arm and writes the estimate; returns 1 if the sample was used, else 0.
         ///
         /// # Safety
         /// `at` was written by the start function; `q` and `tau` hold two numbers, `theta` has room for nine.
@@ -73,7 +73,7 @@ macro_rules! controller {
 controller!(f64, armgap_start_f64, armgap_update_f64);
 controller!(f32, armgap_start_f32, armgap_update_f32);
 
-/// One sample of simulated motion under held torques.
+/// Moves the two-link arm with the parameters `theta` by `h` seconds under held torques `tau`, SI.
 ///
 /// # Safety
 /// `q`, `dq` and `tau` point to two numbers each, `theta` to nine.
@@ -96,7 +96,7 @@ pub unsafe extern "C" fn armgap_advance_f64(
     }
 }
 
-/// A six-axis arm of these joints and links in its simulator, with dry friction; moves its state by one interval.
+/// Moves a serial arm of six joints, with dry friction, by `h` seconds under held torques `tau`, SI.
 ///
 /// # Safety
 /// `joints` holds six joints, `theta` 78 parameters, `state` was written before, and `tau` holds six numbers.
@@ -115,7 +115,7 @@ pub unsafe extern "C" fn armgap_advance_chain_f64(
     advance(&plant, state, &Interval { t, h, torque: &torque }, 1);
 }
 
-/// Torques of a motion of a chain with a linear and five rotary joints, their derivatives, and the regressor.
+/// Joint torques of a motion of a chain of one linear and five rotary joints, with their derivatives and the regressor.
 ///
 /// # Safety
 /// `joint` holds a joint, `links` ten parameters of each link, `motion` positions, velocities and accelerations; `derivatives` and

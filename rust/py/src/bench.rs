@@ -1,4 +1,4 @@
-//! `bench`: what one sample costs on this machine.
+//! Python function `bench`: time of one sample of an online estimator on this machine.
 
 use armgap_bench::cost::{Cost, noise, online};
 use armgap_core::regression::{Scheme, Variant};
@@ -6,7 +6,7 @@ use armgap_core::rls::Form;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Typical, median, 99 %, 99.99 % and longest time of one sample, ns; without a scheme, of fixed arithmetic: the machine's noise.
+/// Typical, median, 99 %, 99.99 % and longest time of one sample of an online estimator, ns; without a scheme, of fixed arithmetic: the machine's noise.
 #[pyfunction]
 pub fn bench(
     py: Python<'_>,

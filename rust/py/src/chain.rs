@@ -1,4 +1,4 @@
-//! `Chain`: dynamics of a serial arm of one to seven joints over arrays of states.
+//! Python class `Chain`: dynamics of a serial arm of one to seven joints over arrays of states.
 
 use crate::convert::{effect_instances, matrix, vector};
 use crate::progress::with_progress;
@@ -14,17 +14,17 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 
-/// Largest departure of a rotation from orthogonality, and of an axis from unit length.
+/// Largest departure of a joint's rotation matrix from orthogonality, and of a joint axis from unit length.
 const ORTHOGONAL: f64 = 1e-6;
 
-/// A serial arm of one to seven joints.
+/// Serial arm of one to seven joints, under gravity.
 #[pyclass(module = "armgap._native", frozen)]
 #[derive(Clone)]
 pub struct Chain {
     description: ChainDescription,
 }
 
-/// What the methods below take apart from the quantity: parameters, positions, velocities, accelerations or torques.
+/// Arguments of a method of [`Chain`]: parameters, positions, velocities, and named accelerations or torques, one row per state.
 struct Arguments<'a, 'py> {
     theta: Option<Vec<f64>>,
     q: &'a PyReadonlyArray2<'py, f64>,
@@ -33,7 +33,7 @@ struct Arguments<'a, 'py> {
 }
 
 impl Chain {
-    /// The chain as the crates below take it.
+    /// Joints and gravity of the chain, as `armgap-fit` takes them.
     pub(crate) fn description(&self) -> &ChainDescription {
         &self.description
     }
@@ -42,7 +42,7 @@ impl Chain {
         self.description.joints.len()
     }
 
-    /// The parameters, 13 per joint.
+    /// Checked parameters of the chain, 13 per joint; empty if they are not given.
     fn parameters_of(&self, theta: Option<Vec<f64>>) -> PyResult<Vec<f64>> {
         let needed = PARAMETERS_PER_JOINT * self.joints();
         match theta {
@@ -53,7 +53,7 @@ impl Chain {
         }
     }
 
-    /// A quantity at every row, as one list, and the number of rows.
+    /// Values of a quantity at every state, row after row, and the number of states.
     fn rows(
         &self,
         py: Python<'_>,
@@ -106,17 +106,17 @@ impl Chain {
     }
 }
 
-/// The constructor allows no other sizes.
+/// Error for a number of joints that is not supported, which the constructor rules out.
 fn wrong_size() -> PyErr {
     PyValueError::new_err(format!("a chain has one to {MAX_JOINTS} joints"))
 }
 
-/// Rows of an array of shape `(n, 3)`.
+/// Checked rows of an array of shape `(n, 3)`.
 fn vectors_of(x: &PyReadonlyArray2<'_, f64>, name: &str, n: usize) -> PyResult<Vec<[f64; 3]>> {
     Ok(matrix(x, name, n, 3)?.as_chunks().0.to_vec())
 }
 
-/// Checks one joint; `j` counts from 0.
+/// Error if the rotation, translation or axis of joint `j`, from 0, is invalid.
 fn check_joint(joint: &ChainJoint<f64>, j: usize) -> PyResult<()> {
     let r = &joint.rotation;
     let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -208,8 +208,8 @@ impl Chain {
         self.description.parameters().into_iter().map(|(_, unit)| unit).collect()
     }
 
-    /// Base parameters among these candidates, of which `13 n + j` is a constant torque of joint `j`: estimated parameters, dependent ones,
-    /// and what each of these adds to each of those.
+    /// Base parameters among the candidates, by index, of which `13 n + j` is a constant torque of joint `j`: indices of estimated parameters, indices of
+    /// dependent ones, and the factor, (estimated, dependent), by which each dependent parameter adds to each estimated one.
     fn base_parameters<'py>(
         &self,
         py: Python<'py>,

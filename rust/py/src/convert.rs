@@ -1,4 +1,4 @@
-//! Descriptions that both sides share: kinds of arm, effects, and their parameters.
+//! Conversion of arms, effects and arrays between Python and Rust.
 
 use armgap_core::arm::{ArmKind, LinkParameters, TwoLink};
 use armgap_core::chain::{ChainJoint, JointKind};
@@ -15,12 +15,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::BTreeMap;
 
-/// Values of an effect with a transmission that say where encoder and friction sit: 1 at the motor, 0 at the link.
+/// Keys in the values of an effect with a transmission that say where encoder and friction sit, 1 at the motor, 0 at the link, and whether the rotor moves
+/// with inner joints.
 const ENCODER_SIDE: &str = "encoder_at_motor";
 const FRICTION_SIDE: &str = "friction_at_motor";
 const ROTOR: &str = "rotor_rides";
 
-/// The kinds of arm, as a list of dicts.
+/// Kinds of arm with dynamics in closed form, as a list of dicts: name, joints, parameter names and units.
 #[pyfunction]
 pub fn arm_kinds(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     let list = PyList::empty(py);
@@ -39,7 +40,7 @@ pub fn arm_kinds(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     Ok(list)
 }
 
-/// The effect library, as a list of dicts.
+/// Effects of the library, as a list of dicts: name, equation, source, parameters and further description.
 #[pyfunction]
 pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     let list = PyList::empty(py);
@@ -69,7 +70,7 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     Ok(list)
 }
 
-/// Inertial base parameters from the physical parameters of the links.
+/// Inertial base parameters from masses, kg, lengths, m, distances of the centres of mass, m, and inertias, kg m^2, of the links.
 #[pyfunction]
 pub fn theta_from_links<'py>(
     py: Python<'py>,
@@ -106,7 +107,7 @@ fn one(x: &[f64]) -> Option<f64> {
     if let [value] = x { Some(*value) } else { None }
 }
 
-/// A kind by name.
+/// Kind of arm by its name in arm files.
 pub fn kind_of(name: &str) -> PyResult<ArmKind> {
     let known: Vec<&str> = ArmKind::ALL.iter().map(|k| k.name()).collect();
     ArmKind::from_name(name).ok_or_else(|| {
@@ -114,7 +115,7 @@ pub fn kind_of(name: &str) -> PyResult<ArmKind> {
     })
 }
 
-/// Effects given as `(name, 1-based joint or None, {parameter: value})` on an arm with so many joints.
+/// Checked effects, given as `(name, joint from 1 or None, {parameter: value})`, on an arm with this number of joints.
 pub fn effect_instances(
     joints: usize,
     effects: Vec<(String, Option<usize>, BTreeMap<String, f64>)>,
@@ -167,12 +168,12 @@ pub fn effect_instances(
         .collect()
 }
 
-/// A contiguous view of a vector.
+/// Contiguous view of a vector of float64.
 pub fn vector<'a>(x: &'a PyReadonlyArray1<'_, f64>, name: &str) -> PyResult<&'a [f64]> {
     x.as_slice().map_err(|_| PyValueError::new_err(format!("`{name}` must be a contiguous array of float64")))
 }
 
-/// A contiguous view of a matrix with `rows` rows and `columns` columns.
+/// Contiguous view of a float64 matrix with `rows` rows and `columns` columns.
 pub fn matrix<'a>(
     x: &'a PyReadonlyArray2<'_, f64>,
     name: &str,
@@ -189,7 +190,7 @@ pub fn matrix<'a>(
         .map_err(|_| PyValueError::new_err(format!("`{name}` must be a C-contiguous array of float64")))
 }
 
-/// An entry of an `arm` dict, if it is there and not None.
+/// Value of `key` in an `arm` dict; `None` if it is missing or None.
 fn get<'py, T: for<'a> FromPyObject<'a, 'py>>(arm: &Bound<'py, PyDict>, key: &str) -> PyResult<Option<T>> {
     match arm.get_item(key)? {
         Some(value) if !value.is_none() => Ok(Some(
@@ -199,12 +200,12 @@ fn get<'py, T: for<'a> FromPyObject<'a, 'py>>(arm: &Bound<'py, PyDict>, key: &st
     }
 }
 
-/// An entry of an `arm` dict that must be there.
+/// Value of `key` in an `arm` dict; an error if it is missing or None.
 fn needed<'py, T: for<'a> FromPyObject<'a, 'py>>(arm: &Bound<'py, PyDict>, key: &str) -> PyResult<T> {
     get(arm, key)?.ok_or_else(|| PyValueError::new_err(format!("arm: `{key}` is missing")))
 }
 
-/// The arm of an `arm` dict.
+/// Arm with dynamics in closed form from an `arm` dict.
 pub fn description(arm: &Bound<'_, PyDict>) -> PyResult<ArmDescription> {
     let kind: String = needed(arm, "kind")?;
     let description = ArmDescription {
@@ -235,7 +236,7 @@ pub fn description(arm: &Bound<'_, PyDict>) -> PyResult<ArmDescription> {
     Ok(description)
 }
 
-/// The serial arm of an `arm` dict, whose `chain` has lists of `kinds`, `rotation`, `translation` and `axis`, and `gravity`.
+/// Serial arm from an `arm` dict, whose `chain` has lists of `kinds`, `rotation`, `translation` and `axis`, and `gravity`.
 pub fn serial_arm(arm: &Bound<'_, PyDict>) -> PyResult<SerialArm> {
     let chain: Bound<'_, PyDict> = needed(arm, "chain")?;
     let kinds: Vec<String> = needed(&chain, "kinds")?;
@@ -272,7 +273,7 @@ pub fn serial_arm(arm: &Bound<'_, PyDict>) -> PyResult<SerialArm> {
     Ok(SerialArm { chain, theta, sigma, steps, controller })
 }
 
-/// The position controller of `n` joints; lists that are not given are without effect.
+/// Position controller of `n` joints from a dict of lists; a list that is missing has no effect.
 fn position_controller(
     table: &Bound<'_, PyDict>,
     limits: Option<Vec<f64>>,

@@ -1,4 +1,4 @@
-//! `diagnose`.
+//! Python functions `diagnose`, `diagnosis_schema` and `refit`.
 
 use crate::convert::{description, matrix, serial_arm, vector};
 use crate::progress::with_progress;
@@ -13,11 +13,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Positions of a reference, and velocities where they are logged.
+/// Positions of a position controller's reference, rad or m, one row per sample, and velocities where they are logged.
 type PyReference<'py> = (PyReadonlyArray2<'py, f64>, Option<PyReadonlyArray2<'py, f64>>);
 
-/// Name, times, positions, torques, the torques of the custom effects, first moments of torques that are means, and the reference of a log that holds
-/// one in place of torques.
+/// A log: name, source, times, positions, torques, torques of custom effects, first moments of torques that are means over intervals, and the reference of a
+/// position controller where it is logged in place of torques.
 type PyLog<'py> = (
     String,
     String,
@@ -29,7 +29,7 @@ type PyLog<'py> = (
     Option<PyReference<'py>>,
 );
 
-/// A log's own copy of its numbers, for a thread that may outlive the caller.
+/// Copy of a log for a thread that may outlive the Python call.
 struct Owned {
     name: String,
     source: String,
@@ -41,8 +41,8 @@ struct Owned {
     reference: Option<(Vec<f64>, Option<Vec<f64>>)>,
 }
 
-/// The arm's parameters estimated again without any effect: `theta`, `sigma`, and per joint the RMS errors `before` and `refit` and
-/// the RMS displacement `motion` on the holdout. It is fitted from the arm file's parameters and from `start`.
+/// Re-estimates the arm's parameters without effects, from the arm file's values and from `start`: `theta`, `sigma`, and on the holdout, per joint, the RMS
+/// errors `before` and `refit` and the RMS displacement `motion`, rad or m.
 #[pyfunction]
 pub fn refit<'py>(
     py: Python<'py>,
@@ -71,13 +71,13 @@ pub fn refit<'py>(
     Ok(result)
 }
 
-/// JSON Schema of what [`diagnose`] returns.
+/// JSON Schema of the JSON that [`diagnose`] returns.
 #[pyfunction]
 pub fn diagnosis_schema() -> PyResult<String> {
     serde_json::to_string(&schema()).map_err(|e| PyValueError::new_err(e.to_string()))
 }
 
-/// The diagnosis of training and holdout logs, as JSON; `progress(title, fraction)` is called now and then.
+/// Diagnoses training and holdout logs and returns the result as JSON; `progress(title, fraction)` is called some times a second.
 #[pyfunction]
 #[pyo3(signature = (arm, training, holdout, options, progress=None))]
 pub fn diagnose(
@@ -123,7 +123,7 @@ pub fn diagnose(
     result.map_err(PyValueError::new_err)
 }
 
-/// A planar arm of a fixed kind, or a serial arm.
+/// Arm with dynamics in closed form, or a serial arm.
 enum AnyArm {
     Planar(ArmDescription),
     Serial(SerialArm),

@@ -1,4 +1,4 @@
-//! `Estimator`: the online estimator, one sample at a time or over arrays.
+//! Python class `Estimator`: the online estimator, one sample at a time or over arrays.
 
 use crate::chain::Chain;
 use crate::convert::{kind_of, matrix, vector};
@@ -16,10 +16,10 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArra
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Estimates and errors after every sample, and what became of each.
+/// Estimates, (samples, parameters), prediction errors, (samples, outputs), and outcome of each sample: 0 updated, 1 starting, 2 rejected.
 type Run<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<u8>>);
 
-/// An estimator of any arm.
+/// Online estimator of one of the arms in closed form, or of a serial arm in one of three sizes.
 #[allow(clippy::large_enum_variant)] // Kept in a box.
 #[derive(Clone, Copy)]
 enum Running<T: Real> {
@@ -47,7 +47,7 @@ impl<T: Real> Running<T> {
         made.map_err(complaint)
     }
 
-    /// Covariance for an error of unit variance, row by row.
+    /// Covariance of the estimate for an error of unit variance, row by row.
     fn covariance(&self) -> Vec<T> {
         let mut out = vec![T::zero(); self.estimator().theta().len().pow(2)];
         match self {
@@ -78,7 +78,7 @@ impl<T: Real> Running<T> {
     }
 }
 
-/// An estimator in either precision; numbers cross the boundary as float64.
+/// Online estimator in double or single precision; numbers cross the Python boundary as float64.
 #[allow(clippy::large_enum_variant)] // Kept in a box.
 #[derive(Clone, Copy)]
 enum Any {
@@ -86,7 +86,7 @@ enum Any {
     Single(Running<f32>),
 }
 
-/// The online estimator.
+/// Online estimator of an arm's parameters.
 #[pyclass(module = "armgap._native")]
 #[derive(Clone)]
 pub struct Estimator {
@@ -95,7 +95,8 @@ pub struct Estimator {
     joints: usize,
 }
 
-/// Settings from arguments in the order of the Python class.
+/// Settings of an online estimator; `numbers` are cut-off, forgetting factor, p0, memory, samples between false alarms and floor, `counts` samples of
+/// settling and learning.
 fn settings<T: Real>(
     scheme: &str,
     paper: bool,
@@ -117,7 +118,7 @@ fn settings<T: Real>(
     Ok(EstimatorSettings { scheme, variant, form, cutoff, forgetting, p0, monitor })
 }
 
-/// The estimator of a kind of arm.
+/// Online estimator of an arm with dynamics in closed form.
 fn of_kind<T: Real>(
     kind: &str,
     asymmetry: bool,
@@ -128,7 +129,7 @@ fn of_kind<T: Real>(
     Online::new(settings, &converted(theta0)).map(Running::OfKind).map_err(complaint)
 }
 
-/// The estimator of chosen parameters of a serial arm.
+/// Online estimator of the parameters `columns` of a serial arm; `known` are values of its other parameters, SI.
 fn of_chain<T: Real>(
     chain: &ChainDescription,
     columns: &[usize],
@@ -148,12 +149,12 @@ fn of_chain<T: Real>(
     Running::of_chain(&settings, &converted(theta0))
 }
 
-/// Numbers in another precision.
+/// Numbers of a list converted to the precision of `T`.
 fn converted<T: Real>(x: &[f64]) -> Vec<T> {
     x.iter().map(|x| lit(*x)).collect()
 }
 
-/// Outcomes in the order of `armgap.estimator.OUTCOMES`.
+/// Number of an outcome, in the order of `armgap.estimator.OUTCOMES`.
 fn code(outcome: SampleStatus) -> u8 {
     match outcome {
         SampleStatus::Updated => 0,
@@ -169,7 +170,7 @@ fn complaint(error: OnlineError) -> PyErr {
     })
 }
 
-/// Numbers per joint in single precision, in fixed memory.
+/// Numbers in single precision, at most one per joint, in fixed memory, and how many they are.
 #[allow(clippy::cast_possible_truncation)] // That is the purpose.
 fn narrowed(x: &[f64]) -> ([f32; MAX_JOINTS], usize) {
     let mut narrow = [0.0; MAX_JOINTS];
@@ -198,7 +199,7 @@ impl Any {
         outcome.unwrap_or(SampleStatus::Rejected)
     }
 
-    /// Appends the estimate.
+    /// Appends the estimated parameters, SI, to a list.
     fn theta(&self, to: &mut Vec<f64>) {
         match self {
             Self::Double(running) => to.extend_from_slice(running.estimator().theta()),
@@ -206,7 +207,7 @@ impl Any {
         }
     }
 
-    /// Appends the standard deviations of the estimate.
+    /// Appends the standard deviations of the estimated parameters, SI, to a list.
     fn sigma(&self, to: &mut Vec<f64>) {
         match self {
             Self::Double(running) => to.extend(sigma_of(running.estimator())),
@@ -214,7 +215,7 @@ impl Any {
         }
     }
 
-    /// Appends the errors of the last sample that was used.
+    /// Appends the prediction errors of the last sample that was used to a list.
     fn errors(&self, to: &mut Vec<f64>) {
         match self {
             Self::Double(running) => to.extend_from_slice(running.estimator().errors()),
@@ -223,7 +224,7 @@ impl Any {
     }
 }
 
-/// Standard deviations of the estimate.
+/// Standard deviations of the estimated parameters, SI.
 fn sigma_of<T: Real>(estimator: &dyn OnlineEstimator<T>) -> Vec<T> {
     let mut sigma = vec![T::zero(); estimator.theta().len()];
     estimator.sigma(&mut sigma);
@@ -252,7 +253,7 @@ impl Estimator {
         Ok(Self { any: Box::new(any), joints: kind_of(kind)?.joints() })
     }
 
-    /// An estimator of the parameters `columns` of a serial arm; of `known`, 13 values per joint, those of all others count.
+    /// Online estimator of the parameters `columns` of a serial arm; `known`, 13 values per joint, SI, are used for all other parameters.
     #[staticmethod]
     fn of_chain(
         chain: &Chain,
@@ -277,7 +278,7 @@ impl Estimator {
         Ok(Self { any: Box::new(any), joints: chain.joints.len() })
     }
 
-    /// Takes one sample; 0 updated, 1 starting, 2 rejected.
+    /// Takes one sample at the time `when`, s, or, with `after`, so long after the last one; returns 0 for updated, 1 starting, 2 rejected.
     #[pyo3(signature = (when, after, q, dq, tau))]
     fn update(
         &mut self,
@@ -298,8 +299,8 @@ impl Estimator {
         Ok(code(self.any.update(when, q, dq, tau)))
     }
 
-    /// Takes many samples without the interpreter's lock; the estimates and errors after each, NaN where it gave none, and what became of
-    /// each.
+    /// Takes many samples without the interpreter's lock; returns estimates and prediction errors after each sample, NaN where it gave none, and outcomes: 0
+    /// updated, 1 starting, 2 rejected.
     fn run<'py>(
         &mut self,
         py: Python<'py>,
@@ -339,7 +340,7 @@ impl Estimator {
         ))
     }
 
-    /// A copy with the same state.
+    /// Copy of the estimator in its present state.
     fn copy(&self) -> Self {
         self.clone()
     }
@@ -354,7 +355,7 @@ impl Estimator {
         PyArray1::from_vec(py, self.listed(Any::sigma))
     }
 
-    /// Covariance for an error of unit variance.
+    /// Covariance of the estimate for an error of unit variance, (parameters, parameters).
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let entries = match &*self.any {
@@ -369,7 +370,7 @@ impl Estimator {
         PyArray1::from_vec(py, self.listed(Any::errors))
     }
 
-    /// Excitation and alarm.
+    /// Excitation, from 0 to about 1, and alarm level, above 1 for an alarm.
     #[getter]
     fn signals(&self) -> (f64, f64) {
         match &*self.any {
@@ -381,7 +382,7 @@ impl Estimator {
         }
     }
 
-    /// Samples used and rejected.
+    /// Numbers of samples used and rejected.
     #[getter]
     fn counts(&self) -> (u64, u64) {
         match &*self.any {
@@ -392,14 +393,14 @@ impl Estimator {
 }
 
 impl Estimator {
-    /// Numbers of the present state.
+    /// Numbers that `append` takes from the estimator's present state.
     fn listed(&self, append: fn(&Any, &mut Vec<f64>)) -> Vec<f64> {
         let mut list = Vec::new();
         append(&self.any, &mut list);
         list
     }
 
-    /// Rows of such numbers.
+    /// Array of `rows`, each as long as the list that `append` gives.
     fn table<'py>(
         &self,
         py: Python<'py>,

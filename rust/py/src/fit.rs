@@ -1,4 +1,4 @@
-//! `fit`.
+//! Python function `fit`.
 
 use crate::convert::{description, matrix, vector};
 use armgap_fit::identify::output_error::OutputError;
@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// All parameters of an arm by output error over windows of `horizon` seconds; none for a log without enough of them.
+/// Fits all parameters of an arm to one log by output error over windows of `horizon` seconds; None for a log with too few windows.
 #[pyfunction]
 pub fn fit<'py>(
     py: Python<'py>,

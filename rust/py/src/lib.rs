@@ -1,4 +1,4 @@
-//! The Python module `armgap._native`: views in, check, release the GIL, arrays out. Nothing is computed here.
+//! Python module `armgap._native`: takes views of arrays, checks them, releases the GIL, and returns arrays; other crates compute.
 
 mod bench;
 mod chain;

@@ -1,7 +1,7 @@
-//! Progress callback: long work on a thread of its own, while the calling thread reports progress to Python and checks for signals.
+//! Progress callbacks: long work runs on a thread of its own, while the calling thread reports progress to Python and checks for signals.
 //!
-//! Only the calling thread enters Python: for signals 25 times a second, to report progress 8 times. When it is interrupted it returns at once; the work is told to
-//! stop, and ends at its next unit without anyone waiting for it, which is why it owns its data.
+//! Only the calling thread enters Python: for signals 25 times a second, to report progress 8 times. When interrupted it returns at once; the
+//! work is told to stop, and ends at its next unit while no thread waits for it, which is why it owns its data.
 
 use armgap_fit::progress::{Control, Observer, Progress};
 use pyo3::exceptions::PyRuntimeError;
@@ -13,21 +13,21 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Time between two checks for signals.
+/// Time between two checks for Python signals during long work.
 const CHECK: Duration = Duration::from_millis(40);
 
-/// Signal checks from one progress report to the next.
+/// Number of signal checks from one progress report to the next.
 const CHECKS_PER_REPORT: u32 = 3;
 
-/// What the two threads share.
+/// Latest progress, and whether to stop, shared by the calling and the working thread.
 #[derive(Default)]
 struct Shared {
     latest: Mutex<Option<Progress>>,
     stop: AtomicBool,
 }
 
-/// Runs `work`, which is given an observer; `callback(title, fraction)` is called with the progress. Without it, work is short: it is done on
-/// this thread, and nothing interrupts it.
+/// Runs `work` on its own thread and calls `callback(title, fraction)` with its progress. Without a callback, work is short: it runs on the calling thread
+/// without interruption.
 pub fn with_progress<T: Send + 'static>(
     py: Python<'_>,
     callback: Option<&Py<PyAny>>,
@@ -63,7 +63,7 @@ pub fn with_progress<T: Send + 'static>(
     }
 }
 
-/// A panic as an error for Python: what the work said last, and that it should not have.
+/// Panic as a Python error, with the panic's message and a request to report it.
 #[expect(clippy::needless_pass_by_value, reason = "a panic's payload is given away")]
 fn defect(panic: Box<dyn Any + Send>) -> PyErr {
     let said =
@@ -74,7 +74,7 @@ fn defect(panic: Box<dyn Any + Send>) -> PyErr {
     ))
 }
 
-/// Waits for the result; none if the thread ended without.
+/// Waits for the result of the work, with checks for signals and progress reports; `None` if its thread ended without a result.
 fn wait<T>(ended: &Receiver<T>, shared: &Shared, callback: &Py<PyAny>) -> PyResult<Option<T>> {
     let mut checks = 0;
     loop {
@@ -96,7 +96,7 @@ fn poll(py: Python<'_>, shared: &Shared, callback: Option<&Py<PyAny>>) -> PyResu
     callback.map_or(Ok(()), |callback| report(py, shared, callback, false))
 }
 
-/// Calls back with the progress; with 1 once the work has ended.
+/// Calls the callback with the latest progress, with the fraction 1 once the work has ended.
 fn report(py: Python<'_>, shared: &Shared, callback: &Py<PyAny>, ended: bool) -> PyResult<()> {
     let latest = *shared.latest.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(progress) = latest {

@@ -1,4 +1,4 @@
-//! `regression_rows` and `velocity`.
+//! Python functions `regression_rows` and `velocity`.
 
 use crate::convert::{description, matrix, vector};
 use armgap_fit::identify::regression_rows::RegressionRows;
@@ -34,7 +34,7 @@ pub fn regression_rows<'py>(
     Ok((PyArray1::from_vec(py, rows.psi).reshape([t.len(), n, p])?, table(py, rows.y, t.len(), n)?))
 }
 
-/// Velocities from positions.
+/// Joint velocities from positions by the named method: backward, central or local-cubic.
 #[pyfunction]
 #[pyo3(signature = (t, q, method, half_width=3))]
 pub fn velocity<'py>(

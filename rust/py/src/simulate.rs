@@ -1,4 +1,4 @@
-//! `simulate` and `inertia`.
+//! Python functions `simulate` and `inertia`.
 
 use crate::convert::{effect_instances, kind_of, matrix, vector};
 use crate::progress::with_progress;
@@ -11,7 +11,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 
-/// Positions and velocities of an arm under held torques.
+/// Simulates an arm with effects under held torques: positions, rad or m, and velocities, (samples, joints).
 #[pyfunction]
 #[pyo3(signature = (kind, gravity, link_length, theta, t, tau, q0, dq0, effects, tolerance=1e-9, smoothing=Vec::new(), progress=None))]
 pub fn simulate<'py>(
@@ -38,23 +38,23 @@ pub fn simulate<'py>(
     inputs.run(py, kind.joints(), progress, run)?.ok_or_else(|| PyValueError::new_err(wrong))
 }
 
-/// What a simulation of any arm takes.
+/// Arguments of a simulation of any arm.
 pub(crate) struct Inputs<'a, 'py> {
     pub(crate) t: &'a PyReadonlyArray1<'py, f64>,
     pub(crate) tau: &'a PyReadonlyArray2<'py, f64>,
-    /// Positions and velocities at the first sample.
+    /// Joint positions and velocities at the first sample.
     pub(crate) start: [&'a PyReadonlyArray1<'py, f64>; 2],
     pub(crate) effects: Vec<EffectInstance>,
     pub(crate) tolerance: f64,
-    /// Joint by joint, the width of the rounded sign of friction; none for dry friction.
+    /// Width of the smoothed sign in each joint's friction, rad/s or m/s; empty for exact dry friction.
     pub(crate) smoothing: Vec<f64>,
 }
 
-/// Positions and velocities, one row per sample.
+/// Joint positions, rad or m, and velocities, (samples, joints).
 pub(crate) type Motion<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
 impl Inputs<'_, '_> {
-    /// Simulates `n` joints by `run`; none where that refuses the arm.
+    /// Simulates an arm of `n` joints by `run`; `None` if `run` does not take the arm.
     pub(crate) fn run(
         self,
         py: Python<'_>,
@@ -93,7 +93,7 @@ impl Inputs<'_, '_> {
     }
 }
 
-/// Inertia matrices at some positions, effects included.
+/// Inertia matrices of an arm with effects at the positions `q`: (positions, joints, joints).
 #[pyfunction]
 pub fn inertia<'py>(
     py: Python<'py>,

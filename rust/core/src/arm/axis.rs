@@ -1,6 +1,7 @@
 //! One prismatic joint: `theta1 ddq + theta2 + theta3 dq + theta4 sgn(dq) = tau`.
 //!
-//! `theta1` is the moving mass, `theta2` the component of its weight along the axis (0 when horizontal).
+//! `theta1` is the moving mass, kg, `theta2` the component of its weight along the axis, N (0 when horizontal), `theta3` the viscous, N s/m, and
+//! `theta4` the Coulomb coefficient, N.
 
 use super::{Arm, EquationTerms, Parameter};
 use crate::number::Number;
@@ -8,7 +9,7 @@ use crate::real::Real;
 use crate::trig::SinCos;
 use nalgebra::{SMatrix, SVector};
 
-/// A linear axis; `gravity` [m/s^2] is needed only when its base tilts.
+/// Arm of one prismatic joint; `gravity`, m/s^2, is needed only when the base is tilted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis<T> {
     /// Acceleration of gravity, m/s^2.

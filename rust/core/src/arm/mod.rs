@@ -1,4 +1,4 @@
-//! Arms behind one trait: everything that depends on the kind of arm lives in this folder.
+//! Kinds of arm with dynamics in closed form behind one trait, [`Arm`].
 //!
 //! The dynamics of a serial arm with `N` joints, equation (1) of Reyes and Kelly (1997),
 //!
@@ -8,7 +8,7 @@
 //!
 //! is linear in `theta`, so each arm also gives the regressors of its momentum, of the remaining forces, and of
 //! its energy. `theta` holds the arm's inertial base parameters, then `N` viscous, then `N` Coulomb coefficients:
-//! `P = INERTIAL + 2 N`. Adding an arm is one file here and one line in [`ArmKind::ALL`].
+//! `P = INERTIAL + 2 N`. Adding a kind of arm is one file in this folder and one line in [`ArmKind::ALL`].
 
 mod axis;
 mod pendulum;
@@ -24,40 +24,40 @@ use crate::real::{Real, sgn};
 use crate::trig::SinCos;
 use nalgebra::{SMatrix, SVector};
 
-/// Terms of the equation of motion at a state: inertia matrix, by rows, and `C dq + g`.
+/// Terms of the equation of motion `M ddq + C dq + g + f = tau` at one state.
 #[derive(Debug, Clone, Copy)]
 pub struct EquationTerms<V, const N: usize> {
-    /// `M(q)`.
+    /// Inertia matrix `M(q)`, by rows, kg m^2 (kg).
     pub inertia: [[V; N]; N],
-    /// `C(q, dq) dq + g(q)`.
+    /// Bias `C(q, dq) dq + g(q)`, N m (N).
     pub bias: [V; N],
 }
 
-/// Name and unit of one parameter.
+/// Name and unit of one parameter of an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Parameter {
-    /// Name as it appears in results, for example `theta1`.
+    /// Name of the parameter as it appears in results, for example `theta1`.
     pub name: &'static str,
-    /// SI unit.
+    /// SI unit of the parameter, for example `kg m^2`.
     pub unit: &'static str,
 }
 
-/// The kinds of arm an arm file can name.
+/// Kinds of arm with dynamics in closed form, as an arm file names them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ArmKind {
-    /// One prismatic joint.
+    /// Linear axis: one prismatic joint.
     Axis,
-    /// One rotary joint under gravity.
+    /// Pendulum: one rotary joint under gravity.
     Pendulum,
     /// The two-link vertical arm of Reyes and Kelly (1997).
     TwoLink,
 }
 
 impl ArmKind {
-    /// Every kind, in the order of the documentation.
+    /// All kinds of arm, in the order of the documentation.
     pub const ALL: [Self; 3] = [Self::Axis, Self::Pendulum, Self::TwoLink];
 
-    /// The name an arm file uses.
+    /// Name of the kind of arm in arm files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Axis => <Axis<f64> as Arm<f64, 1, 4>>::KIND,
@@ -66,7 +66,7 @@ impl ArmKind {
         }
     }
 
-    /// Parameters in the order of `theta`.
+    /// Names and units of the arm's parameters in the order of `theta`.
     pub const fn parameters(self) -> &'static [Parameter] {
         match self {
             Self::Axis => <Axis<f64> as Arm<f64, 1, 4>>::PARAMETERS,
@@ -75,7 +75,7 @@ impl ArmKind {
         }
     }
 
-    /// Degrees of freedom.
+    /// Number of joints of the kind of arm.
     pub const fn joints(self) -> usize {
         match self {
             Self::Axis | Self::Pendulum => 1,
@@ -83,17 +83,17 @@ impl ArmKind {
         }
     }
 
-    /// Number of inertial base parameters, the first entries of `theta`.
+    /// Number of inertial base parameters, which come first in `theta`.
     pub const fn inertial(self) -> usize {
         self.parameters().len() - 2 * self.joints()
     }
 
-    /// Whether each joint turns (rad, N m) rather than slides (m, N).
+    /// Whether the arm's joints turn (rad, N m) rather than slide (m, N).
     pub const fn rotary(self) -> bool {
         !matches!(self, Self::Axis)
     }
 
-    /// The kind with this name.
+    /// The kind of arm that arm files call `name`.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
@@ -101,15 +101,15 @@ impl ArmKind {
 
 /// A serial arm with `N` joints and `P` parameters, linear in them.
 ///
-/// Required methods are the arm's own mathematics; the provided ones follow from it and hold for every arm.
+/// Required methods are the equations of one kind of arm; provided methods follow from them.
 pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
-    /// Name in arm files.
+    /// Name of the kind of arm in arm files.
     const KIND: &'static str;
     /// Names and units of `theta`, inertial first, then viscous and Coulomb per joint.
     const PARAMETERS: &'static [Parameter];
     /// Number of inertial base parameters.
     const INERTIAL: usize = P - 2 * N;
-    /// Whether the arm moves in one vertical plane, so that the angle of a tilted base says all about gravity.
+    /// Whether the arm moves in one vertical plane, so that one angle, rad, describes a tilted base.
     const PLANAR: bool = true;
 
     /// Inertia matrix `M(q)`, symmetric positive definite for physical `theta`.
@@ -118,25 +118,26 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Coriolis matrix `C(q, dq)` with `dM/dt - 2 C` skew-symmetric.
     fn coriolis(&self, theta: &[T; P], q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, N>;
 
-    /// Gravity torque `g(q) = dU/dq` with the base turned by `tilt`, rad, in the plane of motion.
+    /// Gravity torque `g(q) = dU/dq`, N m (N), with the base turned by `tilt`, rad, in the plane of motion.
     fn gravity(&self, theta: &[T; P], q: &SVector<T, N>, tilt: T) -> SVector<T, N>;
 
-    /// Regressor of the energy above rest at `q = 0`: `E . theta = K(q, dq) + U(q) - U(0)`.
+    /// Regressor `E` of the energy above rest at `q = 0`, J: `E . theta = K(q, dq) + U(q) - U(0)`.
     fn energy_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SVector<T, P>;
 
-    /// Regressor of the momentum: `Pm theta = M(q) dq`.
+    /// Regressor `Pm`, `(N, P)`, of the momentum: `Pm theta = M(q) dq`.
     fn momentum_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, P>;
 
-    /// Regressor of `g(q) - dK/dq`: what is left of the inertial torque once the momentum's rate is taken out.
+    /// Regressor `B`, `(N, P)`, of what the rate of the momentum leaves of the torque: `B theta = g(q) - dK/dq`, `K` the kinetic energy.
     fn potential_regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, P>;
 
-    /// The regressor of the energy, for the online estimator; arms override it where the processor `C` computes several angles at once.
+    /// [`Arm::energy_regressor`] for the online estimator; an arm overrides it to compute several sines and cosines at once on the processor
+    /// `C`.
     #[inline(always)]
     fn energy_regressor_on<C: Cpu>(&self, q: &SVector<T, N>, dq: &SVector<T, N>) -> SVector<T, P> {
         self.energy_regressor(q, dq)
     }
 
-    /// The regressors of momentum and potential together, for the online estimator; arms override it where terms are shared.
+    /// [`Arm::momentum_regressor`] and [`Arm::potential_regressor`], for the online estimator; an arm overrides it to share terms between them.
     #[inline(always)]
     fn momentum_and_potential<C: Cpu>(
         &self,
@@ -149,14 +150,14 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
     /// Change of `theta` when a point `mass`, kg, is fixed `distance`, m, along the last link.
     fn payload(&self, theta: &[T; P], mass: T, distance: T) -> [T; P];
 
-    /// Angles whose sines and cosines [`Arm::equation_terms`] needs, with the base turned by `tilt`.
+    /// Angles, rad, whose sines and cosines [`Arm::equation_terms`] needs, with the base turned by `tilt`, rad.
     fn angles<V: Number<Real = T>>(&self, q: &[V; N], tilt: V) -> [V; N];
 
-    /// The part of the inertia matrix that does not depend on `q`.
+    /// Part of the inertia matrix, by rows, that does not depend on `q`.
     fn constant_inertia(&self, theta: &[T; P]) -> [[T; N]; N];
 
-    /// Inertia matrix, given its constant part, and `C dq + g` together, for the integrator: of one arm, or of several side by side. The
-    /// joint positions are for arms whose prismatic joints move links; angles come as sines and cosines.
+    /// Inertia matrix and bias `C dq + g` of one arm, or of several side by side, from [`Arm::constant_inertia`], the sines and cosines of
+    /// [`Arm::angles`], and the joint state; `q` is used only by arms whose prismatic joints move links.
     fn equation_terms<V: Number<Real = T>>(
         &self,
         theta: &[V; P],
@@ -166,10 +167,10 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
         dq: &[V; N],
     ) -> EquationTerms<V, N>;
 
-    /// Regressor of the whole equation of motion: `Y(q, dq, ddq) theta = tau`, equation (15).
+    /// Regressor `Y`, `(N, P)`, of the equation of motion: `Y(q, dq, ddq) theta = tau`, Reyes and Kelly (1997), equation (15).
     fn regressor(&self, q: &SVector<T, N>, dq: &SVector<T, N>, ddq: &SVector<T, N>) -> SMatrix<T, N, P>;
 
-    /// Regressor of friction: `f(dq) = F theta`.
+    /// Regressor `F`, `(N, P)`, of friction: `f(dq) = F theta`.
     #[inline]
     fn friction_regressor(&self, dq: &SVector<T, N>) -> SMatrix<T, N, P> {
         let mut f = SMatrix::zeros();
@@ -180,19 +181,19 @@ pub trait Arm<T: Real, const N: usize, const P: usize>: Clone + Send + Sync {
         f
     }
 
-    /// Viscous coefficients within `theta`.
+    /// Viscous coefficients of the joints, from `theta`, N m s/rad (N s/m).
     #[inline]
     fn viscous(&self, theta: &[T; P]) -> SVector<T, N> {
         SVector::from_fn(|j, _| theta[Self::INERTIAL + j])
     }
 
-    /// Coulomb coefficients within `theta`.
+    /// Coulomb coefficients of the joints, from `theta`, N m (N).
     #[inline]
     fn coulomb(&self, theta: &[T; P]) -> SVector<T, N> {
         SVector::from_fn(|j, _| theta[Self::INERTIAL + N + j])
     }
 
-    /// Friction torque `f(dq)`, equation (4), with `sgn(0) = 0`.
+    /// Friction torque `f(dq)`, N m (N), Reyes and Kelly (1997), equation (4), with `sgn(0) = 0`.
     fn friction(&self, theta: &[T; P], dq: &SVector<T, N>) -> SVector<T, N> {
         self.friction_regressor(dq) * SVector::from(*theta)
     }

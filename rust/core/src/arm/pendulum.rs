@@ -1,6 +1,7 @@
-//! One rotary joint: `theta1 ddq + theta2 sin q + theta3 dq + theta4 sgn(dq) = tau`, `q` from hanging down.
+//! One rotary joint: `theta1 ddq + theta2 sin q + theta3 dq + theta4 sgn(dq) = tau`, `q`, rad, from hanging down.
 //!
-//! `theta1` is the inertia about the joint, `theta2 = m g l` the largest gravity torque.
+//! `theta1` is the inertia about the joint, kg m^2, `theta2 = m g l` the largest gravity torque, N m, `theta3` the viscous, N m s/rad, and
+//! `theta4` the Coulomb coefficient, N m.
 
 use super::{Arm, EquationTerms, Parameter};
 use crate::number::Number;
@@ -8,7 +9,7 @@ use crate::real::Real;
 use crate::trig::{SinCos, sin_cos};
 use nalgebra::{SMatrix, SVector};
 
-/// A physical pendulum with a motor in its pivot.
+/// Arm of one rotary joint: a physical pendulum with a motor in its pivot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pendulum<T> {
     /// Acceleration of gravity, m/s^2.

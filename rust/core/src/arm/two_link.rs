@@ -8,8 +8,8 @@
 //! g = [theta4 s1 + theta5 s12,  theta5 s12]          f = [theta6 dq1 + theta8 sgn dq1, theta7 dq2 + theta9 sgn dq2]
 //! ```
 //!
-//! `C` is the one of Christoffel's symbols, for which `dM/dt - 2 C` is skew-symmetric. The paper prints another with the same product
-//! `C dq`; for that one only `dq' (dM/dt - 2 C) dq = 0` holds.
+//! `C` is the matrix of Christoffel's symbols, for which `dM/dt - 2 C` is skew-symmetric. The paper prints a matrix with equal product `C dq`,
+//! for which only `dq' (dM/dt - 2 C) dq = 0` holds.
 
 use super::{Arm, EquationTerms, Parameter};
 use crate::cpu::{Cpu, Portable};
@@ -18,7 +18,7 @@ use crate::real::{Real, lit};
 use crate::trig::{SinCos, sin_cos, sines_cosines};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
-/// The two-link vertical arm.
+/// Two-link vertical arm of Reyes and Kelly (1997).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoLink<T> {
     /// Acceleration of gravity, m/s^2.
@@ -27,27 +27,27 @@ pub struct TwoLink<T> {
     pub length1: T,
 }
 
-/// Physical parameters of the links, Table I: masses, lengths, centres of mass, inertias about them.
+/// Physical parameters of the links of a two-link arm (Reyes and Kelly 1997, Table I).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkParameters<T> {
-    /// Link masses, kg.
+    /// Masses of links 1 and 2, kg.
     pub mass: [T; 2],
-    /// Link lengths, m.
+    /// Lengths of links 1 and 2, m.
     pub length: [T; 2],
-    /// Distance of each centre of mass from its joint, m.
+    /// Distances of the centres of mass of links 1 and 2 from joints 1 and 2, m.
     pub com: [T; 2],
-    /// Inertia of each link about its centre of mass, kg m^2.
+    /// Inertias of links 1 and 2 about their centres of mass, kg m^2.
     pub inertia: [T; 2],
 }
 
 impl<T: Real> TwoLink<T> {
-    /// The arm under `gravity`; without `length1` it follows from `theta2 = l1 m2 lc2` and `theta5 = g m2 lc2`.
+    /// Arm under `gravity`, m/s^2; a missing `length1`, m, follows from `theta2 = l1 m2 lc2` and `theta5 = g m2 lc2`.
     pub fn new(gravity: T, length1: Option<T>, theta: &[T; 9]) -> Self {
         let derived = if theta[4] > T::zero() { gravity * theta[1] / theta[4] } else { T::zero() };
         Self { gravity, length1: length1.unwrap_or(derived) }
     }
 
-    /// Base inertial parameters `theta1 ... theta5` from physical ones, the formulas of section 5.
+    /// Base inertial parameters `theta1 ... theta5` from physical ones (Reyes and Kelly 1997, section 5), with `gravity` in m/s^2.
     pub fn inertial_from_links(links: &LinkParameters<T>, gravity: T) -> [T; 5] {
         let LinkParameters { mass: [m1, m2], length: [l1, _], com: [c1, c2], inertia: [i1, i2] } = *links;
         [

@@ -14,24 +14,24 @@ use crate::real::{Real, lit};
 use crate::trig::SinCos;
 use nalgebra::{SMatrix, SVector};
 
-/// The links' part of `theta`. None if `theta` is too short, which [`check`] rules out.
+/// The ten inertial parameters of every link, from `theta`; `None` if `theta` is too short, which [`check`] rules out.
 #[inline(always)]
 fn links_of<V, const N: usize, const P: usize>(theta: &[V; P]) -> Option<&[LinkInertia<V>; N]> {
     theta.as_chunks().0.first_chunk()
 }
 
-/// Number of the first rotor inertia in `theta`.
+/// Index in `theta` of the rotor inertia of joint 1.
 const fn first_rotor(joints: usize) -> usize {
     LINK_PARAMETERS * joints
 }
 
-/// Fails to compile unless `P` is what a chain of `N` joints has.
+/// Fails to compile unless `P` is 13 parameters for each of `N` joints.
 #[inline(always)]
 const fn check<const N: usize, const P: usize>() {
     const { assert!(P == PARAMETERS_PER_JOINT * N, "a chain has 13 parameters per joint") }
 }
 
-/// Writes a link's row into row `i` of a regressor.
+/// Writes `row` over the ten parameters of link `k` into row `i` of a regressor.
 #[inline(always)]
 fn put<T: Real, const N: usize, const P: usize>(
     matrix: &mut SMatrix<T, N, P>,
@@ -46,7 +46,7 @@ fn put<T: Real, const N: usize, const P: usize>(
     }
 }
 
-/// Writes one entry per joint into the rotors' columns of a regressor.
+/// Writes `of[j]`, for every joint `j`, into the column of rotor inertia `j` of a regressor.
 #[inline(always)]
 fn put_rotors<T: Real, const N: usize, const P: usize>(matrix: &mut SMatrix<T, N, P>, of: &SVector<T, N>) {
     for j in 0..N {
@@ -57,7 +57,7 @@ fn put_rotors<T: Real, const N: usize, const P: usize>(matrix: &mut SMatrix<T, N
 }
 
 impl<T: Real, const N: usize> Chain<T, N> {
-    /// Inertia and bias in a function of its own: the integrator has a dozen calls, each of them long.
+    /// Inertia matrix and bias in a function that is not inlined: the integrator has a dozen calls of them.
     #[inline(never)]
     fn equation_terms_apart<V: Number<Real = T>>(
         &self,
@@ -69,7 +69,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         self.equation_terms_at(&self.poses_at(sincos, q), links, constant_inertia, dq)
     }
 
-    /// `C(q, dq) dq` of these links: the bias without gravity.
+    /// `C(q, dq) dq`, N m (N): the bias without gravity.
     fn velocity_product<const P: usize>(
         &self,
         theta: &[T; P],
@@ -85,9 +85,9 @@ impl<T: Real, const N: usize> Chain<T, N> {
 
 impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
     const KIND: &'static str = "chain";
-    /// Empty: names depend on the number of joints; see [`super::parameter`].
+    /// Empty: names of a chain's parameters depend on the number of joints; see [`super::parameter`].
     const PARAMETERS: &'static [Parameter] = &[];
-    /// The base of a chain is tilted by turning its gravity vector ([`Chain::with_gravity`]).
+    /// False: the base of a chain is tilted by turning its gravity vector ([`Chain::with_gravity`]).
     const PLANAR: bool = false;
 
     fn inertia(&self, theta: &[T; P], q: &SVector<T, N>) -> SMatrix<T, N, N> {
@@ -98,7 +98,7 @@ impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
         SMatrix::from_fn(|i, j| own[i][j] + rotors[i][j])
     }
 
-    /// The symmetric bilinear form of Christoffel's symbols, from the products `C(x) x` of sums and differences.
+    /// Coriolis matrix `C(q, dq)` of Christoffel's symbols, from the products `C(x) x` of sums and differences of velocities `x`.
     fn coriolis(&self, theta: &[T; P], q: &SVector<T, N>, dq: &SVector<T, N>) -> SMatrix<T, N, N> {
         let (mut matrix, quarter) = (SMatrix::<T, N, N>::zeros(), lit::<T>(0.25));
         for j in 0..N {
@@ -110,7 +110,7 @@ impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
         matrix
     }
 
-    /// `tilt` has no meaning here and is left out.
+    /// Gravity torque `g(q)`, N m (N); `tilt` is ignored, for a chain has a gravity vector.
     fn gravity(&self, theta: &[T; P], q: &SVector<T, N>, _tilt: T) -> SVector<T, N> {
         let still = [T::zero(); N];
         links_of(theta)
@@ -190,8 +190,8 @@ impl<T: Real, const N: usize, const P: usize> Arm<T, N, P> for Chain<T, N> {
         matrix
     }
 
-    /// A point mass on the z axis of the last link's frame. A load anywhere else is a change of the last link's ten parameters
-    /// ([`point_mass`]).
+    /// Change of `theta` by a point mass, kg, at `distance`, m, on the z axis of the last link's frame; for a point mass off the axis see
+    /// [`point_mass`].
     fn payload(&self, _theta: &[T; P], mass: T, distance: T) -> [T; P] {
         let (mut delta, load) = ([T::zero(); P], point_mass(mass, [T::zero(), T::zero(), distance]));
         let last = delta.as_chunks_mut::<LINK_PARAMETERS>().0.get_mut(N.wrapping_sub(1));

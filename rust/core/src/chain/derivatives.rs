@@ -1,11 +1,11 @@
 //! Derivatives of the torques of a motion by positions and velocities.
 //!
-//! A joint that moves by `dq_i` carries all links outwards with it as one body: seen from them, it is the motion of the links inwards that
-//! changes. With the motion subspace `S`, its rate `S' = v x S` and `S'' = a x S + v x S'`, both by the motion of the link before, link `k`
-//! then needs `S x* f_k + I_k S'' + 2 B_k S'` more force for the joint's position and `2 (I_k S' + B_k S)` for its velocity, where
-//! `2 B_k x = v_k x* I_k x + x x* I_k v_k - I_k (v_k x x)` (Singh, Russell and Wensing 2022). In the axes used here `B_k` has twelve
-//! numbers: the force `x_w x p`, `p` the linear momentum, and the moment `G x_w`, `G = -[w x] Sigma - [h x] [v x]`, with the angular part
-//! `x_w` alone; `Sigma` are second moments of mass, `h` first moments. They add up over links.
+//! A joint that moves by `dq_i` carries all outer links with it as one body; relative to them the motion of the inner links changes. With
+//! the motion subspace `S` of the joint, `S' = v x S` and `S'' = a x S + v x S'`, `v` and `a` of the parent link, outer link `k` needs
+//! `S x* f_k + I_k S'' + 2 B_k S'` more force per joint position and `2 (I_k S' + B_k S)` per joint velocity, where
+//! `2 B_k x = v_k x* I_k x + x x* I_k v_k - I_k (v_k x x)` (Singh, Russell and Wensing 2022). In the axes of the base frame `B_k` has twelve
+//! numbers: the force `x_w x p`, `p` the linear momentum, and the moment `G x_w`, `G = -[w x] Sigma - [h x] [v x]`, `x_w` the angular part
+//! of `x`, `Sigma` second and `h` first moments of mass. The operators `B_k` of several links add up.
 
 use super::Chain;
 use super::dynamics::InertiaMatrix;
@@ -17,20 +17,20 @@ use super::vector::{
 use crate::number::Number;
 use crate::real::{Real, lit};
 
-/// Torques of a motion with their derivatives; rows are torques.
+/// Joint torques of a motion and their derivatives by `q`, `dq` and `ddq`; row `i` of a matrix is of torque `i`.
 #[derive(Debug, Clone, Copy)]
 pub struct TorqueDerivatives<V, const N: usize> {
-    /// `M ddq + C dq + g`.
+    /// Joint torques `M ddq + C dq + g`, N m (N).
     pub torque: [V; N],
-    /// By positions.
+    /// Derivatives of the torques by joint positions, `(N, N)`, by rows.
     pub by_position: InertiaMatrix<V, N>,
-    /// By velocities.
+    /// Derivatives of the torques by joint velocities, `(N, N)`, by rows.
     pub by_velocity: InertiaMatrix<V, N>,
-    /// By accelerations: the inertia matrix.
+    /// Derivatives of the torques by joint accelerations: the inertia matrix, by rows.
     pub by_acceleration: InertiaMatrix<V, N>,
 }
 
-/// The operator `B` of one or several links.
+/// Operator `B` of one or several links (Singh, Russell and Wensing 2022): `2 B x = v x* I x + x x* I v - I (v x x)`.
 #[derive(Clone, Copy)]
 struct VelocityOperator<V> {
     moment: Matrix3<V>,
@@ -43,7 +43,7 @@ impl<V: Number> VelocityOperator<V> {
         Self { moment: [[zero(); 3]; 3], momentum: [zero(); 3] }
     }
 
-    /// Of a body with this velocity.
+    /// Operator `B` of a body with this inertia and velocity.
     #[inline(always)]
     fn of(inertia: &SpatialInertia<V>, velocity: &Twist<V>) -> Self {
         let (Twist { angular: w, linear: v }, h) = (velocity, &inertia.first);
@@ -72,13 +72,13 @@ impl<V: Number> VelocityOperator<V> {
         Self { moment, momentum: add(&self.momentum, &other.momentum) }
     }
 
-    /// Force on a motion vector.
+    /// Force `B x` for the motion vector `x`.
     #[inline(always)]
     fn times(&self, x: &Twist<V>) -> Wrench<V> {
         Wrench { moment: turned(&self.moment, &x.angular), force: cross(&x.angular, &self.momentum) }
     }
 
-    /// What the power of this force at `joint` is to be multiplied with the angular part of the motion vector by.
+    /// Vector `r` for which the power of the force `B x` at `joint` is `r . x_w`, `x_w` the angular part of the motion vector `x`.
     #[inline(always)]
     fn transposed(&self, joint: &Twist<V>) -> Vector3<V> {
         cross_plus(&self.momentum, &joint.linear, &turned_back(&self.moment, &joint.angular))
@@ -86,7 +86,7 @@ impl<V: Number> VelocityOperator<V> {
 }
 
 impl<T: Real, const N: usize> Chain<T, N> {
-    /// Torques of a motion `[q, dq, ddq]` with their derivatives.
+    /// Joint torques of a motion `[q, dq, ddq]`, SI, and their derivatives.
     #[inline(always)]
     pub fn torque_derivatives<V: Number<Real = T>>(
         &self,

@@ -9,11 +9,11 @@ use crate::linear::solve_positive_definite;
 use crate::number::Number;
 use crate::real::{Real, lit};
 
-/// An inertia matrix, by rows.
+/// Matrix over joints, such as an inertia matrix, by rows.
 pub type InertiaMatrix<V, const N: usize> = [[V; N]; N];
 
 impl<T: Real, const N: usize> Chain<T, N> {
-    /// Inertia matrix `M(q)`, `(N, N)`, kg m^2, of links with these inertial parameters.
+    /// Inertia matrix `M(q)`, `(N, N)`, kg m^2 (kg), of a chain with the inertial parameters `links`.
     #[inline(always)]
     pub fn inertia_matrix<V: Number<Real = T>>(
         &self,
@@ -28,7 +28,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         composite_inertia(&poses, &mut inertia, &[[zero(); N]; N])
     }
 
-    /// Torques of a motion by inverse dynamics: `M ddq + C dq + g`, `(N,)`, N m (N).
+    /// Joint torques of a motion by inverse dynamics: `M ddq + C dq + g`, `(N,)`, N m (N).
     #[inline(always)]
     pub fn inverse_dynamics<V: Number<Real = T>>(
         &self,
@@ -46,14 +46,14 @@ impl<T: Real, const N: usize> Chain<T, N> {
         joint_torques(&poses, &mut forces)
     }
 
-    /// Bias `C dq + g`, `(N,)`, N m (N): the torques of the motion without acceleration.
+    /// Bias `C dq + g`, `(N,)`, N m (N): joint torques of a motion without acceleration.
     #[inline(always)]
     pub fn bias<V: Number<Real = T>>(&self, links: &[LinkInertia<V>; N], q: &[V; N], dq: &[V; N]) -> [V; N] {
         self.equation_terms_at(&self.poses(q), links, &[[zero(); N]; N], dq).bias
     }
 
-    /// Accelerations under the torques `tau` without friction, `(N,)`, by the `L D L'` factors of the inertia matrix to which
-    /// `constant_inertia` is added.
+    /// Joint accelerations, `(N,)`, rad/s^2 (m/s^2), under the torques `tau` without friction, by `L D L'` factors of `M(q)` plus
+    /// `constant_inertia`.
     #[inline(always)]
     pub fn forward_dynamics<V: Number<Real = T>>(
         &self,
@@ -70,7 +70,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         solve_positive_definite(inertia, right)
     }
 
-    /// Kinetic energy, J, of the links.
+    /// Kinetic energy of the links, J.
     #[inline(always)]
     pub fn links_kinetic_energy<V: Number<Real = T>>(
         &self,
@@ -88,7 +88,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         twice * V::of(lit(0.5))
     }
 
-    /// Potential energy above `q = 0`, J.
+    /// Potential energy of the links above that at `q = 0`, J.
     #[inline(always)]
     pub fn links_potential_energy<V: Number<Real = T>>(&self, links: &[LinkInertia<V>; N], q: &[V; N]) -> V {
         let (poses, gravity) = (self.poses(q), of::<V>(&self.gravity));
@@ -103,7 +103,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         energy
     }
 
-    /// Inertia matrix, with `constant_inertia` added, and bias together.
+    /// Inertia matrix, plus `constant_inertia`, and bias `C dq + g` at known link poses.
     #[inline(always)]
     pub(super) fn equation_terms_at<V: Number<Real = T>>(
         &self,
@@ -122,14 +122,14 @@ impl<T: Real, const N: usize> Chain<T, N> {
         EquationTerms { inertia: composite_inertia(poses, &mut inertia, constant_inertia), bias }
     }
 
-    /// Motion of the base: gravity is an acceleration against it.
+    /// Motion of the base: at rest, with gravity as an acceleration in the opposite direction.
     #[inline(always)]
     pub(super) fn base_motion<V: Number<Real = T>>(&self) -> LinkMotion<V> {
         let acceleration = Twist { angular: [zero(); 3], linear: negative(&of(&self.gravity)) };
         LinkMotion { velocity: Twist::zero(), acceleration }
     }
 
-    /// Velocities and accelerations of all links; without `ddq`, of a motion whose joints do not accelerate.
+    /// Velocities and accelerations of all links; without `ddq` the joints do not accelerate.
     #[inline(always)]
     pub(super) fn motions<V: Number<Real = T>>(
         &self,
@@ -153,7 +153,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
     }
 }
 
-/// Velocity and acceleration of a link as spatial vectors; the acceleration less that of gravity.
+/// Spatial velocity of a link, and its spatial acceleration less that of gravity, in the base frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LinkMotion<V> {
     pub(super) velocity: Twist<V>,
@@ -161,7 +161,7 @@ pub(super) struct LinkMotion<V> {
 }
 
 impl<V: Number> LinkMotion<V> {
-    /// Force that this motion of a link needs, its weight included.
+    /// Force that a link of this inertia needs for its motion, its weight included.
     #[inline(always)]
     pub(super) fn force(&self, inertia: &SpatialInertia<V>) -> Wrench<V> {
         let rate = self.velocity.cross_force(&inertia.times(&self.velocity));
@@ -169,7 +169,7 @@ impl<V: Number> LinkMotion<V> {
     }
 }
 
-/// Torques of the joints for these forces on the links, which become those on the chains from each link outwards.
+/// Joint torques, N m (N), for `forces` on single links; `forces` become the sums over each link and all outer ones.
 #[inline(always)]
 pub(super) fn joint_torques<V: Number, const N: usize>(
     poses: &[LinkPose<V>; N],
@@ -184,7 +184,7 @@ pub(super) fn joint_torques<V: Number, const N: usize>(
     torques
 }
 
-/// The inertia matrix for these inertias of the links, which become those of the composite bodies from each link outwards.
+/// Inertia matrix for `inertia` of single links, by composite rigid bodies; `inertia` become the sums over each link and all outer ones.
 #[inline(always)]
 pub(super) fn composite_inertia<V: Number, const N: usize>(
     poses: &[LinkPose<V>; N],

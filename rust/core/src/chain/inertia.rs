@@ -14,24 +14,24 @@ pub const LINK_PARAMETERS: usize = 10;
 /// `I_xx, I_xy, I_yy, I_xz, I_yz, I_zz` about the origin of the link frame, all in the axes of the link frame; kg, kg m, kg m^2.
 pub type LinkInertia<V> = [V; LINK_PARAMETERS];
 
-/// Inertia of one or several bodies about the origin of the base frame, in its axes.
+/// Spatial inertia of one or several bodies about the origin of the base frame, in the axes of the base frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SpatialInertia<V> {
     pub(super) mass: V,
-    /// First moments.
+    /// First moments of mass about the origin of the base frame, kg m.
     pub(super) first: Vector3<V>,
-    /// Second moments `xx, xy, yy, xz, yz, zz`.
+    /// Moments of inertia `xx, xy, yy, xz, yz, zz` about the origin of the base frame, kg m^2.
     pub(super) second: [V; 6],
 }
 
 impl<V: Number> SpatialInertia<V> {
-    /// The inertia of a link without mass.
+    /// Spatial inertia of a link without mass.
     #[inline(always)]
     pub(super) fn zero() -> Self {
         Self { mass: zero(), first: [zero(); 3], second: [zero(); 6] }
     }
 
-    /// Of a link in its pose.
+    /// Spatial inertia, in the base frame, of a link at `pose`.
     #[inline(always)]
     pub(super) fn of(link: &LinkInertia<V>, pose: &LinkPose<V>) -> Self {
         let [mass, hx, hy, hz, xx, xy, yy, xz, yz, zz] = *link;
@@ -57,7 +57,7 @@ impl<V: Number> SpatialInertia<V> {
         }
     }
 
-    /// Of both together.
+    /// Spatial inertia of two bodies that move as one.
     #[inline(always)]
     pub(super) fn plus(&self, other: &Self) -> Self {
         let mut second = self.second;
@@ -67,14 +67,14 @@ impl<V: Number> SpatialInertia<V> {
         Self { mass: self.mass + other.mass, first: add(&self.first, &other.first), second }
     }
 
-    /// Second moments times a vector.
+    /// Product of the matrix of moments of inertia and the vector `x`.
     #[inline(always)]
     pub(super) fn second_times(&self, x: &Vector3<V>) -> Vector3<V> {
         let [xx, xy, yy, xz, yz, zz] = self.second;
         [dot(&[xx, xy, xz], x), dot(&[xy, yy, yz], x), dot(&[xz, yz, zz], x)]
     }
 
-    /// Momentum at a velocity, or force for an acceleration.
+    /// Spatial momentum at a velocity, or spatial force for an acceleration.
     #[inline(always)]
     pub(super) fn times(&self, motion: &Twist<V>) -> Wrench<V> {
         Wrench {
@@ -84,7 +84,7 @@ impl<V: Number> SpatialInertia<V> {
     }
 }
 
-/// Ten parameters of a point mass, kg, at a position in the link frame, m.
+/// Ten inertial parameters of a point mass, kg, at the position `at`, m, in the link frame.
 pub fn point_mass<V: Number>(mass: V, at: Vector3<V>) -> LinkInertia<V> {
     let [x, y, z] = at;
     let [hx, hy, hz] = scaled(mass, &at);

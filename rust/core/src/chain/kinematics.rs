@@ -6,14 +6,14 @@ use crate::number::Number;
 use crate::real::{Real, lit};
 use crate::trig::SinCos;
 
-/// Where a link is.
+/// Pose of a link, and motion subspace of its joint, in the base frame.
 #[derive(Debug, Clone, Copy)]
 pub struct LinkPose<V> {
-    /// Maps vectors of the link frame into the base frame.
+    /// Rotation matrix that maps vectors of the link frame into the base frame.
     pub rotation: Matrix3<V>,
     /// Origin of the link frame in the base frame, m.
     pub position: Vector3<V>,
-    /// Motion subspace of its joint: velocity of the link per joint velocity.
+    /// Motion subspace of the link's joint: spatial velocity of the link per joint velocity.
     pub joint: Twist<V>,
 }
 
@@ -24,14 +24,13 @@ impl<V: Number> LinkPose<V> {
     }
 }
 
-/// What the pose of a link needs to know of its joint. The rotation from the link frame into that of the parent link is
-/// `fixed + cosine cos q + sine sin q` (Rodrigues).
+/// Constants of a joint: the rotation from the link frame into that of the parent link is `fixed + cosine cos q + sine sin q` (Rodrigues).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct JointConstants<T> {
     fixed: Matrix3<T>,
     cosine: Matrix3<T>,
     sine: Matrix3<T>,
-    /// The axis in the parent link's frame.
+    /// Unit vector along the joint axis in the parent link's frame.
     axis: Vector3<T>,
 }
 
@@ -68,7 +67,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         self.poses_at(&sincos, q)
     }
 
-    /// Angles by which the joints turn: their positions; 0 for prismatic joints.
+    /// Angles by which the joints turn, rad: positions of revolute joints, 0 for prismatic joints.
     #[inline(always)]
     pub(super) fn angles_of<V: Number<Real = T>>(&self, q: &[V; N]) -> [V; N] {
         let mut angles = *q;
@@ -80,7 +79,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         angles
     }
 
-    /// Poses of all links, given sines and cosines of the revolute joints' positions.
+    /// Poses of all links, given sines and cosines of the revolute joints' positions and the positions `q`, rad or m.
     #[inline(always)]
     pub(super) fn poses_at<V: Number<Real = T>>(
         &self,

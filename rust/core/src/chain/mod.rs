@@ -2,8 +2,8 @@
 //!
 //! Poses, velocities, forces and inertias are spatial vectors and matrices at one point, the origin of the base frame, in the axes of the
 //! base frame (Featherstone 2008, section 2): links add up without transformations. The inertia matrix is that of the composite rigid
-//! body algorithm (section 6.2), bias and inverse dynamics are recursive Newton-Euler (section 5.3). Everything is written over
-//! [`crate::number::Number`]: one chain or several side by side.
+//! body algorithm (section 6.2), bias and inverse dynamics are recursive Newton-Euler (section 5.3). Scalars are a
+//! [`crate::number::Number`]: of one chain or of several side by side.
 //!
 //! Friction, effects and stick-slip come with [`crate::plant::Plant`], for a [`Chain`] is an [`crate::arm::Arm`] too.
 
@@ -26,43 +26,43 @@ pub use vector::{Matrix3, Twist, Vector3, Wrench};
 use crate::real::Real;
 use kinematics::JointConstants;
 
-/// Most joints of a chain for which the crates above this one choose the size at run time.
+/// Largest number of joints of a chain whose size is chosen at run time, as in `armgap-fit` and the Python and C interfaces.
 pub const MAX_JOINTS: usize = 7;
 
-/// How a joint moves.
+/// Kind of a joint: revolute or prismatic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JointKind {
-    /// Turns about its axis; rad, N m.
+    /// The joint turns about its axis; rad, N m.
     Revolute,
-    /// Slides along its axis; m, N.
+    /// The joint slides along its axis; m, N.
     Prismatic,
 }
 
-/// A joint: its frame in the frame of the parent link at `q = 0`, and its axis. The link frame is the joint frame moved by the joint.
+/// Joint of a chain: its axis, and its frame in the frame of the parent link. At `q = 0` the link frame is the joint frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChainJoint<T> {
-    /// How it moves.
+    /// Kind of the joint: revolute or prismatic.
     pub kind: JointKind,
-    /// Rotation matrix, by rows, from the joint frame into the frame of the parent link; of the first joint, into the base frame.
+    /// Rotation matrix, by rows, from the joint frame into the frame of the parent link; for the first joint, into the base frame.
     pub rotation: Matrix3<T>,
     /// Origin of the joint frame in the frame of the parent link, m.
     pub translation: Vector3<T>,
-    /// Unit vector along the axis, in the joint frame.
+    /// Unit vector along the joint axis, in the joint frame.
     pub axis: Vector3<T>,
 }
 
-/// A serial arm with `N` joints.
+/// Serial arm with `N` revolute or prismatic joints, under gravity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Chain<T, const N: usize> {
     joints: [ChainJoint<T>; N],
     gravity: Vector3<T>,
     constants: [JointConstants<T>; N],
-    /// Gravity along the position of each link's origin and in the axes of its frame, at `q = 0`.
+    /// At `q = 0`, for each link: product of gravity and the position of its frame's origin, m^2/s^2, and gravity in its frame, m/s^2.
     reference: [(T, Vector3<T>); N],
 }
 
 impl<T: Real, const N: usize> Chain<T, N> {
-    /// The chain of these joints, from the base, under `gravity`, m/s^2, in the base frame. Rotations must be orthogonal and axes of unit
+    /// Chain of `joints`, from the base outwards, under `gravity`, m/s^2, in the base frame. Rotations must be orthogonal and axes of unit
     /// length.
     pub fn new(joints: [ChainJoint<T>; N], gravity: Vector3<T>) -> Self {
         let constants = joints.map(|joint| JointConstants::of(&joint));
@@ -71,7 +71,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         chain
     }
 
-    /// The joints, from the base.
+    /// Joints of the chain, from the base outwards.
     pub fn joints(&self) -> &[ChainJoint<T>; N] {
         &self.joints
     }
@@ -81,12 +81,12 @@ impl<T: Real, const N: usize> Chain<T, N> {
         &self.gravity
     }
 
-    /// The same chain under another gravity, as when its base is tilted.
+    /// The chain under a changed `gravity`, m/s^2, in the base frame, as when its base is tilted.
     pub fn with_gravity(&self, gravity: Vector3<T>) -> Self {
         Self::new(self.joints, gravity)
     }
 
-    /// Gravity along the position of each link's origin and in the axes of its frame.
+    /// For each link at `q`: product of gravity and the position of its frame's origin, m^2/s^2, and gravity in its frame, m/s^2.
     fn gravity_along(&self, q: &[T; N]) -> [(T, Vector3<T>); N] {
         let along = |pose: LinkPose<T>| {
             (vector::dot(&self.gravity, &pose.position), vector::turned_back(&pose.rotation, &self.gravity))

@@ -4,10 +4,10 @@ use super::JointKind;
 use super::inertia::LINK_PARAMETERS;
 use core::fmt::{Display, Formatter, Result};
 
-/// Parameters per joint: ten of its link, the rotor's inertia, viscous and Coulomb friction.
+/// Parameters per joint of a chain: ten inertial ones of the link, rotor inertia, viscous and Coulomb friction.
 pub const PARAMETERS_PER_JOINT: usize = LINK_PARAMETERS + 3;
 
-/// Name and unit of a link's ten numbers.
+/// Names and SI units of a link's ten inertial parameters.
 pub const LINK_NAMES: [(&str, &str); LINK_PARAMETERS] = [
     ("mass", "kg"),
     ("mx", "kg m"),
@@ -21,18 +21,18 @@ pub const LINK_NAMES: [(&str, &str); LINK_PARAMETERS] = [
     ("izz", "kg m^2"),
 ];
 
-/// Rotor inertia, viscous and Coulomb friction: name, unit at a revolute joint, unit at a prismatic one.
+/// Rotor inertia, viscous and Coulomb friction of a joint: name, unit at a revolute joint, unit at a prismatic joint.
 const JOINT: [(&str, &str, &str); PARAMETERS_PER_JOINT - LINK_PARAMETERS] =
     [("rotor", "kg m^2", "kg"), ("viscous", "N m s/rad", "N s/m"), ("coulomb", "N m", "N")];
 
-/// Name and unit of one parameter; shown as its name, for example `ixx2`.
+/// Name and unit of one parameter of a chain; displayed as stem and number, for example `ixx2`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ChainParameter {
-    /// Name without the number, for example `ixx`.
+    /// Name of the parameter without the number of its joint or link, for example `ixx`.
     pub stem: &'static str,
-    /// Number of the joint or link, from 1.
+    /// Number of the parameter's joint or link, from 1.
     pub number: usize,
-    /// SI unit.
+    /// SI unit of the parameter, for example `kg m^2`.
     pub unit: &'static str,
 }
 
@@ -42,8 +42,8 @@ impl Display for ChainParameter {
     }
 }
 
-/// The parameter at this index of `theta` for joints of these kinds; `None` beyond the last, 13 per joint: ten of each link, link by
-/// link, then rotor inertias, then viscous, then Coulomb coefficients.
+/// Parameter at `index` of `theta` of a chain with joints of these kinds: ten per link, link by link, then rotor inertias, then viscous, then
+/// Coulomb coefficients; `None` beyond the last.
 pub fn parameter(kinds: &[JointKind], index: usize) -> Option<ChainParameter> {
     let inertial = LINK_PARAMETERS * kinds.len();
     if index < inertial {

@@ -13,7 +13,7 @@ use crate::real::{Real, lit};
 
 impl<T: Real, const N: usize> Chain<T, N> {
     /// Torque regressor: `put(i, k, row)` for every joint `i` and link `k >= i`, so that the sum over `k` of `row . links[k]` is the torque
-    /// of joint `i` by [`Chain::inverse_dynamics`]. Links inside of a joint, `k < i`, do not load it.
+    /// of joint `i` by [`Chain::inverse_dynamics`]. Inner links, `k < i`, do not load the joint.
     #[inline(always)]
     pub fn torque_regressor<V: Number<Real = T>>(
         &self,
@@ -42,8 +42,8 @@ impl<T: Real, const N: usize> Chain<T, N> {
         }
     }
 
-    /// Regressors of the momentum `M dq` and of `g - dK/dq` together: `put(i, k, momentum, potential)` for every joint `i` and link
-    /// `k >= i`. The rate of the first and the second add up to the torque.
+    /// Regressors of the momentum `M dq` and of `g - dK/dq`: `put(i, k, momentum, potential)` for every joint `i` and link `k >= i`. The rate of
+    /// the momentum plus `g - dK/dq` is the torque.
     #[inline(always)]
     pub fn momentum_regressors<V: Number<Real = T>>(
         &self,
@@ -74,7 +74,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
         }
     }
 
-    /// Regressor of the energy above rest at `q = 0`, J: row `k` times `links[k]`, summed over all links.
+    /// Regressor of the links' energy above rest at `q = 0`, J: row `k` times `links[k]`, summed over all links.
     #[inline(always)]
     pub fn links_energy_regressor<V: Number<Real = T>>(
         &self,
@@ -108,7 +108,7 @@ impl<T: Real, const N: usize> Chain<T, N> {
     }
 }
 
-/// A motion vector at the origin of a link's frame, in its axes.
+/// Motion vector at the origin of a link's frame and in the axes of the link, from one at the origin of the base frame.
 #[inline(always)]
 fn in_link<V: Number>(motion: &Twist<V>, pose: &LinkPose<V>) -> Twist<V> {
     let at_origin = cross_plus(&motion.angular, &pose.position, &motion.linear);
@@ -118,7 +118,7 @@ fn in_link<V: Number>(motion: &Twist<V>, pose: &LinkPose<V>) -> Twist<V> {
     }
 }
 
-/// Row over a link's parameters of the power of its momentum at `velocity` in the motion `joint`.
+/// Row over a link's ten parameters: power of the momentum of the link at `velocity` in the motion `joint`.
 #[inline(always)]
 fn momentum_row<V: Number>(joint: &Twist<V>, velocity: &Twist<V>) -> LinkInertia<V> {
     let (w, own) = (&velocity.angular, &joint.angular);
@@ -138,7 +138,7 @@ fn momentum_row<V: Number>(joint: &Twist<V>, velocity: &Twist<V>) -> LinkInertia
     ]
 }
 
-/// The matrix `alpha x + w x w x` of the force for first moments.
+/// Matrix `[alpha x] + [w x] [w x]`, which times the first moments of a link is the force on it.
 #[inline(always)]
 fn first_moments_force<V: Number>(w: &Vector3<V>, alpha: &Vector3<V>) -> [Vector3<V>; 3] {
     let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = squares(w);
@@ -149,7 +149,7 @@ fn first_moments_force<V: Number>(w: &Vector3<V>, alpha: &Vector3<V>) -> [Vector
     ]
 }
 
-/// The moments for each of the second moments, `I alpha + w x I w`.
+/// Moments `I alpha + w x I w` for a unit value of each of `I_xx, I_xy, I_yy, I_xz, I_yz, I_zz`.
 #[inline(always)]
 fn second_moments_moment<V: Number>(w: &Vector3<V>, alpha: &Vector3<V>) -> [Vector3<V>; 6] {
     let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = squares(w);
@@ -164,7 +164,7 @@ fn second_moments_moment<V: Number>(w: &Vector3<V>, alpha: &Vector3<V>) -> [Vect
     ]
 }
 
-/// Products of the entries of a vector.
+/// Outer product `w w'` of the vector `w`, by rows.
 #[inline(always)]
 fn squares<V: Number>(w: &Vector3<V>) -> [Vector3<V>; 3] {
     let [x, y, z] = *w;

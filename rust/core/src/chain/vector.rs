@@ -5,19 +5,19 @@
 use crate::number::Number;
 use crate::real::lit;
 
-/// Three numbers.
+/// Vector of three numbers.
 pub type Vector3<V> = [V; 3];
 
-/// Nine numbers, by rows.
+/// Matrix of three by three numbers, by rows.
 pub type Matrix3<V> = [[V; 3]; 3];
 
-/// Zero in every lane.
+/// The number zero in every lane.
 #[inline(always)]
 pub(super) fn zero<V: Number>() -> V {
     V::of(lit(0.0))
 }
 
-/// `x` in every lane.
+/// Vector `x` in every lane.
 #[inline(always)]
 pub(super) fn of<V: Number>(x: &Vector3<V::Real>) -> Vector3<V> {
     [V::of(x[0]), V::of(x[1]), V::of(x[2])]
@@ -38,13 +38,13 @@ pub(super) fn negative<V: Number>(a: &Vector3<V>) -> Vector3<V> {
     [-a[0], -a[1], -a[2]]
 }
 
-/// `s a`.
+/// Vector `s a`.
 #[inline(always)]
 pub(super) fn scaled<V: Number>(s: V, a: &Vector3<V>) -> Vector3<V> {
     [s * a[0], s * a[1], s * a[2]]
 }
 
-/// `s a + b`.
+/// Vector `s a + b`.
 #[inline(always)]
 pub(super) fn scaled_plus<V: Number>(s: V, a: &Vector3<V>, b: &Vector3<V>) -> Vector3<V> {
     [s.fused(a[0], b[0]), s.fused(a[1], b[1]), s.fused(a[2], b[2])]
@@ -55,13 +55,13 @@ pub(super) fn dot<V: Number>(a: &Vector3<V>, b: &Vector3<V>) -> V {
     a[0].fused(b[0], a[1].fused(b[1], a[2] * b[2]))
 }
 
-/// `a x b`.
+/// Vector product `a x b`.
 #[inline(always)]
 pub(super) fn cross<V: Number>(a: &Vector3<V>, b: &Vector3<V>) -> Vector3<V> {
     [a[1].fused(b[2], -(a[2] * b[1])), a[2].fused(b[0], -(a[0] * b[2])), a[0].fused(b[1], -(a[1] * b[0]))]
 }
 
-/// `a x b + c`.
+/// Vector `a x b + c`.
 #[inline(always)]
 pub(super) fn cross_plus<V: Number>(a: &Vector3<V>, b: &Vector3<V>, c: &Vector3<V>) -> Vector3<V> {
     [
@@ -71,19 +71,19 @@ pub(super) fn cross_plus<V: Number>(a: &Vector3<V>, b: &Vector3<V>, c: &Vector3<
     ]
 }
 
-/// `m x`.
+/// Product `m x` of a matrix and a vector.
 #[inline(always)]
 pub(super) fn turned<V: Number>(m: &Matrix3<V>, x: &Vector3<V>) -> Vector3<V> {
     [dot(&m[0], x), dot(&m[1], x), dot(&m[2], x)]
 }
 
-/// `m' x`.
+/// Product `m' x` of a transposed matrix and a vector.
 #[inline(always)]
 pub(super) fn turned_back<V: Number>(m: &Matrix3<V>, x: &Vector3<V>) -> Vector3<V> {
     scaled_plus(x[0], &m[0], &scaled_plus(x[1], &m[1], &scaled(x[2], &m[2])))
 }
 
-/// `a b`.
+/// Product `a b` of two matrices.
 #[inline(always)]
 pub(super) fn product<V: Number>(a: &Matrix3<V>, b: &Matrix3<V>) -> Matrix3<V> {
     [turned_back(b, &a[0]), turned_back(b, &a[1]), turned_back(b, &a[2])]
@@ -92,20 +92,20 @@ pub(super) fn product<V: Number>(a: &Matrix3<V>, b: &Matrix3<V>) -> Matrix3<V> {
 /// Spatial motion vector: a velocity, an acceleration, or a joint's motion subspace.
 #[derive(Debug, Clone, Copy)]
 pub struct Twist<V> {
-    /// Angular part, rad/s.
+    /// Angular part of the motion vector, rad/s for a velocity.
     pub angular: Vector3<V>,
-    /// Linear part at the origin of the base frame, m/s.
+    /// Linear part of the motion vector at the origin of the base frame, m/s for a velocity.
     pub linear: Vector3<V>,
 }
 
 impl<V: Number> Twist<V> {
-    /// At rest.
+    /// Zero motion vector.
     #[inline(always)]
     pub fn zero() -> Self {
         Self { angular: [zero(); 3], linear: [zero(); 3] }
     }
 
-    /// `s self + other`.
+    /// Motion vector `s self + other`.
     #[inline(always)]
     pub(super) fn scaled_plus(&self, s: V, other: &Self) -> Self {
         Self {
@@ -114,7 +114,7 @@ impl<V: Number> Twist<V> {
         }
     }
 
-    /// Rate of change of a motion vector that moves with this velocity: `self x other`.
+    /// Rate of change of the motion vector `other` fixed in a body that moves at the velocity `self`: `self x other`.
     #[inline(always)]
     pub(super) fn cross(&self, other: &Self) -> Self {
         Self {
@@ -123,7 +123,7 @@ impl<V: Number> Twist<V> {
         }
     }
 
-    /// Rate of change of a force vector that moves with this velocity: `self x* force`.
+    /// Rate of change of the vector `force` fixed in a body that moves at the velocity `self`: `self x* force`.
     #[inline(always)]
     pub(super) fn cross_force(&self, force: &Wrench<V>) -> Wrench<V> {
         Wrench {
@@ -132,7 +132,7 @@ impl<V: Number> Twist<V> {
         }
     }
 
-    /// Power of a force.
+    /// Power of `force` at the velocity `self`, W.
     #[inline(always)]
     pub(super) fn dot(&self, force: &Wrench<V>) -> V {
         dot(&self.angular, &force.moment) + dot(&self.linear, &force.force)
@@ -142,25 +142,25 @@ impl<V: Number> Twist<V> {
 /// Spatial force vector: a force with its moment, or a momentum.
 #[derive(Debug, Clone, Copy)]
 pub struct Wrench<V> {
-    /// Moment about the origin of the base frame, N m.
+    /// Moment about the origin of the base frame, N m, or of a momentum, kg m^2/s.
     pub moment: Vector3<V>,
-    /// Force, N.
+    /// Linear part of the force vector, N, or of a momentum, kg m/s.
     pub force: Vector3<V>,
 }
 
 impl<V: Number> Wrench<V> {
-    /// None.
+    /// Zero force vector.
     #[inline(always)]
     pub fn zero() -> Self {
         Self { moment: [zero(); 3], force: [zero(); 3] }
     }
 
-    /// `self + other`.
+    /// Force vector `self + other`.
     #[inline(always)]
     pub(super) fn plus(&self, other: &Self) -> Self {
         Self { moment: add(&self.moment, &other.moment), force: add(&self.force, &other.force) }
     }
-    /// `s self`.
+    /// Force vector `s self`.
     #[inline(always)]
     pub(super) fn scaled(&self, s: V) -> Self {
         Self { moment: scaled(s, &self.moment), force: scaled(s, &self.force) }

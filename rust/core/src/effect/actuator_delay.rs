@@ -6,7 +6,7 @@
 use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::{Real, lit};
 
-/// Transport delay of the command.
+/// Pure delay of the torque command: `tau_joint(t) = tau(t - delay)`.
 #[derive(Debug)]
 pub struct ActuatorDelay;
 
@@ -39,8 +39,7 @@ impl<T: Real> Effect<T> for ActuatorDelay {
     }
 }
 
-/// Mean over `[from, to]` of the held command, and its first moment about the middle; intervals up to `last` are read, and none is after
-/// it.
+/// Mean over `[from, to]` of the held command `torque`, N m (N), and its first moment about the middle; `last` is the last interval that is read.
 fn held<T: Real>(t: &[T], torque: &[InputSegment<T>], last: usize, from: T, to: T) -> (T, T) {
     let (length, middle) = (to - from, lit::<T>(0.5) * (from + to));
     let (mut upper, mut sum, mut moment, mut i) = (to, T::zero(), T::zero(), last);

@@ -6,7 +6,7 @@
 use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::{Real, lit};
 
-/// First-order actuator.
+/// First-order lag of the torque: `time_constant dtau_joint/dt + tau_joint = tau`.
 #[derive(Debug)]
 pub struct ActuatorLag;
 

@@ -1,21 +1,21 @@
-//! Backlash between motor and link. While it is crossed the motor turns alone and the link is not driven.
+//! Backlash between motor and link: inside it the motor turns alone and the link is not driven.
 //!
-//! The rotor carries a share of the joint's nominal inertia, so with the backlash closed the arm is the nominal one. Its coupling ratio to
-//! the joints before it (the parameter `riding`) is 1 for a motor that sits on the link before and `1 / n` behind a gear of ratio n; on the
-//! first joint it has no influence. The flanks are rigid ([`crate::drivetrain`]); the stiffness and damping below hold a motor to a link
-//! whose motion is measured, not simulated.
+//! The rotor carries a share of the joint's nominal inertia, so with the backlash closed the arm is the nominal one. The rotor's coupling
+//! ratio to the joints before its own (the parameter `riding`) is 1 for a motor on the previous link and `1 / n` behind a gear of ratio n; at
+//! the first joint it has no influence. Flanks are rigid in simulation ([`crate::drivetrain`]); their stiffness and damping hold a motor to a
+//! link whose motion is measured.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::{Real, lit};
 use crate::transmission::Transmission;
 
-/// Natural frequency of the rotor on the flanks of a measured link, 1/s.
+/// Natural frequency of the rotor of a backlash on its flanks where the motion of the link is measured, not simulated, 1/s.
 const FLANK_RATE: f64 = 800.0;
 
-/// Damping ratio of the flanks: no rebound.
+/// Damping ratio of the rotor of a backlash on its flanks, where the motion of the link is measured: no rebound.
 const FLANK_DAMPING: f64 = 0.8;
 
-/// Backlash in the transmission.
+/// Backlash between a motor and its link.
 #[derive(Debug)]
 pub struct Backlash;
 

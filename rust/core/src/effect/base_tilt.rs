@@ -3,7 +3,7 @@
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec};
 use crate::real::Real;
 
-/// Base turned against gravity.
+/// Tilt of the base: gravity turned by `angle`, rad, in the plane of motion.
 #[derive(Debug)]
 pub struct BaseTilt;
 

@@ -3,7 +3,7 @@
 use super::{Edge, Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
-/// Contact with a joint limit.
+/// Contact with a joint limit: a spring and damper beyond a position.
 #[derive(Debug)]
 pub struct Contact;
 

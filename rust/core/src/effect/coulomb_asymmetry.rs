@@ -1,12 +1,12 @@
 //! Coulomb friction whose level depends on the direction: `fc + delta` for `dq > 0`, `fc - delta` for `dq < 0`.
 //!
-//! While the joint moves this is the same function of time as a constant torque `-delta`; only at rest, where friction
-//! holds and a torque does not, do the two differ.
+//! While the joint moves, Coulomb asymmetry is the same function of time as a constant torque `-delta`; the two differ only at rest, where
+//! friction holds and a torque does not.
 
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Coulomb friction that differs by direction.
+/// Coulomb friction that differs by direction: `(fc + delta sgn dq) sgn dq`.
 #[derive(Debug)]
 pub struct CoulombAsymmetry;
 

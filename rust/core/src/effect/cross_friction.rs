@@ -1,11 +1,11 @@
 //! Friction that depends on another joint's motion, as in wrists whose axes share a gear: `level sgn(dq_other)`.
 //!
-//! The other joint is the next one along the arm; the last joint's is the first.
+//! The other joint is the next one along the arm; for the last joint, the first.
 
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Friction by the other joint's direction.
+/// Friction of a joint by the direction of the next joint, `level sgn(dq_other)`.
 #[derive(Debug)]
 pub struct CrossFriction;
 

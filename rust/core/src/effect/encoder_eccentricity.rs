@@ -3,7 +3,7 @@
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
-/// Encoder eccentricity.
+/// Eccentricity of an encoder disc: it shows `q + a sin q + b cos q`.
 #[derive(Debug)]
 pub struct EncoderEccentricity;
 

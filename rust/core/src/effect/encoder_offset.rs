@@ -3,7 +3,7 @@
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Encoder offset.
+/// Offset of the encoder's zero: it shows `q + offset`.
 #[derive(Debug)]
 pub struct EncoderOffset;
 

@@ -1,4 +1,4 @@
-//! External disturbance: a constant torque of the given impulse for `duration` around `time`. It belongs to one log.
+//! External disturbance of one log: a constant torque of the given impulse, N m s (N s), for `duration`, s, around `time`, s.
 //!
 //! Each interval carries the exact mean and first moment of the torque over it, so a mass gains the exact speed and distance whatever
 //! the sample times.
@@ -6,7 +6,7 @@
 use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::{Real, lit};
 
-/// External disturbance at one time.
+/// External disturbance at one time of one log: a constant torque over a short duration.
 #[derive(Debug)]
 pub struct ExternalPulse;
 

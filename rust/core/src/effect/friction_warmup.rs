@@ -1,9 +1,9 @@
-//! Friction that is higher, or lower, when the log begins and settles with a time constant: times `1 + amplitude exp(-t/time_constant)`.
+//! Friction that is higher, or lower, when the log begins and settles with a time constant: a factor `1 + amplitude exp(-t/time_constant)`.
 
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::{Real, lit};
 
-/// Friction that changes while the arm warms up.
+/// Friction that changes while the arm warms up, by the factor `1 + amplitude exp(-t/time_constant)`.
 #[derive(Debug)]
 pub struct FrictionWarmup;
 

@@ -1,11 +1,11 @@
-//! Gear efficiency that depends on the direction of power: a share of the motor's torque is lost while it drives, none while it is driven.
+//! Gear efficiency that depends on the direction of power: a share of the motor's torque is lost while the motor drives, none while it brakes.
 //!
 //! The loss opposes the motion, so it is a part of the Coulomb level wherever the motor pushes in the direction of motion.
 
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Loss of a gear while the motor drives.
+/// Loss of a share of the motor's torque in the gear while the motor drives the joint.
 #[derive(Debug)]
 pub struct GearEfficiency;
 

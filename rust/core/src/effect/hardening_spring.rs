@@ -3,7 +3,7 @@
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
-/// Spring with a cubic part.
+/// Spring at a joint with a linear and a cubic part: `k (q - q0) + cubic (q - q0)^3`.
 #[derive(Debug)]
 pub struct HardeningSpring;
 

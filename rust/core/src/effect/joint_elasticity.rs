@@ -4,17 +4,16 @@
 //! rotor_inertia d2(q + deflection)/dt2 = tau - stiffness deflection - damping d(deflection)/dt
 //! ```
 //!
-//! Damping counts up to the critical one of the rotor on its shaft, `2 sqrt(stiffness rotor_inertia)`.
+//! Damping has no effect beyond the critical damping of the rotor on its shaft, `2 sqrt(stiffness rotor_inertia)`.
 //!
 //! The rotor comes in addition to the rigid arm; encoder and friction are on the link's side or on the motor's
-//! ([`crate::transmission::Sides`]). A shaft of infinite stiffness is a
-//! rigid joint whose rotor is part of the arm's own inertia.
+//! ([`crate::transmission::Sides`]). A shaft of infinite stiffness is a rigid joint whose rotor is part of the arm's own inertia.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, NEVER, Quantity, Spec, Trial};
 use crate::real::{Real, lit};
 use crate::transmission::Transmission;
 
-/// Elastic transmission.
+/// Elastic transmission: a spring and damper between motor and link.
 #[derive(Debug)]
 pub struct JointElasticity;
 

@@ -1,9 +1,9 @@
-//! A spring at the joint: `-k (q - q0)`, a cable, a hose or a counterbalance.
+//! Spring at a joint, as of a cable, a hose or a counterbalance: the torque `-k (q - q0)`.
 
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Joint spring.
+/// Spring at a joint: the torque `-k (q - q0)`.
 #[derive(Debug)]
 pub struct JointSpring;
 

@@ -3,7 +3,7 @@
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Friction that grows with load.
+/// Coulomb friction in proportion to the load that the joint carries: `mu |C dq + g| sgn dq`.
 #[derive(Debug)]
 pub struct LoadDependentFriction;
 

@@ -1,9 +1,9 @@
 //! The library of unmodelled effects, one file each.
 //!
 //! An effect is what a real arm does and the rigid model of [`crate::arm`] leaves out. It acts through one or more
-//! hooks of [`Effect`], all of which default to "nothing": on the command before it becomes torque, as a torque at the
+//! hooks of [`Effect`], all of which default to no effect: on the command before it becomes torque, as a torque at the
 //! joint, on the Coulomb level, on the inertia, on `theta`, on the direction of gravity, or on the measured position.
-//! Adding an effect is one file here and one line in [`catalogue`].
+//! Adding an effect is one file in this folder and one line in [`catalogue`].
 
 mod actuator_delay;
 mod actuator_lag;
@@ -45,10 +45,10 @@ pub use parameter::{EffectParameter, NEVER, Quantity};
 use crate::real::Real;
 use crate::transmission::Transmission;
 
-/// Most parameters an effect may have.
+/// Largest number of parameters of an effect.
 pub const MAX_PARAMETERS: usize = 3;
 
-/// Every effect, in the order of the documentation.
+/// All effects of the library, in the order of the documentation.
 pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
     &[
         &coulomb_asymmetry::CoulombAsymmetry,
@@ -84,79 +84,79 @@ pub fn catalogue<T: Real>() -> &'static [&'static dyn Effect<T>] {
     ]
 }
 
-/// The effect with this name.
+/// The effect called `name`, `None` if there is none.
 pub fn find<T: Real>(name: &str) -> Option<&'static dyn Effect<T>> {
     catalogue::<T>().iter().copied().find(|effect| effect.spec().name == name)
 }
 
-/// Where an effect can sit.
+/// Whether an effect belongs to one joint or to the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
-    /// On one joint.
+    /// The effect belongs to one joint.
     Joint,
-    /// On the arm as a whole.
+    /// The effect belongs to the arm as a whole.
     Arm,
 }
 
-/// Which hooks an effect uses, so that the integrator calls no other.
+/// Hooks of [`Effect`] that an effect uses, so that the integrator calls no others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "one flag per hook")]
 pub struct Hooks {
-    /// [`Effect::force`].
+    /// Whether the effect has [`Effect::force`].
     pub force: bool,
-    /// [`Effect::coulomb`].
+    /// Whether the effect has [`Effect::coulomb`].
     pub coulomb: bool,
-    /// [`Effect::command`].
+    /// Whether the effect has [`Effect::command`].
     pub command: bool,
-    /// [`Effect::measured`].
+    /// Whether the effect has [`Effect::measured`].
     pub measured: bool,
-    /// [`Effect::hysteresis_after`].
+    /// Whether the effect has [`Effect::hysteresis_after`].
     pub memory: bool,
 }
 
 impl Hooks {
-    /// No hook that is called during a step: the effect changes the arm itself.
+    /// Hooks of an effect that changes the arm itself: none is called during a step.
     pub const NONE: Self =
         Self { force: false, coulomb: false, command: false, measured: false, memory: false };
-    /// A torque at the joint.
+    /// Hooks of an effect that is a torque at the joint.
     pub const FORCE: Self = Self { force: true, ..Self::NONE };
-    /// A part of the Coulomb level.
+    /// Hooks of an effect that is a part of the Coulomb level.
     pub const COULOMB: Self = Self { coulomb: true, ..Self::NONE };
-    /// A change of the command.
+    /// Hooks of an effect that changes the torque command.
     pub const COMMAND: Self = Self { command: true, ..Self::NONE };
-    /// A change of the measured position.
+    /// Hooks of an effect that changes the measured position.
     pub const MEASURED: Self = Self { measured: true, ..Self::NONE };
 }
 
-/// What an effect is: the part that does not depend on the scalar type.
+/// Description of an effect: all of it that does not depend on the scalar type.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spec {
-    /// Name in results and on the command line.
+    /// Name of the effect in results and on the command line.
     pub name: &'static str,
-    /// Name for people.
+    /// Name of the effect in reports.
     pub title: &'static str,
-    /// Equation, in the notation of `docs/notation.md`.
+    /// Equation of the effect, in the notation of `docs/notation.md`.
     pub equation: &'static str,
-    /// Where it comes from.
+    /// Literature or practice that the effect's equation comes from.
     pub source: &'static str,
-    /// What a log must contain for it to leave a trace.
+    /// Motion that a log must contain for the effect to show.
     pub excited_by: &'static str,
-    /// One joint or the whole arm.
+    /// Whether the effect belongs to one joint or to the arm.
     pub scope: Scope,
-    /// Fewest joints of an arm that it can sit on.
+    /// Smallest number of joints of an arm that can have the effect.
     pub least_joints: usize,
-    /// Its parameters; the first one switches it off at its neutral value.
+    /// Parameters of the effect; the effect vanishes where the first has its neutral value.
     pub parameters: &'static [EffectParameter],
-    /// Initial guesses, in units of the log's own scale of each quantity (see the fit's `scale`).
+    /// Initial guesses of the parameters, in units of the log's own scale of each quantity (`scale` of `armgap-fit`).
     pub initial_guesses: &'static [[f64; MAX_PARAMETERS]],
-    /// How it is tested before it is fitted.
+    /// Test of the effect to first order, before it is fitted.
     pub trial: Trial,
-    /// Hooks in use.
+    /// Hooks of [`Effect`] that the effect uses.
     pub hooks: Hooks,
 }
 
 impl Spec {
-    /// What most effects share: they sit on one joint of any arm and are tested by their first parameter.
+    /// Defaults of most effects: on one joint of any arm, tested by the first parameter.
     const OF_JOINT: Self = Self {
         name: "",
         title: "",
@@ -172,97 +172,97 @@ impl Spec {
     };
 }
 
-/// How an effect is tested to first order.
+/// How an effect is tested to first order before it is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trial {
-    /// By the derivative at neutral; so many of its first parameters are amplitudes that all vanish there.
+    /// By the derivatives by the first parameters, in this number, at the neutral value, at which these amplitudes vanish together.
     Amplitudes(usize),
-    /// By the derivative at neutral along a ray on which all parameters grow together.
+    /// By the derivative at the neutral value along a ray on which all parameters grow together.
     Ray,
-    /// Not at all: an external disturbance belongs to one log and is looked for there.
+    /// Not at all: an external disturbance is looked for in each log by itself.
     Disturbance,
-    /// By the whole difference it makes at a trial value: a threshold has no derivative where it is never reached.
+    /// By the whole difference that the effect makes at a trial value: a threshold has no derivative where it is never reached.
     Whole,
 }
 
-/// A joint at one instant, as a torque law sees it.
+/// State, torque and load of a joint at one instant, the arguments of an effect's law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointPoint<T> {
     /// Time since the start of the log, s.
     pub t: T,
-    /// Position.
+    /// Joint position, rad or m.
     pub q: T,
-    /// Velocity.
+    /// Joint velocity, rad/s or m/s.
     pub dq: T,
-    /// Torque of the actuator.
+    /// Torque of the actuator, N m (N).
     pub tau: T,
-    /// Torque that gravity and the motion of the other links put on the joint, `C dq + g`.
+    /// Torque that gravity and the motion of other links put on the joint, `C dq + g`, N m (N).
     pub load: T,
-    /// Nominal friction `b |dq| + fc` at this speed.
+    /// Nominal friction `b |dq| + fc` at the joint's speed, N m (N).
     pub friction: T,
-    /// Direction in which the next joint (after the last, the first) slides: -1, 0 or 1.
+    /// Direction in which the next joint slides (for the last joint, the first): -1, 0 or 1.
     pub other: T,
-    /// Hysteresis state of the joint (see [`Effect::hysteresis_after`]).
+    /// Hysteresis state of the joint, N m (N); see [`Effect::hysteresis_after`].
     pub memory: T,
 }
 
-/// A position at which a joint's torque jumps, and the contact beyond it, on the side away from zero.
+/// Position at which a joint's torque jumps, and spring and damper of the contact beyond it, on the side away from zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge<T> {
-    /// Position.
+    /// Joint position at which the torque jumps, rad or m.
     pub position: T,
-    /// Stiffness beyond.
+    /// Stiffness of the contact, N m/rad (N/m).
     pub stiffness: T,
-    /// Damping beyond.
+    /// Damping of the contact, N m s/rad (N s/m).
     pub damping: T,
 }
 
 impl<T: Real> Edge<T> {
-    /// Whether `q` lies beyond.
+    /// Whether the joint position `q` lies beyond the edge, on the side away from zero.
     #[inline]
     pub fn is_behind(&self, q: T) -> bool {
         (q - self.position) * self.position > T::zero()
     }
 
-    /// Fastest rate, 1/s, of an inertia in contact with it.
+    /// Fastest rate of the contact with a body of `inertia`, kg m^2 (kg), in 1/s.
     pub fn rate(&self, inertia: T) -> T {
         (self.stiffness / inertia).sqrt().max(self.damping / inertia)
     }
 }
 
-/// One unmodelled effect: a law with up to [`MAX_PARAMETERS`] parameters `p`.
+/// An unmodelled effect: a law with up to [`MAX_PARAMETERS`] parameters `p`, SI.
 pub trait Effect<T: Real>: Sync {
-    /// Name, parameters, hooks.
+    /// Name, parameters, hooks and further description of the effect.
     fn spec(&self) -> &'static Spec;
 
-    /// Name of the law that is left when the first parameter vanishes; it has the other parameters under the same names.
+    /// Name of the effect that is left when the first parameter vanishes; its parameters are the others, under the same names.
     fn simpler(&self) -> Option<&'static str> {
         None
     }
 
-    /// Torque added to the actuator's side of the joint's equation.
+    /// Torque that the effect adds to the actuator's, N m (N).
     fn force(&self, _p: &[T; MAX_PARAMETERS], _x: &JointPoint<T>) -> T {
         T::zero()
     }
 
-    /// Where [`Effect::force`] jumps, if it does; a step is cut there.
+    /// Position at which [`Effect::force`] jumps, if there is one; the integrator ends a step at the position.
     fn edge(&self, _p: &[T; MAX_PARAMETERS]) -> Option<Edge<T>> {
         None
     }
 
-    /// Addition to the Coulomb level while the joint slides, or is about to slide, in `direction` (+1 or -1).
+    /// Addition to the Coulomb level, N m (N), while the joint slides, or is about to slide, in `direction` (+1 or -1).
     fn coulomb(&self, _p: &[T; MAX_PARAMETERS], _x: &JointPoint<T>, _direction: T) -> T {
         T::zero()
     }
 
-    /// Adds [`Effect::force`] at many points to `sums`, in one call.
+    /// Adds [`Effect::force`] at each of `points` to `sums`.
     fn add_forces(&self, p: &[T; MAX_PARAMETERS], points: &[JointPoint<T>], sums: &mut [T]) {
         for (sum, x) in sums.iter_mut().zip(points) {
             *sum += self.force(p, x);
         }
     }
 
-    /// Adds [`Effect::coulomb`] at many points to `levels`, in one call.
+    /// Adds [`Effect::coulomb`] at each of `points`, in `directions`, to `levels`.
     fn add_coulombs(
         &self,
         p: &[T; MAX_PARAMETERS],
@@ -275,57 +275,57 @@ pub trait Effect<T: Real>: Sync {
         }
     }
 
-    /// Inertia added to the joint's own acceleration only.
+    /// Inertia, kg m^2 (kg), added to the diagonal entry of the joint in the inertia matrix.
     fn inertia(&self, _p: &[T; MAX_PARAMETERS]) -> T {
         T::zero()
     }
 
-    /// Mass and distance along the last link of an added point mass.
+    /// Mass, kg, and distance along the last link, m, of an added point mass.
     fn payload(&self, _p: &[T; MAX_PARAMETERS]) -> Option<(T, T)> {
         None
     }
 
-    /// Angle by which the base is turned against gravity.
+    /// Angle by which the base is turned against gravity, rad.
     fn tilt(&self, _p: &[T; MAX_PARAMETERS]) -> T {
         T::zero()
     }
 
-    /// Hysteresis state after moving by `distance` from a position where it was `memory`.
+    /// Hysteresis state, N m (N), after the joint has moved by `distance`, rad or m, from a position where the state was `memory`.
     fn hysteresis_after(&self, _p: &[T; MAX_PARAMETERS], memory: T, _distance: T) -> T {
         memory
     }
 
-    /// Whether it puts a transmission between motor and link.
+    /// Whether the effect puts a transmission between motor and link.
     fn has_transmission(&self) -> bool {
         false
     }
 
-    /// Transmission of a joint whose own inertia at `q = 0` is `inertia`; none for a rigid joint.
+    /// Transmission of a joint whose own inertia at `q = 0` is `inertia`, kg m^2 (kg); `None` for a rigid joint.
     fn transmission(&self, _p: &[T; MAX_PARAMETERS], _inertia: T) -> Option<Transmission<T>> {
         None
     }
 
-    /// Inertia added to `M_12`, between the first two joints.
+    /// Inertia, kg m^2, added to `M_12` and `M_21`, between the first two joints.
     fn coupling(&self, _p: &[T; MAX_PARAMETERS]) -> T {
         T::zero()
     }
 
-    /// Rewrites a whole log's command of one joint, sample times `t`, into the torque that reaches the joint.
+    /// Rewrites the command of one joint over a whole log, with sample times `t`, s, into the torque that reaches the joint, N m (N).
     fn command(&self, _p: &[T; MAX_PARAMETERS], _t: &[T], _torque: &mut [InputSegment<T>]) {}
 
-    /// Position the encoder shows when the joint stands at `q`.
+    /// Position that the encoder shows when the joint stands at `q`, rad or m.
     fn measured(&self, _p: &[T; MAX_PARAMETERS], q: T) -> T {
         q
     }
 }
 
-/// An effect on a joint of an arm, with its parameters' values.
+/// An effect on a joint of an arm, with values of its parameters.
 #[derive(Clone, Copy)]
 pub struct Active<T: Real> {
-    /// The law.
+    /// Law of the effect.
     pub law: &'static dyn Effect<T>,
-    /// 0-based joint; ignored by effects of the whole arm.
+    /// Joint that the effect is on, from 0; ignored by effects of the whole arm.
     pub joint: usize,
-    /// Parameter values, SI, padded with zeros.
+    /// Values of the effect's parameters, SI, padded with zeros.
     pub p: [T; MAX_PARAMETERS],
 }

@@ -1,63 +1,63 @@
 //! Parameters of effects: what they measure, their units, bounds and neutral values.
 
-/// A threshold so far away that it is never reached: the neutral value of effects that begin beyond one.
+/// Value of a threshold that is never reached, in its SI unit: the neutral value of effects that begin beyond a threshold.
 pub const NEVER: f64 = 1e9;
 
-/// What a parameter measures; it decides the unit and the scale of a first trial value.
+/// Quantity that a parameter of an effect measures; it decides the unit and the scale of a first trial value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Joint torque (force on a linear joint).
     Torque,
     /// Joint inertia (mass on a linear joint).
     Inertia,
-    /// Torque per squared speed.
+    /// Torque per squared speed, N m s^2/rad^2 (N s^2/m^2).
     Drag,
-    /// Torque per cubed speed.
+    /// Torque per cubed speed, N m s^3/rad^3 (N s^3/m^3).
     CubicDrag,
-    /// Torque per position.
+    /// Torque per joint position, N m/rad (N/m).
     Stiffness,
-    /// Torque per deflection of a shaft.
+    /// Torque per deflection of a shaft, N m/rad (N/m).
     ShaftStiffness,
-    /// Torque per deflection rate of a shaft.
+    /// Torque per deflection rate of a shaft, N m s/rad (N s/m).
     ShaftDamping,
-    /// Torque per depth behind a joint limit.
+    /// Torque per depth beyond a joint limit, N m/rad (N/m).
     ContactStiffness,
-    /// Torque per speed behind a joint limit.
+    /// Torque per speed beyond a joint limit, N m s/rad (N s/m).
     ContactDamping,
-    /// Torque per cubed position.
+    /// Torque per cubed joint position, N m/rad^3 (N/m^3).
     Hardening,
-    /// Torque times time.
+    /// Torque times time, N m s (N s).
     Impulse,
-    /// Torque per speed.
+    /// Torque per speed, N m s/rad (N s/m).
     Damping,
-    /// Joint speed.
+    /// Joint speed, rad/s (m/s).
     Speed,
-    /// Joint position.
+    /// Joint position, rad (m).
     Position,
-    /// Joint position where something rests, measured from the middle of the joint's travel.
+    /// Joint position at which a spring is at rest, rad (m); trial values count from the middle of the joint's travel.
     Rest,
-    /// Joint position, measured in the farthest position reached on either side of zero.
+    /// Joint position, rad (m); trial values are shares of the farthest position reached on either side of zero.
     Reach,
-    /// Cycles per revolution (per metre on a linear joint, times 2 pi), measured in cycles over the joint's travel.
+    /// Cycles per revolution (per metre on a linear joint, times 2 pi); trial values are cycles over the joint's travel.
     Cycles,
-    /// Phase or direction, always an angle.
+    /// Phase or direction, rad.
     Angle,
-    /// Cycles per revolution, or any other count.
+    /// Number of cycles per revolution, or any other count.
     Count,
-    /// A ratio to one.
+    /// Ratio without unit.
     Ratio,
-    /// Time.
+    /// Time, s.
     Time,
-    /// Mass.
+    /// Mass, kg.
     Mass,
-    /// Length.
+    /// Length, m.
     Length,
-    /// Time, on the scale of seconds.
+    /// Time, s, with trial values of the order of seconds.
     Duration,
 }
 
 impl Quantity {
-    /// SI unit on a rotary or a linear joint.
+    /// SI unit of the quantity on a rotary or a linear joint.
     pub const fn unit(self, rotary: bool) -> &'static str {
         match (self, rotary) {
             (Self::Torque, true) => "N m",
@@ -89,35 +89,35 @@ impl Quantity {
 /// One parameter of an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EffectParameter {
-    /// Name in results and on the command line.
+    /// Name of the parameter in results and on the command line.
     pub name: &'static str,
-    /// What it measures.
+    /// Quantity that the parameter measures.
     pub quantity: Quantity,
-    /// Smallest admissible value, SI.
+    /// Smallest admissible value of the parameter, SI.
     pub lower: f64,
-    /// Largest admissible value, SI.
+    /// Largest admissible value of the parameter, SI.
     pub upper: f64,
-    /// Value at which the effect vanishes (for the first parameter; others have none of their own).
+    /// Value of an effect's first parameter at which the effect vanishes; without meaning for further parameters.
     pub neutral: f64,
 }
 
 impl EffectParameter {
-    /// A parameter that is neutral at [`NEVER`].
+    /// Parameter that is a threshold: the effect vanishes where it is [`NEVER`].
     pub const fn threshold(name: &'static str, quantity: Quantity, lower: f64) -> Self {
         Self { name, quantity, lower, upper: f64::INFINITY, neutral: NEVER }
     }
 
-    /// A shape: it may take any value and switches nothing off.
+    /// Parameter that shapes an effect: between bounds, with no value at which the effect vanishes.
     pub const fn shape(name: &'static str, quantity: Quantity, lower: f64, upper: f64) -> Self {
         Self { name, quantity, lower, upper, neutral: 0.0 }
     }
 
-    /// A parameter that may take any value and vanishes at zero.
+    /// Parameter that may take any value; the effect vanishes where it is zero.
     pub const fn signed(name: &'static str, quantity: Quantity) -> Self {
         Self { name, quantity, lower: f64::NEG_INFINITY, upper: f64::INFINITY, neutral: 0.0 }
     }
 
-    /// A parameter between bounds that vanishes at zero.
+    /// Parameter between bounds; the effect vanishes where it is zero.
     pub const fn bounded(name: &'static str, quantity: Quantity, lower: f64, upper: f64) -> Self {
         Self { name, quantity, lower, upper, neutral: 0.0 }
     }

@@ -1,12 +1,12 @@
 //! A point mass fixed at a distance along the last link.
 //!
-//! It moves the inertial base parameters along a known curve, so re-estimated parameters absorb it without a trace: it
-//! can be told only against values of the arm file that are trusted.
+//! A payload moves the inertial base parameters along a known curve, so re-estimated parameters absorb it without a trace: it
+//! shows only against values of the arm file that are trusted.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec};
 use crate::real::Real;
 
-/// Unknown load.
+/// Point mass fixed at a distance along the last link.
 #[derive(Debug)]
 pub struct Payload;
 

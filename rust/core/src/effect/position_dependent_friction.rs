@@ -4,7 +4,7 @@ use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity
 use crate::real::Real;
 use crate::trig::sin_cos;
 
-/// Friction that varies with position.
+/// Coulomb friction whose level varies with the joint's position, once per turn: `(a cos q + b sin q) sgn dq`.
 #[derive(Debug)]
 pub struct PositionDependentFriction;
 

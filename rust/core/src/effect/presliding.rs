@@ -5,12 +5,12 @@
 //! dz/dq = stiffness (1 - sgn(dq) z / amplitude),      tau_joint = tau - z
 //! ```
 //!
-//! It depends on the path alone, so between reversals `z` has a closed form in the distance travelled.
+//! The hysteresis state `z` depends on the path alone, so between reversals it has a closed form in the distance travelled.
 
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
-/// Dahl's hysteresis beside the Coulomb friction.
+/// Presliding hysteresis of Dahl (1968), besides Coulomb friction.
 #[derive(Debug)]
 pub struct Presliding;
 

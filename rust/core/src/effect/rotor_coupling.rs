@@ -1,11 +1,11 @@
 //! Coupling of a remote motor's rotor: a motor on link 1 that drives joint 2 through a gear adds `gear inertia` to `M_12`.
 //!
-//! Its share of `M_22` is the effect of `rotor_inertia` on joint 2; the two together are the whole rotor.
+//! The rotor's share of `M_22` is the effect `rotor_inertia` on joint 2; both effects together are the whole rotor.
 
 use super::{Effect, EffectParameter, Hooks, MAX_PARAMETERS, Quantity, Scope, Spec};
 use crate::real::Real;
 
-/// Inertia between the first two joints.
+/// Inertial coupling between the first two joints by the rotor of a remote motor.
 #[derive(Debug)]
 pub struct RotorCoupling;
 

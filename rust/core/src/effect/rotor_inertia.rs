@@ -1,4 +1,4 @@
-//! Inertia on one joint's own acceleration only: the rotor seen through the gear, `inertia ddq`.
+//! Inertia of a rotor reflected to its joint (armature): the torque `inertia ddq` of one joint's own acceleration.
 //!
 //! A motor that drives joint `j` from the previous link adds its inertia times the gear ratio squared to `M_jj` and to
 //! nothing else, unlike a link inertia, which also couples the joints.

@@ -5,7 +5,7 @@
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::{Real, lit};
 
-/// Extra friction at low speed.
+/// Stribeck friction: friction that falls with speed from a higher level at standstill.
 #[derive(Debug)]
 pub struct Stribeck;
 

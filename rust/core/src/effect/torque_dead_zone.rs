@@ -1,9 +1,9 @@
-//! Commands below a level give no torque; above it the excess acts: `sgn(tau) max(|tau| - level, 0)`.
+//! Dead zone of a drive: commands below a level give no torque, larger ones their excess, `sgn(tau) max(|tau| - level, 0)`.
 
 use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Torque dead zone.
+/// Dead zone of a drive, which gives no torque for commands below a level.
 #[derive(Debug)]
 pub struct TorqueDeadZone;
 

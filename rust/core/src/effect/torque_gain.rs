@@ -3,7 +3,7 @@
 use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Wrong gain from command to torque.
+/// Wrong gain from commanded torque to joint torque.
 #[derive(Debug)]
 pub struct TorqueGain;
 

@@ -1,9 +1,9 @@
-//! A constant torque: amplifier or current-sensor bias, `tau + offset`.
+//! Constant torque added to the command, `tau + offset`: bias of an amplifier or a current sensor.
 
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Constant torque added to the command.
+/// Constant torque added to the commanded torque.
 #[derive(Debug)]
 pub struct TorqueOffset;
 

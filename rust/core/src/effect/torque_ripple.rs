@@ -4,7 +4,7 @@ use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity
 use crate::real::Real;
 use crate::trig::sin_cos;
 
-/// Torque ripple (cogging).
+/// Torque ripple (cogging): torque that repeats with the position of the joint, `amplitude sin(n q + phase)`.
 #[derive(Debug)]
 pub struct TorqueRipple;
 

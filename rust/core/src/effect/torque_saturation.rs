@@ -1,9 +1,9 @@
-//! The torque never exceeds a level, whatever is commanded.
+//! Saturation of a drive: its torque never exceeds a level, whatever is commanded.
 
 use super::{Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Spec, Trial};
 use crate::real::Real;
 
-/// Torque saturation.
+/// Saturation of a drive: largest torque that it delivers.
 #[derive(Debug)]
 pub struct TorqueSaturation;
 

@@ -3,7 +3,7 @@
 use super::{Effect, EffectParameter, Hooks, JointPoint, MAX_PARAMETERS, Quantity, Spec};
 use crate::real::Real;
 
-/// Direction-dependent viscous friction.
+/// Viscous friction that differs by direction: `b + delta` forward, `b - delta` backward.
 #[derive(Debug)]
 pub struct ViscousAsymmetry;
 

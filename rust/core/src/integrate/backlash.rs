@@ -9,7 +9,7 @@ use crate::plant::Accelerations;
 use crate::real::Real;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A, N, P> {
-    /// Opens every backlash whose flank would have to pull; returns whether any was opened.
+    /// Opens every backlash whose flank would have to pull at `x` seconds after the sample; returns whether any was opened.
     pub(super) fn open(&self, x: T, state: &mut State<T, N>, motion: &Accelerations<T, N>) -> bool {
         let tau = self.interval.torque_at(x) - motion.motor_friction;
         let mut opened = false;
@@ -23,7 +23,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         opened
     }
 
-    /// When joint `j`'s backlash closes or opens within the step.
+    /// Event at which joint `j`'s backlash closes or opens within the trial step, if it does.
     pub(super) fn flank(
         &self,
         j: usize,
@@ -53,7 +53,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         })
     }
 
-    /// Integrates to the impact of joint `j`'s rotor on its flank.
+    /// Integrates to the impact of joint `j`'s rotor on a flank of its backlash, from a first guess `s`, a fraction of the step.
     pub(super) fn locate_impact(&self, trial_step: &TrialStep<'_, T, N>, j: usize, s: T) -> Located<T, N> {
         let beyond = |there: &State<T, N>| {
             let depth = self.plant.drivetrain().depth(j, &there.latent)?;
@@ -63,7 +63,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         self.locate_crossing(trial_step, s, beyond)
     }
 
-    /// The state just after the impact of joint `j`'s rotor on its flank.
+    /// State just after the impact of joint `j`'s rotor on a flank of its backlash.
     pub(super) fn after_impact(&self, j: usize, mut state: State<T, N>) -> State<T, N> {
         let joints = JointState { q: state.q.into(), dq: state.dq.into() };
         let inertia = self.plant.rigid().kinematics(&joints).equation_terms.inertia;
@@ -71,7 +71,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         state
     }
 
-    /// Closes every backlash whose flank a step without events has crossed.
+    /// Closes every backlash whose rotor has passed a flank in a step in which events were no longer located.
     pub(super) fn close_crossed(&self, state: &mut State<T, N>) {
         for j in 0..N {
             if self.plant.drivetrain().depth(j, &state.latent).is_some_and(|depth| depth > T::zero()) {

@@ -1,4 +1,4 @@
-//! Events inside a step: changes of friction modes, backlash that closes or opens, torques that jump; which comes first, and when.
+//! Events inside a step and their instants: changes of friction modes, backlash that closes or opens, torques that jump.
 
 use super::root::{STRAIGHT, VelocityZero, hermite_root};
 use super::{State, SubStep};
@@ -7,23 +7,23 @@ use crate::kinematics::JointState;
 use crate::plant::{Accelerations, Mode};
 use crate::real::{Real, lit};
 
-/// Corrections of the located instant; each squares the error of the last.
+/// Largest number of Newton corrections of the instant of an event; each squares the error.
 const MAX_REFINEMENTS: usize = 4;
 
-/// Attempts at the instant of a release.
+/// Largest number of false-position steps to the instant at which a stuck joint breaks away or a backlash opens.
 const MAX_FALSE_POSITIONS: usize = 12;
 
-/// A release is located where the stiction violation is positive, but less than this part of its change over the step.
+/// Part of its change over a step below which a positive stiction violation, or flank tension, is near enough to its root.
 const RELEASED: f64 = 1e-8;
 
-/// A joint that has crossed a position at which its torque jumps is put this far beyond it, rad or m.
+/// Distance by which a joint that has crossed a position at which its torque jumps is put beyond the position, rad or m.
 const BESIDE: f64 = 1e-13;
 
-/// Attempts are made this part of a step beyond where the root is expected, so that they end on its far side.
+/// Part of a step by which false-position steps go beyond the expected root, so that they end on its far side.
 const BEYOND: f64 = 1e-9;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A, N, P> {
-    /// The change that a trial step runs into first, if any.
+    /// First event within a trial step from `trial_step.state` to `trial`, if any.
     #[inline]
     pub(super) fn first_event(
         &self,
@@ -70,7 +70,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         first
     }
 
-    /// When a stuck joint breaks away within the step, by linear interpolation of the stiction violation.
+    /// Event at which stuck joint `j` breaks away within the trial step, by linear interpolation of its friction torque at rest less the Coulomb level.
     fn release(
         &self,
         j: usize,
@@ -88,7 +88,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         Some(ModeEvent { joint: j, s, change })
     }
 
-    /// Integrates up to the event.
+    /// Integrates from the start of a trial step up to an event.
     #[inline(never)]
     pub(super) fn locate(&self, trial_step: &TrialStep<'_, T, N>, event: &ModeEvent<T>) -> Located<T, N> {
         if event.joint >= N {
@@ -124,7 +124,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         }
     }
 
-    /// The state just after an event.
+    /// State just after an event, from the state at its instant.
     pub(super) fn applied(&self, event: &ModeEvent<T>, mut state: State<T, N>) -> State<T, N> {
         let j = event.joint;
         if j >= N {
@@ -143,7 +143,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         state
     }
 
-    /// Holds joint `j`, or the motor that its friction acts on.
+    /// Stops joint `j`, or the motor that the joint's friction acts on, and makes the joint stuck.
     pub(super) fn stop(&self, j: usize, state: &mut State<T, N>) {
         if self.plant.drivetrain().brakes_motor(j, &state.latent) {
             state.latent.deflection_rate[j] = -state.dq[j];
@@ -153,7 +153,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         state.modes[j] = Mode::Stuck;
     }
 
-    /// Integrates to where a velocity vanishes: Newton's method, its last correction so small that a straight line is exact.
+    /// Integrates to where the velocity of an event's joint vanishes: Newton's method, its last correction so small that a straight line suffices.
     fn locate_standstill(&self, trial_step: &TrialStep<'_, T, N>, event: &ModeEvent<T>) -> Located<T, N> {
         let &TrialStep { state, x, dt, k1 } = trial_step;
         let mut s = event.s;
@@ -189,7 +189,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         Located { length: s * dt, reached }
     }
 
-    /// Integrates to where a distance, as from a joint limit, vanishes, by Newton's method; `beyond` gives it and its rate.
+    /// Integrates to where a distance, as from a joint limit, vanishes, by Newton's method; `beyond` gives the distance, rad or m, and its rate.
     pub(super) fn locate_crossing(
         &self,
         &TrialStep { state, x, dt, k1 }: &TrialStep<'_, T, N>,
@@ -210,8 +210,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         Located { length: s * dt, reached }
     }
 
-    /// Integrates to just beyond where static friction, or a closed flank, no longer holds: the Illinois variant of false position (Dowell
-    /// and Jarratt 1971) between the start of the step with the violation `ends[0] < 0` and its end with `ends[1] > 0`.
+    /// Integrates to just beyond where static friction, or a closed flank, no longer holds: the Illinois variant of false position (Dowell and Jarratt 1971)
+    /// between the start of the step with the violation `ends[0] < 0` and its end with `ends[1] > 0`.
     fn locate_beyond(
         &self,
         trial_step: &TrialStep<'_, T, N>,
@@ -247,7 +247,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
     }
 }
 
-/// A step that may be cut short: where it starts, when, how long it is, and how the arm moves at its start.
+/// Step that an event may cut short: start `state`, start time `x` after the sample, s, length `dt`, s, and accelerations `k1` at the start.
 pub(super) struct TrialStep<'a, T, const N: usize> {
     pub(super) state: &'a State<T, N>,
     pub(super) x: T,
@@ -255,42 +255,42 @@ pub(super) struct TrialStep<'a, T, const N: usize> {
     pub(super) k1: &'a Accelerations<T, N>,
 }
 
-/// A change of one joint's mode at the fraction `s` of a step.
+/// Change of one joint's friction mode or backlash at the fraction `s` of a step.
 pub(super) struct ModeEvent<T> {
     pub(super) joint: usize,
     pub(super) s: T,
     pub(super) change: Change<T>,
 }
 
-/// What happens at an event.
+/// What changes at an event inside a step.
 pub(super) enum Change<T> {
-    /// The velocity reaches zero.
+    /// The velocity of the joint reaches zero.
     Standstill,
-    /// Static friction no longer holds the joint.
+    /// A stuck joint breaks away: static friction no longer holds it.
     Release {
-        /// The mode it changes to.
+        /// Friction mode that the joint changes to.
         mode: Mode,
-        /// Stiction violation at both ends of the step.
+        /// Friction torque at rest less the Coulomb level of the joint, N m (N), at the start and the end of the step.
         stiction_violation: [T; 2],
     },
-    /// A rotor hits the flank of its backlash.
+    /// The rotor hits a flank of its backlash.
     Impact,
-    /// A joint crosses a position at which its torque jumps.
+    /// The joint crosses a position at which its torque jumps.
     Cross {
-        /// The position.
+        /// Joint position at which the torque jumps, rad or m.
         at: T,
     },
     /// A flank no longer pushes and the backlash opens.
     Open {
-        /// Force by which the flank would have to pull, at both ends of the step; a flank can only push.
+        /// Force by which the flank would have to pull at the start and the end of the step, N m (N); a flank can only push.
         flank_tension: [T; 2],
     },
 }
 
-/// A state at a located event and the time it took to get there.
+/// State at a located event and time from the start of the step.
 pub(super) struct Located<T, const N: usize> {
-    /// Time, s.
+    /// Time from the start of the step to the event, s.
     pub(super) length: T,
-    /// State.
+    /// State at the event.
     pub(super) reached: State<T, N>,
 }

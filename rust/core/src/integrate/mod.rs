@@ -1,10 +1,10 @@
 //! Classical Runge-Kutta over one sample interval, with changes of the friction modes located inside it.
 //!
 //! While no joint reverses, sticks or breaks away the right-hand side is smooth and the step is of order four. A joint whose
-//! velocity would change sign is stopped at the instant it reaches zero; there it either sticks, if friction can hold it, or
+//! velocity would change sign is stopped at the instant of zero velocity; it then either sticks, if friction can hold it, or
 //! goes on in the direction of the torque. A stuck joint breaks away at the instant the torque it needs exceeds its Coulomb
-//! level. So the arm left under a torque below that level does not creep, and a step across a reversal keeps its accuracy. Impacts of
-//! a rotor on the flank of its backlash, and its separation, are located in the same way.
+//! level. So an arm under torques below the Coulomb levels does not creep, and a step across a reversal keeps its accuracy. Impacts of
+//! a rotor on the flank of its backlash, and its separation from the flank, are located by the same methods.
 
 mod backlash;
 mod crossing;
@@ -21,50 +21,49 @@ use crate::transmission::LatentState;
 use crossing::{Located, TrialStep};
 use nalgebra::SVector;
 
-/// Mode changes located within one sub-step before the rest of it is taken with all crossing joints held: eight of each joint, at least
-/// those of two.
+/// Largest number of events located within one step, after which crossing joints are stopped and the rest of the step is taken: 8 per joint, at least 16.
 const fn max_events(joints: usize) -> usize {
     if joints < 2 { 16 } else { 8 * joints }
 }
 
-/// Position, velocity and friction mode of every joint.
+/// Position, velocity and friction mode of every joint, and latent states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State<T, const N: usize> {
-    /// Positions.
+    /// Joint positions, rad or m.
     pub q: SVector<T, N>,
-    /// Velocities.
+    /// Joint velocities, rad/s or m/s.
     pub dq: SVector<T, N>,
-    /// Friction modes.
+    /// Friction mode of each joint: stuck, forward or backward.
     pub modes: [Mode; N],
-    /// Latent states of the transmissions and of hysteresis.
+    /// Latent states of transmissions and of hysteresis.
     pub latent: LatentState<T, N>,
 }
 
 impl<T: Real, const N: usize> State<T, N> {
-    /// A state whose modes follow from its velocities: a joint at rest starts stuck and is released if its torque demands it.
+    /// State whose friction modes follow from its velocities: a joint at rest starts stuck and is released if its torque demands it.
     pub fn new(q: SVector<T, N>, dq: SVector<T, N>) -> Self {
         Self { q, dq, modes: core::array::from_fn(|j| Mode::of(dq[j])), latent: LatentState::none(q) }
     }
 
-    /// Whether every number is finite.
+    /// Whether all joint positions and velocities are finite.
     pub fn is_finite(&self) -> bool {
         self.q.iter().chain(self.dq.iter()).all(nalgebra::ComplexField::is_finite)
     }
 }
 
-/// A sample interval: where it starts, how long it is, and the torque over it.
+/// Sample interval: time of the sample, length, and joint torques over it.
 #[derive(Debug, Clone, Copy)]
 pub struct Interval<'a, T, const N: usize> {
-    /// Time of the sample, s.
+    /// Time of the sample that begins the interval, s.
     pub t: T,
-    /// Length, s.
+    /// Length of the interval, s.
     pub h: T,
-    /// Torque of each joint over the interval.
+    /// Torque of each joint over the interval, N m (N).
     pub torque: &'a [InputSegment<T>; N],
 }
 
 impl<T: Real, const N: usize> Interval<'_, T, N> {
-    /// Torque at `x` seconds after the sample.
+    /// Joint torques at `x` seconds after the sample, N m (N).
     #[inline]
     pub(crate) fn torque_at(&self, x: T) -> SVector<T, N> {
         let s = x / self.h;
@@ -105,7 +104,7 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     }
 }
 
-/// One sample interval in one step, if no friction mode changes within it.
+/// Takes one sample interval in one step; false, with `state` unchanged, if a friction mode changes within the interval.
 #[inline(always)]
 fn fixed_mode_step<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     plant: &Plant<T, A, N, P>,
@@ -134,7 +133,7 @@ fn fixed_mode_step<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     right
 }
 
-/// The rest of a sample interval, of which `done` seconds are over, with exact friction, from mode change to mode change.
+/// Integrates the rest of a sample interval, of which `done` seconds are over, with exact dry friction, from event to event.
 #[inline(never)]
 pub(crate) fn exact<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     plant: &Plant<T, A, N, P>,
@@ -145,11 +144,11 @@ pub(crate) fn exact<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     SubStep::new(plant, interval, state).exact(state, done, interval.h - done);
 }
 
-/// Context of one sub-step.
+/// Plant, sample interval and initial kinematic state of one integration step.
 struct SubStep<'a, T: Real, A, const N: usize, const P: usize> {
     plant: &'a Plant<T, A, N, P>,
     interval: &'a Interval<'a, T, N>,
-    /// Kinematic state at its start; sines and cosines within it are rotated from here.
+    /// Kinematic state at the start of the step; sines and cosines within the step are rotated from it.
     origin: KinematicState<T, N>,
 }
 
@@ -169,7 +168,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
         self.plant.acceleration(self.interval.t + x, &kinematics, &tau, &state.modes, &state.latent)
     }
 
-    /// `state` moved on by `dt` with the rates `(dq, motion)` of some stage.
+    /// State after `dt` seconds from `state` at the velocities of `at` and the accelerations `slope`.
     #[inline]
     fn moved(
         &self,
@@ -188,7 +187,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
         next
     }
 
-    /// One Runge-Kutta step whose first stage is known.
+    /// State after one classical Runge-Kutta step of `dt` seconds, whose accelerations at the start, `k1`, are known.
     #[inline]
     fn runge_kutta(&self, state: &State<T, N>, x: T, dt: T, k1: &Accelerations<T, N>) -> State<T, N> {
         let (half, sixth, two) = (dt * lit(0.5), dt / lit(6.0), lit::<T>(2.0));
@@ -221,13 +220,13 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
         next
     }
 
-    /// A step with friction that is rounded on all joints: no events.
+    /// State after a step of `dt` seconds in which the friction of all joints is rounded, so that there are no events.
     fn smooth(&self, state: &State<T, N>, x: T, dt: T) -> State<T, N> {
         let k1 = self.motion(x, state);
         self.runge_kutta(state, x, dt, &k1)
     }
 
-    /// A step with exact friction: from mode change to mode change.
+    /// Integrates a step of `dt` seconds with exact dry friction, from event to event.
     #[inline]
     fn exact(&self, state: &mut State<T, N>, from: T, dt: T) {
         let (mut x, mut left) = (from, dt);
@@ -254,7 +253,7 @@ impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'a, T
         *state = last;
     }
 
-    /// Holds every joint with dry friction whose velocity contradicts its mode.
+    /// Stops every joint with exact dry friction whose velocity contradicts its friction mode.
     fn hold_reversed(&self, state: &mut State<T, N>) {
         for j in (0..N).filter(|j| !self.plant.is_rounded(*j) && self.plant.is_dry(*j)) {
             let velocity = self.plant.friction_velocity(j, &state.dq, &state.latent);

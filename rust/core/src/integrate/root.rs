@@ -1,22 +1,21 @@
-//! Where a velocity vanishes within a step, from what is known at its ends.
+//! Instant at which a velocity vanishes within a step, from velocities and accelerations at the ends of the step.
 
 use crate::kinematics::JointState;
 use crate::real::{Real, lit};
 
-/// A correction of this part of a step is as good on a straight line: what is left out is of the order of its square.
+/// Newton correction, as a part of a step, below which a straight line in time suffices: its error is of the order of the square.
 pub(super) const STRAIGHT: f64 = 1e-6;
 
-/// A correction of this part of a step is as good on a curve of constant jerk: what is left out is of the order of its cube.
+/// Newton correction, as a part of a step, below which a curve of constant jerk suffices: its error is of the order of the cube.
 const CURVED: f64 = 1e-3;
 
-/// The rate of acceleration over less than this part of a step is not known well enough.
+/// Part of a step below which the jerk, from accelerations at both ends of the part, is not known well enough.
 const SHORT: f64 = 0.01;
 
-/// Newton's step towards a root of the curve through both ends is the last if it is no more than this part of the step: the motion is not
-/// that curve.
+/// Newton step, as a part of a step, at which the search for a root of the cubic through both ends stops: the motion is not exactly that cubic.
 const ROOT: f64 = 1e-3;
 
-/// A joint state close to where joint `j`'s velocity vanishes, `length` after the start of a step, and the accelerations at both.
+/// Joint state close to where joint `j`'s velocity vanishes, `length` seconds after the start of a step, with accelerations at the start and at this state.
 pub(crate) struct VelocityZero<'a, T, const N: usize> {
     pub(crate) joints: &'a JointState<T, N>,
     pub(crate) j: usize,
@@ -25,14 +24,14 @@ pub(crate) struct VelocityZero<'a, T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> VelocityZero<'_, T, N> {
-    /// By how much the velocity vanishes later, by Newton's method.
+    /// Time from the known state to zero velocity by one Newton step, s; negative if the velocity vanished before.
     #[inline]
     pub(crate) fn correction(&self) -> T {
         -self.joints.dq[self.j] / self.ddq[1][self.j]
     }
 
-    /// The joint state where the velocity vanishes and the time from here to there, if it is so close within a step of `whole` that no
-    /// further step is needed.
+    /// Time to zero velocity, s, and the joint state at zero velocity, if it is so close, in a step of `whole` seconds, that no further integration is
+    /// needed.
     #[inline]
     pub(crate) fn reached(&self, whole: T) -> Option<(T, JointState<T, N>)> {
         let correction = self.correction();
@@ -59,8 +58,8 @@ impl<T: Real, const N: usize> VelocityZero<'_, T, N> {
     }
 }
 
-/// First root in `(0, 1)` of the cubic with values `v0, v1` and slopes `d0, d1` at the ends, where `v0 v1 <= 0` or the curve
-/// leaves zero first; found by bisection and Newton on the polynomial alone.
+/// First root in `(0, 1)` of the cubic with values `v0, v1` and slopes `d0, d1` at 0 and 1, where `v0 v1 <= 0` or the cubic leaves zero at 0; by bisection
+/// and Newton's method.
 #[inline]
 pub(crate) fn hermite_root<T: Real>(v0: T, d0: T, v1: T, d1: T) -> T {
     let (two, three) = (lit::<T>(2.0), lit::<T>(3.0));

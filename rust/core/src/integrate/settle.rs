@@ -1,9 +1,9 @@
-//! Friction modes of joints at rest: which break away at an instant, and in which direction.
+//! Friction modes of joints at rest: which joints break away at an instant, and in which direction.
 //!
 //! The accelerations `a` of joints at rest minimise `a' M a / 2 - a' r + sum level_j |a_j|`, which is strictly convex (Gauss's principle of
 //! least constraint with dry friction; Moreau 1988), so one set of modes is right. It is found by an active-set method, as for quadratic
 //! programs: the joint with the largest stiction violation is released; on the way to the accelerations of the new modes, the first
-//! joint whose acceleration would change its sign sticks again. Each round lowers the sum, so none comes back to modes it has left.
+//! joint whose acceleration would change its sign sticks again. Each round lowers the sum, so no set of modes occurs twice.
 
 use super::{State, SubStep};
 use crate::arm::Arm;
@@ -12,7 +12,7 @@ use crate::real::Real;
 use nalgebra::SVector;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A, N, P> {
-    /// Finds the friction modes of joints at rest, and the motion.
+    /// Sets the friction modes of joints at rest, at `x` seconds after the sample, and returns the accelerations.
     #[inline]
     pub(super) fn settle(&self, state: &mut State<T, N>, x: T) -> Accelerations<T, N> {
         let mut motion = self.motion(x, state);
@@ -32,7 +32,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         motion
     }
 
-    /// Releases joint `j`, and sticks joints that are pulled back on the way to the motion without it.
+    /// Releases joint `j`, sticks joints that are then pulled back, and returns the accelerations; `in_vain` marks joints that are pulled back as they are
+    /// released.
     #[inline(never)]
     fn released(
         &self,
@@ -62,20 +63,20 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         self.motion(x, state)
     }
 
-    /// Accelerations on which the joints' friction acts.
+    /// Accelerations of joints, or of the motors that carry their friction, rad/s^2 (m/s^2).
     #[inline]
     fn friction_accelerations(&self, state: &State<T, N>, motion: &Accelerations<T, N>) -> SVector<T, N> {
         SVector::from_fn(|j, _| self.plant.friction_acceleration(j, motion, &state.latent))
     }
 
-    /// Whether the friction of joint `j` acts on something at rest.
+    /// Whether joint `j`, or the motor that carries its friction, is at rest.
     #[inline]
     fn rests(&self, j: usize, state: &State<T, N>) -> bool {
         self.plant.friction_velocity(j, &state.dq, &state.latent) == T::zero()
     }
 
-    /// The released joint at rest whose acceleration is the first to vanish on the way to accelerations against its direction, and the part
-    /// of the way to there.
+    /// Released joint at rest whose acceleration is the first to change sign on a straight line between the accelerations `from` and `to`, with the fraction
+    /// of the line.
     #[inline]
     fn first_pulled_back(
         &self,
@@ -97,7 +98,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         first
     }
 
-    /// A joint whose mode contradicts its velocity, or its acceleration at rest, and the mode it should have.
+    /// Joint whose friction mode contradicts its velocity, or at rest its acceleration, and the mode that agrees with them.
     #[inline]
     fn contradicted(&self, state: &State<T, N>, motion: &Accelerations<T, N>) -> Option<(usize, Mode)> {
         for j in 0..N {
@@ -118,7 +119,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         None
     }
 
-    /// The stuck joint with the largest stiction violation, and the mode it should have.
+    /// Stuck joint, not marked `in_vain`, whose friction torque at rest exceeds its Coulomb level by most, and the friction mode that it breaks away to.
     #[inline]
     fn breaking_away(
         &self,
@@ -139,7 +140,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         found
     }
 
-    /// Stiction violation of joint `j`, and the direction it would slide in.
+    /// Stiction violation of joint `j`, N m (N) (friction torque at rest less the Coulomb level), and the direction, -1 or 1, in which it would slide.
     #[inline]
     pub(super) fn stiction_violation(
         &self,

@@ -1,6 +1,6 @@
 //! Online estimators of serial arms, in three sizes of memory; the number of joints and of parameters is chosen at run time.
 //!
-//! A smaller arm than the size has room for is continued by joints that stand still and carry nothing.
+//! An arm of fewer joints than the size has room for is continued by joints that stand still and carry no mass.
 
 use super::monitored::MonitoredEstimator;
 use super::{EstimatorSettings, OnlineError, check_start};
@@ -8,34 +8,34 @@ use crate::chain::{Chain, ChainJoint, JointKind, LINK_PARAMETERS, PARAMETERS_PER
 use crate::real::{Real, lit};
 use crate::regression::ChosenColumns;
 
-/// An estimator of up to `R` of the `P = 13 N` parameters, and constant torques, of a serial arm of up to `N` joints.
+/// Online estimator of up to `R` of the `P = 13 N` parameters, and constant torques, of a serial arm of up to `N` joints.
 pub type ChainEstimator<T, const N: usize, const P: usize, const R: usize> =
     MonitoredEstimator<T, Chain<T, N>, N, P, R, ChosenColumns<T, N, P, R>>;
 
-/// Up to 2 joints and 20 parameters.
+/// Online estimator of a serial arm of up to 2 joints and 20 parameters.
 pub type SmallChain<T> = ChainEstimator<T, 2, 26, 20>;
-/// Up to 4 joints and 40 parameters.
+/// Online estimator of a serial arm of up to 4 joints and 40 parameters.
 pub type MediumChain<T> = ChainEstimator<T, 4, 52, 40>;
-/// Up to 7 joints and 72 parameters.
+/// Online estimator of a serial arm of up to 7 joints and 72 parameters.
 pub type LargeChain<T> = ChainEstimator<T, 7, 91, 72>;
 
-/// Sizes of estimators. Each has room for the base parameters of any arm of so many joints: `7 n - 4` of its links, `n - 1` rotor
+/// Memory sizes of online estimators of serial arms. Each has room for the base parameters of any arm of `n` joints: `7 n - 4` of its links, `n - 1` rotor
 /// inertias, and viscous, Coulomb and constant torques.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ChainSize {
-    /// [`SmallChain`].
+    /// Up to 2 joints and 20 parameters: [`SmallChain`].
     Small,
-    /// [`MediumChain`].
+    /// Up to 4 joints and 40 parameters: [`MediumChain`].
     Medium,
-    /// [`LargeChain`].
+    /// Up to 7 joints and 72 parameters: [`LargeChain`].
     Large,
 }
 
 impl ChainSize {
-    /// Every size.
+    /// All sizes, from the smallest.
     pub const ALL: [Self; 3] = [Self::Small, Self::Medium, Self::Large];
 
-    /// Most joints and parameters.
+    /// Largest numbers of joints and of estimated parameters.
     pub const fn room(self) -> [usize; 2] {
         match self {
             Self::Small => [2, 20],
@@ -44,29 +44,29 @@ impl ChainSize {
         }
     }
 
-    /// The smallest that has room.
+    /// Smallest size that has room for so many joints and estimated parameters; `None` if there is none.
     pub fn of(joints: usize, parameters: usize) -> Option<Self> {
         Self::ALL.into_iter().find(|size| joints <= size.room()[0] && parameters <= size.room()[1])
     }
 }
 
-/// Settings of an estimator of a serial arm.
+/// Settings of an online estimator of a serial arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChainSettings<'a, T> {
-    /// What does not depend on the arm.
+    /// Settings that do not depend on the arm.
     pub common: EstimatorSettings<T>,
-    /// Joints, from the base; rotations orthogonal, axes of unit length.
+    /// Joints of the arm, from the base outwards; rotations orthogonal, axes of unit length.
     pub joints: &'a [ChainJoint<T>],
     /// Acceleration of gravity in the base frame, m/s^2.
     pub gravity: Vector3<T>,
-    /// Estimated parameters, strictly ascending, as indices into the arm's 13 parameters per joint ([`crate::chain::parameter`]); `13 n + j`
-    /// is a constant torque of joint `j`.
+    /// Estimated parameters, strictly ascending, as indices into the arm's 13 parameters per joint ([`crate::chain::parameter`]); `13 n + j` is a constant
+    /// torque of joint `j`, `n` the number of joints.
     pub columns: &'a [usize],
-    /// Values of the 13 parameters per joint, of which those count that are not estimated; or none, for zeros.
+    /// Known values of the 13 parameters per joint, SI, used for parameters that are not estimated; empty for zeros.
     pub known: &'a [T],
 }
 
-/// Largest departure of a rotation from orthogonality, and of an axis from unit length.
+/// Largest departure of a joint's rotation matrix from orthogonality, and of a joint axis from unit length.
 const ORTHOGONAL: f64 = 1e-4;
 
 impl<T: Real> ChainSettings<'_, T> {
@@ -90,7 +90,7 @@ impl<T: Real> ChainSettings<'_, T> {
         Ok(())
     }
 
-    /// Index in the order of a chain of `room` joints.
+    /// Index of parameter `i` of the arm in `theta` of a chain of `room` joints.
     fn index(&self, i: usize, room: usize) -> usize {
         let n = self.joints.len();
         match i.checked_sub(LINK_PARAMETERS * n) {
@@ -103,7 +103,7 @@ impl<T: Real> ChainSettings<'_, T> {
     }
 }
 
-/// Whether a joint's rotation is one, and its axis of unit length.
+/// Whether a joint's rotation matrix is orthogonal and right-handed, and its axis of unit length.
 fn is_rigid<T: Real>(joint: &ChainJoint<T>) -> bool {
     let dot = |a: &Vector3<T>, b: &Vector3<T>| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let [x, y, z] = &joint.rotation;
@@ -114,7 +114,7 @@ fn is_rigid<T: Real>(joint: &ChainJoint<T>) -> bool {
 }
 
 impl<T: Real, const N: usize, const P: usize, const R: usize> ChainEstimator<T, N, P, R> {
-    /// An estimator that has seen nothing yet; `theta0` has one entry per estimated parameter, or none for zeros.
+    /// Estimator before its first sample; the initial estimate `theta0` has one entry per estimated parameter, or is empty for zeros.
     pub fn of_chain(settings: &ChainSettings<'_, T>, theta0: &[T]) -> Result<Self, OnlineError> {
         const { assert!(P == PARAMETERS_PER_JOINT * N, "a chain has 13 parameters per joint") }
         settings.check(theta0)?;

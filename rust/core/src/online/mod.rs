@@ -1,5 +1,5 @@
-//! Estimator and monitor behind one trait for every arm, for callers that choose the arm at run time: the C and Python interfaces.
-//! [`Online`] is an estimator of one of the arms of [`ArmKind`]; `chain` has those of serial arms.
+//! Online estimator and monitor behind one trait for every arm, for callers that choose the arm at run time: the C and Python interfaces.
+//! [`Online`] is an estimator of one of the arms of [`ArmKind`], [`ChainEstimator`] one of a serial arm.
 //!
 //! Vectors come as slices; a slice of the wrong length is an error, never a panic.
 
@@ -15,89 +15,89 @@ use crate::real::{Real, lit};
 use crate::regression::{Scheme, Variant};
 use crate::rls::Form;
 
-/// Largest number of parameters of any of the arms of [`ArmKind`], asymmetries included.
+/// Largest number of estimated parameters of any of the arms of [`ArmKind`], constant torques included.
 pub const MOST_PARAMETERS: usize = 11;
-/// Largest number of joints of any of them.
+/// Largest number of joints of any of the arms of [`ArmKind`].
 pub const MOST_JOINTS: usize = 2;
 
-/// Settings of an online estimator.
+/// Settings of an online estimator of one of the arms of [`ArmKind`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnlineSettings<T> {
     /// Kind of arm.
     pub kind: ArmKind,
-    /// Regression model.
+    /// Regression model: filtered dynamic, supplied energy or filtered power.
     pub scheme: Scheme,
-    /// Filters and alignment.
+    /// Filters and alignment of signals: as in Reyes and Kelly (1997), or consistent.
     pub variant: Variant,
-    /// How the covariance is kept; by default as suits the precision and `p0`.
+    /// Form in which the covariance is kept; by default as suits the precision and `p0`.
     pub form: Option<Form>,
-    /// Whether one constant torque per joint is estimated too.
+    /// Whether one constant torque per joint is estimated besides the arm's parameters.
     pub asymmetry: bool,
     /// Cut-off of the filters, rad/s.
     pub cutoff: T,
-    /// Forgetting factor in `(0, 1]`.
+    /// Forgetting factor of recursive least squares, in `(0, 1]`.
     pub forgetting: T,
-    /// `P(0) = p0 I`; forgetting lifts no variance above it.
+    /// Initial variance of every parameter, `P(0) = p0 I`; forgetting lifts no variance above it.
     pub p0: T,
-    /// Monitor.
+    /// Settings of the monitor.
     pub monitor: MonitorSettings<T>,
 }
 
-/// Settings of an estimator of any arm.
+/// Settings of an online estimator that do not depend on the arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EstimatorSettings<T> {
-    /// Regression model.
+    /// Regression model: filtered dynamic, supplied energy or filtered power.
     pub scheme: Scheme,
-    /// Filters and alignment.
+    /// Filters and alignment of signals: as in Reyes and Kelly (1997), or consistent.
     pub variant: Variant,
-    /// How the covariance is kept; by default as suits the precision and `p0`.
+    /// Form in which the covariance is kept; by default as suits the precision and `p0`.
     pub form: Option<Form>,
     /// Cut-off of the filters, rad/s.
     pub cutoff: T,
-    /// Forgetting factor in `(0, 1]`.
+    /// Forgetting factor of recursive least squares, in `(0, 1]`.
     pub forgetting: T,
-    /// `P(0) = p0 I`; forgetting lifts no variance above it.
+    /// Initial variance of every parameter, `P(0) = p0 I`; forgetting lifts no variance above it.
     pub p0: T,
-    /// Monitor.
+    /// Settings of the monitor.
     pub monitor: MonitorSettings<T>,
 }
 
-/// Why an estimator cannot be made or a sample cannot be read.
+/// Why an online estimator cannot be made or a sample cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OnlineError {
-    /// A setting is not finite or outside its range.
+    /// The named setting is not finite or outside its range.
     Range(&'static str),
     /// A slice has another length than the arm needs.
     Length {
-        /// Which one.
+        /// Name of the slice.
         name: &'static str,
-        /// Length it needs.
+        /// Length that the arm needs.
         expected: usize,
     },
 }
 
-/// When a sample was taken.
+/// Time of a sample, absolute or from the last sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum When<T> {
-    /// At a time, s.
+    /// Time of the sample, s.
     At(T),
-    /// A period after the last one, s.
+    /// Time since the last sample, s.
     After(T),
 }
 
-/// What became of a sample.
+/// What an online estimator did with a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SampleStatus {
-    /// Taken; not enough samples for a regression yet.
+    /// The sample was taken, but there are not enough samples yet for a regression.
     Starting,
     /// The estimate was updated.
     Updated,
-    /// Not used.
+    /// The sample was not used: not finite, of impossible size or not later than the last.
     Rejected,
 }
 
 impl<T: Real> Default for EstimatorSettings<T> {
-    /// The filtered power model with consistent filters at 50 rad/s, without forgetting.
+    /// Filtered power model with consistent filters at 50 rad/s, without forgetting.
     fn default() -> Self {
         Self {
             scheme: Scheme::FilteredPower,
@@ -112,7 +112,7 @@ impl<T: Real> Default for EstimatorSettings<T> {
 }
 
 impl<T: Real> EstimatorSettings<T> {
-    /// Number of prediction errors per sample of an arm with so many joints.
+    /// Number of prediction errors per sample for an arm with this number of joints.
     pub fn outputs(&self, joints: usize) -> usize {
         if self.scheme == Scheme::FilteredDynamic { joints } else { 1 }
     }
@@ -136,24 +136,24 @@ impl<T: Real> EstimatorSettings<T> {
 }
 
 impl<T: Real> OnlineSettings<T> {
-    /// The defaults of [`EstimatorSettings`].
+    /// The defaults of [`EstimatorSettings`] for an arm of this kind, without constant torques.
     pub fn new(kind: ArmKind) -> Self {
         Self::of(kind, false, EstimatorSettings::default())
     }
 
-    /// These settings for a kind of arm.
+    /// The settings `common` for an arm of this kind; `asymmetry` estimates one constant torque per joint besides its parameters.
     pub fn of(kind: ArmKind, asymmetry: bool, common: EstimatorSettings<T>) -> Self {
         let EstimatorSettings { scheme, variant, form, cutoff, forgetting, p0, monitor } = common;
         Self { kind, scheme, variant, form, asymmetry, cutoff, forgetting, p0, monitor }
     }
 
-    /// What does not depend on the kind of arm.
+    /// Settings that do not depend on the kind of arm.
     fn common(&self) -> EstimatorSettings<T> {
         let Self { scheme, variant, form, cutoff, forgetting, p0, monitor, .. } = *self;
         EstimatorSettings { scheme, variant, form, cutoff, forgetting, p0, monitor }
     }
 
-    /// Number of parameters that are estimated.
+    /// Number of estimated parameters, constant torques included.
     pub fn parameters(&self) -> usize {
         let extra = if self.asymmetry { self.kind.joints() } else { 0 };
         self.kind.parameters().len() + extra
@@ -165,7 +165,7 @@ impl<T: Real> OnlineSettings<T> {
     }
 }
 
-/// A start of the right length, or none, and of possible size.
+/// Error unless the initial estimate `theta0` is empty or of the expected length, and its values are of possible size.
 fn check_start<T: Real>(theta0: &[T], expected: usize) -> Result<(), OnlineError> {
     if !(theta0.is_empty() || theta0.len() == expected) {
         return Err(OnlineError::Length { name: "theta0", expected });
@@ -176,7 +176,7 @@ fn check_start<T: Real>(theta0: &[T], expected: usize) -> Result<(), OnlineError
     Ok(())
 }
 
-/// An estimator of one of the arms of [`ArmKind`].
+/// Online estimator, with monitor, of one of the arms of [`ArmKind`].
 #[derive(Debug, Clone, Copy)]
 pub struct Online<T: Real> {
     settings: OnlineSettings<T>,
@@ -194,7 +194,7 @@ enum EstimatorOfArm<T: Real> {
 }
 
 impl<T: Real> Online<T> {
-    /// An estimator that has seen nothing yet; `theta0` has one entry per parameter, or none for zeros.
+    /// Estimator before its first sample; the initial estimate `theta0` has one entry per estimated parameter, or is empty for zeros.
     pub fn new(settings: OnlineSettings<T>, theta0: &[T]) -> Result<Self, OnlineError> {
         let common = settings.common();
         common.check()?;
@@ -230,12 +230,12 @@ impl<T: Real> Online<T> {
         Ok(Self { settings, running })
     }
 
-    /// The settings.
+    /// Settings that the estimator was made with.
     pub fn settings(&self) -> &OnlineSettings<T> {
         &self.settings
     }
 
-    /// The estimator, whatever its arm.
+    /// Estimator of whichever arm, for reading.
     #[inline]
     pub fn estimator(&self) -> &dyn OnlineEstimator<T> {
         match &self.running {
@@ -248,7 +248,7 @@ impl<T: Real> Online<T> {
         }
     }
 
-    /// The estimator, whatever its arm, to take samples.
+    /// Estimator of whichever arm, for taking samples.
     #[inline]
     pub fn estimator_mut(&mut self) -> &mut dyn OnlineEstimator<T> {
         match &mut self.running {
@@ -273,28 +273,28 @@ impl<T: Real> Online<T> {
         self.estimator_mut().update(when, q, dq, tau)
     }
 
-    /// Estimate.
+    /// Estimated parameters, SI.
     #[inline]
     pub fn theta(&self) -> &[T] {
         self.estimator().theta()
     }
 
-    /// Prediction errors of the last sample used, one per output.
+    /// Prediction errors of the last sample used, N m, J or W by scheme: one per joint for the filtered dynamic model, else one.
     pub fn errors(&self) -> &[T] {
         self.estimator().errors()
     }
 
-    /// Writes the diagonal of `P` into `out` and returns how many entries it has.
+    /// Writes the diagonal of the covariance `P`, for an error of unit variance, into `out`, and returns how many entries it has.
     pub fn variances(&self, out: &mut [T; MOST_PARAMETERS]) -> usize {
         self.estimator().variances(out)
     }
 
-    /// Writes standard deviations of the parameters into `out`, as if errors were white, and returns how many there are.
+    /// Writes standard deviations of the parameters, SI, into `out`, as if prediction errors were white, and returns their number.
     pub fn sigma(&self, out: &mut [T; MOST_PARAMETERS]) -> usize {
         self.estimator().sigma(out)
     }
 
-    /// Writes the covariance for an error of unit variance into `out`, row by row, and returns the number of parameters.
+    /// Writes the covariance `P`, for an error of unit variance, into `out`, row by row, and returns the number of parameters.
     pub fn covariance(&self, out: &mut [T]) -> usize {
         match &self.running {
             EstimatorOfArm::Axis(x) => x.covariance(out),
@@ -306,22 +306,22 @@ impl<T: Real> Online<T> {
         }
     }
 
-    /// Share of a full excitation, from 0 to about 1.
+    /// Excitation by the recent motion, from 0 (none) to about 1 (every parameter).
     pub fn excitation(&self) -> T {
         self.estimator().excitation()
     }
 
-    /// Largest alarm sum as a share of its limit: above 1 the model no longer explains the arm.
+    /// Largest cumulative sum of the alarm test as a share of its limit: above 1 the model no longer explains the arm.
     pub fn alarm_level(&self) -> T {
         self.estimator().alarm_level()
     }
 
-    /// Samples used.
+    /// Number of samples used.
     pub fn updates(&self) -> u64 {
         self.estimator().updates()
     }
 
-    /// Samples rejected.
+    /// Number of samples rejected.
     pub fn rejected(&self) -> u64 {
         self.estimator().rejected()
     }

@@ -1,4 +1,4 @@
-//! An estimator of any arm with its monitor, and what all of them can do.
+//! Online estimator of any arm with its monitor, and the trait of all of them.
 
 use super::{EstimatorSettings, OnlineError, SampleStatus, When};
 use crate::arm::Arm;
@@ -10,12 +10,12 @@ use crate::real::{Real, lit};
 use crate::regression::{AllColumns, Columns};
 use nalgebra::SVector;
 
-/// An estimator, whatever its arm.
+/// Online estimator of any arm, with its monitor.
 pub trait OnlineEstimator<T: Real> {
     /// Number of joints.
     fn joints(&self) -> usize;
 
-    /// Takes one sample: positions, velocities where they are known, and the torques that act until the next sample, one per joint.
+    /// Takes one sample, SI: positions, velocities where they are known, and the torques that act until the next sample, one per joint.
     fn update(
         &mut self,
         when: When<T>,
@@ -24,31 +24,31 @@ pub trait OnlineEstimator<T: Real> {
         tau: &[T],
     ) -> Result<SampleStatus, OnlineError>;
 
-    /// Estimate.
+    /// Estimated parameters, SI.
     fn theta(&self) -> &[T];
 
-    /// Prediction errors of the last sample used, one per output.
+    /// Prediction errors of the last sample used, N m, J or W by scheme: one per joint for the filtered dynamic model, else one.
     fn errors(&self) -> &[T];
 
-    /// Writes the diagonal of `P` into `out`, zeros beyond it, and returns how many entries it has.
+    /// Writes the diagonal of the covariance `P`, for an error of unit variance, into `out`, zeros beyond it, and returns how many entries it has.
     fn variances(&self, out: &mut [T]) -> usize;
 
-    /// Mean square of each prediction error over the monitor's memory.
+    /// Mean square of each prediction error over the monitor's memory, N m, J or W squared by scheme.
     fn mean_square(&self) -> &[T];
 
-    /// Share of a full excitation, from 0 to about 1.
+    /// Excitation by the recent motion, from 0 (none) to about 1 (every parameter).
     fn excitation(&self) -> T;
 
-    /// Largest alarm sum as a share of its limit: above 1 the model no longer explains the arm.
+    /// Largest cumulative sum of the alarm test as a share of its limit: above 1 the model no longer explains the arm.
     fn alarm_level(&self) -> T;
 
-    /// Samples used.
+    /// Number of samples used.
     fn updates(&self) -> u64;
 
-    /// Samples rejected.
+    /// Number of samples rejected.
     fn rejected(&self) -> u64;
 
-    /// Writes standard deviations of the parameters into `out`, as if errors were white, and returns how many there are.
+    /// Writes standard deviations of the parameters, SI, into `out`, as if prediction errors were white, and returns their number.
     fn sigma(&self, out: &mut [T]) -> usize {
         let (count, squares) = (self.variances(out), self.mean_square());
         let spread = squares.iter().fold(T::zero(), |sum, x| sum + *x) / lit(squares.len() as f64);
@@ -59,7 +59,7 @@ pub trait OnlineEstimator<T: Real> {
     }
 }
 
-/// An estimator with its monitor.
+/// Online estimator with its monitor.
 #[derive(Debug, Clone, Copy)]
 pub struct MonitoredEstimator<T: Real, A, const N: usize, const P: usize, const R: usize, S = AllColumns>
 where
@@ -68,9 +68,9 @@ where
     estimator: Estimator<T, A, N, P, R, S>,
     monitor: Monitor<T, N>,
     errors: SVector<T, N>,
-    /// Samples after which the past no longer counts.
+    /// Number of samples after which past samples no longer count, by forgetting.
     memory: T,
-    /// Joints in use, estimated parameters, errors per sample.
+    /// Numbers of joints in use, of estimated `parameters`, and of prediction errors per sample (`outputs`).
     joints: usize,
     parameters: usize,
     outputs: usize,
@@ -79,7 +79,7 @@ where
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>
     MonitoredEstimator<T, A, N, P, R, AllColumns>
 {
-    /// An estimator of all parameters, from these and zeros.
+    /// Estimator of all parameters, from the initial estimate `theta0`, with zeros where it ends.
     pub(super) fn new(arm: A, settings: &EstimatorSettings<T>, theta0: &[T]) -> Self {
         Self::of_columns(arm, AllColumns, [N, R], settings, theta0)
     }
@@ -88,7 +88,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize, const R: usize>
 impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: usize, const R: usize>
     MonitoredEstimator<T, A, N, P, R, S>
 {
-    /// An estimator of chosen parameters of the first so many joints; the others stand still.
+    /// Estimator of `columns` of an arm of which the first `joints` move; further joints stand still.
     pub(super) fn of_columns(
         arm: A,
         columns: S,
@@ -120,13 +120,13 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         }
     }
 
-    /// Uses other instructions than the widest that the processor has.
+    /// Changes the instruction set; the default is the widest that the processor has.
     pub fn with_level(mut self, level: Level) -> Self {
         self.estimator = self.estimator.with_level(level);
         self
     }
 
-    /// Writes the covariance for an error of unit variance into `out`, row by row, and returns the number of parameters.
+    /// Writes the covariance `P`, for an error of unit variance, into `out`, row by row, and returns the number of parameters.
     pub fn covariance(&self, out: &mut [T]) -> usize {
         let (covariance, count) = (self.estimator.rls().covariance(), self.parameters);
         for (column, row) in covariance.data.0.iter().zip(out.chunks_mut(count.max(1))).take(count) {
@@ -137,13 +137,13 @@ impl<T: Real, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const N: usize, const P: 
         count
     }
 
-    /// The estimator alone.
+    /// Estimator without its monitor.
     pub fn estimator(&self) -> &Estimator<T, A, N, P, R, S> {
         &self.estimator
     }
 }
 
-/// The entries of a slice, zeros where it ends.
+/// Vector with the entries of a slice, and zeros where the slice ends.
 #[inline]
 fn vector<T: Real, const N: usize>(x: &[T]) -> SVector<T, N> {
     let mut v = SVector::<T, N>::zeros();
@@ -153,7 +153,7 @@ fn vector<T: Real, const N: usize>(x: &[T]) -> SVector<T, N> {
     v
 }
 
-/// The first entries of a vector.
+/// The first `count` entries of a vector.
 #[inline]
 fn leading<T: Real, const N: usize>(x: &SVector<T, N>, count: usize) -> &[T] {
     x.as_slice().get(..count).unwrap_or(x.as_slice())

@@ -1,4 +1,4 @@
-//! The plant's dynamics with fixed friction modes, as [`crate::fixed_mode`] integrates them.
+//! Dynamics of a plant with fixed friction modes, as [`crate::fixed_mode`] integrates them.
 
 use super::Plant;
 use crate::arm::Arm;

@@ -6,20 +6,20 @@ use crate::effect::JointPoint;
 use crate::real::Real;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
-    /// Joint `j` at an instant.
+    /// State, torque and load of joint `j` at an instant, as effects' laws take them.
     #[inline]
     pub(crate) fn point(&self, j: usize, t: T, q: T, dq: T, tau: T, load: T) -> JointPoint<T> {
         let friction = self.rigid.viscous[j] * dq.abs() + self.rigid.coulomb[j];
         JointPoint { t, q, dq, tau, load, friction, other: T::zero(), memory: T::zero() }
     }
 
-    /// Direction in which joint `j` slides, between -1 and 1 where friction is smoothed.
+    /// Direction in which joint `j` slides: -1, 0 or 1, between them where friction is smoothed.
     #[inline]
     pub(super) fn sliding(&self, j: usize, dq: &[T; N], modes: &[Mode; N]) -> T {
         if self.is_rounded(j) { (dq[j] / self.rounding[j]).tanh() } else { modes[j].direction() }
     }
 
-    /// Coulomb level of joint `j` in a direction, never negative.
+    /// Coulomb level of joint `j` for sliding in `direction`, N m (N), never negative.
     #[inline]
     pub(crate) fn level(&self, j: usize, x: &JointPoint<T>, direction: T) -> T {
         let mut level = self.rigid.coulomb[j];
@@ -33,7 +33,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         level.max(T::zero())
     }
 
-    /// Torque of the force effects on joint `j`.
+    /// Torque of the effects with [`crate::effect::Effect::force`] on joint `j`, N m (N).
     #[inline]
     pub(crate) fn force(&self, j: usize, x: &JointPoint<T>) -> T {
         let mut sum = T::zero();
@@ -47,7 +47,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         sum
     }
 
-    /// Dry friction torque of a joint that is not stuck.
+    /// Dry friction torque of joint `j`, N m (N), positive against motion forward; 0 for a stuck joint.
     #[inline]
     pub(super) fn dry_friction(&self, j: usize, x: &JointPoint<T>, mode: Mode) -> T {
         if self.is_rounded(j) {

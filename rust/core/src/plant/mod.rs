@@ -1,8 +1,8 @@
-//! The arm as a simulator sees it: rigid dynamics, friction and effects, given the state of each joint's friction.
+//! Arm with its effects and friction, solved for the accelerations, given the friction mode of each joint.
 //!
 //! Dry friction is a set of modes: a joint slides in one direction, with its Coulomb torque constant in sign, or it sticks, with
-//! its velocity exactly zero and whatever friction torque that takes. [`Plant::acceleration`] is smooth while no mode changes;
-//! [`crate::integrate`] decides when one does.
+//! exactly zero velocity and the friction torque that keeps it at rest. [`Plant::acceleration`] is smooth while no mode changes;
+//! [`crate::integrate`] decides when a mode changes.
 
 mod dynamics;
 mod laws;
@@ -17,22 +17,22 @@ use crate::real::Real;
 use crate::transmission::{LatentState, Sides};
 use nalgebra::SVector;
 
-/// Most effects one plant can carry.
+/// Largest number of effects of one plant.
 pub const MAX_EFFECTS: usize = 48;
 
-/// What a joint's dry friction does.
+/// Friction mode of a joint: what its dry friction does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// At rest, held by friction.
+    /// The joint is at rest, held by friction.
     Stuck,
-    /// Sliding towards larger `q`.
+    /// The joint slides towards larger `q`.
     Forward,
-    /// Sliding towards smaller `q`.
+    /// The joint slides towards smaller `q`.
     Backward,
 }
 
 impl Mode {
-    /// Direction as a number: -1, 0 or 1.
+    /// Direction in which the joint slides, as a number: -1, 0 (stuck) or 1.
     #[inline]
     pub fn direction<T: Real>(self) -> T {
         match self {
@@ -42,7 +42,7 @@ impl Mode {
         }
     }
 
-    /// The mode of a joint that slides with this sign.
+    /// Friction mode of a joint whose velocity has the sign of `direction`; stuck for zero.
     #[inline]
     pub fn of<T: Real>(direction: T) -> Self {
         if direction > T::zero() {
@@ -55,20 +55,20 @@ impl Mode {
     }
 }
 
-/// Acceleration, and the friction torque that each stuck joint needs to stay at rest.
+/// Joint accelerations, and the friction torque that each stuck joint needs to stay at rest.
 #[derive(Debug, Clone, Copy)]
 pub struct Accelerations<T, const N: usize> {
-    /// `ddq`; exactly zero for stuck joints.
+    /// Joint accelerations `ddq`, rad/s^2 (m/s^2); exactly zero for stuck joints.
     pub ddq: SVector<T, N>,
-    /// Friction torque of stuck joints; zero for sliding ones.
+    /// Friction torque that keeps a stuck joint at rest, N m (N); zero for sliding joints.
     pub friction_at_rest: SVector<T, N>,
-    /// Acceleration of the transmissions' deflections; zero for rigid joints.
+    /// Accelerations of the transmissions' deflections, rad/s^2 (m/s^2); zero for rigid joints.
     pub deflection_acceleration: SVector<T, N>,
-    /// Friction torque of joints whose friction sits at the motor; zero for others.
+    /// Friction torque of joints whose friction acts on the motor, N m (N); zero for others.
     pub motor_friction: SVector<T, N>,
 }
 
-/// An arm with parameter values, effects and a friction model.
+/// Arm with parameter values, effects and a friction model.
 #[derive(Clone)]
 pub struct Plant<T: Real, A, const N: usize, const P: usize> {
     rigid: RigidArm<T, A, N, P>,
@@ -82,7 +82,7 @@ pub struct Plant<T: Real, A, const N: usize, const P: usize> {
 }
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
-    /// The arm without effects and with exact Coulomb friction.
+    /// Plant without effects and with exact Coulomb friction.
     pub fn new(arm: A, theta: [T; P]) -> Self {
         let (viscous, coulomb) = (arm.viscous(&theta).into(), arm.coulomb(&theta).into());
         let (constant_inertia, tilt) = (arm.constant_inertia(&theta), T::zero());
@@ -98,19 +98,18 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         }
     }
 
-    /// Replaces `sgn(dq)` by `tanh(dq / width)` on every joint; a width of zero keeps exact dry friction.
+    /// Replaces `sgn(dq)` by `tanh(dq / width)` on every joint, width in rad/s (m/s); a width of zero keeps exact dry friction.
     pub fn with_smoothing(self, width: T) -> Self {
         self.with_rounding([width; N])
     }
 
-    /// Replaces `sgn(dq)` of every joint by `tanh(dq / width)` with the joint's own width; a width of zero keeps exact dry friction there.
+    /// Replaces `sgn(dq)` of joint `j` by `tanh(dq / widths[j])`, widths in rad/s (m/s); a width of zero keeps exact dry friction on its joint.
     pub fn with_rounding(mut self, widths: [T; N]) -> Self {
         self.rounding = widths.map(|width| if width > T::zero() { width } else { T::zero() });
         self
     }
 
-    /// Adds an effect; beyond [`MAX_EFFECTS`], on a joint the arm does not have, or a tilt of the base of an arm that does not move in one
-    /// plane, `None`.
+    /// Adds an effect; `None` beyond [`MAX_EFFECTS`], for a joint the arm does not have, or for a tilted base of an arm that does not move in one plane.
     pub fn with_effect(mut self, effect: Active<T>) -> Option<Self> {
         let tilt = effect.law.tilt(&effect.p);
         if tilt != T::zero() && !A::PLANAR {
@@ -147,13 +146,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         Some(self)
     }
 
-    /// Says where encoder and friction of joint `j` sit; `None` for a joint that the arm does not have.
+    /// Sets whether encoder and friction of joint `j` sit on the link's or the motor's side; `None` for a joint that the arm does not have.
     pub fn with_sides(mut self, j: usize, sides: Sides) -> Option<Self> {
         self.drivetrain.set_sides(j, sides)?;
         Some(self)
     }
 
-    /// Adds to the inertia between the first two joints.
+    /// Adds `inertia`, kg m^2, to `M_12` and `M_21`, between the first two joints.
     fn add_coupling(&mut self, inertia: T) {
         for (row, column) in [(0, 1), (1, 0)] {
             if let Some(entry) = self.rigid.constant_inertia.get_mut(row).and_then(|row| row.get_mut(column))
@@ -169,13 +168,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         &self.drivetrain
     }
 
-    /// Whether a joint has a hysteresis state.
+    /// Whether any joint has a hysteresis state.
     #[inline]
     pub fn has_hysteresis(&self) -> bool {
         self.has_hysteresis
     }
 
-    /// Hysteresis states of the joints at `q`.
+    /// Hysteresis states of the joints, N m (N), when they have moved to `q` from the positions of `latent`.
     #[inline]
     pub fn memory(&self, q: &SVector<T, N>, latent: &LatentState<T, N>) -> SVector<T, N> {
         let mut memory = latent.memory;
@@ -190,12 +189,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         memory
     }
 
-    /// The arm's numbers, payloads and other inertial effects included.
+    /// Rigid arm of the plant, payloads and other inertial effects included.
     pub fn rigid(&self) -> &RigidArm<T, A, N, P> {
         &self.rigid
     }
 
-    /// Parameter values, payloads included.
+    /// Values of the arm's parameters, payloads included, SI.
     pub fn theta(&self) -> &[T; P] {
         &self.rigid.theta
     }
@@ -213,47 +212,47 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         !(0..N).any(|j| self.is_rounded(j)) && !self.drivetrain.any() && !self.has_hysteresis
     }
 
-    /// Whether effects add a torque to joint `j`, and whether they change its Coulomb level.
+    /// Hooks of the effects on joint `j`: whether they add a torque, and whether they change its Coulomb level.
     #[inline]
     pub(crate) fn hooks(&self, j: usize) -> Hooks {
         self.hooks[j]
     }
 
-    /// Its effects.
+    /// Effects of the plant with their values.
     pub(crate) fn effects(&self) -> impl Iterator<Item = &Active<T>> {
         self.effects.iter().take(self.n_effects).flatten()
     }
 
-    /// Whether joint `j` has dry friction, or effects that may tell in which direction it slides.
+    /// Whether joint `j` has dry friction, or effects that may depend on the direction in which it slides.
     #[inline]
     pub fn is_dry(&self, j: usize) -> bool {
         self.rigid.coulomb[j] > T::zero() || self.hooks.iter().any(|on| on.force || on.coulomb)
     }
 
-    /// 1 for a joint with dry friction, 0 for one without.
+    /// 1 if joint `j` has dry friction, 0 if not.
     #[inline]
     pub(crate) fn dry(&self, j: usize) -> T {
         if self.is_dry(j) { T::one() } else { T::zero() }
     }
 
-    /// Width of the rounded sign of joint `j`, zero for exact dry friction.
+    /// Width of the smooth sign `tanh(dq / width)` in the dry friction of joint `j`, rad/s (m/s); zero for exact dry friction.
     #[inline]
     pub fn rounding(&self, j: usize) -> T {
         self.rounding[j]
     }
 
-    /// Whether the sign of joint `j`'s dry friction is rounded.
+    /// Whether the sign in the dry friction of joint `j` is replaced by a smooth function.
     #[inline]
     pub fn is_rounded(&self, j: usize) -> bool {
         self.rounding[j] > T::zero()
     }
 
-    /// A plant none of whose numbers is infinite or undefined.
+    /// Whether all parameter values of the arm are finite.
     pub fn is_finite(&self) -> bool {
         self.rigid.theta.iter().all(nalgebra::ComplexField::is_finite)
     }
 
-    /// Equation (1) solved for `ddq` under the motors' torque `tau`, with stuck joints held at rest.
+    /// Equation of motion solved for `ddq` under the motor torques `tau`, N m (N), with stuck joints held at rest.
     #[inline]
     pub fn acceleration(
         &self,
@@ -303,7 +302,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         motion
     }
 
-    /// Friction torques on motors that move against their links; a motor that sticks needs what it would pass on otherwise.
+    /// Friction torques on motors that move against their links, N m (N); a stuck motor has the torque that it would otherwise pass on.
     #[inline]
     fn motor_friction(
         &self,
@@ -332,13 +331,13 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         braked
     }
 
-    /// Velocity on which the friction of joint `j` acts.
+    /// Velocity, rad/s or m/s, of joint `j`, or of the motor that carries its friction.
     #[inline]
     pub(crate) fn friction_velocity(&self, j: usize, dq: &SVector<T, N>, latent: &LatentState<T, N>) -> T {
         self.drivetrain.friction_velocity(j, dq[j], latent)
     }
 
-    /// Acceleration on which the friction of joint `j` acts.
+    /// Acceleration, rad/s^2 or m/s^2, of joint `j`, or of the motor that carries its friction.
     #[inline]
     pub(crate) fn friction_acceleration(
         &self,
@@ -353,7 +352,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         }
     }
 
-    /// Equation (1) solved for `ddq`, given the torques that reach the joints.
+    /// Equation of motion solved for `ddq` under the torques `tau`, N m (N), that reach the joints through their transmissions.
     #[inline]
     fn undriven(
         &self,
@@ -399,8 +398,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         self.solve(inertia, &rhs, &held)
     }
 
-    /// Residual torque by inverse dynamics: the torque that a measured motion needs beyond `tau`, with rigid transmissions and friction
-    /// smoothed as set.
+    /// Residual torque by inverse dynamics, N m (N): the torque that the measured motion `[q, dq, ddq]` needs beyond `tau`, with rigid transmissions and
+    /// friction smoothed as set.
     pub fn residual_torque(
         &self,
         t: T,
@@ -428,7 +427,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         residual
     }
 
-    /// `M ddq = rhs` with the rows and columns of stuck joints taken out.
+    /// Solves `M ddq = rhs` without the rows and columns of stuck joints.
     #[inline]
     fn solve(&self, inertia: &[[T; N]; N], rhs: &SVector<T, N>, modes: &[Mode; N]) -> Accelerations<T, N> {
         let stuck = self.stuck(modes);
@@ -457,14 +456,14 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         Accelerations { ddq, friction_at_rest, deflection_acceleration: zero, motor_friction: zero }
     }
 
-    /// Which joints are held; none whose friction is rounded.
+    /// Whether each joint is held at rest by exact dry friction.
     #[inline]
     fn stuck(&self, modes: &[Mode; N]) -> [bool; N] {
         core::array::from_fn(|j| !self.is_rounded(j) && modes[j] == Mode::Stuck)
     }
 
-    /// Stiction violation of joint `j` at rest (friction torque at rest less the Coulomb level), and the direction it would slide in.
-    /// Not positive: the joint stays stuck.
+    /// Stiction violation of joint `j` at rest, N m (N): friction torque at rest less the Coulomb level, positive where the joint breaks away; and the
+    /// direction, -1 or 1, in which the joint would slide.
     #[inline]
     pub fn stiction_violation(&self, j: usize, t: T, q: T, tau: T, friction_at_rest: T) -> (T, T) {
         let direction = if friction_at_rest < T::zero() { -T::one() } else { T::one() };

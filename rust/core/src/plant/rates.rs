@@ -1,4 +1,4 @@
-//! What happens fast in a plant, and where: torques that jump at a position, and rates that call for short steps.
+//! Fast behaviour of a plant: torques that jump at a position, and rates that need short integration steps.
 
 use super::Plant;
 use crate::arm::Arm;
@@ -8,23 +8,23 @@ use crate::linear::free_inertia;
 use crate::real::{Real, lit};
 use nalgebra::SVector;
 
-/// How much shorter the steps of an impact are than those that only keep it stable.
+/// Factor by which steps during an impact are shorter than stability of the integration needs, to resolve the impact.
 const FOLLOWED: f64 = 4.0;
 
 impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P> {
-    /// Whether a torque jumps at a position.
+    /// Whether the torque of any joint jumps at a position.
     #[inline]
     pub fn jumps(&self) -> bool {
         self.jumps
     }
 
-    /// Positions of joint `j` at which a torque jumps.
+    /// Positions of joint `j` at which its torque jumps, with the contacts beyond them.
     pub fn edges(&self, j: usize) -> impl Iterator<Item = Edge<T>> {
         let on_joint = self.effects().filter(move |e| e.joint == j);
         on_joint.filter_map(|e| e.law.edge(&e.p))
     }
 
-    /// The first position between two of joint `j`, at neither, at which a torque jumps.
+    /// First position strictly between `from` and `to`, rad or m, at which the torque of joint `j` jumps.
     pub(crate) fn edge_between(&self, j: usize, from: T, to: T) -> Option<T> {
         if !self.jumps {
             return None;
@@ -37,7 +37,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         })
     }
 
-    /// Fastest rate at `q`, 1/s, at which viscous friction stops a joint.
+    /// Fastest rate, 1/s, at which viscous friction stops a joint at the positions `q`.
     pub fn viscous_rate(&self, q: &SVector<T, N>) -> T {
         let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
         (0..N).fold(T::zero(), |fastest: T, j| {
@@ -45,8 +45,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         })
     }
 
-    /// Fastest rate of the plant at `q`, 1/s: at which smoothed friction stops a joint, a motor oscillates against its link, or a joint hits
-    /// a joint limit, an impact that is to be resolved and not only stable. Zero for a rigid arm with exact friction.
+    /// Fastest rate of the plant at the positions `q`, 1/s: at which smoothed friction stops a joint, a motor oscillates against its link, or a joint meets a
+    /// joint limit, as an impact that is to be resolved. Zero for a rigid arm with exact friction.
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
         let mut fastest = T::zero();
         let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));

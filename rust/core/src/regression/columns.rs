@@ -1,7 +1,7 @@
-//! Which of an arm's parameters are estimated, and what the values of the others are.
+//! Choice of the arm's parameters that are estimated, and known values of further parameters.
 //!
-//! A scheme filters the whole row over the arm's parameters; what is estimated is taken out of it, and parameters of known value, such
-//! as those of a link that was weighed, move to the other side as a known torque: `y - psi_known theta_known = psi theta`.
+//! A scheme filters the whole regressor row over the arm's parameters; the columns of estimated parameters are taken out of the row, and
+//! parameters of known value, as of a weighed link, move to the other side as a known torque: `y - psi_known theta_known = psi theta`.
 //!
 //! The inertial parameters of a serial arm are not all identifiable. With the base parameters of Gautier (1991) a set of independent
 //! columns of the regressor spans all of it, so choosing columns is all that a controller has to do.
@@ -11,16 +11,16 @@ use crate::real::Real;
 use crate::rls::{All, Count, First};
 use nalgebra::{SMatrix, SVector};
 
-/// Columns out of those of an arm with `N` joints and `P` parameters, with room for `R` of them.
+/// Choice of estimated parameters of an arm with `N` joints and `P` parameters, at most `R` of them.
 pub trait Columns<T: Real, const N: usize, const P: usize, const R: usize>: Copy {
-    /// How the number of estimated parameters is known.
+    /// Whether the number of estimated parameters is known to the compiler or at run time.
     type Count: Count;
 
     /// Number of estimated parameters.
     fn count(&self) -> Self::Count;
 
-    /// Rows over the estimated parameters and outputs, from rows over the arm's first `inertial` parameters, friction, and outputs. With
-    /// `M = N` row `i` is that of joint `i`; with `M = 1` it is a sum over joints.
+    /// Regressor rows over the estimated parameters, and outputs, from rows over the arm's first `inertial` parameters, friction, and outputs. With `M = N`
+    /// row `i` is that of joint `i`; with `M = 1` the row is a sum over joints.
     fn rows<const M: usize>(
         &self,
         whole: &SMatrix<T, M, P>,
@@ -30,13 +30,13 @@ pub trait Columns<T: Real, const N: usize, const P: usize, const R: usize>: Copy
     ) -> ([[T; R]; M], [T; M]);
 }
 
-/// Joint `i` alone where every joint has a row, all joints where there is but one.
+/// Index of the joint that `row` belongs to; `None` if the only row is a sum over several joints.
 #[inline(always)]
 const fn joint_of<const N: usize, const M: usize>(row: usize) -> Option<usize> {
     if M == 1 && N != 1 { None } else { Some(row) }
 }
 
-/// All parameters, with `R = P + N` also one constant torque per joint.
+/// Estimation of all parameters of the arm and, with `R = P + N`, of one constant torque per joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AllColumns;
 
@@ -72,26 +72,26 @@ impl<T: Real, const N: usize, const P: usize, const R: usize> Columns<T, N, P, R
     }
 }
 
-/// Marks a torque of friction that is not estimated.
+/// Marks, in place of an index of a column, a friction torque that is not estimated.
 const NONE: u8 = u8::MAX;
 
-/// Columns chosen at run time, and known values of other parameters.
+/// Estimated parameters chosen at run time, and known values of further parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChosenColumns<T, const N: usize, const P: usize, const R: usize> {
-    /// Inertial columns, of which the first so many count.
+    /// Indices of estimated inertial parameters; the first `inertial_count` entries count.
     inertial: [u8; R],
     inertial_count: u8,
-    /// Places in the row of viscous, Coulomb and constant torques per joint.
+    /// Columns of the estimated viscous, Coulomb and constant torques of each joint.
     friction: [[u8; N]; 3],
     count: u8,
-    /// Values of parameters that are not estimated.
+    /// Values of parameters that are not estimated, SI.
     known: SVector<T, P>,
     any_known: bool,
 }
 
 impl<T: Real, const N: usize, const P: usize, const R: usize> ChosenColumns<T, N, P, R> {
-    /// Strictly ascending indices of the estimated parameters, the constant torque of joint `j` at `P + j`, and values of all others.
-    /// `None` if there are too many or an index is not possible.
+    /// Choice of parameters by strictly ascending indices, with the constant torque of joint `j` at `P + j`, and values of all others, SI. `None` if there
+    /// are too many or an index is not possible.
     pub fn new(columns: impl IntoIterator<Item = usize>, known: &[T; P]) -> Option<Self> {
         const { assert!(R < NONE as usize && P < NONE as usize, "indices are bytes") }
         const { assert!(R.is_multiple_of(4), "whole lanes") }
@@ -131,12 +131,12 @@ impl<T: Real, const N: usize, const P: usize, const R: usize> ChosenColumns<T, N
         usize::from(self.count)
     }
 
-    /// Whether nothing is estimated.
+    /// Whether no parameter is estimated.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// What the parameters of known value give in row `m`.
+    /// Output of the parameters of known value in row `m`: `psi_known theta_known`.
     #[inline(always)]
     fn known_output<const M: usize>(
         &self,

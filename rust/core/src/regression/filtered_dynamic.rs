@@ -1,7 +1,7 @@
-//! Filtered dynamic model, equations (23) and (24): `F[tau] = (D[Pm] + F[B]) theta`.
+//! Filtered dynamic model (Reyes and Kelly 1997, equations (23) and (24)): `F[tau] = (D[Pm] + F[B]) theta`.
 //!
-//! `Pm theta = M(q) dq` is the momentum and `B theta = g - dK/dq + f` the rest, so `tau = d/dt(Pm theta) + B theta` needs no acceleration
-//! once filtered.
+//! `Pm theta = M(q) dq` is the momentum and `B theta = g - dK/dq + f` the remaining torque, so `tau = d/dt(Pm theta) + B theta` needs no
+//! acceleration once filtered.
 
 use super::friction::Friction;
 use super::{Columns, SampleInterval, SegmentCoefficients, Snapshot, Variant};
@@ -11,14 +11,14 @@ use crate::filter::Cutoff;
 use crate::real::Real;
 use nalgebra::{SMatrix, SVector};
 
-/// State of the filtered dynamic model: its filters, and the last sample. Of the matrices over all parameters only the inertial columns are used.
+/// State of the filtered dynamic model: its filters, and the last sample. Of matrices over all parameters only the inertial columns are used.
 #[derive(Debug, Clone, Copy)]
 pub struct FilteredDynamic<T: Real, const N: usize, const P: usize> {
     steps: SegmentCoefficients<T>,
     last: Snapshot<T, N>,
     last_momentum: SMatrix<T, N, P>,
     last_potential: SMatrix<T, N, P>,
-    /// The paper's `D` of the momentum, or `F` of it.
+    /// Output of a filter for the momentum regressor: derivative filter `D` with [`Variant::Paper`], low-pass `F` with [`Variant::Exact`].
     momentum: SMatrix<T, N, P>,
     potential: SMatrix<T, N, P>,
     friction: Friction<T, N>,
@@ -26,7 +26,7 @@ pub struct FilteredDynamic<T: Real, const N: usize, const P: usize> {
 }
 
 impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
-    /// The scheme at its first state.
+    /// Filtered dynamic model at its first state.
     pub fn new<A: Arm<T, N, P>>(arm: &A, variant: Variant, cutoff: &Cutoff<T>, now: &Snapshot<T, N>) -> Self {
         let (last_momentum, last_potential) = arm.momentum_and_potential::<Portable>(&now.q, &now.dq);
         let momentum = match variant {
@@ -45,7 +45,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredDynamic<T, N, P> {
         }
     }
 
-    /// The rows and outputs at the next state, reached by `interval`.
+    /// Regressor rows `psi` and outputs `y`, one per joint, at the next state, reached by `interval`.
     #[inline(always)]
     pub fn update<C: Cpu, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const R: usize>(
         &mut self,

@@ -1,4 +1,4 @@
-//! Filtered power model, equations (29) and (30): `F[tau.dq] = (D[E] + F[W]) theta`, the paper's own proposal.
+//! Filtered power model (Reyes and Kelly 1997, equations (29) and (30), their own proposal): `F[tau.dq] = (D[E] + F[W]) theta`.
 
 use super::friction::Friction;
 use super::{Columns, SampleInterval, SegmentCoefficients, Snapshot, Variant};
@@ -8,21 +8,21 @@ use crate::filter::Cutoff;
 use crate::real::{Real, lit};
 use nalgebra::{SMatrix, SVector};
 
-/// State of the filtered power model: its filters, and the last sample. Of the rows over all parameters only the inertial entries are used.
+/// State of the filtered power model: its filters, and the last sample. Of rows over all parameters only the inertial entries are used.
 #[derive(Debug, Clone, Copy)]
 pub struct FilteredPower<T: Real, const N: usize, const P: usize> {
     steps: SegmentCoefficients<T>,
     last: Snapshot<T, N>,
     last_energy: SVector<T, P>,
     last_supply: T,
-    /// The paper's `D` of the energy, or `F` of it.
+    /// Output of a filter for the energy regressor: derivative filter `D` with [`Variant::Paper`], low-pass `F` with [`Variant::Exact`].
     energy: SVector<T, P>,
     friction: Friction<T, N>,
     supply: T,
 }
 
 impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
-    /// The scheme at its first state; `tau` is the torque that acts from then on.
+    /// Filtered power model at its first state; `tau`, N m (N), is the torque that acts from the state on.
     pub fn new<A: Arm<T, N, P>>(
         arm: &A,
         variant: Variant,
@@ -46,7 +46,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
         }
     }
 
-    /// The row and output at the next state, reached by `interval`; `tau` is the torque that acts from then on.
+    /// Regressor row `psi` and output `y` at the next state, reached by `interval`; `tau`, N m (N), is the torque that acts from the state on.
     #[inline(always)]
     pub fn update<C: Cpu, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const R: usize>(
         &mut self,
@@ -104,7 +104,7 @@ impl<T: Real, const N: usize, const P: usize> FilteredPower<T, N, P> {
         self.supply = self.exact_supply::<C>(now, interval);
     }
 
-    /// `F` of the power of torques that are held in two parts, velocity linear over the whole.
+    /// Output of the low-pass filter `F`, W, for the power of torques held in each part of the interval, with velocities linear over the whole.
     #[inline(always)]
     fn exact_supply<C: Cpu>(&mut self, now: &Snapshot<T, N>, interval: &SampleInterval<T, N>) -> T {
         let parts = self.steps.parts(interval);

@@ -1,8 +1,8 @@
 //! Filters of friction over an interval in which joints may reverse.
 //!
 //! A sampled `sgn(dq)` says only that the sign changed somewhere between two samples. Taken as a ramp it is wrong by up to half a period
-//! at every reversal, and a regressor with such an error draws its coefficient towards zero. With the velocity linear between states
-//! the reversal has a place, a share `c` of the interval, and everything has a closed form. With `x = lambda h`, `a = exp(-x)`,
+//! at every reversal, and a regressor with this error draws its coefficient towards zero. With the velocity linear between states
+//! the reversal is at a share `c` of the interval, and all filter outputs have a closed form. With `x = lambda h`, `a = exp(-x)`,
 //! `E = exp(-x (1 - c))` (1 without a reversal), `s` the sign at the start and `Delta` the change of velocity:
 //!
 //! ```text
@@ -11,27 +11,27 @@
 //! F[dq^2]    <-  a y + the parabola's filter, middle Delta^2/4 below the chord
 //! ```
 //!
-//! Friction here is the law of every arm, `f_j = b_j dq_j + fc_j sgn dq_j` ([`crate::arm`]), with one constant torque per joint where
-//! the asymmetry is estimated too.
+//! Friction is `f_j = b_j dq_j + fc_j sgn dq_j`, as for every arm ([`crate::arm`]), plus one constant torque per joint where
+//! Coulomb asymmetry is estimated.
 
 use crate::cpu::Cpu;
 use crate::filter::FilterCoefficients;
 use crate::real::{Real, lit, sgn};
 use nalgebra::SVector;
 
-/// A velocity that is linear between two states.
+/// Velocity of a joint that is linear in time between two states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct VelocitySegment<T> {
     from: T,
     to: T,
-    /// Sign at the start.
+    /// Sign of the velocity at the start of the segment.
     sign: T,
-    /// Whether the sign changes.
+    /// Whether the velocity changes its sign within the segment.
     reverses: bool,
 }
 
 impl<T: Real> VelocitySegment<T> {
-    /// From one velocity to another, linear in between.
+    /// Segment from the velocity `from` to the velocity `to`, rad/s or m/s, linear in time.
     #[inline(always)]
     pub(super) fn new(from: T, to: T) -> Self {
         let reverses = (from > T::zero() && to < T::zero()) || (from < T::zero() && to > T::zero());
@@ -39,7 +39,7 @@ impl<T: Real> VelocitySegment<T> {
         Self { from, to, sign, reverses }
     }
 
-    /// `G`, what the sign adds to its filter.
+    /// Term that the sign of the velocity adds to the output of the low-pass filter `F` over the segment: the output for zero initial output.
     #[inline(always)]
     pub(super) fn sign(&self, step: &FilterCoefficients<T>) -> T {
         let mut end = T::one();
@@ -49,7 +49,7 @@ impl<T: Real> VelocitySegment<T> {
         self.sign * (end + end - T::one() - step.decay)
     }
 
-    /// `F` of the speed.
+    /// Output of the low-pass filter `F` for the absolute velocity at the end of the segment, from the output `y` at its start.
     #[inline(always)]
     pub(super) fn speed<C: Cpu>(&self, step: &FilterCoefficients<T>, y: T) -> T {
         if !self.reverses {
@@ -59,14 +59,14 @@ impl<T: Real> VelocitySegment<T> {
         step.decay * (y - self.from.abs()) + self.to.abs() - slope * self.sign(step)
     }
 
-    /// `F` of the squared velocity.
+    /// Output of the low-pass filter `F` for the squared velocity at the end of the segment, from the output `y` at its start.
     #[inline(always)]
     pub(super) fn square<C: Cpu>(&self, step: &FilterCoefficients<T>, y: T) -> T {
         let change = self.to - self.from;
         step.curve::<C>(y, self.from * self.from, self.to * self.to, change * change * lit(-0.25))
     }
 
-    /// Integral of the speed over an interval of unit length.
+    /// Integral of the absolute velocity over a segment of unit length in time.
     #[inline(always)]
     pub(super) fn distance(&self) -> T {
         let (from, to) = (self.from.abs(), self.to.abs());
@@ -75,20 +75,20 @@ impl<T: Real> VelocitySegment<T> {
         mean * lit(0.5)
     }
 
-    /// Integral of the squared velocity over an interval of unit length.
+    /// Integral of the squared velocity over a segment of unit length in time.
     #[inline(always)]
     pub(super) fn distance_squared(&self) -> T {
         (self.from * (self.from + self.to) + self.to * self.to) * lit(1.0 / 3.0)
     }
 }
 
-/// Decay over the share of the interval after the reversal.
+/// Decay of a filter over the part of a segment after the reversal, `E = exp(-x (1 - c))`; `x = lambda h`.
 #[inline(never)]
 fn after_reversal<T: Real>(x: T, from: T, to: T) -> T {
     (-x * (to / (to - from))).exp()
 }
 
-/// One entry per joint for each of viscous, Coulomb and constant friction.
+/// Filter outputs or integrals of viscous, Coulomb and constant friction, one entry per joint for each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Friction<T, const N: usize> {
     pub(super) viscous: SVector<T, N>,
@@ -97,13 +97,13 @@ pub struct Friction<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Friction<T, N> {
-    /// Filters that start at rest.
+    /// Zero filter outputs and integrals.
     #[inline(always)]
     pub(super) fn zero() -> Self {
         Self { viscous: SVector::zeros(), coulomb: SVector::zeros(), constant: SVector::zeros() }
     }
 
-    /// Torques at a velocity, the paper's filter over them as held.
+    /// Advances the filters of friction torques by a step with velocities `dq` held, as Reyes and Kelly (1997) do.
     #[inline(always)]
     pub(super) fn hold_torques<C: Cpu>(&mut self, step: &FilterCoefficients<T>, dq: &SVector<T, N>) {
         for j in 0..N {
@@ -113,7 +113,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Torques over a velocity segment.
+    /// Advances the filters of friction torques by a step with velocities linear in time.
     #[inline(always)]
     pub(super) fn filter_torques<C: Cpu>(
         &mut self,
@@ -129,7 +129,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Dissipated powers at a velocity, the paper's filter over them as held.
+    /// Advances the filters of dissipated powers by a step with velocities `dq` held, as Reyes and Kelly (1997) do.
     #[inline(always)]
     pub(super) fn hold_powers<C: Cpu>(&mut self, step: &FilterCoefficients<T>, dq: &SVector<T, N>) {
         for j in 0..N {
@@ -139,7 +139,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Dissipated powers over a velocity segment.
+    /// Advances the filters of dissipated powers by a step with velocities linear in time.
     #[inline(always)]
     pub(super) fn filter_powers<C: Cpu>(
         &mut self,
@@ -155,7 +155,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Dissipated energies of a velocity segment of `h` seconds by the trapezoidal rule, as in the paper.
+    /// Adds the dissipated energies of `h` seconds, J, by the trapezoidal rule, as Reyes and Kelly (1997) do.
     #[inline(always)]
     pub(super) fn add_trapezes(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
         let half = h * lit(0.5);
@@ -166,7 +166,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// Dissipated energies of a velocity segment of `h` seconds.
+    /// Adds the dissipated energies of `h` seconds, J, exactly for velocities linear in time.
     #[inline(always)]
     pub(super) fn add_energies(&mut self, h: T, from: &SVector<T, N>, to: &SVector<T, N>) {
         for j in 0..N {
@@ -177,7 +177,7 @@ impl<T: Real, const N: usize> Friction<T, N> {
         }
     }
 
-    /// `put(kind, joint, value)` for viscous, Coulomb and constant friction of one joint, or of all.
+    /// Calls `put(kind, joint, value)` for viscous (0), Coulomb (1) and constant (2) friction of the joint `only`, or of all joints.
     #[inline(always)]
     pub(super) fn write(&self, only: Option<usize>, mut put: impl FnMut(usize, usize, T)) {
         for j in 0..N {
@@ -199,7 +199,7 @@ mod tests {
     const STEP: f64 = 0.0025;
     const PIECES: u32 = 200_000;
 
-    /// `F` of a function of the velocity, in very small pieces.
+    /// Output of the low-pass filter `F` for a function `of` the velocity, from very small steps.
     fn numeric(lambda: f64, y: f64, (from, to): (f64, f64), of: impl Fn(f64) -> f64) -> f64 {
         let step = Cutoff { rad_per_s: lambda }.step(STEP / f64::from(PIECES));
         (0..PIECES).fold(y, |y, k| {

@@ -1,8 +1,8 @@
-//! The regression models, sample by sample: what a scheme makes of positions, velocities and torques.
+//! Regression models (schemes) of Reyes and Kelly (1997): from positions, velocities and torques to regressor rows, sample by sample.
 //!
 //! Each scheme turns one sample into rows `psi` and outputs `y` with `y = psi theta`. Estimated are ([`Columns`]) the arm's `P` parameters,
-//! or some of them, and one constant torque per joint, `f_j = … + asymmetry_j`, which while the joint moves is what Coulomb friction of
-//! different levels in the two directions adds.
+//! or some of them, and one constant torque per joint, `f_j = … + asymmetry_j`, to which Coulomb friction of different levels in the two
+//! directions amounts while the joint moves.
 //!
 //! Two variants differ in the filters and in when signals are taken to be valid:
 //!
@@ -10,7 +10,7 @@
 //! * [`Variant::Exact`]: consistent filters, the torque that really acted between two states ([`SampleInterval`]), and Coulomb friction that
 //!   changes sign where the velocity does (`friction`), not half-way to the next sample.
 //!
-//! Adding a scheme is one file here and one line in [`Scheme::ALL`].
+//! Adding a scheme is one file in this folder and one line in [`Scheme::ALL`].
 
 mod columns;
 mod filtered_dynamic;
@@ -28,22 +28,22 @@ use crate::filter::{CachedCoefficients, Cutoff, FilterCoefficients};
 use crate::real::{Real, lit};
 use nalgebra::SVector;
 
-/// The schemes of the paper.
+/// Schemes of Reyes and Kelly (1997): recursive estimators by their regression models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scheme {
-    /// Equation (24), one error per joint.
+    /// Filtered dynamic model, Reyes and Kelly (1997), equation (24): one prediction error per joint, N m (N).
     FilteredDynamic,
-    /// Equation (28), a scalar error.
+    /// Supplied energy model, Reyes and Kelly (1997), equation (28): one prediction error, J.
     SuppliedEnergy,
-    /// Equation (30), a scalar error.
+    /// Filtered power model, Reyes and Kelly (1997), equation (30): one prediction error, W.
     FilteredPower,
 }
 
 impl Scheme {
-    /// Every scheme.
+    /// All schemes, in the order of the documentation.
     pub const ALL: [Self; 3] = [Self::FilteredDynamic, Self::SuppliedEnergy, Self::FilteredPower];
 
-    /// Name on the command line.
+    /// Name of the scheme on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::FilteredDynamic => "filtered-dynamic",
@@ -52,45 +52,45 @@ impl Scheme {
         }
     }
 
-    /// The scheme with this name.
+    /// The scheme that the command line calls `name`.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|scheme| scheme.name() == name)
     }
 }
 
-/// How signals are filtered and aligned.
+/// Filters and alignment of signals of a scheme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Variant {
-    /// As printed.
+    /// Filters as Reyes and Kelly (1997) print them; position, velocity and torque all of one sample.
     Paper,
-    /// Consistent.
+    /// Filters consistent with each other; position, velocity and torque aligned in time.
     Exact,
 }
 
-/// A state at an instant.
+/// Joint positions and velocities at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Snapshot<T, const N: usize> {
-    /// Positions.
+    /// Joint positions, rad or m.
     pub q: SVector<T, N>,
-    /// Velocities.
+    /// Joint velocities, rad/s or m/s.
     pub dq: SVector<T, N>,
 }
 
 /// Interval from one state to the next in two parts, each under a constant torque.
 ///
-/// With states at the samples both parts have the same torque; with states half-way between samples, where a difference of positions
-/// is the velocity to second order, the sample in the middle is where the torque changes.
+/// With states at the samples both parts have one torque; with states half-way between samples, where a difference of positions is the velocity to second
+/// order, the torque changes at the sample in the middle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampleInterval<T, const N: usize> {
-    /// Duration, s.
+    /// Duration of the interval, s.
     pub h: T,
-    /// Duration of the first part, s.
+    /// Duration of the first part of the interval, s.
     pub split: T,
-    /// Torque over the first part.
+    /// Joint torques over the first part of the interval, N m (N).
     pub first: SVector<T, N>,
-    /// Torque over the second part.
+    /// Joint torques over the second part of the interval, N m (N).
     pub second: SVector<T, N>,
-    /// Positions between the parts.
+    /// Joint positions between the parts of the interval, rad or m.
     pub middle: SVector<T, N>,
 }
 
@@ -121,7 +121,7 @@ impl<T: Real> SegmentCoefficients<T> {
 }
 
 impl<T: Real, const N: usize> Snapshot<T, N> {
-    /// The state half-way to another one `h` seconds later, velocity linear in between.
+    /// State half-way in time to the state `to`, `h` seconds later, with velocities linear in time.
     #[inline(always)]
     fn half_way(&self, to: &Self, h: T) -> Self {
         let half: T = lit(0.5);

@@ -1,7 +1,7 @@
-//! Supplied energy model, equations (27) and (28): `int tau.dq = [E - E(0), int W] theta`.
+//! Supplied energy model (Reyes and Kelly 1997, equations (27) and (28)): `int tau.dq = [E - E(0), int W] theta`.
 //!
-//! A torque that is held does exactly the work `tau (q_end - q_begin)`; the paper's variant takes the trapezoidal rule for that integral
-//! as for the others. The integrals have infinite gain at zero frequency: any constant error grows without bound.
+//! A held torque does exactly the work `tau (q_end - q_begin)`; [`Variant::Paper`] takes the trapezoidal rule for all
+//! integrals. The integrals have infinite gain at zero frequency: any constant error grows without bound.
 
 use super::friction::Friction;
 use super::{Columns, SampleInterval, Snapshot, Variant};
@@ -21,7 +21,7 @@ pub struct SuppliedEnergy<T: Real, const N: usize, const P: usize> {
 }
 
 impl<T: Real, const N: usize, const P: usize> SuppliedEnergy<T, N, P> {
-    /// The scheme at its first state; `tau` is the torque that acts from then on.
+    /// Supplied energy model at its first state; `tau`, N m (N), is the torque that acts from the state on.
     pub fn new<A: Arm<T, N, P>>(arm: &A, now: &Snapshot<T, N>, tau: &SVector<T, N>) -> Self {
         Self {
             first: arm.energy_regressor(&now.q, &now.dq),
@@ -32,7 +32,7 @@ impl<T: Real, const N: usize, const P: usize> SuppliedEnergy<T, N, P> {
         }
     }
 
-    /// The row and output at the next state, reached by `interval`; `tau` is the torque that acts from then on.
+    /// Regressor row `psi` and output `y` at the next state, reached by `interval`; `tau`, N m (N), is the torque that acts from the state on.
     #[inline(always)]
     pub fn update<C: Cpu, A: Arm<T, N, P>, S: Columns<T, N, P, R>, const R: usize>(
         &mut self,

@@ -1,7 +1,7 @@
-//! `P` as `U D U'`, `U` unit upper triangular and `D` diagonal, updated row by row of `Psi'`.
+//! Covariance `P` of recursive least squares as `U D U'`, `U` unit upper triangular and `D` diagonal, updated row by row of `Psi'`.
 //!
-//! Bierman 1977, *Factorization methods for discrete sequential estimation*, chapter V, with everything that does not depend on the
-//! column before it taken out of the loop over columns: with `f = U' psi`, `v = D f` and `alpha_j = mu + sum_(k < j) f_k v_k`,
+//! Bierman 1977, *Factorization methods for discrete sequential estimation*, chapter V, with all that does not depend on the
+//! previous column taken out of the loop over columns: with `f = U' psi`, `v = D f` and `alpha_j = mu + sum_(k < j) f_k v_k`,
 //!
 //! ```text
 //! d_j  <- d_j alpha_j / alpha_(j+1)
@@ -17,7 +17,7 @@ use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 use nalgebra::SMatrix;
 
-/// The factors; `u` column by column with ones on the diagonal and zeros below.
+/// Factors of the covariance `P = U D U'`; `u` column by column with ones on the diagonal and zeros below.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Factorized<T, const R: usize> {
     u: [[T; R]; R],
@@ -70,7 +70,8 @@ impl<T: Real, const R: usize> Factorized<T, R> {
         sums
     }
 
-    /// Learns from rows of `Psi'` and their errors; the leverage, or nothing changed because the rows are of impossible size.
+    /// Updates factors and estimate by rows of `Psi'` and their prediction errors; returns the leverage, or `None`, with nothing changed, if a row is of
+    /// impossible size.
     #[inline(always)]
     pub(super) fn learn<C: Cpu, N: Count, const M: usize>(
         &mut self,
@@ -103,7 +104,7 @@ impl<T: Real, const R: usize> Factorized<T, R> {
         Some(leverage)
     }
 
-    /// One row: moves the estimate, and returns the leverage.
+    /// Updates the factors by one row `psi` and its prediction error, adds the change of the estimate to `moved`, and returns the leverage.
     #[inline(always)]
     fn row<C: Cpu, N: Count>(&mut self, moved: &mut [T; R], psi: &[T; R], error: T, r: usize, mu: T) -> T {
         let mut f = [T::zero(); R];
@@ -142,7 +143,7 @@ impl<T: Real, const R: usize> Factorized<T, R> {
         T::one() - mu * last
     }
 
-    /// Entry `j` of `U' psi`.
+    /// Entry `j` of `U' psi`, `U` the unit upper triangular factor of the covariance.
     #[inline(always)]
     fn dot<C: Cpu>(&self, j: usize, psi: &[T; R], r: usize) -> T {
         let column = &self.u[j];
@@ -179,13 +180,13 @@ impl<T: Real, const R: usize> Factorized<T, R> {
     }
 }
 
-/// Whole lanes that hold entries `0..=j` of a column.
+/// Number of whole lanes that hold entries `0..=j` of a column of `r` entries.
 #[inline(always)]
 const fn lanes_of(j: usize, r: usize) -> usize {
     if j < lead(r) { j / LANES + 1 } else { r / LANES }
 }
 
-/// Smallest entry of `D`: a variance of no arm, which keeps `U` finite.
+/// Smallest entry of `D`, below the variance of any arm's parameter: it keeps `U` finite.
 #[inline]
 fn least<T: Real>() -> T {
     if is_double::<T>() { lit(1e-100) } else { lit(1e-20) }

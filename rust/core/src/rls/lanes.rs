@@ -1,22 +1,22 @@
 //! Sums and products of small vectors, four entries at a time.
 //!
-//! Written so that a compiler finds vector instructions for entries that lie side by side; of `n` entries the first multiple of four are
-//! the `lead`, the rest the tail.
+//! The loops are written so that a compiler finds vector instructions for neighbouring entries; of `n` entries the largest multiple of four
+//! is the `lead`, the rest the tail.
 
 use crate::cpu::Cpu;
 use crate::real::Real;
 use core::fmt::Debug;
 
-/// Entries per vector.
+/// Number of entries of a small vector that recursive least squares takes together: four doubles fill a vector of AVX2.
 pub(super) const LANES: usize = 4;
 
-/// How many of `n` entries fill whole lanes.
+/// Number of entries, of `n`, that fill whole groups of four.
 #[inline(always)]
 pub(super) const fn lead(n: usize) -> usize {
     n / LANES * LANES
 }
 
-/// `a . b` of the first `n` entries.
+/// Scalar product of the first `n` entries of `a` and `b`.
 #[inline(always)]
 pub(super) fn dot<C: Cpu, T: Real, const R: usize>(a: &[T; R], b: &[T; R], n: usize) -> T {
     let mut sums = [T::zero(); LANES];
@@ -32,7 +32,7 @@ pub(super) fn dot<C: Cpu, T: Real, const R: usize>(a: &[T; R], b: &[T; R], n: us
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
-/// Whether every entry is a number of at most this size.
+/// Whether every entry of `a` is a number of at most the size `limit`.
 #[inline(always)]
 pub(super) fn all_within<T: Real, const R: usize>(a: &[T; R], limit: T) -> bool {
     let mut all = true;
@@ -42,16 +42,16 @@ pub(super) fn all_within<T: Real, const R: usize>(a: &[T; R], limit: T) -> bool 
     all
 }
 
-/// How many of the parameters that there is room for are in use.
+/// Number of parameters in use, at most as many as there is room for.
 pub trait Count: Copy + Debug + PartialEq {
-    /// The number for `room` parameters, at most `room`.
+    /// Number of parameters in use where there is room for `room`.
     fn of(self, room: usize) -> usize;
 
-    /// Calls for each of the first `n` entries of a column, and perhaps for some after them, which are zero and stay so.
+    /// Calls `call(i)` for each of the first `n` entries of a column, and perhaps for entries after them, which are zero and stay zero.
     fn each(n: usize, room: usize, call: impl FnMut(usize));
 }
 
-/// All of them, a number known to the compiler.
+/// All parameters that there is room for, a number known to the compiler.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct All;
 
@@ -69,12 +69,12 @@ impl Count for All {
     }
 }
 
-/// The first so many, a number chosen at run time; columns are worked on in whole lanes.
+/// The first parameters, in a number chosen at run time; columns are worked on in whole groups of four.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct First(usize);
 
 impl First {
-    /// At least `n`, in whole lanes if there is room for them: what is beyond `n` is not excited.
+    /// The first `n` parameters, rounded up to whole groups of four if there is room for them: parameters beyond `n` are not excited.
     pub fn new(n: usize) -> Self {
         Self(n.next_multiple_of(LANES))
     }

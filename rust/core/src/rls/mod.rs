@@ -1,4 +1,4 @@
-//! Recursive least squares, equations (20) to (22), for scalar and vector errors, with forgetting.
+//! Recursive least squares (Reyes and Kelly 1997, equations (20) to (22)), for scalar and vector errors, with forgetting.
 //!
 //! ```text
 //! e = y - Psi' theta
@@ -6,8 +6,8 @@
 //! P     <- (P - P Psi (mu I + Psi' P Psi)^-1 Psi' P) / mu
 //! ```
 //!
-//! `P` is kept in one of two forms ([`Form`]), with the same result up to rounding. With forgetting, what is not excited grows by
-//! `1/mu` per sample, which ends in numbers without meaning while the arm rests; so no variance grows beyond that of
+//! `P` is kept in one of two forms ([`Form`]), with one result up to rounding. With forgetting, variances that are not excited grow by
+//! `1/mu` per sample, which ends in numbers without meaning while the arm rests; so no variance grows beyond its value in
 //! `P(0)`: rows and columns are divided by `sqrt(mu)` or by less, which keeps `P` positive definite.
 
 mod factorized;
@@ -22,18 +22,18 @@ use plain::Plain;
 
 pub use lanes::{All, Count, First};
 
-/// How `P` is kept.
+/// Form in which the covariance `P` of recursive least squares is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
-    /// Equation (21) as printed, rounded symmetrically. Positive definite as long as `psi' P psi` stays far below the reciprocal of the
-    /// rounding unit: in double precision for any arm, in single precision not.
+    /// Equation (21) of Reyes and Kelly (1997) as printed, rounded symmetrically. Positive definite as long as `psi' P psi` stays far below the reciprocal of
+    /// the rounding unit: in double precision for any arm, in single precision not.
     Plain,
-    /// `U D U'`: positive definite whatever the rounding.
+    /// Factors `U D U'`: positive definite whatever the rounding.
     Factorized,
 }
 
 impl Form {
-    /// Plain in double precision, unless a variance of `P(0)` is above 10^6; factorized in single precision.
+    /// Form of the covariance: plain in double precision, unless a variance of `P(0)` is above 10^6, else factorized.
     #[inline]
     pub fn default_for<T: Real, const R: usize>(variances: &[T; R]) -> Self {
         let moderate = lanes::all_within(variances, lit(1e6));
@@ -41,7 +41,7 @@ impl Form {
     }
 }
 
-/// Estimate and covariance of `R` parameters, or of the first so many of them where `N` is chosen at run time.
+/// Recursive least squares: estimate and covariance of `R` parameters, or of the first of them where `N` is chosen at run time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rls<T: Real, const R: usize, N: Count = All> {
     theta: SVector<T, R>,
@@ -60,29 +60,29 @@ enum Covariance<T: Real, const R: usize> {
     Factorized(Factorized<T, R>),
 }
 
-/// Forgetting factor, and the variances that it does not lift.
+/// Forgetting factor `mu`, and for each parameter the variance above which forgetting does not lift it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Forgetting<T: Real, const R: usize> {
     mu: T,
     limit: [T; R],
 }
 
-/// What an update did.
+/// What an update of recursive least squares did with a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Update<T, const M: usize> {
-    /// The sample was used; its prediction error before the update.
+    /// The sample was used; holds its prediction error before the update.
     Used(SVector<T, M>),
-    /// The sample is not finite, of impossible size, or would leave `P` indefinite; nothing has changed but the count.
+    /// The sample is not finite, of impossible size, or would leave `P` indefinite; nothing but the count of rejected samples has changed.
     Rejected,
 }
 
 impl<T: Real, const R: usize> Rls<T, R> {
-    /// `theta(0)`, `P(0) = p0 I`, and the forgetting factor `mu` in `(0, 1]`.
+    /// Start from the estimate `theta0`, SI, and `P(0) = p0 I`, with the forgetting factor in `(0, 1]`.
     pub fn new(theta0: SVector<T, R>, p0: T, forgetting: T) -> Self {
         Self::with_covariance(theta0, SMatrix::identity() * p0, forgetting)
     }
 
-    /// `theta(0)`, a full positive definite `P(0)`, of which the upper triangle counts, and the forgetting factor `mu` in `(0, 1]`.
+    /// Start from the estimate `theta0`, SI, and a full positive definite `P(0)`, of which the upper triangle counts, with the forgetting factor in `(0, 1]`.
     pub fn with_covariance(theta0: SVector<T, R>, p0: SMatrix<T, R, R>, forgetting: T) -> Self {
         let limit: [T; R] = p0.diagonal().into();
         Self {
@@ -99,37 +99,37 @@ impl<T: Real, const R: usize> Rls<T, R> {
 }
 
 impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
-    /// Only the first so many parameters; rows must be zero beyond them.
+    /// Restricts the estimate to the first `count` parameters; regressor rows must be zero beyond them.
     pub fn with_count<K: Count>(self, count: K) -> Rls<T, R, K> {
         let Self { theta, covariance, forgetting, level, leverage, updates, rejected, .. } = self;
         Rls { theta, count, covariance, forgetting, level, leverage, updates, rejected }
     }
 
-    /// Keeps `P` in another form.
+    /// Changes the form in which the covariance `P` is kept.
     pub fn with_form(mut self, form: Form) -> Self {
         self.covariance = Covariance::of(&self.covariance(), form);
         self
     }
 
-    /// Uses other instructions than the widest that the processor has.
+    /// Changes the instruction set; the default is the widest that the processor has.
     pub fn with_level(mut self, level: Level) -> Self {
         self.level = level;
         self
     }
 
-    /// The instructions in use.
+    /// Instruction set in use.
     #[inline(always)]
     pub fn level(&self) -> Level {
         self.level
     }
 
-    /// Estimate.
+    /// Estimated parameters, SI.
     #[inline]
     pub fn theta(&self) -> &SVector<T, R> {
         &self.theta
     }
 
-    /// Covariance `P` for an error of unit variance.
+    /// Covariance `P` of the estimate for an error of unit variance.
     pub fn covariance(&self) -> SMatrix<T, R, R> {
         match &self.covariance {
             Covariance::Plain(p) => p.matrix(),
@@ -137,7 +137,7 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
         }
     }
 
-    /// Diagonal of `P`.
+    /// Diagonal of the covariance `P`: variances for an error of unit variance.
     pub fn variances(&self) -> SVector<T, R> {
         match &self.covariance {
             Covariance::Plain(p) => p.diagonal().into(),
@@ -145,7 +145,7 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
         }
     }
 
-    /// How `P` is kept.
+    /// Form in which the covariance `P` is kept.
     pub fn form(&self) -> Form {
         match &self.covariance {
             Covariance::Plain(_) => Form::Plain,
@@ -155,24 +155,24 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
 
     /// Leverage of the last sample used: the sum over its errors of `psi' P psi / (mu + psi' P psi)`, each in `[0, 1)`.
     ///
-    /// Summed over a life without forgetting it comes to the number of parameters learned and then grows like a logarithm; it vanishes
-    /// where a sample says nothing new.
+    /// The sum of leverages over all samples without forgetting reaches the number of parameters learned and then grows like a logarithm; the
+    /// leverage of a sample that says nothing new is zero.
     #[inline]
     pub fn leverage(&self) -> T {
         self.leverage
     }
 
-    /// Samples used.
+    /// Number of samples used.
     pub fn updates(&self) -> u64 {
         self.updates
     }
 
-    /// Samples rejected.
+    /// Number of samples rejected.
     pub fn rejected(&self) -> u64 {
         self.rejected
     }
 
-    /// One sample with `M` errors: `psi` has one row per error.
+    /// Takes one sample with `M` prediction errors: `psi`, `(M, R)`, has one row per error, `y`, `(M,)`, the outputs.
     #[inline]
     pub fn update<const M: usize>(&mut self, psi: &SMatrix<T, M, R>, y: &SVector<T, M>) -> Update<T, M> {
         let mut rows = [[T::zero(); R]; M];
@@ -184,7 +184,7 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
         self.level.run(UpdateKernel { rls: self, rows, y: y.data.0[0] })
     }
 
-    /// One sample with `M` errors, for code that already runs with the instructions in use.
+    /// Takes one sample with `M` prediction errors in code that already runs with the instruction set in use.
     #[inline(always)]
     pub(crate) fn learn<C: Cpu, const M: usize>(&mut self, rows: &[[T; R]; M], y: &[T; M]) -> Update<T, M> {
         let mut error = *y;
@@ -212,7 +212,7 @@ impl<T: Real, const R: usize, N: Count> Rls<T, R, N> {
     }
 }
 
-/// One call of [`Rls::update`].
+/// Arguments of one call of [`Rls::update`], compiled for each instruction set.
 struct UpdateKernel<'a, T: Real, N: Count, const M: usize, const R: usize> {
     rls: &'a mut Rls<T, R, N>,
     rows: [[T; R]; M],
@@ -238,7 +238,7 @@ impl<T: Real, const R: usize> Covariance<T, R> {
 }
 
 impl<T: Real, const R: usize> Forgetting<T, R> {
-    /// By what rows and columns of a `P` with this diagonal are multiplied, and whether that is not the same for all.
+    /// Factors by which forgetting multiplies rows and columns of a covariance with this diagonal, and whether they differ.
     #[inline]
     fn lift(&self, diagonal: &[T; R]) -> ([T; R], bool) {
         let full = T::one() / self.mu.sqrt();
@@ -254,13 +254,13 @@ impl<T: Real, const R: usize> Forgetting<T, R> {
     }
 }
 
-/// Whether numbers are `f64`.
+/// Whether the scalar type `T` is `f64`.
 #[inline]
 fn is_double<T: Real>() -> bool {
     T::default_epsilon() < lit(1e-12)
 }
 
-/// Largest entry of a regressor or an error that is taken; products of three such with `P` stay finite.
+/// Largest entry of a regressor or a prediction error that is taken: products of three such numbers with `P` stay finite.
 #[inline]
 fn largest<T: Real>() -> T {
     if is_double::<T>() { lit(1e30) } else { lit(1e9) }

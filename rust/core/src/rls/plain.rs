@@ -1,8 +1,8 @@
-//! Equation (21) as printed: `P - P Psi (mu I + Psi' P Psi)^-1 Psi' P`, the errors eliminated one by one.
+//! Update of the covariance as Reyes and Kelly (1997) print it in equation (21), `P - P Psi (mu I + Psi' P Psi)^-1 Psi' P`, error by error.
 //!
-//! What is taken off is rounded symmetrically, so `P` stays exactly symmetric although every entry is computed on its own, which is
-//! what vector instructions like. Of the rows beyond the last whole lane only the diagonal block is kept; their other entries are those
-//! of the columns.
+//! The subtracted matrix is rounded symmetrically, so `P` stays exactly symmetric although every entry is computed on its own, as suits
+//! vector instructions. Of rows beyond the last whole group of four only the diagonal block is kept; their further entries are those of the
+//! columns.
 
 use super::lanes::{LANES, dot, lead};
 use super::{Count, Forgetting};
@@ -10,7 +10,7 @@ use crate::cpu::Cpu;
 use crate::real::{Real, lit};
 use nalgebra::SMatrix;
 
-/// The matrix, column by column, and its diagonal once more, side by side for the check.
+/// Covariance `P`, column by column, and a copy of its diagonal for the check that it stays positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Plain<T, const R: usize> {
     p: [[T; R]; R],
@@ -33,7 +33,8 @@ impl<T: Real, const R: usize> Plain<T, R> {
         self.diagonal
     }
 
-    /// Learns from rows of `Psi'` and their errors; the leverage, or nothing changed because `P` would not stay positive definite.
+    /// Updates covariance and estimate by rows of `Psi'` and their prediction errors; returns the leverage, or `None`, with nothing changed, if `P` would not
+    /// stay positive definite.
     #[inline(always)]
     pub(super) fn learn<C: Cpu, N: Count, const M: usize>(
         &mut self,
@@ -89,7 +90,7 @@ impl<T: Real, const R: usize> Plain<T, R> {
         Some(leverage)
     }
 
-    /// `P psi` for each row.
+    /// Product `P psi` of the covariance and each of the rows `psi`.
     #[inline(always)]
     fn times<C: Cpu, const M: usize>(&self, rows: &[[T; R]; M], r: usize) -> [[T; R]; M] {
         let mut product = [[T::zero(); R]; M];
@@ -117,7 +118,7 @@ impl<T: Real, const R: usize> Plain<T, R> {
         product
     }
 
-    /// Adds lane `c` of column `j` times the rows' entries `j`.
+    /// Adds to `sums` the product of entries `4 c` to `4 c + 3` of column `j` of `P` and entry `j` of each row.
     #[inline(always)]
     fn add_column<C: Cpu, const M: usize>(
         &self,
@@ -133,7 +134,7 @@ impl<T: Real, const R: usize> Plain<T, R> {
         }
     }
 
-    /// The new diagonal, and whether it stays positive, which no rounding short of lost definiteness would change.
+    /// Diagonal of `P` after the update, and whether it stays positive, which no rounding short of lost definiteness would change.
     #[inline(always)]
     fn shrunk<C: Cpu, const M: usize>(
         &self,
@@ -153,8 +154,7 @@ impl<T: Real, const R: usize> Plain<T, R> {
         (diagonal, positive)
     }
 
-    /// Takes the sum of `gain gain' / total` off. The product of two gains is the same for `(i, j)` and `(j, i)`, and need not wait for the
-    /// reciprocal.
+    /// Subtracts the sum of `gain gain' / total` from `P`. The product of two gains is equal for `(i, j)` and `(j, i)`, and need not wait for the reciprocal.
     #[inline(always)]
     fn take_off<C: Cpu, const M: usize>(&mut self, gain: &[[T; R]; M], inverse: &[T; M], r: usize) {
         for j in 0..r {

@@ -1,4 +1,4 @@
-//! The state of all lanes of a batch rollout and its step.
+//! State of all lanes of a batch rollout, and one step of all lanes.
 
 use super::clock::Clock;
 use super::cursor::{
@@ -20,46 +20,46 @@ use crate::trig::SinCos;
 use core::array::from_fn;
 use nalgebra::SVector;
 
-/// Steps after which sines and cosines that were rotated step by step are computed anew.
+/// Number of steps of a batch rollout after which sines and cosines that were rotated step by step are computed anew.
 const STEPS_TO_RECOMPUTE: usize = 64;
 
-/// Subtracted from the mode violation of lanes that have ended.
+/// Number subtracted from the mode violation of lanes that have ended, so that it is never positive.
 const IDLE: f64 = 1e30;
 
-/// How far the lanes go in a step.
+/// Time by which the lanes of a batch rollout advance in one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum StepExtent {
-    /// All lanes over a whole sample interval.
+    /// All lanes advance over a whole sample interval.
     Full,
-    /// Some lanes over the rest of an interval.
+    /// Some lanes advance over the rest of an interval only.
     Partial,
-    /// Some lanes up to a reversal.
+    /// Some lanes advance to a reversal only.
     ToReversal,
 }
 
-/// State of all lanes.
+/// State of all lanes of a batch rollout, in `H` vectors of `W` lanes.
 pub(super) struct LaneBatch<'a, T: Real, C, A, const W: usize, const H: usize, const N: usize, const P: usize>
 {
     plant_lanes: [PlantLanes<'a, T, C, A, W, N, P>; H],
     kinematics: [KinematicState<Lanes<T, C, W>, N>; H],
     modes: [Modes<Lanes<T, C, W>, N>; H],
     spans: [Span<Lanes<T, C, W>, N>; H],
-    /// Joint states, sines and cosines at the start of the last step, and its mode checks.
+    /// Joint states at the start of the last step; `sincos` are sines and cosines at the start, `mode_check` the check of the step's friction modes.
     initial_guesses: [JointState<Lanes<T, C, W>, N>; H],
     sincos: [[SinCos<Lanes<T, C, W>>; N]; H],
     mode_check: [ModeCheck<Lanes<T, C, W>, N>; H],
     clocks: [Clock<T, N>; WIDTH],
-    /// 0 for lanes that move, [`IDLE`] for lanes that have ended, so that these never show a mode violation.
+    /// 0 for lanes that move, [`IDLE`] for lanes that have ended, so that ended lanes never show a mode violation.
     idle: [Lanes<T, C, W>; H],
-    /// Which run is in which lane, and its cursor; none in lanes that have ended.
+    /// Index of the run in each lane; `cursors` has the lane's position in the run, `None` if the lane has ended.
     runs: [usize; WIDTH],
     cursors: [Option<RunCursor<'a, T, N>>; WIDTH],
-    /// Lanes that move.
+    /// Number of lanes that have not ended.
     moving: usize,
-    /// The run that enters next.
+    /// Index of the run that enters the next free lane.
     waiting: usize,
     extent: StepExtent,
-    /// Whether a lane has other directions than the modes say.
+    /// Whether the sliding direction of a lane has changed since its friction modes were computed.
     modes_stale: bool,
     steps: usize,
     limit: T,
@@ -68,7 +68,7 @@ pub(super) struct LaneBatch<'a, T: Real, C, A, const W: usize, const H: usize, c
 impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const N: usize, const P: usize>
     LaneBatch<'a, T, C, A, W, H, N, P>
 {
-    /// How many lanes there are.
+    /// Number of lanes in all vectors.
     const LANES: usize = W * H;
 
     #[inline(always)]
@@ -101,13 +101,13 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         Some(lanes)
     }
 
-    /// Whether any lane has not ended.
+    /// Whether the run in any lane has not ended.
     #[inline(always)]
     pub(super) fn are_moving(&self) -> bool {
         self.moving > 0
     }
 
-    /// One step of every lane.
+    /// Takes one step of every lane of the batch rollout.
     #[inline(always)]
     pub(super) fn step(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
         if self.extent != StepExtent::Full {
@@ -134,7 +134,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         }
     }
 
-    /// One step of every lane with its friction modes; returns whether the modes hold in all lanes.
+    /// Takes one step of every lane with its friction modes; returns whether the modes agree with the motion in all lanes.
     #[inline(always)]
     fn step_lanes<const EFFECTS: bool, const ANY_STUCK: bool>(&mut self) -> bool {
         let mut right = self.extent != StepExtent::ToReversal;
@@ -158,7 +158,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         right
     }
 
-    /// Accepts a step whose modes hold in all lanes.
+    /// Accepts a step in which the friction modes hold in all lanes, and starts the next interval of every lane.
     #[inline(always)]
     fn arrive_all(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
         if self.extent != StepExtent::Full {
@@ -185,7 +185,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         self.renew_modes();
     }
 
-    /// Resolves a step lane by lane: accepted, repeated, or handed to the scalar integrator.
+    /// Decides lane by lane whether a step is accepted, repeated, or handed to the scalar integrator.
     #[inline(always)]
     fn resolve_lanes(&mut self, runs: &mut [Run<'a, T, A, N, P>]) {
         self.extent = StepExtent::Partial;
@@ -202,7 +202,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         self.renew_modes();
     }
 
-    /// Recomputes the modes from the current directions.
+    /// Recomputes the friction modes of all lanes from their sliding directions.
     #[inline(always)]
     fn renew_modes(&mut self) {
         for i in 0..H {
@@ -221,7 +221,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         lane_of(&self.kinematics[l / W].joints, l % W)
     }
 
-    /// Writes lane `l`'s positions after its interval, or ends it where they are beyond the limit.
+    /// Writes the positions of lane `l` at the end of its interval, and ends its run if a position is beyond the limit.
     #[inline]
     fn arrive(&mut self, runs: &mut [Run<'a, T, A, N, P>], l: usize) {
         let q = self.joints(l).q;
@@ -238,7 +238,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         self.end(runs, l);
     }
 
-    /// Ends lane `l`'s run; the next one enters, if any is left.
+    /// Ends the run in lane `l`; the next run enters, if there is one.
     #[inline(never)]
     fn end(&mut self, runs: &mut [Run<'a, T, A, N, P>], l: usize) {
         runs[self.runs[l]].state =
@@ -246,7 +246,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const H: usize, const
         self.enter(runs, l);
     }
 
-    /// Puts the next run into lane `l`, or the lane to rest.
+    /// Puts the next run into lane `l`, or ends the lane if there is none.
     #[inline(never)]
     fn enter(&mut self, runs: &mut [Run<'a, T, A, N, P>], l: usize) {
         let mut state = State::new(SVector::zeros(), SVector::zeros());

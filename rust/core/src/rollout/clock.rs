@@ -1,41 +1,41 @@
-//! A lane's progress within its sample interval, and the reversal it aims at.
+//! Progress of a lane of a batch rollout within its sample interval, and the reversal at which its next step shall end.
 
 use crate::real::Real;
 
-/// Mode changes within one interval before the scalar integrator takes the rest of it: six of each joint, at least those of two.
+/// Largest number of mode changes of a lane within one interval, after which the scalar integrator takes the rest of it: 6 per joint, at least 12.
 pub(super) const fn max_changes(joints: usize) -> usize {
     if joints < 2 { 12 } else { 6 * joints }
 }
 
-/// One lane's time.
+/// Progress of one lane of a batch rollout within its sample interval.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Clock<T, const N: usize> {
-    /// Part of the interval that is done, s.
+    /// Part of the sample interval that has been integrated, s.
     pub(super) done: T,
-    /// Part of the interval that is left, s.
+    /// Part of the sample interval that is left, s.
     pub(super) left: T,
-    /// The reversal that the step shall end at.
+    /// Reversal at which the next step shall end, if any.
     pub(super) goal: Option<Reversal<T>>,
-    /// Joints that could not be released at this instant.
+    /// Whether each joint was released at this instant and pulled back.
     pub(super) tried: [bool; N],
-    /// Steps that ended short of the interval's end.
+    /// Number of steps that ended short of the end of the interval, or were repeated.
     pub(super) changes: usize,
 }
 
 impl<T: Real, const N: usize> Clock<T, N> {
-    /// At the start of an interval.
+    /// Clock at the start of a sample interval.
     #[inline(always)]
     pub(super) fn new() -> Self {
         Self { done: T::zero(), left: T::zero(), goal: None, tried: [false; N], changes: 0 }
     }
 
-    /// Whether the next step is the whole interval.
+    /// Whether the next step is the whole sample interval.
     #[inline(always)]
     pub(super) fn is_whole(&self) -> bool {
         self.done == T::zero() && self.goal.is_none()
     }
 
-    /// Advances by `time` within the interval and forgets what was tried at the last instant.
+    /// Advances by `time`, s, within the interval and forgets joints tried at the last instant.
     #[inline]
     pub(super) fn pass(&mut self, time: T) {
         (self.done, self.left) = (self.done + time, self.left - time);
@@ -43,18 +43,18 @@ impl<T: Real, const N: usize> Clock<T, N> {
         self.changes += 1;
     }
 
-    /// Length of the next step.
+    /// Length of the next step, s.
     #[inline(always)]
     pub(super) fn length(&self) -> T {
         self.goal.map_or(self.left, |goal| goal.length)
     }
 }
 
-/// A joint's reversal within a step.
+/// Reversal of a joint within a step.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reversal<T> {
-    /// The joint.
+    /// Joint that reverses, from 0.
     pub(super) joint: usize,
-    /// When, s after the step's start.
+    /// Time of the reversal after the start of the step, s.
     pub(super) length: T,
 }

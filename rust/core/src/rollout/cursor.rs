@@ -1,4 +1,4 @@
-//! The cursor of a run in a lane, and access to one lane's values.
+//! Position of a lane in its run, and access to one lane's values.
 
 use super::Run;
 use crate::cpu::Cpu;
@@ -15,21 +15,21 @@ use core::iter::Zip;
 use core::slice::{Iter, IterMut};
 use nalgebra::SVector;
 
-/// Sample times, one more than there are intervals, their torques, and the positions after them: one count for all of them.
+/// Iterator over the intervals of a run: times at the start and the end, torques, and positions at the end to be written.
 type Rows<'a, T, const N: usize> =
     Zip<Zip<Zip<Iter<'a, T>, Iter<'a, T>>, Iter<'a, [InputSegment<T>; N]>>, IterMut<'a, [T; N]>>;
 
-/// Position of a lane in its run: the current interval and the rows that follow.
+/// Position of a lane in its run: the current interval and those that follow.
 pub(super) struct RunCursor<'a, T, const N: usize> {
     rows: Rows<'a, T, N>,
-    /// The interval it is in; none at the end.
+    /// Current sample interval; `None` at the end of the run.
     pub(super) interval: Option<Interval<'a, T, N>>,
-    /// Positions after it.
+    /// Joint positions at the end of the current interval, to be written, rad or m.
     after: &'a mut [T; N],
 }
 
 impl<'a, T: Real, const N: usize> RunCursor<'a, T, N> {
-    /// At the first interval of a run.
+    /// Cursor at the first interval of a run; `None` if the run has no interval.
     pub(super) fn of<A, const P: usize>(run: &mut Run<'a, T, A, N, P>) -> Option<Self> {
         let ends = run.t.get(1..)?;
         let positions = core::mem::take(&mut run.positions).as_chunks_mut().0;
@@ -38,7 +38,7 @@ impl<'a, T: Real, const N: usize> RunCursor<'a, T, N> {
         Some(Self { rows, interval: Some(interval(row)), after })
     }
 
-    /// Writes the positions after an interval, and goes on to the next.
+    /// Writes the positions `q`, rad or m, at the end of the current interval, and goes on to the next.
     #[inline(always)]
     pub(super) fn arrive(&mut self, q: [T; N]) {
         *self.after = q;
@@ -56,7 +56,7 @@ fn interval<'a, T: Real, const N: usize>(
     Interval { t, h: end - t, torque }
 }
 
-/// Sets lane `l` to an interval.
+/// Sets time, length and torques of lane `l` to those of an interval.
 #[inline(always)]
 pub(super) fn start_interval<T: Real, C: Cpu, const W: usize, const N: usize>(
     span: &mut Span<Lanes<T, C, W>, N>,
@@ -72,7 +72,7 @@ pub(super) fn start_interval<T: Real, C: Cpu, const W: usize, const N: usize>(
     }
 }
 
-/// Values of lane `l`.
+/// Values of lane `l`, one per joint.
 #[inline]
 pub(super) fn lane_values<T: Real, C, const W: usize, const N: usize>(
     x: &[Lanes<T, C, W>; N],
@@ -90,7 +90,7 @@ pub(super) fn lane_of<T: Real, C, const W: usize, const N: usize>(
     JointState { q: lane_values(&joints.q, l), dq: lane_values(&joints.dq, l) }
 }
 
-/// Lane `l`'s sines and cosines.
+/// Sines and cosines of lane `l`.
 #[inline]
 pub(super) fn sincos_of<T: Real, C, const W: usize, const N: usize>(
     sincos: &[SinCos<Lanes<T, C, W>>; N],
@@ -99,7 +99,7 @@ pub(super) fn sincos_of<T: Real, C, const W: usize, const N: usize>(
     from_fn(|j| SinCos { sine: sincos[j].sine.0[l], cosine: sincos[j].cosine.0[l] })
 }
 
-/// Static friction of lane `l`.
+/// Static friction of the joints of lane `l`.
 #[inline]
 pub(super) fn static_friction_of<T: Real, C, const W: usize, const N: usize>(
     friction: &StaticFriction<Lanes<T, C, W>, N>,

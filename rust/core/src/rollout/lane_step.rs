@@ -1,4 +1,4 @@
-//! One lane's step in which friction modes may have changed, and what to do about it.
+//! Step of one lane in which friction modes may have changed, and the decision how the lane goes on.
 
 use super::clock::{Clock, Reversal, max_changes};
 use crate::fixed_mode::StaticFriction;
@@ -7,38 +7,38 @@ use crate::kinematics::JointState;
 use crate::linear::free_inertia;
 use crate::real::Real;
 
-/// One lane's part of a step.
+/// One lane's part of a step of a batch rollout.
 pub(super) struct LaneStep<T, const N: usize> {
-    /// Joint states at its start and its end.
+    /// Joint states at the start and the end of the step.
     pub(super) ends: [JointState<T, N>; 2],
-    /// Accelerations there.
+    /// Joint accelerations at the start and the end of the step, rad/s^2 (m/s^2).
     pub(super) ddq: [[T; N]; 2],
-    /// Static friction there, if any joint is stuck.
+    /// Static friction at the start and the end of the step, if any joint is stuck.
     pub(super) static_friction: Option<[StaticFriction<T, N>; 2]>,
-    /// > 0 or NaN if the step exceeds the angle range.
+    /// > 0 or NaN if the step turns the arm beyond the angle range of one step.
     pub(super) range_violation: T,
-    /// Joints with dry friction.
+    /// Whether each joint has dry friction.
     pub(super) dry: [bool; N],
-    /// Coulomb coefficients.
+    /// Coulomb coefficient of each joint, N m (N).
     pub(super) coulomb: [T; N],
-    /// Inertia at the end.
+    /// Inertia matrix at the end of the step, by rows.
     pub(super) inertia: [[T; N]; N],
 }
 
-/// What to do after the step.
+/// How a lane of a batch rollout goes on after a step.
 pub(super) enum StepOutcome<T, const N: usize> {
-    /// The modes hold: the lane goes on from its end.
+    /// The friction modes hold: the lane goes on from the end of the step.
     Accepted,
-    /// It ended at a reversal, with this joint state.
+    /// The step ended at a reversal, with this joint state.
     Reversed(JointState<T, N>),
-    /// It is repeated from its start with other modes or another length.
+    /// The step is repeated from its start with changed friction modes or another length.
     Repeat,
-    /// The scalar integrator takes the rest of the interval.
+    /// The scalar integrator takes the rest of the sample interval.
     Scalar,
 }
 
 impl<T: Real, const N: usize> LaneStep<T, N> {
-    /// Decides, and sets the lane's clock and its joints' directions accordingly.
+    /// Decides how the lane goes on, and sets its clock and the directions of its joints accordingly.
     pub(super) fn judge(&self, clock: &mut Clock<T, N>, direction: &mut [T; N]) -> StepOutcome<T, N> {
         let near = self.range_violation <= T::zero();
         if !near || clock.changes >= max_changes(N) {
@@ -54,7 +54,7 @@ impl<T: Real, const N: usize> LaneStep<T, N> {
         outcome
     }
 
-    /// Releases the joint with the largest stiction violation, and sticks one that was released but is pulled back.
+    /// Releases the stuck joint whose friction torque at rest exceeds its Coulomb level by most, and sticks a released joint that is pulled back.
     fn settle(&self, clock: &mut Clock<T, N>, direction: &mut [T; N]) -> Option<StepOutcome<T, N>> {
         let (mut released, mut worst) = (None, T::zero());
         for j in 0..N {
@@ -86,7 +86,7 @@ impl<T: Real, const N: usize> LaneStep<T, N> {
         Some(StepOutcome::Repeat)
     }
 
-    /// The reversal that comes first, if any.
+    /// Aims the next step at the earliest reversal within this one; accepts the step if there is none.
     fn first_change(&self, clock: &mut Clock<T, N>, direction: &[T; N]) -> StepOutcome<T, N> {
         let [start, end] = &self.ends;
         let mut first = None;
@@ -112,7 +112,7 @@ impl<T: Real, const N: usize> LaneStep<T, N> {
         StepOutcome::Repeat
     }
 
-    /// Ends at a reversal, or comes closer to it in another step.
+    /// Ends the step at the reversal `goal`, or repeats it with a length closer to the reversal.
     fn approach(
         &self,
         goal: Reversal<T>,
@@ -141,7 +141,7 @@ impl<T: Real, const N: usize> LaneStep<T, N> {
         StepOutcome::Reversed(joints)
     }
 
-    /// Change of joint `j`'s acceleration when its dry friction reverses, all other joints free to move.
+    /// Change of joint `j`'s acceleration when its dry friction reverses, with all other joints free to move, rad/s^2 (m/s^2).
     fn acceleration_step(&self, j: usize) -> T {
         (self.coulomb[j] + self.coulomb[j]) / free_inertia(&self.inertia, j)
     }

@@ -1,10 +1,10 @@
 //! Batch rollouts: many runs at once, one in each lane of a vector unit.
 //!
 //! Each run has its own plant, start, times and torques. A step is taken by all lanes at once with the friction modes they have
-//! ([`crate::fixed_mode`]), and every lane has its own clock: where a joint reverses within a step, that lane goes back to where the step
-//! started, and takes a shorter one to the reversal and another to the sample while the others go on. What is rarer (a joint that
-//! breaks away within a step, a step beyond the angle range) is integrated by the scalar integrator ([`crate::integrate`]). Runs of plants
-//! in which more than friction modes can change are not for a batch.
+//! ([`crate::fixed_mode`]), and every lane has its own clock: a lane in which a joint reverses within a step goes back to the start of the
+//! step, and takes a shorter step to the reversal and another to the sample while other lanes go on. Rarer events (a joint that
+//! breaks away within a step, a step beyond the angle range) are left to the scalar integrator ([`crate::integrate`]). Plants
+//! in which more than friction modes can change cannot run in a batch.
 
 mod batch;
 mod clock;
@@ -20,38 +20,38 @@ use crate::plant::Plant;
 use crate::real::Real;
 use batch::LaneBatch;
 
-/// Number of runs in a batch.
+/// Number of runs that a batch rollout simulates at a time.
 pub const WIDTH: usize = 8;
 
-/// One run: from `state` at the first of the times to the last.
+/// Simulation of one plant from the first of its sample times to the last.
 pub struct Run<'a, T: Real, A, const N: usize, const P: usize> {
-    /// The plant; see [`Plant::only_modes_change`].
+    /// Plant to simulate, of which only friction modes may change ([`Plant::only_modes_change`]).
     pub plant: &'a Plant<T, A, N, P>,
-    /// Sample times, s.
+    /// Sample times of the run, s.
     pub t: &'a [T],
-    /// Torques from each sample to the next.
+    /// Joint torques from each sample to the next, N m (N).
     pub torque: &'a [[InputSegment<T>; N]],
-    /// State at the first sample; after the rollout, the state at its end.
+    /// State at the first sample; after the rollout, the state at the end of the run.
     pub state: State<T, N>,
-    /// Positions at all further samples, `N` for each; those after a run has left the limit stay as they are. The rollout takes them.
+    /// Joint positions, rad or m, at all samples after the first, `N` for each; unchanged after the run has left the limit. The rollout takes the slice.
     pub positions: &'a mut [T],
 }
 
-/// A batch of runs, simulated [`WIDTH`] at a time; each ends where a position exceeds `limit` or is NaN.
+/// Batch of runs, simulated [`WIDTH`] at a time; a run ends where a joint position exceeds `limit`, rad or m, or is NaN.
 pub struct BatchRollout<'r, 'a, T: Real, A, const N: usize, const P: usize> {
-    /// The runs.
+    /// Runs of the batch.
     pub runs: &'r mut [Run<'a, T, A, N, P>],
-    /// Largest position.
+    /// Largest size of a joint position, rad or m, beyond which a run ends.
     pub limit: T,
 }
 
 impl<'a, T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> BatchRollout<'_, 'a, T, A, N, P> {
-    /// Simulates all runs with these instructions.
+    /// Simulates all runs with the instruction set `level`.
     pub fn run_all(self, level: Level) {
         level.run_wide(self);
     }
 
-    /// Simulates runs in `H` vectors of `W` lanes.
+    /// Simulates all runs in `H` vectors of `W` lanes.
     #[inline(always)]
     fn run_batch<C: Cpu, const W: usize, const H: usize>(runs: &mut [Run<'a, T, A, N, P>], limit: T) {
         let Some(mut lanes) = LaneBatch::<T, C, A, W, H, N, P>::new(runs, limit) else { return };

@@ -1,4 +1,4 @@
-//! Plants side by side, one in each lane.
+//! Plants of a batch rollout side by side, one in each lane of a vector.
 
 use crate::arm::Arm;
 use crate::cpu::Cpu;
@@ -12,8 +12,7 @@ use crate::real::Real;
 use crate::trig::{Rotation, SinCos};
 use core::array::from_fn;
 
-/// A joint at an instant. What an effect gets is a copy, made where there is one: whatever a function outside can see has to be kept in
-/// memory throughout.
+/// State, torque and bias of a joint at an instant, copied for the effects' laws: compilers keep data in memory that a function not inlined can see.
 struct JointInstant<V> {
     t: V,
     q: V,
@@ -30,22 +29,22 @@ impl<V: Copy> JointInstant<V> {
     }
 }
 
-/// Plants side by side.
+/// Plants of a batch rollout, one in each lane of a vector.
 pub(super) struct PlantLanes<'a, T: Real, C, A, const W: usize, const N: usize, const P: usize> {
     pub(super) plants: [&'a Plant<T, A, N, P>; W],
     pub(super) rigid: RigidArm<Lanes<T, C, W>, A, N, P>,
-    /// One plant in all lanes.
+    /// Whether all lanes have the same plant.
     same_plant: bool,
-    /// Hooks in use on each joint, in any lane.
+    /// Hooks of effects in use on each joint, in any lane.
     hooks: [Hooks; N],
-    /// 1 where a joint has dry friction.
+    /// 1 in each lane where a joint has dry friction, else 0.
     pub(super) dry: [Lanes<T, C, W>; N],
 }
 
 impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: usize>
     PlantLanes<'a, T, C, A, W, N, P>
 {
-    /// One plant, copied into all lanes.
+    /// Lanes that all have the plant `plant`.
     pub(super) fn new(plant: &'a Plant<T, A, N, P>) -> Self {
         let RigidArm { arm, theta, viscous, coulomb, constant_inertia, tilt } = plant.rigid();
         let rigid = RigidArm {
@@ -60,7 +59,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         Self { plants: [plant; W], rigid, same_plant: true, hooks, dry }
     }
 
-    /// Whether any joint in any lane has effects.
+    /// Whether any joint in any lane has effects that add torque or change its Coulomb level.
     #[inline(always)]
     pub(super) fn has_effects(&self) -> bool {
         let mut any = false;
@@ -70,7 +69,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         any
     }
 
-    /// Puts a plant into lane `l`.
+    /// Puts the plant `plant` into lane `l`.
     pub(super) fn put(&mut self, l: usize, plant: &'a Plant<T, A, N, P>) {
         if core::ptr::eq(self.plants[l], plant) {
             return;
@@ -94,7 +93,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         rigid.tilt.0[l] = own.tilt;
     }
 
-    /// Coulomb levels of sliding joints, and torques of the effects.
+    /// Coulomb level where joint `j` slides, and torque of the effects on joint `j`, N m (N).
     #[inline(never)]
     fn laws(
         &self,
@@ -124,7 +123,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         self.plants[l].point(j, at.t.0[l], at.q.0[l], at.dq.0[l], at.tau.0[l], at.bias.0[l])
     }
 
-    /// Coulomb levels of joint `j` in the lanes where it slides.
+    /// Coulomb levels of joint `j` in the lanes where it slides, N m (N).
     #[inline]
     fn levels(&self, x: &[JointPoint<T>; W], direction: Lanes<T, C, W>, j: usize) -> Lanes<T, C, W> {
         let mut levels = self.rigid.coulomb[j];
@@ -154,7 +153,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         levels
     }
 
-    /// Torques of the effects on joint `j`.
+    /// Torques of the effects on joint `j`, N m (N).
     #[inline]
     fn forces(&self, x: &[JointPoint<T>; W], j: usize) -> Lanes<T, C, W> {
         let mut sums = [T::zero(); W];
@@ -172,7 +171,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         Lanes::new(sums)
     }
 
-    /// Stiction violation of joint `j` in the lanes where it is stuck.
+    /// Friction torque at rest of joint `j` less its Coulomb level, N m (N), in the lanes where the joint is stuck, else 0.
     #[inline(never)]
     fn stiction_violations(
         &self,
@@ -193,7 +192,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
     }
 }
 
-/// Dynamics of the lanes. Without effects it is known whether any joint is stuck, and a step is code without a branch.
+/// Dynamics of plants side by side. Without `EFFECTS` it is known at compile time whether any joint is stuck, and a step has no branch.
 pub(super) struct LaneDynamics<'b, B, const EFFECTS: bool, const ANY_STUCK: bool>(pub(super) &'b B);
 
 impl<

@@ -1,6 +1,6 @@
-//! What several tests share.
+//! Functions shared by several test files.
 
-/// Torques of the seed, equations (31) and (32) of Reyes and Kelly (1997), N m.
+/// Torques (31) and (32) of Reyes and Kelly (1997) at the time `t`, s, in N m.
 pub fn seed_torque(t: f64) -> [f64; 2] {
     [
         (1.0 - (-0.8 * t).exp()) * 29.0 + 68.0 * (16.0 * t + 0.1).sin() + 9.0 * (20.0 * t + 0.15).sin(),
