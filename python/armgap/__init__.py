@@ -102,7 +102,7 @@ find_moved_modules()
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name when it is first used, so that importing the package stays fast."""
+    """Import a public name of the package on first use, so that importing the package stays fast."""
     if name not in _HOMES:
         return old_names(__name__, stacklevel=3)(name)
     value = getattr(import_module(_HOMES[name]), name)
@@ -111,5 +111,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """List the public names."""
+    """List the public names of the package."""
     return __all__

@@ -1,4 +1,4 @@
-"""Names that changed in 0.2.0, and modules that moved: the old ones warn and still work; they go with 0.3.0."""
+"""Names that changed in 0.2.0, and modules that moved: old names work with a warning until 0.3.0."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ RENAMED = {
 }
 
 
-#: Old module to new module; modules of a package that moved have moved with it.
+#: Old module to new module; submodules of a moved package have moved too.
 MOVED = {
     "armgap.arm.serial_arm_file": "armgap.arm.serial.arm_file",
     "armgap.arm.serial_chain": "armgap.arm.serial.chain",
@@ -149,7 +149,7 @@ MOVED = {
 
 
 def _now(name: str) -> str | None:
-    """The new name of a module that moved by itself or with its package."""
+    """Return the new name of a module that moved itself or with its package; None for other names."""
     for old, new in MOVED.items():
         if name == old or name.startswith(f"{old}."):
             return new + name.removeprefix(old)
@@ -161,7 +161,7 @@ def _warn(old: str, new: str, stacklevel: int) -> None:
 
 
 class _MovedModules(MetaPathFinder, Loader):
-    """Finds modules by the names they had."""
+    """Import hook that finds moved modules by their old names."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -177,7 +177,7 @@ class _MovedModules(MetaPathFinder, Loader):
 
 
 def find_moved_modules() -> None:
-    """Let modules be imported by the names they had."""
+    """Install the import hook that finds moved modules by their old names."""
     if not any(isinstance(finder, _MovedModules) for finder in sys.meta_path):
         sys.meta_path.insert(0, _MovedModules())
 

@@ -1,6 +1,6 @@
-"""Everything armgap can complain about: one tree, one line per complaint.
+"""Exceptions of armgap, in one class hierarchy; each message is one line.
 
-Each error carries where it happened (`file`, `column`, `row`) and what to do about it (`remedy`); its text names all of
+Each error has a place (`file`, `column`, `row`) and a `remedy`; its text names all of
 them. Rows count data rows from 1; a row of ``None`` means the whole column or file.
 """
 
@@ -30,11 +30,11 @@ class ArmgapError(Exception):
     Parameters
     ----------
     problem : str
-        What is wrong, without a full stop.
+        Problem in words, without a full stop.
     remedy : str
-        What to do about it.
+        Remedy in words.
     file : path-like, optional
-        File it was found in.
+        File with the problem.
     column : str, optional
         Column of a log, or key of an arm file.
     row : int, optional
@@ -42,7 +42,7 @@ class ArmgapError(Exception):
     """
 
     part = "column"
-    """What `column` is called in the text."""
+    """Word for `column` in the message of the error."""
 
     def __init__(
         self,
@@ -72,7 +72,7 @@ class LogReadError(ArmgapError, OSError):
     """A log cannot be read at all: missing, a folder, or not the format its name promises."""
 
     def __str__(self) -> str:
-        """Return the one-line text."""
+        """Return the error as one line of text."""
         return str(self.args[0])
 
 
@@ -81,7 +81,7 @@ class ColumnError(ArmgapError, ValueError):
 
 
 class SampleError(ArmgapError, ValueError):
-    """A sample is missing or not finite."""
+    """A sample of a log is missing or not finite."""
 
 
 class TimeError(ArmgapError, ValueError):
@@ -89,7 +89,7 @@ class TimeError(ArmgapError, ValueError):
 
 
 class UnitError(ArmgapError, ValueError):
-    """Values have the magnitude of another unit."""
+    """Values of a log's column have the magnitude of another unit than stated or assumed."""
 
 
 class LogShapeError(ArmgapError, ValueError):
@@ -103,7 +103,7 @@ class ArmFileError(ArmgapError, ValueError):
 
 
 class ModelFileError(ArmgapError, ValueError):
-    """A description of a robot, URDF or MJCF, is missing, damaged, or has no serial arm where one is looked for; rows are its lines."""
+    """A description of a robot, URDF or MJCF, is missing, damaged, or has no serial arm between the given links; `row` is a line of the file."""
 
     part = "element"
 
@@ -113,10 +113,10 @@ class OptionError(ArmgapError, ValueError):
 
 
 class ResultError(ArmgapError, OSError):
-    """A result cannot be written where it was asked for."""
+    """A result cannot be written to the requested file."""
 
     def __str__(self) -> str:
-        """Return the one-line text."""
+        """Return the error as one line of text."""
         return str(self.args[0])
 
 
@@ -132,4 +132,4 @@ CATALOGUE: tuple[type[ArmgapError], ...] = (
     OptionError,
     ResultError,
 )
-"""Every leaf of the tree; each has its case in the table of bad inputs."""
+"""All concrete error classes; each has a case in the table of bad inputs."""

@@ -1,4 +1,4 @@
-"""The words that results and options consist of, as types: what a type checker accepts is what the program knows."""
+"""Words of results and options as `Literal` types, so that a type checker accepts exactly the known ones."""
 
 from __future__ import annotations
 
@@ -39,27 +39,27 @@ GapOutcome = Literal["smaller", "larger", "unchanged", "none"]
 ChainStage = Literal["drive", "transmission", "mechanics", "sensor"]
 
 SERIAL = "serial"
-"""The kind of an arm that has a chain."""
+"""Kind of arm that has a chain of joints."""
 SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
-"""The regression models, in the order of Reyes and Kelly (1997)."""
+"""Names of the regression models, in the order of Reyes and Kelly (1997)."""
 FILTERS: tuple[Filters, ...] = get_args(Filters)
-"""Consistent filters, and the paper's as printed."""
+"""Sets of filters for identification: consistent ones, and those of Reyes and Kelly (1997) as printed."""
 VELOCITIES: tuple[VelocityMethod, ...] = get_args(VelocityMethod)
-"""Ways to get velocities."""
+"""Methods to compute velocities from positions."""
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 """Verdicts of a diagnosis."""
 STATUSES: tuple[Status, ...] = get_args(Status)
-"""What a candidate can be that is no cause."""
+"""Statuses of a candidate effect that is no cause."""
 CAUSE_STATUSES: tuple[CauseStatus, ...] = get_args(CauseStatus)
-"""What can become of a cause between two diagnoses."""
+"""Statuses of a cause in a comparison of two diagnoses."""
 GAP_OUTCOMES: tuple[GapOutcome, ...] = get_args(GapOutcome)
-"""What can become of the gap between two diagnoses."""
+"""Changes of the gap between two diagnoses."""
 CHAIN_STAGES: tuple[ChainStage, ...] = get_args(ChainStage)
-"""Stages from command to measured position."""
+"""Stages of the chain from command to measured position."""
 
 
 def joint_units(data: dict[str, Any]) -> list[str]:
-    """Unit of each joint's position in a result; a serial arm may have joints that turn and joints that slide."""
+    """Return the unit of each joint's position in a result; a serial arm may have rotary and linear joints."""
     n_joints = len(data["gap"]["before"])
     units = list((data.get("arm") or {}).get("joint_unit") or [])
     return units if len(units) == n_joints else [str(data["gap"].get("unit", "rad"))] * n_joints

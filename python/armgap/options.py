@@ -1,4 +1,4 @@
-"""Options of functions, checked: what is no number, or none that the option can have, is an `OptionError` in one line."""
+"""Checks of function options: an invalid or impossible number raises an `OptionError` of one line."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from armgap.errors import OptionError
 __all__ = ["LARGEST_SEED", "positive", "seed", "whole"]
 
 LARGEST_SEED = 2**64 - 1
-"""The core's generator takes 64 bits."""
+"""Largest seed of the compiled core's random generator, which takes 64 bits."""
 
 
 def positive(value: Any, what: str, remedy: str = "give a positive number of seconds") -> float:
-    """Return a positive finite number.
+    """Return an option's value as a float if it is a positive finite number.
 
     Raises
     ------
     OptionError
-        If it is none.
+        If the value is no positive finite number.
     """
     try:
         number = float(value)
@@ -32,12 +32,12 @@ def positive(value: Any, what: str, remedy: str = "give a positive number of sec
 
 
 def whole(value: Any, what: str, least: int, most: int) -> int:
-    """Return a whole number from `least` to `most`.
+    """Return an option's value as an integer if it is a whole number from `least` to `most`.
 
     Raises
     ------
     OptionError
-        If it is none.
+        If the value is no whole number from `least` to `most`.
     """
     try:
         number = operator.index(value)
@@ -49,11 +49,11 @@ def whole(value: Any, what: str, least: int, most: int) -> int:
 
 
 def seed(value: Any) -> int:
-    """Return a seed.
+    """Return an option's value as the seed of a random generator.
 
     Raises
     ------
     OptionError
-        If it is negative, too large or no whole number.
+        If the value is negative, too large or no whole number.
     """
     return whole(value, "seed", 0, LARGEST_SEED)

@@ -1,4 +1,4 @@
-"""Former name of `armgap.diagnosis.custom_effect`; goes with 0.3.0."""
+"""Former name of the module `armgap.diagnosis.custom_effect`; removed in 0.3.0."""
 
 from armgap._renamed import old_names
 

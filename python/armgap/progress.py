@@ -1,6 +1,6 @@
 """Progress of long work, reported to a callback.
 
-Code that takes its time calls `report_progress`; `use_callback` sets the function that receives the reports inside a block. The callback is
+Long computations call `report_progress`; `use_callback` sets the function that receives the reports inside a block. The callback is
 kept in a context variable, so that a reader of files deep inside a diagnosis reports without a parameter for it in every function above.
 """
 
@@ -19,7 +19,7 @@ __all__ = ["ProgressCallback", "part_callback", "report_progress", "use_callback
 if not TYPE_CHECKING:
     __getattr__ = old_names(__name__)
 
-#: Called with a task in words and the fraction of it that is done, from 0 to 1, which never falls while the task is the same.
+#: Callback for progress, called with a task in words and the fraction of it that is done, from 0 to 1, which never falls while the task is the same.
 ProgressCallback = Callable[[str, float], object]
 
 _callback: ContextVar[ProgressCallback | None] = ContextVar("armgap_progress", default=None)
@@ -46,7 +46,7 @@ def use_callback(callback: ProgressCallback | None) -> Iterator[None]:
 
 
 def report_progress(work: str, fraction: float) -> None:
-    """Report a task in words and the fraction of it that is done, from 0 to 1."""
+    """Report a task in words and its fraction done, from 0 to 1, to the current callback."""
     callback = _callback.get()
     if callback is not None:
         callback(work, fraction)
@@ -58,7 +58,7 @@ def part_callback(work: str, number: int, count: int) -> ProgressCallback:
     Parameters
     ----------
     work : str
-        The whole task; what the part calls itself is not passed on.
+        Name of the whole task, reported in place of the part's own.
     number, count : int
         Number of the part, from 0, and number of parts.
 

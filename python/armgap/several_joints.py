@@ -1,4 +1,4 @@
-"""Causes that are on several joints at once: where they are, and the same cause joint by joint."""
+"""Causes on several joints at once: their location in words, and conversion to causes of single joints."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ __all__ = ["by_joint", "joint_text", "place_text"]
 
 
 def joint_text(joint: int | None) -> str:
-    """Where an effect sits that is on one joint, or on the whole arm."""
+    """Return the location of an effect on one joint, or on the whole arm, in words."""
     return "whole arm" if joint is None else f"joint {joint}"
 
 
 def place_text(entry: Mapping[str, Any]) -> str:
-    """Where a cause, candidate or look-alike of a diagnosis sits.
+    """Return the location of a cause, candidate or equivalent effect of a diagnosis in words.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def place_text(entry: Mapping[str, Any]) -> str:
 
 
 def by_joint(causes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return causes with an entry per joint in place of one that has the same law on several.
+    """Return causes with one entry per joint in place of a cause with a common law on several joints.
 
     Examples
     --------

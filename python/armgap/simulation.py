@@ -1,4 +1,4 @@
-"""Simulation of an arm with its nominal parameters and, on request, with effects that a real arm would have."""
+"""Simulation of an arm with its nominal parameters and, on request, with effects of real arms."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Effect:
 
     @classmethod
     def parse(cls, text: str) -> Effect:
-        """Read ``NAME:JOINT:key=value,…``; the joint of a whole-arm effect is left empty.
+        """Read an effect from a text ``NAME:JOINT:key=value,…``; the joint of a whole-arm effect is left empty.
 
         Raises
         ------
@@ -69,7 +69,7 @@ def effects() -> list[dict[str, Any]]:
 
 
 def seed_torque(t: ArrayLike) -> NDArray[np.float64]:
-    """Torques (31) and (32) of Reyes and Kelly (1997).
+    """Return the torques (31) and (32) of Reyes and Kelly (1997).
 
     Parameters
     ----------
@@ -116,13 +116,13 @@ def simulate(
     Parameters
     ----------
     arm : Arm
-        The arm.
+        Arm to simulate.
     t : array_like, shape (n_samples,)
         Sample times [s], increasing, evenly spaced or not.
     tau : array_like, shape (n_samples, n_joints)
         Torques, held until the next sample [N m].
     q0, dq0 : array_like, shape (n_joints,), optional
-        Start; by default at rest at ``q = 0``.
+        Initial positions and velocities; by default at rest at ``q = 0``.
     effects : sequence of Effect
         Effects added to the arm.
     encoder : bool, default True
@@ -200,7 +200,7 @@ def simulate(
 
 
 def _check_effects(effects: Any) -> None:
-    """Raise if what was given are no effects."""
+    """Raise if a sequence holds anything but effects of the library (`Effect`)."""
     for effect in (effects,) if isinstance(effects, str | Effect) else effects:
         if not isinstance(effect, Effect) or effect is effects:
             remedy = (

@@ -9,12 +9,12 @@ from contextlib import contextmanager
 __all__ = ["THREADS", "one_thread"]
 
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS")
-"""What libraries read when they are loaded."""
+"""Environment variables by which numerical libraries set their number of threads when loaded."""
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Let processes that are started meanwhile use one thread each."""
+    """Make processes started inside the ``with`` block use one thread each."""
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))
     try:

@@ -1,16 +1,16 @@
-"""Arms: what an arm file or a description of the robot says, as a chain of links with parameters, limits and a controller.
+"""Arms: an arm file, or a URDF or MJCF description, read as a chain of links with parameters, limits and a controller.
 
 =================  ================================================================================
 file               what
 =================  ================================================================================
-`rigid_body`       the ten inertial numbers of a link
+`rigid_body`       the ten inertial parameters of a link
 `controller`       the position controller of a serial arm
 `serial_chain`     the chain of a serial arm
-`free_space`       links as capsules, boxes in their way
+`free_space`       links as capsules, obstacles as boxes
 `serial_toml`      a serial arm as text
 `arm`              `Arm`, `MotionLimits`
-`corrections`      how columns of a log are read otherwise
-`description`      URDF and MJCF as a tree, resolved to a chain; changes to their text
+`corrections`      corrections of a log's columns: signs, zeros, units, order
+`description`      URDF and MJCF as a tree, resolved to a chain; edits of URDF and MJCF text
 `serial_links`     links of a serial arm in an arm file
 `serial_trust`     default standard deviations of a serial arm's parameters
 `serial_arm_file`  arm files of serial arms

@@ -1,4 +1,4 @@
-"""Arm files: the nominal model of an arm and how far its values are trusted."""
+"""Model of an arm (`Arm`): nominal parameters with standard deviations, limits, chain, controller and corrections of logs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["Arm", "MotionLimits", "kinds", "listed", "only_planar", "quoted"]
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """What an arm's joints may do; the torque's limit is the arm's `torque_limit`.
+    """Limits of position, speed and acceleration for planned motions of an arm; limits of torque are `Arm.torque_limit`.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class MotionLimits:
     speed, acceleration : ndarray, shape (n_joints,)
         Largest speed [rad/s or m/s] and acceleration [rad/s^2 or m/s^2].
     space : FreeSpace, optional
-        What the links must not touch.
+        Obstacles that the links must not touch.
     """
 
     position_min: NDArray[np.float64]
@@ -45,7 +45,7 @@ class MotionLimits:
     space: FreeSpace | None = None
 
     def toml_lines(self) -> list[str]:
-        """Return the table of an arm file, without the links' lengths."""
+        """Return the limits as the lines of an arm file's table ``[limits]``, without the links' lengths."""
         names = ("position_min", "position_max", "speed", "acceleration")
         lines = [f"{name} = {listed(getattr(self, name))}" for name in names]
         if self.space is not None:
@@ -61,7 +61,7 @@ class Arm:
     Attributes
     ----------
     name : str
-        Name for people.
+        Name of the arm in reports.
     kind : str
         ``"axis"``, ``"pendulum"``, ``"two-link"`` or ``"serial"``.
     gravity : float
@@ -69,8 +69,8 @@ class Arm:
     sample_period : float
         Nominal sample period [s].
     theta, sigma : ndarray, shape (n_parameters,)
-        Inertial base parameters, then viscous, then Coulomb coefficients per joint [SI], and the 1-sigma trust in each. Of a serial arm the
-        inertial ones are ten per link, see `armgap.arm.rigid_body`, then the rotors' inertias at the joints.
+        Inertial base parameters, then viscous, then Coulomb coefficients per joint [SI], and the standard deviation of each. The inertial parameters
+        of a serial arm are ten per link, see `armgap.arm.rigid_body`, then the rotors' inertias at the joints.
     counts_per_rev : ndarray, shape (n_joints,), optional
         Encoder counts per revolution (per metre on a linear joint).
     torque_limit : ndarray, shape (n_joints,), optional
@@ -78,10 +78,10 @@ class Arm:
     link_length : ndarray, shape (n_joints,), optional
         Link lengths [m].
     link_mass : ndarray, shape (n_joints,), optional
-        Link masses [kg]; motion does not tell them, an export to a simulator wants them.
+        Link masses [kg]; not identifiable from motion, but needed by an export to a simulator.
     encoder_side, friction_side : tuple of {"motor", "link", "unknown"}, optional
-        Per joint, the side of the transmission that the encoder measures and that friction acts on. Where it is unknown, an elastic or
-        slack transmission is tried with both.
+        Per joint, the side of the transmission that the encoder measures and that friction acts on. For ``"unknown"``, an elastic or
+        slack transmission is tried with both sides.
     gear_ratio : ndarray, shape (n_joints,), optional
         Turns of the motor per turn of the joint.
     columns : dict of str to str
@@ -89,19 +89,19 @@ class Arm:
     sealed : str, optional
         SHA-256 of a sealed key that belongs to the arm's logs.
     path : Path, optional
-        File it was read from.
+        File that the arm was read from.
     corrections : Corrections, optional
-        How columns of the arm's logs are to be read otherwise than they stand.
+        Corrections of the columns of the arm's logs: signs, zeros, units, order.
     limits : MotionLimits, optional
-        What a planned motion keeps to.
+        Limits that a planned motion keeps to.
     chain : SerialChain, optional
-        Joints and their placements, of a serial arm; gravity as a vector is part of it.
+        Joints of a serial arm with their placements, and gravity as a vector.
     controller : Controller, optional
-        Position controller: it tracks a planned motion, and logs may hold its references in place of torques.
+        Position controller that tracks a planned motion; logs may hold its references in place of torques.
     tau_kind : {"command", "measured"}
         Whether torques are commands, held until the next row, or measured, interpolated.
     notes : tuple of str
-        What was noticed while the description was read.
+        Remarks from reading the robot's description.
 
     Raises
     ------
@@ -133,7 +133,7 @@ class Arm:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check that kind, chain and parameters belong together."""
+        """Check that kind, chain and parameters of the arm are consistent with each other."""
         if (self.kind == SERIAL) != (self.chain is not None):
             raise OptionError(
                 f"an arm of kind `{self.kind}` and its chain do not fit", remedy='give kind "serial" a chain'
@@ -156,7 +156,7 @@ class Arm:
         Raises
         ------
         ArmFileError
-            If the file is missing, not TOML, or describes no possible arm; it names the key.
+            If the file is missing, not TOML, or describes no possible arm; the message names the key.
         """
         from armgap.arm.arm_file import ArmFile
 
@@ -170,12 +170,12 @@ class Arm:
 
     @property
     def n_inertial(self) -> int:
-        """Number of inertial base parameters; of a serial arm ten per link and one per rotor."""
+        """Number of inertial base parameters; for a serial arm ten per link and one per rotor."""
         return int(self._kind["n_inertial"]) if self.chain is None else 11 * self.chain.n_joints
 
     @property
     def rotary(self) -> bool:
-        """Whether all positions are angles."""
+        """Whether all joint positions of the arm are angles, not lengths."""
         return all(self.rotary_joints)
 
     @property
@@ -187,17 +187,17 @@ class Arm:
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """Names of the entries of `theta`."""
+        """Names of the entries of `theta`: parameters of the arm, such as ``theta1`` or ``mass1``."""
         return tuple(self._kind["parameter_names"]) if self.chain is None else self.chain.parameter_names
 
     @property
     def parameter_units(self) -> tuple[str, ...]:
-        """Units of the entries of `theta`."""
+        """SI units of the entries of `theta`, the parameters of the arm."""
         return tuple(self._kind["parameter_units"]) if self.chain is None else self.chain.parameter_units
 
     @property
     def gravity_parameters(self) -> NDArray[np.intp]:
-        """Indices of the entries of `theta` that are weights: torques or forces of gravity [N m or N]; none of a serial arm."""
+        """Indices into `theta` of gravity torques or forces [N m or N]; empty for a serial arm."""
         if self.chain is not None:
             return np.empty(0, dtype=np.intp)
         weight = "N m" if self.rotary else "N"
@@ -205,7 +205,7 @@ class Arm:
 
     @property
     def expects_weight(self) -> bool:
-        """Whether the weights in `theta` are those of an arm that hangs down at zero: none negative, one positive."""
+        """Whether the gravity parameters in `theta` are those of an arm that hangs down at position 0: none negative, at least one positive."""
         weights = self.theta[self.gravity_parameters]
         return bool(np.all(weights >= 0) and np.any(weights > 0))
 
@@ -221,19 +221,19 @@ class Arm:
         return np.where(self.rotary_joints, 2 * np.pi, 1.0) / self.counts_per_rev
 
     def _repr_html_(self) -> str:
-        """Return kind, conventions and parameters as HTML for a notebook."""
+        """Return kind, conventions and parameters of the arm as HTML for a notebook."""
         from armgap.report.forms.shown import arm_facts
 
         return arm_facts(self).html()
 
     def _repr_markdown_(self) -> str:
-        """Return kind, conventions and parameters as Markdown."""
+        """Return kind, conventions and parameters of the arm as Markdown."""
         from armgap.report.forms.shown import arm_facts
 
         return arm_facts(self).markdown()
 
     def to_native(self) -> dict[str, Any]:
-        """Return the arm as the compiled core takes it."""
+        """Return the arm as the dict that the compiled core reads."""
 
         def as_list(x: NDArray[np.float64] | None) -> list[float] | None:
             return None if x is None else [float(v) for v in x]
@@ -256,7 +256,7 @@ class Arm:
         }
 
     def to_toml(self) -> str:
-        """Return the arm as an arm file; that of a serial arm holds its chain and needs no other file."""
+        """Return the text of an arm file for this arm; for a serial arm the text holds the chain and refers to no other file."""
         if self.chain is not None:
             from armgap.arm.serial.toml import serial_toml
 
@@ -312,7 +312,7 @@ class Arm:
 
 
 def quoted(text: str) -> str:
-    """Return a text as a basic string of TOML, which escapes what JSON does, and DEL."""
+    """Return a text as a basic string of TOML: escaped like JSON, and DEL escaped too."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -322,22 +322,22 @@ def listed(values: Iterable[Any]) -> str:
 
 
 def _at_motor(sides: tuple[Side, ...] | None) -> list[bool | None] | None:
-    """Return per joint whether something sits at the motor, None where that is unknown."""
+    """Return per joint whether `sides` names the motor side of the transmission; None where the side is unknown."""
     return None if sides is None else [None if side == "unknown" else side == "motor" for side in sides]
 
 
 def kinds() -> dict[str, dict[str, Any]]:
-    """Return the kinds of arm by name: joints, number of inertial parameters, parameter names and units."""
+    """Return the properties of each kind of arm by name: joints, number of inertial parameters, parameter names and units."""
     return {entry["kind"]: entry for entry in _native.arm_kinds()}
 
 
 def only_planar(arm: Arm, what: str) -> None:
-    """Raise for a serial arm, where only the closed kinds of arm are supported.
+    """Raise if the arm is a serial arm, for a function that supports only axis, pendulum and two-link arms.
 
     Raises
     ------
     OptionError
-        It names what was asked for.
+        If the arm is a serial arm; the message names the function `what`.
     """
     if arm.chain is not None:
         raise OptionError(f"{what} does not take serial arms", remedy=f"give an arm of the kind {', '.join(kinds())}")

@@ -1,4 +1,4 @@
-"""Reading and checking of arm files: every complaint names the file and the key."""
+"""Reading and checking of arm files; every error message names the file and the key."""
 
 from __future__ import annotations
 
@@ -42,28 +42,28 @@ _TABLES: dict[str, tuple[str, ...]] = {
 }
 _SCALARS = ("name", "kind", "gravity", "sample_period")
 _MOST_BYTES = 2**20
-"""Size of an arm file: a thousand times what one needs."""
+"""Largest accepted size of an arm file, bytes: a thousand times what an arm file needs."""
 _FORMATS = "docs/formats.md, Arm file"
 _CLOSE_KIND = 0.75
-"""Likeness from which another kind is suggested: a slip of the pen, not another machine (`six-axis` and `axis` have 0.67)."""
+"""String similarity above which a known kind of arm is suggested for a misspelt one (`six-axis` and `axis`, different machines, have 0.67)."""
 _MARKUP = {"robot": "a URDF", "sdf": "an SDF model", "mujoco": "an MJCF model"}
 _KINDS = [*kinds(), SERIAL]
 _REMEDY_MARKUP = (
     f"make an arm file of it with armgap model, or write one of the kind {', '.join(_KINDS)}; see {_FORMATS}"
 )
-#: Standard deviations of values whose file states none, as a part of the value: a drawing is right to 10 %, friction to half.
+#: Standard deviations of parameters whose arm file states none, as a part of the value: a drawing is right to 10 %, friction to half.
 _INERTIAL_SIGMA = 0.1
 _FRICTION_SIGMA = 0.5
 _LISTED = 40
-"""Words that a message lists: all keys of a table, not all links of a humanoid."""
+"""Names that an error message lists at most: all keys of a table, but not all links of a humanoid."""
 STRONGEST_GRAVITY = 30.0  # m/s^2
-# Sample periods beyond these [s] are in another unit.
+# Range of plausible sample periods [s]; a period outside the range is in another unit.
 SHORTEST_PERIOD_S = 1e-5
 LONGEST_PERIOD_S = 0.5
 
 
 class ArmFile:
-    """One arm file being checked."""
+    """One arm file while it is checked."""
 
     tables: Mapping[str, tuple[str, ...]] = _TABLES
     scalars: tuple[str, ...] = _SCALARS
@@ -74,7 +74,7 @@ class ArmFile:
 
     @classmethod
     def load(cls, path: Path) -> ArmFile:
-        """Read the file's TOML."""
+        """Read an arm file as TOML."""
         try:
             text = read_bounded(path, _MOST_BYTES).decode("utf-8-sig")
         except OSError as error:
@@ -92,11 +92,11 @@ class ArmFile:
         return cls(path, data)
 
     def error(self, key: str, problem: str, remedy: str) -> ArmFileError:
-        """Return the complaint about a key."""
+        """Return the error about a key of the arm file, with the problem and its remedy."""
         return ArmFileError(problem, remedy=remedy, file=self.path, column=key)
 
     def fields(self) -> dict[str, Any]:
-        """Return the fields of an `Arm`, all of them checked."""
+        """Return the checked fields of an `Arm` by name."""
         if self.data.get("kind") == SERIAL:
             from armgap.arm.serial.arm_file import SerialArmFile
 
@@ -249,7 +249,7 @@ class ArmFile:
         return self._optional("geometry.link_mass", n)
 
     def _column_keys(self, n: int) -> list[str]:
-        """Return the columns of a log that can be mapped."""
+        """Return the names of log columns that an arm file's table ``[columns]`` can map for an arm of n joints."""
         return ["t", *(f"{kind}{j}" for kind in ("q", "tau", "dq", "tau_meas", "q_link") for j in range(1, n + 1))]
 
     def _limits(self, n: int) -> MotionLimits | None:
@@ -315,7 +315,7 @@ class ArmFile:
         return dict(mapping)
 
     def _corrections(self) -> Corrections:
-        """Return how the logs' columns are to be read otherwise than they stand."""
+        """Return the corrections of log columns that the arm file states."""
         from armgap.arm.corrections import CORRECTIONS, Corrections
 
         given = self.data.get("corrections", {})
@@ -350,13 +350,13 @@ class ArmFile:
 
 
 def _markup(text: str) -> str:
-    """What kind of model a text in angle brackets is."""
+    """Return the format of a text in angle brackets: URDF, MJCF or other XML."""
     root = re.search(r"<([A-Za-z][\w:.-]*)", re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL))
     return _MARKUP.get(root[1] if root else "", "XML")
 
 
 def suggest(word: str, known: Sequence[str], cutoff: float = 0.6) -> str:
-    """Name what is known, the first of many, and before it what is spelt nearly so."""
+    """Return a hint for a misspelt word: the closest known word, then the first of the known words."""
     close = difflib.get_close_matches(word, known, n=1, cutoff=cutoff)
     more = f", and {len(known) - _LISTED} more" if len(known) > _LISTED else ""
     listed = ", ".join(known[:_LISTED]) + more

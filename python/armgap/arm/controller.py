@@ -27,8 +27,8 @@ class Controller:
     ki : ndarray, shape (n_joints,), optional
         Integral gain [N m/(rad s)].
     sigma_kp, sigma_kd, sigma_ki : ndarray, shape (n_joints,), optional
-        One standard deviation of trust in the gains; without `sigma_kp` they are known exactly, with it those of `kd` and `ki` are by default the
-        same shares of the gains as that of `kp`.
+        One standard deviation of trust in the gains; without `sigma_kp` the gains are known exactly, with it `sigma_kd` and `sigma_ki` are
+        by default the same shares of `kd` and `ki` as `sigma_kp` is of `kp`.
     delay : ndarray, shape (n_joints,), optional
         Time by which the controller's torque is late [s].
     deadband : ndarray, shape (n_joints,), optional
@@ -71,7 +71,7 @@ class Controller:
         dq_ref: NDArray[np.float64] | None = None,
         limit: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
-        """Return the mean torques of the controller over the intervals of a log: to compare them with an arm, without delay, deadband and integral.
+        """Return the controller's mean torques over the sample intervals of a log, without delay, deadband and integral part.
 
         Parameters
         ----------
@@ -80,14 +80,14 @@ class Controller:
         q, q_ref : ndarray, shape (n_samples, n_joints)
             Positions [rad or m], and references that are held until the next sample.
         dq_ref : ndarray, as `q_ref`, optional
-            Velocities of the reference; taken from `q_ref` without them.
+            Velocities of the reference; differences of `q_ref` by default.
         limit : ndarray, shape (n_joints,), optional
             Largest torques [N m or N].
 
         Returns
         -------
         ndarray, shape (n_samples, n_joints)
-            The last row repeats the one before.
+            Torques [N m or N]; the last row repeats the row before it.
         """
         h = np.diff(t)[:, None]
         rate = -np.diff(q, axis=0) / h
@@ -99,14 +99,14 @@ class Controller:
         return np.concatenate([tau, tau[-1:]])
 
     def to_native(self) -> dict[str, Any]:
-        """Return the controller as the compiled core takes it."""
+        """Return the controller as the dict that the compiled core reads."""
         given = {name: values.tolist() for name, values in self.vectors if not name.startswith("sigma")}
         sigmas = {name: values.tolist() for name, values in self.sigmas.items()}
         return {**given, **sigmas, "rate_of_error": self.kd_on == "error"}
 
     @property
     def vectors(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
-        """Names and values of what is given per joint."""
+        """Names and values of the controller's settings that are given per joint."""
         for name in VECTORS:
             if (values := getattr(self, name)) is not None:
                 yield name, values
@@ -115,4 +115,4 @@ class Controller:
 VECTORS: tuple[str, ...] = (
     "kp", "kd", "ki", "sigma_kp", "sigma_kd", "sigma_ki", "delay", "deadband", "speed_limit",
 )  # fmt: skip
-"""Keys with one number per joint."""
+"""Keys of a controller in an arm file that take one number per joint."""

@@ -1,4 +1,4 @@
-"""Corrections of the input: what an option or a line of the arm file says about how a log's columns are to be read."""
+"""Corrections of the input by options or by an arm file: sign, zero, order, unit, factor or time shift of a log's columns."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _POSITION = re.compile(r"q([1-9]\d*)")
 _ZERO = re.compile(r"(q|q_link)([1-9]\d*)")
 _TORQUE = re.compile(r"tau([1-9]\d*)?")
 _FACTOR = re.compile(r"(tau|tau_meas)([1-9]\d*)?")
-# A shift this near to a whole number of sample periods is one.
+# Distance of a time shift from a whole number of sample periods, in periods, up to which the shift counts as whole.
 _WHOLE = 0.05
-# Arrays of a log that a column of each kind stands for where signs and joints are concerned: what is measured at a joint counts its way.
+# Arrays of a log that a correction of sign or joint changes, by kind of column: whatever is measured at a joint changes with the joint's sign.
 _TOGETHER = {
     "q": ("q", "dq", "q_ref", "dq_ref", "q_link"),
     "dq": ("dq",),
@@ -39,49 +39,50 @@ _TOGETHER = {
     "q_link": ("q_link",),
     "tau_meas": ("tau_meas",),
 }
-# Those that a zero or a unit of the positions is about, and those that a factor on torques is: a measured torque has a unit of its own.
+# Arrays of a log that a correction of zero or unit changes, by kind of position column, and arrays that a factor on torques
+# changes; a measured torque has a unit of its own and is not among them.
 _POSITIONS = {"q": ("q", "q_ref", "q_link"), "q_link": ("q_link",)}
 _FACTORS = {"tau": ("tau", "moment"), "tau_meas": ("tau_meas",)}
-# Those whose times a shift of the torques is about: what is measured is measured beside the positions.
+# Arrays of a log that a time shift of the torques moves; measured torques are not among them, for they are sampled with the positions.
 _SHIFTED = ("tau", "moment")
 _ANGLE = re.compile(r"(?P<number>[-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|m|turns)?")
 _ANGLE_UNITS = {"deg": math.pi / 180, "rad": 1.0, "m": 1.0, "turns": 2 * math.pi, None: 1.0}
 _SPAN = re.compile(r"(?:(?P<log>.+):)?(?P<first>[\d.]+)-(?P<last>[\d.]+)")
-# Standard deviation [SI] left to gravity parameters that are known to be zero.
+# Standard deviation [SI] of gravity parameters that are known to be zero.
 _NO_GRAVITY_SIGMA = 1e-9
 
 
 @dataclass(frozen=True)
 class Corrections:
-    """How the columns of the logs differ from what the arm file means.
+    """Corrections that bring the columns of logs to the conventions of the arm file.
 
-    They are applied in this order: `unit`, `swap`, `flip`, `zero`, `absolute` and `relative`, `factor`, `skip`, `shift`; `gravity` is about
-    the arm. What is said of a position column holds for its second encoder ``q_link`` too; sign and joint of a torque column hold for the
-    measured torque ``tau_meas`` too, its factor and shift do not. Either can be named alone where signs, joints, zeros or factors are meant.
+    Corrections are applied in this order: `unit`, `swap`, `flip`, `zero`, `absolute` and `relative`, `factor`, `skip`, `shift`; `gravity` changes
+    the arm. Corrections of a position column hold for the joint's second encoder ``q_link`` too; sign and joint of a torque column hold for
+    ``tau_meas`` too, factor and shift do not. ``q_link`` and ``tau_meas`` can be named alone for signs, joints, zeros or factors.
 
     Attributes
     ----------
     flip : tuple of str
-        Columns that count the other way: ``"q1"``, ``"tau2"``.
+        Columns with reversed sign: ``"q1"``, ``"tau2"``.
     zero : mapping of str to float
-        Where the zero of a position column lies in the model's position [rad or m]; it is added to the column.
+        Model position at the zero of a position column [rad or m], added to the column.
     swap : tuple of (str, str)
-        Columns that stand for each other: ``("q1", "q2")``.
+        Pairs of exchanged columns: ``("q1", "q2")``.
     absolute : tuple of str
-        Position columns that count from the world where the model counts from the link before.
+        Columns with positions relative to the world where the model's are relative to the preceding link.
     relative : tuple of str
-        Position columns that count from the link before where the model counts from the world.
+        Columns with positions relative to the preceding link where the model's are relative to the world.
     factor : mapping of str to float
-        Factors that make torques of torque columns; velocities stay.
+        Factors from torque columns to torques [N m or N]; velocities are not scaled.
     shift : mapping of str to float
         ``{"tau": s}``: seconds to be added to the times of all torques.
     gravity : {"reversed", "compensated"}, optional
-        ``"reversed"``: gravity acts the other way than the arm file says; ``"compensated"``: torques were logged without what
-        carries the arm's weight, or the arm moves in a horizontal plane.
+        ``"reversed"``: gravity acts the other way than the arm file says; ``"compensated"``: logged torques lack the part
+        that carries the arm's weight, or the arm moves in a horizontal plane.
     unit : {"deg", "turns"}, optional
-        Unit of all positions where it is not rad.
+        Unit of all positions; None for rad.
     skip : tuple of str
-        Times of a log that are left out, in seconds from its first sample: ``"0-2.5"``, or ``"run1:0-2.5"`` of one log.
+        Times of a log that are left out, in seconds from its first sample: ``"0-2.5"``, or ``"run1:0-2.5"`` for the log ``run1`` alone.
 
     Examples
     --------
@@ -101,17 +102,17 @@ class Corrections:
     skip: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        """Whether there is anything to correct."""
+        """Whether any correction is set."""
         return any(getattr(self, f.name) for f in fields(self))
 
     @classmethod
     def parse(cls, **values: Any) -> Corrections:
-        """Read corrections as options give them, lists of words, or as an arm file does.
+        """Read corrections from lists of words, as command-line options give them, or from mappings, as an arm file does.
 
         Parameters
         ----------
         **values
-            By name of the correction: a word such as ``"tau1,tau2"`` or ``"q1=180deg"``, a list of words, or a mapping.
+            Value per name of a correction: a word such as ``"tau1,tau2"`` or ``"q1=180deg"``, a list of words, or a mapping.
 
         Raises
         ------
@@ -145,7 +146,7 @@ class Corrections:
         )
 
     def merged(self, other: Corrections) -> Corrections:
-        """Return both; where both speak of one column the other wins."""
+        """Return the union of two sets of corrections; for a column that both correct, `other` wins."""
         return Corrections(
             flip=tuple(dict.fromkeys((*self.flip, *other.flip))),
             zero={**self.zero, **other.zero},
@@ -160,7 +161,7 @@ class Corrections:
         )
 
     def options(self) -> tuple[str, ...]:
-        """Return the command line's options for this."""
+        """Return the command-line options that state these corrections."""
         words = [f"--units q={self.unit}"] if self.unit else []
         words += [f"--flip {','.join(self.flip)}"] if self.flip else []
         words += [f"--zero {column}={_in_degrees(value)}" for column, value in self.zero.items()]
@@ -173,7 +174,7 @@ class Corrections:
         return (*words, *((f"--gravity {self.gravity}",) if self.gravity else ()))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what there is to correct, ready for JSON."""
+        """Return the corrections that are set as a dict ready for JSON."""
         given = {f.name: getattr(self, f.name) for f in fields(self)}
         plain = {
             k: list(v) if isinstance(v, tuple) else dict(v) if isinstance(v, Mapping) else v for k, v in given.items()
@@ -181,7 +182,7 @@ class Corrections:
         return {k: v for k, v in plain.items() if v}
 
     def toml_lines(self) -> list[str]:
-        """Return the lines of an arm file's ``[corrections]`` table, but for gravity, which the arm's values hold already."""
+        """Return the lines of an arm file's ``[corrections]`` table, without gravity, which the arm's parameters already include."""
         lines = [f"unit = {json.dumps(self.unit)}"] if self.unit else []
         lines += [
             f"{name} = {json.dumps(list(getattr(self, name)))}"
@@ -195,12 +196,12 @@ class Corrections:
         return lines
 
     def on_log(self, log: Log) -> Log:
-        """Return the log with its columns read so, and say so among its findings.
+        """Return the log with its columns corrected; each correction is added to the log's findings.
 
         Raises
         ------
         ColumnError
-            If a column is not there.
+            If the log lacks a column that is to be corrected.
         """
         about_log = replace(self, gravity=None)
         if not about_log:
@@ -228,7 +229,7 @@ class Corrections:
         return replace(log, **columns, findings=(*log.findings, said))
 
     def _positions(self, columns: dict[str, Any]) -> None:
-        """Correct unit, order, signs, zeros and reference of the columns in place."""
+        """Correct unit, order, signs, zeros and reference link of position columns in place."""
         if self.unit is not None:
             for values in _of(columns, _POSITIONS["q"]):
                 values *= _ANGLE_UNITS[self.unit]
@@ -251,7 +252,7 @@ class Corrections:
                     values[:, j] += sign * values[:, j - 1]
 
     def _skipped(self, log: Log) -> Any:
-        """Return which samples are left out."""
+        """Return a mask of the samples that the correction `skip` leaves out."""
         skipped = np.zeros(len(log), dtype=bool)
         for span in self.skip:
             match = _SPAN.fullmatch(span)
@@ -261,7 +262,7 @@ class Corrections:
         return skipped
 
     def on_arm(self, arm: Arm) -> Arm:
-        """Return the arm with gravity as these corrections say."""
+        """Return the arm with gravity corrected: reversed or compensated."""
         if self.gravity is None:
             return arm
         if arm.chain is not None:
@@ -299,14 +300,14 @@ CORRECTIONS: tuple[str, ...] = tuple(f.name for f in fields(Corrections))
 
 
 def _of(columns: Mapping[str, Any], names: Iterable[str]) -> list[Any]:
-    """Return the arrays that there are; torques of a log of references have no columns."""
+    """Return those of the named arrays that the log has; a log of references has no torques."""
     return [x for name in names if (x := columns[name]) is not None and x.shape[1]]
 
 
 def _shifted(t: Any, period: float, seconds: float) -> tuple[Any, Any]:
-    """Return the rows whose shifted torques are known, and the rows that these torques stand in; each is held until the next.
+    """Return the rows whose shifted torques are known, and the rows that hold these torques; each torque is held until the next row.
 
-    A shift by whole sample periods takes every torque to the row so many rows away, however stamps scatter.
+    A shift by whole sample periods takes every torque to the row that many rows away, however the time stamps scatter.
     """
     rows = np.arange(len(t))
     samples = seconds / period

@@ -1,4 +1,4 @@
-"""What an arm in a plane must not touch: links as capsules, what stands in the way as boxes, and the arm itself."""
+"""Collision checks of an arm in a plane: links as capsules, obstacles as boxes, self-collision included."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ __all__ = ["FreeSpace"]
 
 Array = NDArray[np.float64]
 
-#: Distance of the points by which a link's axis is followed, as a part of its radius and of its length.
+#: Spacing of the points along a link's axis, as a part of the link's radius and of the link's length, whichever is larger.
 _STEP, _FEWEST = 0.5, 1 / 50
-#: Part of the last link, from the joint that joins it to the one before, that is not held against that one: there they always touch.
+#: Part of the last link, from its joint on, that is not checked against the link before it: links touch at the joint they share.
 JOINED = 0.5
 
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """Shapes of links and of what stands in their way, in the plane of motion: x to the right, y upwards, from the first joint [m].
+    """Shapes of links and obstacles, in the plane of motion: x to the right, y upwards, from the first joint [m].
 
     Attributes
     ----------
     link_length, link_radius : ndarray, shape (n_joints,)
         Length of every link, and radius of the capsule around its axis [m].
     boxes : ndarray, shape (n_boxes, 4)
-        ``x_min, y_min, x_max, y_max`` of everything that stands in the way [m].
+        ``x_min, y_min, x_max, y_max`` of each obstacle [m].
     """
 
     link_length: Array
@@ -35,9 +35,9 @@ class FreeSpace:
     boxes: Array
 
     def clearance(self, q: Array) -> tuple[Array, list[str]]:
-        """Return the distance that is left in some poses to everything that must not be touched, and what each column is.
+        """Return the distances between links and obstacles, and between links, in some poses, with the name of each pair.
 
-        Links are followed from point to point; half the distance of two points is taken off, so that nothing slips between them.
+        Distances are taken from points along each link, less half the spacing of the points, so that no obstacle lies between points unseen.
 
         Parameters
         ----------
@@ -66,7 +66,7 @@ class FreeSpace:
         return np.array(columns).reshape(len(columns), len(q)).T, names
 
     def is_free(self, q: Array) -> bool:
-        """Return whether the arm touches nothing in consecutive poses of a motion, nor on straight ways between them.
+        """Return whether the arm is free of collision in consecutive poses of a motion and on straight lines in joint space between them.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class FreeSpace:
         return bool(np.all(self.clearance(q)[0] > 0.5 * way[:, None]))
 
     def touched(self, q: Array) -> str | None:
-        """Return what overlaps in a pose `q`, shape (n_joints,); None where nothing does."""
+        """Return the name of a pair of shapes that overlap in a pose `q`, shape (n_joints,); None without overlap."""
         distances, names = self.clearance(q[None])
         if not names:
             return None
@@ -89,7 +89,7 @@ class FreeSpace:
         return names[worst] if distances[0, worst] <= 0 else None
 
     def _axes(self, q: Array) -> list[tuple[Array, float]]:
-        """Points along the axis of every link, shape (n_poses, n_points, 2), and their distance."""
+        """Return points along the axis of every link, shape (n_poses, n_points, 2), each with the spacing of the points [m]."""
         begin, found = np.zeros((len(q), 2)), []
         for length, radius, angle in zip(self.link_length, self.link_radius, np.cumsum(q, axis=1).T, strict=True):
             count = math.ceil(length / max(_STEP * radius, _FEWEST * length)) + 1
@@ -102,7 +102,7 @@ class FreeSpace:
 
 
 def _to_segment(points: Array, end: Array) -> Array:
-    """Distances of points (n_poses, n_points, 2) from the segments from the origin to the ends (n_poses, 2)."""
+    """Return the distances of points, shape (n_poses, n_points, 2), from the segments from the origin to `end`, shape (n_poses, 2)."""
     part = np.einsum("pnk,pk->pn", points, end) / np.maximum(np.sum(end * end, axis=1), 1e-300)[:, None]
     nearest = np.clip(part, 0.0, 1.0)[..., None] * end[:, None]
     apart = points - nearest

@@ -1,4 +1,4 @@
-"""An arm from the description of a robot."""
+"""Reading of a serial arm from a robot's description, URDF or MJCF."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from armgap.options import positive
 
 __all__ = ["read_model"]
 
-#: Sample period of an arm file made from a description that tells none, s.
+#: Sample period of an arm file made from a description that states none, s.
 _PERIOD_S = 0.002
 
 
@@ -41,16 +41,16 @@ def read_model(
     Parameters
     ----------
     path : path-like
-        URDF, or MJCF, which MuJoCo reads (extra ``trial``).
+        URDF file, or MJCF file, which needs MuJoCo (extra ``trial``).
     base, tip : str, optional
-        First and last link; by default the root, and the end of the only branch that moves.
+        First and last link; by default the root link, and the end of the only branch with moving joints.
     frozen : mapping of str to float, optional
-        Positions of joints that stand still [rad or m]. Joints off the chain stand at 0 by default, which `Arm.notes` says.
+        Positions of joints that stand still [rad or m]. Joints off the chain stand at 0 by default; `Arm.notes` lists them.
     gravity : float or sequence of 3 floats, optional
-        Acceleration of gravity in the frame of the base [m/s^2]; a number g stands for ``[0, 0, -g]``. By default that of the description:
-        9.81 against the z axis of a URDF's root.
+        Acceleration of gravity in the frame of the base [m/s^2]; a number g stands for ``[0, 0, -g]``. By default the description's
+        gravity: 9.81 against the z axis of a URDF's root link.
     trust : {"published", "cad", "guess", "none"}
-        How far the description's masses and inertias are trusted, see `armgap.arm.serial.trust`.
+        Level of trust in the description's masses and inertias, see `armgap.arm.serial.trust`.
     name : str, optional
         Name of the arm; by default the description's.
     sample_period : float, default 0.002
@@ -59,12 +59,12 @@ def read_model(
     Returns
     -------
     Arm
-        Of the kind ``"serial"``, with the chain in `Arm.chain` and remarks in `Arm.notes`.
+        Arm of the kind ``"serial"``, with the chain in `Arm.chain` and remarks in `Arm.notes`.
 
     Raises
     ------
     ModelFileError
-        If the file cannot be read or there is no such chain; it names the element and the remedy.
+        If the file cannot be read or has no chain from `base` to `tip`; the message names the element and the remedy.
     OptionError
         If an option has an impossible value.
 
@@ -103,7 +103,7 @@ def _finite(value: Any, what: str) -> float:
 
 
 def _vector(gravity: float | Sequence[float]) -> NDArray[np.float64]:
-    """Return gravity as a vector; a number acts against the z axis."""
+    """Return gravity as a vector [m/s^2], shape (3,); a single number g stands for ``[0, 0, -g]``."""
     given = (0.0, 0.0, -_finite(gravity, "gravity")) if isinstance(gravity, int | float) else gravity
     vector = np.array([_finite(value, "gravity") for value in given])
     if vector.shape != (3,) or float(np.linalg.norm(vector)) > STRONGEST_GRAVITY:

@@ -1,4 +1,4 @@
-"""Inertia of rigid bodies in ten numbers, linear in the equation of motion: ``m, m cx, m cy, m cz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz``.
+"""Inertia of rigid bodies in ten inertial parameters, linear in the equation of motion: ``m, m cx, m cy, m cz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz``.
 
 ``c`` is the centre of mass and ``I`` the inertia about the origin of the body's frame, along its axes (Khalil 2002, section 9.3;
 Featherstone 2008, section 2.13). The inertia about the centre of mass follows by the parallel axis theorem.
@@ -31,18 +31,18 @@ __all__ = [
 Array = NDArray[np.float64]
 
 INERTIAL_NAMES: tuple[str, ...] = ("mass", "mx", "my", "mz", "ixx", "ixy", "iyy", "ixz", "iyz", "izz")
-"""Names of the ten numbers; a joint's number follows."""
+"""Names of a body's ten inertial parameters; the joint's number is appended."""
 INERTIAL_UNITS: tuple[str, ...] = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
 #: Rows and columns of the six independent entries of a symmetric 3 x 3 matrix, in the order of arm files.
 _ROWS, _COLUMNS = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
-# A negative eigenvalue of the pseudo-inertia that is this small beside the largest is rounding of the description.
+# Size of a negative eigenvalue of an inertia that counts as rounding of the description, as a part of the inertia's trace.
 _CONSISTENT = 1e-9
-# A unit vector's length is 1 to this many times the rounding of double precision.
+# Tolerance of a unit vector's length, and of sines and cosines at zero: a few times the rounding of double precision.
 _UNIT = 4.0 * np.finfo(np.float64).eps
 
 
 def symmetric(six: Sequence[float] | Array) -> Array:
-    """Return the symmetric matrix, shape (3, 3), of ``xx, xy, yy, xz, yz, zz``."""
+    """Return the symmetric matrix, shape (3, 3), with the entries ``xx, xy, yy, xz, yz, zz``."""
     matrix = np.empty((3, 3))
     matrix[_ROWS, _COLUMNS] = six
     matrix[_COLUMNS, _ROWS] = six
@@ -54,12 +54,12 @@ def _six(matrix: Array) -> Array:
 
 
 def _steiner(mass: float, com: Array) -> Array:
-    """Return the inertia of a point mass about the origin."""
+    """Return the inertia of a point mass about the origin [kg m^2], shape (3, 3) (Steiner)."""
     return mass * (float(com @ com) * np.eye(3) - np.outer(com, com))
 
 
 def about_origin(mass: float, com: Array, inertia: Array) -> Array:
-    """Return the ten numbers of a body.
+    """Return a body's ten inertial parameters about the origin of its frame, shape (10,).
 
     Parameters
     ----------
@@ -74,23 +74,23 @@ def about_origin(mass: float, com: Array, inertia: Array) -> Array:
 
 
 def about_com(ten: Array) -> tuple[float, Array, Array]:
-    """Return mass, centre of mass and inertia about it; the reverse of `about_origin`, for a mass other than zero."""
+    """Return mass, centre of mass and inertia about it from ten inertial parameters; the inverse of `about_origin`, for non-zero mass."""
     mass = float(ten[0])
     com = ten[1:4] / mass
     return mass, com, symmetric(ten[4:]) - _steiner(mass, com)
 
 
 def moved(ten: Array, rotation: Array, translation: Array) -> Array:
-    """Return the ten numbers in another frame.
+    """Return a body's ten inertial parameters in another frame, shape (10,).
 
     Parameters
     ----------
     ten : ndarray, shape (10,)
-        In the body's own frame.
+        Inertial parameters in the body's own frame.
     rotation : ndarray, shape (3, 3)
-        Its axes in the other frame, as columns.
+        Axes of the body's frame in the other frame, as columns.
     translation : ndarray, shape (3,)
-        Its origin in the other frame [m].
+        Origin of the body's frame in the other frame [m].
     """
     mass, first = float(ten[0]), rotation @ ten[1:4]
     inertia = rotation @ symmetric(ten[4:]) @ rotation.T
@@ -101,7 +101,7 @@ def moved(ten: Array, rotation: Array, translation: Array) -> Array:
 
 
 def inconsistency(ten: Array) -> str:
-    """Say why no body has these ten numbers: its pseudo-inertia has to be positive semi-definite (Wensing et al. 2018); empty if one has.
+    """Return why no body has these ten inertial parameters: the pseudo-inertia is not positive semi-definite (Wensing 2018); else empty.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def inconsistency(ten: Array) -> str:
 
 
 def pseudo_inertia(ten: Array) -> Array:
-    """Return the pseudo-inertia of ten numbers, shape (4, 4), which is linear in them and positive semi-definite for every body that can exist.
+    """Return the pseudo-inertia, shape (4, 4), of ten inertial parameters: linear in them and positive semi-definite for every body that can exist.
 
     Its upper left part is the second moment ``integral of x x' dm`` about the origin, its last column first moments and mass (Wensing, Kim and
     Slotine 2018, equation 6).
@@ -157,7 +157,7 @@ def rotation_between(start: Array, end: Array) -> Array:
 
 
 def rpy_of(rotation: Array) -> Array:
-    """Return roll, pitch and yaw [rad] of a rotation, shape (3,); the reverse of `rpy_matrix`, with a roll of zero where pitch is a right angle."""
+    """Return roll, pitch and yaw [rad] of a rotation, shape (3,); the inverse of `rpy_matrix`, with a roll of zero where pitch is a right angle."""
     r = rotation
     level = math.hypot(r[0, 0], r[1, 0])
     pitch = math.atan2(-r[2, 0], level)
@@ -180,7 +180,7 @@ def rpy_matrix(rpy: Sequence[float] | Array) -> Array:
 
 
 def unit_axis(axis: Sequence[float] | Array) -> Array | None:
-    """Return an axis at length 1, shape (3,); one that has it stays as it is to the last bit; None for a zero axis."""
+    """Return an axis scaled to length 1, shape (3,); an axis of length 1 is returned unchanged to the last bit; None for a zero axis."""
     vector = np.array(axis, dtype=np.float64)
     largest = float(np.max(np.abs(vector)))
     if largest == 0:

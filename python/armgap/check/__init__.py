@@ -1,4 +1,4 @@
-"""Plausibility of the input: what contradicts the arm file, or was done to a log before it got here, said before any effect."""
+"""Plausibility checks of the input before a diagnosis: contradictions between logs and arm file, and traces of earlier processing in a log."""
 
 from armgap.arm.corrections import CORRECTIONS, Corrections
 from armgap.check.check import NAMES, Check, CheckName, Severity

@@ -1,4 +1,4 @@
-"""What a check says: a defect of the input, how sure that is, and what to do about it."""
+"""Result of a check of the input: a defect, its severity, and its remedies."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 
 
 class CheckEntry(TypedDict):
-    """A `Check` in a diagnosis."""
+    """Entry of a diagnosis' ``checks``: a `Check` of the input as a JSON object."""
 
     check: Annotated[CheckName, "Which defect."]
     joint: Annotated[int | None, "1-based joint; null for the whole log or arm."]
@@ -54,18 +54,18 @@ class Check:
     Attributes
     ----------
     check : str
-        Which defect, one of `NAMES`.
+        Identifier of the defect, one of `NAMES`.
     severity : {"error", "repaired", "warning"}
         ``"error"``: log and arm file contradict each other, the verdict is ``"input"``; ``"repaired"``: the log was repaired and the
-        diagnosis goes on with it; ``"warning"``: noticed, nothing was changed.
+        diagnosis goes on with it; ``"warning"``: the log was not changed.
     message : str
-        One sentence with the figures.
+        One sentence with the figures of the defect.
     remedies : tuple of str
-        What mends it: options of the command line, or lines of the arm file. Several where no log tells them apart.
+        Remedies of the defect: command-line options, or lines of the arm file. Several where no log tells them apart.
     joint : int, optional
         Joint, from 1; None for the whole log or arm.
     log : str, optional
-        Name of the log; None if it concerns all.
+        Name of the log; None if the defect concerns all logs.
     rows : tuple of (int, int)
         Ranges of rows ``(first, last)`` of the log, from 0, both included.
     """
@@ -80,7 +80,7 @@ class Check:
 
     @property
     def remedy(self) -> str:
-        """All remedies in one line."""
+        """All remedies of the defect in one line."""
         return " or ".join(self.remedies)
 
     def line(self, log: str | None = None) -> str:
@@ -104,7 +104,7 @@ class Check:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Check:
-        """Build it from an entry of ``checks``."""
+        """Build a check from an entry of a diagnosis' ``checks``."""
         return cls(
             check=data["check"],
             severity=data["severity"],
@@ -116,5 +116,5 @@ class Check:
         )
 
     def of(self, log: str | None) -> Check:
-        """Return the same check of another log."""
+        """Return a copy of the check for another log."""
         return replace(self, log=log)

@@ -1,8 +1,8 @@
-"""Contradictions between logs and arm file: another reading explains the logs where the one they have does not.
+"""Contradictions between logs and arm file: a corrected reading of the columns explains the logs where the columns as logged do not.
 
-Two steps. The equation error of the arm within bounds costs a millisecond per reading and finds what may be (`screen`). Predictions over
-short windows, with the parameters estimated again in the trust that the arm file states, decide (`confirm`). Both compare the log as
-it stands with the log as it would be without the defect; neither knows anything about a single defect.
+Two steps. The equation error of the arm within bounds costs a millisecond per reading and finds candidates (`screen`). Predictions over
+short windows, with the parameters re-estimated under the standard deviations of the arm file, decide (`confirm`). Both steps compare the
+log as it stands with the log without the defect, and neither step has a rule for any single defect.
 """
 
 from __future__ import annotations
@@ -44,35 +44,35 @@ READINGS: tuple[Callable[[Arm, float], Iterable[Reading]], ...] = (
     gravity_missing.readings,
     position_unit.readings,
 )
-"""Every check that offers other readings of the input."""
+"""Functions that yield the readings of the input to be tried, for an arm and the largest position in its logs."""
 
-# A reading is looked at more closely if it lowers the mean log share of unexplained torque by this much. On logs of a simulator the right
-# reading wins by 0.17 to 4; on single logs of a real arm a wrong one has won by up to 0.6, which predictions then refute.
+# A reading of the input is refitted if it lowers the mean log share of unexplained torque by this much. On logs of a simulator the right
+# reading wins by 0.17 to 4; on single logs of a real arm a wrong reading has won by up to 0.6, which predictions then refute.
 _SUSPICIOUS = 0.1
-# Readings that are looked at more closely, at most.
+# Readings of the input that are refitted at most.
 _MOST_SUSPECTS = 3
-# A reading is right if predictions miss by less than this part of what they miss with the log as it stands. Unmodelled effects seldom
-# change the RMS of wrong readings by less than a factor of two.
+# A reading of the input is right if its prediction error is below this part of the prediction error with the log as it stands. Unmodelled effects
+# seldom change the RMS of wrong readings by less than a factor of two.
 BETTER = 0.7
-# And if the logarithms of this ratio and of the equation error fall by so much together. Of 161 right readings on 14 cases, where an arm may have
-# what the log as it stands asks for, the least say 1.3 (beside a drive that saturates), 1.9 and 2.1; wrong ones, on pieces of two runs of a real
-# arm, 0.73 and 0.86.
+# Least fall of the logarithms of that ratio and of the equation error together with a right reading of the input. Of 161 right readings on 14 cases,
+# where an arm may have what the log as it stands asks for, the least say 1.3 (beside a drive that saturates), 1.9 and 2.1; wrong readings of pieces
+# of two runs of a real arm say 0.73 and 0.86.
 _SAYS = 1.0
-# With parameters that no arm has the log as it stands explains nothing; the other reading must then do about as well. So must a size of all torques
-# that the arm file's values may as well be off by.
+# Largest ratio of a reading's prediction error to that of the log as it stands, where the log as it stands needs parameters outside the
+# bounds, and for a factor on all torques that the arm file's parameters may be off by instead.
 AS_GOOD = 1.3
-# A reading that explains a log predicts it: errors stay below this part of the motion. Unmodelled effects leave up to a tenth.
+# Largest prediction error of a reading that explains a log, as a part of the motion. Unmodelled effects leave up to a tenth.
 EXPLAINS = 0.3
-# Or predictions miss by less than the motion itself, and its equation of motion leaves less than this share of every joint's torque: where a drive
-# saturates or has a dead zone for whole windows, predictions of right readings miss by 0.35 and 0.58 of the motion and the equation leaves 0.016 and
-# 0.063 (two cases). Wrong readings of them leave 0.07 to 1.2, so predictions have to be better than as the log stands here too. A real arm that
-# balances moves so little that predictions miss by twice the motion; with its joints exchanged the equation leaves 0.068.
+# A reading also explains a log if predictions miss by less than the motion and less than this share of every joint's torque is unexplained: where a
+# drive saturates or has a dead zone for whole windows, predictions of right readings miss by 0.35 and 0.58 of the motion and 0.016 and 0.063 of the
+# torque is unexplained (two cases). Wrong readings leave 0.07 to 1.2, so predictions have to be better than with the log as it stands too. A real arm
+# that balances moves so little that predictions miss by twice the motion; with its joints exchanged the equation leaves 0.068.
 _ACCOUNTS_FOR = 0.1
-# Errors below this part of the motion are as good as none.
+# Prediction errors below this part of the motion count as none.
 _NEGLIGIBLE = 1e-3
-# Other readings whose predictions are as good to this part, and that lower the equation error as far (to `_SUSPICIOUS`), are named beside it.
+# Ratio of prediction errors up to which another reading, with an equation error equal to within `_SUSPICIOUS`, is named beside the best.
 _ALIKE = 1.05
-# Parameters count as impossible beyond the bounds by so many standard deviations.
+# Standard deviations beyond the bounds from which parameters count as impossible.
 _SURE = 3.0
 
 
@@ -87,7 +87,7 @@ class Refit:
 
     @classmethod
     def of(cls, arm: Arm, training: Sequence[Log], holdout: Sequence[Log], horizon: float) -> Refit:
-        """Fit the parameters of the arm in the trust that it states, from its file and from what the equation of motion says of the logs."""
+        """Fit the arm's parameters to training logs, with prior from arm file and equation of motion, and judge the fit on the holdout."""
         errors = EquationError([Rows.of(log, arm) for log in training], arm)
         start = errors.fit(*bounds(arm)).theta if len(errors) else arm.theta
         found = _native.refit(
@@ -101,17 +101,17 @@ class Refit:
         return cls(theta, sigma, error, motion)
 
     def possible(self, arm: Arm) -> bool:
-        """Whether an arm may have these parameters whose file is right about signs and orders of magnitude."""
+        """Whether the parameters are possible for an arm whose file is right about signs and orders of magnitude."""
         low, high = bounds(arm)
         slack = _SURE * np.where(np.isfinite(self.sigma), self.sigma, 0.0)
         b = arm.n_inertial
         return bool(np.all(self.theta[:b] >= (low - slack)[:b]) and np.all(self.theta[:b] <= (high + slack)[:b]))
 
     def against(self, other: Refit, *, rescaled: bool = False) -> float:
-        """Return this error as a part of another one, the geometric mean over the joints.
+        """Return the prediction error as a part of that of `other`: geometric mean over the joints.
 
-        Of positions in other units each error is taken relative to its own motion. Of other readings it is not: a joint that hardly moves as it
-        stands may move with another reading, which makes no prediction better.
+        With `rescaled`, for positions in different units, each error is taken relative to the RMS displacement of its own motion. Errors of other
+        readings are not scaled: a joint that hardly moves in the log as it stands may move in another reading without a better prediction.
         """
         if rescaled:
             return self.relative / other.relative
@@ -128,18 +128,18 @@ class Refit:
 
 @dataclass(frozen=True)
 class Found:
-    """A reading that is right where the one of the log is not.
+    """Reading of the input that predictions confirm where the log as it stands is contradicted.
 
     Attributes
     ----------
     reading : Reading
-        What is wrong, and what undoes it.
+        Defect of the input, and the corrections that undo it.
     alike : tuple of Reading
-        Other readings that explain the logs as well.
+        Other readings that explain the logs equally well.
     unexplained : tuple of (float, float)
-        Largest share of a joint's torque that the equation of motion leaves, as the log stands and as it is read then.
+        Largest share of a joint's torque unexplained by the equation of motion: with the log as it stands, with the corrected log.
     error : tuple of (ndarray, ndarray)
-        RMS prediction error per joint, as the log stands and as it is read then [rad or m].
+        RMS prediction error per joint [rad or m]: with the log as it stands, with the corrected log.
     """
 
     reading: Reading
@@ -150,7 +150,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Suspect:
-    """A reading with a smaller equation error than the log as it stands."""
+    """Candidate reading of the input, with a smaller equation error than the log as it stands."""
 
     reading: Reading
     fit: Fit
@@ -158,7 +158,7 @@ class Suspect:
 
 
 def screen(base: EquationError, logs: Sequence[Log], arm: Arm) -> tuple[Fit, list[Suspect]]:
-    """Return what the logs leave as they stand (`base`), and readings that lower it, the best first."""
+    """Return the fit to the logs as they stand (`base`), and readings of the input with a smaller equation error, the best first."""
     low, high = bounds(arm)
     stands = base.fit(low, high)
     travel = max(float(np.ptp(log.q, axis=0).max()) for log in logs)
@@ -179,7 +179,7 @@ def _read(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> Fit:
-    """Return the equation error with the logs, or the arm, read so."""
+    """Return the equation error with the logs, or the arm, corrected by a reading."""
     if reading.corrections.gravity is not None:
         weights = arm.gravity_parameters
         low, high = low.copy(), high.copy()
@@ -200,10 +200,10 @@ def confirm(
     arm: Arm,
     horizon: float,
 ) -> Found | None:
-    """Return the reading that predictions confirm, or none.
+    """Return the candidate reading that predictions confirm; None if no reading is confirmed.
 
-    Of several the one counts by which predictions and torques together say most: where something hidden makes up most of what predictions miss, they
-    hardly tell readings apart.
+    Of several confirmed readings the one with the largest gain in predictions and torques together is returned: predictions alone hardly
+    tell readings apart where a hidden effect dominates their error.
     """
     if not suspects:
         return None

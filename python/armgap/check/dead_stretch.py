@@ -1,4 +1,4 @@
-"""`dead_stretch`: torques zero or constant for a stretch in which the arm moves as if it were driven."""
+"""`dead_stretch`: torques that are zero or constant over a stretch in which the arm moves as if it were driven."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from armgap.log.log import Log
 __all__ = ["find"]
 
 Run = tuple[int, int, int]
-"""A joint from 0, and the first and last sample of a stretch in which its torque does not change."""
-# A torque that stays the same for so long [s] is a stretch.
+"""Joint (from 0), and the first and last sample of a stretch in which the joint's torque does not change."""
+# Shortest time over which a joint's torque has to stay constant to count as a dead stretch [s].
 _SHORTEST_S = 0.4
-# The filters have forgotten what was before after this time [s], six of their time constants.
+# Time after which the filters' transient has faded [s], six of their time constants.
 _FORGOTTEN_S = 0.2
-# The equation of motion leaves so many times more there (mean square) than elsewhere, and this share of the joint's torque.
+# Ratio of the mean square residual of the equation of motion in a dead stretch to that elsewhere, and residual as a share of the joint's torque.
 _WORSE = 25.0
 _SHARE = 0.1
-# Stretches that begin within this time [s] are judged by the same rows beside them.
+# Time [s] within which stretches of constant torque begin that are judged together, by rows outside of all of them.
 _TOGETHER_S = 16.0
-# Rows that a judgement needs, inside and outside.
+# Rows of the equation of motion that a judgement of a stretch needs, inside and outside.
 _FEWEST = 30
 
 
 def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
-    """Return the stretches of each log whose torque was not recorded."""
+    """Return one check per stretch of a log whose torque was not recorded."""
     checks = []
     for log in logs:
         runs = [(j, first, last) for j in range(log.n_joints) for first, last in _constant(log, j)]
@@ -40,7 +40,7 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
 
 
 def _neighbours(log: Log, runs: list[Run]) -> Iterator[list[Run]]:
-    """Yield runs that are judged together, because they begin within some seconds."""
+    """Yield groups of runs that are judged together because they begin within `_TOGETHER_S` of each other."""
     group: list[Run] = []
     for run in sorted(runs, key=lambda run: run[1]):
         if group and log.t[run[1]] - log.t[group[0][1]] > _TOGETHER_S:
@@ -54,7 +54,7 @@ def _neighbours(log: Log, runs: list[Run]) -> Iterator[list[Run]]:
 def _constant(log: Log, j: int) -> list[tuple[int, int]]:
     """Return ranges of samples over which a joint's torque does not change although it does elsewhere.
 
-    At the column's largest and smallest value a command is clipped, not missing.
+    Stretches at the column's largest or smallest value are left out: there a command is clipped, not missing.
     """
     tau = log.tau[:, j]
     if np.all(tau == tau[0]):
@@ -67,7 +67,7 @@ def _constant(log: Log, j: int) -> list[tuple[int, int]]:
 
 
 def _judged(log: Log, arm: Arm, runs: list[Run], near: list[Run]) -> list[Check]:
-    """Judge the runs `near` each other by what the equation of motion leaves beside them, outside of all `runs`."""
+    """Judge the runs `near` by the residual of the equation of motion in the rows beside them that lie outside of all `runs`."""
     rows = Rows.of(log, arm, around=(near[0][1], max(last for _, _, last in near)))
     dead = np.zeros((len(rows.y), log.n_joints), dtype=bool)
     alive = np.ones(len(rows.y), dtype=bool)
@@ -112,7 +112,7 @@ def _check(log: Log, j: int, first: int, last: int, within: float, outside: NDAr
 
 
 def _merged(checks: list[Check]) -> list[Check]:
-    """Return one check per stretch, of the whole arm where all joints' torques are missing."""
+    """Return one check per dead stretch: for the whole arm where all joints' torques are missing."""
     by_rows: dict[tuple[tuple[int, int], ...], list[Check]] = {}
     for check in checks:
         by_rows.setdefault(check.rows, []).append(check)

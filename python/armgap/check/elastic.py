@@ -1,4 +1,4 @@
-"""Elastic torques beside an arm's equation of motion: whatever on a joint does not fall with its position, as springs and contacts do."""
+"""Elastic torques beside an arm's equation of motion: any torque on a joint that never falls with position, such as a spring or contact."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ __all__ = ["beside_elasticity"]
 
 Array = NDArray[np.float64]
 
-# Turns of a fit beside elastic torques. One that takes most of a torque is found in the first; after five no share changed by more than 0.02 on
-# nine development cases (columns of another arm 0.5 to 1.1, a spring 0.7 before and 0.09 after).
+# Alternating fits of model and elastic torques. An elastic torque that takes most of a torque is found in the first; after five no share changed by
+# more than 0.02 on nine development cases (columns of another arm 0.5 to 1.1, a spring 0.7 before and 0.09 after).
 _TURNS = 5
-# Positions are taken together in so many classes where a torque may be any function of them that does not fall.
+# Classes of position within which an elastic torque, any function that does not fall with position, is constant.
 _CLASSES = 50
 
 
@@ -28,18 +28,18 @@ def beside_elasticity(
     model: Callable[[EquationError], tuple[Array, Array]],
     joints: Sequence[int] | None = None,
 ) -> EquationError:
-    """Return the equation error of the torques without an elastic one on each joint, fitted by turns with the model.
+    """Return the equation error of the torques less an elastic torque on each joint, which is fitted alternately with the model.
 
     Parameters
     ----------
     base : EquationError
-        Of the logs.
+        Equation error of the logs.
     logs : sequence of Log
-        The logs.
+        Logs of the arm.
     model : callable
-        What a fit makes of an equation error: the parameters, and the factors that belong on the torques, not zero on the joints asked for.
+        Fit to an equation error: returns the parameters and a factor per torque, non-zero for the joints in `joints`.
     joints : sequence of int, optional
-        Joints that elastic torques are looked for on; all by default.
+        Joints (from 0) with an elastic torque; all by default.
     """
     q = np.concatenate([log.q[rows.samples] for log, rows in zip(logs, base.rows, strict=True)])
     ends = np.cumsum([len(rows.y) for rows in base.rows])[:-1]

@@ -1,8 +1,8 @@
-"""Equation error of the arm's own model: the torque that its parameters leave unexplained, within the values an arm file may mean.
+"""Equation error of the rigid arm model: torque that remains unexplained by parameters within bounds around the arm file.
 
-The filtered dynamic model of Reyes and Kelly (1997, equations 23 and 24) gives rows ``psi theta = y`` without accelerations. Here they are
+The filtered dynamic model of Reyes and Kelly (1997, equations 23 and 24) gives rows ``psi theta = y`` without accelerations. The rows are
 solved by least squares with bounds: inertias and weights keep the sign and the order of magnitude of the arm file, friction stays
-positive. So a log that is read the wrong way cannot be explained by an arm that nobody has.
+positive. So a wrong reading of a log cannot be explained by an impossible arm.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ __all__ = ["CUTOFF", "EquationError", "Fit", "Rows", "bounds"]
 
 Array = NDArray[np.float64]
 
-# Cut-off of the filters [rad/s]: above the motion of arms (a few hertz), below what encoders add; at 2.5 ms it is 0.075 of the sample rate.
+# Cut-off of the filters [rad/s]: above the motion of arms (a few hertz), below the noise of encoders; at 2.5 ms it is 0.075 of the sample rate.
 CUTOFF = 30.0
-# The cut-off at most, in parts of the sample rate, where logs are slow.
+# Largest cut-off of the filters, in parts of the sample rate; it bounds the cut-off for slowly sampled logs.
 _LARGEST_CUTOFF = 0.5
-# Time constants of the filters that pass before a row counts, after the start and after a hole in the samples.
+# Time constants of the filters that pass before a row is used, after the start and after a hole in the samples.
 _SETTLING = 4.0
-# A hole is longer than this many periods.
+# Length of a hole in the samples, in sample periods, beyond which the filters start anew.
 _HOLE = 3.0
-# Inertias and weights may differ from the arm file by this factor. Arm files off by three are re-estimated; ten is another unit.
+# Factor by which inertias and gravity parameters may differ from the arm file. Arm files off by three are re-estimated; ten is another unit.
 _TRUST_FACTOR = 5.0
-# Samples of one log that are used: 16 s at 4 ms; more tells nothing new about a sign.
+# Largest number of samples used of one log: 16 s at 4 ms; more samples tell nothing new about a sign.
 _LARGEST_LOG = 4000
-# Length of log on either side of a stretch that the stretch is compared with [s]: a few periods of the slowest motions that tell anything.
+# Length of log on either side of a stretch that the stretch is compared with [s]: a few periods of the slowest informative motions.
 _BESIDE_S = 8.0
-# Share of a joint's torque below which a residual counts as explained: what unmodelled effects leave of healthy logs of real arms.
+# Share of a joint's torque below which a residual counts as explained: unmodelled effects leave as much in sound logs of real arms.
 _EXPLAINED = 0.02
-# Share of a joint's torque that nothing tells from none.
+# Share of a joint's torque below which a residual counts as zero.
 _EXACT = 1e-5
-# A bound is left if that lowers the cost by more than this part of the largest moment.
+# Decrease of the cost, as a part of the largest moment, from which the active set method leaves a bound.
 _SETTLED = 1e-9
-# Rounds of the active set method per parameter at most, and what keeps columns that a log does not excite solvable.
+# Rounds of the active set method per parameter at most, and the regularisation that keeps columns without excitation solvable.
 _MOST_ROUNDS = 6
 _RIDGE = 1e-10
 
@@ -53,11 +53,11 @@ class Rows:
     Attributes
     ----------
     psi : ndarray, shape (n_rows, n_joints, n_parameters)
-        Regressor.
+        Filtered regressor [SI].
     y : ndarray, shape (n_rows, n_joints)
         Filtered torques [N m or N].
     samples : ndarray, shape (n_rows,)
-        The log's sample of each row.
+        Sample index in the log of each row.
     """
 
     psi: Array
@@ -66,9 +66,9 @@ class Rows:
 
     @classmethod
     def of(cls, log: Log, arm: Arm, cutoff: float = CUTOFF, around: tuple[int, int] | None = None) -> Rows:
-        """Return the rows of a log; of a long one those of a stretch from its middle, or of the samples `around` and some seconds beside them.
+        """Return the rows of a log; of a long log only those of a stretch in its middle, or of the samples `around` and some seconds beside them.
 
-        `cutoff` is that of the filters [rad/s].
+        `cutoff` is the cut-off of the filters [rad/s].
         """
         begin, end = around or ((len(log) - _LARGEST_LOG) // 2, (len(log) + _LARGEST_LOG) // 2)
         beside = max(round(_BESIDE_S / float(np.median(np.diff(log.t)))), end - begin) if around else 0
@@ -86,7 +86,7 @@ class Rows:
 
 
 def _settled(t: Array, hole: float, wait: float) -> NDArray[np.bool_]:
-    """Return which samples lie long enough after the start and after every hole."""
+    """Return a mask of the samples at least `wait` [s] after the start and after every hole longer than `hole` [s]."""
     begins = np.concatenate([[True], np.diff(t) > hole])
     since = np.maximum.accumulate(np.where(begins, np.arange(len(t)), 0))
     settled: NDArray[np.bool_] = t - t[since] > wait
@@ -95,14 +95,14 @@ def _settled(t: Array, hole: float, wait: float) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Fit:
-    """Bounded least squares over the rows of some logs.
+    """Result of bounded least squares over the rows of the equation of motion of some logs.
 
     Attributes
     ----------
     theta : ndarray, shape (n_parameters,)
-        Parameters.
+        Estimated parameters [SI].
     share : ndarray, shape (n_joints,)
-        Mean square of the residual over that of the joint's torque.
+        Mean square of each joint's residual over the mean square of its torque.
     """
 
     theta: Array
@@ -110,17 +110,17 @@ class Fit:
 
     @property
     def cost(self) -> float:
-        """Mean over the joints of the logarithm of the unexplained share."""
+        """Mean over the joints of the logarithm of the unexplained share, which is bounded from below."""
         return float(np.mean(np.log(self.share + _EXPLAINED)))
 
     @property
     def closeness(self) -> float:
-        """Mean over the joints of the logarithm of the unexplained share itself, for readings that all explain nearly everything."""
+        """Mean over the joints of the logarithm of the unexplained share without lower bound, for readings that all explain nearly everything."""
         return float(np.mean(np.log(self.share + _EXACT)))
 
 
 class EquationError:
-    """Normal equations of several logs, joint by joint, and what bounded parameters leave of their torques."""
+    """Normal equations of several logs, joint by joint, and their solution by bounded least squares."""
 
     def __init__(self, rows: Sequence[Rows], arm: Arm, scale: Array | None = None) -> None:
         self.arm = arm
@@ -131,14 +131,14 @@ class EquationError:
         self.scale = self._scale() if scale is None else scale
 
     def _moments(self, torques: Sequence[Array]) -> tuple[Array, Array]:
-        """Return the products of the regressor with torques, and of torques with themselves, per joint."""
+        """Return per joint the products of the regressor with the torques, and the mean squares of the torques."""
         pairs = list(zip(self.rows, torques, strict=True))
         moment = sum(np.einsum("kji,kj->ji", r.psi, y) for r, y in pairs) / max(self.count, 1)
         square = sum(np.sum(y**2, axis=0) for y in torques) / max(self.count, 1)
         return np.asarray(moment), np.asarray(square)
 
     def _scale(self) -> Array:
-        """Mean square per joint of the torque, or of the largest term of the equation of motion as the arm file has it.
+        """Mean square per joint of the torque, or of the largest term of the equation of motion with the arm file's parameters.
 
         Inertia and weight cancel near a resonance, where the torque alone would be a small measure.
         """
@@ -147,17 +147,17 @@ class EquationError:
         return scale
 
     def fit(self, low: Array, high: Array, torques: Sequence[Array] | None = None) -> Fit:
-        """Return the parameters between `low` and `high` that explain the torques, or others in their place, best."""
+        """Return the bounded least-squares fit, parameters between `low` and `high`, to the logs' torques or to `torques` in their place."""
         moment, square = (self.moment, self.square) if torques is None else self._moments(torques)
         return self._solve(low, high, moment, square, self.scale)
 
     def with_factors(self, low: Array, high: Array, factors: Array) -> Fit:
-        """Return the fit to torques times a factor per joint; shares are of the torques, whatever their unit."""
+        """Return the fit to torques times a factor per joint; unexplained shares are relative to the scaled torques, whatever their unit."""
         square = self.square * factors**2
         return self._solve(low, high, self.moment * factors[:, None], square, np.maximum(square, 1e-30))
 
     def of_torques(self, fit: Fit) -> Fit:
-        """Return the same fit, its errors relative to the torques alone."""
+        """Return the fit with its unexplained shares relative to the torques alone, not to the largest term of the equation of motion."""
         return replace(fit, share=fit.share * self.scale / np.maximum(self.square, 1e-30))
 
     def _solve(self, low: Array, high: Array, moment: Array, square: Array, scale: Array) -> Fit:
@@ -172,11 +172,11 @@ class EquationError:
         return Fit(theta, np.maximum(left, 0.0) / scale)
 
     def expected(self) -> Array:
-        """Return per joint the factor that makes the arm file's own torques of the logged ones, by least squares."""
+        """Return per joint the least-squares factor from the logged torques to the torques by the arm file's parameters."""
         return (self.moment @ self.arm.theta) / np.maximum(self.square, 1e-30)
 
     def size_of(self, theta: Array) -> Array:
-        """Return per joint the factor that makes the arm file's torques of those of `theta`, by least squares, friction left aside.
+        """Return per joint the least-squares factor from the torques by `theta` to the torques by the arm file's parameters, without friction.
 
         An arm file knows inertias and weights far better than friction.
         """
@@ -190,7 +190,7 @@ class EquationError:
 
 
 def bounds(arm: Arm, factor: float = _TRUST_FACTOR) -> tuple[Array, Array]:
-    """Return the least and largest values that an arm may have whose file is right about signs and orders of magnitude."""
+    """Return the smallest and largest possible parameters of an arm whose file is right about signs and orders of magnitude."""
     low, high = np.zeros(len(arm.theta)), np.full(len(arm.theta), np.inf)
     for i, value in enumerate(arm.theta[: arm.n_inertial]):
         if value == 0:
@@ -226,7 +226,7 @@ def _bounded(gram: Array, moment: Array, low: Array, high: Array) -> Array:
 
 
 def _step_within(x: Array, target: Array, low: Array, high: Array, free: NDArray[np.bool_]) -> tuple[float, int | None]:
-    """Return how far towards `target` the bounds allow, up to 1, and which bound stops it."""
+    """Return the largest step towards `target` within the bounds, as a part up to 1, and the index of the bound that stops the step."""
     step, blocked = 1.0, None
     for i in np.flatnonzero(free & ((target < low) | (target > high))):
         bound = low[i] if target[i] < low[i] else high[i]

@@ -1,8 +1,8 @@
-"""Plausibility of a serial arm's input: logs read in another way explain the arm's torques where the logs as they stand do not.
+"""Contradictions between logs and arm file of a serial arm: corrected columns explain the torques where the columns as logged do not.
 
-The equation of motion of a serial arm is compared in its weak form, weighed by raised cosines: momentum takes the place of accelerations. Its
-parameters are estimated within the trust that the arm file states, with friction and rotor inertias not negative. A reading of the columns
-that is right lowers both what stays of the torques and the distance from the arm file.
+The equation of motion of a serial arm is compared in its weak form, with raised cosines as test functions: momentum takes the place of
+accelerations. Parameters are estimated with the arm file's standard deviations as prior, friction and rotor inertias not negative. A right
+reading of the columns lowers both the unexplained torque and the distance from the arm file.
 """
 
 from __future__ import annotations
@@ -36,34 +36,34 @@ Array = NDArray[np.float64]
 # Half width of a test function [s], and at least so many sample periods.
 _HALF_WIDTH_S = 0.05
 _FEWEST_PERIODS = 5
-# Intervals of all logs together that are compared: some ten seconds of a robot's log tell a sign.
+# Intervals of all logs together in the regression at most: some ten seconds of a robot's log tell a sign.
 _MOST_INTERVALS = 4000
-# Rows that count as one because neighbouring test functions overlap and residuals are correlated over some tenths of a second.
+# Rows per independent one: neighbouring test functions overlap and residuals are correlated over some tenths of a second.
 _CORRELATED = 12.0
-# Rounds in which the weights of the joints follow from their residuals.
+# Iterations in which the weights of the joints are set from their residuals.
 _ROUNDS = 4
-# Share of a joint's mean square torque that stays unexplained, from which other readings are asked for. Friction that the model lacks leaves up
-# to a fifth on logs of real arms.
+# Share of a joint's mean square torque that stays unexplained, from which other readings of the columns are tried. Friction that the model lacks
+# leaves up to a fifth on logs of real arms.
 _SUSPICIOUS = 0.3
-# Squared distance of the parameters from the arm file, per joint, from which other readings are asked for. A joint has six or seven parameters that
-# motion tells, so that one of a right arm file is as large as that.
+# Squared distance of the parameters from the arm file, per joint, from which other readings of the columns are tried. A joint has six or seven
+# identifiable parameters, so that a right arm file has a distance of about this size.
 _FAR = 8.0
-# A reading that lowers that distance by this much, and to less than a third, is right too: six standard deviations of one value.
+# Reduction of the squared distance from the arm file, to less than a third, from which a reading is right too: six standard deviations of one value.
 _RESTORED = 36.0
-# A reading is right where the cost falls by as much as if the unexplained part of one joint's torque fell to a third, and less than `_EXPLAINS`
-# of every joint's mean square torque stays unexplained, or half of what did.
+# A reading of the columns is right where the cost falls by as much as if the unexplained part of one joint's torque fell to a third, and less than
+# `_EXPLAINS` of every joint's mean square torque stays unexplained, or half of the share with the log as it stands.
 _BETTER = 1.0
 _EXPLAINS = 0.15
-# A load may be many times as heavy as the last link.
+# Largest mass of a load as a multiple of the last link's mass.
 _LOADED = 30.0
-# A factor that costs no more than this is 1: friction alone has no unit.
+# Increase of the cost up to which a torque's factor is set to 1: friction alone determines no factor.
 _UNDECIDED = 10.0
-# Two readings whose costs differ by less than this part of what they gain are alike.
+# Difference of two readings' costs, as a part of their gain, below which the readings are alike.
 _ALIKE = 0.02
 
-# Factors within these are gains and no other units.
+# Range of factors on a torque that are gains, not other units.
 _NO_UNIT = (0.5, 2.0)
-# Factors that are tried on a torque, with both signs: three decades either way, then between them.
+# Factors that are tried on a torque, with both signs: three decades either way; refined between neighbours.
 _COARSE = np.concatenate([np.geomspace(1e-3, 1e3, 61), -np.geomspace(1e-3, 1e3, 61)])
 _FINE = np.geomspace(0.8, 1.25, 11)
 
@@ -85,13 +85,13 @@ class Fit:
     Attributes
     ----------
     cost : float
-        Twice the negative logarithm of the likelihood up to a constant, and the squared distance from the arm file.
+        Twice the negative log-likelihood up to a constant, plus the squared distance from the arm file.
     share : ndarray, shape (n_joints,)
         Part of each joint's mean square torque that stays unexplained.
     distance : float
         Squared distance of the parameters from the arm file in its standard deviations.
     count : float
-        Rows of one joint that count, as neighbours are correlated.
+        Effective number of independent rows per joint; neighbouring rows are correlated.
     """
 
     cost: float
@@ -101,7 +101,7 @@ class Fit:
 
 
 def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tuple[Corrections, list[Check]]:
-    """Look for a reading of the columns under which logs and arm file agree where they do not as they stand.
+    """Find corrections of the columns with which logs and arm file agree where they contradict each other as they stand.
 
     Parameters
     ----------
@@ -110,14 +110,14 @@ def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tup
     arm : Arm
         Nominal model, of kind ``"serial"``.
     repair : bool, default True
-        Whether torques in another unit are brought to N m (N); without it they are only said.
+        Whether torques in another unit are brought to N m (N); otherwise they are only reported.
 
     Returns
     -------
     Corrections
-        How columns are to be read; empty where nothing is wrong.
+        Corrections of the columns; empty without a contradiction.
     list of Check
-        What is wrong: one contradiction, or the joints whose torques are in another unit.
+        One contradiction, or one check per joint whose torques are in another unit.
     """
     commanded = not all(log.has_torques for log in logs)
     if commanded and (arm.controller is None or arm.controller.ki is not None):
@@ -150,7 +150,7 @@ def contradictions(logs: Sequence[Log], arm: Arm, *, repair: bool = True) -> tup
 
 
 def _with_load(arm: Arm) -> Arm:
-    """Return the arm with the last link's ten numbers as good as free."""
+    """Return the arm with large standard deviations of the last link's ten inertial parameters, as for an unknown load."""
     sigma = arm.sigma.copy()
     sigma[10 * (arm.n_joints - 1) : 10 * arm.n_joints] *= _LOADED
     return replace(arm, sigma=sigma)
@@ -177,7 +177,7 @@ def _contradiction(
 
 
 def _rescaled(stands: Fit, factors: Array, found: Fit, *, repair: bool) -> tuple[Corrections, list[Check]]:
-    """Say which torques are in another unit; a factor between one half and two is a gain, which is no matter of units."""
+    """Return factors and checks of torques in another unit; a factor between one half and two is a gain, not a unit."""
     low, high = _NO_UNIT
     checks = []
     factor = {}
@@ -196,10 +196,10 @@ def _rescaled(stands: Fit, factors: Array, found: Fit, *, repair: bool) -> tuple
 
 
 def _alike(best: Reading, most: float, logs: Sequence[Log], arm: Arm) -> list[str]:
-    """Remedies of a reading: its own, and of the others those that explain the logs as well.
+    """Return the remedies of the best reading: its own, and those of other readings that explain the logs equally well.
 
-    On planar arms the equation of motion is odd in positions and torques together, so that a sign may be mended on either; on serial arms that
-    holds only where the chain is its own mirror image.
+    On planar arms the equation of motion is odd in positions and torques together, so that a sign can be corrected on either;
+    on serial arms this holds only where the chain is its own mirror image.
     """
     remedies = [best.remedies[0]]
     for remedy in best.remedies[1:]:
@@ -213,7 +213,7 @@ def _alike(best: Reading, most: float, logs: Sequence[Log], arm: Arm) -> list[st
 
 
 def _of_options(remedy: str) -> Corrections | None:
-    """Corrections that a remedy such as ``--flip q1,tau2`` stands for; None for one that is no list of corrections."""
+    """Return the corrections that a remedy such as ``--flip q1,tau2`` stands for; None for a remedy that is no option."""
     words = remedy.split()
     if len(words) % 2 or any(word not in ("--flip", "--zero", "--swap") for word in words[::2]):
         return None
@@ -236,7 +236,7 @@ def _offered(logs: Sequence[Log], arm: Arm) -> Iterator[Reading]:
 
 @dataclass(frozen=True)
 class _Rows:
-    """Torques, shape (rows, n), and the products of their regressors that fits need, joint by joint."""
+    """Torques, shape (rows, n), and products of their regressors for the normal equations, joint by joint."""
 
     y: Array
     square: Array
@@ -245,7 +245,7 @@ class _Rows:
 
     @classmethod
     def of(cls, logs: Sequence[Log], arm: Arm) -> _Rows | None:
-        """Rows of logs; None where they hold too few samples, or where no joint has a torque."""
+        """Return the rows of some logs; None where the logs hold too few samples, or no joint has a torque."""
         if arm.chain is None:
             return None
         chain = arm.chain.native()
@@ -262,7 +262,7 @@ class _Rows:
         return cls(y, square, normal, np.stack([x.T @ t for x, t in zip(psi.transpose(1, 0, 2), y.T, strict=True)]))
 
     def fit(self, arm: Arm, factors: Array) -> Fit:
-        """Estimate the arm's parameters from torques times factors, one per joint."""
+        """Estimate the arm's parameters from torques times one factor per joint."""
         precision = np.zeros(len(arm.sigma))
         free = arm.sigma > 0
         precision[free] = arm.sigma[free] ** -2.0
@@ -287,13 +287,13 @@ class _Rows:
 
 
 def fit(logs: Sequence[Log], arm: Arm) -> Fit | None:
-    """Estimate the arm's parameters from torques; None where the logs hold too few samples."""
+    """Estimate the arm's parameters from the torques of logs; None where the logs hold too few samples."""
     rows = _Rows.of(logs, arm)
     return None if rows is None else rows.fit(arm, np.ones(arm.n_joints))
 
 
 def _factors(logs: Sequence[Log], arm: Arm) -> tuple[Array, Fit] | None:
-    """Find the factors on torques with which the logs agree best with the arm file: joint by joint over a grid, in turns."""
+    """Return the factor per torque for the best agreement of logs and arm file, by alternating grid searches, and its fit; None for short logs."""
     rows = _Rows.of(logs, arm)
     if rows is None:
         return None
@@ -335,14 +335,14 @@ def _estimate(normal: Array, right: Array, prior: Array, fixed: NDArray[np.bool_
 
 
 def _torques(log: Log, arm: Arm) -> Array:
-    """Torques of a log: as logged, or those of the arm's controller under the logged references."""
+    """Return the torques of a log [N m or N]: as logged, or those of the arm's controller under the logged references."""
     if log.has_torques or log.q_ref is None or arm.controller is None:
         return log.tau
     return arm.controller.torque(log.t, log.q, log.q_ref, log.dq_ref, arm.torque_limit)
 
 
 def _rows(chain: _native.Chain, log: Log, torques: Array, most: int) -> tuple[Array, Array] | None:
-    """Torques, shape (rows, n), and regressors, shape (rows, n, 13 n), of one log in the weak form."""
+    """Return torques, shape (rows, n), and regressors, shape (rows, n, 13 n), of one log in the weak form."""
     period = float(np.median(np.diff(log.t)))
     taps = max(round(_HALF_WIDTH_S / period), _FEWEST_PERIODS)
     count = min(len(log) - 1, most)
@@ -380,7 +380,7 @@ def _rows(chain: _native.Chain, log: Log, torques: Array, most: int) -> tuple[Ar
 
 
 def _smoothed(x: Array, half: int) -> Array:
-    """Running mean over `half` samples to either side, shorter at the ends."""
+    """Return the running mean over `half` samples to either side, shorter at the ends."""
     total = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x, axis=0)])
     at = np.arange(len(x))
     low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, len(x))

@@ -1,4 +1,4 @@
-"""The stage between reading and diagnosing: what is wrong with the input, what was repaired, and how the rest is to be read."""
+"""Stage of a diagnosis that checks its input: finds defects of logs and arm file, repairs logs, and chooses the reading of the columns."""
 
 from __future__ import annotations
 
@@ -22,40 +22,40 @@ __all__ = ["Examined", "examine", "unexplained_columns"]
 
 Array = NDArray[np.float64]
 
-# Readings whose mean log share of unexplained torque differs by less are told apart by predictions. One that explains less by this much than springs
-# and contacts do is none: weight that is read the wrong way is as good as a spring in many logs, so the other way round nothing is said.
+# Readings whose mean log share of unexplained torque differs by less are told apart by predictions. A reading that explains less by
+# this much than springs and contacts do is rejected; not the reverse, for wrongly read gravity is equivalent to a spring in many logs.
 _CLOSE = 1.0
-# Rows of the equation of motion that a comparison needs.
+# Rows of the equation of motion that the comparison of readings needs.
 _FEWEST_ROWS = 100
-# Columns do not belong together if this share of what moves a joint (its torque, or the largest term of its equation of motion) stays unexplained and
-# predictions miss by this part of the motion; or, at the second pair, if that share of a driven joint's torque does and the best that the library's
-# effects do misses by as much: the more the one says, the less is asked of the other. Effects of the library leave less than a tenth of a
-# torque on simulated logs, but a stiff hardening spring 0.38, and less than a quarter on logs of a real arm; a torque of which a third is noise was
-# predicted to 0.001. Torques played backwards leave 0.3 to 1.1 and are missed by 0.42 to 2.2 (18 development cases), by 0.28 of the motion at most
-# where an effect is hidden.
+# Torque and position columns do not belong together if this share of what moves a joint (its torque, or the largest term of its equation of motion)
+# stays unexplained and predictions miss by this part of the motion; or, with the second pair, if the share of a driven joint's torque does and the
+# best model with the library's effects misses by as much: the stronger one sign, the weaker the other may be. Effects of the library leave less than
+# a tenth of a torque on simulated logs, but a stiff hardening spring 0.38, and less than a quarter on logs of a real arm; a torque of which a third
+# is noise was predicted to 0.001. Torques played backwards leave 0.3 to 1.1 and are missed by 0.42 to 2.2 (18 development cases), by 0.28 of the
+# motion at most where an effect is hidden.
 _UNRELATED = (0.5, 0.25)
 _UNPREDICTED = (0.3, 0.4)
-# A joint is driven if its torque's mean square is this part of that of the largest term of its equation of motion; one that is not, as the passive
-# joint of an acrobot, has no torque to be explained.
+# A joint is driven if its torque's mean square exceeds this part of that of the largest term of its equation of motion; a joint that is
+# not driven, as the passive joint of an acrobot, has no torque to be explained.
 _DRIVEN = 0.1
-# Shifts of the torques under which predictions that come right are no sign of other columns [samples].
+# Shifts of the torques [samples] with which good predictions are no sign that torques and positions belong to different motions.
 _SHIFTS = (-8, -5, -2, 2, 5, 8)
 
 
 @dataclass(frozen=True)
 class Examined:
-    """Logs and arm as they are to be used, and everything that was noticed.
+    """Checked input of a diagnosis: logs and arm with corrections applied, and the defects that were found.
 
     Attributes
     ----------
     training, holdout : list of Log
-        The logs, repaired, and with the remedies of errors applied.
+        Logs after repairs and after the remedies of errors.
     arm : Arm
-        The arm, with the remedies of errors applied.
+        Arm after the remedies of errors.
     checks : tuple of Check
-        What was noticed, errors first.
+        Defects that were found, errors first.
     corrections : Corrections
-        What was applied.
+        Corrections that were applied.
     """
 
     training: list[Log]
@@ -73,19 +73,19 @@ class Examined:
 def examine(
     training: Sequence[Log], holdout: Sequence[Log], arm: Arm, *, horizon: float = 0.25, repair: bool = True
 ) -> Examined:
-    """Compare what the logs say about the arm with and without each defect that input is known to have.
+    """Check logs and arm file for known defects of input, by the fit of the arm to the logs with and without each defect.
 
     Parameters
     ----------
     training, holdout : sequence of Log
         Logs of one arm.
     arm : Arm
-        Its nominal model.
+        Nominal model of the arm.
     horizon : float, default 0.25
         Prediction horizon [s].
     repair : bool, default True
-        Whether defects are repaired that leave nothing to guess: a torque column's factor, torques that come too late in the file. Without it
-        the same is said as a warning.
+        Whether unambiguous defects are repaired: a torque column's factor, torques that come too late in the file. Otherwise they are
+        reported as warnings.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def examine(
 
 
 def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
-    """Look for another reading of the columns: a factor on torques, or anything that `contradiction.READINGS` offers."""
+    """Find another reading of the columns: a factor on torques, or a reading of `contradiction.READINGS`."""
     logs = [*now.training, *now.holdout]
     base = EquationError([Rows.of(log, now.arm) for log in logs], now.arm)
     if len(base) < _FEWEST_ROWS:
@@ -127,23 +127,23 @@ def _reading(now: Examined, horizon: float, repair: bool) -> Examined:
 def unexplained_columns(
     training: Sequence[Log], holdout: Sequence[Log], arm: Arm, horizon: float, relative: float
 ) -> list[Check]:
-    """Say that torques and positions do not belong together, where a diagnosis has tried every effect and predictions still miss the motion.
+    """Return a check that torques and positions do not belong together, for a diagnosis whose best model still fails to predict the motion.
 
     Parameters
     ----------
     training, holdout : sequence of Log
-        As they were diagnosed.
+        Logs as diagnosed.
     arm : Arm
-        Its nominal model, of a planar kind.
+        Nominal model of the arm, of a planar kind.
     horizon : float
         Prediction horizon [s].
     relative : float
-        RMS error that the diagnosis left, over the RMS displacement within the horizon, of the joint where it is largest.
+        RMS error after the diagnosis over the RMS displacement within the horizon, at the joint with the largest ratio.
 
     Returns
     -------
     list of Check
-        One of severity `error`, or none.
+        One check of severity `error`, or no check.
     """
     if relative < _UNPREDICTED[1]:
         return []
@@ -156,11 +156,10 @@ def unexplained_columns(
 
 
 def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[Check]:
-    """Say that torques and positions do not belong together, by one pair of thresholds.
+    """Return a check that torques and positions do not belong together, by pair `pair` of the thresholds `_UNRELATED`.
 
-    So it is where no parameters with the arm file's signs explain a part of a torque (`share` per joint), not even beside springs and contacts, which
-    can take most of it, or behind a drive that saturates far below its command, and where they do not predict the motion, not even with shifted
-    torques.
+    The check is returned where parameters with the arm file's signs leave a part of a torque unexplained (`share` per joint), even beside
+    springs and contacts or behind a drive that saturates far below its command, and do not predict the motion even with shifted torques.
     """
     worst = int(np.argmax(share))
     logs = [*now.training, *now.holdout]
@@ -180,7 +179,7 @@ def _strangers(share: Array, now: Examined, horizon: float, pair: int) -> list[C
 
 
 def _beside_elasticity(base: EquationError, logs: Sequence[Log], arm: Arm) -> Fit:
-    """Fit the arm beside elastic torques on every joint."""
+    """Fit the arm together with elastic torques on every joint."""
 
     def model(errors: EquationError) -> tuple[Array, Array]:
         return errors.fit(*bounds(arm)).theta, np.ones(arm.n_joints)
@@ -189,7 +188,7 @@ def _beside_elasticity(base: EquationError, logs: Sequence[Log], arm: Arm) -> Fi
 
 
 def _doubted(arm: Arm, factors: torque_unit.Factors) -> Arm:
-    """Return the arm with sigmas wide enough for the factor that all its values are off by, where that is what the torques say."""
+    """Return the arm with standard deviations wide enough for a factor on all its parameters, if the torques suggest such a factor."""
     if factors.checks[0].severity != "warning":
         return arm
     [factor] = set(factors.corrections.factor.values())
@@ -199,7 +198,7 @@ def _doubted(arm: Arm, factors: torque_unit.Factors) -> Arm:
 def _prefers(
     factors: torque_unit.Factors, suspects: Sequence[Suspect], base: EquationError, now: Examined, horizon: float
 ) -> bool:
-    """Return whether factors on torques explain the logs better than any other reading; predictions decide between close ones."""
+    """Return whether factors on torques explain the logs better than any other reading; predictions decide between similar ones."""
     rivals = [s for s in suspects if base.of_torques(s.fit).closeness < factors.closeness + _CLOSE]
     if not rivals and not factors.doubtful:
         return True
@@ -212,7 +211,7 @@ def _prefers(
 
 
 def _confirmed(read: Refit, now: Examined, horizon: float, limit: float) -> bool:
-    """Return whether predictions of logs that are read otherwise are right, and miss by less than `limit` times what they miss as the logs stand."""
+    """Return whether predictions of the corrected logs are right, with errors below `limit` times those of the logs as they stand."""
     return read.relative < EXPLAINS and read.against(_predicted(Corrections(), now, horizon)) < limit
 
 

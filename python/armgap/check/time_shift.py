@@ -1,6 +1,6 @@
-"""`time_shift`: torque and position columns shifted against each other.
+"""`time_shift`: torque and position columns shifted in time against each other.
 
-Torques that come too late in the file would act before they are commanded, which nothing in an arm does: they are shifted back. Torques
+Torques that come too late in the file would act before they are commanded, which is not causal: they are shifted back. Torques
 that come too early look like a delay of the drive, which is an effect (`actuator_delay`).
 """
 
@@ -24,38 +24,39 @@ from armgap.several_joints import by_joint
 
 __all__ = ["acausal", "causal", "confirmed", "early", "taken_back"]
 
-# Shifts that are tried [samples].
+# Largest shift of the torques that is tried [samples].
 _LARGEST = 8
-# Cut-off of the filters [rad/s]: a shift shows in the motion itself; what a controller makes of encoder noise would hide it.
+# Cut-off of the filters [rad/s]: a shift shows in the motion; a controller's response to encoder noise would hide it.
 _CUTOFF = 10.0
-# A shift counts from this part of a sample on. On simulated logs with hidden effects the estimate is -0.25 to 0.85 samples off, and
-# earlier (a negative shift) is the side that no drive's lag is on.
+# Smallest shift of the torques that counts, in samples. On simulated logs with hidden effects the estimate is -0.25 to 0.85 samples off, and
+# a lag of a drive cannot make the shift negative.
 _COUNTS = 0.6
-# So many of the halves of all logs have to agree, each by half as much.
+# Share of the halves of all logs that have to agree on a shift, each with at least half of it.
 _AGREEING = 0.75
-# Predictions with the shift may miss by no more than this part of what they miss without.
+# Largest ratio of prediction errors with the shift to prediction errors without it.
 _AS_GOOD = 1.02
-# A shift by one more sample has to lower the misses to this part; the first one to that part. On 24 development cases torques late by one sample
-# gave 0.01 to 0.72, but for four where an unmodelled effect hides it (0.99 to 1.07); on 180 logs in order the least were 0.87 and 0.89.
+# A shift by one more sample has to lower the prediction errors to the first number, the first sample of shift to the second. On 24 development cases
+# torques late by one sample gave 0.01 to 0.72, but for four where an unmodelled effect hides it (0.99 to 1.07); on 180 logs in order the least ratios
+# were 0.87 and 0.89.
 _CLEARLY = 0.9
 _AT_FIRST = 0.8
-# Torques that come early, where no delays say so: predictions with the shift miss by less than this part of what they miss without. On three
-# arms without effects and torques early by three samples they missed by 0.008 to 0.11; one joint of two that is late makes the other worse.
+# Largest ratio of prediction errors with the shift to those without it, for torques that come early where no delays were named. On three
+# arms without effects and torques early by three samples they missed by 0.008 to 0.11; a delay of one joint of two makes the other joint worse.
 _MOSTLY = 0.5
-# A share of torque that nothing tells from none.
+# Share of unexplained torque that counts as zero when shifts of the torques are compared.
 _EXACT = 1e-7
-# A half needs so many rows.
+# Rows of the equation of motion that each half of a log needs for an estimate of the torques' shift.
 _FEWEST = 200
-# Delays of all joints are one shift of the file if they differ by less than this part of a sample, or by this many of their deviations.
+# Delays of all joints are one shift of the file if they differ by less than this part of a sample, or of their standard deviations.
 _EQUAL = 0.5
 _EQUAL_SIGMAS = 3.0
-# Delays of all joints that make up this part of a repaired shift take it back. Where hysteresis had passed for late torques they made up all of it
-# (0.99 and 1.00, two cases); a shift that is there leaves at most the fraction of a sample that it was rounded by.
+# Delays of all joints that make up this part of a repaired shift take it back. Where hysteresis had passed for late torques the delays made up all of
+# the shift (0.99 and 1.00, two cases); a true shift leaves at most the fraction of a sample by which it was rounded.
 _TAKEN_BACK = 0.7
 
 
 def acausal(logs: Sequence[Log], arm: Arm) -> int | None:
-    """Return by how many samples the torques of all logs come late in the file; 0 if only a part of them says so, None if nothing does."""
+    """Return by how many samples the torques of all logs come late in the file; 0 if only some logs say so, None if none does."""
     curves = [_curve(half, arm) for log in logs for half in _halves(Rows.of(log, arm, _CUTOFF))]
     says = [-_minimum(curve) > 0.5 * _COUNTS for curve in curves]
     if not any(says):
@@ -67,7 +68,7 @@ def acausal(logs: Sequence[Log], arm: Arm) -> int | None:
 
 
 def _halves(rows: Rows) -> list[Rows]:
-    """Return the rows in two halves, for estimates that are independent of each other."""
+    """Return the rows of the equation of motion in two halves of the log, for independent estimates."""
     middle = len(rows.y) // 2
     parts = [slice(0, middle), slice(middle, None)]
     halves = [Rows(rows.psi[part], rows.y[part], rows.samples[part]) for part in parts]
@@ -75,7 +76,7 @@ def _halves(rows: Rows) -> list[Rows]:
 
 
 def _curve(rows: Rows, arm: Arm) -> NDArray[np.float64]:
-    """Return the log-likelihood's cost of every shift, joints weighted by what they leave unexplained."""
+    """Return the negative log-likelihood of every shift that is tried, joints weighted by their unexplained torque."""
     low, high = bounds(arm)
     count = len(rows.y)
     inner = slice(_LARGEST, count - _LARGEST)
@@ -85,7 +86,7 @@ def _curve(rows: Rows, arm: Arm) -> NDArray[np.float64]:
 
 
 def _minimum(costs: NDArray[np.float64]) -> float:
-    """Return the shift where a parabola through the least cost and its neighbours is least [samples]."""
+    """Return the minimum of the parabola through the least cost and its neighbours: a shift [samples]."""
     i = int(np.argmin(costs))
     if i in (0, len(costs) - 1):
         return float(i - _LARGEST)
@@ -96,12 +97,12 @@ def _minimum(costs: NDArray[np.float64]) -> float:
 def confirmed(
     samples: int, training: Sequence[Log], holdout: Sequence[Log], arm: Arm, horizon: float
 ) -> Corrections | None:
-    """Return the shift that predictions prefer, or none; `samples` is what the equation of motion says.
+    """Return the shift of torques that predictions prefer, or None; `samples` is the shift by the equation of motion.
 
-    From there the shift moves on, a sample at a time, for as long as predictions clearly gain. Beside a large unmodelled effect they hardly
-    change with a shift, so they need not gain where the equation of motion has found several samples: only not lose. A single sample may be the
-    doing of an effect, so there predictions decide, and only where they are clearly worse on either side. A shift with which the log wants
-    parameters that no arm has explains nothing.
+    From `samples` the shift grows, a sample at a time, for as long as predictions clearly improve. Beside a large unmodelled effect predictions
+    hardly change with a shift, so a shift by several samples is accepted unless predictions get worse. A shift by one sample may come from
+    an effect, so it is accepted only if predictions are clearly worse on either side. A shift that needs parameters outside the bounds is
+    rejected.
     """
     period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
     as_is = Refit.of(arm, training, holdout, horizon)
@@ -126,7 +127,7 @@ def confirmed(
 
 
 def taken_back(causes: Sequence[Mapping[str, Any]], n_joints: int, shift: float) -> bool:
-    """Return whether named delays on all joints undo a shift [s] of the torques that was repaired before: then none was there."""
+    """Return whether named delays on all joints cancel a repaired shift [s] of the torques, so that the shift did not exist."""
     delays = {
         c["joint"]: c["parameters"]["delay"]["value"] for c in by_joint(causes) if c["effect"] == "actuator_delay"
     }
@@ -139,7 +140,7 @@ def causal(causes: Sequence[Mapping[str, Any]], n_joints: int, period: float) ->
     Parameters
     ----------
     causes : sequence of mapping
-        The causes of a diagnosis.
+        Causes of a diagnosis.
     n_joints : int
         Number of joints.
     period : float
@@ -160,10 +161,10 @@ def causal(causes: Sequence[Mapping[str, Any]], n_joints: int, period: float) ->
 
 
 def early(training: Sequence[Log], holdout: Sequence[Log], arm: Arm, horizon: float) -> Check | None:
-    """Return the warning that torques stand too early in the file, by predictions alone: for a gap that no delays were named for.
+    """Return the warning that torques stand too early in the file, by predictions alone: for a diagnosis that named no delays.
 
-    Where friction or another effect hides a part of it the diagnosis may find no delay of each joint that it could name, though one shift of
-    all torques explains most of what is missed.
+    Where friction or another effect hides part of the shift, a diagnosis may name no delay of any joint although one shift of all torques
+    explains most of the prediction error.
     """
     period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
     as_is = Refit.of(arm, training, holdout, horizon)

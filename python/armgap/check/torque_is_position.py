@@ -1,6 +1,6 @@
-"""`torque_is_position`: a torque column holds the position that a servo was told to go to.
+"""`torque_is_position`: a torque column holds the position reference of a servo.
 
-A servo follows its reference: ``q_ref = q + a dq + b ddq`` with ``q`` itself, not a multiple of it, and small ``a`` and ``b``.
+A servo follows its reference: ``q_ref = q + a dq + b ddq`` with factor 1 of ``q``, and small ``a`` and ``b``.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from armgap.log.log import Log
 
 __all__ = ["find"]
 
-# Units that a reference may be in where positions are in rad: rad, degrees, turns.
+# Units of a position reference whose positions are in rad: rad, degrees, turns.
 _UNITS = (1.0, 180.0 / np.pi, 0.5 / np.pi)
-# The column follows the position by a factor this near to one, and from the same zero to this part of the travel.
+# A reference follows the position by a factor this near to one, and from an equal zero to this part of the travel.
 _NEAR_ONE = 0.15
 _NEAR_ZERO = 0.15
-# A servo answers within this time [s]: its inertia term is smaller than that squared. An arm that hangs swings more slowly.
+# Longest response time of a servo [s]: its inertia term is smaller than this time squared. A hanging arm swings more slowly.
 _SLOWEST = 0.1
-# Share of the column's variance that the servo's equation may leave, and the part of what the arm's own equation leaves.
+# Share of the column's variance that the servo's equation may leave, relative also to what the arm's own equation leaves.
 _LEFT = 0.05
 _BETTER = 0.2
-# Samples that are looked at.
+# Samples of a log that are used at most.
 _MOST = 4000
 
 
 def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
-    """Return the torque columns that are commanded positions."""
+    """Return checks of the torque columns that hold commanded positions."""
     rows = [Rows.of(log, arm) for log in logs]
     base = EquationError(rows, arm)
     if not len(base):
@@ -52,7 +52,7 @@ def find(logs: Sequence[Log], arm: Arm) -> list[Check]:
 
 
 def _in_any_unit(base: EquationError, arm: Arm) -> NDArray[np.float64]:
-    """Return the share that stays unexplained of every column as a torque of whatever unit."""
+    """Return per column the unexplained share of its variance as a torque in any unit."""
     factors = base.expected()
     if np.any(factors <= 0):
         return np.ones(len(factors))
@@ -60,7 +60,7 @@ def _in_any_unit(base: EquationError, arm: Arm) -> NDArray[np.float64]:
 
 
 def _servo(log: Log, j: int) -> float:
-    """Return the share of a torque column's variance that is no reference of a servo; 1 if it is none."""
+    """Return the share of a torque column's variance that the servo's equation leaves; 1 if the column is no reference of a servo."""
     t, q, tau = log.t[:_MOST], log.q[:_MOST, j], log.tau[:_MOST, j]
     variance = float(np.var(tau))
     if variance == 0 or np.ptp(q) == 0:

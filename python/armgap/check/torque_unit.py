@@ -1,7 +1,7 @@
 """`torque_unit`: a torque column in another unit: a motor's current, a percentage, the motor's side of a gear.
 
-One factor per column makes the torques that the arm file expects. A factor on all torques alike is the same as all parameters scaled, so
-there only another order of magnitude is a unit; anything closer is left to the re-estimated parameters and said.
+One factor per column scales it to the torques that the arm file expects. A common factor on all torques is equivalent to scaled
+parameters, so only a factor of another order of magnitude is a unit; a smaller one is left to the re-estimated parameters and reported.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ from armgap.several_joints import by_joint
 
 __all__ = ["LIMITED", "Factors", "find", "limited", "refined", "said"]
 
-# A limit of a drive explains a joint of whose torque it leaves less than this. Drives that are limited leave 0.03 at most, torques played backwards
-# 0.31 and more at their best limit of size or rate (four development cases each).
+# Share of a joint's torque below which the joint is explained by a limit of its drive. Drives that are limited leave 0.03 at most, torques played
+# backwards 0.31 and more at their best limit of size or rate (four development cases each).
 LIMITED = 0.2
 
 
-# A factor within these bounds is a gain of the drive (an effect), or wrong parameters.
+# Range of factors on a torque that are a gain of the drive (an effect), or wrong parameters: from the inverse to this factor.
 _GAIN = 2.0
-# A factor that all columns share: within these bounds an arm file may be that far off.
+# Common factor on all columns that the arm file's parameters may be off by, up or down.
 _SCALED = 4.0
-# Factors beyond this are no unit that a repair should guess at.
+# Largest factor on a torque that is repaired; larger ones are no plausible unit.
 _LARGEST = 2e3
-# Columns share a factor if it differs by less than this.
+# Columns share a factor if their factors differ by less than this ratio.
 _ALIKE = 1.5
 # Parameters may differ from the arm file by this factor while a column's factor is estimated.
 _TRUST = 2.0
 _ROUNDS = 4
-# The factor has to lower the mean log share of unexplained torque by this much; where it lowers it by less than the second, predictions have to
-# agree: friction without bound takes much of a torque in another unit.
+# Reduction of the mean log share of unexplained torque that a factor on torques needs; with a reduction below the second number predictions have
+# to agree: friction without bound takes much of a torque in another unit.
 _GAIN_IN_COST = 0.2
 _CLEAR_GAIN = 0.5
-# A joint of whose torque it leaves more than this share says nothing of a factor: noise that a controller feeds back, or a stop, has made most of it.
+# Share of unexplained torque above which a joint says nothing of a factor: noise fed back by a controller, or a stop, makes most of its torque.
 _LEFT = 0.3
 # Where a factor leaves this share of a torque, a limit of the drive or an elastic torque is tried beside it, and taken where it halves that share:
 # sound logs and factors alone leave 0.02 at most, drives that saturate 0.2 to 0.6 and behind their limit 0.01 to 0.05 (five development cases of six;
@@ -53,9 +53,9 @@ _LEFT = 0.3
 # whose torques were in newton metres.
 _CHANGE_TRIED = 0.1
 _CHANGE_TAKEN = 0.5
-# Share of a torque below which its factor is known as well as it can be: what is off then are the values of the arm file.
+# Share of unexplained torque below which a factor is exact: remaining errors are those of the arm file's parameters.
 _LEAST_SHARE = 1e-3
-# Quantiles of a torque's size that a drive's limit may be at: a limit between two of them still explains what no factor does.
+# Quantiles of a torque's size at which a drive's limit is tried: a limit between two quantiles still explains what no factor does.
 _LEVELS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 # Times in which a drive may take its torque through the range of its commands [s]: steps of a fourth, from what shows in no log to what leaves a
 # constant torque. A rate between two of them is met to 12 %, which leaves far less than what columns of another arm do.
@@ -64,18 +64,18 @@ _SLEW_TIMES = tuple(0.05 * 1.25**k for k in range(25))
 
 @dataclass(frozen=True)
 class Factors:
-    """Factors on torque columns, what they leave unexplained, and what is to be said about them.
+    """Factors on torque columns, with the fit of the scaled torques and the checks to report.
 
     Attributes
     ----------
     corrections : Corrections
-        The factors.
+        Corrections with the factors.
     closeness : float
-        Of the fit with them (`Fit.closeness`).
+        Closeness of the fit with the factors (`Fit.closeness`).
     checks : tuple of Check
-        What is to be said.
+        Checks to report.
     doubtful : bool
-        Whether the equation of motion alone does not decide: predictions have to confirm them.
+        Whether predictions have to confirm the factors, as the equation of motion alone does not decide.
     """
 
     corrections: Corrections
@@ -85,7 +85,7 @@ class Factors:
 
 
 def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
-    """Return the factors that belong on torque columns of the logs (`base`), or None; a drive that saturates is no factor."""
+    """Return the factors that scale torque columns of the logs (`base`) to the arm file, or None; saturation of a drive is no factor."""
     low, high = bounds(arm, _TRUST)
     read = _read(base, logs, arm)
     base, factors = read.errors, read.factors
@@ -115,15 +115,15 @@ def find(base: EquationError, logs: Sequence[Log], arm: Arm) -> Factors | None:
 
 
 def _common(factors: NDArray[np.float64], share: NDArray[np.float64]) -> float:
-    """Return the factor that columns share, each by what its joint says of it: the variance of a fitted factor goes with what the fit leaves."""
+    """Return the common factor of all columns: mean weighted by unexplained share, to which the variance of a joint's factor is proportional."""
     weight = (1.0 - share) / np.maximum(share, _LEAST_SHARE)
     return math.exp(float(np.average(np.log(factors), weights=weight)))
 
 
 def limited(logs: Sequence[Log], arm: Arm, joint: int) -> Fit:
-    """Return the best fit to torques of which those of a joint are limited in size or in rate.
+    """Return the best fit with the torques of one joint limited in size or in rate.
 
-    Far below what was commanded the first looks like a small factor, the second like columns of another arm.
+    A limit in size far below the command looks like a small factor, a limit in rate like columns of another arm.
     """
     low, high = bounds(arm, _TRUST)
     fits = (errors.of_torques(errors.fit(low, high)) for _, errors in _at_limits(logs, arm, joint))
@@ -132,7 +132,7 @@ def limited(logs: Sequence[Log], arm: Arm, joint: int) -> Fit:
 
 @dataclass(frozen=True)
 class _Reading:
-    """Factors of torques, the share of each that they leave, and the joints whose torques were taken otherwise than they are logged."""
+    """Factors of torques, unexplained share of each torque, and joints with torques limited in size or rate or less an elastic torque."""
 
     errors: EquationError
     factors: NDArray[np.float64]
@@ -141,21 +141,21 @@ class _Reading:
 
     @classmethod
     def of(cls, errors: EquationError, low: NDArray[np.float64], high: NDArray[np.float64], changed: Any) -> _Reading:
-        """Read the factors off an equation error, parameters within bounds."""
+        """Estimate the factors from an equation error, with parameters between `low` and `high`."""
         factors = _factors(errors, low, high)
         return cls(errors, factors, errors.with_factors(low, high, factors).share, np.asarray(changed, dtype=bool))
 
     def explains(self, joint: int, before: _Reading) -> bool:
-        """Whether this leaves so little of a joint's torque that its change is the reason of what was left before."""
+        """Whether the limit or elastic torque of a joint explains its torque: it leaves far less unexplained than the reading `before`."""
         enough = self.share[joint] < min(LIMITED, _CHANGE_TAKEN * before.share[joint])
         return bool(enough and np.all(self.factors > 0))
 
 
 def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
-    """Return the factors of the torques.
+    """Return the factors of the torques, with limits of drives and elastic torques tried where factors alone leave much.
 
-    A column in another unit may stand before a drive that is limited, or on a joint with a spring or a stop: what such a joint's motion says of a
-    factor shows only behind the limit, or beside the elastic torque.
+    A column in another unit may stand before a drive that is limited, or on a joint with a spring or a stop: such a joint's factor is
+    identifiable only behind the limit, or beside the elastic torque.
     """
     low, high = bounds(arm, _TRUST)
 
@@ -182,7 +182,7 @@ def _read(base: EquationError, logs: Sequence[Log], arm: Arm) -> _Reading:
 
 
 def _at_limits(logs: Sequence[Log], arm: Arm, joint: int) -> Iterator[tuple[list[Log], EquationError]]:
-    """Logs with torques of a joint that are limited in size or in rate, and their equation error, limit by limit."""
+    """Yield the logs with one joint's torques limited in size or in rate, and their equation error, for each limit that is tried."""
     tau = [log.tau[:, joint] for log in logs]
     sizes = np.quantile(np.abs(np.concatenate(tau)), _LEVELS)
     rates = max(float(np.ptp(x)) for x in tau) / np.array(_SLEW_TIMES)
@@ -193,7 +193,7 @@ def _at_limits(logs: Sequence[Log], arm: Arm, joint: int) -> Iterator[tuple[list
 
 
 def _slewed(t: NDArray[np.float64], tau: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
-    """Torques that follow their commands at this rate [N m/s or N/s] at most, from the first one on."""
+    """Return torques that follow their commands at a rate of at most `rate` [N m/s or N/s], from the first command on."""
     steps, commands = (rate * np.diff(t)).tolist(), tau.tolist()
     now = commands[0]
     slewed = [now]
@@ -206,7 +206,7 @@ def _slewed(t: NDArray[np.float64], tau: NDArray[np.float64], rate: float) -> ND
 def _delivered(
     logs: Sequence[Log], arm: Arm, joint: int, torques: Sequence[NDArray[np.float64]]
 ) -> tuple[list[Log], EquationError]:
-    """The logs with these torques of a joint, and their equation error."""
+    """Return the logs with other torques of one joint, and their equation error."""
     there = []
     for log, delivered in zip(logs, torques, strict=True):
         tau = log.tau.copy()
@@ -220,7 +220,7 @@ def _within(factor: float, bound: float) -> bool:
 
 
 def _factors(base: EquationError, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the factor of every torque column: the form of the torques by parameters in the trust of the file, their size by the file."""
+    """Return the factor of every torque column: shape of the torques by parameters within bounds, size by the arm file."""
     factors = base.expected()
     for _ in range(_ROUNDS):
         if np.any(factors <= 0):
@@ -243,7 +243,7 @@ def _said(factors: NDArray[np.float64], odd: Sequence[int], shared: bool) -> tup
 
 
 def said(factors: Mapping[str, float], severity: Severity = "repaired", *, shared: bool = False) -> list[Check]:
-    """Return one check per column; a factor that all columns share is also one of all parameters."""
+    """Return one check per column with a factor; a factor shared by all columns is reported as a possible factor of all parameters too."""
     checks = []
     for column, c in factors.items():
         remedies = [f"--factor {column}={c:.4g}"]
@@ -258,10 +258,10 @@ def said(factors: Mapping[str, float], severity: Severity = "repaired", *, share
 
 
 def refined(factors: Mapping[str, float], causes: Sequence[Mapping[str, Any]], n_joints: int) -> dict[str, float]:
-    """Return repaired factors with the gains that a diagnosis named; empty where it named none.
+    """Return repaired factors on torques times the gains that a diagnosis named; empty if it named no gain.
 
-    A column of unknown unit has no gain of its own: what the fit finds there is what the factor was off by. A gain of another joint is the
-    inverse on this one, as the size of all parameters is only trusted to a few percent.
+    A column of unknown unit has no gain of its own: a fitted gain is the error of its factor. A gain of another joint counts as the inverse
+    gain of this one, as the scale of all parameters is only trusted to a few percent.
     """
     gains = {c["joint"]: c["parameters"]["gain"]["value"] for c in by_joint(causes) if c["effect"] == "torque_gain"}
     given = {j: factors.get(f"tau{j}", factors.get("tau")) for j in range(1, n_joints + 1)}

@@ -37,23 +37,23 @@ COMMANDS = {
     "reproduce": ("armgap.cli.reproduce", "The seed paper's tables and figures beside our own."),
     "trial": ("armgap.cli.trial", "Blind trials: sealed cases, diagnosed and scored."),
 }
-"""Sub-commands, the module whose ``command`` each one is, and one line about it."""
+"""Sub-commands: name, the module whose ``command`` is the sub-command, and one line of help about it."""
 
-#: Exit statuses: of `click` for wrong usage, and 128 with the number of SIGINT.
+#: Exit statuses of the program: for unusable input or wrong usage as in `click`, and 128 plus the number of SIGINT for an interrupt.
 UNUSABLE_INPUT = 2
 INTERRUPTED = 130
 _SIGNALLED = 128
-"""Status of a program that a signal ended, less the signal's number."""
+"""Exit status of a program that a signal ended, less the signal's number."""
 
 _GARBAGE_EVERY = 50_000
-"""Objects between two searches for garbage: most of what a command makes, modules and charts, stays until it ends."""
+"""Objects allocated between two runs of the garbage collector: most objects of a command, modules and charts, live until it ends."""
 
 
 class LazyGroup(click.Group):
-    """A group whose commands are imported when they are asked for."""
+    """A group of commands whose modules are imported only when they are used."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the sub-command; a reader of standard output that has seen enough ends it quietly."""
+        """Run the sub-command; if the reader of standard output closes it early, end without a message."""
         try:
             return super().invoke(ctx)
         except BrokenPipeError:
@@ -65,7 +65,7 @@ class LazyGroup(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return a sub-command by name."""
+        """Return a sub-command by name, importing its module."""
         if cmd_name not in COMMANDS:
             return None
         try:
@@ -77,7 +77,7 @@ class LazyGroup(click.Group):
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the sub-commands without loading them."""
+        """List the sub-commands in the help text without importing their modules."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
@@ -123,7 +123,7 @@ def _run(arguments: list[str] | None) -> int:
 
 
 def _interrupted(status: int) -> NoReturn:
-    """End at once: everything half done has been cleared away on the way here, and threads that still compute are not waited for."""
+    """End the process at once after an interrupt: half-written files have been removed already, and threads that still compute are not waited for."""
     click.echo("armgap: interrupted", err=True)
     with suppress(OSError):
         sys.stdout.flush()
@@ -131,7 +131,7 @@ def _interrupted(status: int) -> NoReturn:
 
 
 def _unreachable(error: OSError) -> NoReturn:
-    """A file or stream failed outside of what reads logs and writes results: as a rule the summary on standard output."""
+    """End the process with a message about a file or stream that failed outside of reading and writing, as a rule standard output."""
     abandon_stdout()
     place = error.filename if error.filename is not None else "standard output"
     _fail(f"{place}: cannot be used ({error.strerror or error}); choose another place")

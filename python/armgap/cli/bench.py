@@ -1,4 +1,4 @@
-"""``armgap bench``."""
+"""Sub-command ``armgap bench``: cost of the online estimator per sample."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def command(samples: int, period: float, everything: bool, json_file: str | None
 
 
 def measure(samples: int, period: float, *, everything: bool = False) -> dict[str, Any]:
-    """Measure every scheme, filter pair, precision and, with `everything`, form of the covariance."""
+    """Measure the online estimator for every scheme, filter pair, precision and, with `everything`, form of the covariance."""
     from armgap import _native
 
     noise = dict(zip(FIELDS, _native.bench(None, False, False, False, samples), strict=True))

@@ -1,4 +1,4 @@
-"""What the sub-commands share: options, column mappings, consoles and interrupts."""
+"""Parts that the sub-commands share: options, column mappings, consoles and interrupts."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ __all__ = [
 ]
 
 Result = TypeVar("Result")
-#: Interval at which an interrupt is looked for, s: below what a user notices.
+#: Interval at which a long computation checks for an interrupt, s: below what a user notices.
 _POLL_S = 0.05
-#: Width of tables that go to no terminal, in characters.
+#: Width of tables on a standard output that is no terminal, in characters.
 _PIPE_WIDTH = 120
 
 arm_option = click.option(
@@ -90,7 +90,7 @@ _CORRECTIONS = {
 
 
 def corrections_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that say how columns are to be read otherwise than they stand."""
+    """Add the command-line options that correct signs, zeros, units or order of a log's columns."""
     gravity = click.Choice(["reversed", "compensated"])
     command = click.option("--gravity", type=gravity, help="Gravity acts the other way, or torques carry no weight.")(
         command
@@ -101,7 +101,7 @@ def corrections_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def read_arm(path: str, given: Mapping[str, Any]) -> Arm:
-    """Read an arm file, with the values of `corrections_options` on top of its own corrections."""
+    """Read an arm file, with the command line's corrections of columns added to those of the file."""
     from armgap.arm.arm import Arm
     from armgap.arm.corrections import Corrections
 
@@ -116,7 +116,7 @@ quiet_option = click.option("--quiet", is_flag=True, help="No progress and no su
 
 class _Console(Console):
     def on_broken_pipe(self) -> NoReturn:
-        """Leave the end of the program to `main`."""
+        """Raise to `main`, which ends the program when the reader of the console's output is gone."""
         self.quiet = True
         raise
 
@@ -134,7 +134,7 @@ class ManyValues(Command):
     spread = ("--holdout",)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Repeat the option before each of its values, which is what click understands."""
+        """Repeat the option ``--holdout`` before each of its values, as click requires."""
         written: list[str] = []
         repeat: str | None = None
         for index, word in enumerate(args):
@@ -152,12 +152,12 @@ class ManyValues(Command):
 
 
 def parse_columns(text: str | None) -> dict[str, str]:
-    """Read ``q1=name,q2=name``."""
+    """Read the text of option ``--columns``: ``q1=name,q2=name``."""
     return _pairs("--columns", text, "q1=NAME,tau1=NAME")
 
 
 def parse_units(text: str | None) -> dict[str, str]:
-    """Read ``t=ms,q=deg``."""
+    """Read the text of option ``--units``: ``t=ms,q=deg``."""
     return _pairs("--units", text, "t=ms,q=deg")
 
 
@@ -174,7 +174,7 @@ def _pairs(option: str, text: str | None, example: str) -> dict[str, str]:
 
 
 def interruptible(work: Callable[[], Result]) -> Result:
-    """Do long work in a thread, so that an interrupt ends the program at once; the work writes nothing by itself."""
+    """Run `work` in a thread, so that an interrupt ends the program at once; `work` must write no files."""
     done: list[Result] = []
     failed: list[BaseException] = []
 
@@ -194,7 +194,7 @@ def interruptible(work: Callable[[], Result]) -> Result:
 
 
 def frozen_positions(words: tuple[str, ...]) -> dict[str, float]:
-    """Read ``JOINT=VALUE``, once per joint."""
+    """Read the values of option ``--freeze``, ``JOINT=VALUE`` each, as positions by joint name [rad or m]."""
     frozen: dict[str, float] = {}
     for word in words:
         joint, _, text = (part.strip() for part in word.rpartition("="))

@@ -1,4 +1,4 @@
-"""``armgap demo``: a log with a sealed key, diagnosed and then checked; or a log of your own."""
+"""Sub-command ``armgap demo``: diagnosis of a sample log, checked against its sealed key, or of the user's own logs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ __all__ = ["command"]
 REPORT = "armgap-demo.html"
 _NEXT = "your own logs: armgap inspect LOG, then armgap diagnose LOG --arm ARM.toml --report OUT.html"
 PACKAGE = Path(__file__).resolve().parents[1]
-#: The sample case.
+#: Folder of the sample case that is part of the package.
 CASE_FOLDER = PACKAGE / "demo_case"
 
 
@@ -142,7 +142,7 @@ def _diagnose(
 
 
 def _voice(outputs: tuple[str, str | None, bool]) -> Any:
-    """The console, silent where the summary is not wanted on standard output."""
+    """Return the console for the summary, silent if standard output is not for the summary."""
     say = console()
     say.quiet = outputs[2] or is_stdout(*outputs[:2])
     return say
@@ -150,7 +150,7 @@ def _voice(outputs: tuple[str, str | None, bool]) -> Any:
 
 @contextmanager
 def _case(folder: Path | None, fresh: int | None, *, quiet: bool) -> Iterator[Path]:
-    """The case folder that was asked for; a fresh one lasts as long as the command."""
+    """Yield the case folder that the user named, or a newly made one, which is deleted when the command ends."""
     if fresh is None:
         yield folder if folder is not None else CASE_FOLDER
         return
@@ -165,7 +165,7 @@ def _case(folder: Path | None, fresh: int | None, *, quiet: bool) -> Iterator[Pa
 
 
 def _opened(key: Key, result: Diagnosis) -> str:
-    """The key in words, and whether the diagnosis found what it says."""
+    """Return the opened key in words, and whether the diagnosis found the key's cause."""
     from armgap.trial.verdict import judge
 
     hidden = [f"{_name(h.effect, h.joint)} ({_values(h.parameters)})" for h in key.effects]

@@ -1,7 +1,7 @@
-"""Which files a command reads and which it writes, declared as the types of its parameters, and the check that no two of them clash.
+"""Types of command-line parameters for files that a command reads or writes, and the check that no two of the files clash.
 
-A parameter that takes text is of one of the types below, so that a command cannot have an output that nobody looks at. Before a command
-does anything, `check_files` compares all that it was given: by device and inode, or by folder and name where there is no file yet.
+Every parameter that takes text has one of these types, so that a command cannot have an unchecked output. Before a command runs,
+`check_files` compares all of its files: by device and inode, or by folder and name for a file that does not exist yet.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ _REMEDY_FOLDER = "name another folder"
 
 
 class Words(click.types.StringParamType):
-    """Text that names no file."""
+    """Type of a command-line parameter whose text names no file."""
 
 
 class _Place(click.Path):
-    """A file or folder; a name that is none is refused."""
+    """Type of a command-line parameter for a file or folder; text that cannot be a file name is refused."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(readable=False, **options)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the path."""
+        """Return the path given on the command line, or fail if it cannot be a file name."""
         text = os.fspath(value)
         if not text or "\0" in text:
             raise OptionError(f"{_label(param)}: {text!r} is no name of a file or folder", remedy="name one")
@@ -54,12 +54,12 @@ class _Place(click.Path):
 
 
 class InputFile(_Place):
-    """A file that is read, a pattern of such files, or ``-``.
+    """Type of a command-line parameter for an input file, a pattern of input files, or ``-``.
 
     Parameters
     ----------
     words : tuple of str, default none
-        Values that stand for something else than a file.
+        Values of the parameter that name no file.
     """
 
     def __init__(self, words: tuple[str, ...] = ()) -> None:
@@ -68,14 +68,14 @@ class InputFile(_Place):
 
 
 class InputFolder(_Place):
-    """A folder that is read.
+    """Type of a command-line parameter for a folder that is read.
 
     Parameters
     ----------
     holds : callable, optional
-        Whether an entry of the folder, given by its path, belongs to what is read; by default everything does.
+        Function of an entry's path: whether the entry of the folder is read; by default all are.
     exists : bool, default False
-        Whether a folder that is not there is refused as a wrong use of the command.
+        Whether a missing folder is refused as wrong usage of the command.
     """
 
     def __init__(self, holds: Callable[[Path], bool] | None = None, *, exists: bool = False) -> None:
@@ -84,16 +84,16 @@ class InputFolder(_Place):
 
 
 class OutputFile(_Place):
-    """A file that is written, or ``-``."""
+    """Type of a command-line parameter for an output file, or ``-``."""
 
 
 class OutputFolder(_Place):
-    """A folder that is filled.
+    """Type of a command-line parameter for a folder that the command fills.
 
     Parameters
     ----------
     holds : callable, optional
-        As for `InputFolder`: which entries are written.
+        Function of an entry's path: whether the command writes the entry; by default all entries.
     """
 
     def __init__(self, holds: Callable[[Path], bool] | None = None) -> None:
@@ -102,12 +102,12 @@ class OutputFolder(_Place):
 
 
 class Command(click.Command):
-    """A command whose files are checked before it runs.
+    """A click command that checks its files for clashes before it runs.
 
     Parameters
     ----------
     reads : tuple of Path, default none
-        Folders that the command reads without being told.
+        Folders that the command always reads.
     """
 
     def __init__(self, *args: Any, reads: tuple[Path, ...] = (), **kwargs: Any) -> None:
@@ -115,51 +115,51 @@ class Command(click.Command):
         self.reads = reads
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Check the files, then run."""
+        """Check the command's files for clashes, then run the command."""
         check_files(ctx, self.reads)
         return super().invoke(ctx)
 
 
 class Group(click.Group):
-    """A group with options of its own, whose files are checked like those of a command."""
+    """A group of commands with options of its own, whose files are checked for clashes like those of a command."""
 
     command_class = Command
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Check the files, then run."""
+        """Check the group's files for clashes, then run the group."""
         check_files(ctx)
         return super().invoke(ctx)
 
 
 @dataclass(frozen=True)
 class _Named:
-    """One file or folder that a command was given."""
+    """A file or folder given to a command, with its identity and label."""
 
     label: str
     path: str
     chain: tuple[Key, ...]
-    """Keys of the file itself and of the folders that it is in, innermost first."""
+    """Keys (device and inode) of the file itself and of the folders around it, innermost first."""
     mode: int | None
     names: tuple[str, ...]
-    """Names along the chain."""
+    """Names of the file and of the folders around it, innermost first."""
     folder: bool
     holds: Callable[[Path], bool] | None = None
 
 
 def check_files(ctx: click.Context, reads: tuple[Path, ...] = ()) -> None:
-    """Raise before any work is done if an output could not be written, or is an input or another output.
+    """Raise if an output of a command cannot be written, or is also an input or another output.
 
     Parameters
     ----------
     ctx : click.Context
         Context of the command, with its parameters.
     reads : tuple of Path, default none
-        Folders that it reads besides.
+        Further folders that the command reads.
 
     Raises
     ------
     ResultError
-        It names both.
+        If two files clash or an output cannot be written; the message names them.
     """
     inputs = [_named("the sample case", os.fspath(folder), 0, folder=True) for folder in reads]
     outputs: list[_Named] = []
@@ -210,7 +210,7 @@ def _written_by(parameter: click.Parameter, value: str) -> list[_Named]:
 
 
 def _label(parameter: click.Parameter | None) -> str:
-    """What the user calls it: the long option, or the argument's name."""
+    """Return the user's name of a parameter: its long option, or the argument's name."""
     if parameter is None:
         return "a file"
     if isinstance(parameter, click.Argument):
@@ -239,7 +239,7 @@ def _named(label: str, path: str, stream: int, *, folder: bool, holds: Callable[
 
 
 def _key(place: Path) -> Key:
-    """Device and inode; without a file, those of its folder and its name."""
+    """Return a file's device and inode; for a missing file, device and inode of its folder, and its name."""
     status = status_of(place)
     if status is not None:
         return status.st_dev, status.st_ino
@@ -248,7 +248,7 @@ def _key(place: Path) -> Key:
 
 
 def _compare(output: _Named, other: _Named, what: str, same: Callable[[_Named, _Named], bool]) -> None:
-    """Raise if an output is another file, or one lies in the other."""
+    """Raise if an output is the same file as another file or folder, or if one lies in the other."""
     if output.chain[0] == other.chain[0] and same(output, other):
         raise ResultError(
             f"{output.label} would overwrite what {what} ({other.path})", remedy=_REMEDY, file=output.path
@@ -268,12 +268,12 @@ def _compare(output: _Named, other: _Named, what: str, same: Callable[[_Named, _
 
 
 def _same_input(output: _Named, given: _Named) -> bool:
-    """A terminal or a socket may be both ends; a file, a pipe or a disk may not."""
+    """Whether an output is an input that must not be overwritten; a terminal or a socket may be both."""
     return output.mode is None or not (stat.S_ISCHR(output.mode) or stat.S_ISSOCK(output.mode))
 
 
 def _same_output(output: _Named, other: _Named) -> bool:
-    """Whether two results for the same place clash; only those that are thrown away do not."""
+    """Whether two outputs at one path clash; outputs to the null device do not."""
     if output.path == other.path == STANDARD_STREAM:
         return True
     null = status_of(os.devnull)
@@ -281,7 +281,7 @@ def _same_output(output: _Named, other: _Named) -> bool:
 
 
 def _belongs(file: _Named, folder: _Named) -> bool:
-    """Whether a file is, or would become, part of what a folder holds; by its place or by a link."""
+    """Whether a file is, or would become, one of the files that a folder holds, by path or by link."""
     if folder.chain[0] in file.chain[1:]:
         entry = file.names[file.chain.index(folder.chain[0]) - 1]
         if folder.holds is None or folder.holds(Path(folder.path) / entry):
@@ -292,7 +292,7 @@ def _belongs(file: _Named, folder: _Named) -> bool:
 
 
 def _files_in(folder: _Named) -> Iterator[Key]:
-    """Keys of all files that belong to a folder, links followed."""
+    """Yield the keys of all files that belong to a folder, links followed."""
     seen: set[Key] = set()
     for place, folders, files in os.walk(folder.path, followlinks=True):
         top = os.path.samefile(place, folder.path)
@@ -304,7 +304,7 @@ def _files_in(folder: _Named) -> Iterator[Key]:
 
 
 def _known(place: str, seen: set[Key]) -> bool:
-    """Whether a folder was seen before, by another link."""
+    """Whether a folder was seen before, perhaps by another link."""
     key = _key(Path(place))
     known = key in seen
     seen.add(key)

@@ -1,4 +1,4 @@
-"""Numbers on the command line."""
+"""Types of command-line parameters for numbers."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ __all__ = ["Number", "Seed"]
 
 
 class Number(click.FloatRange):
-    """A finite number in a range; what is no number is in every range that only compares."""
+    """Type of a command-line parameter for a finite number in a range; NaN is refused."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the number."""
+        """Return the number given on the command line, or fail if it is not finite."""
         number = super().convert(value, param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value} is not a finite number", param, ctx)
@@ -24,7 +24,7 @@ class Number(click.FloatRange):
 
 
 class Seed(click.IntRange):
-    """A seed of a random generator."""
+    """Type of a command-line parameter for the seed of a random generator."""
 
     def __init__(self) -> None:
         super().__init__(0, LARGEST_SEED)

@@ -1,4 +1,4 @@
-"""A bar on standard error while something takes its time: what is done, how far, and how long it will still take."""
+"""Progress bar on standard error: current work, fraction done, and estimated remaining time."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
 __all__ = ["left", "working"]
 
-# A first guess is worth nothing before so much time has passed and so much is done.
+# Elapsed time and fraction done before which no remaining time is shown.
 _GUESS_AFTER_S = 1.0
 _GUESS_AFTER_PART = 0.03
 
 
 @contextmanager
 def working(message: str, *, quiet: bool) -> Iterator[None]:
-    """Show on standard error how far the work inside the block is, unless quiet, not at a terminal, or asked for plain text by ``NO_COLOR``.
+    """Show the progress of the work inside the ``with`` block on standard error, unless quiet, not at a terminal, or with ``NO_COLOR`` set.
 
-    What is reported with `armgap.progress.report_progress` replaces the message.
+    Texts reported by `armgap.progress.report_progress` replace `message`.
     """
     if quiet or os.environ.get("NO_COLOR") or not sys.stderr.isatty():
         yield
@@ -36,7 +36,7 @@ def working(message: str, *, quiet: bool) -> Iterator[None]:
 
 
 def left(elapsed_s: float, fraction: float) -> float | None:
-    """Return the seconds that remain if the rest goes like what is done; None where that is too early to say.
+    """Return the estimated remaining time [s] at the mean speed so far; None while it is too early for an estimate.
 
     Examples
     --------
@@ -53,7 +53,7 @@ def _bar() -> Progress:
     from rich.text import Text
 
     class TimeLeft(ProgressColumn):
-        """How long it will take, or for how long it has been going on."""
+        """Column of a progress bar with the remaining time, or with the elapsed time if no estimate exists."""
 
         max_refresh = 0.5
 
@@ -75,7 +75,7 @@ def _time(elapsed_s: float, fraction: float | None) -> str:
 
 
 def _clock(seconds: float) -> str:
-    """Return whole seconds in words.
+    """Return a time, rounded to whole seconds, in words.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def _clock(seconds: float) -> str:
 
 
 class _Line:
-    """The one line of the bar; work that starts from less than was done before starts the clock anew."""
+    """State of the progress bar's one line; work that restarts from a smaller fraction restarts the clock."""
 
     def __init__(self, bar: Progress, message: str) -> None:
         self.bar = bar

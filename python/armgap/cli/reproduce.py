@@ -1,4 +1,4 @@
-"""``armgap reproduce``."""
+"""Sub-command ``armgap reproduce``: experiment of Reyes and Kelly (1997)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-#: Columns of a terminal below which Table II is shown scheme by scheme.
+#: Terminal width in characters below which Table II of Reyes and Kelly (1997) is shown scheme by scheme.
 NARROW = 100
 
 
@@ -69,7 +69,7 @@ def _summarise(result: Reproduction, report_file: str) -> None:
 
 
 def _tables(result: Reproduction, *, narrow: bool) -> list[Table]:
-    """Table II as one wide table, or one table per scheme."""
+    """Return Table II of Reyes and Kelly (1997) as one wide table, or as one table per scheme."""
     from armgap.reproduction.page import table_two
 
     header, rows = table_two(result)

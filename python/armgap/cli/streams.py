@@ -1,4 +1,4 @@
-"""Standard streams and signals of the command: whatever happens to them ends in one line and a status, never in a traceback."""
+"""Standard streams and signals of the command line: every failure ends in one line and an exit status, never in a traceback."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _SIGNALS = tuple(s for s in (getattr(signal, name, None) for name in ("SIGTERM",
 
 
 class EndedError(KeyboardInterrupt):
-    """The program was asked to end by another signal than an interrupt.
+    """Exception for a signal other than SIGINT that asks the program to end.
 
     Parameters
     ----------
     number : int
-        Of the signal.
+        Number of the signal.
     """
 
     def __init__(self, number: int) -> None:
@@ -30,9 +30,9 @@ class EndedError(KeyboardInterrupt):
 
 
 def open_streams() -> None:
-    """Open what the program was started without, so that no result gets a standard stream's number; and print any name of a file.
+    """Open standard streams that the program was started without, so that no file takes their descriptors, and make any file name printable.
 
-    A standard output that was closed is opened for reading: what is written there is refused and not lost in silence.
+    A closed standard output is opened for reading: writing to it then fails and is not lost in silence.
     """
     for number, flags in ((0, os.O_RDONLY), (1, os.O_RDONLY), (2, os.O_WRONLY)):
         try:
@@ -50,7 +50,7 @@ def open_streams() -> None:
 
 
 def abandon_stdout() -> None:
-    """Let what is still to be printed go nowhere: the other end is gone or full, and the interpreter flushes once more at its end."""
+    """Redirect standard output to nowhere: its reader is gone or the disk full, and the interpreter flushes once more at exit."""
     with suppress(OSError, ValueError):
         number = sys.stdout.fileno()
         nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -60,7 +60,7 @@ def abandon_stdout() -> None:
 
 @contextmanager
 def ended_by_signals() -> Iterator[None]:
-    """Raise `EndedError` where a signal would end the program at once, so that what is half done is cleared away.
+    """Raise `EndedError` inside the ``with`` block where a signal would end the program at once, so that half-written files are removed.
 
     Signals that are ignored, as under ``nohup``, stay ignored.
     """

@@ -1,4 +1,4 @@
-"""``armgap trial``: make sealed cases, diagnose them, open the keys, score.
+"""Sub-command ``armgap trial``: make sealed cases, diagnose them, open the keys, score.
 
 The steps are sub-commands; without one, a few cases are made, diagnosed and scored in one go.
 """
@@ -93,7 +93,7 @@ for _step in (make, run, score, baselines, former_name, all_of_it):
 
 
 def _only(context: click.Context) -> None:
-    """Options before a sub-command would be lost."""
+    """Raise if options stand before a sub-command of ``armgap trial``, where they would be ignored."""
     given = [p for p in context.params if context.get_parameter_source(p) is click.core.ParameterSource.COMMANDLINE]
     if given:
         raise OptionError(
@@ -115,7 +115,7 @@ def _check(folder: Path | None, make_only: bool, made: Path | None, duration: fl
 
 @contextmanager
 def _cases(made: Path | None, folder: Path | None, make: Callable[[Path], list[Path]]) -> Iterator[list[Path]]:
-    """The case folders: those that exist, or new ones in a folder that lasts as asked."""
+    """Yield the case folders: existing ones, or new ones in `folder` or in a temporary folder."""
     if made is not None:
         found = case_folders_in(made)
         if not found:
@@ -137,11 +137,11 @@ def _make(target: Path, cases: int, seed: int | None, duration: float, quiet: bo
 
 
 def _ignore(_: str, __: float) -> None:
-    """Drop the progress of one case: the bar shows that of all cases."""
+    """Ignore the progress of one case, as the bar shows that of all cases."""
 
 
 def _score(case: Path, horizon: float) -> tuple[str, Judgement, float]:
-    """Diagnose one case without its key, then open the key; return its name, the judgement, and what was closed."""
+    """Diagnose one case without its key, then open the key; return the case's name, the judgement, and the closed share of the gap."""
     from armgap.diagnosis.diagnosis import diagnose
     from armgap.trial.cases.key import open_key
     from armgap.trial.verdict import judge

@@ -1,8 +1,8 @@
-"""The diagnosis: where the gap lies, which effect causes it, how far it shrinks.
+"""The diagnosis: at which joint and in which motion the gap lies, which effect causes it, how far it shrinks.
 
 `diagnosis`  from logs and an arm to the result
 `result`     the result, read from its JSON
-`schema`     the JSON Schema of that
+`schema`     the JSON Schema of the result
 """
 
 from __future__ import annotations

@@ -19,9 +19,9 @@ __all__ = ["CauseChange", "Comparison", "GapChange", "ParameterChange", "compare
 _Place = tuple[str, int | None, tuple[int, ...] | None, tuple[int, int] | None]
 _Key = tuple[_Place, str | None, int]
 SCHEMA = "armgap.diagnosis/1"
-#: Factors of the gap above the sensors' floor at which it counts as smaller or larger: other motions alone vary it by less.
+#: Ratios of the gap above the noise floor, after to before, at which it counts as smaller or larger: different motions vary it by less.
 SMALLER, LARGER = 0.8, 1.25
-#: A value has changed if it moved by more than these standard deviations of the difference, and by more than this share of itself.
+#: A parameter has changed if it differs by more than so many standard deviations of the difference, and by more than this share of itself.
 SIGMAS, SHARE = 3.0, 0.02
 
 
@@ -32,11 +32,11 @@ class GapChange:
     Attributes
     ----------
     model : {"before", "refit", "after"}
-        Arm file, re-estimated, with causes; as in `Gap`.
+        Model with the arm file's parameters, with re-estimated parameters, or with the causes; as in `Gap`.
     before, after : tuple of float
         RMS position error per joint [rad or m].
     factor : float or None
-        The gap above the sensors' floor after, over that before, all joints; None if there was none before.
+        Ratio of the gap above the noise floor, all joints, after to before; None if there was no gap before.
     """
 
     model: str
@@ -47,7 +47,7 @@ class GapChange:
 
 @dataclass(frozen=True)
 class CauseChange:
-    """What became of one cause.
+    """Change of one cause between two diagnoses of an arm.
 
     Attributes
     ----------
@@ -59,9 +59,9 @@ class CauseChange:
         ``"gone"``, ``"unseen"`` (the later log could not show it), ``"undecided"``, ``"new"``, ``"smaller"``, ``"larger"``, ``"unchanged"``, or
         ``"renamed"``: the later diagnosis names a look-alike of it.
     before, after : dict of str to Value, optional
-        Parameters where it is named.
+        Parameters of the cause in each diagnosis that names it.
     why : str
-        What the status rests on.
+        Reason of the status in words.
     joints, row : tuple of int, optional
         Two joints and the factors of their motion, of a term on a row over them.
     """
@@ -78,7 +78,7 @@ class CauseChange:
 
 @dataclass(frozen=True)
 class ParameterChange:
-    """One parameter of the arm, with causes, before and after.
+    """Change of one parameter of the arm, in the model with causes, between two diagnoses.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class ParameterChange:
     sigmas : float or None
         Difference in standard deviations of the difference; None if no standard deviation is known.
     changed : bool
-        Whether the difference counts.
+        Whether the difference is significant.
     """
 
     name: str
@@ -106,27 +106,27 @@ class Comparison:
     Attributes
     ----------
     outcome : {"smaller", "larger", "unchanged", "none"}
-        What became of the gap between log and arm file; ``"none"``: there was none before or after.
+        Change of the gap between log and arm file; ``"none"``: no gap before or after.
     verdict_before, verdict_after : str
         The verdicts of the two diagnoses.
     gap : tuple of GapChange
-        Arm file, re-estimated, with causes.
+        Changes of the gap with the arm file's parameters, with re-estimated parameters, and with causes.
     causes : tuple of CauseChange
         Every cause that either diagnosis names.
     parameters : tuple of ParameterChange
-        The arm's parameters.
+        Changes of the arm's parameters.
     notes : tuple of str
-        What limits the comparison.
+        Limitations of the comparison.
     unit : str
         Unit of positions.
     horizon_s : float
-        Prediction horizon of both [s].
+        Prediction horizon of both diagnoses [s].
     names : tuple of str
-        What the two diagnoses are called.
+        Names of the two diagnoses.
     kind : str
         Kind of the arm.
     joint_units : tuple of str
-        Unit of each joint's position; a serial arm may have joints that turn and joints that slide.
+        Unit of each joint's position; a serial arm may have rotary and linear joints.
     """
 
     outcome: GapOutcome
@@ -143,7 +143,7 @@ class Comparison:
     joint_units: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object, schema ``armgap.diagnosis.comparison/1``."""
+        """Return the comparison as a JSON object, schema ``armgap.diagnosis.comparison/1``."""
         return {"schema": "armgap.diagnosis.comparison/1", **asdict(self)}
 
     def to_json(self, indent: int | None = None) -> str:
@@ -152,7 +152,7 @@ class Comparison:
 
 
 def read_diagnosis(path: str | Path) -> Diagnosis:
-    """Read a diagnosis that ``armgap diagnose --json`` wrote.
+    """Read a diagnosis from a file of ``armgap diagnose --json``.
 
     Raises
     ------
@@ -183,14 +183,14 @@ def compare(before: Diagnosis, after: Diagnosis, names: tuple[str, str] = ("befo
     Parameters
     ----------
     before, after : Diagnosis
-        For example before and after a repair; with the same horizon.
+        Diagnoses with equal horizon, for example before and after a repair.
     names : tuple of str
-        What to call them.
+        Names of the two diagnoses in the comparison.
 
     Raises
     ------
     OptionError
-        If they are of different kinds of arm or have different horizons.
+        If the diagnoses are of different kinds of arm or have different horizons.
     """
     _check(before, after)
     gaps = tuple(_gap(before, after, model) for model in ("before", "refit", "after"))
@@ -276,7 +276,7 @@ def _changed(
 
 
 def _placed(diagnosis: Diagnosis) -> dict[_Key, Cause]:
-    """Causes by effect, joint and log, a law on several joints joint by joint; of several pushes in one log, by their order."""
+    """Return causes by effect, joint and log: a law on several joints joint by joint, external disturbances within one log by their order."""
     found: dict[_Key, Cause] = {}
     for cause in chain.from_iterable(cause.by_joint() for cause in diagnosis.causes):
         number = sum(key[:2] == (_place(cause), cause.log) for key in found)
@@ -285,7 +285,7 @@ def _placed(diagnosis: Diagnosis) -> dict[_Key, Cause]:
 
 
 def _vanished(place: _Place, after: Diagnosis, alike: str | None) -> tuple[CauseStatus, str]:
-    """Status of a cause that the later diagnosis does not name."""
+    """Return status and reason of a cause that the later diagnosis does not name."""
     if alike is not None:
         return "renamed", f"{alike} is named instead, which motion does not tell from it"
     found = next((r for r in after.ruled_out if _place(r) == place), None)
@@ -314,7 +314,7 @@ def _earlier(found: RuledOut | None) -> str:
 
 
 def _resized(before: dict[str, Value], after: dict[str, Value]) -> tuple[CauseStatus, str]:
-    """Status of a cause that both name, by its first parameter that has changed."""
+    """Return status and reason of a cause that both diagnoses name, from its first changed parameter."""
     for name in before:
         change = _change(name, before[name], after[name]) if name in after else None
         if change and change.changed:

@@ -32,18 +32,18 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 @dataclass(frozen=True)
 class CustomEffect:
-    """A custom effect.
+    """An effect whose torque is a function given by the user.
 
     Parameters
     ----------
     name : str
-        What it is called in results: small letters, digits, underscores; not the name of an effect of the library.
+        Name of the effect in results: small letters, digits, underscores; not the name of an effect of the library.
     joint : int
-        Joint it acts on, from 1.
+        Joint that the effect acts on, from 1.
     torque : callable
         ``torque(t, q, dq, tau)`` with times of shape (n_samples,) [s], counted from the log's first sample, and positions, velocities and
-        torques of shape (n_samples, n_joints), SI. It returns the torque on the joint, shape (n_samples,) [N m or N], for size 1. What
-        resists the motion has the opposite sign of the velocity.
+        torques of shape (n_samples, n_joints), SI. It returns the torque on the joint, shape (n_samples,) [N m or N], for size 1. A
+        torque that resists the motion has the opposite sign of the velocity.
 
     Examples
     --------
@@ -59,12 +59,12 @@ class CustomEffect:
 
 
 def check_effects(effects: Any) -> None:
-    """Raise if what was given are no custom effects.
+    """Raise if a sequence holds anything but custom effects.
 
     Raises
     ------
     OptionError
-        It shows the first that is none.
+        If an item is no custom effect; the message shows the first one.
     """
     for effect in (effects,) if isinstance(effects, str | CustomEffect) else effects:
         if not isinstance(effect, CustomEffect) or effect is effects:
@@ -79,11 +79,11 @@ class TorqueTables:
     Attributes
     ----------
     effects : tuple of CustomEffect
-        In order.
+        Effects in the order given.
     scale : tuple of float
-        RMS of each effect's torque over the training logs, by which its tables are divided.
+        RMS of each effect's torque over the training logs, by which the effect's tables are divided.
     by_log : dict of str to list of ndarray
-        Tables of each log, by its name.
+        Torque tables of the effects for each log, by name of the log.
     """
 
     effects: tuple[CustomEffect, ...]
@@ -92,12 +92,12 @@ class TorqueTables:
 
     @classmethod
     def of(cls, effects: Sequence[CustomEffect], training: Sequence[Log], held: Sequence[Log]) -> TorqueTables:
-        """Evaluate the effects.
+        """Evaluate custom effects along training and holdout logs.
 
         Raises
         ------
         OptionError
-            A name is taken or impossible, a joint is not there, or a function does not give one finite torque per sample.
+            If a name is taken or impossible, a joint does not exist, or a function does not return one finite torque per sample.
         """
         _check(effects, training[0].n_joints)
         raw = {log.name: [_evaluated(e, log) for e in effects] for log in (*training, *held)}
@@ -114,13 +114,13 @@ class TorqueTables:
         )
 
     def named(self, data: dict[str, Any]) -> dict[str, Any]:
-        """The JSON object of a diagnosis with the user's names, and sizes in the unit of the user's function."""
+        """Return a diagnosis' JSON object with the user's names of custom effects, and sizes in units of the user's functions."""
         for i, effect in enumerate(self.effects):
             _rename(data, f"user_effect_{i + 1}", effect.name, 1.0 / self.scale[i])
         return data
 
     def applied(self, data: dict[str, Any], logs: Sequence[Log]) -> tuple[dict[str, Any], list[Log]]:
-        """The diagnosis without custom causes, and logs to whose torques theirs are added: for code that knows the library's effects only."""
+        """Return a diagnosis without custom causes, and logs with their torques added, for code that knows only the library's effects."""
         custom = {e.name: (i, e.joint) for i, e in enumerate(self.effects)}
         found = [c for c in data["causes"] if c["effect"] in custom]
         if not found:
@@ -176,7 +176,7 @@ def _evaluated(effect: CustomEffect, log: Log) -> Array:
 
 
 def _rename(node: Any, internal: str, name: str, unit: float) -> None:
-    """Give every mention of an internal name the user's, and its sizes the user's unit."""
+    """Replace an internal effect name in a JSON object by the user's name, and scale its sizes by `unit`."""
     if isinstance(node, list):
         for item in node:
             _rename(item, internal, name, unit)

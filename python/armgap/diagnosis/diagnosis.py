@@ -1,4 +1,4 @@
-"""A diagnosis is made: input prepared, handed over to the core, completed with what is known on this side."""
+"""The function `diagnose`: prepares the input, runs the compiled core, and completes its result."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ from armgap.progress import ProgressCallback, report_progress, use_callback
 
 __all__ = ["InputSummary", "LogRemark", "diagnose"]
 
-#: What a part of a log is called after the log's own name.
+#: Suffixes that name a part or a stretch of a log, after the log's own name.
 _WHOLE = re.compile(r"( \((first|last) part\))?( \(\S+ to \S+ s\))?$")
-#: What a stretch of a log is called after the log's own name.
+#: Suffix that names a stretch of a log, after the log's own name.
 _STRETCH = re.compile(r" \(\S+ to \S+ s\)$")
 MOST_CAUSES = 1000
-"""More than the library can name on any arm."""
+"""Largest number of causes that may be asked for: more than the library can name on any arm."""
 LogLike = Any  # a Log, a path, a pattern such as "logs/*.parquet", or a table
 
 
 class InputLog(TypedDict):
-    """A log as it was read."""
+    """A log of a diagnosis as it was read: its columns and their units."""
 
     name: str
     file: Annotated[str | None, "Its file; null for arrays."]
@@ -53,14 +53,14 @@ class InputLog(TypedDict):
 
 
 class InputSummary(TypedDict):
-    """Which columns of which files were used."""
+    """Files, columns and units of the input that a diagnosis used."""
 
     logs: list[InputLog]
     units: Annotated[dict[str, str], "SI unit of each group of columns."]
 
 
 class LogRemark(TypedDict):
-    """A remark on a log."""
+    """A remark on one log of a diagnosis."""
 
     log: Annotated[str, "Name of the log."]
     kind: str
@@ -83,7 +83,7 @@ def diagnose(
     """Diagnose the gap between an arm's nominal model and its logs.
 
     Candidate effects are fitted together with the arm's parameters by output error over short windows of the training
-    logs, and judged on windows of the holdout logs, whose motion should be another.
+    logs, and judged on windows of the holdout logs, whose motion should differ from that of the training logs.
 
     Parameters
     ----------
@@ -92,22 +92,22 @@ def diagnose(
     arm : Arm or path
         Nominal model.
     holdout : Log, path, pattern, table, or sequence of these, optional
-        Logs to judge on. Without it the last 40 % of every training log are held out.
+        Logs on which models are judged. By default the last 40 % of every training log are held out.
     horizon : float, default 0.25
         Prediction horizon [s].
     max_causes : int, default 4
-        Causes named at most.
+        Largest number of causes to name.
     seed : int, default 1
         Seed of the resampling behind probabilities and intervals.
     effects : sequence of CustomEffect, default none
         Custom effects that take part in the ranking, four at most.
     repair : bool, default True
-        Whether defects of the input are repaired that leave nothing to guess (see `armgap.check`); without it they are only said.
+        Whether unambiguous defects of the input are repaired (see `armgap.check`); otherwise they are only reported.
     corrections : Corrections, optional
-        How columns are to be read otherwise than they stand, on top of what the arm file says.
+        Corrections of columns, added to those of the arm file.
     progress : callable, optional
-        ``progress(work, fraction)`` is called now and then with what is being done and an estimate of how much of it is done, from 0
-        to 1.
+        ``progress(work, fraction)`` is called now and then with the name of the current work and its estimated fraction done,
+        from 0 to 1.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def diagnose(
     Raises
     ------
     ArmgapError
-        A leaf of it, if a log, the arm or an option cannot be used.
+        A subclass of it, if a log, the arm or an option cannot be used.
     KeyboardInterrupt
         On an interrupt, within a fifth of a second.
     """
@@ -138,7 +138,7 @@ def diagnose(
 
 
 def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[CustomEffect]) -> Diagnosis:
-    """Hand over to the core, and add what is known on this side."""
+    """Run the compiled core on prepared input, and add checks, provenance and custom effects to its result."""
     training, held, arm = given.training, given.holdout, given.arm
     contradictory = any(check.severity == "error" for check in given.checks)
     if contradictory:
@@ -199,7 +199,7 @@ def _diagnose(given: PreparedInput, settings: dict[str, Any], effects: Sequence[
 
 
 def _input(arm: Arm, training: list[Log], held: list[Log]) -> InputSummary:
-    """Which columns of which files were used, in which units; stretches of one log are one entry."""
+    """Return the files and columns, with units, that a diagnosis used; stretches of one log are one entry."""
     found: dict[tuple[str, str], InputLog] = {}
     sets: tuple[tuple[Literal["training", "holdout"], list[Log]], ...] = (("training", training), ("holdout", held))
     for use, logs in sets:
@@ -219,13 +219,13 @@ def _input(arm: Arm, training: list[Log], held: list[Log]) -> InputSummary:
 
 
 def _rotary(arm: Arm) -> bool | None:
-    """Whether all joints turn, or none does; None where some do."""
+    """Return True if all joints are rotary, False if none is, None for an arm with both kinds."""
     turning = set(arm.rotary_joints)
     return turning.pop() if len(turning) == 1 else None
 
 
 def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> list[Check]:
-    """List the shift of the file among the equivalents of delays that are equal on all joints, and warn of it."""
+    """Add a time shift of the file to the equivalents of delays that are equal on all joints, and return a warning of it."""
     period = float(np.median(np.concatenate([np.diff(log.t) for log in training])))
     check = causal(data["causes"], arm.n_joints, period)
     if check is None:
@@ -239,7 +239,7 @@ def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> lis
 
 
 def _hidden_delay(data: dict[str, Any], given: PreparedInput) -> list[Check]:
-    """Warn of a shift of the file that predictions see beside a gap without a name, or beside delays and lags that are all joints' together."""
+    """Return a warning of a time shift of the file that predictions support beside an unnamed gap, or beside equal delays or lags of all joints."""
     late = {c["joint"] for c in data["causes"] if c["effect"] in ("actuator_delay", "actuator_lag")}
     asked = data["verdict"] == "unexplained" or len(late) == given.arm.n_joints > 1
     if not asked or given.arm.chain is not None or any(check.check == "time_shift" for check in given.checks):
@@ -249,7 +249,7 @@ def _hidden_delay(data: dict[str, Any], given: PreparedInput) -> list[Check]:
 
 
 def _columns(data: dict[str, Any], given: PreparedInput) -> list[Check]:
-    """Say that these are not the columns of this arm's joints, where no effect of the library brings predictions near the motion."""
+    """Return a check that the columns do not belong to the arm's joints, where no effect of the library brings predictions near the motion."""
     if given.arm.chain is not None:
         return []
     gap = data["gap"]
@@ -259,7 +259,7 @@ def _columns(data: dict[str, Any], given: PreparedInput) -> list[Check]:
 
 
 def _ambiguous_lag(data: dict[str, Any], checks: Sequence[Check]) -> None:
-    """List a low-pass of the positions among the equivalents of what delays a joint's torque; as long as nobody knows, each has half."""
+    """Add a low-pass of the positions to the equivalents of causes that delay a joint's torque; each gets half of the probability."""
     joints = {check.joint for check in checks if check.check == "filtered_positions"}
     for cause in data["causes"]:
         found = {j for j in cause.get("joints") or [cause["joint"]] if j in joints}
@@ -271,6 +271,6 @@ def _ambiguous_lag(data: dict[str, Any], checks: Sequence[Check]) -> None:
 
 
 def _contradicted(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the result of logs and arm file that contradict each other: figures with the remedy applied, no causes."""
+    """Return the result for logs and arm file that contradict each other: gap with the remedy applied, no causes."""
     gap = data["gap"] | {"after": data["gap"]["refit"]}
     return data | {"verdict": "input", "causes": [], "candidates": [], "gap": gap}

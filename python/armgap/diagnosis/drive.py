@@ -2,10 +2,10 @@
 
     tau_meas(t) = gain tau(t - delay) + offset - viscous dq(t) - inertia ddq(t)
 
-`tau` is held between its samples, so the delay counts from the moment at which a command is given. Both sides are weighed by one Gaussian kernel,
+`tau` is held between its samples, so the delay counts from the moment at which a command is given. Both sides are smoothed by one Gaussian kernel,
 which gives velocity and acceleration from positions without a shift in time, and are fitted by least squares: linear in all but the delay, which
-is sought over a grid and then found by Gauss-Newton. A first-order lag of the drive's current loop is part of the delay: under the kernel both do
-the same.
+is searched over a grid and refined by Gauss-Newton. A first-order lag of the drive's current loop is part of the delay: under the kernel both are
+equivalent.
 """
 
 from __future__ import annotations
@@ -25,34 +25,35 @@ __all__ = ["PARAMETERS", "Drive"]
 Array = NDArray[np.float64]
 
 PARAMETERS = ("delay", "gain", "offset", "viscous", "inertia")
-"""Parameters of a drive, in the order of `Drive.values`."""
+"""Names of the parameters of a drive, in the order of `Drive.values`."""
 
-# Standard deviation of the kernel [s]: its cut-off of 7 Hz is above the motion of arms. On a real arm inertias of single logs scattered by 23 %
-# with 5 ms and by 10 to 12 % with 10 to 40 ms, where ripple of the current and encoder steps are gone.
+# Standard deviation of the Gaussian kernel that smooths torques and positions [s]: its cut-off of 7 Hz is above the motion of arms. On a real arm
+# inertias of single logs scattered by 23 % with 5 ms and by 10 to 12 % with 10 to 40 ms, where ripple of the current and encoder steps are gone.
 _KERNEL_S = 0.02
-# The kernel's standard deviation at least, in sample periods: narrower ones have no second derivative on the samples.
+# Smallest standard deviation of the Gaussian kernel, in sample periods: narrower kernels have no second derivative on the samples.
 _KERNEL_PERIODS = 2.0
-# Half width of the kernel in standard deviations: 6e-5 of it lies beyond.
+# Half width of the Gaussian kernel in standard deviations: 6e-5 of its weight lies beyond.
 _REACH = 4.0
-# Delays that are looked for [s]: field buses and current loops take 1 to 30 ms; a measured torque that comes before its command is one of the file.
+# Range of delays that are searched [s]: field buses and current loops take 1 to 30 ms; a measured torque before its command is a time shift of the
+# file.
 _EARLIEST_S, _LATEST_S = -0.05, 0.1
-# Step of the grid of delays, in standard deviations of the kernel, within which the cost is a parabola.
+# Step of the grid of delays, in standard deviations of the Gaussian kernel: within a step the cost is a parabola.
 _GRID = 0.25
-# Rounds of Gauss-Newton; from within a step of the grid it has converged to 1e-6 s after four.
+# Gauss-Newton iterations for a drive's delay; from within a step of the grid it has converged to 1e-6 s after four.
 _ROUNDS = 8
-# A hole is longer than this many periods, as where the equation of motion is compared.
+# Length of a hole in the samples, in sample periods, at which a log is split, equal to that for the equation of motion.
 _HOLE = 3.0
-# A command that varies by less than this part of the measured torque tells neither gain nor delay.
+# Variation of a command, as a part of the measured torque, below which it determines neither gain nor delay.
 _VARIES = 0.01
-# Length of a block [s] whose residuals count as one: torques are correlated over some tenths of a second.
+# Length of a block of torque residuals that counts as one independent value [s]: torques are correlated over some tenths of a second.
 _BLOCK_S = 1.0
-# Standard deviation of where in its period a torque is sampled, in periods: that of a uniform distribution.
+# Standard deviation of the sampling instant of a torque within its period, in periods: that of a uniform distribution.
 _SAMPLED = 1.0 / np.sqrt(12.0)
 
 
 @dataclass(frozen=True)
 class _Stretch:
-    """Signals of one joint over a stretch without holes, weighed by the kernel, at even times.
+    """Signals of one joint over a stretch without holes, smoothed by the Gaussian kernel, at even times.
 
     Attributes
     ----------
@@ -76,7 +77,7 @@ class _Stretch:
 
     @classmethod
     def of(cls, t: Array, q: Array, tau: Array, tau_meas: Array) -> _Stretch | None:
-        """Weigh the signals by the kernel; None where the stretch is too short."""
+        """Smooth the signals of a stretch by the Gaussian kernel; None where the stretch is too short."""
         step = float(np.median(np.diff(t)))
         sigma = max(_KERNEL_S, _KERNEL_PERIODS * step)
         even = np.arange(t[0], t[-1], step)
@@ -107,7 +108,7 @@ class _Stretch:
         )  # fmt: skip
 
     def columns(self, delay: float) -> Array:
-        """Return what gain, offset, viscous part and inertia are multiplied by, shape (n_inner, 4)."""
+        """Return the regressor of gain, offset, viscous part and inertia for a delay [s], shape (n_inner, 4)."""
         tau = np.interp(self.t[self.inner] - delay, self.t, self.tau)
         return np.stack([tau, np.ones_like(tau), -self.dq[self.inner], -self.ddq[self.inner]], axis=1)
 
@@ -117,19 +118,19 @@ class _Stretch:
 
     @property
     def measured(self) -> Array:
-        """Measured torque that the model is fitted to, shape (n_inner,)."""
+        """Measured torque that the drive model is fitted to, shape (n_inner,)."""
         return self.tau_meas[self.inner]
 
     @property
     def blocks(self) -> NDArray[np.intp]:
-        """Number of each row's block from the start of the stretch."""
+        """Block number of each row of a stretch, counted from its start."""
         t = self.t[self.inner]
         return np.asarray((t - t[0]) / _BLOCK_S, dtype=np.intp)
 
 
 @dataclass(frozen=True)
 class Drive:
-    """The drive of one joint.
+    """Identified drive of one joint: model from commanded to measured torque.
 
     Attributes
     ----------
@@ -137,7 +138,7 @@ class Drive:
         Joint, from 0.
     values, sigma : ndarray, shape (5,)
         Delay [s], gain, offset [N m], viscous part [N m s/rad] and inertia [kg m^2] with their standard deviations, from the scatter between blocks
-        of a second or between logs, whichever is larger; that of the delay also holds that a torque is sampled anywhere in its period.
+        of a second or between logs, whichever is larger; the delay's standard deviation includes the unknown sampling instant within a period.
     """
 
     joint: int
@@ -146,7 +147,7 @@ class Drive:
 
     @classmethod
     def identify(cls, logs: Sequence[Log], joint: int) -> Drive | None:
-        """Fit the drive of a joint, from 0, to logs; None where the command does not vary, or no delay within reach explains the measured torque."""
+        """Fit the drive of a joint (from 0) to logs; None for a constant command, or if no delay in range explains the measured torque."""
         by_log = [found for log in logs if (found := _stretches(log, joint))]
         stretches = [stretch for found in by_log for stretch in found]
         if not stretches:
@@ -179,7 +180,7 @@ class Drive:
         return cls(joint, values, scatter)
 
     def left(self, logs: Sequence[Log]) -> tuple[float, float]:
-        """Return the RMS of measured less commanded torque on some logs, and of measured less modelled torque [N m]; weighed by the kernel."""
+        """Return the RMS over some logs of measured less commanded, and of measured less modelled torque [N m], smoothed by the Gaussian kernel."""
         stretches = [stretch for log in logs for stretch in _stretches(log, self.joint)]
         if not stretches:
             return 0.0, 0.0
@@ -188,7 +189,7 @@ class Drive:
         return float(np.sqrt(np.mean(apart**2))), float(np.sqrt(np.mean(left**2)))
 
     def parameters(self, *, rotary: bool) -> dict[str, Any]:
-        """Return the parameters by name, each with value, sigma and unit."""
+        """Return the drive's parameters by name, each with value, sigma and unit."""
         units = ("s", "1", "N m", "N m s/rad", "kg m^2") if rotary else ("s", "1", "N", "N s/m", "kg")
         return {
             name: {"value": float(value), "sigma": float(sigma), "unit": unit}
@@ -209,13 +210,13 @@ def _stretches(log: Log, joint: int) -> list[_Stretch]:
 
 
 def _jacobian(stretch: _Stretch, values: Array) -> Array:
-    """Return the derivatives of the modelled torque by all parameters, shape (n_inner, 5)."""
+    """Return the derivatives of the modelled torque by delay, gain, offset, viscous part and inertia, shape (n_inner, 5)."""
     delay, gain = values[:2]
     return np.column_stack([stretch.by_delay(delay, gain), stretch.columns(delay)])
 
 
 def _scatter(rows: Array, residual: Array, groups: NDArray[np.intp]) -> Array:
-    """Return standard deviations of a least squares fit whose residuals are correlated within groups and not between them, shape (n_parameters,)."""
+    """Return standard deviations of least-squares estimates for residuals correlated within groups only, shape (n_parameters,)."""
     _, group = np.unique(groups, return_inverse=True)
     count = int(group.max()) + 1
     if count < 2:

@@ -1,8 +1,8 @@
-"""The gap along the chain command -> drive -> transmission -> mechanics -> sensor, from logs that hold more of it than command and position.
+"""The gap along the chain command -> drive -> transmission -> mechanics -> sensor, from logs that hold further signals along the chain.
 
-Signals measured along the chain take the place of what the model is given: the measured torque `tau_meas` of a joint that of the commanded one,
-which takes its drive out of the prediction, and the position `q_link` of a second encoder that of the first, which takes its transmission out. Each
-time the arm's parameters are estimated again. With S the signals in use and E_j(S) the RMS error that is left at joint j,
+Measured signals replace inputs and outputs of the model: the measured torque `tau_meas` of a joint replaces the commanded torque, which
+removes the drive from the prediction, and the position `q_link` of a second encoder replaces that of the first, which removes the
+transmission. The arm's parameters are re-estimated each time. With S the signals in use and E_j(S) the RMS error that is left at joint j,
 
     whole gap             E2 = sum_j E_j()^2, nothing replaced
     drive, transmission   what the replacement of the joint's signal takes off sum_j E_j(S)^2, over E2; in turns, always the signal that
@@ -36,18 +36,18 @@ __all__ = ["LEAST_SHARE", "ChainEntry", "drive_chain"]
 Array = NDArray[np.float64]
 
 LEAST_SHARE = 0.05
-"""Share of the gap from which a stage is listed, and a signal used: ideal drives on 12 sets of simulated logs take up to 0.04 by chance."""
+"""Share of the gap from which a stage is listed, and a measured signal used: ideal drives on 12 sets of simulated logs take up to 0.04 by chance."""
 
-# Weight of the sample after an interval in the torque over it: held, straight, and measured where the interval ends.
+# Weight of the sample at the end of an interval in the measured torque over the interval: held, linear, or measured before the new command.
 _HELD, _STRAIGHT, _ENDED = 0.0, 0.5, 1.0
-# A delay below this part of a sample period is none: samples do not tell when between them a measured torque changes.
+# Delay of a drive, in sample periods, below which it counts as none: samples do not show when between them a measured torque changes.
 _AT_ONCE = 0.6
-# A second encoder whose position differs from the first one's by less than this part of the motion tells nothing of a transmission.
+# A second encoder whose position differs from the first encoder's by less than this part of the motion tells nothing of a transmission.
 _APART = 1e-9
 
 
 class ChainValue(TypedDict):
-    """A figure of a stage."""
+    """A parameter of an identified drive: value, standard deviation and unit."""
 
     value: float
     sigma: Annotated[float, "Standard deviation."]
@@ -55,7 +55,7 @@ class ChainValue(TypedDict):
 
 
 class ChainEntry(TypedDict):
-    """A stage of the chain at one joint."""
+    """Share of the gap that arises in one stage of the drive chain at one joint."""
 
     stage: ChainStage
     joint: int
@@ -69,11 +69,11 @@ class ChainEntry(TypedDict):
 
 @dataclass(frozen=True)
 class _Signal:
-    """A signal that can take the place of another one: at the end of the drive or of the transmission of a joint, from 0.
+    """A measured signal that can replace a signal of the model: at the end of the drive or of the transmission of a joint (from 0).
 
-    A measured torque is known at its samples only. From one to the next it may be that of the first, as a command is held, go straight, or be that of
-    the last, as a current is that was measured before the new command: `after` is the weight of the last, 0, 0.5 or 1. A sample period lies
-    between these, which is more than many drives are late.
+    A measured torque is known at its samples only. Over an interval it may be the torque at the start, as a held command, the mean of
+    both ends, or the torque at the end, as a current measured before the new command: `after` is the weight of the end, 0, 0.5 or 1. The
+    choices differ by up to a sample period, which is more than the delay of many drives.
     """
 
     stage: ChainStage
@@ -81,7 +81,7 @@ class _Signal:
     after: float = 0.5
 
     def into(self, log: Log) -> Log:
-        """Return the log with this signal in use."""
+        """Return the log with this measured signal in place of the model's signal."""
         if self.stage == "transmission":
             assert log.q_link is not None
             q = log.q.copy()
@@ -100,7 +100,7 @@ class _Signal:
 
 @dataclass(frozen=True)
 class _Case:
-    """Arm and logs, and what is left of the gap with some signals in use."""
+    """Arm and logs of a drive-chain analysis, with the remaining gap for sets of measured signals."""
 
     arm: Arm
     training: Sequence[Log]
@@ -108,7 +108,7 @@ class _Case:
     horizon: float
 
     def left(self, signals: Sequence[_Signal]) -> Array:
-        """Return squared errors E_j(S)^2, shape (n_joints,)."""
+        """Return the squared errors E_j(S)^2 with the measured signals S in use, shape (n_joints,)."""
         training, holdout = ([_with(log, signals) for log in logs] for logs in (self.training, self.holdout))
         if self.arm.chain is None:
             error = Refit.of(self.arm, training, holdout, self.horizon).error
@@ -117,7 +117,7 @@ class _Case:
         return np.zeros(self.arm.n_joints) if found is None else np.nan_to_num(np.maximum(found.share, 0.0))
 
     def signals(self) -> Iterator[_Signal]:
-        """Return the signals that all logs hold beside what the model is given; none behind position controllers."""
+        """Yield the measured signals that all logs hold besides command and position; none for an arm with a position controller."""
         logs = [*self.training, *self.holdout]
         if not all(log.has_torques for log in logs):
             return
@@ -143,7 +143,7 @@ def _with(log: Log, signals: Sequence[_Signal]) -> Log:
 def drive_chain(
     arm: Arm, training: Sequence[Log], holdout: Sequence[Log], *, horizon: float, floor: Sequence[float]
 ) -> list[ChainEntry]:
-    """Say how much of the gap arises at which stage of the chain from command to measured position.
+    """Return the share of the gap that arises at each stage of the chain from command to measured position.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def drive_chain(
     horizon : float
         Prediction horizon [s].
     floor : sequence of float, shape (n_joints,)
-        RMS errors that the sensors' noise alone leaves on the holdout [rad or m]; not used of serial arms.
+        RMS errors that the sensors' noise alone leaves on the holdout [rad or m]; not used for serial arms.
 
     Returns
     -------
@@ -188,7 +188,7 @@ def drive_chain(
 
 
 def _replaced(case: _Case, signals: Sequence[_Signal]) -> tuple[dict[_Signal, float], Array, float]:
-    """Return what each signal in use takes off the gap, the squared errors that are left, and the whole gap."""
+    """Return the reduction of the gap by each measured signal in use, the remaining squared errors, and the whole gap."""
     left = case.left(())
     whole = max(float(left.sum()), float(np.finfo(float).tiny))
     gains: dict[_Signal, float] = {}
@@ -223,7 +223,7 @@ def _entry(case: _Case, stage: ChainStage, joint: int, share: float, used: bool,
 
 
 def _detail(case: _Case, stage: ChainStage, joint: int, used: bool) -> str:
-    """What a share rests on, in words."""
+    """Return in words the basis on which a stage's share of the gap was computed."""
     what = "predictions" if case.arm.chain is None else "the arm's torques"
     match stage:
         case "drive" if used:
@@ -239,7 +239,7 @@ def _detail(case: _Case, stage: ChainStage, joint: int, used: bool) -> str:
 
 
 def _follows(drive: Drive, case: _Case, rotary: bool) -> str:
-    """The drive in words, with its figures and what they are worth on the holdout."""
+    """Return a drive in words, with its parameters and its accuracy on the holdout."""
     delay, gain, _, _, inertia = drive.values
     apart, left = drive.left(case.holdout)
     worth = 1.0 - (left / apart) ** 2 if apart > 0 else 0.0

@@ -1,4 +1,4 @@
-"""Logs and arm as a diagnosis takes them: read, corrected, repaired, split, cut into stretches, and checked against each other."""
+"""Input of a diagnosis: logs and arm are read, corrected, repaired, split, cut into stretches, and checked against each other."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from armgap.log.stretches import choose
 
 __all__ = ["PreparedInput", "prepare", "refused", "split"]
 
-# Share of every log that is held out where no holdout is given.
+# Share of every log that is held out where no holdout is given, from its end.
 _HELD_OUT = 0.4
 
 
 @dataclass(frozen=True)
 class PreparedInput:
-    """Logs and arm, and what is to be said about them."""
+    """Prepared logs and arm of a diagnosis, with the checks to report."""
 
     training: list[Log]
     holdout: list[Log]
@@ -43,7 +43,7 @@ class PreparedInput:
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def with_factors(self, factors: Mapping[str, float]) -> PreparedInput:
-        """Return the input with other factors on its torque columns than those that it was repaired with."""
+        """Return the prepared input with other factors on its torque columns than those of the repair."""
         by_column = {
             f"tau{j + 1}": self.factors.get(f"tau{j + 1}", self.factors.get("tau", 1.0))
             for j in range(self.arm.n_joints)
@@ -59,7 +59,7 @@ class PreparedInput:
         )
 
     def without_shift(self) -> PreparedInput:
-        """Return the input with torques at the times at which they stand in the file."""
+        """Return the prepared input with torques at their original times, without the repair of a time shift."""
         back = Corrections(shift={"tau": -self.shift})
         return replace(
             self,
@@ -73,20 +73,20 @@ class PreparedInput:
 def prepare(
     logs: Any, holdout: Any, arm: Arm, corrections: Corrections, settings: Mapping[str, Any], *, repair: bool
 ) -> PreparedInput:
-    """Read logs and make them ready for a diagnosis.
+    """Read logs and prepare them for a diagnosis.
 
     Parameters
     ----------
     logs, holdout : Log, path, pattern, table, or sequence of these
-        Training logs, and logs to judge on; without a holdout (None) the last part of every training log is held out.
+        Training logs, and logs on which models are judged; without a holdout (None) the last part of every training log is held out.
     arm : Arm
         Nominal model.
     corrections : Corrections
-        How columns are to be read otherwise than they stand.
+        Corrections of the logs' columns.
     settings : mapping
-        What was asked for, `horizon` [s] among it.
+        Options of the diagnosis, such as `horizon` [s].
     repair : bool
-        Whether defects are repaired that leave nothing to guess.
+        Whether unambiguous defects are repaired.
     """
     read = {"training": _read(logs, arm), "holdout": [] if holdout is None else _read(holdout, arm)}
     asked = {**settings, "repair": repair, "corrections": corrections.to_dict()}
@@ -98,7 +98,7 @@ def prepare(
 def _given(
     logs: Sequence[Log], holdout: Sequence[Log], arm: Arm, corrections: Corrections, *, repair: bool
 ) -> PreparedInput:
-    """Correct and repair the logs, each by itself, and split them where nothing is held out."""
+    """Correct and repair the logs, each by itself, and split training logs where no holdout is given."""
     training, checks = _repaired(logs, arm, corrections, repair=repair)
     arm = corrections.on_arm(arm)
     if not holdout:
@@ -111,7 +111,7 @@ def _given(
 
 
 def _examined(given: PreparedInput, horizon: float, *, repair: bool) -> PreparedInput:
-    """Choose stretches of long logs, and compare logs and arm file with and without each defect."""
+    """Choose stretches of long logs, and check logs and arm file for known defects."""
     training, held = (choose(group, horizon=horizon) for group in (given.training, given.holdout))
     for log in (*training, *held):
         if log.duration < horizon:
@@ -172,7 +172,7 @@ def _read(logs: Any, arm: Arm) -> list[Log]:
 
 
 def refused(message: str, training: list[Log], held: list[Log]) -> LogShapeError:
-    """Name the logs that the core could not work with."""
+    """Return an error that names the logs that the compiled core could not work with."""
     problem, _, remedy = message.partition("; ")
     logs = held if "holdout" in problem else training
     files = ", ".join(dict.fromkeys(str(log.path or log.name) for log in logs))
@@ -180,7 +180,7 @@ def refused(message: str, training: list[Log], held: list[Log]) -> LogShapeError
 
 
 def _tell_apart(training: list[Log], held: list[Log]) -> tuple[list[Log], list[Log]]:
-    """Give logs of the same name their folder's name, then a number."""
+    """Make log names unique: logs of equal name get their folder's name, then a number."""
     logs = [*training, *held]
     for rename in (_with_folder, _with_number):
         names = [log.name for log in logs]
@@ -197,7 +197,7 @@ def _with_number(log: Log, number: int) -> Log:
 
 
 def split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
-    """Return the first parts of logs, to learn from, and the last 40 % of each, to judge on."""
+    """Return the first parts of logs for training, and the last 40 % of each as holdout."""
     training, held = [], []
     for log in logs:
         cut = int(np.searchsorted(log.t, log.t[0] + (1 - _HELD_OUT) * log.duration))

@@ -1,4 +1,4 @@
-"""What a result was made from: hashes of the inputs, options, and the version."""
+"""Provenance of a result: hashes of the inputs, options, and the version."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ __all__ = ["Provenance", "provenance"]
 
 
 class HashedInput(TypedDict):
-    """An input and its hash."""
+    """An input file of a diagnosis and its SHA-256."""
 
     file: Annotated[str | None, "File it was read from; null without one."]
     sha256: Annotated[str, "SHA-256 of the file, or of the text or columns of what came from none."]
 
 
 class HashedLog(HashedInput):
-    """A log and its hash."""
+    """A log of a diagnosis and its SHA-256."""
 
     name: str
     set: Annotated[str, "What it was used for: training or holdout."]
 
 
 class Provenance(TypedDict):
-    """What a result was made from."""
+    """Provenance of a diagnosis: hashes of the inputs, options, and version."""
 
     version: Annotated[str, "Version of this library."]
     options: Annotated[dict[str, Any], "What was asked for."]
@@ -45,13 +45,13 @@ def provenance(arm: Arm, logs: Mapping[str, Sequence[Log]], options: Mapping[str
     Parameters
     ----------
     arm : Arm
-        The nominal model; the hash is that of its file, or of its text as an arm file. A serial arm's is always that of its text, which
-        holds what its file takes from a description.
+        The nominal model, hashed by its file, or by its text as an arm file. A serial arm is always hashed by its text, which
+        includes the robot's description.
     logs : mapping of str to sequence of Log
-        Logs as they were read, by what they are used for. The hash is that of the file, or of the columns of a log that came from
+        Logs as they were read, by their use. A log is hashed by its file, or by its columns if it came from
         no regular file.
     options : mapping
-        What was asked for.
+        Options of the command or function.
     """
     return {
         "version": _native.__version__,

@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 MOST_BYTES = 2**28
-"""Size of a diagnosis' file; the largest hold some MB."""
+"""Largest accepted size of a diagnosis' file, bytes; the largest diagnoses have some MB."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Values:
-    """The same of several joints, in their order."""
+    """Values of one parameter on several joints, in the joints' order, with standard deviations and SI unit."""
 
     value: tuple[float, ...]
     sigma: tuple[float, ...]
@@ -62,7 +62,7 @@ class GapAtHorizon:
 
     @classmethod
     def read(cls, data: dict[str, Any]) -> GapAtHorizon:
-        """Return it from its JSON entries."""
+        """Build the RMS errors at one prediction horizon from their JSON entries."""
         before, refit, after, floor = (tuple(data[key]) for key in ("before", "refit", "after", "floor"))
         return cls(data["horizon_s"], before, refit, after, floor)
 
@@ -74,9 +74,9 @@ class SecondHalves:
     Attributes
     ----------
     after : tuple of float
-        With positions as they were measured [rad or m].
+        Error with positions as they were measured [rad or m].
     with_zeros : tuple of float
-        With the encoder zeros that the first half of each log shows [rad or m].
+        Error with the encoder zeros estimated from the first half of each log [rad or m].
     """
 
     after: tuple[float, ...]
@@ -85,29 +85,29 @@ class SecondHalves:
 
 @dataclass(frozen=True)
 class Gap:
-    """How far predictions miss on the holdout: RMS position error per joint.
+    """Gap on the holdout: RMS error of predicted positions per joint.
 
     Attributes
     ----------
     horizon_s : float
         Prediction horizon [s].
     before, refit, after, floor : tuple of float
-        With the arm file as it is, with its parameters re-estimated, with the named causes added, and what measurement
-        noise alone leaves [rad or m].
+        RMS error with the arm file's parameters, with re-estimated parameters, with the named causes added, and by
+        measurement noise alone [rad or m].
     closed : float
         Share of the gap above the floor that is closed, over all joints.
     closed_ci : tuple of float
-        95 % interval of it, from resampled windows.
+        95 % confidence interval of `closed`, from resampled windows.
     free_run_before, free_run_after : tuple of float
         RMS error over the whole holdout, simulated from its first sample [rad or m].
     horizons : tuple of GapAtHorizon
-        RMS errors at other prediction horizons, as far as the logs are long enough.
+        RMS errors at other prediction horizons, for which the logs are long enough.
     motion : tuple of float
         RMS displacement over the horizon [rad or m].
     unexplained : float
-        Share of the gap above the floor with parameters re-estimated that the named causes leave, from 0 to 1.
+        Share of the gap above the floor, parameters re-estimated, that remains with the named causes, from 0 to 1.
     second_halves : SecondHalves, optional
-        What encoder zeros that differ between recordings make of the gap; none of a single training recording.
+        Gap with encoder zeros re-estimated per recording; None for a single training recording.
     """
 
     horizon_s: float
@@ -127,7 +127,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Location:
-    """Where a part of the gap lies."""
+    """Joint and regime of motion in which a part of the gap lies, with its share."""
 
     joint: int
     share: float
@@ -140,7 +140,7 @@ class Location:
 
 @dataclass(frozen=True)
 class Equivalent:
-    """An effect that these logs do not tell from a named one, and why; `joints` and `row` as in `Cause`."""
+    """An effect that the logs do not distinguish from a named one, and why; `joints` and `row` as in `Cause`."""
 
     effect: str
     joint: int | None
@@ -151,14 +151,14 @@ class Equivalent:
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause, or a candidate, which says `why` it is not named; a push belongs to one log.
+    """A named cause, or a candidate with the reason `why` it is not named; an external disturbance belongs to one log.
 
-    An elastic or slack transmission has `sides`: ``encoder`` and ``friction`` at the ``"motor"`` or the ``"link"``, and whether its ``rotor``
-    ``"rides"`` on the joints before or is ``"geared"``.
+    An elastic or slack transmission has `sides`: ``encoder`` and ``friction`` at the ``"motor"`` or the ``"link"``, and ``rotor``, which
+    ``"rides"`` on the preceding joints or is ``"geared"``.
 
-    The same law on several `joints` at once is one cause: its `joint` is None, its `parameters` are empty, and `values` has one per joint
-    (`by_joint` makes causes of single joints of it). A term that acts on a sum or a difference of two joints' motion has a `row`, their
-    factors.
+    A common law on several `joints` is one cause: `joint` is None, `parameters` are empty, and `values` has one entry per joint
+    (`by_joint` splits it into causes of single joints). A term that acts on a sum or a difference of two joints' motion has the factors of
+    the joints as `row`.
     """
 
     effect: str
@@ -176,7 +176,7 @@ class Cause:
     values: dict[str, Values] = field(default_factory=dict)
 
     def by_joint(self) -> tuple[Cause, ...]:
-        """Return this cause, or one per joint where it has the same law on several."""
+        """Return the cause itself, or one cause per joint where a common law acts on several joints."""
         if not self.joints or self.row:
             return (self,)
         return tuple(
@@ -203,7 +203,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class RuledOut:
-    """A candidate that was looked for and not found: ``absent``, ``not excited`` or ``undecided``; `joints` and `row` as in `Cause`."""
+    """A candidate effect that was not found: ``absent``, ``not excited`` or ``undecided``; `joints` and `row` as in `Cause`."""
 
     effect: str
     joint: int | None
@@ -216,17 +216,17 @@ class RuledOut:
 
 @dataclass(frozen=True)
 class Sanity:
-    """A re-estimated parameter that is not to be believed as it stands.
+    """A warning about an implausible re-estimated parameter of the arm.
 
     Attributes
     ----------
     parameter : str
         Name as in the arm's parameters.
     kind : str
-        ``"sign"``: gravity turned over; ``"sigma"``: more than five of the arm file's standard deviations away; ``"zero"``: friction
-        of the arm file is gone; ``"unmoved"``: it stayed where it began, beside a gap.
+        ``"sign"``: reversed gravity; ``"sigma"``: more than five of the arm file's standard deviations away; ``"zero"``: no friction
+        where the arm file has some; ``"unmoved"``: at its nominal value in spite of a gap.
     message : str
-        The same in words, with the figures.
+        The warning in words, with its figures.
     """
 
     parameter: str
@@ -236,14 +236,14 @@ class Sanity:
 
 @dataclass(frozen=True)
 class DependenceLaw:
-    """A torque as a table over a variable.
+    """Residual torque of a joint as a table over a variable.
 
     Attributes
     ----------
     x : tuple of float
         Mean of the variable in each class, rising.
     torque, sigma : tuple of float
-        Torque there, beside its mean, and its standard deviation [N m or N].
+        Torque in each class less the mean torque, and its standard deviation [N m or N].
     """
 
     x: tuple[float, ...]
@@ -253,7 +253,7 @@ class DependenceLaw:
 
 @dataclass(frozen=True)
 class Dependence:
-    """What the residual torque of a joint depends on that no named effect explains.
+    """Variable on which the part of a joint's residual torque depends that no named effect explains.
 
     Attributes
     ----------
@@ -264,7 +264,7 @@ class Dependence:
     share : float
         Share of the residual torque's variance beyond noise that the law predicts in logs that it was not fitted to, 0 to 1.
     law : DependenceLaw
-        The law. It has no name: another arm, load or motion may have another.
+        Torque over the variable, an unnamed law that may differ for another arm, load or motion.
     """
 
     joint: int
@@ -276,20 +276,20 @@ class Dependence:
 
 @dataclass(frozen=True)
 class ChainPart:
-    """What a stage of the chain from command to measured position adds to the gap at one joint.
+    """Share of the gap at one joint that arises in a stage of the chain from command to measured position.
 
     Attributes
     ----------
     stage : {"drive", "transmission", "mechanics", "sensor"}
-        Between command and measured torque, first and second encoder, measured torque and position, position and sensor.
+        Stage of the chain: between command and measured torque, first and second encoder, measured torque and position, position and sensor.
     joint : int
         Joint, from 1.
     share : float
-        Share of the squared gap with parameters re-estimated, from 0 to 1; see `armgap.diagnosis.drive_chain`.
+        Share of the squared gap, parameters re-estimated, from 0 to 1; see `armgap.diagnosis.drive_chain`.
     parameters : dict
-        Of a drive: ``delay``, ``gain``, ``offset``, ``viscous`` and ``inertia``, see `armgap.diagnosis.drive`.
+        Parameters of a drive: ``delay``, ``gain``, ``offset``, ``viscous`` and ``inertia``, see `armgap.diagnosis.drive`.
     detail : str
-        The same in words, with the figures.
+        The share and its basis in words, with figures.
     """
 
     stage: ChainStage
@@ -312,28 +312,28 @@ class Diagnosis(NotebookDisplay):
         ``"none"``: the gap is within noise; ``"parameters"``: right structure, wrong values; ``"effect"``: causes
         named; ``"unexplained"``: a gap that no effect in the library explains; ``"input"``: logs and arm file contradict each other.
     gap : Gap
-        How far.
+        RMS prediction errors on the holdout, before and after.
     where : tuple of Location
-        Where, most of the gap first.
+        Joints and regimes where the gap lies, the largest share first.
     causes : tuple of Cause
-        Which, strongest first.
+        Named causes, strongest first.
     ruled_out : tuple of RuledOut
-        What was looked for and not found.
+        Candidate effects that were not found.
     parameters : dict
         ``nominal``, ``refit`` and ``with_causes``: name to `Value`.
     checks : tuple of Check
-        What was noticed about the input, errors first.
+        Defects of the input, errors first.
     candidates : tuple of Cause
-        What was found and is not fit to be named, each with its `why`; not part of the model with causes.
+        Effects found but not named, each with its reason `why`; not part of the model with causes.
     sanity : tuple of Sanity
-        Re-estimated parameters of the model with causes that are not to be believed as they stand.
+        Re-estimated parameters of the model with causes that are implausible.
     unnamed : tuple of Dependence
-        What the residual torque that stays depends on, strongest first; empty where the rest is within noise.
+        Dependences of the remaining residual torque, strongest first; empty where it is within noise.
     chain : tuple of ChainPart
-        How much of the gap arises between command and position at which stage, largest share first; empty where the logs hold neither measured
+        Share of the gap at each stage between command and position, largest share first; empty where the logs hold neither measured
         torques nor second encoders.
     extra : dict
-        What a report draws besides: curves, ranking, options.
+        Further data for reports: curves, ranking, options.
     """
 
     verdict: Verdict
@@ -396,7 +396,7 @@ class Diagnosis(NotebookDisplay):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object, schema ``armgap.diagnosis/1``."""
+        """Return the diagnosis as a JSON object, schema ``armgap.diagnosis/1``."""
         return self._data
 
     def to_json(self, indent: int | None = None) -> str:
@@ -405,7 +405,7 @@ class Diagnosis(NotebookDisplay):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader should know: notes on the diagnosis, and what was noticed in the logs, one line per kind."""
+        """Remarks for a reader of the diagnosis: its notes, and findings in the logs, one line per kind."""
         return (*self.extra.get("notes", ()), *remarks(self.extra.get("log_findings", ())))
 
     def summary(self) -> str:
@@ -417,7 +417,7 @@ class Diagnosis(NotebookDisplay):
 
 
 def _take(kind: type[_Record], data: dict[str, Any]) -> _Record:
-    """Build a record from the entries it knows."""
+    """Build a record from those entries of a JSON object that the record's type has."""
     return kind(**{f.name: data[f.name] for f in fields(kind) if f.name in data})
 
 
@@ -430,7 +430,7 @@ def _location(data: dict[str, Any]) -> Location:
 
 
 def _several(data: dict[str, Any]) -> dict[str, Any]:
-    """Joints and row of what is on several joints."""
+    """Return the entries `joints` and `row` of a JSON object, for an effect on several joints."""
     return {key: tuple(data[key]) for key in ("joints", "row") if data.get(key)}
 
 

@@ -1,4 +1,4 @@
-"""The JSON Schema of a diagnosis, from the types that it is written from: the core's, and those of what is added on this side."""
+"""JSON Schema of a diagnosis, made from the types that the diagnosis is written from, in the compiled core and in Python."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""Parameters from logs, without a diagnosis.
+"""Estimation of an arm's parameters from logs, without a diagnosis.
 
 ================  ==================================================================
 file              what
 ================  ==================================================================
-`base_columns`    sums of a serial arm's parameters that motion determines
-`estimator`       sample by sample, as a controller would
-`identification`  from whole logs by least squares, scheme by scheme
-`fitting`         by output error
+`base_columns`    combinations of a serial arm's parameters that motion determines
+`estimator`       online estimation, sample by sample
+`identification`  recursive least squares over whole logs, by three schemes
+`fitting`         output error
 ================  ==================================================================
 """

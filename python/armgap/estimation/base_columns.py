@@ -13,31 +13,31 @@ from armgap.errors import OptionError
 
 __all__ = ["BaseParameters", "base_parameters"]
 
-#: Parameters of a link and its joint: ten inertial numbers, rotor inertia, viscous and Coulomb friction.
+#: Number of parameters of a link and its joint: ten inertial parameters, rotor inertia, viscous and Coulomb friction.
 PER_JOINT = 13
-# Digits of the factors in texts, and the share of the largest factor below which one is left out of them.
+# Digits of the factors in texts of base parameters, and the share of the largest factor below which a factor is left out.
 DIGITS, LEAST = 4, 1e-4
 
 
 @dataclass(frozen=True)
 class BaseParameters:
-    """Independent parameters of a serial arm, and what the others add to them.
+    """Base parameters of a serial arm: independent parameters, each with the dependent ones that it combines with.
 
-    With independent columns `Y_b` of the regressor, `Y theta = Y_b (theta_b + K theta_d)`: motion determines the sum in brackets, never its
-    parts.
+    With independent columns `Y_b` of the regressor, `Y theta = Y_b (theta_b + K theta_d)`: motion determines only the sum in brackets,
+    not its terms.
 
     Attributes
     ----------
     names, units : tuple of str
         Names of the independent parameters and their SI units, n_base of each.
     columns : tuple of int
-        Their indices, from 0, into the arm's parameters; a constant torque of joint j is 13 n_joints + j.
+        Indices, from 0, of the independent parameters among the arm's parameters; a constant torque of joint j is 13 n_joints + j.
     dependent_names : tuple of str
-        Names of the parameters that are part of combinations only, or do not show at all.
+        Names of the parameters that act only in combinations, or not at all.
     dependent : tuple of int
-        Their indices.
+        Indices of the dependent parameters.
     combination : ndarray, shape (n_base, n_dependent)
-        `K`: what one unit of a dependent parameter adds to each base parameter.
+        Matrix `K`: derivative of each base parameter by each dependent parameter.
     fixed : tuple of str
         Names of the parameters that keep the arm's value and are not estimated.
     """
@@ -51,12 +51,12 @@ class BaseParameters:
     fixed: tuple[str, ...] = ()
 
     def of(self, theta: ArrayLike) -> NDArray[np.float64]:
-        """Return the base parameters of an arm with these parameters.
+        """Return the values of the base parameters for given parameters of the arm.
 
         Parameters
         ----------
         theta : array_like, shape (13 n_joints,) or (14 n_joints,)
-            Parameters as in `Arm.theta`; constant torques of the joints after them, zero by default.
+            Parameters as in `Arm.theta`; followed by constant torques of the joints, zero by default.
 
         Returns
         -------
@@ -67,7 +67,7 @@ class BaseParameters:
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """Each combination as text, for example ``izz1 + iyy2 + 0.25 mass3``."""
+        """Combinations of parameters as texts, one per base parameter, for example ``izz1 + iyy2 + 0.25 mass3``."""
         return tuple(
             _sum(name, self.dependent_names, row) for name, row in zip(self.names, self.combination, strict=True)
         )
@@ -85,22 +85,22 @@ def _sum(first: str, names: tuple[str, ...], factors: NDArray[np.float64]) -> st
 def base_parameters(arm: Arm, *, fixed: Iterable[str] = (), asymmetry: bool = False) -> BaseParameters:
     """Find the base parameters of a serial arm.
 
-    Columns of the torques' regressor over random states are taken from the base outwards, and are dependent if less than 1e-4 of their
-    length is independent of those before (QR): right angles typed with four decimals leave less, a millimetre of geometry more.
+    Columns of the torques' regressor over random states are taken from the base outwards; a column is dependent if less than 1e-4 of its
+    length is independent of the columns before it (QR): right angles typed with four decimals leave less, a millimetre of geometry more.
 
     Parameters
     ----------
     arm : Arm
-        The arm; of its values none is used.
+        Serial arm; only its chain is used.
     fixed : iterable of str, optional
-        Parameters that are not estimated, by name (``"mass7"``) or, for all joints, by its beginning (``"rotor"``).
+        Parameters that are not estimated, by name (``"mass7"``) or, for all joints, by the beginning of the name (``"rotor"``).
     asymmetry : bool, default False
         Add one constant torque per joint.
 
     Raises
     ------
     OptionError
-        If the arm is not serial, or a name is none of its parameters.
+        If the arm is not serial, or has no parameter of a name in `fixed`.
 
     References
     ----------
@@ -131,7 +131,7 @@ def base_parameters(arm: Arm, *, fixed: Iterable[str] = (), asymmetry: bool = Fa
 
 
 def _indices(fixed: tuple[str, ...], names: tuple[str, ...]) -> set[int]:
-    """Indices of parameters by name, or by what their names begin with."""
+    """Return the indices of parameters given by name, or by the beginning of their names."""
     found: set[int] = set()
     for name in fixed:
         mine = {i for i, known in enumerate(names) if name in (known, known.rstrip("0123456789"))}

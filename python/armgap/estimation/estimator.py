@@ -18,23 +18,23 @@ from armgap.literals import FILTERS, SCHEMES, SERIAL, Filters, Scheme
 __all__ = ["OUTCOMES", "Estimator", "Run"]
 
 OUTCOMES: tuple[str, ...] = ("updated", "starting", "rejected")
-"""What can become of a sample."""
+"""Outcomes of a sample given to the online estimator."""
 
 _FORMS = ("plain", "factorized")
 
 
 @dataclass(frozen=True)
 class Run:
-    """What `Estimator.run` returns.
+    """Results of the online estimator over many samples, as `Estimator.run` returns them.
 
     Attributes
     ----------
     theta : ndarray, shape (n_samples, n_parameters)
         Estimate after each sample.
     errors : ndarray, shape (n_samples, n_joints) or (n_samples, 1)
-        Prediction errors of each sample; NaN where it was not used.
+        Prediction errors of each sample; NaN for a sample that was not used.
     outcome : ndarray of uint8, shape (n_samples,)
-        What became of each sample, as an index into `OUTCOMES`.
+        Outcome of each sample, as an index into `OUTCOMES`.
     """
 
     theta: NDArray[np.float64]
@@ -45,7 +45,7 @@ class Run:
 class Estimator:
     """Recursive estimation of an arm's parameters, as a controller runs it.
 
-    It runs the compiled code of the C library, allocates nothing per sample and gives the same numbers.
+    The estimator runs the compiled code of the C library, allocates nothing per sample and gives equal numbers.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ class Estimator:
         The arm, or its kind: ``"axis"``, ``"pendulum"`` or ``"two-link"``. Of an arm only the kind is used; of a serial arm its chain, and
         the values of fixed parameters. The base parameters of a serial arm are estimated, see `base_parameters`.
     scheme : {"filtered-power", "filtered-dynamic", "supplied-energy"}
-        Regression model: equations (30), (24) and (28) of the paper.
+        Regression model: equations (30), (24) and (28) of Reyes and Kelly (1997).
     filters : {"exact", "paper"}
-        Consistent filters, or the paper's as printed.
+        Consistent filters, or those of the paper as printed.
     cutoff : float, default 50
         Cut-off of the filters [rad/s], in (0, 1e6].
     forgetting : float, default 1
-        Forgetting factor in (0, 1]. Forgetting lifts no variance above its start, so a resting arm does no harm.
+        Forgetting factor in (0, 1]. Forgetting raises no variance above its initial value, so a resting arm does no harm.
     p0 : float, default 1000
         ``P(0) = p0 I``, in (0, 1e12].
     theta0 : array_like, shape (n_parameters,), optional
@@ -67,9 +67,9 @@ class Estimator:
     asymmetry : bool, default False
         Estimate a constant resisting torque per joint too.
     fixed : iterable of str, optional
-        Parameters of a serial arm that keep the arm's value, by name (``"mass7"``) or, for all joints, by its beginning (``"rotor"``).
+        Parameters of a serial arm that keep the arm's value, by name (``"mass7"``) or, for all joints, by the beginning of the name (``"rotor"``).
     form : {"plain", "factorized"}, optional
-        How the covariance is kept: equation (21) as printed, or U D U'. By default plain in double precision with `p0` up to 1e6, factorized
+        Form of the covariance: equation (21) as printed, or U D U'. By default plain in double precision with `p0` up to 1e6, factorized
         otherwise.
     single : bool, default False
         Compute in single precision, as on a controller without a unit for doubles.
@@ -163,13 +163,13 @@ class Estimator:
             raise OptionError(str(error), remedy="see help(armgap.Estimator) for ranges") from None
 
     def _known(self, arm: Arm) -> list[float]:
-        """Values of fixed parameters, zero for dependent ones, which are part of combinations."""
+        """Return the values of fixed parameters, and zero for dependent parameters, which are estimated as part of combinations."""
         dependent = () if self._base is None else self._base.dependent
         return [0.0 if i in dependent else float(value) for i, value in enumerate(arm.theta)]
 
     @property
     def base(self) -> BaseParameters | None:
-        """What the entries of `theta` stand for, of a serial arm."""
+        """Base parameters that the entries of `theta` stand for, for a serial arm; else None."""
         return self._base
 
     @property
@@ -184,12 +184,12 @@ class Estimator:
 
     @property
     def theta(self) -> NDArray[np.float64]:
-        """Estimate, shape (n_parameters,)."""
+        """Estimated parameters [SI], shape (n_parameters,)."""
         return self._native.theta
 
     @property
     def sigma(self) -> NDArray[np.float64]:
-        """Standard deviations of the estimate, as if errors were white, shape (n_parameters,)."""
+        """Standard deviations of the estimated parameters, as if prediction errors were white, shape (n_parameters,)."""
         return self._native.sigma
 
     @property
@@ -199,27 +199,27 @@ class Estimator:
 
     @property
     def errors(self) -> NDArray[np.float64]:
-        """Prediction errors of the last sample that was used, one per joint or one."""
+        """Prediction errors of the last used sample [N m, W or J], one per joint or a single one."""
         return self._native.errors
 
     @property
     def excitation(self) -> float:
-        """Near 1 while the motion excites every parameter, near 0 while it teaches nothing new."""
+        """Excitation by the recent motion, from 0 (it determines no parameter further) to 1 (it determines every parameter)."""
         return self._native.signals[0]
 
     @property
     def alarm(self) -> float:
-        """Sum of the alarm as a share of its limit: above 1 the model no longer explains the arm."""
+        """Sum of the alarm's test of prediction errors as a share of its limit: above 1 the model no longer explains the arm."""
         return self._native.signals[1]
 
     @property
     def updates(self) -> int:
-        """Samples used."""
+        """Number of samples used by the estimator."""
         return self._native.counts[0]
 
     @property
     def rejected(self) -> int:
-        """Samples rejected: not finite, of impossible size, not later than the last one, or unusable by least squares."""
+        """Number of rejected samples: not finite, of impossible size, not later than the previous one, or unusable by least squares."""
         return self._native.counts[1]
 
     def update(
@@ -231,18 +231,18 @@ class Estimator:
         t: float | None = None,
         h: float | None = None,
     ) -> str:
-        """Take one sample.
+        """Update the estimate with one sample.
 
         Parameters
         ----------
         q : array_like, shape (n_joints,)
-            Positions.
+            Positions [rad or m].
         tau : array_like, shape (n_joints,)
-            Torques that act until the next sample.
+            Torques that act until the next sample [N m or N].
         dq : array_like, shape (n_joints,), optional
-            Velocities; whether they are given is settled by the first sample.
+            Velocities [rad/s or m/s]; given with every sample or with none.
         t, h : float
-            Time [s], or period since the last sample [s]: one of them.
+            Time [s], or period since the last sample [s]; give one of the two.
 
         Returns
         -------
@@ -252,7 +252,7 @@ class Estimator:
         Raises
         ------
         OptionError
-            If an array has another shape, or neither or both of `t` and `h` are given.
+            If an array has a wrong shape, or neither or both of `t` and `h` are given.
         """
         if (t is None) == (h is None):
             raise OptionError("a sample needs its time or its period", remedy="give `t` or `h`")
@@ -271,7 +271,7 @@ class Estimator:
         t: ArrayLike | None = None,
         h: ArrayLike | None = None,
     ) -> Run:
-        """Take many samples; other threads go on meanwhile, and contiguous float64 arrays are not copied.
+        """Update the estimate with many samples; the interpreter lock is released, and contiguous float64 arrays are not copied.
 
         Parameters
         ----------
@@ -280,7 +280,7 @@ class Estimator:
         dq : array_like, shape (n_samples, n_joints), optional
             Velocities.
         t, h : array_like, shape (n_samples,)
-            Times [s], or periods since the sample before [s] (one number stands for all): one of them.
+            Times [s], or periods since the sample before [s] (or one number for all samples); give one of the two.
 
         Returns
         -------

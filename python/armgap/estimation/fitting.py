@@ -1,4 +1,4 @@
-"""All parameters of an arm from one log by output error, with exact dry friction."""
+"""Estimation of all parameters of an arm from one log by output error, with exact dry friction."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ class ArmFit:
     Attributes
     ----------
     log : str
-        What was fitted.
+        Name of the log.
     parameter_names, parameter_units : tuple of str
         Names and SI units of the entries of `theta`.
     theta : ndarray, shape (n_parameters,)
-        Parameters at the minimum.
+        Parameters at the minimum [SI].
     sigma : ndarray, shape (n_parameters,)
-        Standard deviations, as if the differences were white and the windows' first states exact.
+        Standard deviations, as if output errors were white and the windows' initial states exact.
     rms : float
         RMS difference between measured and predicted positions, all joints together [rad or m].
     iterations : int
-        Steps taken.
+        Number of Gauss-Newton steps.
     settled : bool
-        Whether the last step changed nothing any more.
+        Whether the iteration converged.
     """
 
     log: str
@@ -48,7 +48,7 @@ class ArmFit:
     settled: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the result, ready for JSON."""
+        """Return the result of the fit as a dict ready for JSON."""
         rows = zip(self.parameter_names, self.theta, self.sigma, self.parameter_units, strict=True)
         return {
             "log": self.log,
@@ -62,18 +62,18 @@ class ArmFit:
 def fit(log: Log, arm: Arm, *, horizon: float = 0.25) -> ArmFit:
     """Fit all parameters of an arm to a log by output error.
 
-    The log is cut into windows, each of which is simulated from its measured first state under the logged torque; the squared differences
-    of positions are minimised by Gauss-Newton steps from the arm's own values. The model has no effects beyond the arm's own: where
-    something is missing, `diagnose` says what.
+    The log is cut into windows, each of which is simulated from its measured initial state under the logged torque; the squared differences
+    of positions are minimised by Gauss-Newton steps from the arm's own values. The model is that of the arm file without
+    effects; `diagnose` finds missing effects.
 
     Parameters
     ----------
     log : Log
-        The log.
+        Log to fit.
     arm : Arm
-        The arm; its values are where the search starts.
+        Arm; its parameters are the initial values.
     horizon : float, default 0.25
-        Length of a window [s]. Longer windows are more sensitive to the parameters and less to first states.
+        Length of a window [s]. Longer windows are more sensitive to the parameters and less to initial states.
 
     Returns
     -------

@@ -21,8 +21,8 @@ from armgap.progress import report_progress
 
 __all__ = ["SCHEMES", "Identification", "identify", "velocity"]
 
-# An estimate depends on the cut-off when halving it moves the estimate by more than both: on noise-free and encoder-noise runs of the
-# right model the movement stays below 3 sigma or 1 %, on the real arm of docs/real-arm.md it is 10 to 30 sigma and 15 to 35 %.
+# A parameter estimate depends on the filters' cut-off if halving the cut-off moves it by more than both thresholds: on noise-free and encoder-noise
+# runs of the right model the movement stays below 3 sigma or 1 %, on the real arm of docs/real-arm.md it is 10 to 30 sigma and 15 to 35 %.
 DRIFT_SIGMAS = 5.0
 DRIFT_SHARE = 0.02
 
@@ -34,7 +34,7 @@ class Identification:
     Attributes
     ----------
     log, scheme, filters, velocity : str
-        What was identified, and how.
+        Name of the log, regression model, filters, and source of velocities.
     cutoff : float
         Cut-off of the filters [rad/s].
     parameter_names, parameter_units : tuple of str
@@ -42,11 +42,11 @@ class Identification:
     theta : ndarray, shape (n_parameters,)
         Estimate after the last sample.
     sigma : ndarray, shape (n_parameters,)
-        Standard deviations, from the last covariance and the prediction errors of the second half of the log, as if those were white.
+        Standard deviations, from the last covariance and the prediction errors of the second half of the log, as if these were white.
     nominal : ndarray, shape (n_parameters,)
-        The arm's values of the same parameters; NaN where it has none.
+        The arm file's values of the parameters in `theta`; NaN for a parameter that it lacks.
     base : BaseParameters, optional
-        Of a serial arm, which sums of its parameters the entries of `theta` stand for.
+        Base parameters that the entries of `theta` stand for, for a serial arm.
     t : ndarray, shape (n_samples,)
         Sample times [s].
     history : ndarray, shape (n_samples, n_parameters)
@@ -54,7 +54,7 @@ class Identification:
     errors : ndarray, shape (n_samples, n_joints) or (n_samples, 1)
         Prediction errors; NaN before the first regression.
     cutoff_drift : ndarray, shape (n_parameters,), or None
-        Estimate at this cut-off less the estimate at half of it. In the right model and with good velocities it is of the size of
+        Estimate at this cut-off less the estimate at half of it. With a right model and good velocities the difference is of the size of
         `sigma`; None for the supplied energy, which has no cut-off.
     updates, rejected : int
         Samples used, and samples rejected because they were not finite.
@@ -80,7 +80,7 @@ class Identification:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What to know before using the estimates; empty when nothing was noticed."""
+        """Remarks on the quality of the estimates; empty if none applies."""
         if self.cutoff_drift is None:
             return ()
         moved = np.abs(self.cutoff_drift)
@@ -94,7 +94,7 @@ class Identification:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the result without its time series, ready for JSON."""
+        """Return the identification as a dict ready for JSON, without time series."""
         parameters: dict[str, dict[str, Any]] = {
             name: {"value": float(v), "sigma": float(s), "unit": unit}
             for name, v, s, unit in zip(self.parameter_names, self.theta, self.sigma, self.parameter_units, strict=True)
@@ -117,7 +117,7 @@ class Identification:
         }
 
     def to_json(self, indent: int | None = None) -> str:
-        """Return the result without its time series as JSON."""
+        """Return the identification as JSON, without time series."""
         return json.dumps(self.to_dict(), indent=indent)
 
 
@@ -127,16 +127,16 @@ def velocity(
     method: Literal["backward", "central", "local-cubic"] = "local-cubic",
     half_width: int = 3,
 ) -> NDArray[np.float64]:
-    """Velocities from positions.
+    """Return velocities computed from positions.
 
     Parameters
     ----------
     t : array_like, shape (n_samples,)
         Sample times [s], evenly spaced or not.
     q : array_like, shape (n_samples, n_joints)
-        Positions.
+        Positions [rad or m].
     method : str
-        ``"backward"``: the mean velocity of the period before, as in the paper, so half a period late; zero at the first sample.
+        ``"backward"``: the mean velocity of the preceding period, as in Reyes and Kelly (1997), so half a period late; zero at the first sample.
         ``"central"``: the slope of the parabola through a sample and its neighbours.
         ``"local-cubic"``: local cubic least squares over ``2 half_width + 1`` samples.
     half_width : int, default 3
@@ -178,12 +178,12 @@ def identify(
     Parameters
     ----------
     log : Log
-        The log.
+        Log of the arm.
     arm : Arm
-        The arm; its values are not used but those of fixed parameters. Of a serial arm base parameters are estimated: sums of the arm's
+        Arm; only values of fixed parameters are used. For a serial arm base parameters are estimated: combinations of the arm's
         parameters, see `base_parameters`.
     scheme : {"filtered-power", "filtered-dynamic", "supplied-energy"}
-        Regression model: equations (30), (24) and (28) of the paper.
+        Regression model: equations (30), (24) and (28) of Reyes and Kelly (1997).
     filters : {"exact", "paper"}
         Consistent filters, or the paper's as printed.
     cutoff : float, default 50
@@ -197,10 +197,10 @@ def identify(
     asymmetry : bool, default False
         Estimate a constant resisting torque per joint too, which is what Coulomb friction of different levels adds in motion.
     fixed : iterable of str, optional
-        Parameters of a serial arm that keep the arm's value, by name (``"mass7"``) or, for all joints, by its beginning (``"rotor"``).
+        Parameters of a serial arm that keep the arm's value, by name (``"mass7"``) or, for all joints, by the beginning of the name (``"rotor"``).
     velocity : {"backward", "central", "local-cubic", "sensor", "midpoint"}, optional
-        Where velocities come from. ``"midpoint"`` takes the difference of two positions as the velocity half-way between them and aligns
-        everything else with that, as the online estimator does. By default backward for the paper's filters, central for the exact ones.
+        Source of the velocities. ``"midpoint"`` takes the difference of two positions as the velocity half-way between them and aligns
+        all other terms with that time, as the online estimator does. By default backward for the paper's filters, central for the exact ones.
 
     Returns
     -------
@@ -272,7 +272,7 @@ def identify(
 
 
 def _sigma(errors: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard deviations, with the errors of the second half as if those were white."""
+    """Return standard deviations of estimates, with prediction errors of the second half of the log taken as white."""
     late = errors[len(errors) // 2 :]
     spread = float(np.nanmean(late**2)) if np.isfinite(late).any() else 0.0
     return np.asarray(np.sqrt(spread * np.maximum(np.diag(covariance), 0.0)))

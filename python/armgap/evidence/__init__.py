@@ -1,4 +1,4 @@
-"""What speaks for a result besides its figures: laws drawn through data, and whether values are physically possible."""
+"""Evidence for a diagnosis: residual torques drawn over a cause's variable, and checks that parameters are physically possible."""
 
 from armgap.evidence.consistency import consistency
 from armgap.evidence.laws import laws

@@ -1,4 +1,4 @@
-"""Whether the estimated links of a serial arm are such as a body can have."""
+"""Physical consistency of the estimated links of a serial arm."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from armgap.evidence.plausibility import Plausibility
 
 __all__ = ["consistency"]
 
-#: Inertial numbers of a link: mass, first moments, inertia about the joint's frame.
+#: Number of inertial parameters of a link: mass, first moments, inertia about the joint's frame.
 _NUMBERS = 10
 
 
 def consistency(data: dict[str, Any], arm: Arm) -> list[Plausibility]:
-    """Return what makes the links of a serial arm's model with causes physically possible or not.
+    """Return for each link of a serial arm's model with causes whether it is physically possible.
 
-    A link's ten numbers are estimated one by one, as motion tells only sums of them; where the nominal values hold the rest, a single link may
-    come out with a mass or inertia that no body has although the arm's torques are right.
+    Motion determines only combinations of the links' inertial parameters; the rest comes from the nominal values. So a single link may
+    get an impossible mass or inertia although the arm's torques are right.
 
     Parameters
     ----------
     data : dict
-        JSON object of the diagnosis.
+        Diagnosis as a JSON object.
     arm : Arm
         Nominal model, of kind ``"serial"``.
 

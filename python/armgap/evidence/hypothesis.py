@@ -1,4 +1,4 @@
-"""A fitted model as the compiled simulator takes it: parameters, effects, friction smoothing."""
+"""A fitted model of an arm as input of the compiled simulator: parameters, effects, friction smoothing."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 TOLERANCE = 3e-6
 #: Effects that change the inertia matrix.
 ON_INERTIA = ("rotor_inertia", "rotor_coupling", "payload")
-#: Points of the table that turns measured positions into true ones.
+#: Number of points of the lookup table from measured to true positions of an encoder.
 TABLE = 4001
 
 
@@ -37,12 +37,12 @@ class EffectInstance(NamedTuple):
     log: str | None = None
 
     def on(self, joint: int | None) -> tuple[str, int | None, dict[str, float]]:
-        """The effect as the compiled simulator takes it, on some joint."""
+        """Return name, joint and values of the effect as the compiled simulator reads them, on a given joint."""
         return self.effect, joint, self.parameters
 
 
 def at_motor(sides: dict[str, str] | None) -> dict[str, float]:
-    """Return where encoder and friction sit, and how the rotor moves (`sides` of a cause), as the compiled simulator takes it."""
+    """Return `sides` of a cause as numbers for the compiled simulator: places of encoder and friction, and motion of the rotor."""
     if sides is None:
         return {}
     found = {f"{what}_at_motor": float(sides[what] == "motor") for what in ("encoder", "friction")}
@@ -51,12 +51,12 @@ def at_motor(sides: dict[str, str] | None) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A model of an arm.
+    """A model of an arm: base parameters, effects and smoothed friction.
 
     Attributes
     ----------
     arm : Arm
-        Kind, gravity and lengths.
+        Arm that gives kind, gravity and link lengths.
     theta : tuple of float
         Parameters [SI].
     effects : tuple of EffectInstance
@@ -73,7 +73,7 @@ class Hypothesis:
 
     @classmethod
     def of(cls, data: dict[str, Any], arm: Arm) -> Hypothesis:
-        """Return the model with causes of a diagnosis."""
+        """Return the model with causes from a diagnosis' JSON object."""
         found = data["parameters"]["with_causes"]
         effects = tuple(
             EffectInstance(
@@ -90,11 +90,11 @@ class Hypothesis:
         return cls(arm, tuple(float(found[name]["value"]) for name in arm.parameter_names), effects, smoothing)
 
     def only(self, effects: Sequence[EffectInstance]) -> Hypothesis:
-        """Return the same model with other effects."""
+        """Return the model with other effects in place of its own."""
         return replace(self, effects=tuple(effects))
 
     def run(self, t: Array, tau: Array, q0: Array, dq0: Array) -> tuple[Array, Array]:
-        """Positions and velocities under held torques, each of shape (n_samples, n_joints).
+        """Return positions [rad or m] and velocities under held torques, shape (n_samples, n_joints) each.
 
         Raises
         ------
@@ -110,7 +110,7 @@ class Hypothesis:
         )
 
     def inertia(self, q: Array) -> Array:
-        """Inertia matrices at poses `q` of shape (n_poses, n_joints): shape (n_poses, n_joints, n_joints).
+        """Return inertia matrices at poses `q`, shape (n_poses, n_joints), as an array of shape (n_poses, n_joints, n_joints).
 
         Raises
         ------
@@ -124,7 +124,7 @@ class Hypothesis:
 
 
 def delivered(t: Array, tau: Array, effects: Sequence[EffectInstance]) -> Array:
-    """Torque at the joints when effects act on the command, mean of each sample; shape of `tau`.
+    """Return the mean torque at the joints in each sample interval, with effects on the command; shape of `tau`.
 
     Each joint's command drives a unit mass that has these effects and no others: its acceleration is the torque.
     """
@@ -139,9 +139,9 @@ def delivered(t: Array, tau: Array, effects: Sequence[EffectInstance]) -> Array:
 
 
 def true_positions(q: Array, effects: Sequence[EffectInstance]) -> Array:
-    """Positions behind measured ones when effects act on the encoders; shape of `q`.
+    """Return true positions for measured positions `q` with effects on the encoders; shape of `q`.
 
-    A free unit inertia sweeps the range at constant speed; what its encoder shows is the table to look up.
+    A free unit inertia is simulated over the range at constant speed; its encoder readings are the lookup table.
     """
     found = np.array(q, dtype=np.float64)
     for joint in {e.joint for e in effects if e.joint is not None}:

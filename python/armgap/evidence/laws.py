@@ -1,4 +1,4 @@
-"""A cause against its own variable: the residual torque of the model without it, and the fitted law through it.
+"""Evidence for a cause: residual torque of the model without the cause over the cause's variable, with the fitted law.
 
 Short windows of the held-out logs are predicted twice under the logged torque, without the cause and with it. The second
 derivative of "measured minus predicted without" times the inertia matrix is the residual torque of the model without the
@@ -24,17 +24,17 @@ from armgap.log.log import Log
 
 __all__ = ["laws"]
 
-#: Windows looked at, over all logs.
+#: Windows that evidence is taken from at most, over all logs.
 _WINDOWS = 160
-#: Half width of the cubic whose curvature is taken: samples at least, and s at least.
+#: Half width of the local cubic that gives second derivatives: samples at least, and s at least.
 HALF_SAMPLES, HALF_S = 8, 0.016
-#: Ranges of the variable, samples in each at least, samples altogether at least, and points drawn.
+#: Ranges of the variable that evidence is averaged over, samples in each at least, samples altogether at least, and points drawn at most.
 BINS, FEWEST, _ENOUGH, POINTS = 24, 4, 40, 400
-#: A joint slower than this part of its fast motion is taken to be at rest, where dry friction hides every torque.
+#: A joint slower than this part of its fast motion counts as at rest, where dry friction hides every torque.
 _REST = 0.01
-#: An event is looked at for so many times its duration before and after it, and its duration taken for so many s at least.
+#: Evidence for an event is taken from so many of its durations before and after it, with a duration of so many s at least.
 EVENT, EVENT_S = 4.0, 0.1
-#: Two-sided 95 % of the normal distribution.
+#: Two-sided 95 % quantile of the normal distribution, in standard deviations.
 NORMAL_95 = 1.96
 
 ON_COMMAND = ("actuator_lag", "actuator_delay", "torque_saturation", "torque_dead_zone", "torque_gain")
@@ -42,14 +42,14 @@ ON_ENCODER = ("encoder_offset", "encoder_eccentricity")
 
 
 class LawPoints(TypedDict):
-    """Samples, a few hundred at most."""
+    """Residual torque of samples over the variable of a cause, a few hundred samples at most."""
 
     x: Annotated[list[float], "Variable of the law."]
     y: Annotated[list[float], "Residual torque of the model without the cause."]
 
 
 class LawBins(TypedDict):
-    """Means over ranges of the variable."""
+    """Means of residual torque and law over ranges of a cause's variable."""
 
     x: Annotated[list[float], "Variable of the law."]
     mean: Annotated[list[float], "Residual torque of the model without the cause."]
@@ -58,7 +58,7 @@ class LawBins(TypedDict):
 
 
 class Law(TypedDict):
-    """A cause's law and the data it is drawn through; these only where enough samples remain."""
+    """Fitted law of a cause and the residual torques that support it; samples and means only if there are enough samples."""
 
     effect: str
     joint: Annotated[int | None, "1-based joint; null for the whole arm."]
@@ -94,9 +94,9 @@ class EvidenceSamples:
 
 @dataclass(frozen=True)
 class Variable:
-    """What a cause depends on: its name with a place for the joint, unit of a rotary and of a linear joint, and value.
+    """Variable that a cause's torque depends on: name with a placeholder for the joint, unit for a rotary and a linear joint, and value.
 
-    `folded` causes change sign with the direction of motion; their torque is drawn along it.
+    The torque of `folded` causes changes sign with the direction of motion; it is drawn as a torque along the motion.
     """
 
     name: str
@@ -137,20 +137,20 @@ VARIABLES = {
     "contact": _POSITION,
     "rotor_inertia": Variable("ddq{}", ("rad/s^2", "m/s^2"), lambda x, j, p: x.ddq[:, j]),
 }
-"""The variable of each effect; others are drawn over the torque that their own law adds."""
+"""Variable over which evidence of each effect is drawn; effects not listed are drawn over the torque that their law adds."""
 
 
 def laws(data: dict[str, Any], arm: Arm, training: Sequence[Log], held: Sequence[Log]) -> list[Law]:
-    """Return, for each cause of a diagnosis, its law and the data it is drawn through.
+    """Return, for each cause of a diagnosis, its fitted law and the residual torques that support it.
 
     Parameters
     ----------
     data : dict
-        JSON object of the diagnosis.
+        Diagnosis as a JSON object.
     arm : Arm
         Nominal model.
     training, held : sequence of Log
-        Logs that were learnt from and judged on. Evidence is taken from the held-out ones; of a cause that belongs to one log,
+        Training and holdout logs. Evidence is taken from the holdout; for a cause that belongs to one log,
         from that log.
 
     Returns
@@ -167,7 +167,7 @@ def _evidence_logs(cause: EffectInstance, training: Sequence[Log], held: Sequenc
 
 
 def _is_in(log: Log, effect: EffectInstance) -> bool:
-    """Whether an effect acts in a log, or in the log that this one is a part of."""
+    """Whether an effect acts in a log, or in the whole log that `log` is a part of."""
     return effect.log is None or log.name in (effect.log, f"{effect.log} (first part)", f"{effect.log} (last part)")
 
 
@@ -209,13 +209,13 @@ def _law(model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]) -> Law:
 
 
 def _moves(dq: Array) -> NDArray[np.bool_]:
-    """Samples in which a joint moves."""
+    """Return a mask of the samples in which each joint moves."""
     speed = np.abs(dq)
     return np.asarray(speed > _REST * np.quantile(speed, 0.99))
 
 
 def _most_moved(points: EvidenceSamples) -> int:
-    """The joint whose torque the law changes most, relative to the residual torque that the law does not explain."""
+    """Return the joint whose torque the law changes most, relative to the residual torque that the law does not explain."""
     scale = np.sqrt(np.mean((points.residual - points.law) ** 2, axis=0)) + 1e-300
     return int(np.argmax(np.sqrt(np.mean(points.law**2, axis=0)) / scale))
 
@@ -223,7 +223,7 @@ def _most_moved(points: EvidenceSamples) -> int:
 def _points(
     model: Hypothesis, cause: EffectInstance, logs: Sequence[Log]
 ) -> tuple[EvidenceSamples | None, int, list[str]]:
-    """Evidence from windows spread over all logs; how many, and why others could not be simulated."""
+    """Return evidence from windows spread over all logs, the number of windows, and why others could not be simulated."""
     found: list[EvidenceSamples] = []
     failed: list[str] = []
     whole = sum(log.duration for log in logs)
@@ -247,7 +247,7 @@ def _points(
 
 
 class _CauseComparison:
-    """One log with and without one cause."""
+    """Simulation of one log with and without one cause."""
 
     def __init__(self, model: Hypothesis, cause: EffectInstance, log: Log) -> None:
         rest = [e for e in model.effects if e is not cause and _is_in(log, e)]
@@ -260,7 +260,7 @@ class _CauseComparison:
         self.around = _around(cause, log)
 
     def starts(self, wanted: int) -> list[int]:
-        """First rows of windows that do not overlap in the rows that evidence is taken from, spread over the log."""
+        """Return the first rows of windows spread over the log; rows that evidence is taken from do not overlap."""
         first, last = self.around
         last -= 6 * self.half + 1
         fitting = (last - first) // (4 * self.half + 1) + 1
@@ -290,7 +290,7 @@ class _CauseComparison:
 
 
 def _around(cause: EffectInstance, log: Log) -> tuple[int, int]:
-    """Rows to look at: all, or those around an event."""
+    """Return the range of rows that evidence is taken from: all, or those around an event."""
     if "time" not in cause.parameters:
         return 0, len(log)
     middle, reach = cause.parameters["time"], EVENT * max(cause.parameters["duration"], EVENT_S)
@@ -299,7 +299,7 @@ def _around(cause: EffectInstance, log: Log) -> tuple[int, int]:
 
 
 class _ModelledLog:
-    """A log as one model sees it: the torque that arrives, and true positions and velocities."""
+    """A log with the signals of one model: torque at the joints, true positions and velocities."""
 
     def __init__(self, model: Hypothesis, effects: Sequence[EffectInstance], log: Log, half: int) -> None:
         commanded = [e for e in effects if e.effect in ON_COMMAND]
@@ -310,13 +310,13 @@ class _ModelledLog:
         self.dq = _native.velocity(np.ascontiguousarray(log.t), np.ascontiguousarray(self.q), "local-cubic", half)
 
     def predict(self, rows: slice) -> Array:
-        """Positions as the encoders show them, shape (n_rows, n_joints)."""
+        """Return predicted positions as the encoders show them [rad or m], shape (n_rows, n_joints)."""
         t = self.t[rows]
         return self.model.run(t, self.tau[rows], self.q[rows.start], self.dq[rows.start])[0]
 
 
 def _curvature(t: Array, x: Array, at: NDArray[np.intp]) -> Array:
-    """Second derivatives of columns at some rows, from cubics over the neighbourhood; shape (n_at, n_columns)."""
+    """Return second derivatives of the columns of `x` at rows `at`, from local cubics; shape (n_at, n_columns)."""
     half = int(at[0])
     near = at[:, None] + np.arange(-half, half + 1)
     span = t[-1] - t[0]
@@ -326,10 +326,10 @@ def _curvature(t: Array, x: Array, at: NDArray[np.intp]) -> Array:
 
 
 def _bins(x: Array, y: Array, law: Array, window: Array) -> LawBins:
-    """Means over ranges of the variable, with the 95 % half width of each mean.
+    """Return means of torques over ranges of the variable `x`, with the 95 % half width of each mean.
 
-    The ranges lie halfway between equally wide and equally full ones; sparse ones are left out, and their samples stay
-    in the cloud of points.
+    The ranges lie halfway between equally wide and equally full ones; sparse ones are left out, but their samples
+    are still drawn as points.
     """
     low, high = np.quantile(x, [0.005, 0.995])
     bins = min(BINS, len(x) // FEWEST)
@@ -345,10 +345,10 @@ def _bins(x: Array, y: Array, law: Array, window: Array) -> LawBins:
 
 
 def _cluster_sigma(rest: Array, window: Array) -> float | None:
-    """Standard deviation of a mean whose samples are independent from window to window only; None from one window.
+    """Return the standard deviation of a mean whose samples are correlated within windows; None for one window.
 
     Neighbours within a window share the measurement noise, so each window counts once (the sandwich estimate for
-    clusters). What the law says varies within a range and is taken off first.
+    clusters). The law, which varies within a range, is subtracted first.
     """
     _, owner = np.unique(window, return_inverse=True)
     sums = np.bincount(owner, rest - rest.mean())
@@ -359,7 +359,7 @@ def _cluster_sigma(rest: Array, window: Array) -> float | None:
 
 
 def _explained(bins: LawBins) -> float:
-    """Share of the mean square of the binned data that the law explains."""
+    """Return the share of the mean square of the binned data that the law explains."""
     mean, law = np.array(bins["mean"]), np.array(bins["law"])
     whole = float(np.sum(mean**2))
     return float(f"{1.0 - float(np.sum((mean - law) ** 2)) / whole:.4g}") if whole > 0 else 0.0

@@ -1,8 +1,8 @@
-"""Whether fitted values are physically possible: positive definite inertia, gravity that pulls the same way, positive friction.
+"""Physical plausibility of fitted parameters: positive definite inertia, gravity in its nominal direction, positive friction.
 
 A base parameter set belongs to some arm of rigid bodies only if its inertia matrix is positive definite in every pose;
-friction that feeds energy into the arm is impossible at any speed; gravity that has turned over belongs to another zero of the
-positions, another sign or another mount, not to this arm.
+friction that feeds energy into the arm is impossible at any speed; reversed gravity means another zero of the positions,
+another sign or another mount, not a property of the arm.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from armgap.evidence.hypothesis import Array, Hypothesis
 
 __all__ = ["plausibility"]
 
-#: Poses per joint at which the inertia matrix is looked at.
+#: Poses per joint at which the inertia matrix is checked.
 _POSES = 24
 
 
 class Plausibility(TypedDict):
-    """Whether a value of the model with causes is physically possible."""
+    """Whether a parameter of the model with causes is physically possible."""
 
     check: Annotated[str, "What has to hold, in words."]
     holds: bool
@@ -30,7 +30,7 @@ class Plausibility(TypedDict):
 
 
 def plausibility(data: dict[str, Any], arm: Arm) -> list[Plausibility]:
-    """Return what makes the model with causes physically possible or not."""
+    """Return for the parameters of the model with causes whether they are physically possible."""
     model = Hypothesis.of(data, arm)
     found = data["parameters"]["with_causes"]
     friction = (_friction(name, found[name]) for name in arm.parameter_names[arm.n_inertial :])
@@ -49,7 +49,7 @@ def _inertia(model: Hypothesis) -> Plausibility:
 
 
 def _gravity(data: dict[str, Any]) -> list[Plausibility]:
-    """Parameters whose gravity has turned over; nothing where none has."""
+    """Return one entry for gravity parameters with reversed sign; empty if there are none."""
     tables = data["parameters"]
     return [
         {
@@ -63,7 +63,7 @@ def _gravity(data: dict[str, Any]) -> list[Plausibility]:
 
 
 def _largest_compliance(model: Hypothesis) -> float | None:
-    """Largest eigenvalue of the inverse inertia matrix over all poses; None where it is not positive definite."""
+    """Return the largest eigenvalue of the inverse inertia matrix over all poses; None where it is not positive definite."""
     try:
         eigenvalues = np.linalg.eigvalsh(np.linalg.inv(model.inertia(_poses(model.arm))))
     except ValueError:  # a pose without mobility, or more effects than the simulator carries
@@ -72,14 +72,14 @@ def _largest_compliance(model: Hypothesis) -> float | None:
 
 
 def _poses(arm: Arm) -> Array:
-    """Poses over a whole turn of every joint, shape (n_poses, n_joints)."""
+    """Return poses over a whole turn of every joint, shape (n_poses, n_joints)."""
     turn = np.linspace(-np.pi, np.pi, _POSES, endpoint=False)
     grid = np.meshgrid(*([turn] * arm.n_joints), indexing="ij")
     return np.column_stack([g.ravel() for g in grid])
 
 
 def _friction(name: str, value: dict[str, Any]) -> Plausibility:
-    """A friction coefficient is possible unless it is negative by more than its uncertainty."""
+    """Return whether a friction coefficient is possible: not negative by more than its uncertainty."""
     sigma = value["sigma"] or 0.0
     holds = value["value"] + 2.0 * sigma >= 0.0
     within = ", within twice its uncertainty" if holds and value["value"] < 0 else ""
@@ -91,7 +91,7 @@ def _friction(name: str, value: dict[str, Any]) -> Plausibility:
 
 
 def _rounded(value: float, sigma: float, unit: str) -> str:
-    """A value and its uncertainty to the same place."""
+    """Return a value and its uncertainty as text, rounded to one common digit."""
     if sigma <= 0:
         return f"{value:.3g} {unit}"
     places = max(0, 1 - math.floor(math.log10(sigma)))

@@ -1,4 +1,4 @@
-"""What was found goes back into a simulator: MJCF, URDF, an arm file, JSON."""
+"""Export of a diagnosed arm to simulators: MJCF, URDF, an arm file, JSON."""
 
 from armgap.export.chain.joint import Joint
 from armgap.export.chain.links import Links, physical

@@ -1,4 +1,4 @@
-"""A corrected model: what was found about an arm, ready to be written for a simulator."""
+"""A corrected model: parameters and causes of a diagnosed arm, ready to be written for a simulator."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ from armgap.several_joints import place_text
 
 __all__ = ["LEAST_SIGMA", "Corrected", "placed", "value"]
 
-#: Trust in an exported value, relative, at best. An estimate's sigma holds for the logs it came from; tomorrow's arm is
-#: warmer, and values trusted to their last digit would make every other log look like a payload.
+#: Smallest relative standard deviation of an exported parameter. An estimate's sigma holds for its own logs; tomorrow's arm is
+#: warmer, and parameters trusted to their last digit would make every other log look like a payload.
 LEAST_SIGMA = 0.01
 
 
 @dataclass(frozen=True)
 class Corrected(ABC):
-    """An arm as a diagnosis found it, ready to be written for a simulator.
+    """Model of an arm with the parameters and causes of a diagnosis, ready to be written for a simulator.
 
     Attributes
     ----------
     arm : Arm
-        The arm file it started from.
+        Arm file of the diagnosis.
     stage : str
-        ``"with_causes"`` or ``"refit"``.
+        Model of the diagnosis: ``"with_causes"`` or ``"refit"``.
     theta, sigma : ndarray, shape (n_parameters,)
-        The arm's parameters with every cause in them that is a change of these, and their standard deviations.
+        Parameters of the arm, including causes that only change parameters, and their standard deviations [SI].
     joints : tuple of Joint
-        What sits at the joints.
+        Friction, springs, drive, encoder and stop of each joint.
     causes : tuple of Cause
-        All causes of the stage, with a field or without.
+        All causes of the stage, whether or not a format has a field for them.
     notes : tuple of str
-        What to know about these values.
+        Remarks on the parameters.
     verdict : str
         The diagnosis' verdict.
     """
@@ -58,32 +58,32 @@ class Corrected(ABC):
 
     @abstractmethod
     def simulated(self, form: str) -> SimulatorModel:
-        """Return the arm as MJCF (``"mjcf"``) or URDF (``"urdf"``) has it.
+        """Return the arm as a chain for MJCF (``"mjcf"``) or URDF (``"urdf"``).
 
         Raises
         ------
         ExportError
-            If no arm that could be built has these values.
+            If no physically possible arm has the corrected parameters.
         """
 
     @abstractmethod
     def nominal(self) -> Arm:
-        """Return the arm with the values found, as the nominal model of further diagnoses."""
+        """Return the arm with the corrected parameters, as nominal model for further diagnoses."""
 
     @abstractmethod
     def remarks(self, form: str) -> tuple[str, ...]:
-        """Return everything to know about the file of a format: what is missing in it, what was chosen, one line each."""
+        """Return remarks on the exported file of a format, one line each: what the format cannot hold, and what was chosen."""
 
     @abstractmethod
     def data(self) -> dict[str, Any]:
-        """Return what the JSON object has of this kind of arm: links and gravity."""
+        """Return entries of the exported JSON object that depend on the kind of arm: links and gravity."""
 
     def field_of(self, cause: Cause, form: str) -> str | None:
-        """Return where a cause goes in a format, None if it has no field there."""
+        """Return the field of a format that a cause is written to; None if the format has none."""
         return None if cause.row else field_of(cause.effect, cause.joint, form, self.arm.kind)
 
     def missing(self, form: str) -> tuple[str, ...]:
-        """Return one line per cause that a format has no field for, or only in part."""
+        """Return one line per cause for which a format has no field, or only in part."""
         lines = []
         for cause in self.causes:
             short = FIELDS[cause.effect].short if cause.effect in FIELDS else ""
@@ -95,12 +95,12 @@ class Corrected(ABC):
         return tuple(lines)
 
     def render(self, form: str) -> str:
-        """Return the file of a format: ``"mjcf"``, ``"urdf"``, ``"toml"`` or ``"json"``.
+        """Return the text of the exported file: ``"mjcf"``, ``"urdf"``, ``"toml"`` or ``"json"``.
 
         Raises
         ------
         ExportError
-            If the format does not exist, or needs links and no arm that could be built has these values.
+            If the format does not exist, or needs links and no physically possible arm has the corrected parameters.
         """
         from armgap.export import data
         from armgap.export.formats import mjcf, toml, urdf
@@ -112,12 +112,12 @@ class Corrected(ABC):
 
 
 def value(cause: Cause, name: str) -> float:
-    """Value of a cause's parameter."""
+    """Return the value of a cause's parameter [SI] by name."""
     return cause.parameters[name].value
 
 
 def placed(found: Cause | Equivalent) -> str:
-    """Name of an effect where it sits."""
+    """Return the name of an effect with its joint."""
     if found.joint is None and not found.joints:
         return found.effect
     return f"{found.effect} of {place_text(vars(found))}"

@@ -1,4 +1,4 @@
-"""From a diagnosis to a corrected model."""
+"""Conversion of a diagnosis to a corrected model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["STAGES", "correct"]
 
 #: Stages of a diagnosis that can be exported.
 STAGES = ("with_causes", "refit")
-#: Values of the arm file and the diagnosis agree to this, relative.
+#: Relative difference up to which parameters of arm file and diagnosis count as equal.
 _SAME = 1e-9
 
 
@@ -23,14 +23,14 @@ def correct(diagnosis: Diagnosis, arm: Arm, *, stage: str = "with_causes", keep_
     Parameters
     ----------
     diagnosis : Diagnosis
-        What was found.
+        Diagnosis of the arm.
     arm : Arm
-        The arm file it was found with.
+        Arm file of the diagnosis.
     stage : {"with_causes", "refit"}, default "with_causes"
         Re-estimated parameters with the causes, or without them.
     keep_lengths : bool, default False
-        Keep the arm file's length of link 1 of a two-link arm, and move theta2 and theta5 to it in the ratio of their variances. Without it
-        the length is the one that they imply, and the dynamics are exactly those found.
+        Keep the arm file's length of link 1 of a two-link arm, and move theta2 and theta5 to it in the ratio of their variances. By default
+        theta2 and theta5 imply the length, and the dynamics are exactly those of the diagnosis.
 
     Returns
     -------

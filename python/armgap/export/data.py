@@ -1,4 +1,4 @@
-"""The corrected model as JSON, schema ``armgap.export/1``."""
+"""Export of a corrected model as JSON, schema ``armgap.export/1``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SCHEMA = "armgap.export/1"
 
 
 def to_dict(model: Corrected) -> dict[str, Any]:
-    """Return the JSON object: parameters, links, joints, effects with their fields, and notes."""
+    """Return a corrected model as a JSON object: parameters, links, joints, effects with their fields, and notes."""
     arm = model.arm
     triples = zip(arm.parameter_names, model.theta, model.sigma, arm.parameter_units, strict=True)
     return {
@@ -47,5 +47,5 @@ def _effect(model: Corrected, cause: Cause) -> dict[str, Any]:
 
 
 def render(model: Corrected) -> str:
-    """Return the JSON text."""
+    """Return a corrected model as JSON text."""
     return json.dumps(to_dict(model), indent=2, allow_nan=False) + "\n"

@@ -1,4 +1,4 @@
-"""What can go wrong on the way from a diagnosis to a simulator."""
+"""Errors of an export from a diagnosis to a simulator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where each effect goes in each simulator, and where it has no field."""
+"""Fields of simulator formats that effects are written to, and effects without a field."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from armgap.literals import SERIAL
 
 __all__ = ["FIELDS", "FORMATS", "Field", "field_of"]
 
-#: Formats and the endings of their files.
+#: Export formats, with the endings of their files.
 FORMATS = {"mjcf": ".xml", "urdf": ".urdf", "toml": ".toml", "json": ".json"}
 
 
 @dataclass(frozen=True)
 class Field:
-    """The field an effect goes into; None where the format has none.
+    """Field of each format that an effect is written to; None for a format without one.
 
     Attributes
     ----------
     mjcf, urdf, toml : str, optional
-        Names of the fields.
+        Names of the fields in MJCF, URDF and arm files.
     short : str
-        What the field falls short of, or why no format has one.
+        Limitation of the field, or reason why no format has one.
     """
 
     mjcf: str | None = None
@@ -30,7 +30,7 @@ class Field:
     short: str = ""
 
     def of(self, form: str) -> str | None:
-        """Return the field in a format; JSON holds every effect."""
+        """Return the name of the field in a format; JSON has a field for every effect."""
         return "effects" if form == "json" else {"mjcf": self.mjcf, "urdf": self.urdf, "toml": self.toml}[form]
 
 
@@ -60,7 +60,7 @@ FIELDS: dict[str, Field] = {
     "rotor_coupling": Field(mjcf="joint armature of joint 2, inertial"),
     "external_pulse": Field(short="an event of one log, no property of the arm"),
 }
-"""Every effect that some format has a field for, or that needs a word; any other effect has none."""
+"""Fields of effects by name of the effect; an effect not listed has no field in any format but JSON."""
 
 _OF_SERIAL = FIELDS | {
     "payload": Field("inertial", "inertial", "link"),
@@ -72,7 +72,7 @@ _SAME_AS_LINK = "inertial of link 1, whose inertia it adds to without a differen
 
 
 def field_of(effect: str, joint: int | None, form: str, kind: str) -> str | None:
-    """Return where an effect goes in a format, None if it has no field there.
+    """Return the field of a format that an effect is written to; None if the format has none.
 
     Parameters
     ----------

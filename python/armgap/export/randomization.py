@@ -1,13 +1,13 @@
-"""Ranges for domain randomisation: what was exported, how well it is known, and models drawn from that, schema ``armgap.randomization/1``.
+"""Ranges for domain randomisation: exported parameters, their standard deviations, and random models, schema ``armgap.randomization/1``.
 
-Standard deviations are those of the diagnosis. Of a serial arm's links only combinations are known well: numbers drawn one by one
-would be links that are no bodies, with torques that the logs exclude. The correlations are those of a least-squares estimate along the diagnosed
-motion beside the arm file's standard deviations,
+Standard deviations are those of the diagnosis. Of a serial arm's links only combinations are known well: independent draws of inertial
+parameters would give impossible links, with torques that the logs exclude. The correlations are those of a least-squares estimate along the
+diagnosed motion with the arm file's standard deviations as prior,
 
     C = (k Y' Y + diag(1/sigma^2))^-1
 
 (Ljung 1999, section 7.4), with `k`, the information in a sample's torque, such that the standard deviations agree best with the diagnosis'. They are
-then scaled to these exactly. Each model drawn from it is brought to the nearest links that bodies can be.
+then scaled to the diagnosis' values exactly. Each random model is moved to the nearest physically consistent links.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ __all__ = ["SCHEMA", "covariance", "randomization"]
 Array = NDArray[np.float64]
 
 SCHEMA = "armgap.randomization/1"
-#: Ranges reach so many standard deviations to either side: 95 % of a normal distribution.
+#: Half width of the ranges for domain randomisation, in standard deviations: 95 % of a normal distribution.
 _REACH = 2.0
-#: What cannot be negative, nor zero for a body, is at least this share of its value.
+#: Lower end of a range, as a share of the value, for a parameter that must not be negative, or must be positive for a body.
 _LEAST_SHARE = 0.1
 _INFORMATION = 10.0 ** np.arange(0.0, 12.0, 0.25)
 _STEP = 1e-6
@@ -43,16 +43,16 @@ _POSITIVE = ("mass", "ixx", "iyy", "izz")
 
 
 def randomization(model: Corrected, *, draws: int = 20, seed: int = 1) -> str:
-    """Return ranges of all exported quantities, and models drawn from what is known about them, as JSON.
+    """Return ranges of all exported parameters, and random models, as JSON text.
 
     Parameters
     ----------
     model : Corrected
-        What is exported.
+        Exported model.
     draws : int, default 20
-        Models of a serial arm; a planar arm has none, as its parameters are known one by one.
+        Number of random models of a serial arm; none for a planar arm, whose parameters are known one by one.
     seed : int, default 1
-        Of the draws.
+        Seed of the random generator.
     """
     found: dict[str, Any] = {
         "schema": SCHEMA,
@@ -139,7 +139,7 @@ def _of_joints(model: CorrectedSerial) -> Iterable[dict[str, Any]]:
 
 
 def _of_causes(model: Corrected) -> list[dict[str, Any]]:
-    """Parameters of the causes; of those that are in the links or rotors they tell where the others' values come from."""
+    """Return the parameters of causes with ranges; those already included in links or rotors are marked as the origin of these."""
     return [
         _entry({"effect": cause.effect, **_place(cause), "quantity": name}, v.value, v.sigma, v.unit)
         for cause in model.causes
@@ -148,13 +148,13 @@ def _of_causes(model: Corrected) -> list[dict[str, Any]]:
 
 
 def _place(cause: Cause) -> dict[str, Any]:
-    """Entries that say where a cause is."""
+    """Return JSON entries for the joint or joints of a cause."""
     on_row = {"joints": list(cause.joints or ()), "row": list(cause.row)} if cause.row else {}
     return {"joint": cause.joint, **on_row}
 
 
 def _draw(model: CorrectedSerial, spread: Array, rng: np.random.Generator) -> dict[str, Any]:
-    """Return one model: links that bodies can be, and joints."""
+    """Return one random model: physically consistent links, and joints."""
     n = model.arm.n_joints
     center = np.concatenate([model.bodies.inertial.ravel(), model.bodies.rotor])
     values, vectors = np.linalg.eigh(spread)

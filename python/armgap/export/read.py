@@ -1,4 +1,4 @@
-"""Reading a diagnosis back from its file."""
+"""Reading of a diagnosis from its JSON file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SCHEMA = "armgap.diagnosis/1"
 
 
 def read_diagnosis(path: str | Path) -> Diagnosis:
-    """Read and check a diagnosis.
+    """Read a diagnosis from its JSON file and check it.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Files: small ones read whole, results written whole or not at all, JSON Schema of types."""
+"""Files: bounded reading of small files, atomic writing of results, JSON Schema of types."""

@@ -1,4 +1,4 @@
-"""JSON Schema (draft 2020-12) of types: `TypedDict`, `Literal`, lists, dicts and plain values, described by `Annotated` texts."""
+"""JSON Schema (draft 2020-12) of Python types: `TypedDict`, `Literal`, lists, dicts and plain values, described by `Annotated` texts."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def schema_of(kind: Any, definitions: dict[str, Schema]) -> Schema:
     Parameters
     ----------
     kind : type
-        Built of `TypedDict`, `Literal`, `Annotated`, `list`, `tuple`, `dict` with keys of str, unions, str, bool, int, float, None and `Any`.
+        Type built of `TypedDict`, `Literal`, `Annotated`, `list`, `tuple`, `dict` with keys of str, unions, str, bool, int, float, None and `Any`.
     definitions : dict
-        Schemas by name, to which those of `TypedDict` types are added.
+        Schemas by name, to which the schemas of `TypedDict` types are added.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def schema_of(kind: Any, definitions: dict[str, Schema]) -> Schema:
     Raises
     ------
     TypeError
-        If the type is built of something else.
+        If the type contains any other type.
     """
     origin, parts = get_origin(kind), get_args(kind)
     if kind is Any:

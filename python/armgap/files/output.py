@@ -1,7 +1,7 @@
-"""Results as files: whole or not at all, in the place of what they replace; streams and devices are written through.
+"""Atomic writing of results to files, complete or not at all; streams and devices are written to directly.
 
-A regular file is written beside its target under a name of its own and renamed when it is complete and on the disk, so that neither an
-interrupt nor a full disk leaves half of it, and two programs that write the same file do not mix. It takes over mode, owner, group and
+A regular file is written in its target's folder under a temporary name and renamed when it is complete and on the disk, so that neither an
+interrupt nor a full disk leaves half of it, and two programs that write one file do not mix. It takes over mode, owner, group and
 extended attributes of the file it replaces. Symbolic links stay and are followed. See docs/decisions/032-nothing-lost.md.
 """
 
@@ -36,27 +36,27 @@ __all__ = [
 STANDARD_STREAM = "-"
 Content: TypeAlias = str | bytes | Callable[[Path], Any]
 _PLACE = "choose another place"
-#: Descriptors of the standard streams.
+#: File descriptors of standard output and standard error.
 _STDOUT, _STDERR = 1, 2
 _OS_ERROR = re.compile(r"\(os error ([0-9]+)\)")
-"""How libraries written in Rust pass on what the system said."""
+"""Pattern of an operating system's error number in error messages of libraries written in Rust."""
 _NEW_FILE = 0o666  # less the umask
 
 
 def write(path: str | os.PathLike[str], content: Content) -> None:
-    """Write a result.
+    """Write a result to a file, atomically, or to a stream.
 
     Parameters
     ----------
     path : path-like
-        Where to; ``-`` is standard output.
+        Path of the file; ``-`` is standard output.
     content : str, bytes or callable
         Text, written as UTF-8; bytes; or a function that is given the path of an empty file to fill.
 
     Raises
     ------
     ResultError
-        If it cannot be written. A regular file that was there is then as it was.
+        If the result cannot be written; an existing regular file is then unchanged.
     """
     try:
         if os.fspath(path) == STANDARD_STREAM:
@@ -82,12 +82,12 @@ def write_folder(path: str | os.PathLike[str], fill: Callable[[Path], Any]) -> P
     path : path-like
         New or empty folder; its parent exists.
     fill : callable
-        Is given the path of an empty folder.
+        Function that fills an empty folder, given by its path.
 
     Raises
     ------
     ResultError
-        If it cannot be written, or there is a folder that is not empty.
+        If the folder cannot be written, or exists and is not empty.
     """
     target = Path(path)
     partial = _beside(target)
@@ -105,12 +105,12 @@ def write_folder(path: str | os.PathLike[str], fill: Callable[[Path], Any]) -> P
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raise if a result could not be written there, without touching anything.
+    """Raise if a result could not be written to a path, without writing anything.
 
     Raises
     ------
     ResultError
-        With the reason.
+        If the path cannot be written to; the message names the reason.
     """
     if os.fspath(path) == STANDARD_STREAM:
         return
@@ -139,9 +139,9 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def descriptor(path: str | os.PathLike[str]) -> int | None:
-    """Return the number of the open file of this process that a path such as ``/dev/stdout`` or ``/dev/fd/3`` stands for, else None.
+    """Return the file descriptor that a path such as ``/dev/stdout`` or ``/dev/fd/3`` stands for; None for other paths.
 
-    A file to which standard output or standard error is redirected counts as that stream: replacing it would take it away from the shell.
+    A file to which standard output or standard error is redirected counts as the stream: replacing the file would detach it from the shell.
     """
     word = os.path.abspath(path)
     for _ in range(40):  # as many links as Linux follows
@@ -159,7 +159,7 @@ def descriptor(path: str | os.PathLike[str]) -> int | None:
 
 
 def is_stdout(*paths: str | os.PathLike[str] | None) -> bool:
-    """Return whether one of the results goes where standard output goes, so that nothing else may be printed there."""
+    """Return whether one of the output paths is standard output, so that no other text may be printed to it."""
     return any(p is not None and (os.fspath(p) == STANDARD_STREAM or _leads_to_stdout(p)) for p in paths)
 
 
@@ -179,7 +179,7 @@ def _is_open(number: int, there: os.stat_result) -> bool:
 
 
 def status_of(path: str | os.PathLike[str]) -> os.stat_result | None:
-    """Return what the system says of a file; None where there is none that can be reached."""
+    """Return the status of a file; None for a missing or unreachable file."""
     try:
         return os.stat(path)
     except OSError:
@@ -187,7 +187,7 @@ def status_of(path: str | os.PathLike[str]) -> os.stat_result | None:
 
 
 def _is_special(path: str | os.PathLike[str]) -> bool:
-    """Whether it is a device, a pipe or a socket: what has no content that could be replaced."""
+    """Whether a path is a device, a pipe or a socket, which has no content to replace."""
     there = status_of(path)
     return there is not None and not (stat.S_ISREG(there.st_mode) or stat.S_ISDIR(there.st_mode))
 
@@ -199,7 +199,7 @@ def _refused(path: str | os.PathLike[str], error: Exception) -> ResultError:
 
 
 def _beside(target: Path) -> Path:
-    """Return an unused name in the folder of a target; it does not depend on the target's, which may be as long as names can be."""
+    """Return an unused name in the folder of `target`, independent of the target's name, which may have the largest possible length."""
     return target.with_name(f".armgap-{secrets.token_hex(8)}.partial")
 
 
@@ -229,7 +229,7 @@ def _replace(target: Path, content: Content) -> None:
 
 
 def _fill(file: Path, content: Callable[[Path], Any]) -> None:
-    """Let a function fill a file; what the system said to a library that has errors of its own is said by `OSError` again."""
+    """Let a function fill a file; operating system errors that a library wraps in its own are raised as `OSError`."""
     try:
         content(file)
     except Exception as error:
@@ -262,7 +262,7 @@ def _check_replaceable(target: Path, old: os.stat_result) -> None:
 
 
 def _keep(number: int, target: Path, old: os.stat_result) -> None:
-    """Give an open file mode, owner and extended attributes of the file whose place it will take."""
+    """Give an open file mode, owner and extended attributes of the file that it will replace."""
     new = os.fstat(number)
     if hasattr(os, "fchown") and (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
         os.fchown(number, old.st_uid, old.st_gid)
@@ -275,7 +275,7 @@ def _keep(number: int, target: Path, old: os.stat_result) -> None:
 
 
 def _bytes(content: Content) -> bytes:
-    """Return what is to be written; a function fills a file of its own for it."""
+    """Return the content as bytes; a function is given a temporary file to fill."""
     if isinstance(content, str):
         return content.encode("utf-8", "backslashreplace")
     if isinstance(content, bytes):
@@ -288,7 +288,7 @@ def _bytes(content: Content) -> bytes:
 
 
 def _pour(number: int, data: bytes) -> None:
-    """Write all of it."""
+    """Write all bytes to a file descriptor."""
     rest = memoryview(data)
     while rest:
         rest = rest[os.write(number, rest) :]
@@ -302,7 +302,7 @@ def _to_descriptor(number: int, content: Content) -> None:
 
 
 def _to_stdout(content: Content) -> None:
-    """Print a result; text ends with its line."""
+    """Print a result to standard output; text ends with a line break."""
     data = _bytes(content)
     if isinstance(content, str) and not content.endswith("\n"):
         data += b"\n"

@@ -1,4 +1,4 @@
-"""Small files that are read whole, and no further than they can be meant to go."""
+"""Bounded reading of small files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["is_text", "printable", "read_bounded"]
 
 
 def is_text(path: str | os.PathLike[str]) -> bool:
-    """Whether a file's name is text, as it need not be."""
+    """Whether a file's name is valid text, which operating systems do not require."""
     try:
         os.fspath(path).encode("utf-8")
     except UnicodeEncodeError:
@@ -31,7 +31,7 @@ def printable(name: str) -> str:
 
 
 def read_bounded(path: str | os.PathLike[str], most: int) -> bytes:
-    """Return the content of a file; ``-`` is standard input.
+    """Return the content of a file of limited size; ``-`` is standard input.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def read_bounded(path: str | os.PathLike[str], most: int) -> bytes:
     Raises
     ------
     OSError
-        If it cannot be read, or is larger.
+        If the file cannot be read, or is larger than `most`.
     """
     if os.fspath(path) == "-":
         data = sys.stdin.buffer.read(most + 1)

@@ -1,4 +1,4 @@
-"""Many robots, many logs: the same diagnosis for every entry of a manifest, what drifts, and which arm is the odd one.
+"""Many robots, many logs: a diagnosis for every entry of a manifest, parameters that drift, and arms that differ from the others.
 
 ===========  ===============================================================================
 file         what
@@ -6,11 +6,11 @@ file         what
 `manifest`   entries, read and checked
 `work`       one entry diagnosed, in a process of its own
 `engines`    where entries are diagnosed: processes of this machine, or a Ray cluster
-`folder`     the folder of results: one diagnosis per entry, tables, page; what is done stays
+`folder`     the folder of results: one diagnosis per entry, tables, page; existing results are kept
 `tables`     rows of the tables
-`series`     parameters over the visits of all robots: what drifts, which robot is the odd one
-`drift`      the tests behind that
-`page`       the page over all of them
+`series`     parameters over the visits of all robots: drifting parameters, robots that differ
+`drift`      statistical tests for drift
+`page`       HTML page of the whole fleet
 ===========  ===============================================================================
 """
 

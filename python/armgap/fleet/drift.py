@@ -1,10 +1,10 @@
 """Parameters that grow from some visit on, and robots that differ from the others.
 
-**Series.** Logarithms of a parameter's estimates, less the robot's own median and less the median of all robots of the same day, as far as that
-varies by more than chance: what a day does to all is no drift.
+**Series.** Logarithms of a parameter's estimates, less the robot's own median and less the median of all robots of a day, as far as the latter
+varies by more than chance: a common change of all robots on a day is no drift.
 
-**Test.** A ramp from an unknown visit on is looked for by the generalised likelihood ratio (Basseville and Nikiforov 1993, section 2.4.3; for a
-changing mean Siegmund and Venkatraman 1995): for every onset the slope by weighted least squares beside an unknown level, over its standard
+**Test.** A ramp from an unknown visit on is detected by the generalised likelihood ratio (Basseville and Nikiforov 1993, section 2.4.3; for a
+changing mean Siegmund and Venkatraman 1995): for every onset the slope by weighted least squares, with an unknown level, over its standard
 deviation; the largest of all counts.
 
 **Scatter.** A visit's variance is that of its estimate plus a scatter from visit to visit, which is the fleet's: chosen so that the squared
@@ -42,27 +42,28 @@ __all__ = [
 
 Array = NDArray[np.float64]
 FALSE_ALARMS = 2e-3
-"""False alarms of a fleet per visit of all its robots, over all parameters: at most one in 500 visits. The bound is wide, and a visit shares its
-evidence with those before: with normal scatter it is one in about 1500. Twice as many find a drift of 3 % per visit in a scatter of 10 % a fifth of a
-visit sooner."""
-# Visits before a ramp that say where it started from, and fewest visits on it.
+"""Allowed false alarms of drift per visit of all robots of a fleet, over all parameters: at most one in 500 visits. The bound is wide, and a visit
+shares its evidence with those before: with normal scatter it is one in about 1500. Twice as many find a drift of 3 % per visit in a scatter of 10 %
+a fifth of a visit sooner.
+"""
+# Visits before a ramp that determine its initial level, and fewest visits on the ramp.
 _FEWEST_BEFORE, _FEWEST_ON = 3, 3
-# Robots without which there is no fleet to compare with: the median of three is often one of them.
+# Robots that a comparison with the fleet needs: the median of three is often one of them.
 _FEWEST_ROBOTS = 4
-# Share of the evidence that stays with any one visit left out. A ramp over three visits keeps 0.6 of it without the last; one wild visit keeps
-# nothing.
+# Share of the evidence for a ramp that has to remain with any one visit left out. A ramp over three visits keeps 0.6 of it without the last; one wild
+# visit keeps nothing.
 _STAYS = 0.5
-# Relative standard error from which on an estimate says nothing about its logarithm.
+# Relative standard error from which an estimate says nothing about its logarithm.
 _VAGUE = 0.3
-# Degrees of freedom that count as a known scatter.
+# Degrees of freedom from which the scatter of visits counts as known exactly.
 _KNOWN = 1e6
 # Largest autocorrelation: beyond it scatter is a random walk, which no test tells from a drift.
 _MOST_CORRELATION = 0.9
-# Squared logarithm that counts as no change at all, and accuracy of the scatter, relative to the largest step.
+# Squared change of a logarithm that counts as zero, and accuracy of the fleet's scatter, relative to the largest step.
 _NOTHING, _CLOSE = 1e-30, 1e-6
-# A robot is odd from this many robust standard deviations on.
+# Robust standard deviations from the fleet's median from which a robot is odd.
 _ODD = 5.0
-# Share of the robots from which on they are not odd but of several models.
+# Share of robots far from the median from which they count as several models, not as odd.
 _SEVERAL_MODELS = 0.2
 # Standard deviation of normal numbers over the median of their absolute values.
 _MAD = 1.4826
@@ -70,20 +71,20 @@ _MAD = 1.4826
 
 @dataclass(frozen=True)
 class Drift:
-    """A parameter of one robot that changes steadily.
+    """Drift of one robot's parameter: a steady change from some visit on.
 
     Attributes
     ----------
     robot : int
-        Row of the table.
+        Row of the robot in the table of values.
     onset : int
-        Column from which it changes.
+        Column of the table from which the parameter changes.
     rate : float
         Relative change per visit of the robot.
     evidence : float
         Standard deviations by which the rate differs from zero.
     threshold : float
-        Standard deviations from which on it counts.
+        Standard deviations from which a rate counts as drift.
     """
 
     robot: int
@@ -94,7 +95,7 @@ class Drift:
 
 
 def drifts(values: Array, sigma: Array | None = None, *, tests: int | None = None) -> list[Drift]:
-    """Return the series that hold a ramp up to their last visit, the surest first.
+    """Return drifts of one parameter: series with a ramp up to their last visit, strongest evidence first.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def drifts(values: Array, sigma: Array | None = None, *, tests: int | None = Non
     sigma : ndarray, shape (n_robots, n_visits), optional
         Standard errors of the values; unknown (NaN) ones count as zero, and so do all by default.
     tests : int, optional
-        Series that are looked at, this parameter's and all others'; by default the robots of this one.
+        Number of series tested, over all parameters; by default the robots of this parameter.
     """
     series, error = relative(values, sigma)
     long = np.count_nonzero(np.isfinite(series), axis=1) >= _FEWEST_BEFORE + _FEWEST_ON
@@ -126,7 +127,7 @@ def drifts(values: Array, sigma: Array | None = None, *, tests: int | None = Non
 
 
 def relative(values: Array, sigma: Array | None = None) -> tuple[Array, Array]:
-    """Return logarithms of sizes, less the robot's own level and the fleet's median of each day, and their standard errors.
+    """Return logarithms of absolute values, less the robot's own level and the fleet's median of each day, and their standard errors.
 
     Parameters
     ----------
@@ -145,7 +146,7 @@ def relative(values: Array, sigma: Array | None = None) -> tuple[Array, Array]:
 
 
 def _day(series: Array) -> Array:
-    """What each day does to all robots, shape (n_visits,): their median, drawn to zero by as much as it is chance (James and Stein 1961)."""
+    """Return the common change of all robots on each day, shape (n_visits,): median, shrunk to zero by its chance part (James and Stein 1961)."""
     robots = np.count_nonzero(np.isfinite(series), axis=0)
     many = robots >= _FEWEST_ROBOTS
     if not many.any():
@@ -166,7 +167,7 @@ def _median(x: Array, axis: int) -> Array:
 
 
 def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
-    """Return the fleet's scatter from visit to visit, each robot's dispersion about it, and the degrees of freedom behind that.
+    """Return the fleet's scatter from visit to visit, each robot's dispersion relative to it, and the dispersions' degrees of freedom.
 
     Parameters
     ----------
@@ -200,11 +201,11 @@ def fleet_scatter(series: Array, error: Array) -> tuple[float, Array, Array]:
 
 
 def fleet_autocorrelation(series: Array) -> float:
-    """Return the first-order autocorrelation of what visits scatter by, 0 where it is no more than chance.
+    """Return the first-order autocorrelation of the scatter between visits, 0 where it is within chance.
 
     ``1 + rho`` is the mean square of differences between visits two apart over that between neighbours, both relative to the robot's own
-    scatter; neither knows the level or, to first order, a drift. In white noise its variance is ``2/n`` for ``n`` visits, and one standard
-    deviation of it counts as chance.
+    scatter; neither depends on the level or, to first order, a drift. In white noise the variance of ``rho`` is ``2/n`` for ``n`` visits, and
+    one standard deviation of it counts as chance.
 
     Parameters
     ----------
@@ -222,7 +223,7 @@ def fleet_autocorrelation(series: Array) -> float:
 
 
 def _steps(series: Array, error: Array) -> tuple[Array, Array]:
-    """Squared differences between neighbouring known visits, NaN after the last, and what the estimates' errors add to them."""
+    """Return squared differences between neighbouring known visits, NaN after the last, and their expected part from the estimates' errors."""
     square, errors = np.full(series.shape, np.nan), np.zeros(series.shape)
     for robot, row in enumerate(series):
         known = np.flatnonzero(np.isfinite(row))
@@ -233,26 +234,26 @@ def _steps(series: Array, error: Array) -> tuple[Array, Array]:
 
 
 def _dispersions(steps: tuple[Array, Array], scatter: float) -> Array:
-    """Mean square differences of each robot over what a scatter and the estimates' errors make of them."""
+    """Return for each robot the mean square difference over its expectation from a scatter and the estimates' errors."""
     square, errors = steps
     share = square / (2.0 * scatter**2 + errors + _NOTHING)
     return np.asarray(np.nansum(share, axis=1) / np.maximum(np.count_nonzero(np.isfinite(square), axis=1), 1))
 
 
 def _freedom(steps: NDArray[np.int64]) -> Array:
-    """Degrees of freedom of the mean square successive difference of ``n = steps + 1`` values (von Neumann et al. 1941: 2 (n-1)^2/(3n-4))."""
+    """Return the degrees of freedom of the mean square successive difference of ``steps + 1`` values (von Neumann et al. 1941: 2 (n-1)^2/(3n-4))."""
     return np.asarray(2.0 * steps**2 / np.maximum(3.0 * steps - 1.0, 1.0))
 
 
 def _median_of_mean_square(freedom: Array) -> Array:
-    """Median of a chi-squared variable over its degrees of freedom (Wilson and Hilferty 1931)."""
+    """Return the median of a chi-squared variable over its degrees of freedom (Wilson and Hilferty 1931)."""
     return np.asarray((1.0 - 2.0 / (9.0 * freedom)) ** 3)
 
 
 def _prior_freedom(dispersion: Array, freedom: Array) -> float:
-    """Degrees of freedom that the fleet's scatter is worth beside a robot's own (Smyth 2004).
+    """Return the degrees of freedom of the fleet's scatter as prior for a robot's own scatter (Smyth 2004).
 
-    They follow from what the robots' logarithms vary by beyond chance and one standard error of it:
+    They follow from the variance of the robots' log dispersions beyond chance and one standard error:
     ``var log s^2 = psi'(d/2) + psi'(d0/2)``; robust over the robots, with ``psi'(x) = 1/x + 1/(2 x^2) + 1/(6 x^3)`` and its inverse ``1/2 + 1/y``.
     """
     if len(dispersion) < _FEWEST_ROBOTS:
@@ -267,7 +268,7 @@ def _prior_freedom(dispersion: Array, freedom: Array) -> float:
 
 
 def _without_ramp(row: Array) -> Array:
-    """Logarithms of one robot less the level and the ramp, of any onset, that leave least of them by least squares, NaN where unknown."""
+    """Return logarithms of one robot less level and ramp, with the onset of the least squares minimum, NaN where unknown."""
     known = np.flatnonzero(np.isfinite(row))
     rest = row.copy()
     if len(known) < _FEWEST_BEFORE + _FEWEST_ON:
@@ -282,21 +283,21 @@ def _without_ramp(row: Array) -> Array:
 
 
 def _exceedance(ratio: Array, freedom: Array, prior: float) -> Array:
-    """Probability that a ratio of mean squares, of these degrees of freedom each, is as large (Paulson 1942), shape of `ratio`."""
+    """Return the probability that a ratio of mean squares with given degrees of freedom is at least `ratio` (Paulson 1942), shape of `ratio`."""
     a, b, root = 2.0 / (9.0 * freedom), 2.0 / (9.0 * prior), np.cbrt(ratio)
     normal = ((1.0 - b) * root - (1.0 - a)) / np.sqrt(a + b * root**2)
     return np.array([0.5 * math.erfc(x / math.sqrt(2.0)) for x in normal])
 
 
 def threshold(allowed: float, length: float, freedom: float) -> float:
-    """Return the standard deviations that noise exceeds with a probability of at most `allowed`.
+    """Return the threshold in standard deviations that the largest statistic of noise exceeds with a probability of at most `allowed`.
 
     Parameters
     ----------
     allowed : float
         Probability, above 0 and below 1.
     length : float
-        Of the curve that the normed ramps are [rad].
+        Length of the curve of normed ramps on the sphere [rad].
     freedom : float
         Degrees of freedom behind the scatter.
     """
@@ -305,7 +306,7 @@ def threshold(allowed: float, length: float, freedom: float) -> float:
 
 @dataclass(frozen=True)
 class _Equations:
-    """A series as a level and a ramp from every onset on, whitened: one equation per visit.
+    """Regression of a series on a level and a ramp from each onset, whitened: one equation per visit.
 
     Attributes
     ----------
@@ -320,19 +321,19 @@ class _Equations:
     correlation: float
 
     def whitened(self, x: Array) -> Array:
-        """Return columns without their autocorrelation from visit to visit (Prais and Winsten 1954)."""
+        """Return columns with their autocorrelation from visit to visit removed (Prais and Winsten 1954)."""
         white = x.astype(np.float64)
         white[..., 1:] -= self.correlation * x[..., :-1]
         white[..., 0] *= np.sqrt(1.0 - self.correlation**2)
         return white
 
     def ramps(self) -> Array:
-        """Ramps of slope 1 from every onset on, shape (n_onsets, n_visits)."""
+        """Return ramps of slope 1 from every onset, shape (n_onsets, n_visits)."""
         onsets = np.arange(_FEWEST_BEFORE, len(self.row) - _FEWEST_ON + 1)
         return self.whitened(np.maximum(np.arange(len(self.row)) - onsets[:, None] + 1.0, 0.0))
 
     def beside(self, x: Array, y: Array) -> Array:
-        """Rows of `x` less their weighted projection on those of `y`, shapes (n, n_visits) or (n_visits,)."""
+        """Return rows of `x` less their weighted projection on the rows of `y`, shapes (n, n_visits) or (n_visits,)."""
         part = np.sum(x * self.weight * y, axis=-1) / np.sum(self.weight * y**2, axis=-1)
         return np.asarray(x - part[..., None] * y)
 
@@ -341,7 +342,7 @@ class _Equations:
         return self.whitened(np.ones(len(self.row)))
 
     def slopes(self) -> tuple[Array, Array, float]:
-        """Slopes for all onsets, their standard deviations, and the length of the curve of normed ramps [rad]."""
+        """Return slopes for all onsets, their standard deviations, and the length of the curve of normed ramps [rad]."""
         ramps = self.beside(self.ramps(), self.level())
         square = (ramps**2) @ self.weight
         normed = ramps * np.sqrt(self.weight) / np.sqrt(square)[:, None]
@@ -349,7 +350,7 @@ class _Equations:
         return (ramps * self.weight) @ self.whitened(self.row) / square, 1.0 / np.sqrt(square), float(turned.sum())
 
     def without_one(self, onset: int) -> float:
-        """Least evidence for a ramp with any one visit left out, which is to give it a parameter of its own."""
+        """Return the least evidence for a ramp with any one visit left out, which gives the visit a parameter of its own."""
         visit = self.whitened(np.eye(len(self.row)))
         ramps = self.beside(self.beside(self.ramps()[onset], visit), self.beside(self.level(), visit))
         part, square = (ramps * self.weight) @ self.whitened(self.row), (ramps**2) @ self.weight
@@ -368,7 +369,7 @@ def _drift(equations: _Equations, visits: NDArray[np.intp], robot: int, freedom:
 
 
 def odd_ones(values: Array) -> list[tuple[int, float, float, float]]:
-    """Return robots whose usual value lies far from the others', the farthest first; none where many do, as in a fleet of several models.
+    """Return robots whose median value is far from the other robots', the farthest first; none where many are, as in a fleet of several models.
 
     Parameters
     ----------
@@ -378,7 +379,7 @@ def odd_ones(values: Array) -> list[tuple[int, float, float, float]]:
     Returns
     -------
     list of (robot, usual, fleet, apart)
-        Row, median of its visits, median of all robots' medians, and the robust standard deviations between them.
+        Row of the robot, median of its visits, median of all robots' medians, and robust standard deviations between both medians.
     """
     usual = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in values])
     known = np.isfinite(usual)

@@ -1,4 +1,4 @@
-"""Where entries are diagnosed: processes of this machine, or a Ray cluster. Both hand back outcomes as they come."""
+"""Engines that diagnose the entries of a fleet: processes of this machine, or a Ray cluster; both yield outcomes as they arrive."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from armgap.workers import THREADS, one_thread
 __all__ = ["ENGINES", "Engine", "EngineMissingError"]
 
 Engine = Callable[..., Iterator[tuple[Entry, Outcome]]]
-# Entries handed out at a time, per worker: enough that none waits, few enough that memory stays bounded.
+# Entries per worker that are handed out ahead: enough that no worker waits, few enough that memory stays bounded.
 _AHEAD = 2
 
 
 class EngineMissingError(ArmgapError, ImportError):
-    """A package that the engine needs is not installed."""
+    """Error: a package that the chosen engine needs is not installed."""
 
     def __str__(self) -> str:
-        """Return the one-line text."""
+        """Return the error as one line of text."""
         return str(self.args[0])
 
 
 def local(
     entries: Sequence[Entry], settings: Mapping[str, Any], *, workers: int, limit_s: float, address: str | None
 ) -> Iterator[tuple[Entry, Outcome]]:
-    """Diagnose in processes of this machine, one thread each; a process that dies or takes too long costs its entry only."""
+    """Diagnose entries in processes of this machine, one thread each; a process that dies or takes too long costs its entry only."""
     if address is not None:
         raise OptionError("--address is for --engine ray", remedy="leave it out")
     with one_thread(), pebble.ProcessPool(max_workers=workers, context=get_context("spawn")) as pool:
@@ -61,7 +61,7 @@ def local(
 def ray(
     entries: Sequence[Entry], settings: Mapping[str, Any], *, workers: int, limit_s: float, address: str | None
 ) -> Iterator[tuple[Entry, Outcome]]:
-    """Diagnose on a Ray cluster: the one at `address`, or one started on this machine. Paths have to be the same on all its nodes."""
+    """Diagnose entries on the Ray cluster at `address`, or on one started on this machine. Paths have to be equal on all nodes."""
     cluster = _needed("ray", "--engine ray", "ray")
     threads = dict.fromkeys(THREADS, "1")
     options = {"address": address} if address else {"num_cpus": workers}
@@ -94,7 +94,7 @@ def ray(
 
 
 ENGINES: dict[str, Engine] = {"local": local, "ray": ray}
-"""Engines by name."""
+"""Engines of a fleet by name: functions that diagnose entries."""
 
 
 def _as_they_come(

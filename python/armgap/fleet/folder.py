@@ -1,4 +1,4 @@
-"""The folder of a fleet: one diagnosis per entry, the tables and the page. What stands in it is not computed again."""
+"""Folder of a fleet's results: one diagnosis per entry, tables and page; existing results are not computed again."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from armgap.fleet.work import Outcome, content_key
 __all__ = ["LIMIT_S", "Fleet", "belongs", "run_fleet"]
 
 LIMIT_S = 600.0
-"""Longest time for one entry [s]."""
+"""Longest time for the diagnosis of one entry of a fleet [s]."""
 _DIAGNOSES = "diagnoses"
 _SUMMARY, _PARAMETERS, _PAGE = "summary.parquet", "parameters.parquet", "index.html"
 
 
 def belongs(path: Path) -> bool:
-    """Whether an entry of the folder is one that a fleet writes."""
+    """Whether a file in the folder of results is one that a fleet writes."""
     return path.name in (_DIAGNOSES, _SUMMARY, _PARAMETERS, _PAGE)
 
 
 @dataclass(frozen=True)
 class Fleet:
-    """What a manifest came to.
+    """Results of the diagnoses of a manifest.
 
     Attributes
     ----------
     folder : Path
-        Where everything lies.
+        Folder of the results.
     summary, parameters : polars.DataFrame
         The tables, see docs/formats.md.
     answered : int
-        Entries computed by this run; the others stood in the folder.
+        Number of entries computed by this run; results of other entries existed already.
     settings : mapping
-        Keyword arguments that each diagnosis had.
+        Keyword arguments of each diagnosis.
     """
 
     folder: Path
@@ -54,7 +54,7 @@ class Fleet:
 
     @property
     def failed(self) -> pl.DataFrame:
-        """Entries without a diagnosis, and why."""
+        """Entries without a diagnosis, with the reason."""
         return self.summary.filter(pl.col("error").is_not_null())
 
 
@@ -75,9 +75,9 @@ def run_fleet(
     Parameters
     ----------
     entries : sequence of Entry
-        See `read_manifest`.
+        Entries of a manifest, see `read_manifest`.
     folder : path-like
-        Made if it is not there. Results belong to the content of logs and arm file, the settings and the version; entries whose process
+        Folder of results, made if missing. Results belong to the content of logs and arm file, the settings and the version; entries whose process
         died or took too long are tried again by the next run.
     settings : mapping, optional
         Keyword arguments of `armgap.diagnose`, such as ``horizon``.
@@ -88,11 +88,11 @@ def run_fleet(
     limit_s : float, default 600
         Longest time for one entry [s].
     address : str, optional
-        Of a Ray cluster that runs already.
+        Address of a running Ray cluster.
     again : bool, default False
-        Diagnose also what stands in the folder.
+        Whether to repeat diagnoses whose results exist.
     progress : callable, optional
-        Is told how many entries are done, and of how many.
+        Called with the number of entries done and of all entries.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def _keep(place: Path, key: str, outcome: Outcome) -> None:
 def _written(
     folder: Path, keys: Mapping[Entry, str], lost: Mapping[str, Outcome], answered: int, settings: Mapping[str, Any]
 ) -> Fleet:
-    """Make tables and page of what stands in the folder, one diagnosis in memory at a time."""
+    """Write tables and page from the results in the folder, with one diagnosis in memory at a time."""
     from armgap.fleet.page import fleet_document
     from armgap.report.output import render_report
 

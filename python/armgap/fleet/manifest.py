@@ -1,4 +1,4 @@
-"""Manifests: which logs belong to which arm, and when they were recorded."""
+"""Manifest of a fleet: arms, their logs, and times of recording."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SEPARATOR = ";"
 
 
 class ManifestError(ArmgapError):
-    """A manifest cannot be read, or one of its rows is no entry."""
+    """Error: a manifest cannot be read, or one of its rows is no valid entry."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +32,15 @@ class Entry:
     Attributes
     ----------
     robot : str
-        Which arm.
+        Name of the robot.
     arm : str
-        Path of its arm file.
+        Path of the robot's arm file.
     logs, holdout : tuple of str
-        Paths or URLs of its logs; without a holdout the last part of every log is held out.
+        Paths or URLs of the robot's logs; without a holdout the last part of every log is held out.
     time : str
         When the logs were recorded, ISO 8601; empty where that is unknown.
     row : int
-        Of the manifest, counted from 1.
+        Row of the manifest, counted from 1.
     """
 
     robot: str
@@ -52,12 +52,12 @@ class Entry:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Everything the diagnosis is made from."""
+        """All files and URLs that the diagnosis of the entry reads."""
         return (self.arm, *self.logs, *self.holdout)
 
 
 def is_url(word: str) -> bool:
-    """Whether a log is named by a URL, which polars reads."""
+    """Whether a log is given by a URL, not by a path."""
     return "://" in word
 
 
@@ -67,12 +67,12 @@ def read_manifest(path: str | Path) -> list[Entry]:
     Parameters
     ----------
     path : path-like
-        Its columns are `COLUMNS`; several logs are separated by ``;`` or, in TOML, listed. Paths are relative to the manifest.
+        File with the columns `COLUMNS`; several logs are separated by ``;`` or, in TOML, listed. Paths are relative to the manifest.
 
     Raises
     ------
     ManifestError
-        If it cannot be read, a column is missing, or a row has no robot, arm or log, or a time that is none.
+        If the manifest cannot be read, lacks a column, or has a row without robot, arm or log, or with an invalid time.
     OptionError
         If the name does not end in ``.csv``, ``.parquet`` or ``.toml``.
     """

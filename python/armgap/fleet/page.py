@@ -1,4 +1,4 @@
-"""The page of a fleet: robots by cause, what drifts, which robot is the odd one, and what failed."""
+"""HTML page of a fleet: robots by cause, drifting parameters, robots that differ from the others, and failed entries."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 __all__ = ["fleet_document", "moved", "plain_time"]
 
-# Charts and rows that are shown; the tables hold all of them.
+# Charts and table rows that the fleet's page shows at most; the tables on disk hold all.
 _CHARTS, _ROWS = 6, 40
 _EMPTY = "-"
 _MIDNIGHT = "T00:00:00"
 
 
 def fleet_document(fleet: Fleet) -> Document:
-    """Return the page of a fleet."""
+    """Return the page of a fleet as a document."""
     robots = fleet.summary["robot"].n_unique()
     moves, odd_ones = list(moving(fleet.parameters)), odd(fleet.parameters)
     failed, done = fleet.failed.height, fleet.summary.filter(pl.col("error").is_null())
@@ -56,7 +56,7 @@ def _since(move: Move) -> str:
 
 
 def plain_time(time: str | None) -> str:
-    """Return a time for people: a midnight is a day, an unknown one a dash."""
+    """Return a time for a reader: midnight as a day, an unknown time as a dash."""
     return (time or _EMPTY).removesuffix(_MIDNIGHT)
 
 
@@ -153,7 +153,7 @@ def _moving(parameters: pl.DataFrame, moves: list[Move]) -> Section:
 
 
 def _course(parameters: pl.DataFrame, move: Move) -> Drawing:
-    """The parameter of one robot over its visits, with its interval."""
+    """Return a chart of one robot's parameter over its visits, with its 95 % interval."""
     robot, of, name = move.robot, move.of, move.name
     rows = parameters.filter((pl.col("robot") == robot) & (pl.col("of") == of) & (pl.col("name") == name)).sort("time")
     value, sigma = rows["value"].to_numpy(), rows["sigma"].fill_null(0.0).to_numpy()

@@ -1,4 +1,4 @@
-"""Series of parameters over the visits of robots: which of them drift, and which robot's values lie far from the others'."""
+"""Series of parameters over the visits of robots: tests for drift, and for robots that differ from the others."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Series:
     Attributes
     ----------
     of, name : str
-        What the parameter is of, ``arm`` or ``effect:joint``, and its name.
+        Owner of the parameter, ``arm`` or ``effect:joint``, and the parameter's name.
     robots : list of str
-        Rows.
+        Names of the robots, one per row.
     times : list of list of str
         When each value was estimated; empty where that is unknown or there is no value.
     values, sigma : ndarray, shape (n_robots, n_visits)
-        Estimates and standard errors, NaN where there is none. A column holds visits of the same day: the first of each robot on that day,
+        Estimates and standard errors, NaN for none. A column holds visits of the same day: the first of each robot on that day,
         or the second, and so on. Without times the first visits of all robots stand in one column.
     """
 
@@ -48,13 +48,13 @@ class Move:
     Attributes
     ----------
     robot, of, name : str
-        Which parameter of which robot.
+        Robot, owner of the parameter (``arm`` or ``effect:joint``), and the parameter's name.
     visit : int
-        From which of the robot's visits it changes, counted from 1 among those that have a value.
+        First of the robot's visits with a changed parameter, counted from 1 among those with a value.
     since : str
-        Time of that visit; empty where it is unknown.
+        Time of the first changed visit; empty where unknown.
     drift : Drift
-        How fast, and by how much evidence.
+        Rate of the drift and its evidence.
     """
 
     robot: str
@@ -67,7 +67,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Odd:
-    """A parameter of one robot whose `usual` value lies `apart` from the `fleet`'s by so many robust standard deviations; medians, in its unit."""
+    """A parameter of one robot whose median `usual` differs from the `fleet`'s median by `apart` robust standard deviations, in its unit."""
 
     robot: str
     of: str
@@ -83,7 +83,7 @@ def series_of(parameters: pl.DataFrame) -> list[Series]:
     Parameters
     ----------
     parameters : polars.DataFrame
-        As ``parameters.parquet``.
+        Table as in ``parameters.parquet``.
     """
     place = ["robot", "of", "name"]
     day = pl.col("time").fill_null("").str.slice(0, _DAY)
@@ -108,12 +108,12 @@ def _series(of: str, name: str, table: pl.DataFrame) -> Series:
 
 
 def moving(parameters: pl.DataFrame) -> Iterator[Move]:
-    """Yield what drifts: parameters of arms and of causes, by name, the surest of each first.
+    """Yield the drifting parameters of arms and of causes, by name, strongest evidence of each name first.
 
     Parameters
     ----------
     parameters : polars.DataFrame
-        As ``parameters.parquet``.
+        Table as in ``parameters.parquet``.
     """
     found = series_of(parameters)
     tests = sum(len(series.robots) for series in found)
@@ -130,7 +130,7 @@ def odd(parameters: pl.DataFrame) -> list[Odd]:
     Parameters
     ----------
     parameters : polars.DataFrame
-        As ``parameters.parquet``.
+        Table as in ``parameters.parquet``.
     """
     found = [
         Odd(series.robots[robot], series.of, series.name, usual, fleet, apart)

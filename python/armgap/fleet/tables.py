@@ -1,4 +1,4 @@
-"""Rows of the tables: one per named cause, and one per parameter."""
+"""Rows of a fleet's tables: one per named cause, and one per parameter."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ PARAMETERS: dict[str, type[pl.DataType]] = {
 
 
 def summary_rows(entry: Entry, diagnosis: dict[str, Any]) -> list[Row]:
-    """Return the rows of an entry's diagnosis."""
+    """Return the rows of ``summary.parquet`` for one entry's diagnosis."""
     gap = diagnosis["gap"]
     of_entry = {
         **_empty(entry),
@@ -56,7 +56,7 @@ def summary_rows(entry: Entry, diagnosis: dict[str, Any]) -> list[Row]:
 
 
 def failed_row(entry: Entry, error: str, seconds: float | None) -> Row:
-    """Return the row of an entry without a diagnosis."""
+    """Return the row of ``summary.parquet`` for an entry without a diagnosis."""
     return {**_empty(entry), "seconds": seconds, "error": error}
 
 
@@ -65,14 +65,14 @@ def _empty(entry: Entry) -> Row:
 
 
 def _place(cause: dict[str, Any]) -> str:
-    """Where a cause is: a joint, two joints with the sign of the second's motion, or nothing."""
+    """Return the location of a cause as text: a joint, two joints with the sign of the second's motion, or empty."""
     if cause.get("row"):
         return f"{cause['joints'][0]}{'+' if cause['row'][1] > 0 else '-'}{cause['joints'][1]}"
     return str(cause["joint"] or "")
 
 
 def parameter_rows(entry: Entry, diagnosis: dict[str, Any]) -> Iterator[Row]:
-    """Yield the re-estimated parameters of the arm, and those of its named causes."""
+    """Yield rows of ``parameters.parquet``: re-estimated parameters of the arm, and parameters of its named causes."""
     place = {"robot": entry.robot, "time": entry.time or None}
     arm = diagnosis["parameters"]["with_causes"]
     found = [("arm", name, value) for name, value in arm.items()]

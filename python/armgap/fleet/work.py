@@ -1,4 +1,4 @@
-"""One entry diagnosed in a process of its own; what goes wrong with it is a sentence, not the end of the fleet."""
+"""Diagnosis of one entry of a fleet in its own process; a failure becomes one sentence and does not end the fleet."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from armgap.fleet.manifest import Entry, is_url
 __all__ = ["Outcome", "answer", "answer_within", "content_key", "took_too_long"]
 
 Outcome = dict[str, Any]
-"""``diagnosis``, the JSON text, or ``error``, one line, or ``lost``, why there is neither; and ``seconds``."""
-#: Time between alarms [s]: an exception raised inside a destructor or a callback of another library is swallowed there.
+"""Outcome of an entry: ``diagnosis`` (JSON text), ``error`` (one line), or ``lost`` (reason why there is neither); and ``seconds``."""
+#: Time between repeated alarms [s]: an exception raised inside a destructor or a callback of another library is swallowed.
 _ALARM_AGAIN_S = 0.5
 _READERS: dict[str, Callable[[str], pl.DataFrame]] = {".parquet": pl.read_parquet, ".csv": pl.read_csv}
 
 
 def content_key(entry: Entry, settings: Mapping[str, Any]) -> str:
-    """Return what a result belongs to: the content of the files, the settings and the version; of a URL its text.
+    """Return a hash of all that a result depends on: content of the files, settings and version; for a URL its text.
 
-    A file that cannot be read counts by its name, so that the entry is tried again once it is there.
+    A file that cannot be read counts by its name, so that the entry is tried again once the file exists.
     """
     mark = hashlib.sha256(json.dumps([__version__, dict(settings), len(entry.logs)], sort_keys=True).encode())
     for place in entry.files:
@@ -47,7 +47,7 @@ def _digest(place: str) -> bytes:
 
 
 def answer(entry: Entry, settings: Mapping[str, Any]) -> Outcome:
-    """Diagnose an entry.
+    """Diagnose one entry of a fleet and return its outcome.
 
     Parameters
     ----------
@@ -71,23 +71,23 @@ def answer(entry: Entry, settings: Mapping[str, Any]) -> Outcome:
 
 
 def took_too_long(limit_s: float) -> Outcome:
-    """Return the outcome of an entry that was stopped after its time [s]; the next run tries it again."""
+    """Return the outcome of an entry that was stopped after `limit_s` [s]; the next run tries the entry again."""
     return {"lost": f"took longer than {limit_s:g} s", "seconds": limit_s}
 
 
 class _TimeIsUp(BaseException):
-    """Raised by the alarm; no `Exception`, so that nothing on the way takes it for a defect of the entry."""
+    """Exception of the alarm at the time limit; no `Exception`, so that no handler takes it for a defect of the entry."""
 
 
 def answer_within(entry: Entry, settings: Mapping[str, Any], limit_s: float) -> Outcome:
-    """Diagnose an entry in the main thread of a process, for so long at most [s]; without limit where there is no ``SIGALRM`` (Windows).
+    """Diagnose an entry in the main thread of a process, for at most `limit_s` [s]; without limit on systems without ``SIGALRM`` (Windows).
 
     Parameters
     ----------
     entry, settings
         As for `answer`.
     limit_s : float
-        Above 0.
+        Time limit [s], above 0.
     """
     if not hasattr(signal, "SIGALRM"):
         return answer(entry, settings)
@@ -107,7 +107,7 @@ def answer_within(entry: Entry, settings: Mapping[str, Any], limit_s: float) -> 
 
 
 def _source(place: str) -> Any:
-    """A path as it is; of a URL the table that polars reads there."""
+    """Return a path as it is; for a URL the table that polars reads from it."""
     if not is_url(place):
         return Path(place)
     suffix = Path(place.partition("?")[0]).suffix.lower()

@@ -1,4 +1,4 @@
-"""What a log holds: columns, sampling, steps, saturation, motion, and what it tells about the arm's parameters."""
+"""Inspection of a log: columns, sampling, steps, saturation, motion, and excitation of the arm's parameters."""
 
 from armgap.inspection.inspection import Inspection, inspect
 from armgap.inspection.unmapped import Column, Columns, columns_of

@@ -1,4 +1,4 @@
-"""What each joint's position and torque look like: steps, saturation, rest and motion."""
+"""Properties of each joint's position and torque in a log: steps, saturation, rest and motion."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ __all__ = ["FlatTop", "JointChannels", "joint", "step_of"]
 if not TYPE_CHECKING:
     __getattr__ = old_names(__name__)
 
-# So many changes between samples tell the step of a channel.
+# Number of changes between samples from which the step of a channel is determined at most.
 _ENOUGH = 200_000
 _SMALLEST = 2000
-# Changes are whole multiples of a step if most lie this close to one, in steps.
+# Changes of a channel are whole multiples of a step if at least this share of them (second) lies this close (first, in steps).
 _CLOSE, _MOST = 0.05, 0.97
-# A torque stays at its extreme for at least this many samples where it is cut off.
+# Samples in a row for which a torque stays at its extreme, at least, where it is cut off.
 _FLAT_SAMPLES = 5
 _FLAT_MARGIN = 1e-6
-# A joint rests where it moves, over the time below, by no more than two steps, and slower than this part of its top speed.
+# A joint rests where it moves over this time by no more than two steps, and slower than this part (second number) of its top speed.
 _SPAN_S = 0.02
 _REST_STEPS = 2.0
 _REST_SHARE = 1e-3
@@ -33,7 +33,7 @@ _REST_SHARE = 1e-3
 
 @dataclass(frozen=True)
 class FlatTop:
-    """A level at which a torque is cut off: share of the samples there, and the longest time in one go."""
+    """A level at which a torque is cut off: share of the samples at the level, and longest uninterrupted time [s]."""
 
     level: float
     share: float
@@ -42,24 +42,24 @@ class FlatTop:
 
 @dataclass(frozen=True)
 class JointChannels:
-    """One joint's channels.
+    """Properties of one joint's position and torque in a log.
 
     Attributes
     ----------
     joint : int
-        Counted from 1.
+        Joint, counted from 1.
     q_range, tau_range : tuple of float
-        Smallest and largest position [rad or m] and torque [N m or N]; no torque of a log that holds references in its place.
+        Smallest and largest position [rad or m] and torque [N m or N]; no torque for a log of references.
     q_step, tau_step : float, optional
-        Step in whole multiples of which values change; None if they change by any amount.
+        Step of which all changes of position or torque are whole multiples; None without a step.
     q_step_arm : float, optional
-        Encoder step of the arm file.
+        Encoder step of the arm file [rad or m].
     top_speed : float
         Speed exceeded for 1 % of the time [rad/s or m/s].
     rest, motion : float
-        Shares of the time.
+        Shares of the time at rest and in motion.
     reversals : int
-        Changes of direction.
+        Number of changes of direction.
     flat_tops : tuple of FlatTop
         Levels at which the torque is cut off.
     """
@@ -78,7 +78,7 @@ class JointChannels:
 
 
 def joint(log: Log, j: int, arm: Arm | None) -> JointChannels:
-    """Return what the channels of joint `j` (from 0) look like."""
+    """Return the properties of position and torque of joint `j` (from 0)."""
     q = np.ascontiguousarray(log.q[:, j])
     tau = np.ascontiguousarray(log.tau[:, j]) if log.has_torques else None
     step = step_of(q)
@@ -102,7 +102,7 @@ def joint(log: Log, j: int, arm: Arm | None) -> JointChannels:
 
 
 def step_of(values: NDArray[np.float64]) -> float | None:
-    """Return the step in whole multiples of which values change, None if there is none.
+    """Return the step of which all changes of the values are whole multiples; None without a step.
 
     Examples
     --------
@@ -119,7 +119,7 @@ def step_of(values: NDArray[np.float64]) -> float | None:
 
 
 def _fitted(moved: NDArray[np.float64], step: float) -> float | None:
-    """Return the step nearest to a guess, None if changes are not whole multiples of it."""
+    """Return the step nearest to a guess; None if changes are not whole multiples of it."""
     for most in (5, 50, 500):  # small multiples first, so that the guess's error does not add up
         multiples = np.round(moved / step)
         near = (multiples >= 1) & (multiples <= most)
@@ -130,7 +130,7 @@ def _fitted(moved: NDArray[np.float64], step: float) -> float | None:
 
 
 def _smallest(values: NDArray[np.float64]) -> float:
-    """Return what changes between samples amount to at rest, for a channel without steps."""
+    """Return the size of changes between samples at rest, for a channel without steps."""
     moved = np.abs(np.diff(values[:_ENOUGH]))
     moved = moved[moved > 0]
     return float(np.quantile(moved, 0.05)) if len(moved) else 0.0
@@ -142,7 +142,7 @@ def _speeds(t: NDArray[np.float64], q: NDArray[np.float64], period: float) -> ND
 
 
 def _flat_tops(tau: NDArray[np.float64], period: float) -> tuple[FlatTop, ...]:
-    """Return the extremes at which a torque stays for several samples in a row, and more than once or long."""
+    """Return the extremes at which a torque stays for several samples in a row, repeatedly or for long."""
     low, high = float(tau.min()), float(tau.max())
     margin = _FLAT_MARGIN * max(abs(low), abs(high))
     found = []

@@ -1,4 +1,4 @@
-"""Whether a motion tells the arm's parameters.
+"""Excitation of an arm's parameters by the motion of a log.
 
 The filtered dynamic regression ``y = psi theta`` of the arm is run over the log; the information ``A = sum psi' psi`` follows from the
 covariance of recursive least squares, ``A = P^-1 - P(0)^-1``, and adds up over stretches. Parameters are measured in units of the arm
@@ -29,25 +29,25 @@ __all__ = ["Excitation", "ParameterExcitation", "excitation"]
 if not TYPE_CHECKING:
     __getattr__ = old_names(__name__)
 
-#: Variance of a parameter that nothing is known of, in squares of its unit: far above any information that a log has.
+#: Variance of an unknown parameter, in squares of its unit: far above the information of any log.
 _P0 = 1e9
 _CUTOFF = 50.0  # rad/s
 _BUDGET = 200_000  # samples
-# What an error of this part of the RMS torque, white, would do to a parameter.
+# White error, as a part of the RMS torque, for which standard deviations of parameters are stated.
 _ERROR = 0.01
-# Information below this part of the largest is none, within rounding.
+# Information below this part of the largest counts as none, within rounding.
 _NOTHING = 1e-14
 _WELL, _HARDLY = 0.05, 0.5
 
 
 @dataclass(frozen=True)
 class ParameterExcitation:
-    """What a log tells about one parameter.
+    """Excitation of one parameter of an arm by a log.
 
     Attributes
     ----------
     name : str
-        Its name.
+        Name of the parameter.
     value : float
         The arm file's value [SI].
     sigma : float
@@ -67,16 +67,16 @@ class ParameterExcitation:
 
 @dataclass(frozen=True)
 class Excitation:
-    """What a log tells about the parameters of an arm.
+    """Excitation of the parameters of an arm by a log.
 
     Attributes
     ----------
     condition : float
         Condition number of the regressor with parameters in units of the arm file's values; infinite if some combination is not excited.
     parameters : tuple of ParameterExcitation
-        In the arm's order.
+        Excitation of each parameter, in the arm's order.
     weakest : str
-        The combination of parameters that the log tells least about.
+        Combination of parameters that the log excites least.
     samples : int
         Samples used.
     """
@@ -88,7 +88,7 @@ class Excitation:
 
 
 def excitation(log: Log, arm: Arm) -> Excitation:
-    """Return what a log tells about the parameters of an arm; of a long log, its informative stretches are used."""
+    """Return the excitation of an arm's parameters by a log; for a long log, its informative stretches are used."""
     parts = choose([log], _BUDGET)
     scale = np.where(arm.theta != 0.0, np.abs(arm.theta), arm.sigma)
     information = sum((_information(part, arm) for part in parts), np.zeros((len(scale), len(scale))))
@@ -110,7 +110,7 @@ def excitation(log: Log, arm: Arm) -> Excitation:
 
 
 def _information(log: Log, arm: Arm) -> NDArray[np.float64]:
-    """Return ``sum psi' psi`` over a log."""
+    """Return the information matrix ``sum psi' psi`` of a log's filtered dynamic regression."""
     t, q, tau = (np.ascontiguousarray(x) for x in (log.t, log.q, log.tau))
     estimator = Estimator(arm, scheme="filtered-dynamic", cutoff=_CUTOFF, p0=_P0)
     estimator.run(q, tau, _native.velocity(t, q, "local-cubic", 3), t=t)
@@ -124,7 +124,7 @@ def _word(sigma: float) -> str:
 
 
 def _combination(direction: NDArray[np.float64], arm: Arm) -> str:
-    """Name the parameters that make up a direction, those that matter."""
+    """Name the parameters with the largest parts in a direction of parameter space."""
     direction = direction / direction[np.argmax(np.abs(direction))]
     terms = [
         (abs(c), f"{c:+.2g} {name}") for c, name in zip(direction, arm.parameter_names, strict=True) if abs(c) > 0.2

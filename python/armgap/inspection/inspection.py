@@ -1,4 +1,4 @@
-"""The inspection of one log."""
+"""The function `inspect` and its result: the inspection of one log."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from armgap.progress import report_progress
 
 __all__ = ["Inspection", "inspect"]
 
-# Checks against the arm predict over this time [s], from parameters that this part of the log has taught.
+# Horizon of predictions in the checks against the arm file [s], with parameters from an earlier part of the log.
 _HORIZON_S = 0.25
 _LEARNT = 0.6
 
@@ -36,23 +36,23 @@ class Inspection:
     log : str
         Name of the log.
     columns : dict
-        The file's own names by standard name.
+        Column names of the file by standard name.
     sampling : Sampling
-        When samples were taken.
+        Rate, jitter and gaps of the samples.
     joints : tuple of JointChannels
-        Positions and torques of each joint.
+        Properties of position and torque of each joint.
     excitation : Excitation, optional
-        What the log tells about the arm's parameters; None without an arm, and for a serial arm.
+        Excitation of the arm's parameters; None without an arm, and for a serial arm.
     findings : tuple of Finding
-        What was noticed, recognised or changed while reading.
+        Remarks from reading the log: recognised, changed or unusual contents.
     source : Log
         The log itself.
     rotary : bool, optional
-        Whether the joints turn; None without an arm, and where some turn and some slide.
+        Whether the joints are rotary; None without an arm, and for an arm with rotary and linear joints.
     kind : str
         Kind of the arm; empty without one.
     checks : tuple of Check
-        What was noticed about the log by itself and against the arm file.
+        Defects of the log by itself and against the arm file.
     """
 
     log: str
@@ -68,13 +68,13 @@ class Inspection:
 
     @property
     def units(self) -> tuple[str, str]:
-        """Units of positions and of torques; both kinds without an arm that says which."""
+        """Units of positions and of torques; rotary and linear ones if no arm is given."""
         if self.rotary is None:
             return "rad or m", "N m or N"
         return ("rad", "N m") if self.rotary else ("m", "N")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the result, ready for JSON, without the log itself; what is infinite becomes null."""
+        """Return the inspection as a dict ready for JSON, without the log; infinite numbers become null."""
         found: dict[str, Any] = {"schema": "armgap.inspection/1", "log": self.log, "columns": self.columns}
         found["sampling"] = asdict(self.sampling)
         found["joints"] = [asdict(j) for j in self.joints]
@@ -85,21 +85,21 @@ class Inspection:
         return plain
 
     def to_json(self, indent: int | None = None) -> str:
-        """Return the result as JSON."""
+        """Return the inspection as JSON."""
         return json.dumps(self.to_dict(), indent=indent, allow_nan=False)
 
 
 def inspect(log: Any, arm: Arm | None = None, *, repair: bool = True) -> Inspection:
-    """Say what a log holds.
+    """Inspect a log: columns, sampling, steps, saturation, motion and excitation.
 
     Parameters
     ----------
     log : Log, path or table
-        The log, or anything that `Log.read` and `Log.from_frame` take.
+        Log to inspect, or anything that `Log.read` and `Log.from_frame` take.
     arm : Arm, optional
-        The arm it belongs to; needed for what the log tells about parameters, and for checks against the arm file.
+        Arm of the log, needed for the excitation of parameters and for checks against the arm file.
     repair : bool, default True
-        Whether what can be repaired without guessing is repaired before the figures are taken.
+        Whether unambiguous defects are repaired before figures are computed.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def inspect(log: Any, arm: Arm | None = None, *, repair: bool = True) -> Inspect
 
 
 def _checked(log: Log, arm: Arm | None, *, repair: bool) -> tuple[Log, tuple[Check, ...]]:
-    """Return the log, repaired, and what is to be said about it; an arm's own checks judge the last part on the first."""
+    """Return the repaired log, and its checks; those against the arm test the last part with parameters from the first part."""
     log, checks = data_checks(log, arm, repair=repair)
     if arm is None or arm.chain is not None or log.duration < 4 * _HORIZON_S:
         return log, tuple(checks)

@@ -1,4 +1,4 @@
-"""An inspection as one HTML page that loads nothing from elsewhere."""
+"""HTML page of inspections that loads no external files."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from armgap.report.words import SummaryAnswer
 
 __all__ = ["render"]
 
-#: Points of a drawn line and bars of a histogram: more than a screen resolves.
+#: Points of a drawn line, or bars of a histogram, at most: more than a screen resolves.
 _POINTS = 1500
 _BINS = 60
-#: What is marked in the curves: its words, its shape, its colour.
+#: Marks of findings in curves: words, shape and colour by kind of finding.
 _MARKS = {"cleaned": ("left out", "inverted_triangle", charts.BEFORE), "gap": ("gap", "triangle", charts.REFIT)}
 
 
 def render(inspections: Sequence[Inspection]) -> str:
-    """Return the page for one inspection or several."""
+    """Return the HTML page for one inspection or several."""
     single = len(inspections) == 1
     title = f"Log: {inspections[0].log}" if single else f"{len(inspections)} logs"
     lead = "What the log holds, how it was sampled, and what its motion tells."
@@ -41,7 +41,7 @@ def render(inspections: Sequence[Inspection]) -> str:
 
 
 def _read(found: Inspection) -> dict[str, Any]:
-    """Columns and units of a log as the section of the conventions takes them."""
+    """Return columns and units of a log in the form of a report's section on conventions."""
     return {"name": found.log, "columns": dict(found.source.columns), "units": dict(found.source.units)}
 
 
@@ -96,7 +96,7 @@ def _over_time(found: Inspection) -> list[Any]:
 
 
 def _mark(chart: Any, found: Inspection, low: float) -> None:
-    """Mark below a curve when rows were left out, and where there are gaps."""
+    """Mark rows that were left out, and gaps, below a curve."""
     for kind, (label, marker, colour) in _MARKS.items():
         times = [t for f in found.findings if f.kind == kind for t in f.times]
         if times:
@@ -106,7 +106,7 @@ def _mark(chart: Any, found: Inspection, low: float) -> None:
 
 
 def _envelope(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the smallest and largest value of each part of a curve, so that nothing sticks out unseen."""
+    """Return the smallest and largest value of each part of a curve, so that no peak is lost in a drawing."""
     rows = len(t) // _POINTS
     if rows < 3:
         return t, values

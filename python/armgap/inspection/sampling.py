@@ -1,4 +1,4 @@
-"""When samples were taken: rate, jitter, gaps."""
+"""Sampling of a log: rate, jitter, gaps."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armgap.log.log import Log
 __all__ = ["Sampling", "sampling"]
 
 GAP_PERIODS = 3.0
-"""A hole longer than this many periods is a gap."""
+"""Length of a hole in the samples, in sample periods, from which it counts as a gap."""
 
 #: Gaps that are listed at most.
 _LISTED = 5
@@ -19,7 +19,7 @@ _LISTED = 5
 
 @dataclass(frozen=True)
 class Sampling:
-    """When samples were taken.
+    """Sampling of a log: rate, jitter and gaps.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Sampling:
     gaps : int
         Holes longer than three periods.
     gap_s : float
-        Sum of their lengths.
+        Sum of the gaps' lengths [s].
     widest : tuple of (float, float)
         Time and length of the widest gaps, widest first [s].
     """
@@ -49,7 +49,7 @@ class Sampling:
 
 
 def sampling(log: Log) -> Sampling:
-    """Return when a log's samples were taken."""
+    """Return rate, jitter and gaps of a log's samples."""
     steps = np.diff(log.t)
     period = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP_PERIODS * period)

@@ -1,4 +1,4 @@
-"""An inspection in a terminal."""
+"""Output of an inspection in a terminal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["column_table", "tables"]
 
 
 def tables(found: Inspection) -> RenderableType:
-    """Return what `rich` prints: what the log is, its joints, and what it tells about the arm's parameters."""
+    """Return an inspection as tables for `rich`: properties of the log, of its joints, and excitation of the arm's parameters."""
     from rich import box
     from rich.console import Group
     from rich.table import Table
@@ -40,7 +40,7 @@ def tables(found: Inspection) -> RenderableType:
 
 
 def column_table(found: Columns, file: str) -> RenderableType:
-    """Return what `rich` prints of a file that nobody has mapped: its columns, and a mapping to confirm."""
+    """Return a table for `rich` of a file without a mapping of columns: its columns, and a mapping to confirm."""
     from rich import box
     from rich.console import Group
     from rich.table import Table

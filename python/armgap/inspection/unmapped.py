@@ -1,6 +1,6 @@
-"""A file whose columns nobody has named yet: what each column holds, and a mapping that its name and trend suggest.
+"""Columns of a log file without a mapping to standard names: contents of each column, and a mapping proposed by names and trends.
 
-What is proposed is for the user to confirm: nothing is read by it.
+The proposal is for the user to confirm; no log is read with it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Column", "Columns", "columns_of"]
 
-#: Words of a name, in the order in which quantities are looked for: "pos_vel" is a velocity, "target_position" no measurement.
+#: Words in a column's name that suggest a quantity, in the order in which they are tried: "pos_vel" is a velocity, "target_position" no measurement.
 _WORDS: dict[str, re.Pattern[str]] = {
     "skip": re.compile(
         r"(target|desired|des|ref|reference|setpoint|goal|temp|temperature|voltage|error|err|status|acc|acceleration)"
@@ -36,24 +36,24 @@ _WORDS: dict[str, re.Pattern[str]] = {
 }
 _TIME = re.compile(r"(t|time|stamp|timestamp|sec|secs|seconds|clock|ms|us|ns|nanosec)")
 _JOINT = ("q", "tau", "dq")
-#: What stands where no column suggests itself.
+#: Placeholder in a proposed mapping for a standard name without a suggested column.
 _PLACEHOLDER = "NAME"
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a file.
+    """Contents of one column of a log file.
 
     Attributes
     ----------
     name, dtype : str
-        As in the file.
+        Name and type of the column in the file.
     unit : str or None
         Unit that the file states.
     rows, missing : int
         Rows, and rows without a finite number.
     low, high : float or None
-        Range of its numbers; None where it holds none.
+        Range of the numbers; None for a column without numbers.
     trend : str
         ``"rising"`` (as times do), ``"constant"``, ``"varies"``, or ``"text"``.
     """
@@ -70,7 +70,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Columns:
-    """The columns of a file that nobody has mapped, and a mapping to confirm.
+    """Columns of a log file without a mapping to standard names, and a proposed mapping.
 
     Attributes
     ----------
@@ -79,9 +79,9 @@ class Columns:
     columns : tuple of Column
         Every column of the file.
     proposed : dict
-        Column by standard name; ``"NAME"`` where none suggests itself.
+        Column by standard name; ``"NAME"`` where no column is suggested.
     units : dict
-        Units by group that this mapping would need, such as ``{"q": "deg"}``.
+        Units by group that the proposed mapping needs, such as ``{"q": "deg"}``.
     """
 
     log: str
@@ -91,12 +91,12 @@ class Columns:
 
     @property
     def options(self) -> str:
-        """The mapping as options of the command line."""
+        """Proposed mapping as command-line options."""
         words = f"--columns {shlex.quote(_pairs(self.proposed))}"
         return f"{words} --units {_pairs(self.units)}" if self.units else words
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object, schema ``armgap.columns/1``."""
+        """Return the columns and the proposed mapping as a JSON object, schema ``armgap.columns/1``."""
         return {
             "schema": "armgap.columns/1",
             "log": self.log,
@@ -115,7 +115,7 @@ def columns_of(path: str | Path, arm: Arm | None = None) -> Columns:
     path : path-like
         Log of any format.
     arm : Arm, optional
-        Arm the log belongs to; says how many joints there are.
+        Arm of the log, for the number of joints.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def _course(values: NDArray[np.float64]) -> str:
 
 
 def _proposed(columns: tuple[Column, ...], n_joints: int | None) -> dict[str, str]:
-    """Standard names in their order, each with the column that suggests itself."""
+    """Return suggested columns by standard name, in the order of standard names."""
     usable = [c for c in columns if c.low is not None]
     kinds = {c.name: _kind(c) for c in usable}
     rising = [c.name for c in usable if c.trend == "rising"]
@@ -172,13 +172,13 @@ def _proposed(columns: tuple[Column, ...], n_joints: int | None) -> dict[str, st
 
 
 def _numbered(names: list[str]) -> list[str]:
-    """Names in the order of the first number in each, where each has one; else as in the file."""
+    """Return names sorted by the first number in each, if every name has one; else in the order of the file."""
     numbers = [re.search(r"[0-9]+", name) for name in names]
     return sorted(names, key=lambda name: int(re.findall(r"[0-9]+", name)[0])) if all(numbers) else names
 
 
 def _kind(column: Column) -> str | None:
-    """What a column seems to be: by the words of its name; a rising column with a name of time is time."""
+    """Return the quantity that a column seems to hold, by the words of its name; None if unknown. A time column also has to rise."""
     words = [w for w in re.split(r"[^a-z0-9]+", _spread(column.name)) if w]
     if column.trend == "rising" and any(_TIME.fullmatch(w) for w in words):
         return "t"
@@ -189,13 +189,13 @@ def _kind(column: Column) -> str | None:
 
 
 def _spread(name: str) -> str:
-    """A name in small letters whose words are apart: ``shoulderPos1`` is ``shoulder pos1``, and ``pos1`` is ``pos 1``."""
+    """Return a name in small letters with its words separated: ``shoulderPos1`` becomes ``shoulder pos1``, and ``pos1`` becomes ``pos 1``."""
     apart = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name).lower()
     return re.sub(r"(?<=[a-z]{2})(?=[0-9])", " ", apart)
 
 
 def _units(path: str | Path, proposed: dict[str, str], arm: Arm | None) -> dict[str, str]:
-    """Units that reading by a mapping would ask for, one after the other."""
+    """Return the units, by group, that reading with the proposed mapping would ask for."""
     units: dict[str, str] = {}
     if _PLACEHOLDER in proposed.values() or str(path) == "-":
         return units

@@ -1,4 +1,4 @@
-"""An inspection in words and tables of words, for the terminal and the page alike."""
+"""Texts and text tables of an inspection, for terminal and HTML page."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ __all__ = ["COLUMN_HEADER", "column_rows", "grids", "overview", "proposal"]
 
 Grid = tuple[list[str], list[list[str]]]
 COLUMN_HEADER = ("column", "type", "unit", "lowest", "highest", "trend", "missing")
-"""What is said of each column of a file that nobody has mapped."""
+"""Header of the table of a file's columns without a mapping to standard names."""
 _UNKNOWN = 10.0  # ten times the value
 _RECOMMENDED = 100.0  # condition number up to which a motion counts as a good one
 
 
 def overview(found: Inspection) -> list[tuple[str, str]]:
-    """Return questions and answers on the whole log."""
+    """Return questions and answers on a whole log."""
     s = found.sampling
     answers = [
         (
@@ -41,7 +41,7 @@ def overview(found: Inspection) -> list[tuple[str, str]]:
 
 
 def _duration(seconds: float) -> str:
-    """Seconds, and minutes or hours where there are many.
+    """Return a duration [s] as text, with minutes or hours in brackets for a long one.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def _excitation(e: Excitation) -> str:
 
 
 def grids(found: Inspection) -> list[tuple[str, Grid]]:
-    """Return titles and tables."""
+    """Return titles and tables of an inspection."""
     all_grids = [("Joints", _joints(found))]
     if found.excitation is not None:
         share = "Standard deviation of each parameter if the torque carried white noise of 1 % of its RMS"
@@ -139,7 +139,7 @@ def _parameters(e: Excitation) -> Grid:
 
 
 def column_rows(found: Columns) -> list[tuple[str, ...]]:
-    """Return a row per column of the file."""
+    """Return one table row per column of a file without a mapping."""
 
     def number(value: float | None) -> str:
         return "" if value is None else f"{value:.6g}"
@@ -151,7 +151,7 @@ def column_rows(found: Columns) -> list[tuple[str, ...]]:
 
 
 def proposal(found: Columns, file: str) -> list[str]:
-    """Return what to try next, and what to make sure of."""
+    """Return lines with a command to try for a file without a mapping, and with what to verify."""
     lines = [
         "not all of t, q1, tau1 and so on are there, and no mapping was given; by their names these may be meant:",
         f"armgap inspect {shlex.quote(file)} {found.options}",

@@ -1,4 +1,4 @@
-"""Logs: reading, naming of columns, and checks at the door."""
+"""Logs: reading of files, mapping of columns to standard names and SI units, and checks."""
 
 from armgap.log.findings import Finding
 from armgap.log.gather import gather, paths

@@ -1,4 +1,4 @@
-"""What a log must satisfy, and what is worth saying about it."""
+"""Requirements on a log, whose violation is an error, and findings worth reporting."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ if TYPE_CHECKING:
 
 __all__ = ["motion", "notice", "order", "unused", "without_repeats"]
 
-#: Samples of a log at least.
+#: Smallest number of samples of a log.
 _FEWEST_SAMPLES = 20
-# A hole longer than this many periods is a gap worth naming.
+# Length of a hole in the samples, in sample periods, from which it is reported as a gap.
 _GAP_PERIODS = 3.0
-# A sample period further than this from the arm file's is worth naming.
+# Relative deviation of the sample period from the arm file's from which it is reported.
 _PERIOD_MARGIN = 0.1
-# Sample times further than this part of a period from an even grid are worth naming.
+# Deviation of sample times from an even grid, in periods, from which it is reported.
 _JITTER = 0.02
-# Moments of one finding that are kept to be drawn.
+# Times per finding that are kept for charts at most.
 _DRAWN = 200
 
 
 def order(arrays: Arrays, place: Path | str, names: Names) -> None:
-    """Raise unless there are enough samples and their times increase."""
+    """Raise unless a log has enough samples and its times increase."""
     if len(arrays.t) < _FEWEST_SAMPLES:
         raise LogShapeError(
             f"holds {len(arrays.t)} samples, at least {_FEWEST_SAMPLES} are needed",
@@ -58,7 +58,7 @@ def order(arrays: Arrays, place: Path | str, names: Names) -> None:
 
 
 def without_repeats(arrays: Arrays) -> tuple[Arrays, list[Finding]]:
-    """Leave out rows that repeat the row before in time and every value, and say how many."""
+    """Leave out rows that repeat the time and all values of the row before, and return a finding with their number."""
     again = np.flatnonzero(np.diff(arrays.t) == 0) + 1
     if not len(again):
         return arrays, []
@@ -70,7 +70,7 @@ def without_repeats(arrays: Arrays) -> tuple[Arrays, list[Finding]]:
 
 
 def _repeat(arrays: Arrays, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Whether the row after each of `rows` is the same in every value."""
+    """Return a mask: whether the row after each of `rows` has equal values in all columns."""
     same: NDArray[np.bool_] = arrays.t[rows + 1] == arrays.t[rows]
     for values in (
         arrays.q, arrays.tau, arrays.dq, arrays.tau_meas, arrays.q_link, arrays.q_ref, arrays.dq_ref,
@@ -99,7 +99,7 @@ def motion(arrays: Arrays, place: Path | str, names: Names) -> None:
 
 
 def notice(arrays: Arrays, names: Names, arm: Arm | None) -> list[Finding]:
-    """Return what a reader should know although it does not stop the work."""
+    """Return findings about sampling, limits and constant columns that do not prevent a diagnosis."""
     plain = [*_constants(arrays, names), *_limits(arrays, names, arm)]
     return [
         *(Finding(kind, message) for kind, message in _sampling(arrays, arm)),
@@ -109,7 +109,7 @@ def notice(arrays: Arrays, names: Names, arm: Arm | None) -> list[Finding]:
 
 
 def unused(recording: Recording, names: Names) -> list[Finding]:
-    """Say which columns of velocities, measured torques and positions on the link's side are left out."""
+    """Return findings about columns of velocities, measured torques and link-side positions that are left out."""
     said = []
     for prefix in ("dq", "tau_meas", "q_link"):
         if columns := left_out(recording, names, prefix):

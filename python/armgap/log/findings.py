@@ -1,4 +1,4 @@
-"""What is noticed about a log without stopping the work."""
+"""Findings about a log that do not prevent a diagnosis."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from dataclasses import dataclass
 
 __all__ = ["Finding", "counted", "remarks"]
 
-# What was changed about a log, or how it was understood, is told of each log; the rest once per kind.
+# Kinds of findings that are reported for each log: changes and interpretations of the log; other kinds are reported once.
 _TOLD_EACH = frozenset({"units", "format", "joints", "torque", "clock", "cleaned", "corrected", "stretches"})
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something about a log that its reader should know but that does not stop the work.
+    """Finding about a log that its reader should know, but that does not prevent a diagnosis.
 
     Attributes
     ----------
     kind : str
-        How the log was understood: ``"format"``, ``"units"``, ``"joints"``, ``"torque"``, ``"clock"``, ``"columns"``. What
-        was changed: ``"cleaned"``, ``"corrected"``, ``"stretches"``. What is worth knowing: ``"sampling"``, ``"period"``, ``"gap"``,
-        ``"constant"``, ``"limit"``, ``"checks"``.
+        Kind of finding. Interpretation of the log: ``"format"``, ``"units"``, ``"joints"``, ``"torque"``, ``"clock"``, ``"columns"``. Changes
+        of the log: ``"cleaned"``, ``"corrected"``, ``"stretches"``. Other remarks: ``"sampling"``, ``"period"``, ``"gap"``, ``"constant"``,
+        ``"limit"``, ``"checks"``.
     message : str
-        In words.
+        The finding in words.
     times : tuple of float
-        When it happened, counted from the log's first sample [s], where it can be drawn; the first 200 of more.
+        Times of the finding from the log's first sample [s], for charts; 200 at most.
     """
 
     kind: str
@@ -33,7 +33,7 @@ class Finding:
 
 
 def counted(count: int, thing: str) -> str:
-    """Return a number of things.
+    """Return a count with its noun as text, in the plural unless the count is 1.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def counted(count: int, thing: str) -> str:
 
 
 def remarks(entries: Iterable[Mapping[str, str]]) -> list[str]:
-    """Return findings (``log``, ``kind``, ``message``) as lines; the same thing seen in many logs takes one line.
+    """Return findings (``log``, ``kind``, ``message``) as lines; equal findings in several logs share one line.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Tables in memory: polars, pandas, pyarrow, and mappings of arrays."""
+"""Tables in memory as logs: polars, pandas, pyarrow, and mappings of arrays."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ _KNOWN = "a polars, pandas or pyarrow table, or a mapping from names to arrays"
 
 
 def is_table(thing: Any) -> bool:
-    """Whether something is a table in memory rather than a path or a log."""
+    """Whether an object is a table in memory rather than a path or a log."""
     return isinstance(thing, pl.DataFrame | pl.LazyFrame | Mapping) or _is_pandas(thing) or _is_arrow(thing)
 
 
 def record(frame: Any, name: str) -> Recording:
-    """Return a table as a recording.
+    """Return a table in memory as a recording.
 
     Raises
     ------
     OptionError
-        If it is no table.
+        If the object is no table.
     """
     if isinstance(frame, Mapping):
         return _mapping(frame, name)
@@ -54,7 +54,7 @@ def _is_arrow(thing: Any) -> bool:
 
 
 def _pandas(frame: Any) -> pl.DataFrame:
-    """Return a pandas table; a named index is a column, as times often are."""
+    """Return a pandas table as a polars table; a named index becomes a column, as times often are."""
     if frame.index.name is not None and frame.index.name not in frame.columns:
         frame = frame.reset_index()
     _unique([str(column) for column in frame.columns], "table")

@@ -1,4 +1,4 @@
-"""Several logs at once: paths, patterns, tables, and sequences of these."""
+"""Reading of several logs: paths, patterns, tables, and sequences of these."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["gather", "paths"]
 
 
 def paths(words: Iterable[str | os.PathLike[str]]) -> list[Path]:
-    """Return the files that words stand for; a word that is no file may be a pattern such as ``logs/*.parquet``.
+    """Return the files given by paths or patterns; a word that is no file may be a pattern such as ``logs/*.parquet``.
 
     Raises
     ------
@@ -46,19 +46,19 @@ def gather(
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
 ) -> list[Log]:
-    """Return logs, read where they are not read yet.
+    """Return a list of logs; paths, patterns and tables are read.
 
     Parameters
     ----------
     logs : Log, path, pattern, table, or sequence of these
-        Tables are those of `Log.from_frame`.
+        Input to read; for tables see `Log.from_frame`.
     arm, columns, units
         As in `Log.read`.
 
     Raises
     ------
     OptionError
-        If something is none of these; otherwise as `Log.read`.
+        If an item has none of these types; other errors as for `Log.read`.
     """
     found: list[Log] = []
     alone = isinstance(logs, Log | str | os.PathLike) or is_table(logs) or not isinstance(logs, Iterable)

@@ -1,8 +1,8 @@
-"""Reading in a process apart.
+"""Reading of HDF5 and MATLAB files in a child process, safe from crashes of their libraries.
 
 The C libraries behind HDF5 and MATLAB files can crash on damaged ones (about 1 in 1500 to 3000 with a few bytes overwritten), or never
-come back. They run in a child, which hands over what it read; if the child dies, that is an error of the file and not the end of the
-program. One child serves all files that are read, and ends with the program.
+come back. They run in a child process, which returns the data; if the child dies, an error of the file is raised and the program
+goes on. One child serves all files that are read, and ends with the program.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from armgap.log.recording import Source
 
 __all__ = ["call"]
 
-#: Time that a reader in a process of its own is given, s, and a rate below every disk's, bytes/s, that prolongs it with the file.
+#: Time limit of a reader in a child process, s, and a data rate below any disk's, bytes/s, by which the limit grows with the file.
 _PATIENCE_S = 60.0
 _SLOWEST_BYTES_PER_S = 5e6
-#: Bytes of the number before each message that says how long it is.
+#: Length of the number before each message between parent and child, which states the message's size, bytes.
 _LENGTH = 8
 
 
 class CrashedError(Exception):
-    """The child died or did not come back."""
+    """Exception: the child process that reads a file died or did not answer in time."""
 
 
 class _Child:
-    """A child that answers requests until its input ends."""
+    """A child process that answers requests until its input ends."""
 
     def __init__(self) -> None:
         path = os.pathsep.join(p for p in sys.path if p)
@@ -45,7 +45,7 @@ class _Child:
         )
 
     def ask(self, request: Any, patience_s: float) -> Any:
-        """Return the answer to a request; whatever the child raised is raised here."""
+        """Send a request to the child process and return the answer; exceptions of the child are raised again."""
         timer = threading.Timer(patience_s, self.process.kill)
         timer.start()
         try:
@@ -64,7 +64,7 @@ class _Child:
         raise answer
 
     def close(self) -> None:
-        """End the child."""
+        """End the child process."""
         self.process.kill()
         self.process.wait()
         for pipe in (self.process.stdin, self.process.stdout):
@@ -80,12 +80,12 @@ _lock = threading.Lock()
 
 
 def call(module: str, function: str, source: Source) -> Any:
-    """Return ``module.function(source)``, run in a child.
+    """Return ``module.function(source)``, run in a child process.
 
     Raises
     ------
     CrashedError
-        If the child dies over it, or does not come back in time.
+        If the child dies, or does not answer in time.
     Exception
         Whatever the function raises.
     """
@@ -112,7 +112,7 @@ def _receive(stream: Any) -> Any:
 
 
 def _serve() -> None:
-    """Answer requests from standard input until it ends."""
+    """Answer requests from standard input until it ends, as the child process."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever a library prints must not come between answers
     requests = sys.stdin.buffer
@@ -129,7 +129,7 @@ def _serve() -> None:
 
 
 def _portable(error: Exception) -> Exception:
-    """Return an error that any process can load."""
+    """Return an exception that can be unpickled in any process."""
     return ValueError(str(error) or type(error).__name__)
 
 

@@ -1,4 +1,4 @@
-"""A log of an arm, checked."""
+"""The class `Log`: a checked log of an arm in SI units."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 __all__ = ["COLUMNS", "SIGNALS", "Log"]
 
 SIGNALS = ("q", "tau", "dq", "moment", "q_ref", "dq_ref", "tau_meas", "q_link")
-"""Arrays of a log with one row per sample, beside its times."""
+"""Names of a log's arrays with one row per sample, apart from its times."""
 
 COLUMNS = tuple(name for name in SIGNALS if name != "moment")
-"""Those of them that stand in files, a column per joint."""
+"""Names of a log's arrays that are stored in files, with one column per joint."""
 
-#: Times are kept to nanoseconds: parts of a second.
+#: Nanoseconds per second; times of a log are rounded to nanoseconds.
 _NS = 1e9
 
 
@@ -42,9 +42,9 @@ class Log:
     Attributes
     ----------
     name : str
-        Name in results, usually the file's.
+        Name of the log in results, usually that of the file.
     t : ndarray, shape (n_samples,)
-        Sample times [s], increasing, to the nanosecond; from 0, in a part of a log from where it begins.
+        Sample times [s], increasing, to the nanosecond; from 0, or from the begin of a part in its log.
     q : ndarray, shape (n_samples, n_joints)
         Positions as measured [rad or m].
     tau : ndarray, shape (n_samples, n_joints)
@@ -52,22 +52,22 @@ class Log:
     dq : ndarray, shape (n_samples, n_joints), optional
         Velocities, where a sensor gives them [rad/s or m/s].
     findings : tuple of Finding
-        What was noticed while reading.
+        Findings from reading the log.
     path : Path, optional
-        File it was read from.
+        File that the log was read from.
     columns : mapping
         The file's own name of each column in use, by standard name.
     moment : ndarray, shape (n_samples, n_joints), optional
-        First moment of every torque about the middle of its interval, where it is the mean of several [N m s^2 or N s^2].
+        First moment of every torque about the middle of its interval, if the torque is a mean of several [N m s^2 or N s^2].
     part_of : str, optional
-        Name of the log that it is a part of.
+        Name of the whole log, for a part of one.
     first_row : int
-        Row of that log, from 0, that it begins with.
+        First row of the part in the whole log, from 0.
     units : mapping
-        Unit that each of these columns had in the file, by standard name; the arrays are in SI units.
+        Unit of each column in the file, by standard name; the arrays are in SI units.
     q_ref, dq_ref : ndarray, shape (n_samples, n_joints), optional
-        Positions [rad or m] that a position controller was given at `t` and held until the next sample, of a log without torques, and velocities
-        [rad/s or m/s] where they are logged.
+        Reference positions [rad or m] of a position controller, given at `t` and held until the next sample, of a log without torques,
+        and reference velocities [rad/s or m/s] if logged.
     tau_meas : ndarray, shape (n_samples, n_joints), optional
         Torques as measured at `t`, from the motors' currents as a rule, beside the commanded ones [N m or N].
     q_link : ndarray, shape (n_samples, n_joints), optional
@@ -110,7 +110,7 @@ class Log:
             The file's own names of columns: ``{"q1": "shoulder_position"}``. Adds to the arm file's mapping and wins
             over it.
         arm : Arm, optional
-            Arm the log belongs to; its joints, sample period and limits are checked too.
+            Arm of the log; its joints, sample period and limits are checked too.
         units : mapping, optional
             Units of the file where they are not SI: ``{"t": "ms", "q": "deg"}``, see `armgap.log.conversion.units.FACTORS`. A
             group of columns whose unit is declared is not checked for its magnitude.
@@ -118,7 +118,7 @@ class Log:
         Raises
         ------
         LogReadError, ColumnError, SampleError, TimeError, UnitError, LogShapeError
-            Each names the file, column and row, and what to do.
+            If the log cannot be used; the message names file, column and row, and the remedy.
         """
         recording, name, source = record(path)
         return cls._build(recording, name, source, columns, arm, units)
@@ -133,7 +133,7 @@ class Log:
         arm: Arm | None = None,
         units: Mapping[str, str] | None = None,
     ) -> Log:
-        """Take a log from a table in memory.
+        """Make a log from a table in memory and check it.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class Log:
         Raises
         ------
         OptionError
-            If it is nothing of these; otherwise as `read`.
+            If `frame` has none of these types; other errors as for `read`.
         """
         return cls._build(frames.record(frame, name), name, None, columns, arm, units)
 
@@ -166,27 +166,27 @@ class Log:
         name: str = "log",
         arm: Arm | None = None,
     ) -> Log:
-        """Take a log from arrays.
+        """Make a log from arrays and check it.
 
         Parameters
         ----------
         t : array_like, shape (n_samples,)
             Sample times [s].
         q, tau, dq : array_like, shape (n_samples, n_joints), or (n_samples,) for one joint
-            Positions [rad or m], torques [N m or N], velocities [rad/s or m/s]; `tau` is None where references stand in its place.
+            Positions [rad or m], torques [N m or N], velocities [rad/s or m/s]; `tau` is None for a log of references.
         q_ref, dq_ref : array_like, as `q` and `dq`, optional
-            References of a position controller, which count where `tau` is None.
+            References of a position controller, used if `tau` is None.
         tau_meas, q_link : array_like, as `tau` and `q`, optional
             Torques as measured, and positions on the link's side of the transmissions.
         name : str
             Name of the log in results and errors.
         arm : Arm, optional
-            Arm the log belongs to.
+            Arm of the log.
 
         Raises
         ------
         OptionError
-            If the shapes do not fit; otherwise as `read`.
+            If the shapes do not fit; other errors as for `read`.
         """
         data: dict[str, NDArray[np.float64]] = {"t": np.asarray(t, dtype=np.float64)}
         given = {
@@ -243,7 +243,7 @@ class Log:
         return log if arm is None or arm.corrections is None else arm.corrections.on_log(log)
 
     def __post_init__(self) -> None:
-        """Put times on whole nanoseconds, so that a log is the same log in every format, and make the arrays read-only."""
+        """Round times to whole nanoseconds, so that a log is equal in every file format, and make the arrays read-only."""
         object.__setattr__(self, "t", np.rint(self.t * _NS) / _NS)
         for name in ("t", *SIGNALS):
             values = getattr(self, name)
@@ -259,7 +259,7 @@ class Log:
 
     @property
     def has_torques(self) -> bool:
-        """Whether torques are logged; of other logs references of a position controller are."""
+        """Whether torques are logged, not references of a position controller."""
         return bool(self.tau.shape[1])
 
     def with_torques(self, use: str) -> Log:
@@ -268,12 +268,12 @@ class Log:
         Parameters
         ----------
         use : str
-            What needs them, in words.
+            Purpose of the torques, in words, for the error message.
 
         Raises
         ------
         ColumnError
-            If it holds references in their place.
+            If the log holds references in place of torques.
         """
         if not self.has_torques:
             raise ColumnError(
@@ -291,7 +291,7 @@ class Log:
 
     @property
     def duration(self) -> float:
-        """Duration [s]."""
+        """Duration of the log [s]."""
         return float(self.t[-1] - self.t[0])
 
     def __len__(self) -> int:
@@ -300,25 +300,25 @@ class Log:
 
     @property
     def recording(self) -> str:
-        """Name of the whole log, also of a part of it."""
+        """Name of the whole log, for a part of a log too."""
         return self.part_of or self.name
 
     def _repr_html_(self) -> str:
-        """Return length, rate and columns as HTML for a notebook."""
+        """Return length, rate and columns of the log as HTML for a notebook."""
         from armgap.report.forms.shown import log_facts
 
         return log_facts(self).html()
 
     def _repr_markdown_(self) -> str:
-        """Return length, rate and columns as Markdown."""
+        """Return length, rate and columns of the log as Markdown."""
         from armgap.report.forms.shown import log_facts
 
         return log_facts(self).markdown()
 
     def part(self, first: int, last: int, name: str, *, findings: tuple[Finding, ...] | None = None) -> Log:
-        """Return the samples `first` up to, not including, `last` as a log of its own, with the times of this one.
+        """Return the samples from `first` up to, not including, `last` as a log with unchanged times.
 
-        It inherits the findings unless others are given.
+        The part keeps the log's findings unless `findings` are given.
         """
         rows = slice(first, last)
         arrays: dict[str, Any] = {
@@ -330,11 +330,11 @@ class Log:
         )
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Log:
-        """Return the log with other findings."""
+        """Return the log with other findings in place of its own."""
         return replace(self, findings=findings)
 
     def to_native(self, tables: Sequence[NDArray[np.float64]] = ()) -> tuple[Any, ...]:
-        """Return the log as the compiled core takes it, with a table of torques per custom effect."""
+        """Return the log as the tuple that the compiled core reads, with a table of torques per custom effect."""
         fix = np.ascontiguousarray
         moment, dq_ref = (None if x is None else fix(x) for x in (self.moment, self.dq_ref))
         reference = None if self.q_ref is None or self.has_torques else (fix(self.q_ref), dq_ref)
@@ -350,7 +350,7 @@ class Log:
         )
 
     def to_polars(self) -> pl.DataFrame:
-        """Return the log as a table with the columns ``t, q1 …, tau1 …`` and those of the other groups that there are, such as ``dq1 …``."""
+        """Return the log as a table with the columns ``t, q1 …, tau1 …`` and the other groups that the log holds, such as ``dq1 …``."""
         data = {"t": self.t}
         for prefix in COLUMNS:
             values = getattr(self, prefix)

@@ -1,4 +1,4 @@
-"""What a format's reader hands on: columns on one clock or several, before anything is named or checked."""
+"""Raw contents of a log file: columns on one clock or several, before mapping to standard names and checks."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ __all__ = ["Recording", "Source", "Stream", "Suggestion"]
 
 @dataclass(frozen=True)
 class Source:
-    """A file, a folder, or what came from standard input."""
+    """Source of a log: a file, a folder, or data from standard input."""
 
     path: Path
     data: bytes | None = None
 
     def open(self) -> BinaryIO:
-        """Return the bytes as a stream."""
+        """Return the source's bytes as a stream."""
         return io.BytesIO(self.data) if self.data is not None else self.path.open("rb")
 
     def head(self, size: int) -> bytes:
-        """Return the first bytes."""
+        """Return the first `size` bytes of the source."""
         with self.open() as stream:
             return stream.read(size)
 
     @property
     def size(self) -> int:
-        """Number of bytes."""
+        """Number of bytes of the source."""
         return len(self.data) if self.data is not None else self.path.stat().st_size
 
 
@@ -46,9 +46,9 @@ class Stream:
     columns : tuple of str
         Names, unique in the whole recording.
     fetch : callable
-        Returns a column by name; reads it when it is asked for.
+        Function that reads a column, by name, on demand.
     time : str, optional
-        Column that holds the times, where the format knows.
+        Column with the times, if the format states it.
     units : mapping
         Units that the file states, by column, as in `armgap.log.conversion.units.FACTORS`.
     """
@@ -60,13 +60,13 @@ class Stream:
 
     @classmethod
     def of(cls, frame: pl.DataFrame, time: str | None = None, units: Mapping[str, str] | None = None) -> Stream:
-        """Take the columns of a table in memory."""
+        """Return a stream with the columns of a table in memory."""
         return cls(tuple(frame.columns), frame.__getitem__, time, units or {})
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """Which column is which, said by the file itself, and what to tell about it."""
+    """Mapping of columns that a file itself suggests, with findings to report."""
 
     names: Mapping[str, str]
     findings: tuple[Finding, ...] = ()
@@ -74,16 +74,16 @@ class Suggestion:
 
 @dataclass(frozen=True)
 class Recording:
-    """All columns of a log.
+    """All columns of a log file, before mapping to standard names.
 
     Attributes
     ----------
     streams : tuple of Stream
-        One per clock.
+        Streams of columns, one per clock.
     findings : tuple of Finding
-        What was noticed while reading.
+        Findings from reading the file.
     suggest : callable, optional
-        ``suggest(n_joints, mapped)`` returns names for what is not mapped, where the format knows joints by itself.
+        ``suggest(n_joints, mapped)`` returns columns for unmapped standard names, if the format names joints.
     """
 
     streams: tuple[Stream, ...]
@@ -92,7 +92,7 @@ class Recording:
 
     @property
     def columns(self) -> list[str]:
-        """Names of all columns."""
+        """Names of all columns of the recording."""
         return [name for stream in self.streams for name in stream.columns]
 
     def stream_of(self, column: str) -> Stream:

@@ -1,10 +1,10 @@
-"""Stretches of long logs that are worth diagnosing.
+"""Selection of the informative stretches of long logs for a diagnosis.
 
 A diagnosis costs time per sample, and hours of a log mostly repeat each other or rest. Logs beyond a budget are cut into stretches of
-equal length; each is described by what it visits, and stretches are taken one by one, always the one that adds most to what is covered
-already. Covered are cells per joint: position by direction of motion, speed on a logarithmic scale, torque, and reversals at each
-level of torque; and parts of the log's time, for what changes while an arm warms up. What a cell adds shrinks with what is in it
-already, so that what was seen often is left for what was not; what a sensor's noise alone would do counts as rest.
+equal length; each is described by the cells that it visits, and stretches are taken one by one, always the one that adds most
+coverage. There are cells per joint: position by direction of motion, speed on a logarithmic scale, torque, and reversals at each
+level of torque; and parts of the log's time, for what changes while an arm warms up. The gain of a cell shrinks with its
+contents, so that rare cells are preferred to frequent ones; motion within a sensor's noise counts as rest.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from armgap.log.log import Log
 __all__ = ["BUDGET", "STRETCH_S", "choose"]
 
 BUDGET = 24_000
-"""Samples of all training logs, or of all holdout logs, that are diagnosed whole; of more, stretches are chosen."""
+"""Samples of all training logs, or of all holdout logs, up to which logs are diagnosed whole; for longer logs stretches are chosen."""
 
 STRETCH_S = 2.0
-"""Length of a stretch [s]."""
+"""Length of a stretch of a long log [s]."""
 
 _FEWEST = 4  # stretches, however long
 _POSITIONS = 12
 _SPEEDS = 6  # decades below the top speed, in halves
 _TORQUES = 8
 _TIMES = 8
-# A stretch needs at least this share of its samples in motion of some joint.
+# Share of samples with motion of some joint that a stretch needs at least.
 _MOTION = 0.02
-# Slower than this part of the log's top speed, and by fewer position steps than this, a joint is at rest.
+# Speed below which a joint is at rest: this part of the log's top speed, and fewer position steps than the second number.
 _REST_SHARE = 1e-3
 _REST_STEPS = 2.0
 
 
 @dataclass(frozen=True)
 class _Ranges:
-    """What the cells span, over all logs, per joint."""
+    """Ranges of position, speed and torque that the cells of coverage span, over all logs, per joint."""
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
@@ -57,15 +57,15 @@ def choose(logs: Sequence[Log], budget: int = BUDGET, *, horizon: float = 0.25) 
     logs : sequence of Log
         Logs of one arm.
     budget : int, default `BUDGET`
-        Samples of all logs together.
+        Largest number of samples of all logs together.
     horizon : float, default 0.25
         Prediction horizon [s]; a stretch lasts four horizons at least.
 
     Returns
     -------
     list of Log
-        The logs themselves if they fit. Otherwise stretches, each a log on the clock of the one it was cut from and with its place in
-        its name; the first of each log says how much was chosen.
+        The logs themselves if they are within the budget. Otherwise stretches, each a log with the times of its whole log and with its place
+        in its name; the first stretch of each log has a finding on how much was chosen.
     """
     if sum(len(log) for log in logs) <= budget:
         return list(logs)
@@ -96,7 +96,7 @@ def _cut(index: int, log: Log, length_s: float, budget: int) -> list[tuple[int, 
 
 
 def _visits(logs: Sequence[Log], pieces: list[tuple[int, int, int]]) -> NDArray[np.float64]:
-    """Return how much of each piece lies in each cell, shape (n_pieces, n_cells); nothing for pieces at rest."""
+    """Return the samples of each piece in each cell of coverage, shape (n_pieces, n_cells); zero for pieces at rest."""
     speeds = [_Speeds(log) for log in logs]
     ranges = _ranges(speeds)
     cells = np.array([_cells(logs[i], speeds[i], slice(first, last), ranges) for i, first, last in pieces])
@@ -116,21 +116,21 @@ class _Speeds:
         self.rest = _REST_STEPS * np.array(step) / (self.stride * log.sample_period)
 
     def of(self, rows: slice) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        """Return speeds (n, n_joints) in a range of rows, and the rows they belong to."""
+        """Return speeds, shape (n, n_joints), in a range of rows, and the rows of the speeds."""
         at = np.arange(rows.start, rows.stop, self.stride)
         moved, passed = np.diff(self.log.q[at], axis=0), np.diff(self.log.t[at])
         return moved / passed[:, None], at[:-1]
 
 
 def _step(values: NDArray[np.float64]) -> float:
-    """Return the typical change between samples while at rest: the lower quartile of the changes there are."""
+    """Return the typical change between samples at rest: the lower quartile of non-zero changes."""
     moved = np.abs(np.diff(values[: 1 << 20]))
     moved = moved[moved > 0]
     return float(np.quantile(moved, 0.05)) if len(moved) else 0.0
 
 
 def _ranges(speeds: Sequence[_Speeds]) -> _Ranges:
-    """Return ranges of samples, chosen from speeds that stand for several samples each."""
+    """Return the ranges that the cells of coverage span, from speeds of all logs."""
     tops = [np.quantile(np.abs(s.of(slice(0, len(s.log)))[0]), 0.999, axis=0) for s in speeds]
     q = [s.log.q[:: s.stride] for s in speeds]
     tau = [_load(s.log, slice(None, None, s.stride)) for s in speeds]
@@ -143,7 +143,7 @@ def _ranges(speeds: Sequence[_Speeds]) -> _Ranges:
 
 
 def _cells(log: Log, speeds: _Speeds, rows: slice, ranges: _Ranges) -> NDArray[np.float64]:
-    """Return the share of a piece's samples in each cell, all joints."""
+    """Return the share of a piece's samples in each cell of coverage, for all joints."""
     dq, at = speeds.of(rows)
     rest = np.maximum(speeds.rest, _REST_SHARE * ranges.speed)
     moving = np.abs(dq) > rest
@@ -153,7 +153,7 @@ def _cells(log: Log, speeds: _Speeds, rows: slice, ranges: _Ranges) -> NDArray[n
 
 
 def _load(log: Log, rows: slice | NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return the size of the torques in some rows, shape (n, n_joints); behind a position controller that of the position errors."""
+    """Return absolute torques in some rows, shape (n, n_joints); with a position controller, absolute position errors."""
     return np.abs(log.tau[rows] if log.q_ref is None or log.has_torques else log.q_ref[rows] - log.q[rows])
 
 
@@ -183,7 +183,7 @@ def _joint_cells(
 
 
 def _greedy(visits: NDArray[np.float64], rows: list[int], budget: int) -> list[int]:
-    """Return pieces, in order, that cover most within the budget: sums of logarithms, gained most first."""
+    """Return the chosen pieces in order: greedily those with the largest gain in summed logarithms of coverage, within the budget."""
     covered = np.full(visits.shape[1], 0.1)
     left = set(np.flatnonzero(visits.any(axis=1)).tolist())
     chosen: list[int] = []
@@ -203,7 +203,7 @@ def _greedy(visits: NDArray[np.float64], rows: list[int], budget: int) -> list[i
 
 
 def _parts(whole: Log, spans: list[tuple[int, ...]]) -> list[Log]:
-    """Return stretches of a log as logs; the first carries the log's findings and what was chosen."""
+    """Return stretches of a log as logs; the first has the log's findings and a finding on how much was chosen."""
     parts = []
     for first, last in _merged(spans):
         name = f"{whole.name} ({whole.t[first]:.6g} to {whole.t[last - 1]:.6g} s)"
@@ -221,7 +221,7 @@ def _parts(whole: Log, spans: list[tuple[int, ...]]) -> list[Log]:
 
 
 def _merged(spans: list[tuple[int, ...]]) -> list[tuple[int, int]]:
-    """Join stretches that follow each other."""
+    """Return stretches with adjacent ones joined."""
     merged: list[tuple[int, int]] = []
     for first, last in sorted(spans):
         if merged and merged[-1][1] == first:

@@ -1,4 +1,4 @@
-"""Linear least squares of a rival's values, the arm's with their prior, to a difference of predictions."""
+"""Linear least squares: parameters of arm and rival, the arm's with their prior, fitted to a difference of predictions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class Fitted(NamedTuple):
-    """Values fitted to a difference, what is left of it in standard deviations, and its square with that of the prior."""
+    """Result of a fit to a difference of predictions: values, remaining difference in standard deviations, and its square plus that of the prior."""
 
     values: Array
     left: Array
@@ -23,16 +23,16 @@ class Fitted(NamedTuple):
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns that are fitted to a difference of predictions.
+    """Regressor columns that are fitted to a difference of predictions.
 
     Attributes
     ----------
     common : ndarray, shape (n_numbers, n_common)
-        Of what every model fits, in standard deviations of the prior.
+        Columns of the values that every model fits, in standard deviations of the prior.
     free : ndarray, shape (n_numbers, n_free)
-        Of the rival's own values, without a prior.
+        Columns of the rival's own values, without a prior.
     names : tuple of str
-        Those values.
+        Names of the rival's own values.
     simulated : int
         Leading columns of `common` that are parameters of the arm.
     """
@@ -43,14 +43,14 @@ class Columns:
     simulated: int
 
     def product(self, values: Array, *, simulated: bool) -> Array:
-        """Change of the predictions by some values; `simulated` leaves out what no simulation has: the nuisances."""
+        """Return the change of the predictions by some values; `simulated` leaves out nuisances, which no simulation has."""
         common = values[: self.common.shape[1]].copy()
         if simulated:
             common[self.simulated :] = 0.0
         return np.asarray(self.common @ common + self.free @ values[self.common.shape[1] :], dtype=np.float64)
 
     def fitted(self, delta: Array, weight: Array) -> Fitted:
-        """Fit the columns to a difference, each number of which has a weight."""
+        """Return the weighted least-squares fit of the columns to a difference of predictions."""
         n, k = self.common.shape[1], self.free.shape[1]
         columns = np.hstack([self.common, self.free]) * weight[:, None]
         # Values without a prior in units of what they do, so that they are as well scaled as the rest.

@@ -1,11 +1,11 @@
 """Expected evidence of a motion for one model against another (T-optimality, Atkinson and Fedorov 1975).
 
-Both models predict the motion's windows from the same starts under the same torques, as a diagnosis does. What counts of their
-difference is what is left after the rival's values, all of the arm's (with the arm file's standard deviations as prior) and a diagnosis'
+Both models predict the motion's windows from the same starts under the same torques, as a diagnosis does. The difference of their
+predictions counts that remains after the rival's values, all of the arm's (with the arm file's standard deviations as prior) and a diagnosis'
 nuisances are fitted to it to first order; half of its square, in units of noise and discrepancy, is the expected log-likelihood ratio.
 
-A decision of `armgap.diagnose` needs more than a likely effect: without it the gap has to stand above the noise floor, and most windows
-have to prefer it. Both are counted too, by its own thresholds.
+A decision of `armgap.diagnose` needs more than a likely effect: without the effect the gap has to exceed the noise floor, and most
+windows have to prefer the effect. Both conditions are evaluated too, with the diagnosis' thresholds.
 """
 
 from __future__ import annotations
@@ -31,34 +31,34 @@ __all__ = ["HypothesisPair", "PredictedMotion", "Setting"]
 
 Array = NDArray[np.float64]
 
-#: Samples per window at which motions are predicted; denser ones than the log's are not taken.
+#: Samples per prediction window at which motions are predicted, at most as dense as those of a log.
 WINDOW_SAMPLES = 50
-#: Polynomials per window and joint; those of degree 0 and 1 take up the start's error.
+#: Polynomials per window and joint that represent predictions; those of degree 0 and 1 take up the error of the initial state.
 DEGREES = 12
-#: Discrepancy at least, as a part of the noise floor.
+#: Smallest assumed discrepancy of the best model, as a part of the noise floor.
 LEAST_DISCREPANCY = 0.3
 #: RMS of t^2 over an interval, over the RMS of its part of degree 2 (Legendre polynomials).
 BEND = 6.0
-#: Time by which predictions with latent states begin before their windows, s.
+#: Time before a window at which the prediction of a model with latent states begins, s.
 LEAD = 0.15
 #: Tolerance of predictions, in standard deviations of a position.
 ACCURACY = 0.1
-#: Change of a parameter over which its sensitivity is taken, in standard deviations of its prior, and at most this part of its value.
+#: Step of finite differences for a parameter's sensitivity, in standard deviations of its prior, and at most this part of its value.
 STEP_SIGMA, STEP_PART = 0.2, 0.02
-#: Part of a log that a diagnosis fits to, its beginning; it judges on the rest.
+#: Part of a log, from its beginning, that a diagnosis fits to; it judges on the rest.
 TRAINED = 0.6
 #: Widths of the smoothed sign of friction that a diagnosis may choose, in RMS speeds of the motion.
 SMOOTHED = (0.01, 0.05)
-#: Steps in which a rival is fitted beyond first order.
+#: Gauss-Newton steps in which a rival is fitted after the first-order fit.
 _STEPS = 8
-#: Decrease of a step, as a part of what was left, below which the fit has settled.
+#: Decrease of the cost by a Gauss-Newton step, as a part of the cost before, below which the fit of a rival has converged.
 SETTLED = 0.02
 _MEASURED = ("encoder_offset", "encoder_eccentricity")
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What evidence is counted with.
+    """Models, noise and horizon with which the expected evidence of a motion is computed.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Setting:
     sigma : ndarray, shape (n_joints,)
         Standard deviation of a measured position [rad or m].
     encoder_step : ndarray, shape (n_joints,)
-        Step of the encoders, zero where it is not known [rad or m].
+        Step of the encoders, zero where unknown [rad or m].
     discrepancy : ndarray, shape (n_joints,)
         RMS error of predictions that the best model leaves beyond the noise floor [rad or m].
     excess : float
@@ -85,7 +85,7 @@ class Setting:
 
     @classmethod
     def of(cls, data: dict[str, Any], model: Hypothesis) -> Setting:
-        """Return the setting of a diagnosis (its JSON object)."""
+        """Return the setting for a diagnosis (its JSON object) and its best model."""
         gap, noise = data["gap"], data["noise"]
         after, floor = np.array(gap["after"], dtype=np.float64), np.array(gap["floor"], dtype=np.float64)
         beyond = np.maximum(after**2 - floor**2, 0.0)
@@ -97,7 +97,7 @@ class Setting:
 
     @property
     def arm(self) -> Arm:
-        """The arm."""
+        """Arm of the best model."""
         return self.model.arm
 
     @property
@@ -109,7 +109,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class HypothesisPair:
-    """One question as models.
+    """Two sets of models for one question of a planned experiment: with the effect, and without it.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class HypothesisPair:
     rival : tuple of EffectInstance
         Effects of the rival's model.
     free : EffectInstance, optional
-        The effect of the rival whose values are fitted.
+        Effect of the rival with fitted values.
     """
 
     alternatives: tuple[tuple[float, tuple[EffectInstance, ...]], ...]
@@ -127,16 +127,16 @@ class HypothesisPair:
 
 
 class PredictedMotion:
-    """A motion, its torques, and what models predict over its windows.
+    """A reference motion, its torques, and the predictions of models over its windows.
 
     Parameters
     ----------
     setting : Setting
-        What evidence is counted with.
+        Models, noise and horizon of the predictions.
     motion : Motion
-        The motion.
+        Reference motion.
     most : int, optional
-        Windows that are looked at, spread evenly; evidence is that of all.
+        Windows that are predicted, spread evenly; evidence is scaled to all windows.
     """
 
     def __init__(self, setting: Setting, motion: Motion, most: int | None = None) -> None:
@@ -167,7 +167,7 @@ class PredictedMotion:
         self._columns: Array | None = None
 
     def _weights(self) -> tuple[Array, Array]:
-        """One over the standard deviations of a window's polynomials, from white noise and from all; shape (n_windows, n_degrees, n_joints).
+        """Return the inverse standard deviations of a window's polynomials: by white noise, and in total; shape (n_windows, n_degrees, n_joints).
 
         An encoder's rounding stays the same until the joint has moved by a step. The discrepancy is that of a torque that changes from window
         to window: its positions fall with the square of the degree.
@@ -193,7 +193,7 @@ class PredictedMotion:
         lead: bool,
         smoothing: tuple[float, ...] | None = None,
     ) -> Array:
-        """Factors of the polynomials in the predictions of all windows, one column of numbers [rad or m].
+        """Return the polynomial coefficients of the predictions of all windows as one vector [rad or m].
 
         Raises
         ------
@@ -231,7 +231,7 @@ class PredictedMotion:
         return np.asarray(np.einsum("wsj,sk->wkj", found, self._basis), dtype=np.float64).ravel()
 
     def _true_start(self, rows: Array, effects: Sequence[EffectInstance]) -> tuple[Array, Array]:
-        """States of the joints behind the encoders, which show the reference."""
+        """Return the joints' true positions and velocities at the windows' starts, for encoders that read the reference."""
         q, dq = self.q[rows], self.dq[rows]
         sensors = [e for e in effects if e.effect in _MEASURED]
         if not sensors:
@@ -242,9 +242,9 @@ class PredictedMotion:
         return middle, dq * (above - below) / (2 * step)
 
     def sensitivities(self) -> Array:
-        """Derivatives of the predictions by what every model fits, in standard deviations of the prior; shape (n_numbers, n_columns).
+        """Return derivatives of the predictions by the values that every model fits, per prior standard deviation; shape (n_numbers, n_columns).
 
-        Arm parameters; a delay of all torques, whose prior is one sample; widths of the smoothed sign of friction.
+        The values are arm parameters; a delay of all torques, whose prior is one sample; widths of the smoothed sign of friction.
         """
         if self._columns is None:
             self._columns = np.column_stack([*self._of_parameters(), *self._of_nuisances()])
@@ -280,12 +280,12 @@ class PredictedMotion:
         return columns
 
     def outcome(self, pair: HypothesisPair, steps: int = _STEPS) -> Outcome:
-        """What the motion tells about a pair; nothing where a model's motion cannot be computed.
+        """Return the expected outcome of the motion for a pair of models; no evidence where a model cannot be simulated.
 
         Parameters
         ----------
         pair : HypothesisPair
-            The pair.
+            Models with and without the effect in question.
         steps : int, default 8
             Gauss-Newton steps in which the rival is fitted, beyond the first-order fit.
         """
@@ -303,7 +303,7 @@ class PredictedMotion:
         return Outcome(left, self._share * plain, above / needs, certain, prior, weight, spread)
 
     def floors(self, pair: HypothesisPair, index: int, floor: Array) -> float:
-        """RMS difference of one of the pair's models from the rival, in noise floors, worst joint; infinite if it cannot be computed."""
+        """Return the RMS difference of model `index` of a pair from the rival, in noise floors, at the worst joint; infinite if not computable."""
         try:
             delta, _ = self._difference(pair.alternatives[index][1], pair)
         except ValueError:
@@ -313,11 +313,11 @@ class PredictedMotion:
         return float(np.max(rms / np.maximum(floor, 1e-12)))
 
     def difference(self, pair: HypothesisPair) -> Array:
-        """Difference of the first model's predictions from the rival's."""
+        """Return the difference of predictions between the pair's first model and the rival."""
         return self._difference(pair.alternatives[0][1], pair)[0]
 
     def left_of(self, delta: Array, column: Array | None = None) -> tuple[float, float]:
-        """Square of what the arm's own values leave of a difference, and the factor of a further column that is fitted with them."""
+        """Return the square of a difference that the arm's parameters leave, and the coefficient of a further column fitted with them."""
         free = np.empty((len(delta), 0)) if column is None else column[:, None]
         found = Columns(self.sensitivities(), free, (), len(self._arm.sigma)).fitted(delta, self._whole)
         return found.square, 0.0 if column is None else float(found.values[-1])
@@ -370,7 +370,7 @@ class PredictedMotion:
     def _moved(
         self, pair: HypothesisPair, columns: Columns, values: Array
     ) -> tuple[tuple[float, ...], tuple[EffectInstance, ...]]:
-        """The rival's model with fitted values; friction and inertia stay positive."""
+        """Return the rival's model with fitted values added; friction and inertia stay positive."""
         arm, theta = self._arm, np.array(self._setting.model.theta)
         p = len(theta)
         changed = theta + arm.sigma * values[:p]
@@ -385,7 +385,7 @@ class PredictedMotion:
         return tuple(kept.tolist()), tuple(moved if e == pair.free else e for e in pair.rival)
 
     def _of_rival(self, pair: HypothesisPair, lead: bool) -> tuple[tuple[str, ...], Array]:
-        """Values of the rival's effect that are fitted, and derivatives of its predictions by them."""
+        """Return names of the rival's fitted values, and derivatives of its predictions by them."""
         theta, free = self._setting.model.theta, pair.free
         if free is None:
             return (), np.empty((len(self._white), 0))
@@ -402,7 +402,7 @@ class PredictedMotion:
         return tuple(names), np.column_stack(columns)
 
 
-#: Values of an effect that say where it sits, not how large it is.
+#: Parameters of an effect that state its location, not its size.
 _FIXED = ("riding", "encoder_at_motor", "friction_at_motor", "rotor_rides")
 
 

@@ -1,4 +1,4 @@
-"""Torques that a motion needs, by the compiled core: nothing here knows an arm's equation."""
+"""Torques that a motion needs, by inverse dynamics from the compiled core."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ __all__ = ["LATENT", "inverse_dynamics", "torque_with"]
 
 Array = NDArray[np.float64]
 
-#: Effects with a state that no encoder shows: their torque is not that of an instant.
+#: Effects with a state that no encoder shows: their torque is no function of the present motion alone.
 LATENT = ("joint_elasticity", "backlash", "presliding", "actuator_lag", "actuator_delay")
-#: Effects that let no torque suffice, or whose torque has no bound.
+#: Effects that limit the torque, or whose torque has no bound, so that inverse dynamics fail.
 UNREACHABLE = ("contact", "torque_saturation")
-#: Time over which an acceleration is taken, s.
+#: Simulated time from which an acceleration is computed, s.
 INSTANT = 1e-5
 #: Speed below which a joint may stick, rad/s or m/s.
 MOVING = 1e-3
 
 
 def accelerations(model: Hypothesis, q: Array, dq: Array, tau: Array, t: Array) -> Array:
-    """Accelerations of a model in some states, under some torques; shape of `q`."""
+    """Return accelerations of a model in given states under given torques [rad/s^2 or m/s^2]; shape of `q`."""
     arm = model.arm
     lengths = None if arm.link_length is None else arm.link_length.tolist()
     effects, theta = [e.on(e.joint) for e in model.effects], list(model.theta)
@@ -42,9 +42,9 @@ def accelerations(model: Hypothesis, q: Array, dq: Array, tau: Array, t: Array) 
 
 
 def inverse_dynamics(model: Hypothesis, q: Array, dq: Array, ddq: Array) -> Array:
-    """Torques of a motion of the arm without effects, dry friction included; shape of `q`.
+    """Return the torques of a motion for the arm without effects, dry friction included [N m or N]; shape of `q`.
 
-    The motion's accelerations differ from those of the arm without friction and torque by what the torque gives it.
+    The torque is the inertia matrix times the difference to the accelerations without torque and friction, plus friction.
     """
     arm = model.arm
     b, n = arm.n_inertial, arm.n_joints
@@ -58,7 +58,7 @@ def inverse_dynamics(model: Hypothesis, q: Array, dq: Array, ddq: Array) -> Arra
 def torque_with(
     model: Hypothesis, effects: Sequence[EffectInstance], t: Array, motion: tuple[Array, Array, Array], tau: Array
 ) -> Array:
-    """Torques of a motion with effects added to a model, to first order from torques `tau` without them; shape of `tau`.
+    """Return the torques of a motion with effects added to a model, to first order from torques `tau` without them; shape of `tau`.
 
     Effects with latent states, and those that no torque overcomes, are left out; so are instants at which a joint hardly moves.
     """

@@ -1,4 +1,4 @@
-"""Limits of a planned motion: the arm file's, or what the diagnosed logs covered."""
+"""Limits of a planned motion: the arm file's, or the range of the diagnosed logs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["PlanLimits", "limits_of"]
 
 Array = NDArray[np.float64]
 
-#: Part of a limit that a reference may use: what follows it overshoots, an arm with a slow drive by a tenth.
+#: Part of a limit that a reference motion may use: the arm overshoots the reference, with a slow drive by a tenth.
 MARGIN = 0.92
 #: Part of the torque limit that the feed-forward may use under the best model; the rest is the controller's.
 TORQUE_MARGIN = 0.8
@@ -24,25 +24,25 @@ TORQUE_MARGIN = 0.8
 TORQUE_MOST = 0.95
 #: Samples on either side of a local cubic from which the logs' accelerations are estimated.
 _HALF_WIDTH = 10
-#: Quantile of the logs' accelerations that counts as what they covered: estimates scatter.
+#: Quantile of the logs' accelerations that is taken as their largest: estimates scatter.
 COVERED = 0.995
 _REMEDY = "add a [limits] table with position_min, position_max, speed and acceleration"
 
 
 @dataclass(frozen=True)
 class PlanLimits:
-    """Limits with their source.
+    """Limits of a planned motion, with their source.
 
     Attributes
     ----------
     motion : MotionLimits
-        Range of positions, largest speeds and accelerations, and what must not be touched.
+        Range of positions, largest speeds and accelerations, and obstacles.
     torque : ndarray of shape (n_joints,), optional
         Largest torque [N m or N]; None where the arm file names none.
     source : {"arm file", "logs"}
-        Where `motion` comes from.
+        Source of `motion`.
     home : ndarray, shape (n_joints,)
-        Where the motion begins and ends: zero, or what is nearest to it within the limits [rad or m].
+        Pose at which the motion begins and ends: zero, or the nearest pose within the limits [rad or m].
     """
 
     motion: MotionLimits
@@ -51,7 +51,7 @@ class PlanLimits:
     home: Array
 
     def inner(self) -> MotionLimits:
-        """Return the limits that a reference keeps to."""
+        """Limits reduced by a margin, to which a reference motion keeps."""
         m = self.motion
         middle, half = 0.5 * (m.position_min + m.position_max), 0.5 * MARGIN * (m.position_max - m.position_min)
         low, high = np.minimum(middle - half, self.home), np.maximum(middle + half, self.home)
@@ -79,7 +79,7 @@ def limits_of(arm: Arm, data: dict[str, Any]) -> PlanLimits:
     Raises
     ------
     ArmFileError
-        If the arm file has no limits and the diagnosis does not say what its logs covered.
+        If the arm file has no limits and the diagnosis does not hold the range of its logs.
     """
     motion, source = (arm.limits, "arm file") if arm.limits is not None else (_covered(arm, data), "logs")
     home = np.clip(np.zeros(arm.n_joints), motion.position_min, motion.position_max)
@@ -87,7 +87,7 @@ def limits_of(arm: Arm, data: dict[str, Any]) -> PlanLimits:
 
 
 def _covered(arm: Arm, data: dict[str, Any]) -> MotionLimits:
-    """What the logs of a diagnosis covered: positions and speeds from its map, accelerations from its measured curves."""
+    """Return the range of the diagnosed logs as limits: positions and speeds from the diagnosis' map, accelerations from measured curves."""
     columns = [_joint_covered(arm, data, j) for j in range(1, arm.n_joints + 1)]
     low, high, speed, acceleration = (np.array(column) for column in zip(*columns, strict=True))
     return MotionLimits(low, high, speed, acceleration)
@@ -110,7 +110,7 @@ def _joint_covered(arm: Arm, data: dict[str, Any], joint: int) -> tuple[float, f
 
 
 def _acceleration(curve: dict[str, Any]) -> Array:
-    """Accelerations of a measured curve; its stretches are treated apart."""
+    """Return accelerations [rad/s^2 or m/s^2] of a measured curve, stretch by stretch."""
     t, q = (np.asarray(curve[key], dtype=np.float64) for key in ("t", "measured"))
     gaps = np.flatnonzero(np.diff(t) > 1.5 * np.median(np.diff(t))) + 1
     found = []

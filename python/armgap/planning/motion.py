@@ -21,42 +21,42 @@ __all__ = ["PER_JOINT", "Motion", "build", "count", "named"]
 
 Array = NDArray[np.float64]
 
-#: Parts of a motion that have an amplitude and a speed of their own, and sines of each joint in them.
+#: Phases of a reference motion with separate pose and oscillations, and sines per joint in each phase.
 PHASES, SINES = 2, 2
-#: Numbers per joint: pose, and amplitude and frequency of every oscillation, in both phases.
+#: Number of design variables per joint of a reference motion: pose, and amplitude and frequency of every oscillation, in both phases.
 PER_JOINT = PHASES * (1 + 2 * SINES)
-#: Time at rest at either end, s.
+#: Time at rest at either end of a reference motion, s.
 _REST = 0.2
-#: Shortest move between two poses, s.
+#: Shortest duration of a move between two poses of a reference motion, s.
 SHORTEST_MOVE = 0.2
 #: Largest speed and acceleration of a fifth-order move over a unit distance in unit time (Siciliano 2009).
 BLEND_SPEED, BLEND_ACCELERATION = 1.875, 10.0 / math.sqrt(3.0)
-#: Smallest oscillation, as a part of the largest.
+#: Smallest amplitude of an oscillation, as a part of the largest that the limits allow.
 SMALLEST = 0.01
-#: Highest frequency: this many times the one at which speed and acceleration limit the amplitude alike; within these bounds, Hz.
+#: Highest frequency of oscillations: this many times that at which speed and acceleration limit the amplitude equally; within these bounds, Hz.
 OVERTONE, HIGHEST, LEAST_HIGHEST = 4.0, 10.0, 1.0
-#: Samples per period at the highest frequency at least.
+#: Samples per period of an oscillation at the highest frequency, at least.
 SAMPLES_PER_PERIOD = 20
-#: Phases are spread by the golden angle, so that joints and oscillations do not go in step.
+#: Golden angle, by which phases of joints and oscillations are spread so that they are not in step, rad.
 GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 #: Time over which an oscillation fades in or out: this part of a phase, at most so long, s.
 FADE_PART, FADE = 0.2, 0.6
-#: Points per second at which oscillations are held against their limits.
+#: Points per second at which oscillations are compared with their limits.
 LOOK_HZ = 200.0
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A reference motion.
+    """Reference motion: moves between home and two poses, with oscillations around each pose.
 
     Attributes
     ----------
     home : ndarray, shape (n_joints,)
         Pose at the beginning and the end [rad or m].
     times : tuple of float
-        When the three moves begin and end, six instants [s].
+        Begin and end of the three moves, six instants [s].
     duration : float
-        Length [s].
+        Length of the motion [s].
     centres : ndarray, shape (2, n_joints)
         Poses of the two phases [rad or m].
     amplitude, frequency : ndarray, shape (2, n_joints, 2)
@@ -74,7 +74,7 @@ class Motion:
     scale: float = 1.0
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
-        """Positions, velocities and accelerations at times `t`, each of shape (n_times, n_joints)."""
+        """Return positions, velocities and accelerations at times `t`, each of shape (n_times, n_joints)."""
         n = len(self.home)
         q, dq, ddq = np.tile(self.home, (len(t), 1)), np.zeros((len(t), n)), np.zeros((len(t), n))
         poses = [self.home, *self.centres, self.home]
@@ -99,24 +99,24 @@ class Motion:
 
 
 def count(n_joints: int) -> int:
-    """Return how many numbers make a motion."""
+    """Return the number of design variables of a reference motion."""
     return PER_JOINT * n_joints + 1
 
 
 def build(numbers: Array, home: Array, limits: MotionLimits, duration: float, period: float) -> Motion:
-    """Return the motion of some numbers, within the limits.
+    """Return the reference motion for given design variables, within the limits.
 
     Parameters
     ----------
     numbers : ndarray, shape (`count(n_joints)`,)
-        From 0 to 1: the first phase's part of the time; then per joint and phase the pose, and an amplitude and a frequency for each of
-        two oscillations.
+        Design variables from 0 to 1: the first phase's part of the time; then per joint and phase the pose, and an amplitude and a frequency
+        for each of two oscillations.
     home : ndarray, shape (n_joints,)
         Pose at the beginning and the end [rad or m], within the limits.
     limits : MotionLimits
-        What is kept to.
+        Limits of position, speed and acceleration.
     duration : float
-        Length [s], 2 or more.
+        Length of the motion [s], 2 or more.
     period : float
         Sample period [s].
     """
@@ -158,7 +158,7 @@ def highest_frequency(limits: MotionLimits, period: float) -> Array:
 
 
 def _moves(home: Array, centres: Array, limits: MotionLimits) -> list[float]:
-    """Shortest times of the three moves, all joints together."""
+    """Return the shortest times of the three moves [s], all joints together."""
     poses = [home, *centres, home]
     times = []
     for before, after in pairwise(poses):
@@ -170,7 +170,7 @@ def _moves(home: Array, centres: Array, limits: MotionLimits) -> list[float]:
 
 
 def oscillation(tau: Array, length: float, amplitude: Array, frequency: Array) -> tuple[Array, Array, Array]:
-    """Oscillation of a phase, faded in and out, with its two derivatives; each of shape (n_times, n_joints).
+    """Return the oscillation of a phase, faded in and out, with its two derivatives; each of shape (n_times, n_joints).
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def oscillation(tau: Array, length: float, amplitude: Array, frequency: Array) -
     length : float
         Length of the phase [s].
     amplitude, frequency : ndarray, shape (n_joints, 2)
-        Of the two oscillations [rad or m, Hz].
+        Amplitudes and frequencies of the two oscillations [rad or m, Hz].
     """
     n = len(amplitude)
     fade = min(FADE, FADE_PART * length)
@@ -198,12 +198,12 @@ def oscillation(tau: Array, length: float, amplitude: Array, frequency: Array) -
 
 
 def _blend(x: Array) -> tuple[Array, Array, Array]:
-    """Fifth-order step from 0 to 1 over 0 to 1, with its two derivatives (Siciliano 2009)."""
+    """Return a fifth-order step from 0 to 1 over 0 to 1, with its two derivatives (Siciliano 2009)."""
     x = np.clip(x, 0.0, 1.0)
     return x**3 * (10 - 15 * x + 6 * x * x), 30 * x * x * (1 - x) ** 2, 60 * x * (1 - x) * (1 - 2 * x)
 
 
-#: Amplitudes and speeds of the motions a search begins with, as parts of the range of each.
+#: Slow frequencies and small amplitudes of the initial motions of a search, as parts of their ranges.
 _SLOW, _SMALL = 0.15, 0.4
 _PATTERNS: dict[str, tuple[tuple[float, float, float, float], tuple[float, float, float, float]]] = {
     "slow reversals": ((_SMALL, 0.35, 0.5, 0.5), (0.7, _SLOW, _SMALL, 0.4)),
@@ -214,16 +214,16 @@ _PATTERNS: dict[str, tuple[tuple[float, float, float, float], tuple[float, float
 
 
 def named(name: str, n_joints: int, poses: tuple[float, float] = (0.5, 0.5)) -> Array:
-    """Return the numbers of a usual motion.
+    """Return the design variables of a usual motion.
 
     Parameters
     ----------
     name : {"slow reversals", "fast multisine", "large travel", "slow, then fast"}
-        What it is good for: friction, inertia, effects of the position, several.
+        Name of the motion; the four excite friction, inertia, effects of the position, and several of these.
     n_joints : int
         Number of joints.
     poses : tuple of float, default the middle of the range
-        Where the joints oscillate, from 0 to 1 of their ranges.
+        Poses at which the joints oscillate, from 0 to 1 of their ranges.
     """
     first, second = _PATTERNS[name]
     joint = [poses[0], *first, poses[1], *second]

@@ -1,4 +1,4 @@
-"""What a motion tells about two models, and how near that is to a decision of `armgap.diagnose`."""
+"""Expected evidence of a motion for one of two models, against the thresholds of `armgap.diagnose`."""
 
 from __future__ import annotations
 
@@ -12,37 +12,38 @@ __all__ = ["Outcome", "certainty", "settled"]
 
 Array = NDArray[np.float64]
 
-#: A diagnosis explains a gap whose cost is this many times the floor, with what takes this part of the excess, in windows whose
-#: mean advantage is so many standard errors (`rust/fit/src/search/acceptance.rs`).
+#: Thresholds of a diagnosis: cost of a gap over the floor's, part of the excess that an effect removes, and standard errors of the
+#: windows' mean advantage (`rust/fit/src/search/acceptance.rs`).
 ABOVE_FLOOR, MATTERS, CERTAIN = 1.25, 0.1, 3.5
-#: Standard errors of that advantage on the part of the log that it judges on alone.
+#: Standard errors of the windows' mean advantage that a diagnosis needs on the holdout alone.
 HELD_CERTAIN = 1.0
-#: Standard deviations from its prior that a value of the arm returns by what a diagnosis names without a gap.
+#: Change of a parameter of the arm towards its prior, in standard deviations, from which a diagnosis names an effect without a gap.
 TRUST_SIGMAS = 4.0
-#: Standard deviations by which evidence may exceed what a decision needs before more of it is worth nothing to the search.
+#: Standard deviations of evidence above a decision's threshold from which more evidence does not count in the search.
 _ENOUGH = 3.0
-#: Evidence that the search aims at, over what is enough: the effect may be smaller than thought.
+#: Evidence that the search aims at, as a multiple of sufficient evidence: the effect may be smaller than assumed.
 AIM = 100.0
-#: Growth of a merit over its range: the smaller, the more the least one counts.
+#: Growth of a logarithmic merit over its range: the smaller, the more the weakest condition counts.
 _GROWTH = 1e4
 
 
 class Outcome(NamedTuple):
-    """What a motion tells about a pair, one entry per size of the effect.
+    """Expected evidence of a motion for a pair of models, one entry per size of the effect.
 
     Attributes
     ----------
     fitted, plain : ndarray
-        Expected log-likelihood ratio over the windows that a diagnosis fits to, with the rival fitted, and over all windows without.
+        Expected log-likelihood ratio over the windows that a diagnosis fits to, with the rival fitted, and over all windows with the rival
+        not fitted.
     above : ndarray
-        Cost that the fitted rival leaves above the noise, over what a diagnosis needs to explain it; the lesser of what it fits to and what
-        it judges on.
+        Cost of the fitted rival above the noise, over the threshold of a diagnosis; the smaller of the values for training and holdout
+        windows.
     certain : ndarray
-        Mean advantage of a window, in standard errors; less where what is judged on has less than its part.
+        Mean advantage of a window, in standard errors; less where holdout windows have less than their part.
     prior : ndarray
-        Part of `fitted` that is the prior's: the rival needs values of the arm that are not trusted.
+        Part of `fitted` from the prior: the rival needs implausible parameters of the arm.
     weight : ndarray
-        Weights of the sizes, one together.
+        Weights of the sizes, with sum 1.
     spread : float
         Standard deviation of `above` from the noise alone.
     """
@@ -57,11 +58,11 @@ class Outcome(NamedTuple):
 
     @property
     def expected(self) -> float:
-        """Expected log-likelihood ratio, mean over the sizes."""
+        """Expected log-likelihood ratio of the models, mean over the sizes of the effect."""
         return float(self.weight @ self.fitted)
 
     def settled(self, threshold: float) -> float:
-        """Probability of a decision, mean over the sizes."""
+        """Return the probability that a diagnosis decides the question, mean over the sizes of the effect."""
         likely = [settled(x, threshold) for x in self.fitted]
         high = [_normal((x - 1.0) / self.spread) for x in self.above]
         common = [_normal(x - CERTAIN) for x in self.certain]
@@ -70,7 +71,7 @@ class Outcome(NamedTuple):
         return float(self.weight @ np.maximum(by_motion, by_prior))
 
     def merit(self, threshold: float) -> float:
-        """How near all that a decision by the motion needs is, from 0 to 1, mean over the sizes; it grows with the logarithm."""
+        """Return how nearly the conditions of a decision are met, from 0 to 1, on a logarithmic scale, mean over the sizes of the effect."""
         enough = _enough(threshold)
         parts = (
             self.fitted / (AIM * enough),
@@ -82,29 +83,29 @@ class Outcome(NamedTuple):
 
     @property
     def kept(self) -> float:
-        """Part of the difference that fitting the rival leaves."""
+        """Part of the difference between two models that remains after the rival is fitted."""
         plain = float(self.weight @ self.plain)
         return self.expected / plain if plain > 0 else 0.0
 
 
 def settled(expected: float, threshold: float) -> float:
-    """Probability that a log-likelihood ratio exceeds a threshold: normal, its variance twice its expectation."""
+    """Return the probability that a log-likelihood ratio exceeds a threshold: normal, with variance twice the expectation."""
     return _normal((expected - threshold) / math.sqrt(2.0 * expected)) if expected > 0 else 0.0
 
 
 def _normal(x: float) -> float:
-    """Standard normal distribution function."""
+    """Return the standard normal distribution function."""
     return 0.5 * math.erfc(-x / math.sqrt(2.0))
 
 
 def certainty(advantage: Array, share: float) -> float:
-    """Mean advantage of windows, each of which stands for `share` of them, in standard errors."""
+    """Return the mean advantage of windows in standard errors, if each window stands for `share` independent ones."""
     mean = float(np.mean(advantage)) if len(advantage) else 0.0
     scatter = float(np.var(advantage)) + 2.0 * mean if mean > 0 else 0.0
     return math.sqrt(share * len(advantage) / scatter) * mean if scatter > 0 else 0.0
 
 
 def _enough(threshold: float) -> float:
-    """Expected log-likelihood ratio that lies `_ENOUGH` of its standard deviations above a threshold."""
+    """Return the expected log-likelihood ratio that lies `_ENOUGH` of its standard deviations above a threshold."""
     half = _ENOUGH / math.sqrt(2.0)
     return (half + math.sqrt(half * half + threshold)) ** 2

@@ -1,4 +1,4 @@
-"""What a plan says: the report, and the summary in a terminal."""
+"""Report of a planned experiment, and its summary in a terminal."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["lines", "plan_document", "plan_summary"]
 
 #: Probability of a decision from which a question counts as one that the motion settles.
 SURE = 0.9
-#: Points of a curve that are drawn.
+#: Points of a curve in a plan's report that are drawn at most.
 DRAWN = 2000
 _COLOURS = (charts.BEFORE, charts.AFTER, charts.FLOOR, charts.REFIT, charts.MEASURED)
 _ORIGINS = {
@@ -35,7 +35,7 @@ _ORIGINS = {
 
 
 def plan_document(plan: Plan) -> Document:
-    """Return the report of a plan."""
+    """Return the report of a plan as a document."""
     conventions = section(plan.kind)
     sections = [
         _motion(plan),
@@ -50,13 +50,13 @@ def plan_document(plan: Plan) -> Document:
 
 
 def lead(plan: Plan) -> str:
-    """How many questions it is expected to settle."""
+    """Return a sentence on how many questions the planned motion is expected to settle."""
     sure = sum(q.settled >= SURE for q in plan.questions)
     return f"One motion of {figure(plan.duration)} s, expected to settle {sure} of {_counted(len(plan.questions), 'open question')}."
 
 
 def answers(plan: Plan) -> list[SummaryAnswer]:
-    """What it is for, how sure one will be, and what it does not tell."""
+    """Return the purpose of a plan, the expected certainty, and the questions that it leaves open, as answers."""
     best = sorted(plan.questions, key=lambda q: -q.settled)
     settled = [f"{_short(q)}: {percent(q.settled)}" for q in best]
     unsettled = [q for q in best if q.why]
@@ -77,7 +77,7 @@ def answers(plan: Plan) -> list[SummaryAnswer]:
 
 
 def lines(plan: Plan) -> list[str]:
-    """A plan as text, one line per question."""
+    """Return a plan as text, one line per question."""
     settled = [
         f"{_asked(q)}: expected log-likelihood ratio {figure(q.expected_log_likelihood_ratio)}, settled with probability {figure(q.settled, 2)}"
         f"{f' ({q.why})' if q.why else ''}"
@@ -88,7 +88,7 @@ def lines(plan: Plan) -> list[str]:
 
 
 def _asked(q: PlannedQuestion) -> str:
-    """A question in words."""
+    """Return a question of a plan in words."""
     other = "none" if q.against == NONE else f"{title(q.against)} ({joint_text(q.against_joint)})"
     return f"{_short(q)} or {other}?"
 
@@ -179,7 +179,7 @@ def _method(plan: Plan) -> Section:
 
 
 def plan_summary(plan: Plan) -> RenderableType:
-    """Return what `rich` prints: the answers."""
+    """Return the answers of a plan for `rich` to print."""
     from rich.console import Group
     from rich.text import Text
 

@@ -1,4 +1,4 @@
-"""`plan`: the next experiment from a diagnosis."""
+"""`plan`: plans the next experiment from a diagnosis."""
 
 from __future__ import annotations
 
@@ -37,43 +37,43 @@ __all__ = ["Plan", "PlannedQuestion", "plan"]
 
 Array = NDArray[np.float64]
 
-#: Questions that a motion is planned for unless they are asked for.
+#: Questions that a motion is planned for by default, at most.
 MOST_QUESTIONS = 5
-#: Log-likelihood ratio that a decision needs, beside the logarithm of the number of candidates.
+#: Log-likelihood ratio that a decision needs, in addition to the logarithm of the number of candidates.
 DECISION = 3.0
-#: Shortest and longest motion, s.
+#: Shortest and longest motion that can be planned, s.
 SHORTEST, LONGEST = 2.0, 120.0
-#: Evidence of less than this is none.
+#: Expected log-likelihood ratio below which evidence counts as none.
 NEXT_TO_NOTHING = 1.0
-#: Part of a difference that is left after the rival was fitted, below which the two are one.
+#: Part of the difference between two models, left after the rival is fitted, below which the models are equivalent.
 SAME = 1e-3
-#: The same, of two effects that are one where their values are fitted: what rounding and the last step of the fit leave.
+#: Part of the difference between two models with all values fitted below which they are identical: rounding and the last step leave as much.
 IDENTICAL = 1e-5
-#: Effects that may imitate one in question of which it is looked at how well they do.
+#: Number of effects for which it is tried how well they imitate an effect in question.
 _TRIED = 8
 SCHEMA = "armgap.plan/1"
 
 
 @dataclass(frozen=True)
 class PlannedQuestion:
-    """What a planned motion is expected to tell about one question.
+    """Expected evidence of a planned motion for one question.
 
     Attributes
     ----------
     effect, joint : str, int or None
         The effect in question.
     against, against_joint : str, int or None
-        The effect it is to be told from; ``"none"`` is its absence.
+        Effect to be distinguished from `effect`; ``"none"`` for its absence.
     expected_log_likelihood_ratio : float
-        Expectation if the effect is in the arm, mean over its sizes.
+        Expected ratio if the effect is in the arm, mean over its sizes.
     settled : float
-        Probability that the log-likelihood ratio exceeds what a decision needs, mean over its sizes.
+        Probability that the log-likelihood ratio exceeds a decision's threshold, mean over its sizes.
     origin : {"asked", "equivalents", "candidate", "undecided", "not excited"}
-        Why it is open.
+        Reason why the question is open.
     sizes : (str, float, float), optional
-        Parameter, and the range of its values that the mean is over [SI].
+        Parameter, and range of its values over which means are taken [SI].
     why : str
-        What keeps it from being settled; empty where it is as good as settled.
+        Reason why the question may stay open; empty where it is practically settled.
     """
 
     effect: str
@@ -119,17 +119,17 @@ class Plan:
     q_ref, dq_ref, tau_ff : ndarray, shape (n_samples, n_joints)
         Reference positions and velocities, and the torque that the best model needs for them from each sample to the next [SI].
     questions : tuple of PlannedQuestion
-        What it is for.
+        Questions that the motion is planned for.
     left_out : tuple of str
-        Open questions that it is not for, as ``effect:joint against rival``.
+        Other open questions, as ``effect:joint against rival``.
     limits : PlanLimits
-        What it keeps to.
+        Limits of the motion.
     threshold : float
         Log-likelihood ratio that a decision needs.
     evaluations : int
-        Motions that were compared.
+        Number of motions compared.
     notes : tuple of str
-        What to know about it.
+        Remarks on the plan.
     """
 
     arm: str
@@ -147,11 +147,11 @@ class Plan:
 
     @property
     def duration(self) -> float:
-        """Length of the motion [s]."""
+        """Length of the planned motion [s]."""
         return float(self.t[-1])
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the plan but for its motion as a JSON object, schema ``armgap.plan/1``."""
+        """Return the plan without its motion as a JSON object, schema ``armgap.plan/1``."""
         return {
             "schema": SCHEMA,
             "arm": {"name": self.arm, "kind": self.kind},
@@ -173,7 +173,7 @@ class Plan:
         }
 
     def to_json(self, indent: int | None = None) -> str:
-        """Return `to_dict` as JSON."""
+        """Return the plan without its motion as JSON."""
         return json.dumps(self.to_dict(), indent=indent, allow_nan=False)
 
     def to_polars(self) -> pl.DataFrame:
@@ -186,7 +186,7 @@ class Plan:
         return pl.DataFrame(columns)
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the motion, as CSV or Parquet by the name's ending; ``-`` is CSV on standard output.
+        """Write the reference motion, as CSV or Parquet by the name's ending; ``-`` is CSV on standard output.
 
         Raises
         ------
@@ -201,7 +201,7 @@ class Plan:
             write(path, table.write_csv())
 
     def summary(self) -> str:
-        """Return what the motion is for and how sure one will be after it, one line per question."""
+        """Return the purpose of the plan and its expected certainty, one line per question."""
         from armgap.planning.page import lines
 
         return "\n".join(lines(self))
@@ -211,7 +211,7 @@ _PARQUET = (".parquet", ".pq")
 
 
 def check_output(path: str | os.PathLike[str]) -> None:
-    """Raise if a motion cannot be written under this name."""
+    """Raise if a motion cannot be written to a path."""
     if os.fspath(path) != STANDARD_STREAM and Path(path).suffix.lower() not in (*_PARQUET, ".csv"):
         raise ResultError("has an unknown ending", remedy="write .csv or .parquet", file=path)
 
@@ -225,7 +225,7 @@ def plan(
     seed: int = 1,
     progress: ProgressCallback | None = None,
 ) -> Plan:
-    """Plan the motion that settles best what a diagnosis left open.
+    """Plan the motion that best settles the questions a diagnosis left open.
 
     Of the motions tried, the one with the most expected evidence is taken: the log-likelihood ratio of the effect in question against its
     rival, both with all values fitted to the planned motion (T-optimality, Atkinson and Fedorov 1975). It keeps to the arm file's limits, or to
@@ -234,16 +234,16 @@ def plan(
     Parameters
     ----------
     diagnosis : Diagnosis or path
-        What is known so far.
+        Diagnosis of the arm.
     arm : Arm or path
         The arm that was diagnosed.
     questions : sequence of str, default none
-        Effects to settle, ``"EFFECT:JOINT"`` each, against their absence and their equivalents. Without it, the five open questions
-        with the largest consequences.
+        Effects to settle, ``"EFFECT:JOINT"`` each, against their absence and their equivalents. By default the five open
+        questions with the largest consequences.
     duration : float, default 10
         Length of the motion [s], 2 to 120.
     seed : int, default 1
-        Seed of the search; the same seed gives the same motion.
+        Seed of the search; equal seeds give equal motions.
     progress : callable, optional
         As for `armgap.diagnose`.
 
@@ -254,7 +254,7 @@ def plan(
     Raises
     ------
     ArmgapError
-        A leaf of it, if the diagnosis, the arm or an option cannot be used, or nothing is open.
+        A subclass of it, if the diagnosis, the arm or an option cannot be used, or nothing is open.
     """
     seconds = options.positive(duration, "duration")
     if not SHORTEST <= seconds <= LONGEST:
@@ -269,7 +269,7 @@ def plan(
 
 
 def check_optimiser() -> None:
-    """Raise if the package that searches for motions is not installed."""
+    """Raise if the package for differential evolution is not installed."""
     from importlib.util import find_spec
 
     if find_spec("scipy") is None:
@@ -279,7 +279,7 @@ def check_optimiser() -> None:
 
 
 def _usable(diagnosis: Diagnosis | str | os.PathLike[str], arm: Arm) -> dict[str, Any]:
-    """Return the JSON object of a diagnosis that belongs to the arm and leaves something to ask."""
+    """Return the JSON object of a diagnosis, after a check that it belongs to the arm and leaves a question open."""
     from armgap.export.read import read_diagnosis
 
     if isinstance(diagnosis, list | tuple):
@@ -365,7 +365,7 @@ def _plan(data: dict[str, Any], arm: Arm, wanted: Sequence[str], duration: float
 def _against_look_alikes(
     builder: HypothesisBuilder, chosen: Sequence[TestedQuestion], usual: PredictedMotion, remarks: list[str]
 ) -> list[TestedQuestion]:
-    """Pose the questions that come up once an effect is told from its absence: whether it is it or an effect that imitates it."""
+    """Return questions of each chosen effect against effects that imitate it, for the case that the effect is present."""
     known = {frozenset((p.question.place, p.question.rival)) for p in chosen}
     unseen = [p for p in chosen if p.question.against == NONE]
     likely = [q for p in unseen for q in builder.look_alikes(p)[:_TRIED]]
@@ -379,7 +379,7 @@ def _against_look_alikes(
 
 
 def _urgency(tested: TestedQuestion) -> tuple[int, float]:
-    """Causes against equivalents first, then what would cost most."""
+    """Return the sort key of a question: causes against equivalents first, then by consequence."""
     first = min(rank(tested.question), 2)
     return first, -min(tested.consequence, 1e9)
 
@@ -405,7 +405,7 @@ def _scales(arm: Arm, data: dict[str, Any], limits: PlanLimits, usual: Predicted
 
 
 def _sampled(motion: Motion, setting: Setting) -> tuple[Array, Array, Array, Array]:
-    """The motion at the arm's sample period; a torque is that of the middle of its sample, the last one that of rest."""
+    """Return the motion at the arm's sample period: times, positions, velocities, and torques, each for the middle of its interval."""
     period = setting.arm.sample_period
     t = period * np.arange(round(motion.duration / period) + 1, dtype=np.float64)
     q, dq, _ = motion.at(t)
@@ -427,7 +427,7 @@ def _answer(tested: TestedQuestion, outcome: Outcome, most: float, threshold: fl
 
 
 def _obstacle(question: Question, outcome: Outcome, most: float) -> str:
-    """What keeps a question from being settled."""
+    """Return the reason why a question may stay open after the motion."""
     other = "the arm's own values" if question.against == NONE else spelt(*question.rival)
     if outcome.kept < SAME and float(outcome.weight @ outcome.plain) > NEXT_TO_NOTHING:
         return f"fitting {other} gives the same motion: no motion within these limits tells them apart"

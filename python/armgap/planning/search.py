@@ -24,19 +24,19 @@ __all__ = ["Found", "Search", "standard"]
 
 Array = NDArray[np.float64]
 
-#: Size of the population, and generations after the first.
+#: Population of differential evolution, and generations after the first.
 POPULATION, GENERATIONS = 16, 9
-#: Windows by which motions are compared, and motions of which the best is taken by all windows.
+#: Windows on which motions are compared, and finalists, which are compared on all windows.
 _WINDOWS, FINALISTS = 20, 4
-#: Steps in which a motion is scaled down until its torques suffice.
+#: Steps in which a motion is scaled down until its torques are within limits, at most.
 _SHRINKS = 12
-#: Factor by which a motion that touches something is scaled down, until it does not.
+#: Factor per step by which a motion with a collision is scaled down.
 _SHRINK = 0.8
-#: Every so many steps of prediction torques are looked at while a motion is scaled down.
+#: Torques are checked at every so many prediction steps while a motion is scaled down.
 COARSE = 4
-#: Poses per joint at which the torque left for accelerations is looked at; at least this part of the limit counts as left.
+#: Poses per joint at which the torque left for accelerations is computed, and smallest part of the limit that counts as left.
 _POSES_PER_JOINT, LEFT = 5, 0.1
-#: Part of the torque left that a joint's own acceleration takes; the rest is for the other joints' accelerations.
+#: Part of the torque left for accelerations that a joint's own acceleration takes; the rest is for the other joints' accelerations.
 COUPLED = 0.6
 _SEEDS = ("slow, then fast", "large travel", "fast multisine", "slow reversals")
 _POSES = ((0.5, 0.5), (0.3, 0.7), (0.8, 0.35))
@@ -44,16 +44,16 @@ _POSES = ((0.5, 0.5), (0.3, 0.7), (0.8, 0.35))
 
 @dataclass(frozen=True)
 class Found:
-    """The best motion of a search.
+    """Result of a search for a motion.
 
     Attributes
     ----------
     motion : Motion
-        The motion.
+        Motion with the most evidence.
     evaluations : int
-        Motions that were tried.
+        Number of motions tried.
     most : ndarray, shape (n_questions,)
-        Most evidence of any motion tried, per question.
+        Largest evidence of any motion tried, per question.
     """
 
     motion: Motion
@@ -62,19 +62,19 @@ class Found:
 
 
 def standard(n_joints: int) -> Array:
-    """Return the numbers of the usual motion by which sizes are judged."""
+    """Return the design variables of the usual motion with which sizes of effects are judged."""
     return named("slow, then fast", n_joints, (0.35, 0.65))
 
 
 class Search:
-    """Motions within limits, and their worth for some questions.
+    """Search for the motion within limits that gives the most evidence for some questions.
 
     Parameters
     ----------
     setting : Setting
-        What evidence is counted with.
+        Models, noise and horizon of the expected evidence.
     limits : PlanLimits
-        What is kept to.
+        Limits of the motion.
     duration : float
         Length of the motion [s].
     """
@@ -87,7 +87,7 @@ class Search:
         self._inner = self._reachable(limits.inner())
 
     def _check_home(self) -> None:
-        """Raise if the arm cannot be held where the motion begins, or touches something there."""
+        """Raise if the arm cannot be held at the home pose, or collides with something in it."""
         space = self._limits.motion.space
         if space is not None and (pair := space.touched(self._limits.home)) is not None:
             raise OptionError(
@@ -105,7 +105,7 @@ class Search:
             )
 
     def _reachable(self, inner: MotionLimits) -> MotionLimits:
-        """Limits whose accelerations are roughly those that the torque left beside gravity and friction gives."""
+        """Return limits with accelerations reduced to those that the torque left by gravity and friction allows, roughly."""
         if self._limits.torque is None:
             return inner
         arm, model = self._setting.arm, self._setting.model
@@ -122,13 +122,13 @@ class Search:
         return replace(inner, acceleration=np.minimum(inner.acceleration, COUPLED * left / inertia))
 
     def motion(self, numbers: Array) -> Motion:
-        """Return the motion of some numbers from 0 to 1, within limits of position, speed, acceleration, torque and free space."""
+        """Return the motion for design variables from 0 to 1, within limits of position, speed, acceleration, torque and free space."""
         period = self._setting.arm.sample_period
         motion = build(numbers, self._limits.home, self._inner, self._duration, period)
         return self._allowed(motion, (), TORQUE_MARGIN)
 
     def _allowed(self, motion: Motion, effects: Sequence[Any], part: float) -> Motion:
-        """Scale a motion down until its torques are within a part of the limit and the arm touches nothing."""
+        """Scale a motion down until its torques are within a part of the limit and the arm is free of collision."""
         for _ in range(_SHRINKS):
             within = self._within(motion, effects, part)
             motion = self._clear(within)
@@ -137,7 +137,7 @@ class Search:
         return motion.scaled(0.0)
 
     def _clear(self, motion: Motion) -> Motion:
-        """Scale a motion down until the arm touches nothing."""
+        """Scale a motion down until the arm is free of collision."""
         space = self._limits.motion.space
         if space is None:
             return motion
@@ -167,7 +167,7 @@ class Search:
         return motion.scaled(0.0)
 
     def kept(self, motion: Motion, tested: Sequence[TestedQuestion]) -> Motion:
-        """Scale a motion down until its torques suffice under every model in question, and the arm touches nothing."""
+        """Scale a motion down until its torques suffice under every model in question and the arm is free of collision."""
         for p in tested:
             largest = p.pair.alternatives[-1][1][-1]
             motion = self._allowed(motion, (largest,), TORQUE_MOST)
@@ -178,7 +178,7 @@ class Search:
         return PredictedMotion(self._setting, motion)
 
     def best(self, tested: Sequence[TestedQuestion], threshold: float, seed: int) -> Found:
-        """Return the best motion that is found for some questions; the same seed finds the same."""
+        """Return the best motion found for some questions; equal seeds give equal motions."""
         from scipy.optimize import differential_evolution
 
         state = _State(np.zeros(len(tested)))
@@ -203,7 +203,7 @@ class Search:
         return Found(self._final(state, tested, threshold), state.count, state.most)
 
     def _final(self, state: _State, tested: Sequence[TestedQuestion], threshold: float) -> Motion:
-        """The best of the finalists by all sizes and windows, with the rival fitted in full."""
+        """Return the best of the finalists, judged by all sizes and windows, with the rival fully fitted."""
         motions = [self.kept(motion, tested) for _, _, motion in state.best]
         every = [[self.play(motion).outcome(p.pair) for p in tested] for motion in motions]
         sure = [sum(x.settled(threshold) for x in outcomes) / len(tested) for outcomes in every]
@@ -211,7 +211,7 @@ class Search:
         return motions[max(range(len(motions)), key=lambda i: order[i])]
 
     def _population(self, seed: int) -> Array:
-        """Usual motions at several poses, and random ones."""
+        """Return the initial population: usual motions at several poses, and random ones."""
         n = self._setting.arm.n_joints
         rng = np.random.default_rng([seed, 1])
         usual = [named(name, n, poses) for poses in _POSES for name in _SEEDS]
@@ -222,7 +222,7 @@ class Search:
 
 @dataclass
 class _State:
-    """What a search has seen so far."""
+    """State of a search: motions tried so far, with their worth."""
 
     most: Array
     count: int = 0
@@ -230,6 +230,6 @@ class _State:
 
 
 def _worth(outcomes: Sequence[Outcome], threshold: float) -> float:
-    """Worth of a motion for several questions, from 0 to 1; the worst one counts as much as their mean."""
+    """Return the worth of a motion for several questions, from 0 to 1; the least settled question counts as much as the mean."""
     merits = [x.merit(threshold) for x in outcomes]
     return 0.5 * (float(np.mean(merits)) + min(merits))

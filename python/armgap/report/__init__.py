@@ -1,4 +1,4 @@
-"""Reports: results, then documents of sections, then HTML, Markdown or a terminal."""
+"""Reports of results: documents made of sections, shown as HTML, Markdown or in a terminal."""
 
 from armgap.report.document import Document, diagnosis_document
 from armgap.report.forms.html import render_html, write_html

@@ -1,4 +1,4 @@
-"""What to do next: a few lines that follow from the verdict and from what the diagnosis holds."""
+"""Recommended next steps after a diagnosis, a few lines by its verdict and contents."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ __all__ = ["next_steps"]
 
 Data = dict[str, Any]
 
-#: Effects that the logs do not excite and that are listed here; all of them have a section of their own.
+#: Unexcited effects listed in the next steps at most; a section of the report lists all.
 LISTED = 3
-#: Share of the gap above the floor that may stay before it is worth a line: less is what other motions alone vary it by.
+#: Remaining share of the gap above the floor from which a next step mentions it: a different motion alone changes it by less.
 REMAINDER = 0.2
 _EXPORT = "`armgap export DIAGNOSIS.json --arm ARM.toml -o corrected.toml` (`.xml` for MuJoCo, `.urdf` for URDF)"
 _INTO_MODEL = "; `--model ROBOT.urdf -o corrected.urdf` writes them into your own description"
@@ -28,12 +28,12 @@ _OWN = "If you suspect a law, write it as a custom effect and give it to `armgap
 
 
 def next_steps(data: Data) -> list[str]:
-    """Return what to do next, most urgent first.
+    """Return the recommended next steps, most urgent first.
 
     Parameters
     ----------
     data : dict
-        JSON object of a diagnosis.
+        Diagnosis as a JSON object.
     """
     return [*([] if _is_serial(data) else _impossible(data)), *_BY_VERDICT.get(data["verdict"], _none)(data)]
 
@@ -91,7 +91,7 @@ def _unexplained(data: Data) -> list[str]:
 
 
 def _excite(data: Data) -> list[str]:
-    """Which motion to record so that what these logs cannot show is shown or ruled out."""
+    """Return lines with motions to record that show or rule out the unexcited effects."""
     silent = dict.fromkeys(r["effect"] for r in data.get("ruled_out") or [] if r["status"] == "not excited")
     if not silent:
         return []

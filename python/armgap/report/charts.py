@@ -1,4 +1,4 @@
-"""Charts: one look for all of them, one meaning per colour, drawn on a transparent ground for light and dark pages.
+"""Charts of reports, in a common style with one meaning per colour, on a transparent ground for light and dark pages.
 
 Texts, axes and grids take their colour from the page's style sheet (``--bk-…`` variables), so they follow it into the dark.
 """
@@ -16,7 +16,7 @@ from armgap.report.words import error_text, symbol_text, unit_text
 
 __all__ = ["AFTER", "BEFORE", "FLOOR", "MEASURED", "REFIT", "bars", "law", "lines"]
 
-# Okabe and Ito's colour-blind-safe palette; the greys are readable on white and on near-black.
+# Colours of charts: Okabe and Ito's colour-blind-safe palette; the greys are readable on white and on near-black.
 MEASURED = "#808080"
 BEFORE = "#D55E00"
 REFIT = "#E69F00"
@@ -25,7 +25,7 @@ FLOOR = "#009E73"
 
 
 def figure(title: str, x_label: str, y_label: str, **options: Any) -> Any:
-    """Return an empty figure in the common look."""
+    """Return an empty chart in the common style."""
     from bokeh.plotting import figure as make
 
     settings: dict[str, Any] = {
@@ -51,7 +51,7 @@ def figure(title: str, x_label: str, y_label: str, **options: Any) -> Any:
 
 
 def _tools(f: Any) -> None:
-    """Return the tools of a chart: drag over a stretch to zoom in; the wheel alone goes on scrolling the page."""
+    """Add the tools of a chart: dragging zooms in; the mouse wheel alone scrolls the page."""
     from bokeh.models import BoxZoomTool, PanTool, ResetTool, SaveTool, WheelZoomTool
 
     wheel, box = WheelZoomTool(dimensions="width", modifiers="ctrl"), BoxZoomTool(dimensions="width")
@@ -82,12 +82,12 @@ def lines(
     levels: Sequence[tuple[str, float, str]] = (),
     **options: Any,
 ) -> Any:
-    """Curves over a common abscissa.
+    """Return a chart of curves over a common abscissa.
 
     Parameters
     ----------
     title, x_label, y_label : str
-        Texts.
+        Title, and labels of the axes.
     x : array_like, shape (n,)
         Abscissa.
     curves : sequence of (label, values, colour)
@@ -114,7 +114,7 @@ def lines(
 
 
 def _lifted(values: ArrayLike, gaps: Sequence[int]) -> NDArray[np.float32]:
-    """A column with gaps, in the precision that a screen can show."""
+    """Return a column with NaN before each gap, in single precision."""
     return np.insert(np.asarray(values, dtype=np.float32), gaps, np.nan)
 
 
@@ -129,7 +129,7 @@ def bars(
     x_label: str = "",
     **options: Any,
 ) -> Any:
-    """Grouped bars; with `log` the axis is logarithmic, over whole decades, and values of zero are left out; with `labels` each bar has its value."""
+    """Return a chart of grouped bars; `log`: logarithmic axis over whole decades, without values of zero; `labels`: each bar shows its value."""
     from bokeh.models import ColumnDataSource, FactorRange, LabelSet
 
     factors = [(group, label) for group in groups for label, _, _ in series]
@@ -163,7 +163,7 @@ def bars(
 
 
 def _decades(f: Any, low: float, high: float) -> float:
-    """Let a logarithmic axis run over whole decades, with every decade and its parts marked; return where it begins."""
+    """Set a logarithmic axis to whole decades with ticks at every decade and its parts; return its lower end."""
     from bokeh.models import FixedTicker
 
     first, last = math.floor(math.log10(0.8 * low)), math.ceil(math.log10(1.6 * high))
@@ -178,7 +178,7 @@ def _decades(f: Any, low: float, high: float) -> float:
 
 
 def law(entry: dict[str, Any]) -> Any:
-    """A cause against its own variable: samples, means over ranges with their intervals, and the fitted law.
+    """Return a chart of a cause's evidence over its variable: samples, means over ranges with their intervals, and the fitted law.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def law(entry: dict[str, Any]) -> Any:
 
 
 def dependence(entry: dict[str, Any]) -> Any:
-    """A law without a name: the table with the 95 % interval of each of its values.
+    """Return a chart of an unnamed law: its table with the 95 % interval of each value.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def dependence(entry: dict[str, Any]) -> Any:
 
 
 def _reach(f: Any, values: Sequence[float], margin: float = 0.5) -> None:
-    """Show these values, with a margin in parts of their span: half of it holds so much of a cloud as twice the span."""
+    """Set a chart's y range to the values plus a margin in parts of their span."""
     low, high = min(values), max(values)
     beside = margin * (high - low or 1.0)
     f.y_range.start, f.y_range.end = low - beside, high + beside

@@ -1,4 +1,4 @@
-"""The report of a comparison: what became of the gap, the causes and the parameters."""
+"""Report of a comparison of two diagnoses: changes of the gap, the causes and the parameters."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ _LEADS = {
     "unchanged": "The gap between the arm and its model is about what it was.",
     "none": "There is no gap, neither before nor after.",
 }
-#: Statuses in the order in which they are said: what went and what came first.
+#: Statuses of causes in the order of the report: gone and new ones first.
 _ORDER = ("gone", "new", "renamed", "smaller", "larger", "unchanged", "undecided", "unseen")
 
 
 def comparison_document(c: Comparison) -> Document:
-    """Return the report of a comparison."""
+    """Return the report of a comparison as a document."""
     heading = f"Compared: {c.names[0]} and {c.names[1]}"
     conventions = section(c.kind)
     sections = [_gap(c), _causes(c), _parameters(c), *([conventions] if conventions else []), _method(c)]
@@ -51,7 +51,7 @@ def comparison_document(c: Comparison) -> Document:
 
 
 def lead(c: Comparison) -> str:
-    """What went, what came, and then what became of the gap."""
+    """Return a sentence with the causes that are gone, the new ones, and the change of the gap."""
     return " ".join([*_went_and_came(c), _LEADS[c.outcome]])
 
 
@@ -66,7 +66,7 @@ def _by_status(c: Comparison) -> list[CauseChange]:
 
 
 def answers(c: Comparison) -> list[SummaryAnswer]:
-    """Three questions about a repair: what went and what came, then how far."""
+    """Return three answers about a repair: causes gone, causes new, and change of the gap."""
     return [
         SummaryAnswer("What became of the causes?", *_became(c)),
         SummaryAnswer("Did the gap shrink?", *_shrunk(c)),
@@ -180,7 +180,7 @@ def _method(c: Comparison) -> Section:
 
 
 def comparison_summary(c: Comparison) -> RenderableType:
-    """Return what `rich` prints: the three answers, and the gap per joint."""
+    """Return the three answers and the gap per joint for `rich` to print."""
     from rich import box
     from rich.console import Group
     from rich.table import Table as Grid

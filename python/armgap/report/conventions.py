@@ -1,4 +1,4 @@
-"""Which zero, which angles and which signs a kind of arm has; in words, and as a section with the logs' columns and units."""
+"""Conventions of each kind of arm (zero, angles, signs): sentences, and a report section with the logs' columns and units."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ WORDS: dict[str, tuple[str, ...]] = {
         "theta5 sin(q1 + q2) at joint 2.",
     ),
 }
-"""Kind of arm to its conventions, one sentence or two each."""
+"""Conventions by kind of arm, a few sentences each."""
 
 _OF_SERIAL_ARMS = (
     "q = 0 and the positive direction of each joint are those of the description that the arm file names, or of its [[link]] tables.",
@@ -71,12 +71,12 @@ _SHOWN = {"Nm": "N m", "mNm": "mN m"}
 
 
 def brief(kind: str) -> str:
-    """The conventions of a kind of arm in one line; nothing for a kind that is not known."""
+    """Return the conventions of a kind of arm in one line; empty for an unknown kind."""
     return _BRIEF.get(kind, "")
 
 
 def section(kind: str, logs: list[Data] | None = None, si: Data | None = None) -> Section | None:
-    """Return the section of an arm's conventions.
+    """Return the report section of an arm's conventions.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def section(kind: str, logs: list[Data] | None = None, si: Data | None = None) -
 
 
 def _tables(kind: str, logs: list[Data], si: Data) -> list[Table]:
-    """One table for all logs that name their columns alike and have the same units."""
+    """Return tables of columns and units, one for all logs with equal column names and units."""
     groups: dict[str, tuple[Data, list[str]]] = {}
     for log in logs:
         names = groups.setdefault(repr((log["columns"], log["units"])), (log, []))[1]

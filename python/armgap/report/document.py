@@ -1,4 +1,4 @@
-"""What a report says, before it becomes a page, Markdown, or anything else."""
+"""Contents of a report, independent of its form."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ __all__ = ["Document", "diagnosis_document"]
 
 @dataclass(frozen=True)
 class Document:
-    """A report.
+    """Contents of a report, independent of its form.
 
     Attributes
     ----------
     title, lead : str
         Heading and the sentence below it.
     answers : sequence of SummaryAnswer
-        The first screen.
+        Answers shown on the first screen.
     sections : sequence of Section
-        What follows; the first one's pictures belong to the first screen.
+        Sections after the answers; pictures of the first section belong to the first screen.
     brief : str
         The arm's conventions in one line.
     before : Section, optional
-        What stands before the answers.
+        Section before the answers.
     """
 
     title: str
@@ -42,7 +42,7 @@ class Document:
 
 
 def diagnosis_document(diagnosis: Diagnosis | dict[str, Any]) -> Document:
-    """Return the report of a diagnosis, or of its JSON object."""
+    """Return the report of a diagnosis, given as an object or as its JSON object."""
     from armgap.report.sections.all import SECTIONS
     from armgap.report.sections.checks import input_checks
 

@@ -1,4 +1,4 @@
-"""Reports as files, in the form that the file's extension asks for."""
+"""Writing of reports to files, in the form given by the file's extension."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ FORMS: dict[str, Callable[[Document, dict[str, Any]], str]] = {
     ".md": _markdown,
     ".json": _json,
 }
-"""File extension to form."""
+"""Functions that make a report's form, by file extension."""
 
 
 def _form(path: str | Path) -> Callable[[Document, dict[str, Any]], str]:
@@ -56,7 +56,7 @@ def _form(path: str | Path) -> Callable[[Document, dict[str, Any]], str]:
 
 
 def check_report(path: str | Path | None) -> None:
-    """Raise before any work is done if no report could be written under this name.
+    """Raise if the extension of a report's path stands for no form of report.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def check_report(path: str | Path | None) -> None:
 
 
 def prepare_report(path: str | Path | None) -> None:
-    """Load what a page's charts need on a thread of its own, while the work it will show is done in the core."""
+    """Import the modules for a report's charts in a separate thread, in parallel with the computation."""
     if path is not None and _form(path) is _html:
         Thread(target=import_module, args=("bokeh.plotting",), daemon=True).start()
 
@@ -79,7 +79,7 @@ def render_report(document: Document, data: dict[str, Any], path: str | Path) ->
     Parameters
     ----------
     document : Document
-        What the report says.
+        Contents of the report.
     data : dict
         The result as a JSON object, for the machine form.
     path : path-like

@@ -1,4 +1,4 @@
-"""The page around sections: one file, offline, every string of the input escaped."""
+"""HTML page of a report: one file that loads nothing, with every string of the input escaped."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if not TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Bar:
-    """A cell that holds a bar: a share from 0 to 1, its text and its colour."""
+    """Table cell that holds a bar: a share from 0 to 1, its text and its colour."""
 
     share: float
     text: str
@@ -27,7 +27,7 @@ class Bar:
 
 @dataclass(frozen=True)
 class IntervalLine:
-    """A cell that holds dots on a line from -1 to 1 around a shaded middle.
+    """Table cell that holds dots on a line from -1 to 1 around a shaded middle.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ Cell = str | Bar | IntervalLine
 
 @dataclass(frozen=True)
 class Table:
-    """A table of cells; with a `fold` text it starts closed under that text."""
+    """A table of cells; with a `fold` text it is initially folded under the text."""
 
     header: Sequence[str]
     rows: Sequence[Sequence[Cell]]
@@ -58,7 +58,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A chart (bokeh model) with a caption in the page's own text; where no chart can be drawn, a table says the same."""
+    """A chart (bokeh model) with a caption in the page's own text; in forms without charts, a table with the same contents."""
 
     caption: str
     chart: Any
@@ -67,20 +67,20 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Tile:
-    """One field of a map.
+    """One tile of a heat map.
 
     Attributes
     ----------
     text : str
-        Its value.
+        Value of the tile.
     depth : float
-        How dark it is, from 0 to 1.
+        Darkness of the tile, from 0 to 1.
     tip : str
-        What it stands for.
+        Tooltip with the tile's meaning.
     marked : bool
-        Whether it is outlined.
+        Whether the tile is outlined.
     low, high : str
-        The limits of its range, in the unit of its row; empty where it has none.
+        Limits of the tile's range, in the unit of its row; empty without limits.
     """
 
     text: str
@@ -93,7 +93,7 @@ class Tile:
 
 @dataclass(frozen=True)
 class HeatMap:
-    """A map in rows of tiles, each row with its label."""
+    """Heat map in rows of tiles, each row with its label."""
 
     caption: str
     rows: Sequence[tuple[str, Sequence[Tile]]]
@@ -124,7 +124,7 @@ class Section:
     points : sequence of str
         A list, beside the drawing where there is one.
     name : str
-        What a link calls the section, such as ``"conventions"`` in ``#conventions``; by default its number.
+        Name of the section in links, such as ``"conventions"`` in ``#conventions``; by default its number.
     """
 
     title: str
@@ -141,7 +141,7 @@ class Section:
 
 @dataclass(frozen=True)
 class _Part:
-    """A section with its charts turned into HTML."""
+    """Section of a page with its charts converted to HTML."""
 
     section: Section
     charts: Sequence[tuple[str, str]]
@@ -165,13 +165,13 @@ def render(
     title, lead : str
         Heading and the sentence below it.
     answers : sequence of SummaryAnswer
-        The first screen.
+        Answers shown on the first screen.
     sections : sequence of Section
-        What follows; the first one's pictures belong to the first screen.
+        Sections after the answers; pictures of the first section belong to the first screen.
     brief : str
         The arm's conventions in one line, with a link to the section named ``conventions``.
     before : Section, optional
-        What stands before the answers, without charts.
+        Section before the answers, without charts.
     """
     drawings = [[_drawing(f) for f in section.figures] for section in sections]
     script, library, divs = _embedded([d.chart for several in drawings for d in several])
@@ -194,7 +194,7 @@ def _table(table: Table | tuple[Sequence[str], Sequence[Sequence[Cell]]]) -> Tab
 
 
 def _embedded(charts: Sequence[Any]) -> tuple[str, str, Sequence[str]]:
-    """Charts as (script, library, elements); without charts the page needs neither script nor library."""
+    """Return charts as (script, library, elements); without charts, empty script and library."""
     if not charts:
         return "", "", ()
     from bokeh.document import Document
@@ -203,7 +203,7 @@ def _embedded(charts: Sequence[Any]) -> tuple[str, str, Sequence[str]]:
 
     class Checked(Document):  # type: ignore[misc]
         def validate(self) -> None:
-            """Nothing: what bokeh would look for, in an eighth of the report's time, tests look for."""
+            """Skip bokeh's validation of a chart, an eighth of the report's time; tests validate instead."""
 
     page = Checked()
     with page.models.freeze():  # what belongs to the page is looked up once, not once per chart
@@ -227,7 +227,7 @@ def _template() -> Any:
 
 
 def _code(text: str) -> Any:
-    """Text whose words between backticks are set as code; all of it escaped."""
+    """Return an escaped text with its words between backticks set as code."""
     from markupsafe import Markup, escape
 
     parts = text.split("`")

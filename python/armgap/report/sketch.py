@@ -1,4 +1,4 @@
-"""The sketch of an arm's conventions: zero, positive direction, elbow angle, sign of the torque, gravity; as SVG.
+"""Sketch of an arm's conventions as SVG: zero, positive direction, elbow angle, sign of the torque, gravity.
 
 Lines and texts take their colour from the page (``currentColor`` and the variables ``--ink`` and ``--soft``), so that one drawing serves a
 light and a dark page; as a file of its own it brings both along. Angles count from hanging down, counter-clockwise.
@@ -11,7 +11,7 @@ from math import cos, radians, sin
 
 __all__ = ["KINDS", "panel", "sheet"]
 
-#: Size of one panel, and height of its title [px].
+#: Width and height of the sketch of one kind of arm, and height of its title [px].
 WIDTH, HEIGHT, TITLE = 300, 220, 26
 Point = tuple[float, float]
 
@@ -59,7 +59,7 @@ def sheet() -> str:
 
 
 def _axis() -> str:
-    """A carriage on a rail that climbs to the right."""
+    """Return the sketch of a linear axis: a carriage on a rail that climbs to the right."""
     start, slope = (30.0, 165.0), radians(90 + 18)
 
     def along(distance: float, up: float = 0.0) -> Point:
@@ -83,7 +83,7 @@ def _axis() -> str:
 
 
 def _pendulum() -> str:
-    """One link that has turned by 40 degrees."""
+    """Return the sketch of a pendulum: one link turned by 40 degrees."""
     base, q1 = (150.0, 62.0), radians(40)
     end = _away(base, q1, 120)
     return "".join(
@@ -102,7 +102,7 @@ def _pendulum() -> str:
 
 
 def _two_link() -> str:
-    """Link 1 has turned by 32 degrees, link 2 by 46 degrees more."""
+    """Return the sketch of a two-link arm: link 1 turned by 32 degrees, link 2 by 46 degrees more."""
     base, q1, q2 = (120.0, 48.0), radians(32), radians(46)
     elbow = _away(base, q1, 92)
     end = _away(elbow, q1 + q2, 84)
@@ -128,11 +128,11 @@ def _two_link() -> str:
 
 
 KINDS: dict[str, Callable[[], str]] = {"axis": _axis, "pendulum": _pendulum, "two-link": _two_link}
-"""Kind of arm to the drawing of its panel."""
+"""Functions that draw the sketch, by kind of arm."""
 
 
 def _away(start: Point, angle: float, distance: float) -> Point:
-    """The point at a distance from another, in a direction counted from down, counter-clockwise."""
+    """Return the point at a distance from `start` in a direction counted from down, counter-clockwise."""
     return start[0] + distance * sin(angle), start[1] + distance * cos(angle)
 
 
@@ -150,7 +150,7 @@ def _polygon(points: list[Point]) -> str:
 
 
 def _head(tip: Point, angle: float, size: float) -> str:
-    """An arrow's head that points in a direction."""
+    """Return the head of an arrow that points in a direction, as SVG."""
     left, right = (_away(tip, angle + turn, size) for turn in (radians(155), radians(-155)))
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in (tip, left, right))
     return f"<polygon points='{points}' fill='currentColor'/>"
@@ -161,7 +161,7 @@ def _arrow(a: Point, b: Point, angle: float, width: float = 1.5) -> str:
 
 
 def _turn(centre: Point, radius: float, start: float, end: float, width: float = 1.5) -> str:
-    """An arc from one direction to another, counter-clockwise, with a head at its end."""
+    """Return an arc between two directions, counter-clockwise, with an arrow head at its end, as SVG."""
     size = 7 + 1.5 * width
     a, tip = _away(centre, start, radius), _away(centre, end, radius)
     b = _away(centre, end - 0.6 * size / radius, radius)
@@ -172,13 +172,13 @@ def _turn(centre: Point, radius: float, start: float, end: float, width: float =
 
 
 def _torque(joint: Point, label: str, start: float = 115, end: float = 255) -> str:
-    """A thick arc around a joint, counter-clockwise between two directions in degrees, with its label."""
+    """Return a thick arc around a joint, between two directions in degrees counter-clockwise, with its label, as SVG."""
     arc = _turn(joint, 24, radians(start), radians(end), width=3)
     return arc + _text((joint[0] + 28, joint[1] - 14), label)
 
 
 def _base(joint: Point) -> str:
-    """What the first joint is fixed to: a hatched plate behind the joint."""
+    """Return the base that the first joint is fixed to, a hatched plate behind the joint, as SVG."""
     x, y = joint
     hatch = "".join(_line((x - 34 + 9 * i, y - 40), (x - 28 + 9 * i, y - 34), 1.2) for i in range(8))
     legs = _line((x - 9, y - 33), (x, y), 2) + _line((x + 9, y - 33), (x, y), 2)

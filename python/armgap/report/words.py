@@ -1,4 +1,4 @@
-"""A diagnosis in plain sentences, the same in the terminal, in Markdown and in the report."""
+"""A diagnosis in plain sentences, for terminal, Markdown and report alike."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ Data = dict[str, Any]
 
 #: Causes less probable than this are called the best candidate, not the cause.
 DOUBTFUL = 0.5
-#: A joint's share of the gap is worth naming from here on.
+#: Share of the gap from which a joint is named in a sentence.
 MINOR_JOINT = 0.02
-#: Shares beyond which percentages have one and two decimals.
+#: Shares beyond which percentages are written with one and with two decimals.
 NEARLY, ALMOST = 0.99, 0.995
-#: Joints of which a sentence gives the errors; tables and charts have all.
+#: Joints whose errors a sentence gives at most; tables and charts have all.
 MOST_JOINTS = 3
 #: Decimal places, and size, beyond which a number is written with an exponent.
 MOST_PLACES, MOST = 6, 1e5
@@ -95,7 +95,7 @@ _INERTIAL = {
         "theta5": "gravity torque of link 2",
     },
 }
-#: Terms of a serial arm that are no effects of the library.
+#: Words for parameters of a serial arm that are no effects of the library.
 _OF_SERIAL_ARMS = {
     "nominal_link": "wrong nominal link",
     "coupled_transmission": "transmission that couples two joints",
@@ -112,16 +112,16 @@ _VARIABLES = {"dq": "speed", "reversal": "near a reversal", "q": "position", "ta
 
 @dataclass(frozen=True)
 class SummaryAnswer:
-    """One of the three questions.
+    """One question of a summary with its answer.
 
     Attributes
     ----------
     question : str
-        The question.
+        Text of the question.
     headline : str
         The answer in a few words.
     detail : str
-        What is to be said besides, in whole sentences.
+        Further information in whole sentences.
     """
 
     question: str
@@ -130,7 +130,7 @@ class SummaryAnswer:
 
     @property
     def text(self) -> str:
-        """Headline and detail as running text."""
+        """Headline and detail of the answer as running text."""
         return f"{self.headline}. {self.detail}" if self.detail else f"{self.headline}."
 
 
@@ -140,12 +140,12 @@ def _titles() -> dict[str, str]:
 
 
 def title(effect: str) -> str:
-    """Name of an effect for people."""
+    """Return the title of an effect for readers."""
     return _OF_SERIAL_ARMS.get(effect) or _titles().get(effect, effect.replace("_", " "))
 
 
 def figure(number: float | None, digits: int = 3) -> str:
-    """A number with a few significant digits; a dash where there is none."""
+    """Return a number as text with a few significant digits; a dash for None."""
     if number is None:
         return "–"
     text = f"{number:.{digits}g}"
@@ -153,19 +153,19 @@ def figure(number: float | None, digits: int = 3) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in percent, with more digits where it nears 100 and never rounded up to it."""
+    """Return a share as a percentage, with more digits near 100 % and never rounded up to it."""
     places = 0 if share <= NEARLY or share >= 1.0 else 1 if share <= ALMOST else 2
     number = f"{min(100 * share, 99.99):.{places}f}" if places else f"{100 * share:.0f}"
     return f"{'0' if number == '-0' else number}\N{NO-BREAK SPACE}%"
 
 
 def unit_text(unit: str) -> str:
-    """A unit for people: powers raised, and none for ratios."""
+    """Return a unit for readers: powers raised, empty for ratios."""
     return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³")
 
 
 def value(entry: Any, digits: int = 4) -> str:
-    """A value with its uncertainty and unit, both to the same place; or a bare number."""
+    """Return a value with its uncertainty and unit, both rounded to one digit position; or a bare number."""
     if not isinstance(entry, dict):
         return "" if entry is None else figure(float(entry), digits)
     if isinstance(entry["value"], list):
@@ -186,12 +186,12 @@ def _spread(number: float | None, sigma: float | None, digits: int) -> str:
 
 
 def sizes(parameters: Data) -> str:
-    """The parameters of an effect in one line."""
+    """Return the parameters of an effect in one line of text."""
     return ", ".join(f"{name} {value(p, 3)}" for name, p in parameters.items())
 
 
 def error_text(number: float) -> str:
-    """An error with two significant digits, zeros included; it is an RMS and worth no more.
+    """Return an RMS error as text with two significant digits, zeros included.
 
     Examples
     --------
@@ -202,7 +202,7 @@ def error_text(number: float) -> str:
 
 
 def milli_unit(units: Sequence[str]) -> str:
-    """Thousandths of the joints' units, for the heading of a column or an axis.
+    """Return thousandths of the joints' units as text for the heading of a column or an axis.
 
     Examples
     --------
@@ -213,7 +213,7 @@ def milli_unit(units: Sequence[str]) -> str:
 
 
 def millis(values: Sequence[float], units: Sequence[str]) -> str:
-    """RMS errors per joint in thousandths, or in whole units where one is that large; one unit behind all of them, or each with its own.
+    """Return RMS errors per joint as text in thousandths of the unit, or in whole units for large errors, with one common unit or each with its own.
 
     Examples
     --------
@@ -230,9 +230,9 @@ def millis(values: Sequence[float], units: Sequence[str]) -> str:
 
 
 def each_joint(*models: Sequence[float], units: Sequence[str], joints: Sequence[int] | None = None) -> str:
-    r"""The errors of each joint from one model to the next, in thousandths, or in whole units where one is that large.
+    r"""Return the errors of each joint from one model to the next as text, in thousandths of the unit, or in whole units for large errors.
 
-    `joints` are those that the errors belong to, from 1; by default all of them in their order.
+    `joints` are the joints of the errors, from 1; by default all joints in order.
 
     Examples
     --------
@@ -253,7 +253,7 @@ def each_joint(*models: Sequence[float], units: Sequence[str], joints: Sequence[
 
 
 def parameter_text(kind: str, name: str) -> str:
-    """What a parameter of the arm stands for, in a few words; nothing for one that is not known."""
+    """Return the meaning of an arm's parameter in a few words; empty for an unknown one."""
     stem, number = name.rstrip("0123456789"), name[len(name.rstrip("0123456789")) :]
     if stem in _FRICTION:
         return f"{_FRICTION[stem]} of joint {number}"
@@ -263,7 +263,7 @@ def parameter_text(kind: str, name: str) -> str:
 
 
 def named(effect: Data) -> str:
-    """An effect with its place, and its log if it belongs to one."""
+    """Return an effect with its joint, and its log if it belongs to one, as text."""
     place = f"{title(effect['effect'])}, {place_text(effect)}"
     if sides := effect.get("sides"):
         encoder, friction = sides["encoder"], sides["friction"]
@@ -272,18 +272,18 @@ def named(effect: Data) -> str:
 
 
 def doubtful(data: Data) -> bool:
-    """Whether causes were named beside a gap that stays unexplained."""
+    """Whether a diagnosis names causes although a part of the gap stays unexplained."""
     causes = data.get("causes") or []
     return bool(causes) and causes[0]["probability"] < DOUBTFUL
 
 
 def none_allowed(data: Data) -> bool:
-    """Whether a gap is left and no cause could be named, because the number of causes was limited to none."""
+    """Whether a gap remains for which no cause could be named because the number of causes was limited to zero."""
     return data["verdict"] == "unexplained" and (data.get("options") or {}).get("max_causes") == 0
 
 
 def verdict(data: Data) -> str:
-    """The verdict as a sentence."""
+    """Return the verdict of a diagnosis as a sentence."""
     if data["verdict"] == "input":
         return _contradiction(data)
     if doubtful(data):
@@ -294,7 +294,7 @@ def verdict(data: Data) -> str:
 
 
 def _contradiction(data: Data) -> str:
-    """Say which columns and which lines of the arm file contradict each other, and the remedy."""
+    """Return a sentence on the columns and arm file lines that contradict each other, and the remedy."""
     found = _errors(data)
     if not found:
         return _VERDICTS["input"]
@@ -308,13 +308,13 @@ def _errors(data: Data) -> list[Data]:
 
 
 def _check_text(check: Data) -> str:
-    """Name and place of a check."""
+    """Return name and place of a check of the input as text."""
     name = check["check"].replace("_", " ")
     return name if check.get("joint") is None else f"{name} of joint {check['joint']}"
 
 
 def answers(data: Data) -> list[SummaryAnswer]:
-    """The three questions with their answers."""
+    """Return the three questions of a diagnosis (where, which, how far) with their answers."""
     first = SummaryAnswer("Where is the gap?", *_where(data))
     if data["verdict"] == "input":
         first = SummaryAnswer("What contradicts what?", *_contradicts(data))
@@ -353,14 +353,14 @@ def _where(data: Data) -> tuple[str, str]:
 
 
 def _regime(place: Data) -> str:
-    """The regime of a place, as it follows the joint."""
+    """Return the regime of a location in words, to follow the joint's name."""
     if not place.get("range"):
         return "throughout its motion"
     return f"{'in' if place['regime'].startswith('part') else 'at'} {place['regime']}"
 
 
 def _inside(place: Data) -> str:
-    """The regime of a place as its detail follows."""
+    """Return the regime of a location as a detail in words."""
     span = place["range"]
     if span["variable"].startswith("reversal"):
         return str(place["detail"])
@@ -369,7 +369,7 @@ def _inside(place: Data) -> str:
 
 
 def _limits(data: Data, place: Data) -> str:
-    """The range of a place beside all that the joint went through: ``0.02 to 0.53 of at most 4.1 rad/s``."""
+    """Return the range of a location's regime beside the joint's whole range: ``0.02 to 0.53 of at most 4.1 rad/s``."""
     span = place.get("range")
     if not span or span["variable"].startswith("reversal"):
         return ""
@@ -384,7 +384,7 @@ def _limits(data: Data, place: Data) -> str:
 
 
 def symbol_text(variable: str) -> str:
-    """A variable of the evidence, such as ``dq2``, with what it is; anything else as it is.
+    """Return the meaning of a variable such as ``dq2``; any other text unchanged.
 
     Examples
     --------
@@ -403,7 +403,7 @@ def symbol_text(variable: str) -> str:
 
 
 def variable_text(variable: str) -> str:
-    """A regime variable in a word."""
+    """Return the variable of a regime, such as speed or position, in a word."""
     bare = variable.replace("abs(", "").rstrip(")").rstrip("0123456789")
     return _VARIABLES.get(bare, variable)
 
@@ -425,13 +425,13 @@ def _which(data: Data) -> tuple[str, str]:
 
 
 def _counted(names: list[str]) -> list[str]:
-    """Names in their order, each once, with how often it occurs."""
+    """Return names in order, each once, with its number of occurrences."""
     times = {name: names.count(name) for name in names}
     return [name if n == 1 else f"{name} ({n} times)" for name, n in times.items()]
 
 
 def _about(cause: Data, *, alone: bool) -> str:
-    """Sizes, probability and look-alikes of one cause."""
+    """Return sizes, probability and equivalents of one cause as text."""
     lead = "" if alone else f"{named(cause)}: "
     text = _capital(f"{lead}{sizes(cause['parameters'])}; probability {cause['probability']:.2f}")
     others = cause.get("equivalents") or []
@@ -445,7 +445,7 @@ def _capital(text: str) -> str:
 
 
 def _missed_most(errors: Sequence[float]) -> list[int]:
-    """Joints, from 1, that a sentence lists: all where they are few, else those with the largest errors."""
+    """Return the joints, from 1, whose errors a sentence lists: all if there are few, else those with the largest errors."""
     numbers = range(1, len(errors) + 1)
     if len(errors) <= MOST_JOINTS:
         return list(numbers)

@@ -1,4 +1,4 @@
-"""The seed paper's experiment, repeated on a simulated arm: Table II, Figures 2 to 7, and what explains their deviations.
+"""Experiment of Reyes and Kelly (1997), repeated on a simulated arm: Table II, Figures 2 to 7, and causes of their deviations.
 
 F. Reyes and R. Kelly, *Experimental evaluation of identification schemes on a direct drive robot*, Robotica 15 (1997) 563-571.
 """

@@ -1,4 +1,4 @@
-"""The experiment: Table I's arm, the paper's run, and every identification the report speaks of."""
+"""Experiment of Reyes and Kelly (1997): the arm of Table I, the run, and all identifications of the report."""
 
 from __future__ import annotations
 
@@ -22,33 +22,33 @@ __all__ = ["LADDER", "PAPER_ESTIMATES", "PAPER_MEASURED", "Reproduction", "repro
 
 #: Gravity of the experiment of Reyes and Kelly (1997) [m/s^2].
 GRAVITY = 9.81
-#: Its sample period, s.
+#: Sample period of the experiment of Reyes and Kelly (1997), s.
 SAMPLE_PERIOD_S = 0.0025
-#: Its duration, s.
+#: Duration of the experiment of Reyes and Kelly (1997), s.
 DURATION_S = 10.0
-#: Cutoff of its filters [rad/s].
+#: Cut-off of the filters of Reyes and Kelly (1997) [rad/s].
 CUTOFF_RAD_S = 50.0
-#: Coulomb friction of joint 1 in either direction, Table I [N m].
+#: Coulomb friction of joint 1, forward and backward, by Table I of Reyes and Kelly (1997) [N m].
 COULOMB_FORWARD, COULOMB_BACKWARD = 7.17, 8.049
-#: Its encoders and torque limits, section 5 [counts per revolution, N m].
+#: Encoders and torque limits of the arm of Reyes and Kelly (1997), section 5 [counts per revolution, N m].
 COUNTS_PER_REV = (1024000.0, 655360.0)
 TORQUE_LIMIT = (200.0, 15.0)
 
 PAPER_MEASURED = (2.351, 0.084, 0.102, 38.465, 1.825, 2.288, 0.175, 7.60, 1.734)
-"""Table II, column "Measured"."""
+"""Table II of Reyes and Kelly (1997), column "Measured" [SI], nine base parameters."""
 
 PAPER_ESTIMATES: dict[str, tuple[float | None, ...]] = {
     "supplied-energy": (2.14, 0.088, 0.087, 39.04, None, None, None, None, None),
     "filtered-power": (1.99, 0.084, 0.084, 36.20, 2.01, 2.35, 0.192, 4.95, 1.01),
     "filtered-dynamic": (1.98, 0.087, 0.084, 38.48, 1.99, 2.11, 0.120, 6.20, 1.18),
 }
-"""Table II; the paper gives no values where the supplied energy did not converge."""
+"""Estimates of Table II of Reyes and Kelly (1997) by scheme [SI]; the paper gives no values where the supplied energy did not converge."""
 
-# The low-frequency noise that integrals amplify: the amplifiers' torques wander by about one percent of the motors' limits.
+# Standard deviation of low-frequency torque noise, which integrals amplify: amplifiers wander by about one percent of the motors' limits.
 WANDER_NM = (2.0, 0.15)
 WANDER_HZ = 1.0
 WANDER_SEEDS = tuple(range(10))
-# The estimates' first seconds belong to the choice of P(0).
+# Time from which estimates are judged [s]; before it they depend on the choice of P(0).
 SETTLED_S = 3.0
 
 LadderStep = tuple[str, Filters, VelocityMethod, bool]
@@ -58,27 +58,27 @@ LADDER: tuple[LadderStep, ...] = (
     ("and central velocities", "exact", "central", False),
     ("and asymmetric friction in the model", "exact", "central", True),
 )
-"""What is put right, step by step: label, filters, velocity, asymmetry in the model."""
+"""Steps that correct errors of Reyes and Kelly (1997) one after another: label, filters, velocity, asymmetry in the model."""
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """The result of `reproduce`.
+    """Result of `reproduce`: the experiment of Reyes and Kelly (1997) on a simulated arm.
 
     Attributes
     ----------
     arm : Arm
-        Table I's arm with the mean of its two Coulomb levels.
+        Arm of Table I with the mean of its two Coulomb levels.
     log : Log
-        The simulated run.
+        Log of the simulated run.
     steps : dict
-        ``steps[scheme]`` holds one `Identification` per entry of the ladder.
+        ``steps[scheme]`` holds one `Identification` per entry of `LADDER`.
     wandering : dict
-        ``wandering[scheme]``: everything as in the paper, on runs of amplifiers whose torque wanders slowly, one per seed.
+        ``wandering[scheme]``: identifications as in the paper, on runs with slowly wandering torques of the amplifiers, one per seed.
     ideal : dict
-        ``ideal[(scheme, cutoff)]``: the paper's filters alone, on a run without encoder and asymmetry and with true velocities.
+        ``ideal[(scheme, cutoff)]``: identifications with the paper's filters, on a run without encoder steps and asymmetry and with true velocities.
     responses : dict
-        Open-loop runs of models: ``"Table I"`` with one Coulomb level, and the two schemes' estimates with everything as in the paper.
+        Open-loop runs of models: ``"Table I"`` with one Coulomb level, and two schemes' estimates identified as in the paper.
     """
 
     arm: Arm
@@ -89,12 +89,12 @@ class Reproduction:
     responses: dict[str, Log] = field(repr=False)
 
     def deviation(self, scheme: Scheme, step: int) -> NDArray[np.float64]:
-        """Relative deviation of the nine estimates from the truth at a step of the ladder."""
+        """Return the relative deviations of nine estimates from the true parameters at a step of `LADDER`."""
         estimate = self.steps[scheme][step].theta[: len(self.arm.theta)]
         return np.asarray(estimate / self.arm.theta - 1.0)
 
     def decomposition(self, scheme: Scheme) -> dict[str, list[float | None]]:
-        """What explains Table II's deviations from "measured", in percent of the measured value, for one scheme."""
+        """Return the causes of one scheme's deviations from "measured" in Table II of Reyes and Kelly (1997), in percent of the measured value."""
         d = [100 * self.deviation(scheme, i) for i in range(len(LADDER))]
         paper = [
             None if e is None else 100 * (e / m - 1)
@@ -110,22 +110,22 @@ class Reproduction:
         return {"Table II": paper, **{k: list(v) for k, v in parts.items()}, "unexplained": left}
 
     def movement(self, results: Sequence[Identification]) -> NDArray[np.float64]:
-        """Peak-to-peak movement of each estimate once settled, as a share of the true value; the median over the results."""
+        """Return the peak-to-peak movement of each settled estimate, as a share of the true value: median over the results."""
         settled = [r.history[np.searchsorted(r.t, SETTLED_S) :, : len(self.arm.theta)] for r in results]
         return np.asarray(np.median([np.ptp(h, axis=0) for h in settled], axis=0) / np.abs(self.arm.theta))
 
     def misfit(self, label: str) -> NDArray[np.float64]:
-        """RMS distance of an open-loop response from the run [rad], shape (n_joints,)."""
+        """Return the RMS difference of an open-loop response from the simulated run [rad], shape (n_joints,)."""
         return np.asarray(np.sqrt(np.mean((self.responses[label].q - self.log.q) ** 2, axis=0)))
 
     def findings(self) -> list[tuple[str, str]]:
-        """Return the findings as (title, sentence with this run's figures)."""
+        """Return the findings of the reproduction as pairs of title and sentence with figures."""
         from armgap.reproduction.findings import FINDINGS
 
         return [finding(self) for finding in FINDINGS]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return estimates, decomposition and findings, ready for JSON."""
+        """Return estimates, decomposition and findings of the reproduction as a dict ready for JSON."""
         return {
             "schema": "armgap.reproduction/1",
             "truth": dict(zip(self.arm.parameter_names, self.arm.theta.tolist(), strict=True)),
@@ -140,12 +140,12 @@ class Reproduction:
         }
 
     def to_json(self, indent: int | None = None) -> str:
-        """Return estimates, decomposition and findings as JSON."""
+        """Return estimates, decomposition and findings of the reproduction as JSON."""
         return json.dumps(self.to_dict(), indent=indent)
 
 
 def seed_arm() -> Arm:
-    """Return the arm of Table I, with the mean of joint 1's two Coulomb levels.
+    """Return the arm of Table I of Reyes and Kelly (1997), with the mean of joint 1's two Coulomb levels.
 
     Examples
     --------
@@ -170,16 +170,16 @@ def seed_arm() -> Arm:
 
 
 def seed_run(arm: Arm, *, real: bool = True, wander: NDArray[np.float64] | None = None) -> Log:
-    """Simulate the paper's run: torques (31) and (32), 10 s at 2.5 ms, from rest.
+    """Simulate the run of Reyes and Kelly (1997): torques (31) and (32), 10 s at 2.5 ms, from rest.
 
     Parameters
     ----------
     arm : Arm
-        The arm.
+        Arm to simulate.
     real : bool, default True
-        Asymmetric friction of joint 1 and encoder counts; otherwise neither, and true velocities in the log.
+        Whether friction of joint 1 is asymmetric and positions are encoder counts; if not, the log has true velocities.
     wander : ndarray, shape (n_samples, n_joints), optional
-        Torque that acts beside the commanded one [N m]; the log holds the commanded one.
+        Torque added to the commanded torque [N m]; the log holds only the commanded torque.
     """
     t = np.arange(round(DURATION_S / SAMPLE_PERIOD_S)) * SAMPLE_PERIOD_S
     delta = (COULOMB_FORWARD - COULOMB_BACKWARD) / 2
@@ -191,7 +191,7 @@ def seed_run(arm: Arm, *, real: bool = True, wander: NDArray[np.float64] | None 
 
 
 def reproduce() -> Reproduction:
-    """Repeat the paper's experiment on a simulated arm.
+    """Repeat the experiment of Reyes and Kelly (1997) on a simulated arm.
 
     Returns
     -------
@@ -225,7 +225,7 @@ def _response(arm: Arm, theta: NDArray[np.float64], log: Log) -> Log:
 
 
 def _wander(seed: int, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """First-order noise of `WANDER_HZ` with the standard deviations `WANDER_NM`."""
+    """Return first-order noise with bandwidth `WANDER_HZ` and standard deviations `WANDER_NM` [N m]."""
     decay = np.exp(-2 * np.pi * WANDER_HZ * SAMPLE_PERIOD_S)
     noise = np.random.default_rng(seed).standard_normal(shape)
     for k in range(1, len(noise)):

@@ -1,4 +1,4 @@
-"""What the reproduction shows, each finding a title and a sentence with the run's own figures."""
+"""Findings of the reproduction of Reyes and Kelly (1997), each a title and a sentence with figures."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ WIDE_RAD_S = 2 * np.pi * CUTOFF_RAD_S
 
 
 def percent(x: float | None, digits: int = 1) -> str:
-    """Return a signed percentage, empty for None."""
+    """Return a number as a signed percentage; empty for None."""
     return "" if x is None else f"{x:+.{digits}f} %"
 
 
 def filters(r: Reproduction) -> tuple[str, str]:
-    """The paper's filters, alone."""
+    """Return the finding on the filters of Reyes and Kelly (1997) alone."""
     low = {c: 100 * (r.ideal[DYNAMIC, c].theta[0] / r.arm.theta[0] - 1) for c in (CUTOFF_RAD_S, WIDE_RAD_S)}
     ratio = r.ideal[POWER, CUTOFF_RAD_S].theta[3] / r.ideal[DYNAMIC, CUTOFF_RAD_S].theta[3]
     paper = (PAPER_ESTIMATES[POWER][3] or np.nan) / (PAPER_ESTIMATES[DYNAMIC][3] or np.nan)
@@ -50,7 +50,7 @@ def filters(r: Reproduction) -> tuple[str, str]:
 
 
 def velocities(r: Reproduction) -> tuple[str, str]:
-    """Backward differences."""
+    """Return the finding on velocities by backward differences."""
     late, good = (100 * r.deviation(DYNAMIC, i)[5:7] for i in (1, 2))
     return (
         "Backward differences lag by half a period",
@@ -60,7 +60,7 @@ def velocities(r: Reproduction) -> tuple[str, str]:
 
 
 def asymmetry(r: Reproduction) -> tuple[str, str]:
-    """Two Coulomb levels of joint 1."""
+    """Return the finding on the two Coulomb levels of joint 1."""
     before, after = (100 * r.deviation(DYNAMIC, i)[3] for i in (2, 3))
     worst = 100 * max(np.abs(r.deviation(s, 3)).max() for s in SCHEMES)
     delta = (COULOMB_FORWARD - COULOMB_BACKWARD) / 2
@@ -74,7 +74,7 @@ def asymmetry(r: Reproduction) -> tuple[str, str]:
 
 
 def unexplained(r: Reproduction) -> tuple[str, str]:
-    """What of Table II's deviations the three causes leave, scheme by scheme."""
+    """Return the finding on the deviations in Table II of Reyes and Kelly (1997) that filters, velocities and asymmetry leave, scheme by scheme."""
     names = [(0, "theta1"), (2, "theta3"), (7, "theta8"), (8, "theta9")]
 
     def listed(scheme: Scheme, part: str) -> str:
@@ -91,7 +91,7 @@ def unexplained(r: Reproduction) -> tuple[str, str]:
 
 
 def drift(r: Reproduction) -> tuple[str, str]:
-    """What integrals make of slow noise."""
+    """Return the finding on drift of estimates by integrated slow noise."""
     moved = {s: 100 * r.movement(r.wandering[s])[4:] for s in (ENERGY, POWER)}
     quiet = {s: 100 * r.movement(r.steps[s][3:])[4:] for s in (ENERGY, POWER)}
     table = ", ".join(
@@ -109,4 +109,4 @@ def drift(r: Reproduction) -> tuple[str, str]:
 
 
 FINDINGS = (filters, velocities, asymmetry, unexplained, drift)
-"""Every finding, in the report's order."""
+"""Functions that return the findings of the reproduction, in the report's order."""

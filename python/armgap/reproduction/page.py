@@ -1,4 +1,4 @@
-"""The report of the reproduction: Table II beside the run, what explains its deviations, Figures 2 to 7."""
+"""Report of the reproduction of Reyes and Kelly (1997): Table II beside the run, causes of its deviations, Figures 2 to 7."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from armgap.reproduction.findings import percent
 
 __all__ = ["document", "render", "table_two"]
 
-# An estimate's first samples are far off; the pictures show what lies within so many times the true value.
+# Range of charts of estimates, in true values: the first estimates are far off and are cut.
 SPAN = 1.6
 Curve = tuple[str, Identification, str]
 
 
 def _names(r: Reproduction) -> list[str]:
-    """The paper's names, with the arm's own where they differ."""
+    """Return the parameter names of Reyes and Kelly (1997), with the arm's own in brackets where they differ."""
     return [n if n == f"theta{i}" else f"theta{i} {n}" for i, n in enumerate(r.arm.parameter_names, start=1)]
 
 
 def table_two(r: Reproduction) -> tuple[list[str], list[list[str]]]:
-    """Return Table II beside this run, as header and rows."""
+    """Return Table II of Reyes and Kelly (1997) beside the simulated run, as header and rows."""
     header = ["parameter", "Table I", "paper: measured", *(f"{who}: {s}" for s in SCHEMES for who in ("paper", "here"))]
     rows = []
     for i, name in enumerate(_names(r)):
@@ -59,7 +59,7 @@ def _parts(r: Reproduction) -> list[list[str]]:
 
 
 def _estimates(r: Reproduction, curves: Sequence[Curve], first: int = 0) -> list[Any]:
-    """Estimates over time, one small picture per parameter."""
+    """Return charts of estimates over time, one small chart per parameter."""
     thin = slice(None, None, 8)
     figures: list[Any] = []
     names = _names(r)
@@ -144,7 +144,7 @@ def _sections(r: Reproduction) -> list[Section]:
 
 
 def document(r: Reproduction) -> Document:
-    """Return the report."""
+    """Return the report of the reproduction as a document."""
     lead = "Reyes and Kelly 1997 on a simulated arm of Table I: asymmetric Coulomb friction, encoder counts, backward differences."
     return Document(
         "The seed reproduced", lead, [SummaryAnswer(title, "", text) for title, text in r.findings()], _sections(r)
@@ -152,5 +152,5 @@ def document(r: Reproduction) -> Document:
 
 
 def render(r: Reproduction) -> str:
-    """Return the report as one HTML page that loads nothing from elsewhere."""
+    """Return the report of the reproduction as one HTML page that loads no external files."""
     return page_of(document(r))

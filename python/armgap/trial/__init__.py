@@ -1,7 +1,7 @@
-"""Blind trials: cases made by a physics engine that is not ours, with a sealed key.
+"""Blind trials: cases simulated by an independent physics engine, with a sealed key.
 
-MuJoCo (``pip install 'armgap[trial]'``) moves the arm; actuators and encoders are modelled here. Nothing of
-armgap's own dynamics takes part, so that a diagnosis cannot be right merely because both sides share an error.
+MuJoCo (``pip install 'armgap[trial]'``) moves the arm; actuators and encoders are modelled here. Armgap's
+own dynamics take no part, so that a diagnosis cannot be right merely because simulation and diagnosis share an error.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""``python -m armgap.trial --seed N -o FOLDER``: make a sealed demo case."""
+"""Command ``python -m armgap.trial --seed N -o FOLDER``: makes a sealed demo case."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What a method answers to a case: named causes with probabilities and sizes, bounds, the gap, and the time it took.
+"""Answer of a method to a case of a trial: named causes with probabilities and sizes, bounds, the gap, and the time it took.
 
-Every method under trial gives the same record, so that all are scored by the same rules. On disk it is one JSON file
+All methods give answers in one form and are scored by one set of rules. On disk an answer is one JSON file
 per case, schema ``armgap.answer/1``.
 """
 
@@ -20,7 +20,7 @@ Name = tuple[str, int | None]
 
 @dataclass(frozen=True)
 class Size:
-    """A parameter of a named cause, SI; sigma None where a method gives none."""
+    """Estimated parameter of a named cause [SI]; sigma is None for a method without standard deviations."""
 
     value: float
     sigma: float | None = None
@@ -28,18 +28,18 @@ class Size:
 
 @dataclass(frozen=True)
 class NamedCause:
-    """A named cause.
+    """A cause named by a method under trial.
 
     Attributes
     ----------
     effect, joint
-        Standard name; joint from 1, None for the whole arm.
+        Standard name of the effect; joint from 1, None for the whole arm.
     probability : float
-        The method's own, 0 to 1.
+        Probability by the method itself, 0 to 1.
     sizes : dict of str to Size
-        Parameters, where the method gives them.
+        Estimated parameters, if the method gives any.
     look_alikes : tuple of (effect, joint)
-        What the method says it cannot tell from the cause.
+        Effects that the method states as indistinguishable from the cause.
     """
 
     effect: str
@@ -50,13 +50,13 @@ class NamedCause:
 
     @property
     def name(self) -> Name:
-        """Effect and joint."""
+        """Effect and joint of the named cause."""
         return self.effect, self.joint
 
 
 @dataclass(frozen=True)
 class AbsentEffect:
-    """An effect called absent: its size is said to stay below `value`, with 95 % confidence."""
+    """An effect that a method calls absent, with `value` as upper 95 % bound of its size."""
 
     effect: str
     joint: int | None
@@ -75,21 +75,21 @@ class Answer:
     verdict : str
         ``"none"``, ``"parameters"``, ``"effect"`` or ``"unexplained"``.
     causes : tuple of NamedCause
-        First the one the method believes most.
+        Named causes, the most probable first.
     limits : tuple of AbsentEffect
-        Effects called absent, with bounds.
+        Effects that the method calls absent, with bounds.
     reach : GapAtHorizon, optional
-        How far predictions miss, where the method predicts.
+        RMS prediction errors, if the method predicts.
     theta : tuple of float
-        The arm's parameters beside the causes, in the arm file's order, where the method gives them.
+        Parameters of the arm in the model with causes, in the arm file's order, if the method gives them.
     place : int, optional
-        Joint on which most of the gap lies, where the method says it.
+        Joint with most of the gap, if the method names one.
     error : str, optional
-        Why there is no answer.
+        Reason of a missing answer.
     remark : str
-        What the method itself says besides.
+        Remark of the method.
     seconds : float
-        CPU time of one thread.
+        CPU time of one thread [s].
     seal, version : str
         Hash that the case states for its key; version of the software that answered.
     """
@@ -108,7 +108,7 @@ class Answer:
     version: str = ""
 
     def stamped(self, seal: str, version: str, seconds: float) -> Answer:
-        """Return this answer with the case's seal, the version and the CPU time filled in."""
+        """Return the answer with the case's seal, the version and the CPU time filled in."""
         return replace(self, seal=seal, version=version, seconds=round(seconds, 4))
 
     def to_json(self) -> str:
@@ -117,7 +117,7 @@ class Answer:
 
     @classmethod
     def from_json(cls, text: str) -> Answer:
-        """Read an answer.
+        """Read an answer from JSON.
 
         Raises
         ------
@@ -138,12 +138,12 @@ class Answer:
 
 
 def read_answer(path: Path) -> Answer:
-    """Read an answer's file.
+    """Read an answer from its file.
 
     Raises
     ------
     OptionError
-        It is not there, or not an answer.
+        The file is missing, or not an answer.
     """
     try:
         return Answer.from_json(path.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""The methods under trial: armgap's own diagnosis, and the baselines. One interface: a sealed case in, an answer out."""
+"""The methods under trial: armgap's own diagnosis, and the baselines. Each method maps a sealed case to an answer."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HORIZON = 0.25  # s
 
 @cache
 def _build() -> str:
-    """Version of armgap, with a mark of the compiled core: answers of another build are given again."""
+    """Return the version of armgap with a hash of the compiled core; answers of another build are computed again."""
     core = hashlib.sha256(Path(_native.__file__).read_bytes()).hexdigest()
     return f"{_native.__version__}+{core[:8]}"
 
@@ -36,17 +36,17 @@ class Method:
     Attributes
     ----------
     name, title : str
-        For folders and for people.
+        Name for folders, and title for readers.
     settings : str
-        What it is and how it was set, in one sentence or two.
+        Description and settings of the method, in one sentence or two.
     answer : callable
         Answers a sealed case.
     version : callable
-        Version of the software behind it; answers of another version are given again.
+        Function that returns the version of the method's software; answers of another version are computed again.
     check : callable
-        Raises before any work is done if the method cannot run.
+        Function that raises if the method cannot run.
     expresses : frozenset of str, optional
-        Effects it can name, or their equivalents, where these are not all.
+        Effects that the method can name, or their equivalents, if these are not all effects.
     """
 
     name: str
@@ -59,14 +59,14 @@ class Method:
 
 
 def methods() -> dict[str, Method]:
-    """All methods by name, armgap first."""
+    """Return all methods under trial by name, armgap first."""
     from armgap.trial.baselines.all import BASELINES
 
     return {m.name: m for m in (ARMGAP, *BASELINES)}
 
 
 def answer_with_armgap(case: SealedCase) -> Answer:
-    """Diagnose a case with default settings."""
+    """Return armgap's answer to a case: a diagnosis with default settings."""
     from armgap.diagnosis.diagnosis import diagnose
 
     result = diagnose(case.training, case.arm, holdout=case.holdout, horizon=HORIZON)
@@ -74,7 +74,7 @@ def answer_with_armgap(case: SealedCase) -> Answer:
 
 
 def from_diagnosis(result: Diagnosis, names: Sequence[str]) -> Answer:
-    """A diagnosis as an answer; `names` are the arm's parameters in its order."""
+    """Return a diagnosis as an answer; `names` are the arm's parameter names in order."""
     gap = result.gap
     final = result.parameters["with_causes"]
     absent = [r for r in result.ruled_out if r.status == "absent" and r.bound is not None]
@@ -97,7 +97,7 @@ def _named(cause: Cause) -> NamedCause:
 
 
 def _first_ranks(result: Diagnosis) -> str:
-    """The candidates that closed most alone, for whoever studies a failure."""
+    """Return a remark with the candidates that alone close most of the gap, for the analysis of failures."""
     first = result.extra.get("ranking", [])[:5]
     return ", ".join(f"{r['effect']}:{r['joint'] or ''} {r['closed']:.0%}" for r in first)
 

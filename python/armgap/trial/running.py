@@ -1,7 +1,7 @@
-"""Many cases answered by one method, in parallel processes; what is already answered stays.
+"""Answers of one method to many cases, in parallel processes; existing answers are kept.
 
 The answer to ``DIR/case-0007`` by method M is ``DIR/answers/M/case-0007.json``. An answer is kept when it belongs to
-the case (its seal) and to the software (its version), and is no failure. Keys stay closed: a method is given what `SealedCase` holds.
+the case (its seal) and to the software (its version), and is no failure. Keys stay closed: a method receives a `SealedCase`.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from armgap.workers import one_thread
 
 __all__ = ["ANSWERS", "answer_cases", "answer_file", "open_cases"]
 
-#: Longest time for one case, s.
+#: Default time limit of a method for one case, s.
 _LIMIT_S = 300.0
 
 
 def answer_file(case: Path, method: str) -> Path:
-    """Where the answer of a method to a case lies."""
+    """Return the path of the answer of a method to a case."""
     return case.parent / ANSWERS / method / f"{case.name}.json"
 
 
 def open_cases(folder: str | Path, method: Method, again: bool = False) -> list[Path]:
-    """Case folders that a method has not answered yet."""
+    """Return the folders of cases that a method has not answered yet."""
     return [c for c in case_folders(folder) if again or not _answered(c, method)]
 
 
 def answer_cases(
     cases: list[Path], method: Method, *, workers: int = 1, limit_s: float = _LIMIT_S
 ) -> Iterator[tuple[Path, Answer]]:
-    """Let a method answer cases, in processes of one thread each; every answer is written as soon as it is there.
+    """Let a method answer cases, in processes of one thread each; every answer is written at once.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def answer_cases(
     Yields
     ------
     tuple of Path and Answer
-        In order.
+        Case folder and answer, in order of the cases.
     """
     if not cases:
         return
@@ -72,7 +72,7 @@ def answer_cases(
 
 
 def _result(result: Callable[[], Answer], case: Path, method: Method, limit_s: float) -> Answer:
-    """The answer, or why there is none."""
+    """Return the answer of a worker process, or an answer with the error."""
     from pebble import ProcessExpired
 
     try:
@@ -86,7 +86,7 @@ def _result(result: Callable[[], Answer], case: Path, method: Method, limit_s: f
 
 
 def _answer(case: str, name: str) -> Answer:
-    """One case in a process of its own; complaints of armgap and failures of a baseline become answers."""
+    """Return the answer of a method to one case, in its own process; errors of armgap and failures of a baseline become answers."""
     method = methods()[name]
     start = time.process_time()
     try:

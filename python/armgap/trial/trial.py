@@ -15,11 +15,11 @@ from armgap.trial.cases.case import Case, EffectRequest, NoMotionError, make_cas
 from armgap.trial.cases.layout import case_name
 from armgap.trial.simulation.arms import MODELS
 
-#: Families of cases and their usual shares.
+#: Families of trial cases and their default shares.
 FAMILIES = {"single": 0.65, "null": 0.08, "parameters": 0.07, "pair": 0.12, "outside": 0.08}
-#: Kinds of machine and how often each is drawn.
+#: Kinds of machine with the share of cases drawn from each.
 MACHINES = {"direct-drive": 0.45, "geared": 0.35, "pendulum": 0.12, "axis": 0.08}
-#: Seeds of the cases that the diagnosis may be developed on; reported scores use fresh ones.
+#: Seed of the trial cases that the diagnosis may be developed on; reported scores use fresh seeds.
 DEVELOPMENT_SEED = 1997
 DEVELOPMENT_SEEDS = (11, DEVELOPMENT_SEED)
 RETRIES = 10
@@ -27,7 +27,7 @@ RETRIES = 10
 
 @dataclass(frozen=True)
 class Plan:
-    """One case to make.
+    """Plan of one trial case.
 
     Attributes
     ----------
@@ -36,13 +36,13 @@ class Plan:
     family : str
         Key of :data:`FAMILIES`.
     model : str
-        Machine.
+        Kind of machine.
     effects : tuple of (name, joint)
-        What to hide.
+        Effects to hide.
     nominal : {"exact", "off"}
-        Whether the arm file's values are the true ones.
+        Whether the arm file's parameters are exact or off.
     duration : float
-        Length of each log, s.
+        Length of each log [s].
     """
 
     seed: tuple[int, ...]
@@ -53,7 +53,7 @@ class Plan:
     duration: float = 10.0
 
     def make(self) -> Case:
-        """Make the case; a seed without an acceptable motion is followed by the next.
+        """Make the planned case; if a seed gives no acceptable motion, the next seed is tried.
 
         Raises
         ------
@@ -72,12 +72,12 @@ class Plan:
 
 
 def fresh_seed() -> int:
-    """A seed that nobody has developed on."""
+    """Return a random seed, outside the seeds used in development."""
     return secrets.randbelow(2**31)
 
 
 def plan_trial(seed: int, n_cases: int, families: Mapping[str, float] | None = None) -> list[Plan]:
-    """Decide what each case of a trial hides, in an order that gives nothing away.
+    """Return plans with the hidden effects of each case of a trial, in an order that reveals nothing.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def make_trial(
     seed, n_cases, families
         See :func:`plan_trial`.
     folder : path
-        Where the case folders go.
+        Folder for the case folders.
     duration : float, default 10
         Length of each log, s.
     workers : int, default 1
@@ -146,7 +146,7 @@ def _make(plan: Plan, target: Path) -> Path:
 
 
 def _deal(shares: Mapping[str, float], n: int) -> list[str]:
-    """Numbers of cases in proportion to the shares, by largest remainder."""
+    """Return family names of n cases in proportion to the shares, by largest remainder."""
     total = sum(shares.values())
     exact = {name: n * share / total for name, share in shares.items()}
     names = [name for name, x in exact.items() for _ in range(int(x))]
@@ -155,7 +155,7 @@ def _deal(shares: Mapping[str, float], n: int) -> list[str]:
 
 
 def _endless(rng: np.random.Generator, model: str, families: tuple[str, ...]) -> Iterator[EffectRequest]:
-    """Every effect and joint of a machine in random order, again and again."""
+    """Yield every effect and joint of a machine in random order, endlessly."""
     arm = MODELS[model]
     requests = possible(arm.kind, arm.n_joints, families)
     while True:
@@ -190,7 +190,7 @@ def _pair(requests: Iterator[EffectRequest]) -> tuple[EffectRequest, EffectReque
     return first, second
 
 
-#: Pairs that motion cannot tell apart make no fair pair.
+#: Pairs of effects that motion cannot distinguish, which are not hidden together.
 LOOK_ALIKES = (
     {"torque_offset", "coulomb_asymmetry"},
     {"base_tilt", "encoder_offset"},

@@ -1,4 +1,4 @@
-"""Was the diagnosis right? Its first cause against what the key says, look-alikes counted."""
+"""Judgement of a diagnosis: its first cause against the key, with equivalent effects accepted."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ Name = tuple[str, int | None]
 
 @dataclass(frozen=True)
 class Judgement:
-    """What came of a diagnosis.
+    """Judgement of a diagnosis against the key of its case.
 
     Attributes
     ----------
     right : bool
-        The first cause is a hidden one, or its equivalent; without hidden effects, none was named.
+        Whether the first cause is hidden, or equivalent to a hidden one; without hidden effects, whether none was named.
     exact : bool
-        Right without help of an equivalence.
+        Whether the diagnosis is right without an equivalence.
     found : int
-        Hidden effects among all causes.
+        Number of hidden effects among all named causes.
     extra : int
-        Causes named that are not hidden.
+        Number of named causes that are not hidden.
     named, hidden : str
-        For people.
+        Named causes and hidden effects in words.
     """
 
     right: bool
@@ -40,7 +40,7 @@ class Judgement:
 
 
 def judge(diagnosis: Diagnosis, key: Key) -> Judgement:
-    """Compare a diagnosis with the opened key."""
+    """Return the judgement of a diagnosis against the opened key of its case."""
     named = [(c.effect, c.joint) for c in diagnosis.causes] if diagnosis.verdict == "effect" else []
     hidden = _distinct(key.effects)
     matches = [any(equivalent(n, h) for h in hidden) for n in named]
@@ -55,7 +55,7 @@ def judge(diagnosis: Diagnosis, key: Key) -> Judgement:
 
 
 def equivalent(named: Name, hidden: Name) -> bool:
-    """Whether no log of motion alone separates the two: the look-alikes that hold for every log.
+    """Return whether no log of motion distinguishes two effects: equivalents that hold for every log.
 
     A hidden rotor that couples the joints is also a rotor: most of what it does is inertia on joint 2's own acceleration.
     """
@@ -70,7 +70,7 @@ def equivalent(named: Name, hidden: Name) -> bool:
 
 
 def describe(names: list[Name]) -> str:
-    """Names for people: ``stribeck (joint 2)``."""
+    """Return effects with joints in words: ``stribeck (joint 2)``."""
     if not names:
         return "no effect"
     return " and ".join(f"{n} (joint {j})" if j is not None else n for n, j in names)

@@ -1,1 +1,1 @@
-"""Descriptions of robots: URDF and MJCF as a tree of links and joints, and a serial chain out of it."""
+"""Descriptions of robots: URDF and MJCF read as a tree of links and joints and resolved to a serial chain."""

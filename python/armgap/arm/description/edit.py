@@ -1,4 +1,4 @@
-"""Changes to the text of an XML file that leave everything else in it as it is, to the byte."""
+"""Edits of the text of an XML file that leave everything outside the changed elements as it is, to the byte."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class XmlText:
     data : bytes
         The file, as it was given to `armgap.arm.description.xml.parse`.
     path : Path
-        Its name, for complaints.
+        Name of the file, for error messages.
 
     Raises
     ------
     ModelFileError
-        If its characters have two bytes.
+        If the file is encoded in UTF-16.
     """
 
     def __init__(self, data: bytes, path: Path) -> None:
@@ -43,20 +43,20 @@ class XmlText:
         self._inside: dict[int, tuple[Element, list[str]]] = {}
 
     def set(self, element: Element, values: Mapping[str, str]) -> None:
-        """Give an element these attributes; it keeps its others."""
+        """Set attributes of an element; its other attributes stay."""
         self._attributes.setdefault(element.begins, (element, {}))[1].update(values)
 
     def replace(self, element: Element, text: str) -> None:
-        """Put lines of text in the place of an element."""
+        """Replace an element by lines of text."""
         begins, ends = self._span(element)
         self._changes.append((begins, ends, self._indented(text, self._indent(element))))
 
     def add(self, parent: Element, text: str) -> None:
-        """Put lines of text into an element, before all that is in it."""
+        """Insert lines of text as the first content of an element."""
         self._inside.setdefault(parent.begins, (parent, []))[1].append(text)
 
     def render(self) -> bytes:
-        """Return the changed file."""
+        """Return the edited file as bytes."""
         changes = list(self._changes)
         for begins in self._attributes.keys() | self._inside.keys():
             element = (self._attributes.get(begins) or self._inside[begins])[0]

@@ -1,4 +1,4 @@
-"""MJCF, as MuJoCo's own compiler resolves it: defaults, includes, meshes, inertias from shapes."""
+"""MJCF models as MuJoCo's own compiler resolves them: defaults, includes, meshes, inertias from shapes."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 def mjcf_tree(path: Path) -> Tree:
     """Return bodies and joints of an MJCF model.
 
-    A body with several joints becomes several links, of which the last has the body's name and inertia. The frame of a link is that of its
-    joint: at the joint's ``pos``, along the body's axes. Bodies and joints without names are called ``body1``, ``joint0`` by their numbers.
+    A body with several joints becomes several links, of which the last has the body's name and inertia. The frame of a link is its
+    joint's frame: at the joint's ``pos``, along the body's axes. Bodies and joints without names are named by number: ``body1``, ``joint0``.
 
     Raises
     ------
@@ -127,7 +127,7 @@ class _Mjcf:
         )
 
     def _actuated(self, joints: dict[str, Joint]) -> None:
-        """Give joints the limits and gains of their actuators."""
+        """Give joints the limits and gains of their MJCF actuators."""
         m, enum = self.model, self.mujoco
         for a in range(m.nu):
             if m.actuator_trntype[a] != enum.mjtTrn.mjTRN_JOINT:
@@ -148,7 +148,7 @@ class _Mjcf:
             joints[name] = joint
 
     def _coupled(self, joints: dict[str, Joint]) -> None:
-        """Make joints follow those that an equality constraint ties them to."""
+        """Add a `Mimic` to each joint that an MJCF equality constraint couples to another joint."""
         m = self.model
         for e in np.flatnonzero(m.eq_type == self.mujoco.mjtEq.mjEQ_JOINT):
             if not m.eq_active0[e]:
@@ -179,7 +179,7 @@ class _Mjcf:
 
 
 def _matrix(quaternion: Array) -> Array:
-    """Return the rotation of a quaternion ``w, x, y, z``, of any length but 0."""
+    """Return the rotation matrix, shape (3, 3), of a quaternion ``w, x, y, z`` of any length but 0."""
     w, x, y, z = quaternion / np.linalg.norm(quaternion)
     return np.array(
         [

@@ -1,4 +1,4 @@
-"""From the file of a description to a chain."""
+"""Reading of a URDF or MJCF file as a serial chain."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FOUND = {"robot": "URDF", "mujoco": "MJCF"}
 def read_description(
     path: Path, *, base: str | None, tip: str | None, frozen: Mapping[str, float], expected: str | None = None
 ) -> ResolvedModel:
-    """Read a URDF or MJCF file, told apart by its first element, and resolve it to a chain.
+    """Read a URDF or MJCF file, recognised by its first element, and resolve it to a chain.
 
     Parameters
     ----------
@@ -32,14 +32,14 @@ def read_description(
     base, tip, frozen
         As in `armgap.arm.description.resolve.resolve`.
     expected : {"URDF", "MJCF"}, optional
-        What it is said to be.
+        Format that the caller states.
 
     Raises
     ------
     ModelFileError
-        If it cannot be read or has no such chain.
+        If the file cannot be read or has no chain from `base` to `tip`.
     OptionError
-        If it is MJCF and MuJoCo is not installed.
+        If the file is MJCF and MuJoCo is not installed.
     """
     return resolve(read_tree(path, expected), base=base, tip=tip, frozen=frozen)
 

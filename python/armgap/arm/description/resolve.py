@@ -1,4 +1,4 @@
-"""A serial chain out of a tree: base to tip, with all that does not move fused into the links that carry it."""
+"""Serial chain out of a tree of links: base to tip, with all links that do not move fused into the links that carry them."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ __all__ = ["Carried", "Located", "locate", "resolve"]
 
 Array = NDArray[np.float64]
 
-#: Joints or links that a message lists at most.
+#: Joints or links that an error message lists at most.
 _LISTED = 12
-# Placements agree to this [m]: what rounding of a description's numbers leaves of them.
+# Largest distance between placements that count as equal [m]: what rounding of a description's numbers leaves.
 _SAME_PLACE = 1e-6
 _MOST_FOLLOWED = 16
-# Dampings and frictions that stand for nothing: some tools write them so that a simulation calms down.
+# Values of joint damping and friction in descriptions that are placeholders: some tools write them to calm a simulation down.
 _PLACEHOLDERS = (10.0, 100.0, 1000.0)
 
 
@@ -49,11 +49,11 @@ class Carried:
     link : str
         Name.
     rotation : ndarray, shape (3, 3)
-        Its axes in the frame of the chain's link, as columns.
+        Axes of the carried link in the frame of the chain's link, as columns.
     translation : ndarray, shape (3,)
-        Its origin there [m].
+        Origin of the carried link in the frame of the chain's link [m].
     rigid : bool
-        Whether only fixed joints lie between.
+        Whether only fixed joints lie between the chain's link and the carried link.
     """
 
     link: str
@@ -64,20 +64,20 @@ class Carried:
 
 @dataclass(frozen=True)
 class Located:
-    """Where a chain lies in a description.
+    """Placement of a chain in the tree of a robot's description.
 
     Attributes
     ----------
     base : str
         The link in whose frame the chain begins.
     rotation : ndarray, shape (3, 3)
-        Axes of its frame in that of the root, as columns.
+        Axes of the base's frame in the frame of the root, as columns.
     translation : ndarray, shape (3,)
-        Its origin there [m].
+        Origin of the base in the frame of the root [m].
     before, behind : ndarray, shapes (3, 3) and (3,)
         Axes, as columns, and origin [m] of the link before the first joint in the frame of the base.
     carried : tuple of tuple of Carried
-        Per link of the chain what it carries, itself included.
+        Description links carried by each link of the chain, itself included.
     """
 
     base: str
@@ -100,30 +100,29 @@ def resolve(tree: Tree, *, base: str | None, tip: str | None, frozen: Mapping[st
     tree : Tree
         Links and joints.
     base, tip : str, optional
-        First and last link; by default the root, and the end of the only branch that moves.
+        First and last link; by default the root link, and the end of the only branch with moving joints.
     frozen : mapping of str to float
-        Positions of joints that stand still [rad or m]. Joints that hang on the chain without being part of it stand at 0, or at the limit
-        next to it.
+        Positions of joints that stand still [rad or m]. Other joints outside the chain stand at 0, or at the limit next to 0.
 
     Raises
     ------
     ModelFileError
-        If there is no such chain, or several; it lists the links to choose from.
+        If no chain, or more than one, fits; the message lists the links to choose from.
     """
     return _Resolver(tree, frozen).model(base, tip)
 
 
 def locate(tree: Tree, chain: SerialChain, frozen: Mapping[str, float]) -> Located:
-    """Find a chain that was resolved from a description in it again.
+    """Return the placement of a chain in the description that it was resolved from.
 
     Parameters
     ----------
     tree : Tree
         Links and joints.
     chain : SerialChain
-        Its joints have the names and placements of the description's.
+        Chain whose joints have the names and placements of the description's.
     frozen : mapping of str to float
-        Positions of joints that stand still, as for `resolve`; others that are not part of the chain stand at 0, or at the limit next to it.
+        Positions of joints that stand still, as for `resolve`; other joints outside the chain stand at 0, or at the limit next to 0.
 
     Raises
     ------
@@ -209,7 +208,7 @@ class _Resolver:
         return roots[0]
 
     def _below(self, base: str) -> list[str]:
-        """Return the links that hang on a link, deepest last."""
+        """Return the links that descend from the link `base`, deepest last."""
         found, ahead = [], [base]
         while ahead:
             link = ahead.pop(0)
@@ -219,7 +218,7 @@ class _Resolver:
         return found
 
     def _tip(self, base: str) -> str:
-        """Return the end of the only branch that moves."""
+        """Return the last link of the only branch below `base` that has moving joints."""
         skip = len(self.tree.path(base))
         ends: dict[tuple[str, ...], str] = {}
         for link in (base, *self._below(base)):
@@ -253,7 +252,7 @@ class _Resolver:
         return self.tree.error(joint, problem, f"begin the chain behind it with the base `{joint.child}`")
 
     def _check(self, joint: Joint) -> None:
-        """Raise for a joint of the chain that no chain can have."""
+        """Raise for a joint on the way from base to tip that a serial chain cannot have."""
         if joint.kind == "fixed":
             return
         if joint.kind not in MOVING:
@@ -265,7 +264,7 @@ class _Resolver:
             raise self.tree.error(joint, problem, f"freeze it ({joint.name} = POSITION), or end the chain before it")
 
     def _position(self, joint: Joint, followed: int = 0) -> float:
-        """Return where a joint stands that is not part of the chain."""
+        """Return the position [rad or m] at which a joint outside the chain stands still."""
         if joint.name in self.frozen:
             return self.frozen[joint.name]
         position = 0.0
@@ -275,7 +274,7 @@ class _Resolver:
         return min(max(position, joint.lower), joint.upper)
 
     def _moved(self, pose: _Pose, joint: Joint) -> _Pose:
-        """Return the pose of the link behind a joint that stands still, from that of the link before it."""
+        """Return the pose of the link behind a joint that stands still, from the pose of the link before the joint."""
         placed = pose.then(joint.rotation, joint.translation)
         if joint.kind == "fixed":
             return placed
@@ -287,7 +286,7 @@ class _Resolver:
         return placed.then(about_axis(joint.axis, position), np.zeros(3))
 
     def _fused(self, path: list[Joint], base: str) -> tuple[list[_Pose], Array]:
-        """Return the placements of the moving joints, and the ten numbers of each link with all that hangs on it."""
+        """Return the placements of the moving joints, and the ten inertial parameters of each link with all links fused into it."""
         placements: list[_Pose] = []
         inertial: list[Array] = []
         pose, link = _here(), base
@@ -306,12 +305,12 @@ class _Resolver:
         return placements, np.array(inertial)
 
     def _hanging(self, link: str, pose: _Pose, onward: Joint | None) -> Array:
-        """Return the ten numbers of a link with all that hangs on it, but for what comes behind the joint `onward` of the chain."""
+        """Return the ten inertial parameters of a link with all links that hang on it, except those behind the chain's joint `onward`."""
         bodies = self._carried(link, pose, onward)
         return sum((moved(self.tree.links[b.link], b.rotation, b.translation) for b in bodies), np.zeros(10))
 
     def _carried(self, link: str, pose: _Pose, onward: Joint | None, *, rigid: bool = True) -> list[Carried]:
-        """Return a link and all that hangs on it, but for what comes behind the joint `onward` of the chain."""
+        """Return a link and all links that hang on it, except those behind the chain's joint `onward`."""
         found: list[Carried] = []
         ahead = [(link, pose, rigid)]
         while ahead:
@@ -329,7 +328,7 @@ class _Resolver:
         return found
 
     def located(self, chain: SerialChain) -> Located:
-        """Return where the chain lies in the tree; every moving joint that is not part of it stands still."""
+        """Return the placement of the chain in the tree; every moving joint outside the chain stands still."""
         tree, joints = self.tree, [self.tree.joints.get(name) for name in chain.joint_names]
         for name, joint in zip(chain.joint_names, joints, strict=True):
             if joint is None or joint.kind not in MOVING:
@@ -362,7 +361,7 @@ class _Resolver:
         return Located(base, at.rotation, at.translation, before, behind, tuple(map(tuple, carried)))
 
     def _base_of(self, chain: SerialChain, bases: dict[str, _Pose], first: _Pose) -> tuple[str, _Pose]:
-        """Return the link before the first joint in whose frame that joint lies as the chain says."""
+        """Return the base link of the chain and its pose: the link before the first joint whose frame matches the chain's placement of that joint."""
         for name, at in bases.items():
             rotation = at.rotation.T @ first.rotation
             translation = at.rotation.T @ (first.translation - at.translation)
@@ -382,7 +381,7 @@ class _Resolver:
             )
 
     def _gravity(self, to_base: Iterable[Joint]) -> Array:
-        """Return gravity in the frame of the base."""
+        """Return the acceleration of gravity [m/s^2] in the frame of the chain's base, shape (3,)."""
         pose = _here()
         for joint in to_base:
             still = joint.kind in (*MOVING, "fixed")
@@ -390,7 +389,7 @@ class _Resolver:
         return np.asarray(pose.rotation.T @ self.tree.gravity) + 0.0
 
     def _said(self, chain: SerialChain, inertial: Array) -> list[str]:
-        """Return what is to be said about the chain and its links."""
+        """Return remarks about the chain and its links for `ResolvedModel.notes`."""
         notes = []
         if self.still:
             stands = ", ".join(_few([f"`{name}` at {value:g}" for name, value in self.still.items()]))
@@ -417,7 +416,7 @@ class _Resolver:
         return notes
 
     def _friction(self, moving: list[Joint], name: str, notes: list[str]) -> Array:
-        """Return the joints' coefficients; nan where they are placeholders or no friction."""
+        """Return the joints' friction coefficients `name`; nan where the description has placeholders or no friction."""
         values = _values(moving, name)
         word = {"viscous": "damping", "coulomb": "friction"}[name]
         if np.any(values < 0):
@@ -456,7 +455,7 @@ def _begins(longer: tuple[str, ...], shorter: tuple[str, ...]) -> bool:
 
 
 def _common(sequences: list[list[str]]) -> list[str]:
-    """Return what several sequences begin with."""
+    """Return the common prefix of several sequences."""
     first, last = min(sequences), max(sequences)
     count = next((i for i, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), min(len(first), len(last)))
     return first[:count]
@@ -471,7 +470,7 @@ def _values(joints: list[Joint], name: str) -> Array:
 
 
 def _gear_ratio(moving: list[Joint], notes: list[str]) -> Array | None:
-    """Return the reductions where all joints have one and not all are 1, which stands for unknown."""
+    """Return the joints' gear ratios; None unless all joints have one and not all are 1, which stands for unknown."""
     ratios = _values(moving, "reduction")
     if np.isnan(ratios).all() or np.all(ratios[np.isfinite(ratios)] == 1.0):
         return None
@@ -483,7 +482,7 @@ def _gear_ratio(moving: list[Joint], notes: list[str]) -> Array | None:
 
 
 def _controller(moving: list[Joint], notes: list[str]) -> Controller | None:
-    """Return the position actuators where all joints have one."""
+    """Return the position controller made of the joints' actuators; None unless all joints have one."""
     kp, kd = _values(moving, "kp"), _values(moving, "kd")
     if not np.isfinite(kp).all():
         return None

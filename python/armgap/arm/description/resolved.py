@@ -1,4 +1,4 @@
-"""What a description says about one serial arm."""
+"""A robot's description resolved to the model of one serial arm."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ class ResolvedModel:
     chain : SerialChain
         The moving joints from base to tip.
     inertial : ndarray, shape (n_joints, 10)
-        Ten inertial numbers of each link, see `armgap.arm.rigid_body`, with all that hangs rigidly on it.
+        Ten inertial parameters of each link, see `armgap.arm.rigid_body`, including everything that is rigidly attached to the link.
     rotor_inertia, viscous, coulomb : ndarray, shape (n_joints,)
         Inertia of the rotors at the joints [kg m^2 or kg], friction coefficients [N m s/rad, N m; N s/m, N]; nan where unknown.
     gear_ratio : ndarray, shape (n_joints,), optional
         Turns of the motor per turn of the joint.
     sigma : ndarray, shape (n_joints, 10), optional
-        Standard deviations of `inertial`; nan in the rows of links whose trust nobody states.
+        Standard deviations of `inertial`; nan for links without stated trust.
     controller : Controller, optional
         Position actuators of the description.
     notes : tuple of str
-        What was taken how, and what looks wrong.
+        Remarks on how elements of the description were read, and on suspicious values.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""A robot as a description has it: links and joints in a tree."""
+"""A robot's description as a tree of links and joints."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ __all__ = ["MOVING", "Joint", "Mimic", "Tree"]
 Array = NDArray[np.float64]
 
 MOVING = ("revolute", "prismatic")
-"""Kinds of joint that a chain can have; others are ``"fixed"``, or have several degrees of freedom."""
+"""Kinds of joint that a serial chain can have; joints of other kinds are ``"fixed"``, or have several degrees of freedom."""
 
 
 @dataclass(frozen=True)
 class Mimic:
-    """A joint follows another one: its position is ``multiplier`` times that of `joint`, plus `offset`."""
+    """Coupling of a joint to another one: its position is ``multiplier`` times the position of `joint`, plus `offset`."""
 
     joint: str
     multiplier: float = 1.0
@@ -36,27 +36,27 @@ class Joint:
     Attributes
     ----------
     name, parent, child : str
-        Joint, and the links that it joins.
+        Names of the joint, its parent link and its child link.
     kind : str
-        ``"revolute"``, ``"prismatic"``, ``"fixed"``, or the description's own word for what has more freedom.
+        ``"revolute"``, ``"prismatic"``, ``"fixed"``, or the description's own word for a joint with more degrees of freedom.
     rotation : ndarray, shape (3, 3)
-        Axes of the joint's frame in that of the parent, as columns, at position 0.
+        Axes of the joint's frame in the frame of the parent link, as columns, at position 0.
     translation : ndarray, shape (3,)
-        Its origin in the frame of the parent [m].
+        Origin of the joint's frame in the frame of the parent link [m].
     axis : ndarray, shape (3,), optional
         Unit vector in the joint's frame; None if the description's is zero.
     lower, upper, speed, effort : float
-        Limits of position, speed and torque; infinite where unknown.
+        Limits of position [rad or m], speed [rad/s or m/s] and torque [N m or N]; infinite where unknown.
     viscous, coulomb, rotor_inertia : float
         Friction coefficients and inertia of the rotor at the joint [SI]; nan where unknown.
     reduction : float
         Turns of the motor per turn of the joint; nan where unknown.
     kp, kd : float
-        Gains of a position actuator; nan where it has none.
+        Gains of the joint's position actuator [SI]; nan without one.
     mimic : Mimic, optional
-        The joint that it follows.
+        Coupling to the joint that this joint follows.
     row : int, optional
-        Line of the file.
+        Line of the joint in the description's file.
     """
 
     name: str
@@ -97,14 +97,14 @@ class Tree:
     joints : mapping of str to Joint
         Joints in the order of the file.
     gravity : ndarray, shape (3,)
-        In the frame of the root [m/s^2].
+        Acceleration of gravity in the frame of the root link [m/s^2].
     notes : tuple of str
-        What was noticed while reading.
+        Remarks from reading the description.
 
     Raises
     ------
     ModelFileError
-        If a joint names a link that is not there, a link has two parents, or links go round in a circle.
+        If a joint names a missing link, a link has two parents, or links form a loop.
     """
 
     file: Path
@@ -115,12 +115,12 @@ class Tree:
     gravity: Array
     notes: tuple[str, ...] = ()
     parent_joint: dict[str, Joint] = field(init=False, default_factory=dict)
-    """Joint that moves each link but the roots."""
+    """Joint that moves each link, by name of the link; root links have none."""
     child_joints: dict[str, list[Joint]] = field(init=False, default_factory=dict)
-    """Joints that begin at each link."""
+    """Joints whose parent is a link, by name of the link."""
 
     def __post_init__(self) -> None:
-        """Check the links of all joints and index them."""
+        """Check that the links of all joints exist, and index joints by parent and child link."""
         for joint in self.joints.values():
             for what, link in (("parent", joint.parent), ("child", joint.child)):
                 if link not in self.links:
@@ -143,11 +143,11 @@ class Tree:
 
     @property
     def roots(self) -> list[str]:
-        """Links that no joint moves."""
+        """Names of the links that no joint moves."""
         return [link for link in self.links if link not in self.parent_joint]
 
     def path(self, link: str) -> list[Joint]:
-        """Return the joints from the root to a link."""
+        """Return the joints from the root link to a link."""
         joints: list[Joint] = []
         while link in self.parent_joint:
             joints.append(self.parent_joint[link])
@@ -155,6 +155,6 @@ class Tree:
         return joints[::-1]
 
     def error(self, joint: Joint | None, problem: str, remedy: str) -> ModelFileError:
-        """Return a complaint about a joint, or about the whole description."""
+        """Return an error about a joint, or about the whole description if `joint` is None."""
         column, row = (None, None) if joint is None else (f"joint {joint.name}", joint.row)
         return ModelFileError(problem, remedy=remedy, file=self.file, column=column, row=row)

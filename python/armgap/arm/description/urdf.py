@@ -1,4 +1,4 @@
-"""URDF: links with inertia and joints with axis, limits and friction; shapes, colours and simulators' own elements are passed over."""
+"""URDF: links with inertia and joints with axis, limits and friction; shapes, colours and simulators' own elements are ignored."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def urdf_tree(root: Element, path: Path) -> Tree:
     Raises
     ------
     ModelFileError
-        If something that is needed is missing or no number; it names the element and its line.
+        If a required element is missing or a value is no number; the message names the element and its line.
     """
     return _Urdf(root, path).tree()
 
@@ -86,7 +86,7 @@ class _Urdf:
         return name
 
     def _numbers(self, element: Element, key: str, default: tuple[float, ...] | None) -> Array:
-        """Return the numbers of an attribute, as many as the default has; None asks for one that must be there."""
+        """Return the numbers of an XML attribute, as many as the default has; without a default, the one number of a required attribute."""
         text = element.attributes.get(key)
         if text is None:
             if default is None:
@@ -113,7 +113,7 @@ class _Urdf:
         return rpy_matrix(self._numbers(origin, "rpy", zero)), self._numbers(origin, "xyz", zero)
 
     def _inertial(self, link: Element) -> Array:
-        """Return a link's ten numbers, zeros without an inertial element."""
+        """Return a link's ten inertial parameters; zeros for a link without an inertial element."""
         inertial = link.first("inertial")
         if inertial is None:
             return np.zeros(10)
@@ -152,7 +152,7 @@ class _Urdf:
         return joint
 
     def _limited(self, joint: Joint, limit: Element | None, *, continuous: bool) -> Joint:
-        """Return the joint with its limits; zeros of speed and torque, and of both positions, stand for unknown."""
+        """Return the joint with its limits; limits of speed or torque that are zero, and limits of position that are both zero, count as unknown."""
         if limit is None:
             return joint
         lower, upper = (self._number(limit, key, 0.0) for key in ("lower", "upper"))
@@ -178,7 +178,7 @@ class _Urdf:
         return Mimic(other, self._number(mimic, "multiplier", 1.0), self._number(mimic, "offset", 0.0))
 
     def _reductions(self) -> Iterator[tuple[str, float]]:
-        """Return joints with the reductions of their transmissions, which stand beside the joint, in it or in the actuator."""
+        """Yield joints with the gear ratios of their transmissions, given beside the joint, in the joint or in the actuator."""
         for transmission in self.root.all("transmission"):
             joints, actuators = (list(transmission.all(tag)) for tag in ("joint", "actuator"))
             if len(joints) != 1:
@@ -198,12 +198,12 @@ class _Urdf:
 
 
 def _is_macro(text: str) -> bool:
-    """Whether a value is an expression of xacro."""
+    """Whether an attribute's value is an expression of xacro."""
     return "${" in text or "$(" in text
 
 
 def _macros(root: Element) -> Iterator[Element]:
-    """Return the elements that only xacro understands."""
+    """Yield the elements that only xacro understands."""
     ahead = [root]
     while ahead:
         element = ahead.pop()

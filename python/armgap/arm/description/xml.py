@@ -1,4 +1,4 @@
-"""XML of descriptions without namespaces: prefixes that nobody declares are part of the name, lines are kept for complaints."""
+"""XML of robot descriptions, read without namespaces: undeclared prefixes are part of the name, line numbers are kept for error messages."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from armgap.files.reading import read_bounded
 __all__ = ["Element", "parse", "read_text"]
 
 _MOST_BYTES = 64 * 2**20
-"""Size of a description: tens of times those with collision shapes inside."""
+"""Largest accepted size of a description, bytes: tens of times that of descriptions with collision shapes inside."""
 
 
 @dataclass
 class Element:
-    """One element: its name with its prefix, attributes, elements inside, text, line, and the bytes at which it begins and its end tag does."""
+    """One XML element: name with prefix, attributes, child elements, text, line, and the byte offsets of its start and of its end tag."""
 
     tag: str
     attributes: dict[str, str]
@@ -29,21 +29,21 @@ class Element:
     ends: int = 0
 
     def first(self, tag: str) -> Element | None:
-        """Return the first element inside with this name."""
+        """Return the first child element with a name; None without one."""
         return next(self.all(tag), None)
 
     def all(self, tag: str) -> Iterator[Element]:
-        """Return all elements inside with this name."""
+        """Return all child elements with a name."""
         return (child for child in self.children if child.tag == tag)
 
 
 def read_text(path: Path) -> bytes:
-    """Return the content of a description.
+    """Return the bytes of a description's file.
 
     Raises
     ------
     ModelFileError
-        If it cannot be read.
+        If the file cannot be read.
     """
     try:
         return read_bounded(path, _MOST_BYTES)
@@ -57,12 +57,12 @@ def read_text(path: Path) -> bytes:
 
 
 def parse(data: bytes, path: Path) -> Element:
-    """Return the root element.
+    """Parse XML and return the root element.
 
     Raises
     ------
     ModelFileError
-        If it is not XML; it names the line. Entities of its own are refused.
+        If the data are not XML, or declare entities; the message names the line.
     """
     top = Element("", {}, 0)
     stack = [top]

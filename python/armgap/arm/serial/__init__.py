@@ -1,1 +1,1 @@
-"""Serial arms: their chain, their arm files, and how far nominal values are trusted."""
+"""Serial arms: their chain, their arm files, and default standard deviations of their nominal values."""

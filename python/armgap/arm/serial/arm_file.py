@@ -1,4 +1,4 @@
-"""Arm files of serial arms: keys of their own, with the chain from a URDF, an MJCF model or ``[[link]]`` tables."""
+"""Arm files of serial arms: the keys that only serial arms have, with the chain from a URDF, an MJCF model or ``[[link]]`` tables."""
 
 from __future__ import annotations
 
@@ -50,29 +50,29 @@ _TAU_KINDS = ("command", "measured")
 
 
 class SerialArmFile(ArmFile):
-    """One arm file of a serial arm being checked.
+    """One arm file of a serial arm while it is checked.
 
     Parameters
     ----------
     path : Path
-        File.
+        Arm file.
     data : dict
-        Its content.
+        Content of the arm file.
     described : ResolvedModel, optional
-        The model, where the file names none.
+        Model of the arm, for an arm file that names no description.
     """
 
     tables = _TABLES
     scalars = _SCALARS
     joints: tuple[str, ...] = ()
-    """Names of the chain's joints, once it is known."""
+    """Names of the chain's joints; empty until the chain is read."""
 
     def __init__(self, path: Path, data: dict[str, Any], described: ResolvedModel | None = None) -> None:
         super().__init__(path, data)
         self.described = described
 
     def fields(self) -> dict[str, Any]:
-        """Return the fields of an `Arm`, all of them checked."""
+        """Return the checked fields of an `Arm` by name."""
         with np.errstate(over="ignore", invalid="ignore"):
             return self._fields()
 
@@ -145,7 +145,7 @@ class SerialArmFile(ArmFile):
         return next(trust for trust in TRUSTS if trust == word)
 
     def _gravity(self) -> Array | None:
-        """Return gravity in the frame of the base; None where the file leaves it to the description."""
+        """Return gravity in the frame of the base [m/s^2], shape (3,); None where the arm file leaves gravity to the description."""
         value = self.data.get("gravity")
         if value is None:
             return None
@@ -192,7 +192,7 @@ class SerialArmFile(ArmFile):
     def _vector(
         self, table: dict[str, Any], key: str, n: int, minimum: float | None = None, above: float | None = None
     ) -> Array:
-        """Return numbers in the order of the chain, from a list or by names of joints."""
+        """Return one number per joint, in the order of the chain, from a list or from a table by joint name."""
         name = key.rpartition(".")[2]
         value = table.get(name)
         if isinstance(value, dict) and self.joints:
@@ -208,7 +208,7 @@ class SerialArmFile(ArmFile):
         return super()._vector(table, key, n, minimum, above)
 
     def _nominal(self, key: str, described: Array, free: Array, share: float) -> tuple[Array, Array]:
-        """Return nominal values and standard deviations, from the file, else from the description, else 0 and `free`."""
+        """Return nominal values and standard deviations of a parameter: from the arm file, else from the description, else 0 and `free`."""
         table, name = key.split(".")
         given = self._table_or_empty(table)
         n = len(self.joints)
@@ -218,14 +218,14 @@ class SerialArmFile(ArmFile):
         return values, np.where(values > 0, share * values, free)
 
     def _either(self, key: str, other: str, n: int) -> Array | None:
-        """Return a list that may stand in either of two tables."""
+        """Return a list of numbers that the arm file may hold in the table of limits or in another table, under the key `key` or `other`."""
         first, second = self._optional(key, n), self._optional(other, n)
         if first is not None and second is not None:
             raise self.error(other, f"stands beside `{key}`", "give one of them")
         return second if first is None else first
 
     def _limited(self, model: ResolvedModel) -> Any:
-        """Return the chain with the limits that the file gives."""
+        """Return the chain with the joint limits that the arm file gives."""
         chain, table, n = model.chain, self._table_or_empty("limits"), model.chain.n_joints
         keys = (("lower", "position_min"), ("upper", "position_max"), ("speed", "speed"), ("acceleration",) * 2)
         given: dict[str, Any] = {
@@ -240,7 +240,7 @@ class SerialArmFile(ArmFile):
         return chain
 
     def _loaded(self, inertial: Array) -> tuple[Array, tuple[str, ...]]:
-        """Return the links with the payload on the last one."""
+        """Return the links' inertial parameters with the arm file's payload on the last link, and remarks."""
         if "payload" not in self.data:
             return inertial, ()
         table = self.data["payload"]

@@ -29,7 +29,7 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 
 
 def _unknown() -> NDArray[np.float64]:
-    """Return what stands for limits that are not given."""
+    """Return an empty array, which stands for limits that are not given."""
     return np.empty(0)
 
 
@@ -37,9 +37,9 @@ def _unknown() -> NDArray[np.float64]:
 class SerialChain:
     """A serial chain of n joints.
 
-    Joint j turns about, or slides along, `axis[j]` through the origin of its frame. That frame lies at `rotation[j]`, `translation[j]` in
-    the frame of the link before it (of the base for the first), at position 0. The frame of link j is the joint's frame moved by the joint.
-    All arrays are read-only.
+    Joint j turns about, or slides along, `axis[j]` through the origin of its frame. The frame of joint j lies at `rotation[j]`,
+    `translation[j]` in the frame of link j - 1 (of the base for the first joint), at position 0. The frame of link j is the joint's frame
+    moved by the joint. All arrays are read-only.
 
     Attributes
     ----------
@@ -48,11 +48,11 @@ class SerialChain:
     kinds : tuple of {"revolute", "prismatic"}
         Kind of each joint.
     rotation : ndarray, shape (n, 3, 3)
-        Axes of each joint's frame in the frame of the link before, as columns.
+        Axes of each joint's frame in the frame of the preceding link, as columns.
     translation : ndarray, shape (n, 3)
-        Origin of each joint's frame in the frame of the link before [m].
+        Origin of each joint's frame in the frame of the preceding link [m].
     axis : ndarray, shape (n, 3)
-        Unit vector in the joint's frame.
+        Unit vector along the joint's axis, in the joint's frame.
     gravity : ndarray, shape (3,)
         Acceleration of gravity in the frame of the base [m/s^2].
     lower, upper : ndarray, shape (n,)
@@ -79,12 +79,12 @@ class SerialChain:
     effort: NDArray[np.float64] = field(default_factory=_unknown)
 
     def __post_init__(self) -> None:
-        """Check the shapes, fill in limits that are not given, and make the arrays read-only.
+        """Check the shapes of a chain's arrays, fill in limits that are not given, and make the arrays read-only.
 
         Raises
         ------
         OptionError
-            If one does not have a row per joint.
+            If an array does not have one row per joint.
         """
         n = len(self.joint_names)
         for name, shape in (*((key, (n, *rest)) for key, rest in _SHAPES.items()), ("gravity", (3,))):
@@ -107,7 +107,7 @@ class SerialChain:
 
     @property
     def rotary(self) -> tuple[bool, ...]:
-        """Whether each joint turns."""
+        """Whether each joint is rotary."""
         return tuple(kind == "revolute" for kind in self.kinds)
 
     @property
@@ -119,7 +119,7 @@ class SerialChain:
 
     @property
     def parameter_units(self) -> tuple[str, ...]:
-        """Units of the 13 n parameters."""
+        """Units of the 13 n parameters of a chain of n joints."""
         rotor = ["kg m^2" if turns else "kg" for turns in self.rotary]
         viscous = ["N m s/rad" if turns else "N s/m" for turns in self.rotary]
         coulomb = ["N m" if turns else "N" for turns in self.rotary]
@@ -131,7 +131,7 @@ class SerialChain:
         Raises
         ------
         OptionError
-            If the chain has more joints than the core computes with.
+            If the chain has more joints than the compiled core supports.
         """
         try:
             return _native.Chain(list(self.kinds), self.rotation, self.translation, self.axis, self.gravity)
@@ -141,7 +141,7 @@ class SerialChain:
             ) from None
 
     def to_native(self) -> dict[str, Any]:
-        """Return the chain as the compiled core takes it: nested lists."""
+        """Return the chain as the dict of nested lists that the compiled core reads."""
         return {
             "kinds": list(self.kinds),
             "rotation": self.rotation.tolist(),

@@ -27,22 +27,22 @@ _KEYS = (
 )  # fmt: skip
 _PLACEMENT = ("xyz", "rpy", "rotation")
 _KINDS: dict[str, JointKind] = {**{kind: kind for kind in get_args(JointKind)}, "continuous": "revolute"}
-#: Links that an arm file lists at most.
+#: Number of ``[[link]]`` tables in an arm file at most.
 _MOST_JOINTS = 64
-# Rows of a rotation that are typed with a few digits are made orthonormal; beyond this they are no rotation.
+# Largest deviation of a rotation matrix in an arm file from an orthonormal one; a smaller one, from few digits, is orthonormalised.
 _ROTATION = 1e-3
 _EXACT = 1e-12
 
 
 class LinkTables:
-    """The links of one arm file being checked."""
+    """The ``[[link]]`` tables of one arm file while they are checked."""
 
     def __init__(self, file: ArmFile, tables: Any) -> None:
         self.file = file
         self.tables = tables
 
     def model(self, gravity: Array) -> ResolvedModel:
-        """Return the chain and inertia of all links, with gravity in the frame of the base."""
+        """Return the chain and inertia of all links in the tables, with gravity in the frame of the base."""
         if not isinstance(self.tables, list) or not self.tables or not all(isinstance(t, dict) for t in self.tables):
             raise self._error("link", "must be a list of tables", "write [[link]] before each link")
         if len(self.tables) > _MOST_JOINTS:
@@ -100,7 +100,7 @@ class LinkTables:
         return _KINDS[word]
 
     def _numbers(self, value: Any, key: str, shape: tuple[int, ...]) -> Array:
-        """Return finite numbers of a shape."""
+        """Return the value of a key as an array of finite numbers of a given shape."""
         size = " x ".join(map(str, shape))
         try:
             found = np.array(value, dtype=np.float64)
@@ -142,7 +142,7 @@ class LinkTables:
         return rotation, translation
 
     def inertia(self, value: Any, key: str) -> Array:
-        """Return the six numbers of an inertia given by name: ``{ixx = ..., iyy = ..., izz = ...}``, off-diagonals 0 where left out."""
+        """Return the six entries of an inertia matrix given by name: ``{ixx = ..., iyy = ..., izz = ...}``, off-diagonals 0 where left out."""
         if not isinstance(value, dict):
             raise self._error(
                 key, f"must be a table, not {value!r}", "write inertia = {ixx = ..., iyy = ..., izz = ...}"
@@ -156,7 +156,7 @@ class LinkTables:
         return np.array([float(self._numbers(value.get(k, 0.0), f"{key}.{k}", ())) for k in INERTIA_KEYS])
 
     def _inertial(self, i: int) -> Array:
-        """Return a link's ten numbers; zeros where the file gives none."""
+        """Return the ten inertial parameters of link i; zeros where the arm file gives none."""
         table, key = self.tables[i], f"link {i + 1}"
         if "theta" in table:
             for other in ("mass", "com", "inertia"):
@@ -192,7 +192,7 @@ class LinkTables:
         return value
 
     def _positions(self) -> tuple[Array, Array]:
-        """Return the limits of position; without bound where the file gives none."""
+        """Return the lower and upper limits of position [rad or m]; infinite where the arm file gives none."""
         ends = []
         for i, table in enumerate(self.tables):
             low, high = (

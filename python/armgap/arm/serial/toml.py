@@ -1,4 +1,4 @@
-"""A serial arm as an arm file that stands alone: what is read back is the same arm."""
+"""Writing of a serial arm as a self-contained arm file, which reads back as the same arm."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["serial_toml"]
 
 Array = NDArray[np.float64]
 
-# Mass, centre and inertia about it give the ten numbers back to this, relative to their largest; what does not is written as it is.
+# Largest rounding error of the ten inertial parameters, relative to the largest, at which mass, centre and central inertia are written for them.
 _SAME = 1e-15
 _PER_JOINT = (
     ("position_min", "lower"),
@@ -30,10 +30,10 @@ _ROWS, _COLUMNS = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
 
 
 def serial_toml(arm: Arm) -> str:
-    """Return the text of an arm file.
+    """Return the text of a serial arm's arm file.
 
-    Placements, axes, joints' values and standard deviations are written to the last bit; mass, centre of mass and inertia about it give
-    the link's ten numbers back to 1e-15 of the largest.
+    Placements, axes, joints' values and standard deviations are written to the last bit; mass, centre of mass and central
+    inertia give the link's ten inertial parameters back to 1e-15 of the largest.
     """
     chain = arm.chain
     assert chain is not None
@@ -77,7 +77,7 @@ def serial_toml(arm: Arm) -> str:
 
 
 def _inertial_lines(ten: Array) -> list[str]:
-    """Return mass, centre and inertia about it, or the ten numbers where these do not give them back; nothing where all are zero."""
+    """Return TOML lines with a link's mass, centre and central inertia, or, if rounding requires, ten inertial parameters; empty if all are zero."""
     if not ten.any():
         return []
     if ten[0] > 0:
@@ -92,7 +92,7 @@ def _inertial_lines(ten: Array) -> list[str]:
 
 
 def _neat(values: float | Array) -> Array:
-    """Return values without what rounding left in their last digits: to 15 digits of the largest."""
+    """Return values rounded to 15 digits of the largest."""
     largest = float(np.max(np.abs(values)))
     digits = 15 - (math.ceil(math.log10(largest)) if largest > 0 else 0)
     return np.asarray(np.round(values, digits)) + 0.0

@@ -1,4 +1,4 @@
-"""How far the nominal values of a serial arm are trusted, where the arm file does not say it value by value.
+"""Default standard deviations of a serial arm's nominal parameters, where the arm file states none value by value.
 
 Links
     One word for all of them, `Trust`. Its share t of the mass m is the mass's standard deviation. First moments have ``t m L`` and inertias
@@ -7,12 +7,12 @@ Links
     than the rest of the link. ``"none"`` stands for values that are unknown: the standard deviation of the mass is what 100 kg per metre of L
     make, an order of magnitude above usual links (UR10: 15 to 25 kg/m, Panda: 10), and at least the mass itself.
 Friction
-    Half of each value. Where there is none, a fifth of the largest torque that the joint is known to deal with: its limit of torque, or the
-    largest weight that it can carry of the arm itself, but at least 2 % of that of any joint; viscous coefficients reach it at 1 rad/s
+    Half of each nominal coefficient. Without a value, a fifth of the largest expected torque of the joint: its limit of torque, or the
+    largest gravity torque by the arm itself, but at least 2 % of that of any joint; viscous friction reaches it at 1 rad/s
     (0.2 m/s).
 Rotors
-    The value itself. Where there is none, the inertia that the joint moves with the arm stretched out, but at least 2 % of that of any joint: the
-    last joints of geared arms carry little and have rotors of the same size.
+    The nominal rotor inertia itself. Without a value, the inertia that the joint moves with the arm stretched out, but at least 2 % of that
+    of any joint: the last joints of geared arms carry little and have rotors of the same size.
 """
 
 from __future__ import annotations
@@ -31,37 +31,37 @@ Array = NDArray[np.float64]
 Trust = Literal["published", "cad", "guess", "none"]
 
 TRUSTS: dict[Trust, float] = {"published": 0.1, "cad": 0.3, "guess": 1.0, "none": 1.0}
-"""Standard deviation of the mass as a share of it."""
-#: Standard deviation of friction that a file states, as a part of it.
+"""Standard deviation of a link's mass as a share of the mass, by level of trust in the arm's inertial parameters."""
+#: Standard deviation of a friction coefficient that an arm file states, as a part of the coefficient.
 FRICTION_SHARE = 0.5
-#: Mass per length of a link of unknown mass [kg/m]: more than any robot's.
+#: Mass per length of a link of unknown mass, as its standard deviation [kg/m]: more than any robot's.
 _UNKNOWN_KG_PER_M = 100.0
 _USUAL_KG_PER_M = 10.0
-"""Mass of a link that the description gives none, where a scale of torque or inertia is wanted."""
-#: Reach of a joint at least, as a part of the arm's, and where the arm has none [m].
+"""Mass per length of a link without a mass in the description [kg/m], for scales of torque and inertia."""
+#: Smallest characteristic length of a link, as a part of the arm's reach, and for an arm without reach [m].
 _LEAST_REACH_SHARE = 0.05
 _NO_REACH_M = 0.1
-#: Coulomb friction that is unknown, as a part of the torque that the joint needs.
+#: Standard deviation of unknown Coulomb friction, as a part of the joint's scale of torque.
 _FRICTION_OF_TORQUE = 0.2
-#: Torque and inertia that a joint is scaled by at least, as a part of the largest of its kind.
+#: Smallest scale of torque or inertia of a joint, as a part of the largest over the arm's joints.
 _LEAST_OF_LARGEST = 0.02
 _GRAVITY = 9.81  # m/s^2; of the scale of torque, whatever the arm's own
 _TURNING_SPEED, _SLIDING_SPEED = 1.0, 0.2  # rad/s, m/s
 
 
 class Scales:
-    """Sizes that an arm's links and joints could have.
+    """Scales of length, torque, inertia and friction of an arm, for standard deviations of unknown parameters.
 
     Attributes
     ----------
     length : ndarray, shape (n,)
         Characteristic lengths of the links [m].
     torque : ndarray, shape (n,)
-        Torques that the joints deal with [N m or N].
+        Largest torques expected at the joints [N m or N].
     inertia : ndarray, shape (n,)
-        Inertias that the joints move [kg m^2 or kg].
+        Inertias moved by the joints [kg m^2 or kg].
     viscous, coulomb : ndarray, shape (n,)
-        Standard deviations of friction coefficients that nothing is known of.
+        Standard deviations of unknown friction coefficients [SI].
     """
 
     def __init__(self, chain: SerialChain, inertial: Array) -> None:
@@ -96,14 +96,14 @@ class Scales:
 
 
 def link_sigma(mass: Array, length: Array, trust: Trust) -> Array:
-    """Return the standard deviations of the links' ten numbers, shape (n, 10).
+    """Return the standard deviations of the links' ten inertial parameters [SI], shape (n, 10).
 
     Parameters
     ----------
     mass, length : ndarray, shape (n,)
         Masses [kg] and characteristic lengths [m] of the links.
     trust : {"published", "cad", "guess", "none"}
-        Of the inertial values.
+        Level of trust in the inertial parameters.
     """
     sigma = TRUSTS[trust] * np.abs(mass)
     unknown = _UNKNOWN_KG_PER_M * length

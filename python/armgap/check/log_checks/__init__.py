@@ -1,1 +1,1 @@
-"""Checks of one log by itself, before the equation of motion."""
+"""Checks of a single log on its own, without the equation of motion."""

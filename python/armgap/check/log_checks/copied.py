@@ -1,7 +1,7 @@
-"""Holdout logs that hold rows of the training logs: their contents are compared, whatever the files are called.
+"""Detection of holdout logs that hold rows of training logs, by contents, whatever the files are called.
 
-A row is the same if all its positions and torques, or references, are. Rows that occur more than once in a log (a joint at rest) say nothing. What is
-left has to agree in time too: the same distance between the clocks for many rows.
+Two rows are equal if all positions and torques, or references, are equal. Rows that occur more than once in a log (a joint at rest) are
+not compared. Equal rows have to agree in time too: one distance between the clocks for many rows.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from armgap.log.log import Log
 
 __all__ = ["copied_holdout"]
 
-# Rows at the same distance in time that make a copy; two runs of one experiment do not agree to the last digit so often.
+# Equal rows at one distance in time that make a copy; two runs of one experiment do not agree to the last digit so often.
 _FEWEST = 40
-# Distances in time are told apart by this part of a period.
+# Distances in time that differ by less than this part of a sample period count as one.
 _APART = 0.5
-# A hole of so many rows in a copied range is filled: rows that occur twice.
+# Largest hole in a copied range of rows that is filled: rows that occur twice are not compared.
 _HOLE = 50
 
 
 def copied_holdout(training: Sequence[Log], holdout: Sequence[Log]) -> list[Check]:
-    """Say which holdout logs hold rows of training logs.
+    """Return a check for every holdout log that holds rows of a training log.
 
     Parameters
     ----------
     training, holdout : sequence of Log
-        Logs that are learnt from, and judged on.
+        Logs that parameters are fitted to, and logs that models are judged on.
 
     Returns
     -------
     list of Check
-        One for each pair that shares rows, with the rows of the holdout log.
+        One check for each pair of logs that shares rows, with the rows of the holdout log.
     """
     known = [_rows(log) for log in training]
     checks = []
@@ -55,7 +55,7 @@ def copied_holdout(training: Sequence[Log], holdout: Sequence[Log]) -> list[Chec
 
 
 def _rows(log: Log) -> tuple[NDArray[np.uint64], NDArray[np.intp]]:
-    """Return a number for each row's contents, sorted, and the row, of contents that occur once."""
+    """Return hash values of those rows whose contents occur once in a log, sorted, and the indices of the rows."""
     keys = np.zeros(len(log), dtype=np.uint64)
     driven = log.tau if log.q_ref is None else log.q_ref
     for column in (*log.q.T, *driven.T):
@@ -73,7 +73,7 @@ def _common(
     held: Log,
     its_rows: tuple[NDArray[np.uint64], NDArray[np.intp]],
 ) -> NDArray[np.intp]:
-    """Return the rows of the holdout log that stand in the training log at one distance in time."""
+    """Return the rows of the holdout log that also stand in the training log, at one distance in time."""
     _, here, there = np.intersect1d(its_rows[0], theirs[0], assume_unique=True, return_indices=True)
     if len(here) < _FEWEST:
         return np.arange(0)
@@ -88,7 +88,7 @@ def _common(
 
 
 def _filled(rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return rows with small holes closed."""
+    """Return row indices with small holes between them filled."""
     ends = np.flatnonzero(np.diff(rows) > _HOLE)
     parts = zip(rows[np.r_[0, ends + 1]], rows[np.r_[ends, len(rows) - 1]], strict=True)
     return np.concatenate([np.arange(a, b + 1) for a, b in parts])

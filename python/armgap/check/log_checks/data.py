@@ -1,4 +1,4 @@
-"""The checks that need the columns of one log only, in the order in which defects hide each other."""
+"""All checks of a single log's columns, in the order in which one defect can hide another."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ _REMEDY = "leave out --no-repair"
 
 
 def data_checks(log: Log, arm: Arm | None, *, repair: bool) -> tuple[Log, list[Check]]:
-    """Look for defects that a log shows by itself, and repair those that can be repaired without guessing.
+    """Find defects of a single log, and repair those that can be repaired without guessing.
 
     Parameters
     ----------
     log : Log
-        Log as it was read.
+        Log as read from its file.
     arm : Arm, optional
-        Arm it belongs to; the step of its encoders is used, and whether its joints turn.
+        Arm of the log, for the step of its encoders and the kind of its joints.
     repair : bool
-        Whether to repair. Without it, what could be repaired is a warning.
+        Whether to repair defects. If not, a repairable defect becomes a warning.
 
     Returns
     -------
     log : Log
-        The repaired log, or the log itself.
+        The repaired log, or `log` itself.
     checks : list of Check
-        What was noticed; rows are those of the log as it was given.
+        Defects that were found; row numbers refer to the log as it was given.
     """
     current, rows = log, None
     said: list[Check] = []
@@ -62,7 +62,7 @@ def data_checks(log: Log, arm: Arm | None, *, repair: bool) -> tuple[Log, list[C
 
 
 def _worded(check: Check, outcome: Outcome, rows: NDArray[np.intp] | None, *, repair: bool) -> Check:
-    """Return a check with rows of the original log, and with what was done or could be."""
+    """Return a check with row numbers of the original log, and with a message of what was, or could be, repaired."""
     if rows is not None:
         check = replace(check, rows=tuple((int(rows[a]), int(rows[b])) for a, b in check.rows))
     if check.severity != "repaired":

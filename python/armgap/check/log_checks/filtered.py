@@ -1,9 +1,9 @@
 """Positions that are smoother than their encoder: low-passed, interpolated from a slower rate, or fitted.
 
-A raw encoder adds white noise, its step over the square root of 12 while the joint moves: differences of every order, each in its own
-norm, give the same deviation once motion has faded. A low-pass leaves less of it, and less by higher orders; interpolation leaves
-none between its knots. Numbers that are exact to their last digit never were an encoder's; a simulation of dry friction still has
-the kinks of its reversals, which a low-pass would have taken away.
+A raw encoder adds white noise, its step over the square root of 12 while the joint moves: normalised differences of every order give
+the same standard deviation of noise once motion has faded. A low-pass leaves less noise, and less by higher orders; interpolation leaves
+none between its knots. Positions that are exact to their last digit come from no encoder; a simulation of dry friction still has
+the kinks of its reversals, which a low-pass would have smoothed.
 """
 
 from __future__ import annotations
@@ -29,36 +29,37 @@ __all__ = ["look"]
 
 Array = NDArray[np.float64]
 
-# Noise below this part of the encoder's is not the encoder's.
+# Noise of a position below this part of the encoder's own noise shows that the position was filtered.
 _OF_ENCODER = 0.5
-# By differences of order 6 noise appears larger than by order 12 by this factor if it falls towards high frequencies.
+# Ratio of noise by differences of order 6 to noise by order 12 from which noise counts as coloured, falling towards high frequencies.
 _COLOURED = 1.3
-# Counts per row from which rounding is white.
+# Encoder counts per row from which rounding noise is white.
 _WHITE_COUNTS = 1.0
-# A joint moves where it gets on by more than this part of its usual fast pace, per row.
+# A joint counts as moving where its travel per row exceeds this part of its usual fast travel per row.
 _MOVES = 0.05
-# Positions that are held in this share of the rows in motion are another defect.
+# Share of the rows in motion with held positions from which the defect is `repeated`, not a filter.
 _HELD = 0.1
-# Rows in motion that have to speak, and reversals that an exact log has to pass smoothly.
+# Rows in motion that the check of filtered positions needs, and reversals that an exact log has to pass smoothly.
 _FEWEST, _REVERSALS = 200, 4
-# Numbers are exact within so many roundings, fourth differences within so many times more.
+# Positions are exact if noise is within so many roundings, fourth differences if they are within so many times more.
 _EXACT, _FOURTH = 20.0, 8.0
-# Rows whose neighbours are a period away within this part: differences mean something there.
+# Deviation from a sample period, as a part of it, within which rows count as evenly spaced, so that differences are meaningful.
 _EVEN = 0.2
-# Interpolation leaves this share of the fourth differences exact, and others this much larger than what is exact. Rounding to a grid
-# makes up to so many steps of it more often than none.
+# Share of fourth differences that are zero between an interpolation's knots, ratio of the others to the rounding, and steps of a
+# grid of positions that rounding to the grid makes more often than zero.
 _PIECEWISE, _KNOTS, _FEW_COUNTS = 0.05, 1e3, 5
-# Those others are of any size: what one in ten exceeds is so many times what one in twenty stays below. Steps of a grid make it 4.
+# Fourth differences at an interpolation's knots are of any size: their 90 % quantile is so many times their 5 % quantile, for at least so many
+# knots. Steps of a grid make the ratio 4.
 _ANY_SIZE, _FEWEST_KNOTS = 20.0, 20
-# Torques that explain this share of the high frequencies, with an inertia above zero, speak for motion. A controller's torques follow
-# the encoder's noise, and so does what a low-pass leaves of it, by half or so.
+# Share of a position's high frequencies that torques, with a positive inertia, have to explain to count as motion. A controller's
+# torques follow the encoder's noise, filtered or not, by about half.
 _EXPLAINED = 0.9
 _HALF = 6
 _DOUBLE = float(np.finfo(np.float64).eps)
 
 
 def look(log: Log, arm: Arm | None) -> Outcome:
-    """Say which joints' positions have less noise at high frequencies than any encoder."""
+    """Return the outcome with a check of the joints whose positions have less noise at high frequencies than any encoder."""
     steps = None if arm is None else arm.encoder_step
     found = []
     for j in range(log.n_joints):
@@ -73,7 +74,7 @@ def look(log: Log, arm: Arm | None) -> Outcome:
 
 
 def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
-    """Return what speaks against a raw encoder; empty if nothing does."""
+    """Return why joint j's positions do not come from a raw encoder; empty if nothing speaks against one."""
     rows = blocks(len(log))
     pieces = [np.ascontiguousarray(log.q[r, j]) for r in rows]
     paces = [travel_per_row(q, _HALF) for q in pieces]
@@ -114,7 +115,7 @@ def _why(log: Log, j: int, step: float | None, dry: bool) -> str:
 
 
 def _even(t: Array, period: float) -> NDArray[np.bool_]:
-    """Return the rows whose neighbours, on either side, lie a period apart."""
+    """Return a mask of the rows whose neighbours, on either side, lie a sample period away."""
     off = np.append(0, np.cumsum(np.abs(np.diff(t) / period - 1) > _EVEN))
     rows = np.arange(len(t))
     return np.asarray(off[np.minimum(rows + _HALF, len(t) - 1)] == off[np.maximum(rows - _HALF, 0)])
@@ -128,7 +129,7 @@ def _unmeasured(pieces: list[Array], moving: list[NDArray[np.bool_]], exact: flo
 
 
 def _stale(pieces: list[Array], moving: list[NDArray[np.bool_]]) -> int:
-    """Return how many rows in motion repeat the position before."""
+    """Return the number of rows in motion that repeat the position before."""
     return sum(int(np.count_nonzero((q[1:] == q[:-1]) & m[1:])) for q, m in zip(pieces, moving, strict=True))
 
 
@@ -137,7 +138,7 @@ def _largest(pieces: list[Array]) -> float:
 
 
 def _between_knots(pieces: list[Array], moving: list[NDArray[np.bool_]], exact: float, grid: float) -> float:
-    """Return the share of rows whose fourth differences are exactly zero; none if all are alike, or steps of the grid."""
+    """Return the share of rows with fourth differences of exactly zero; 0 if all differences are alike, or are steps of a grid."""
     bends = np.concatenate([np.abs(np.diff(q, n=4)[m[2:-2]]) for q, m in zip(pieces, moving, strict=True)])
     zero = bends <= exact
     others = bends[~zero]
@@ -152,7 +153,7 @@ def _between_knots(pieces: list[Array], moving: list[NDArray[np.bool_]], exact: 
 
 
 def _over_times(log: Log, j: int, rows: list[slice], moving: list[NDArray[np.bool_]]) -> float:
-    """Return the noise left by cubics over the stamps, which uneven times do not hide."""
+    """Return the noise of joint j's positions by cubics over the time stamps, which is valid for uneven times too."""
     left = np.concatenate(
         [from_neighbours(log.t[r], log.q[r, j : j + 1])[m[2:-2], 0] for r, m in zip(rows, moving, strict=True)]
     )
@@ -165,7 +166,7 @@ def _reversals(pieces: list[Array], moving: list[NDArray[np.bool_]]) -> int:
 
 
 def _driven(log: Log, j: int, rows: list[slice], moving: list[NDArray[np.bool_]]) -> bool:
-    """Whether torques explain the high frequencies: held torques accelerate, so sixth differences follow fourth ones of torque."""
+    """Whether torques explain joint j's high frequencies: held torques accelerate, so sixth differences of position follow fourth ones of torque."""
     if not log.has_torques:
         return False
     y = np.concatenate([np.diff(log.q[r, j], n=6)[m[3:-3]] for r, m in zip(rows, moving, strict=True)])

@@ -1,4 +1,4 @@
-"""Numbers that several checks ask of a column: its grid, its noise at high frequencies, how fast it moves."""
+"""Numbers about a column that several checks use: step of its grid, noise at high frequencies, travel per row."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ __all__ = ["ORDERS", "blocks", "from_neighbours", "grid_step", "noise_by_order",
 
 Array = NDArray[np.float64]
 
-# Evidence is taken from so many blocks of so many rows, evenly spread: enough for a few per cent, and its cost has a bound.
+# Number and length of the blocks of rows, evenly spread over a log, that evidence is taken from: enough for a few per cent at bounded cost.
 _BLOCKS, _BLOCK_ROWS = 16, 4096
 
-# Differences between distinct values are whole multiples of a step if this share of them lies so close to one, in steps.
+# Values lie on a grid if at least this share (second number) of their differences lies so close (first number, in steps) to whole steps.
 _CLOSE, _MOST = 0.1, 0.97
-# Fewer distinct values do not tell a grid.
+# Distinct values from which the step of a grid is determined.
 _FEWEST_LEVELS = 6
-# Values closer to each other than this part of the largest are one value.
+# Values closer to each other than this part of the largest count as one value.
 _SAME = 1e-12
 
 ORDERS = (4, 6, 8, 10, 12)
-"""Orders of the differences that noise is taken from: motion fades with the order, white noise stays."""
+"""Orders of the differences that measure noise: motion fades with the order, white noise stays."""
 
 
 def blocks(n: int) -> list[slice]:
-    """Return the rows that evidence is taken from: all of a short log, evenly spread blocks of a long one."""
+    """Return slices of the rows that evidence is taken from: all n rows of a short log, evenly spread blocks of a long one."""
     if n <= _BLOCKS * _BLOCK_ROWS:
         return [slice(0, n)]
     starts = np.linspace(0, n - _BLOCK_ROWS, _BLOCKS).astype(int)
@@ -34,7 +34,7 @@ def blocks(n: int) -> list[slice]:
 
 
 def grid_step(values: Array) -> float | None:
-    """Return the step of the grid that values lie on, None if they take any value or too few.
+    """Return the step of the grid that values lie on; None for values without a grid, or too few distinct ones.
 
     Examples
     --------
@@ -57,14 +57,14 @@ def grid_step(values: Array) -> float | None:
 
 
 def rounding(q: Array) -> float:
-    """Return the rounding of the numbers that positions are stored in."""
+    """Return the rounding error of positions [rad or m] in the number format, single or double precision, that they were stored in."""
     largest = float(np.max(np.abs(q), initial=0.0))
     single = bool(np.all(q == q.astype(np.float32)))
     return largest * float(np.finfo(np.float32 if single else np.float64).eps)
 
 
 def travel_per_row(q: Array, half: int) -> Array:
-    """Return how far a position gets per row, net over `half` rows to either side, shape (n_samples,)."""
+    """Return the travel of a position per row, net over `half` rows to either side, shape (n_samples,)."""
     n = len(q)
     rows = np.arange(n)
     after, before = np.minimum(rows + half, n - 1), np.maximum(rows - half, 0)
@@ -72,9 +72,9 @@ def travel_per_row(q: Array, half: int) -> Array:
 
 
 def noise_by_order(pieces: list[Array], wanted: list[NDArray[np.bool_]]) -> tuple[Array, Array]:
-    """Return the standard deviation of white noise that differences of each of `ORDERS` amount to: by squares, and by the median.
+    """Return the standard deviation of white noise by differences of each of `ORDERS`: from mean squares, and from medians.
 
-    White noise gives the same by every order; motion, and noise that somebody filtered, less by higher ones.
+    White noise gives equal values by every order; motion, and filtered noise, smaller values by higher orders.
     """
     by_squares, by_median = [], []
     for order in ORDERS:
@@ -89,19 +89,19 @@ def noise_by_order(pieces: list[Array], wanted: list[NDArray[np.bool_]]) -> tupl
 
 
 def from_neighbours(t: Array, q: Array) -> Array:
-    """Return by how much positions miss the cubic through the two rows before and the two after, in standard deviations of one row.
+    """Return the errors of positions from the cubic through two rows before and two rows after, scaled to the noise of one row.
 
     Parameters
     ----------
     t : ndarray, shape (n_samples,)
-        Times, at least five.
+        Sample times [s], at least five.
     q : ndarray, shape (n_samples, n_joints)
-        Positions.
+        Positions [rad or m].
 
     Returns
     -------
     ndarray, shape (n_samples - 4, n_joints)
-        White noise of standard deviation s gives s, whatever the times.
+        Scaled errors [rad or m]: white noise of standard deviation s gives s, whatever the times.
     """
     n = len(t)
     x = [t[2 + i : n - 2 + i] - t[2 : n - 2] for i in (-2, -1, 1, 2)]

@@ -1,4 +1,4 @@
-"""What a check of one log's columns comes to, and rows left out of a log."""
+"""Result of a check of one log's columns, and removal of rows from a log."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from armgap.log.log import Log
 
 __all__ = ["NOTHING", "Outcome", "ranges", "seconds", "with_rows"]
 
-# More ranges of rows than that say nothing more.
+# Ranges of rows that a check lists at most.
 _LISTED = 200
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a check found in a log.
+    """Result of the check of one log's columns.
 
     Attributes
     ----------
     checks : tuple of Check
-        What it says; severity ``"repaired"`` where `repaired` holds the remedy.
+        Defects that were found; severity ``"repaired"`` where `repaired` is the log without them.
     repaired : Log, optional
         The log without the defect.
     kept : ndarray, optional
-        Rows of the log that are left in `repaired`; None if all are.
+        Rows of the log that `repaired` keeps; None if it keeps all.
     deed : str
-        What was done, in words.
+        The repair in words.
     """
 
     checks: tuple[Check, ...] = ()
@@ -44,7 +44,7 @@ NOTHING = Outcome()
 
 
 def ranges(rows: NDArray[np.intp] | Sequence[int]) -> tuple[tuple[int, int], ...]:
-    """Return sorted rows as ranges ``(first, last)``, the first 200 of more.
+    """Return sorted rows as ranges ``(first, last)``, 200 ranges at most.
 
     Examples
     --------
@@ -60,15 +60,15 @@ def ranges(rows: NDArray[np.intp] | Sequence[int]) -> tuple[tuple[int, int], ...
 
 
 def seconds(time: float) -> str:
-    """Return a time in words."""
+    """Return a time [s] in words, with its unit."""
     return f"{time:.4g} s"
 
 
 def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None = None) -> Log:
-    """Return some rows of a log, each with the mean torque, or reference, from its time to that of the next one.
+    """Return some rows of a log, each with the mean torque, or reference, from its own time to that of the next kept row.
 
-    The torque's impulse over every interval and its first moment are what they were, so that an arm gains the same momentum and goes the
-    same way.
+    The torque's impulse over every interval and its first moment are preserved, so that an arm gains the same momentum and travels the same
+    distance.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None 
     kept : ndarray
         Rows to keep, increasing.
     valid : ndarray, shape (n_samples, n_joints), optional
-        Torques that count; a row without any valid one takes the torque before it.
+        Mask of valid torques; an interval without a valid torque takes the torque before it.
     """
     held = np.append(np.diff(log.t), log.sample_period)[:, None]
     weight = np.broadcast_to(held, log.tau.shape) if valid is None or not log.has_torques else held * valid
@@ -105,7 +105,7 @@ def with_rows(log: Log, kept: NDArray[np.intp], valid: NDArray[np.bool_] | None 
 def _moment(
     log: Log, kept: NDArray[np.intp], mean: NDArray[np.float64], valid: NDArray[np.bool_] | None
 ) -> NDArray[np.float64]:
-    """Return the first moment of the torque about the middle of every interval between kept rows; zero where a torque does not count."""
+    """Return the first moment of the torque about the middle of every interval between kept rows; zero where a torque is not valid."""
     first, counts = int(kept[0]), np.diff(np.append(kept, len(log)))
     ends = np.append(log.t[1:], log.t[-1] + log.sample_period)
     middle = np.repeat(0.5 * (log.t[kept] + np.append(log.t[kept[1:]], ends[-1])), counts)

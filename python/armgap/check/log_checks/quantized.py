@@ -1,6 +1,6 @@
-"""Torques in steps that matter: many levels, all whole multiples of a step that is large beside the torque's own spread.
+"""Coarsely quantised torques: many levels, all whole multiples of a step that is large beside the torque's own variation.
 
-A command that has few levels because it was made so, or that stays at each for long and then goes somewhere else, is not rounded.
+A command with few levels by design, or that stays at each level for long and then jumps by more than one step, is not quantised.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ __all__ = ["look"]
 
 Array = NDArray[np.float64]
 
-# Rounding by this part of the torque's RMS variation is as large as many an effect.
+# Rounding error as a part of the torque's RMS variation from which quantisation is reported: as large as many an effect.
 _MATTERS = 0.015
-# Fewer levels are a command's own.
+# Number of levels below which a torque counts as a command with levels by design, not as quantised.
 _LEVELS = 8
-# Changes of level that have to be seen.
+# Changes of a torque's level that the check of quantisation needs.
 _CHANGES = 40
-# A command that stays at a level for so many rows as a rule, and then goes more than one step, or stays equally long, was made so.
+# A torque counts as rounded if its median stay at a level is below so many rows, or this share of its changes are of one step and stays vary so much.
 _STAYS, _ONE_STEP, _EQUALLY_LONG = 5, 0.5, 0.2
 
 
 def look(log: Log, arm: Arm | None) -> Outcome:
-    """Say which torques are rounded so that it matters."""
+    """Return the outcome with a check of the torques whose quantisation is coarse enough to matter."""
     found = []
     for j in range(log.tau.shape[1]):
         tau = np.concatenate([log.tau[rows, j] for rows in blocks(len(log))])
@@ -46,7 +46,7 @@ def look(log: Log, arm: Arm | None) -> Outcome:
 
 
 def _rounded(tau: Array, step: float) -> bool:
-    """Whether levels are passed as a rounded signal passes them."""
+    """Whether a torque passes through its levels as a rounded continuous signal does."""
     if len(np.unique(np.round(tau / step))) < _LEVELS:
         return False
     moved = np.diff(tau)

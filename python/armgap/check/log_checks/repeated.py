@@ -1,7 +1,7 @@
 """Positions held over several rows while the joint moves: only rows with a fresh position stay.
 
-A position that is held is followed by a step that makes up for the rows it was held over. A joint that stops does not do that, and
-one that moves by a few encoder counts per row or less repeats its position by nature.
+A held position is followed by a step that makes up for the rows of the hold. A joint that stops shows no such step, and
+a joint that moves by a few encoder counts per row or less repeats its position by nature.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ __all__ = ["look"]
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# A joint that moves so many counts per row does not repeat a position by itself.
+# Encoder counts per row from which a moving joint does not repeat a position by itself.
 _FAST_COUNTS = 8.0
-# Where positions are held at all, a row that repeats is a held one if the joint moves by so many counts per row.
+# Encoder counts per row from which a repeated position counts as held, in a log where positions are held at all.
 _SLOW_COUNTS = 2.0
-# After a hold the position steps by what the motion asks over the rows of the hold, within these factors.
+# Range of the position's step after a hold, relative to the travel of the motion over the rows of the hold.
 _MAKES_UP = (0.5, 2.0)
-# Share of the rows in motion that are held, and rows of that kind, before anything is said.
+# Share of the rows in motion with held positions, and number of these rows, from which a hold is reported.
 _SHARE, _FEWEST = 0.1, 20
-# Motion is judged over so many rows to either side at least, and twice the usual hold.
+# Rows to either side over which motion is judged at least (else twice the usual hold), and rows of the longest hold.
 _AROUND, _LONGEST = 8, 64
-# Joints have one pattern if their held rows agree to this share.
+# Share of held rows in common from which two joints are held together.
 _AGREE = 0.9
-# A pattern is regular if this share of the holds is.
+# Share of holds of equal length from which a joint's held positions have a regular pattern.
 _REGULAR = 0.95
 
 
 @dataclass(frozen=True)
 class _Held:
-    """One joint: rows that repeat the one before, that lie in fast motion, in any; share of rows held, length of a hold."""
+    """Holds of one joint: rows that repeat the previous position, rows in fast motion and in any motion, share of rows held, length of a hold."""
 
     again: Flags
     fast: Flags
@@ -50,7 +50,7 @@ class _Held:
 
 
 def look(log: Log, arm: Arm | None) -> Outcome:
-    """Find joints whose positions are held; repair if they are held together, or the others do not move."""
+    """Find joints with held positions; repair the log if the joints are held together, or the other joints do not move."""
     joints = [_held(np.ascontiguousarray(log.q[:, j])) for j in range(log.n_joints)]
     held = [j for j, h in enumerate(joints) if h.share >= _SHARE]
     if not held:
@@ -101,7 +101,7 @@ def _reach(length: float) -> int:
 
 
 def _holds(q: Array, step: float) -> tuple[int, int, Array]:
-    """Return the rows held, the rows in fast motion, and the length of each hold."""
+    """Return the number of rows held, the number of rows in fast motion, and the length of each hold, rows."""
     starts = np.append(0, np.flatnonzero(q[1:] != q[:-1]) + 1)
     if len(starts) < 4:
         return 0, 0, np.empty(0)
@@ -119,7 +119,7 @@ def _holds(q: Array, step: float) -> tuple[int, int, Array]:
 
 
 def _agree(held: _Held, other: _Held) -> bool:
-    """Whether two joints hold their positions in the same rows, as far as both move."""
+    """Whether two joints hold their positions in the same rows, where both move."""
     both = held.fast & other.fast
     if np.count_nonzero(both) < _FEWEST:
         return True
@@ -130,7 +130,7 @@ def _agree(held: _Held, other: _Held) -> bool:
 
 
 def _fresh(log: Log, held: list[_Held]) -> NDArray[np.intp]:
-    """Return the rows with fresh positions: at a regular beat throughout, otherwise wherever no moving joint is held."""
+    """Return the rows with fresh positions: every period of a regular hold, otherwise all rows in which no moving joint is held."""
     rows = np.arange(len(log))
     beat = _beat(held)
     if beat is not None:
@@ -143,7 +143,7 @@ def _fresh(log: Log, held: list[_Held]) -> NDArray[np.intp]:
 
 
 def _beat(held: list[_Held]) -> tuple[int, int] | None:
-    """Return period and phase of a regular hold, None if it has none."""
+    """Return period and phase of a regular hold, rows; None for an irregular one."""
     fresh = np.unique(np.concatenate([np.flatnonzero(~h.again & h.fast) for h in held]))
     if len(fresh) < _FEWEST:
         return None

@@ -1,10 +1,10 @@
-"""Single rows that no motion explains: a position that returns at once, a torque of absurd size that nothing answers.
+"""Spikes: single rows of a position that returns at once, or of an absurdly large torque without a response of the arm.
 
 A position is a spike if for one to three rows it lies off the straight line between the rows around it by several times what the
-joint moves per row next to it: even a joint that is struck, and reverses within a row, does not get that far. A torque is one if
-it is far beyond the largest torques of the log for one to three rows, and no joint gets faster than otherwise by it.
+joint moves per row next to it: even a joint that is struck, and reverses within a row, does not get that far. A torque is a spike
+if it is far beyond the largest torques of the log for one to three rows, and no joint accelerates more than otherwise.
 
-A position that is left out is missed by nobody. Without a torque nobody knows what drove the arm, so there the log is broken in two.
+A row with a spike of position is left out. At a spike of torque the true torque is unknown, so there the log is split in two.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ __all__ = ["look"]
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
-# Longest run of wild rows; the longest that leaves windows whole.
+# Longest run of spike rows; the longest that leaves prediction windows whole.
 _LONGEST = 3
-# Off the line by so many times what the joint moves per row around it. A blow reverses a joint within a row: up to 2.
+# Distance of a spike from the line through its neighbours, in units of the travel per row around it. A blow reverses a joint within a row: up to 2.
 _TIMES_MOTION = 3.0
-# And by so many times the change of speed per row that is exceeded in 5 % of the rows.
+# Distance of a spike from the line through its neighbours, in units of the change of travel per row that is exceeded in 5 % of the rows.
 _TIMES_USUAL = 20.0
-# At the ends of a log only one side speaks.
+# Distance of a spike at an end of a log, where neighbours are on one side only, in units of the usual change of travel per row.
 _TIMES_AT_END = 10.0
-# More rows than this share are no single rows.
+# Share of rows of a log up to which rows with deviating positions or torques count as spikes.
 _MOST = 0.005
-# A torque beyond the largest 0.5 % by this factor is looked at; by the second one it is absurd whatever the arm does.
+# Ratio to the torque exceeded in 0.5 % of the rows from which a torque is a candidate, and from which it is absurd whatever the arm does.
 _TORQUE_FACTOR, _TORQUE_ABSURD = 30.0, 1e3
-# Torques that are zero but for so few rows have no usual size.
+# Share of rows with non-zero torque below which a torque has no usual size.
 _TORQUE_ACTIVE = 0.05
-# A log of fewer rows than this is not broken in two.
+# Rows that each part of a log needs for the log to be split in two.
 _FEWEST_LEFT = 16
-# Rows over which a speed is taken on either side of a torque.
+# Rows over which a speed is taken on either side of a torque spike.
 _SPEED_ROWS = 5
-# Predictions end where samples are missing for 10 periods and a quarter of the usual horizon; so much is left out around a torque [s; periods].
+# Length left out around a torque spike [s; periods]: predictions end where samples are missing for 10 periods and a quarter of the usual horizon.
 _BREAK, _BREAK_PERIODS = 0.07, 12
-# Scales are taken from so many rows.
+# Rows that scales of travel and torque are taken from at most.
 _ENOUGH = 200_000
 
 
 def look(log: Log, arm: Arm | None) -> Outcome:
-    """Leave out rows that no motion explains, and those beside a torque that is not known."""
+    """Leave out rows with spikes of position, and rows around a spike of torque."""
     if len(log) < 4 * _LONGEST + 4:
         return NOTHING
     found = []
@@ -114,7 +114,7 @@ def _line(q: Array, k: Rows, m: int, i: int) -> Array:
 
 
 def _at_start(q: Array, floor: float) -> Rows:
-    """Return the first row, or the first few, if they lie far off where the rows after them come from."""
+    """Return the first row, or the first few, if they lie far off the line through the rows after them."""
     for m in range(_LONGEST, 0, -1):
         around = float(np.max(np.abs(np.diff(q[m : m + 4]))))
         pace = q[m + 1] - q[m]
@@ -141,7 +141,7 @@ def _torques(t: Array, q: Array, tau: Array) -> Rows:
 
 
 def _answered(t: Array, q: Array, first: int, last: int) -> bool:
-    """Whether the joint's speed changes over the rows by more than it ever does in as many."""
+    """Whether the joint's speed changes over the rows of a torque spike by more than over equally many rows elsewhere."""
     w = _SPEED_ROWS
     if first < w or last + 1 + w >= len(q):
         return False

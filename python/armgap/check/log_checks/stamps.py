@@ -1,10 +1,9 @@
-"""Stamps that scatter around even times at which the samples were really taken.
+"""Jitter of time stamps: stamps scatter around the even times at which the samples were taken.
 
-Both are tried: how well do the positions follow smooth curves (the cubic through two rows before and two after) over the stamps as
-they stand, and over even times? A stamp that is off by e makes a position of a joint at speed v look off by v e. Where even times
-explain the positions clearly better, and nothing of the stamps' scatter is left in how they miss, they replace the stamps. Where
-samples were really taken at uneven times they do not, and where both explain as well, nothing is done. Rows may be missing from the
-even times, and the clock may drift slowly.
+Stamps and even times are compared by how well positions follow smooth curves (the cubic through two rows before and two after). A stamp that
+is off by e makes a position of a joint at speed v look off by v e. Where even times explain the positions clearly better, and the errors over
+even times do not correlate with the scatter, even times replace the stamps. Where both explain the positions equally well the stamps stay.
+Rows may be missing from the even times, and the clock may drift slowly.
 """
 
 from __future__ import annotations
@@ -24,28 +23,28 @@ __all__ = ["look"]
 
 Array = NDArray[np.float64]
 
-# Stamps that scatter by less than this part of a period are even.
+# Scatter of time stamps, in sample periods, below which they count as even.
 _EVEN = 0.01
-# Half of the variance, among this share of the rows, where the stamps would show most, has to be theirs; no joint may say the opposite.
+# Half of the error variance, in this share of the rows, where jitter shows most, has to be the stamps'; no joint may say the opposite.
 _BETTER, _WORSE, _LOUD = 0.5, 1.2, 0.2
-# Part of the stamps' scatter that positions may show: 1 where stamps are right, 0 where even times are.
+# Correlation of position errors with the stamps' scatter, at most: 1 where stamps are right, 0 where even times are.
 _SHOWN = 0.15
-# Rows that have to speak.
+# Rows that the comparison of stamps and even times needs.
 _FEWEST = 100
-# A period longer than this part beyond the usual may hide a missing row; one is missing if the times beyond are late by this part.
+# Step between stamps, in periods, that may hide a missing row; a row is missing if the later stamps are late by this part of a period.
 _LONG, _LATE = 1.3, 0.6
-# Looks at rows that are taken to be missing, each with a line through the stamps of its own.
+# Iterations of the search for missing rows, each with a new line through the stamps.
 _ROUNDS = 12
-# Rows to either side whose mean lateness is compared.
+# Rows to either side of a long step whose mean lateness is compared.
 _BESIDE = 12
-# Even times stay within this part of a period of the stamps' mean over so many rows; a clock's drift bends by less, too.
+# Largest distance of even times from the stamps' mean over so many rows, in periods; a clock's drift is slower.
 _NEAR, _MEAN_ROWS = 0.35, 25
-# A drift of the clock is followed over so many rows if it stands out by so many deviations.
+# Rows over which the clock's drift is averaged, and standard deviations from which a drift is followed.
 _DRIFT_ROWS, _DRIFT_STANDS_OUT = 128, 4.0
 
 
 def look(log: Log, arm: Arm | None) -> Outcome:
-    """Replace stamps by even times if the positions speak for those."""
+    """Replace time stamps by even times if the positions fit even times better."""
     if len(log) < 2 * _FEWEST:
         return NOTHING
     period = log.sample_period
@@ -70,7 +69,7 @@ def look(log: Log, arm: Arm | None) -> Outcome:
 
 
 def _better(log: Log, even: Array) -> float | None:
-    """Return by how much smoother positions are over even times, as a ratio of deviations; None if not clearly so."""
+    """Return the ratio of position errors over even times to those over the stamps; None unless even times are clearly better."""
     rows = blocks(len(log))
     joined = [_misses(log.t[r], even[r], log.q[r]) for r in rows]
     stamped, evenly, shown = (np.concatenate(columns) for columns in zip(*joined, strict=True))
@@ -89,7 +88,7 @@ def _better(log: Log, even: Array) -> float | None:
 
 
 def _misses(t: Array, even: Array, q: Array) -> tuple[Array, Array, Array]:
-    """Return how positions miss cubics over the stamps, over even times, and over even times if the stamps were right."""
+    """Return errors of positions from cubics: over the stamps, over even times, and expected over even times if the stamps were right."""
     speed = np.gradient(q, even, axis=0)
     by_scatter = from_neighbours(even, speed * (t - even)[:, None])
     return from_neighbours(t, q), from_neighbours(even, q), by_scatter
@@ -103,7 +102,7 @@ def _middle(values: Array) -> float:
 
 
 def _even_times(t: Array, steps: Array, period: float) -> Array | None:
-    """Return even times for the rows of a log, a whole number of periods apart; None if its stamps are not around any."""
+    """Return even times for the rows of a log [s], a whole number of periods apart; None if the stamps do not scatter around even times."""
     missing = _missing(t, steps, period)
     index = np.arange(len(t)) + np.append(0, np.cumsum(missing))
     start, period = _straight(index, t)
@@ -130,7 +129,7 @@ def _even_times(t: Array, steps: Array, period: float) -> Array | None:
 
 
 def _missing(t: Array, steps: Array, period: float) -> NDArray[np.intp]:
-    """Return how many rows are missing in each step: as many whole periods as the rows after it are late."""
+    """Return the number of missing rows in each step between stamps: the whole periods by which the stamps after the step are late."""
     missing = np.zeros(len(steps), dtype=np.intp)
     at = np.flatnonzero(steps > _LONG * period)
     if not len(at):
@@ -157,7 +156,7 @@ def _missing(t: Array, steps: Array, period: float) -> NDArray[np.intp]:
 
 
 def _settled(missing: NDArray[np.intp], late: Array, steps: Array, period: float) -> NDArray[np.intp]:
-    """Return missing rows after a second look: what lies between two long steps is moved by the whole periods that it is late."""
+    """Return missing rows after a second pass: stamps between two long steps are moved by the whole periods by which they are late."""
     if not missing.any():
         return missing
     edges = np.append(0, np.flatnonzero((steps > _LONG * period) | (missing > 0)) + 1)
@@ -172,7 +171,7 @@ def _settled(missing: NDArray[np.intp], late: Array, steps: Array, period: float
 
 
 def _jump(late: Array, edges: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return by how many periods to move what follows edges at which the mean lateness jumps, those that jump most first."""
+    """Return by how many periods to move the stamps after each edge at which the mean lateness jumps, largest jumps first."""
     sums = np.append(0.0, np.cumsum(late))
     low, high = np.maximum(edges - 2 * _BESIDE, 0), np.minimum(edges + 2 * _BESIDE, len(late))
     shift = (sums[high] - sums[edges]) / (high - edges) - (sums[edges] - sums[low]) / np.maximum(edges - low, 1)
@@ -188,7 +187,7 @@ def _jump(late: Array, edges: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _straight(index: NDArray[np.intp], t: Array) -> tuple[float, float]:
-    """Return start and slope of the line through stamps, those far off left out."""
+    """Return start [s] and slope [s per row] of the line through time stamps, outliers left out."""
     x = index - index.mean()
     slope = float(x @ (t - t.mean()) / (x @ x))
     left = t - t.mean() - slope * x
@@ -201,7 +200,7 @@ def _straight(index: NDArray[np.intp], t: Array) -> tuple[float, float]:
 
 
 def _drift(late: Array) -> Array:
-    """Return the slow part of how late stamps are; nothing if the scatter explains it."""
+    """Return the slow part of the stamps' lateness, the clock's drift; zeros if the scatter explains it."""
     count = len(late) // _DRIFT_ROWS
     if count < 2:
         return np.zeros_like(late)

@@ -1,4 +1,4 @@
-"""Positions that jump by a whole turn where an encoder of one turn starts again: taken out."""
+"""Positions that jump by a whole turn where a single-turn encoder wraps around: the jumps are removed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["look"]
 
 
 def look(log: Log, arm: Arm | None) -> Outcome:
-    """Compare the path with and without the turn at every jump; joints that slide have no turns."""
+    """Remove jumps by a turn where the path without the jump is smoother; linear joints are left as they are."""
     if arm is not None and not arm.rotary:
         return NOTHING
     found = []

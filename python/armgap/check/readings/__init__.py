@@ -1,1 +1,1 @@
-"""Other readings of a log's columns, each tried against the equation of motion."""
+"""Alternative readings of a log's columns, each tested against the equation of motion."""

@@ -1,4 +1,4 @@
-"""`gravity_missing`: torques hold no weight: they were logged after gravity compensation, or the arm moves in a horizontal plane."""
+"""`gravity_missing`: torques lack the part that carries the arm's weight, by gravity compensation or because the arm moves in a horizontal plane."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["readings"]
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield the arm without its weights, where it has any."""
+    """Yield the arm with gravity parameters of zero, if it has any."""
     weighs = arm.theta[arm.gravity_parameters] if arm.chain is None else arm.chain.gravity
     if weighs.any():
         yield reading(

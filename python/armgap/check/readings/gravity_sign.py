@@ -1,7 +1,7 @@
-"""`gravity_sign`: weights of the arm file act against the log's gravity.
+"""`gravity_sign`: gravity parameters of the arm file have the wrong sign for the log.
 
-Where joint 1 turns this is a zero half a turn off (`position_zero`), except that an arm file whose weights are negative says itself that
-the sign is what is odd.
+For a rotary joint 1 reversed gravity is equivalent to a zero half a turn off (`position_zero`); for an arm file with negative gravity
+parameters the sign is named.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ __all__ = ["readings"]
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield the arm with its gravity turned over, where it has any that no other check speaks of."""
+    """Yield the arm with reversed gravity, if it has gravity parameters and `position_zero` does not cover the case."""
     if arm.chain is not None:
         if arm.chain.gravity.any():
             yield reading(

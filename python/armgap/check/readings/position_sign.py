@@ -1,6 +1,6 @@
-"""`position_sign`: positions of one joint, or everything of it, count the other way.
+"""`position_sign`: positions of one joint, or positions and torques of the joint, have reversed sign.
 
-For a single joint this is `torque_sign`: no log tells the two apart.
+For an arm of one joint `position_sign` is equivalent to `torque_sign`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ __all__ = ["readings"]
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield, for arms of several joints, each joint's positions, and its positions with its torques."""
+    """Yield, for arms of several joints, each joint with reversed positions, and with reversed positions and torques."""
     if arm.n_joints == 1:
         return
     joints = range(1, arm.n_joints + 1)

@@ -1,4 +1,4 @@
-"""`position_unit`: positions of joints that turn are in degrees or in turns."""
+"""`position_unit`: positions of rotary joints are in degrees or in turns."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from armgap.check.readings.reading import Reading, reading
 
 __all__ = ["readings"]
 
-# Joints of a log worth diagnosing move over more than this many degrees, and over less than this many turns.
+# Travel of a joint in degrees, at least, and in turns, at most, in a log worth diagnosing.
 _LEAST_DEGREES = 10.0
 _MOST_TURNS = 3.0
 
 
 def readings(arm: Arm, travel: float) -> Iterator[Reading]:
-    """Yield the units that `travel`, the farthest that a position column goes, may be in, for an arm that turns."""
+    """Yield degrees or turns as unit of positions, where possible for the largest position `travel` in the logs, for an arm with rotary joints."""
     if arm.rotary and travel < _MOST_TURNS:
         yield reading("position_unit", "positions are in turns", Corrections(unit="turns"))
     if arm.rotary and travel > _LEAST_DEGREES:

@@ -1,6 +1,6 @@
-"""`position_zero`: a joint counts from 90 or 180 degrees off the model's zero.
+"""`position_zero`: the zero of a joint's positions lies 90 or 180 degrees off the model's zero.
 
-For joint 1 half a turn is the same as gravity's sign, or a ceiling mount; a quarter turn is the same as a wall mount.
+For joint 1 half a turn is equivalent to reversed gravity, or a ceiling mount; a quarter turn is equivalent to a wall mount.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from armgap.check.readings.reading import Reading, reading
 
 __all__ = ["OFFSETS", "readings"]
 
-#: Zeros that people count from, beside the model's own [degrees].
+#: Usual zeros of positions other than the model's own [degrees].
 OFFSETS = (180, 90, -90)
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield every joint that turns with its zero at each of `OFFSETS`."""
+    """Yield every rotary joint with its zero at each of `OFFSETS`."""
     if not arm.rotary:
         return
     for j in range(1, arm.n_joints + 1):

@@ -1,4 +1,4 @@
-"""Another reading of the input: a defect that it may have, and the corrections that undo it."""
+"""Alternative reading of the input: a possible defect, and the corrections that undo it."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ __all__ = ["Reading", "reading"]
 
 @dataclass(frozen=True)
 class Reading:
-    """A defect of columns or arm file, and what undoes it.
+    """Possible defect of a log's columns or of an arm file, and the corrections that undo it.
 
     Attributes
     ----------
     check : str
-        Which defect.
+        Identifier of the defect.
     what : str
         The defect in words, continuing "as if".
     corrections : Corrections
-        What undoes it.
+        Corrections that undo the defect.
     remedies : tuple of str
-        Options, or lines of the arm file, that undo it; more than one where nothing tells them apart.
+        Options, or lines of the arm file, that undo the defect; more than one where no log tells them apart.
     joint : int, optional
         Joint, from 1.
     """
@@ -38,7 +38,7 @@ class Reading:
 def reading(
     check: CheckName, what: str, corrections: Corrections, *others: Corrections | str, joint: int | None = None
 ) -> Reading:
-    """Return a reading whose remedies are its own corrections' options, then those of `others`."""
+    """Return a reading whose remedies are the options of `corrections`, then those of `others`."""
     words = [" ".join(corrections.options())]
     words += [other if isinstance(other, str) else " ".join(other.options()) for other in others]
     return Reading(check, what, corrections, tuple(words), joint)

@@ -1,4 +1,4 @@
-"""`relative_angle`: a joint's angle is measured from the world where the model counts it from the link before, or the reverse."""
+"""`relative_angle`: a joint's angle is relative to the world where the model's is relative to the preceding link, or the reverse."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["readings"]
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield both directions for every joint after the first of an arm that turns."""
+    """Yield world-relative and link-relative positions for every joint after the first of an arm with rotary joints."""
     if not arm.rotary:
         return
     for j in range(2, arm.n_joints + 1):

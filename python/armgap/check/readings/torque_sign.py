@@ -1,6 +1,6 @@
-"""`torque_sign`: torques count the other way.
+"""`torque_sign`: torques have reversed sign.
 
-All torques turned over are the same as all positions turned over: the equation of motion is odd in ``(q, tau)`` together.
+Reversing all torques is equivalent to reversing all positions: the equation of motion is odd in ``(q, tau)`` together.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ __all__ = ["readings"]
 
 
 def readings(arm: Arm, _travel: float) -> Iterator[Reading]:
-    """Yield one reading per joint, and one of all joints."""
+    """Yield one reading with reversed torque per joint, and one with the torques of all joints reversed."""
     joints = range(1, arm.n_joints + 1)
     every_tau, every_q = tuple(f"tau{j}" for j in joints), tuple(f"q{j}" for j in joints)
     every = reading(

@@ -1,1 +1,1 @@
-"""Sub-commands about logs: their diagnosis, and what goes before and follows."""
+"""Sub-commands about logs: diagnosis, inspection, identification, planning, comparison, fleets."""

@@ -1,4 +1,4 @@
-"""``armgap compare``."""
+"""Sub-command ``armgap compare``: changes between two diagnoses."""
 
 from __future__ import annotations
 
@@ -42,6 +42,6 @@ def command(before: str, after: str, report_file: str | None, json_file: str | N
 
 
 def _names(before: str, after: str) -> tuple[str, str]:
-    """The files' names, or before and after where they do not differ."""
+    """Return names for the two diagnoses: their file names, or before and after where these are equal."""
     names = printable(Path(before).stem), printable(Path(after).stem)
     return names if names[0] != names[1] else ("before", "after")

@@ -1,4 +1,4 @@
-"""``armgap diagnose``."""
+"""Sub-command ``armgap diagnose``: diagnosis of an arm from its logs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``armgap fleet``."""
+"""Sub-command ``armgap fleet``: diagnoses of many robots."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from armgap.progress import report_progress
 
 __all__ = ["command"]
 
-# Options that are handed on to each diagnosis.
+# Command-line options that are passed on to each diagnosis of the fleet.
 _SETTINGS = ("horizon", "max_causes")
-# Drifts that are listed; the page holds more.
+# Drifts listed on the terminal at most; the HTML page lists all.
 _DRIFTS = 10
 
 

@@ -1,4 +1,4 @@
-"""``armgap identify``."""
+"""Sub-command ``armgap identify``: parameters from logs by recursive least squares."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def command(
 def _identified(
     logs: Sequence[Log], arm: Arm, schemes: Sequence[Scheme], settings: dict[str, Any]
 ) -> list[Identification]:
-    """Every scheme on every log."""
+    """Return the identification by every scheme on every log."""
     from armgap.estimation.identification import identify
 
     work = [(log, scheme) for log in logs for scheme in schemes]

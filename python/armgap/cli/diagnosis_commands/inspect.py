@@ -1,4 +1,4 @@
-"""``armgap inspect``."""
+"""Sub-command ``armgap inspect``: contents of logs."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def command(
 def _inspected(
     path: Path, arm: Arm | None, naming: dict[str, Any], *, listing: bool, repair: bool
 ) -> Inspection | Columns:
-    """What a log holds; or, where nobody has said which column is which, what columns there are."""
+    """Return the inspection of a log; or, for unknown column names without a mapping, the columns with a proposed mapping."""
     from armgap.errors import ColumnError
     from armgap.inspection.inspection import inspect
     from armgap.inspection.unmapped import columns_of

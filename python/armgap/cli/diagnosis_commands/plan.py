@@ -1,4 +1,4 @@
-"""``armgap plan``."""
+"""Sub-command ``armgap plan``: motion for the questions that a diagnosis left open."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Sub-commands about models: read, simulated, exported, replayed."""
+"""Sub-commands about models of arms: reading, simulation, export, replay."""

@@ -1,4 +1,4 @@
-"""``armgap export``."""
+"""Sub-command ``armgap export``: corrected model for a simulator."""
 
 from __future__ import annotations
 

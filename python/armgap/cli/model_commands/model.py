@@ -1,4 +1,4 @@
-"""``armgap model``."""
+"""Sub-command ``armgap model``: arm file from a URDF or MJCF model."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def command(
 
 
 def _table(chain: SerialChain, masses: list[float]) -> Table:
-    """Return the chain, a row per joint."""
+    """Return a table of the chain's joints for the terminal, one row per joint."""
     from rich import box
     from rich.markup import escape
     from rich.table import Table

@@ -1,4 +1,4 @@
-"""``armgap replay``."""
+"""Sub-command ``armgap replay``: recording for the Rerun viewer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``armgap simulate``."""
+"""Sub-command ``armgap simulate``: log of a simulated arm."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 MOST_SAMPLES = 10**8
-"""Of a simulation: days, and more than a computer's memory as a rule."""
+"""Largest number of samples of a simulation: days of motion, and more than a computer's memory as a rule."""
 SEED = "seed"
-"""Stands for the seed paper's torques."""
+"""Value of option ``--torque`` that stands for the torques of Reyes and Kelly (1997)."""
 
 
 @click.command("simulate", cls=Command)
@@ -127,7 +127,7 @@ def command(
 
 
 def _start(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the state a log starts from; its velocity is the slope of its first samples where no sensor gives it."""
+    """Return position and velocity at the start of a log; without a velocity sensor, the slope of the first samples."""
     from armgap.estimation.identification import velocity
 
     if log.dq is not None:

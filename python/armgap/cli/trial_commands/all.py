@@ -1,4 +1,4 @@
-"""``armgap trial all``: the whole trial in one command."""
+"""Sub-command ``armgap trial all``: the whole trial in one command."""
 
 from __future__ import annotations
 

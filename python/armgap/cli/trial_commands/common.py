@@ -1,4 +1,4 @@
-"""What the sub-commands of ``armgap trial`` share."""
+"""Options and progress bar that the sub-commands of ``armgap trial`` share."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 Item = TypeVar("Item")
-#: Processes at most.
+#: Largest number of worker processes.
 MOST_WORKERS = 1024
 
 folder_argument = click.argument("folder", metavar="DIR", type=InputFolder(belongs, exists=True))
@@ -53,7 +53,7 @@ workers_option = click.option(
 
 
 def progress(items: Iterable[Item], total: int, label: str, *, quiet: bool) -> Iterator[Item]:
-    """Pass items on, with a bar on standard error at a terminal."""
+    """Yield the items, with a progress bar on standard error at a terminal."""
     from armgap.cli.common import console
 
     say = console(error=True)

@@ -1,4 +1,4 @@
-"""``armgap trial make``."""
+"""Sub-command ``armgap trial make``: sealed cases of a trial."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def make(cases: int, seed: int | None, folder: Path, duration: float, workers: i
 
 
 def make_them(folder: Path, cases: int, seed: int | None, duration: float, workers: int, quiet: bool) -> list[Path]:
-    """Make the cases that are missing, and say how they are sealed."""
+    """Make the missing cases of a trial, and print the hashes of their keys."""
     from armgap.trial.cases.making import make_cases, read_manifest, seal_of_all
     from armgap.trial.trial import fresh_seed
 

@@ -1,4 +1,4 @@
-"""``armgap trial run`` and ``armgap trial baselines``."""
+"""Sub-commands ``armgap trial run`` and ``armgap trial baselines``: answers to the cases of a trial."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armgap.cli.trial_commands.common import folder_argument, progress, workers_
 __all__ = ["answer_all", "baselines", "former_name", "limit_option", "run"]
 
 LONGEST_S = 1e6
-"""Of one case: eleven days; a system's clocks do not wait for ever."""
+"""Largest time limit for one case [s]: eleven days, within the range of a system's timers."""
 limit_option = click.option(
     "--limit",
     "limit_s",
@@ -63,14 +63,14 @@ def baselines(folder: Path, only: tuple[str, ...], workers: int, limit_s: float,
     answer_all(folder, list(only) or known, workers, limit_s, again, quiet)
 
 
-#: Former name of the command; goes with 0.3.0.
+#: Former name ``peers`` of the command ``armgap trial baselines``; removed in 0.3.0.
 former_name = Command(
     "peers", callback=baselines.callback, params=baselines.params, help=baselines.help, hidden=True, deprecated=True
 )
 
 
 def answer_all(folder: Path, names: Sequence[str], workers: int, limit_s: float, again: bool, quiet: bool) -> None:
-    """Let methods answer the cases that they have not answered."""
+    """Let the named methods answer all cases that they have not answered yet."""
     from armgap.trial.cases.sealed import case_folders
     from armgap.trial.methods import methods
     from armgap.trial.running import answer_cases, open_cases

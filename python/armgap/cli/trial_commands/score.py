@@ -1,4 +1,4 @@
-"""``armgap trial score``."""
+"""Sub-command ``armgap trial score``: scores of all methods on the cases of a trial."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def score(folder: Path, json_file: str | None, md_file: str | None, quiet: bool)
 
 
 def score_all(folder: Path, json_file: str | None, md_file: str | None, quiet: bool) -> None:
-    """Score all methods that answered, and write what is asked for."""
+    """Score all methods that answered every case, and write the requested files."""
     from armgap.trial.cases.making import read_manifest, seal_of_all
     from armgap.trial.cases.sealed import case_folders
     from armgap.trial.scoring.figures import figures, opened_keys
@@ -64,7 +64,7 @@ def score_all(folder: Path, json_file: str | None, md_file: str | None, quiet: b
 
 
 def _answered(cases: list[Path]) -> tuple[list[str], list[str]]:
-    """Methods that have answered every case, armgap first, and a note on each that has answered some."""
+    """Return the methods that have answered every case, armgap first, and a note on each method that has answered only some."""
     from armgap.errors import OptionError
     from armgap.trial.methods import methods
     from armgap.trial.running import answer_file

@@ -1,14 +1,14 @@
-"""The nearest links that bodies can be.
+"""Nearest physically consistent links for given joint torques.
 
-Motion determines combinations of the links' numbers only (base parameters, Khalil 2002). Estimated one by one, a single link may come
-out with numbers that no body has although all torques are right. Of the links with the same torques, those are wanted that are bodies,
-whose pseudo-inertias are positive definite (Wensing, Kim and Slotine 2018), and that are nearest to the nominal ones, in units of these'
-standard deviations (Sousa and Cortesao 2014). This is a convex problem::
+Motion determines combinations of the links' inertial parameters only (base parameters, Khalil 2002). A single estimated link may be
+physically impossible although all torques are right. Of all links with equal torques, those are chosen whose pseudo-inertias are positive
+definite (Wensing, Kim and Slotine 2018) and that are nearest to the nominal links, in units of the nominal values' standard deviations (Sousa
+and Cortesao 2014). This is a convex problem::
 
     minimise  |Y (x - found)|^2 / 2 + |(x - nominal)/sigma|^2 / 2 - mu sum log det P_k(x)
 
 with torques `Y x` in units of a share of each joint's own, so small that torques stay where they can, and a barrier `mu` that goes to zero
-(Boyd and Vandenberghe 2004, section 11.3). Where no bodies have these torques, the solution is the one that misses them least.
+(Boyd and Vandenberghe 2004, section 11.3). Where no consistent links have these torques, the solution has the least torque error.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ __all__ = ["BODY_TOLERANCE", "Bodies", "nearest_bodies"]
 
 Array = NDArray[np.float64]
 
-#: Torques that differ by less than this share of the joint's own are the same: what is left of an estimate is ten times that and more.
+#: Torque differences below this share of a joint's own torque count as none: the errors of an estimate are ten times larger and more.
 BODY_TOLERANCE = 1e-3
-#: A torque that differs by this share of the joint's own costs as much as a value that is one standard deviation away: where the torques can be
-#: kept, and where they cannot. There a smaller share makes links absurd (rods of many times the mass) and torques hardly better.
+#: Torque error, as a share of the joint's torque, that costs as much as one standard deviation of a parameter: where the torques can be
+#: kept, and where they cannot. In the second case a smaller share makes links absurd (rods of many times the mass) and torques hardly better.
 _SHARES = (1e-5, 1e-3)
-#: Barriers from one that the torques hardly count beside to one that hardly counts beside a tenth of a standard deviation.
+#: Weights of the log-det barrier: from one that outweighs the torques to one that is small beside a tenth of a standard deviation.
 _BARRIERS = 10.0 ** np.arange(10.0, -3.0, -2.0)
 _MOST_STEPS = 60
-#: Newton decrement, in units of the barrier, at which its minimum is reached.
+#: Newton decrement, in units of the barrier's weight, at which the minimum for this weight is reached.
 _REACHED = 1e-6
 _SLOPE = 0.1
 _LEAST_PART = 1e-10
@@ -41,18 +41,18 @@ _UNIT_PSEUDO_INERTIAS = np.array([pseudo_inertia(unit) for unit in np.eye(10)])
 
 @dataclass(frozen=True)
 class Bodies:
-    """Links that bodies can be.
+    """Physically consistent links, with the change of joint torques.
 
     Attributes
     ----------
     inertial : ndarray, shape (n_joints, 10)
-        Inertia of each link.
+        Ten inertial parameters of each link.
     rotor : ndarray, shape (n_joints,)
         Rotor inertias, none of them negative.
     changed : tuple of int
-        Links, from 0, that no body has as they were found; empty if nothing was changed.
+        Links, from 0, that were physically impossible as estimated; empty if no link was changed.
     torque_error : ndarray, shape (n_joints,)
-        RMS change of each joint's torque by it, as a share of that torque.
+        RMS change of each joint's torque, as a share of the torque.
     """
 
     inertial: Array
@@ -62,23 +62,23 @@ class Bodies:
 
     @property
     def same_torques(self) -> bool:
-        """Whether bodies with these links need the same torques as the parameters that were estimated."""
+        """Whether the consistent links need the torques of the estimated parameters, to within `BODY_TOLERANCE`."""
         return bool(np.all(self.torque_error < BODY_TOLERANCE))
 
 
 def nearest_bodies(
     found: Array, nominal: Array, sigma: Array, regressor: Array, beside: Array, *, exact: bool = True
 ) -> Bodies:
-    """Return links that bodies can be, with the torques of those found.
+    """Return the nearest physically consistent links with the torques of the estimated links.
 
     Parameters
     ----------
     found, nominal, sigma : ndarray, shape (11 n,)
-        Ten numbers per link, then the rotors' inertias: as they were found, nominal, and the standard deviations of these.
+        Ten inertial parameters per link, then the rotors' inertias: estimated, nominal, and standard deviations of the nominal values.
     regressor : ndarray, shape (n_states, n_joints, 11 n)
-        Torques per unit of each of them in the states that count.
+        Torques per unit of each parameter in the states to compare.
     beside : ndarray, shape (n_joints, 10)
-        Inertia of what hangs on each link and is to stay as it is; the rest has to be a body.
+        Inertial parameters of parts of each link that stay as they are; the rest of the link has to be consistent.
     exact : bool, default True
         Whether torques are kept to `BODY_TOLERANCE` where that is possible; else they are weighed against the distance from the nominal values.
     """
@@ -100,7 +100,7 @@ def nearest_bodies(
 
 
 def _minimised(found: Array, nominal: Array, sigma: Array, rows: Array, beside: Array) -> Array:
-    """Return the values that minimise ``|rows (x - found)|^2 + |(x - nominal)/sigma|^2`` among those of bodies, by Newton's method with barriers."""
+    """Return the consistent links' parameters that minimise ``|rows (x - found)|^2 + |(x - nominal)/sigma|^2``, by Newton's method with barriers."""
     n = len(beside)
     # Rotors that are not there stay so.
     free = np.concatenate([np.ones(10 * n, dtype=bool), found[10 * n :] > 0])
@@ -134,7 +134,7 @@ def _minimised(found: Array, nominal: Array, sigma: Array, rows: Array, beside: 
 
 
 class _Barrier:
-    """``-sum log det P_k - sum log rotor_j`` of links without what is beside them, and of the rotors that there are."""
+    """Barrier function ``-sum log det P_k - sum log rotor_j`` of links without the parts that stay as they are, and of rotors."""
 
     def __init__(self, n: int, beside: Array, rotors: NDArray[np.intp]) -> None:
         self.n = n
@@ -142,11 +142,11 @@ class _Barrier:
         self.rotors = 10 * n + rotors
 
     def pseudo_inertias(self, x: Array) -> Array:
-        """Pseudo-inertias of the links, shape (n, 4, 4)."""
+        """Return the pseudo-inertias of the links, shape (n, 4, 4)."""
         return np.tensordot(x[: 10 * self.n].reshape(self.n, 10) - self.beside, _UNIT_PSEUDO_INERTIAS, axes=1)
 
     def value(self, x: Array) -> float:
-        """Return its value; infinite where a link is no body."""
+        """Return the value of the barrier; infinite where a link is physically impossible."""
         if np.any(x[self.rotors] <= 0):
             return float("inf")
         try:
@@ -157,7 +157,7 @@ class _Barrier:
         return -2.0 * float(np.log(diagonals).sum()) - float(np.log(x[self.rotors]).sum())
 
     def derivatives(self, x: Array) -> tuple[Array, Array]:
-        """Return gradient and second derivatives."""
+        """Return gradient and Hessian of the barrier function."""
         gradient, hessian = np.zeros(len(x)), np.zeros((len(x), len(x)))
         for k, inverse in enumerate(np.linalg.inv(self.pseudo_inertias(x))):
             by = inverse @ _UNIT_PSEUDO_INERTIAS
@@ -170,7 +170,7 @@ class _Barrier:
 
 
 def _start(nominal: Array, sigma: Array, barrier: _Barrier) -> Array:
-    """Return the nominal values with balls around the links' origins so heavy that every link is a body."""
+    """Return the nominal values with balls added at the links' origins, so heavy that every link is physically consistent."""
     n, x = barrier.n, nominal.copy()
     x[barrier.rotors] = np.maximum(x[barrier.rotors], sigma[barrier.rotors])
     for k in range(n):

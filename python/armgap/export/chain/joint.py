@@ -1,4 +1,4 @@
-"""What sits at a joint of a corrected model, and what effects change in it."""
+"""Friction, springs, drive, encoder and stops of one joint of a corrected model, and their changes by effects."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["ON_JOINT", "Joint", "with_causes"]
 
 @dataclass(frozen=True)
 class Joint:
-    """One corrected joint, SI.
+    """Friction, springs, drive, encoder and stop of one joint of a corrected model [SI].
 
     Attributes
     ----------
     viscous, coulomb : float
-        Friction.
+        Friction coefficients [N m s/rad, N m; N s/m, N].
     armature : float
-        Inertia on the joint's own acceleration only.
+        Reflected rotor inertia, which acts on the joint's own acceleration only [kg m^2 or kg].
     stiffness, cubic, rest : float
         Spring ``-stiffness (q - rest) - cubic (q - rest)^3``.
     drag, cubic_drag : float
@@ -34,7 +34,7 @@ class Joint:
     limit : float, optional
         Largest command that gives more torque.
     reading : float
-        What the encoder shows at ``q = 0``.
+        Encoder reading at ``q = 0`` [rad or m].
     stop : (position, stiffness), optional
         Spring beyond a position, on the side away from zero.
     """
@@ -62,7 +62,7 @@ class Joint:
         return np.array(given[: 3 if self.cubic_drag else 2 if self.drag else 1])
 
     def free(self, far: float) -> tuple[float, float, float] | None:
-        """Range of readings without the stop's spring, which ends at `far` on the other side, and its stiffness; None without a stop."""
+        """Return the range of encoder readings within the stop, `far` on the side without one, and the stop's stiffness; None without a stop."""
         if self.stop is None:
             return None
         position, stiffness = self.stop
@@ -71,7 +71,7 @@ class Joint:
 
 
 def _spring(joint: Joint, p: Mapping[str, float]) -> Joint:
-    """One more spring; where one of them hardens, its rest position is kept and the others' preload becomes an offset."""
+    """Return the joint with one more spring; a hardening spring keeps its rest position, and the others' preload becomes an offset."""
     k, q0, cubic = p["k"], p["q0"], p.get("cubic", 0.0)
     stiffness, preload = joint.stiffness + k, joint.stiffness * joint.rest + k * q0
     if cubic or joint.cubic:
@@ -101,11 +101,11 @@ ON_JOINT: dict[str, Callable[[Joint, Mapping[str, float]], Joint]] = {
     "encoder_offset": lambda j, p: replace(j, reading=j.reading + p["offset"]),
     "contact": lambda j, p: replace(j, stop=(p["position"], p["stiffness"])),
 }
-"""What an effect of a joint changes in it; payload and tilt concern the whole arm."""
+"""Functions that apply an effect to a joint, by name of the effect; payload and tilt concern the whole arm."""
 
 
 def with_causes(joints: Iterable[Joint], causes: Iterable[Cause]) -> tuple[Joint, ...]:
-    """Return joints with what the causes change in them, one after the other."""
+    """Return joints with the changes by all causes applied, one after the other."""
     changed = list(joints)
     for cause in causes:
         if cause.effect in ON_JOINT and cause.joint is not None:

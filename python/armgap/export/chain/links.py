@@ -1,4 +1,4 @@
-"""Physical link parameters that move exactly as the base parameters say.
+"""Physical link parameters with given base parameters.
 
 Motion determines base parameters only: for the two-link arm five numbers, made of two masses, two centres of mass, two
 inertias and the length of link 1. With ``s2 = m2 lc2``, ``S = m1 lc1 + m2 l1`` and ``B = theta1 - theta3``::
@@ -8,7 +8,7 @@ inertias and the length of link 1. With ``s2 = m2 lc2``, ``S = m1 lc1 + m2 l1`` 
     B      = I1 + s1^2/m1 + m2 l1^2            so  m2 < B/l1^2,  m1 > s1^2/J1,  with s1 = S - m2 l1,  J1 = B - m2 l1^2
 
 The interval of ``m2`` is not empty exactly if the inertia matrix is positive definite in every position, and any point of
-it will do. Masses that the arm file states are taken if they lie inside. Otherwise ``m2`` is the middle of its interval,
+the interval gives the same motion. Masses of the arm file are taken if they lie inside. Otherwise ``m2`` is the middle of its interval,
 where ``(m2 theta3 - s2^2)(B - m2 l1^2)`` is largest, which vanishes where either link becomes impossible; and
 ``m1 = s1^2/J1 + J1/l1^2``. Consistency in the sense of Wensing, Kim and Slotine (2018): positive masses, and moments of
 inertia about the centre of mass that a distribution of positive mass can have.
@@ -31,30 +31,30 @@ if TYPE_CHECKING:
 
 __all__ = ["Links", "links_of", "physical"]
 
-#: Radius of gyration of a moving mass that never turns, m.
+#: Radius of gyration assumed for a moving mass that never turns, m.
 _ANY_RADIUS = 0.1
-#: Length that stands in where nothing determines one, m.
+#: Link length assumed where neither motion nor arm file determines one, m.
 _ANY_LENGTH = 1.0
-#: Lengths closer than this are the same, relative.
+#: Relative difference of lengths below which they count as equal.
 _SAME_LENGTH = 1e-6
 
 
 @dataclass(frozen=True)
 class Links:
-    """Physical parameters per link, SI, and what had to be chosen.
+    """Physical parameters per link [SI], with the choices made where motion does not determine them.
 
     Attributes
     ----------
     mass, com, inertia : tuple of float
-        kg; m from the joint along the link (negative beyond the joint); kg m^2 about the centre of mass.
+        Mass [kg]; centre of mass along the link from the joint [m], negative beyond the joint; inertia about the centre of mass [kg m^2].
     length : tuple of (float or None)
-        m; None where neither motion nor arm file tells it.
+        Length of each link [m]; None where neither motion nor arm file determines it.
     slope : float
-        Inclination of a linear axis, rad.
+        Inclination of a linear axis [rad].
     surplus : float
-        Constant force on a linear axis that exceeds its weight, N.
+        Part of the constant force on a linear axis that exceeds its weight [N].
     choices : tuple of str
-        What was chosen because motion does not tell, one sentence each.
+        Choices where motion does not determine a parameter, one sentence each.
     """
 
     mass: tuple[float, ...]
@@ -74,14 +74,14 @@ def physical(
     length: Sequence[float] | None = None,
     mass: Sequence[float] | None = None,
 ) -> Links:
-    """Return link parameters, all of them possible, whose base parameters are `theta`.
+    """Return physically possible link parameters whose base parameters are `theta`.
 
     Parameters
     ----------
     kind : {"axis", "pendulum", "two-link"}
         Kind of arm.
     gravity : float
-        m/s^2.
+        Acceleration of gravity [m/s^2].
     theta : sequence of float
         Inertial base parameters in the order of the kind.
     length, mass : sequence of float, optional
@@ -90,7 +90,7 @@ def physical(
     Raises
     ------
     ExportError
-        No arm that could be built has these base parameters; it names the reason.
+        If no physically possible arm has these base parameters; the message names the reason.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def physical(
 
 
 def links_of(arm: Arm, theta: NDArray[np.float64]) -> tuple[Links | None, ExportError | None]:
-    """Return links with these base parameters and what the arm file states about links, or why there are none."""
+    """Return link parameters with the base parameters `theta` and the arm file's lengths and masses, or the error why there are none."""
     length, mass = (None if x is None else x.tolist() for x in (arm.link_length, arm.link_mass))
     try:
         return physical(arm.kind, arm.gravity, theta[: arm.n_inertial].tolist(), length=length, mass=mass), None
@@ -167,7 +167,7 @@ def _two_link(
 def _first_length(
     gravity: float, th2: float, th5: float, length: Sequence[float] | None
 ) -> tuple[float, tuple[str, ...]]:
-    """Length of link 1: what theta2 and theta5 imply, or the stated one where they say nothing."""
+    """Return the length of link 1 [m] that theta2 and theta5 imply, or the stated one where they imply none, with notes."""
     stated = length[0] if length else None
     moment = _moment(th5, gravity, "theta5")
     if gravity == 0 or (th2 == 0 and moment == 0):
@@ -192,7 +192,7 @@ def _ratio(a: float, b: float) -> str:
 
 
 def _moment(torque: float, gravity: float, name: str) -> float:
-    """First moment of mass, kg m, behind a gravity torque."""
+    """Return the first moment of mass [kg m] that makes a gravity torque."""
     if gravity > 0:
         return torque / gravity
     if torque != 0:
@@ -201,7 +201,7 @@ def _moment(torque: float, gravity: float, name: str) -> float:
 
 
 def _mass(link: int, low: float, high: float, canonical: float, stated: Sequence[float] | None) -> tuple[float, str]:
-    """A mass strictly between its bounds: the stated one if it is, the canonical one otherwise."""
+    """Return a mass [kg] strictly between its bounds, the stated one if possible, else the canonical one, and a note on the choice."""
     span = f"above {low:.4g} kg" if math.isinf(high) else f"between {low:.4g} and {high:.4g} kg"
     if stated and low < stated[link - 1] < high:
         return stated[

@@ -1,4 +1,4 @@
-"""What simulators take: a chain of rigid bodies, and what sits at its joints."""
+"""Model of an arm in the terms of simulators: a chain of rigid bodies with friction, springs and drives at its joints."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from armgap.export.chain.joint import Joint
 
 __all__ = ["SimulatorModel", "number", "numbers"]
 
-#: Longest time step of a simulation [s].
+#: Longest time step of an exported simulation [s].
 _TIME_STEP = 5e-4
-#: Rate of decay by viscous friction, times the time step, up to which Runge-Kutta is used; it is stable to 2.8 (Hairer 1993, section IV.2).
+#: Decay rate by viscous friction, times the time step, up to which Runge-Kutta is used; the method is stable to 2.8 (Hairer 1993, section IV.2).
 _STABLE = 1.0
 _POSES = 50
 
 
 @dataclass(frozen=True)
 class SimulatorModel:
-    """An arm as MJCF and URDF describe one.
+    """Model of an arm in terms that MJCF and URDF can describe.
 
     Attributes
     ----------
@@ -31,13 +31,13 @@ class SimulatorModel:
     chain : SerialChain
         Joints with their placements, limits of position, and gravity in the frame of the base.
     inertial : ndarray, shape (n_joints, 10)
-        Inertia of each link, see `armgap.arm.rigid_body`; each is that of a body.
+        Inertia of each link, see `armgap.arm.rigid_body`; physically consistent.
     joints : tuple of Joint
-        What sits at the joints.
+        Friction, springs, drive, encoder and stop of each joint.
     sample_period : float
-        Sample period of the logs [s]; a time step divides it.
+        Sample period of the logs [s]; a whole multiple of the time step.
     tip : ndarray, shape (3,), optional
-        Tip in the frame of the last link [m].
+        Position of the tip in the frame of the last link [m].
     """
 
     name: str
@@ -54,10 +54,10 @@ class SimulatorModel:
 
     @property
     def integrator(self) -> str:
-        """Integrator of MuJoCo for that step.
+        """MuJoCo's integrator for the time step.
 
-        Runge-Kutta of fourth order, whose errors are a tenth of those of the others; where viscous friction stops a joint too fast for it, or
-        drives have a delay or a lag, which advance once a step, ``"implicitfast"``.
+        Runge-Kutta of fourth order, whose errors are a tenth of those of other integrators; where viscous friction makes a joint too stiff for
+        it, or drives have a delay or a lag, which advance once a step, ``"implicitfast"``.
         """
         if any(joint.lag or joint.delay for joint in self.joints):
             return "implicitfast"
@@ -69,10 +69,10 @@ class SimulatorModel:
 
 
 def number(value: float) -> str:
-    """Return a number that reads back as itself."""
+    """Return the shortest text of a number that reads back as the same number."""
     return f"{value:.0f}" if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
 
 
 def numbers(values: NDArray[np.float64]) -> str:
-    """Return numbers that read back as themselves, with blanks between them."""
+    """Return numbers, separated by blanks, as texts that read back as the same numbers."""
     return " ".join(number(value) for value in values)

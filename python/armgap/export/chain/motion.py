@@ -1,4 +1,4 @@
-"""States in which torques are compared: along the motion that was diagnosed, and throughout the arm's range."""
+"""States in which joint torques of two models are compared: along the diagnosed motion, and at random within the arm's range."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ __all__ = ["States", "any_states", "diagnosed_states", "positions"]
 
 Array = NDArray[np.float64]
 States = tuple[Array, Array, Array]
-"""Positions, velocities and accelerations, shape (n_states, n_joints) each."""
+"""Positions, velocities and accelerations of states of an arm, shape (n_states, n_joints) each."""
 
-#: States that are taken from the motion, and at random.
+#: Number of states taken from the diagnosed motion, and number of random states.
 _STATES = 400
-#: Half width of the cubics that velocities and accelerations are taken from [s]: as wide as the test functions of the diagnosis.
+#: Half width of the local cubics that give velocities and accelerations [s]: that of the test functions of the diagnosis.
 _HALF_WIDTH_S = 0.05
 _FEWEST = 7
-#: Speed [rad/s or m/s] and acceleration of random states.
+#: Standard deviations of speed [rad/s or m/s] and acceleration [rad/s^2 or m/s^2] of random states.
 _SPEED, _ACCELERATION = 1.0, 3.0
 
 
 def positions(diagnosis: Diagnosis, n: int) -> list[tuple[Array, Array]]:
-    """Return times [s] and measured positions, shape (n_samples, n_joints), of the holdout logs that the diagnosis has drawn."""
+    """Return times [s] and measured positions, shape (n_samples, n_joints), of the holdout logs that the diagnosis holds for its curves."""
     logs: dict[str, dict[int, tuple[Array, Array]]] = {}
     for s in diagnosis.extra.get("series", ()):
         logs.setdefault(s["log"], {})[s["joint"]] = (np.array(s["t"]), np.array(s["measured"]))
@@ -35,7 +35,7 @@ def positions(diagnosis: Diagnosis, n: int) -> list[tuple[Array, Array]]:
 
 
 def diagnosed_states(diagnosis: Diagnosis, n: int) -> States | None:
-    """Return states along the holdout, from local cubics; None if the diagnosis holds no motion."""
+    """Return states along the diagnosed holdout motion, from local cubics; None if the diagnosis holds no motion."""
     found: list[Array] = []
     logs = [(t, q) for t, q in positions(diagnosis, n) if len(t) > 2 * _FEWEST]
     for t, q in logs:
@@ -55,7 +55,7 @@ def diagnosed_states(diagnosis: Diagnosis, n: int) -> States | None:
 
 
 def any_states(arm: Arm) -> States:
-    """Return random states within the limits of position, a turn or a metre where there is none."""
+    """Return random states within the limits of position, or within a turn or a metre for a joint without limits."""
     chain, rng = arm.chain, np.random.default_rng(1)
     assert chain is not None
     reach = np.where(chain.rotary, math.pi, 0.5)

@@ -1,4 +1,4 @@
-"""Corrected models of the planar kinds of arm: base parameters, and links that could be built."""
+"""Corrected models of planar arms: base parameters, and physically possible links with these."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ _ACROSS = np.array([0.0, 1.0, 0.0])
 
 @dataclass(frozen=True)
 class CorrectedPlanar(Corrected):
-    """A planar arm as a diagnosis found it.
+    """Model of a planar arm with the parameters and causes of a diagnosis.
 
     Attributes
     ----------
     links : Links or None
-        Link parameters that have these base parameters; None if no arm that could be built has them.
+        Link parameters with the corrected base parameters; None if no physically possible arm has them.
     tilt : float
-        Angle of the base against gravity [rad]; on a linear axis it is part of the slope.
+        Angle of the base against gravity [rad]; for a linear axis it is part of the slope.
     unbuildable : ExportError, optional
-        Why there are no links.
+        Reason why `links` is None.
     """
 
     links: Links | None = None
@@ -48,16 +48,16 @@ class CorrectedPlanar(Corrected):
     unbuildable: ExportError | None = None
 
     def field_of(self, cause: Cause, form: str) -> str | None:
-        """Return where a cause goes in a format, None if it has no field there."""
+        """Return the field of a format that a cause is written to; None if the format has none."""
         if cause.effect == "rotor_coupling" and self.uncoupled() is None:
             return field_of(cause.effect, cause.joint, form, self.arm.kind) if form == "json" else None
         return super().field_of(cause, form)
 
     def uncoupled(self) -> CorrectedPlanar | None:
-        """Return a model of the same motion without inertial coupling of a remote rotor.
+        """Return a model with equal motion but without inertial coupling of a remote rotor.
 
         An inertia `x` that is added to ``M_12`` alone is theta3 larger by `x` with a rotor of joint 2 smaller by `x`. None if
-        that leaves no rotor that could be built, as for a positive coupling without a rotor inertia of joint 2.
+        the rotor's inertia would become negative, as for a positive coupling without a rotor inertia of joint 2.
         """
         x = sum(value(cause, "inertia") for cause in self.causes if cause.effect == "rotor_coupling")
         if not x:
@@ -70,7 +70,7 @@ class CorrectedPlanar(Corrected):
         return replace(self, theta=theta, links=links, joints=(first, replace(second, armature=second.armature - x)))
 
     def remarks(self, form: str) -> tuple[str, ...]:
-        """Return everything to know about the file of a format: what is missing in it, what was chosen, one line each."""
+        """Return remarks on the exported file of a format, one line each: what the format cannot hold, and what was chosen."""
         links = ((self.uncoupled() or self) if form == "mjcf" else self).links
         chosen = links.choices if links is not None and form != "toml" else ()
         gone = (str(self.unbuildable),) if self.unbuildable is not None else ()
@@ -79,13 +79,13 @@ class CorrectedPlanar(Corrected):
         return (*self.missing(form), *lost, *self.notes, *gone, *chosen)
 
     def built(self) -> Links:
-        """Return the links, or raise why there are none."""
+        """Return the links, or raise an error if no physically possible links exist."""
         if self.links is None:
             raise self.unbuildable or ExportError("has no links")
         return self.links
 
     def simulated(self, form: str) -> SimulatorModel:
-        """Return the arm as a chain: links hang down along -z and turn about y.
+        """Return the arm as a chain for MJCF or URDF: links hang down along -z and turn about y.
 
         In URDF the rotor of joint 1 is part of its link, which makes no difference.
         """
@@ -127,7 +127,7 @@ class CorrectedPlanar(Corrected):
         return replace(self.arm, name=f"{self.arm.name}, corrected", theta=theta, sigma=sigma, sealed=None)
 
     def data(self) -> dict[str, Any]:
-        """Return what the JSON object has of this kind of arm: links, slope and tilt."""
+        """Return entries of the exported JSON object that only planar arms have: links, slope and tilt."""
         return {
             "links": None if self.links is None else _rows(self.links),
             "slope": None if self.links is None else self.links.slope,
@@ -150,7 +150,7 @@ def correct_planar(
     *,
     keep_lengths: bool,
 ) -> CorrectedPlanar:
-    """Turn the values of a planar arm and the causes beside them into a corrected model; see `armgap.correct`."""
+    """Make a corrected model from the estimated parameters and causes of a planar arm; see `armgap.correct`."""
     theta, tilt = np.array([v.value for v in values]), 0.0
     for cause in causes:
         theta = theta + _payload(arm, cause)
@@ -178,7 +178,7 @@ def correct_planar(
 
 
 def _payload(arm: Arm, cause: Cause) -> Array:
-    """Change of the base parameters by a payload."""
+    """Return the change of the base parameters by a payload [SI]."""
     change = np.zeros(len(arm.parameter_names))
     if cause.effect != "payload":
         return change
@@ -193,14 +193,14 @@ def _payload(arm: Arm, cause: Cause) -> Array:
 
 
 def _first_length(arm: Arm) -> float:
-    """Length of link 1 with which the diagnosis placed a payload."""
+    """Return the length of link 1 [m] that the diagnosis assumed for the place of a payload."""
     if arm.link_length is not None:
         return float(arm.link_length[0])
     return arm.gravity * float(arm.theta[1]) / float(arm.theta[4]) if arm.theta[4] > 0 else 0.0
 
 
 def _with_length(theta: Array, values: Sequence[Value], arm: Arm) -> tuple[Array, tuple[str, ...]]:
-    """Nearest theta2 and theta5, in units of their sigmas, with ``g theta2 = l1 theta5``."""
+    """Return theta with theta2 and theta5 moved, least in units of their sigmas, so that ``g theta2 = l1 theta5``, and notes."""
     if arm.kind != "two-link" or arm.link_length is None or arm.gravity == 0:
         raise ExportError(
             "there is no length of link 1 to keep",

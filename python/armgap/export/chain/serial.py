@@ -1,4 +1,4 @@
-"""Corrected models of serial arms: links that bodies can be, rotors and friction, gravity in the frame of the base."""
+"""Corrected models of serial arms: physically consistent links, rotors and friction, gravity in the frame of the base."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ _COM = ("com_x", "com_y", "com_z")
 
 @dataclass(frozen=True)
 class CorrectedSerial(Corrected):
-    """A serial arm as a diagnosis found it.
+    """Model of a serial arm with the parameters and causes of a diagnosis.
 
     Attributes
     ----------
     chain : SerialChain
-        The chain, with gravity turned by the tilt of the base that was found.
+        Chain with gravity rotated by the estimated tilt of the base.
     tilt : ndarray, shape (3, 3)
-        Rotation of the base by it.
+        Rotation of the base by the estimated tilt.
     exceeded : tuple of str
         Joints that moved beyond their limits of position.
     expected : ndarray, shape (11 n_joints,)
-        Nominal ten numbers of each link and rotors, with the payload or the change of a link that was found.
+        Nominal inertial parameters of links, ten each, and rotors, with an identified payload or change of a link added.
     regressor : ndarray, shape (n_states, n_joints, 11 n_joints)
-        Torques per unit of each inertial parameter, along the motion that was diagnosed and in random states.
+        Torques per unit of each inertial parameter, along the diagnosed motion and in random states.
     bodies : Bodies
-        Links that bodies can be, with the torques of those found, see `nearest_bodies`.
+        Physically consistent links with the torques of the estimated links, see `nearest_bodies`.
     """
 
     chain: SerialChain
@@ -56,7 +56,7 @@ class CorrectedSerial(Corrected):
     bodies: Bodies
 
     def beside(self, hanging: Array) -> CorrectedSerial:
-        """Return the model with links that are bodies without what hangs on them, shape (n_joints, 10)."""
+        """Return the model with links that are physically consistent without the parts `hanging` on them, ten inertial parameters each."""
         found, n = self.theta[: 11 * self.arm.n_joints], self.arm.n_joints
         bodies = nearest_bodies(found, self.expected, self.arm.sigma[: 11 * n], self.regressor, hanging)
         pairs = zip(self.joints, bodies.rotor - self.bodies.rotor, strict=True)
@@ -64,14 +64,14 @@ class CorrectedSerial(Corrected):
         return replace(self, bodies=bodies, joints=joints)
 
     def simulated(self, form: str) -> SimulatorModel:
-        """Return the arm as MJCF and URDF have it, without limits of position that the logs exceed."""
+        """Return the arm as a chain for MJCF or URDF, without limits of position that the logs exceed."""
         beyond = np.isin(self.chain.joint_names, self.exceeded)
         low, high = np.where(beyond, -np.inf, self.chain.lower), np.where(beyond, np.inf, self.chain.upper)
         chain = replace(self.chain, lower=low, upper=high)
         return SimulatorModel(self.arm.name, chain, self.bodies.inertial, self.joints, self.arm.sample_period)
 
     def nominal(self) -> Arm:
-        """Return the arm with the values as they were found, whether or not each link by itself is a body."""
+        """Return the arm with the parameters as estimated, whether or not each link by itself is physically consistent."""
         n, theta = self.arm.n_joints, self.theta.copy()
         theta[10 * n : 11 * n] += np.array([joint.armature for joint in self.joints]) - self.bodies.rotor
         # Columns of one kind: the ten numbers of the links, rotors, viscous and Coulomb friction.
@@ -90,14 +90,14 @@ class CorrectedSerial(Corrected):
         )
 
     def remarks(self, form: str, *, original: bool = False) -> tuple[str, ...]:
-        """Return everything to know about the file of a format: what is missing in it, what was chosen, one line each.
+        """Return remarks on the exported file of a format, one line each: what the format cannot hold, and what was chosen.
 
         Parameters
         ----------
         form : str
             Key of `FORMATS`.
         original : bool, default False
-            Whether the values go into the user's own description.
+            Whether the values are written into the user's own description.
         """
         lines = [*self.missing(form), *self.notes]
         if form == "toml":
@@ -108,7 +108,7 @@ class CorrectedSerial(Corrected):
         return (*lines, *_said(self.bodies, self.chain))
 
     def data(self) -> dict[str, Any]:
-        """Return what the JSON object has of this kind of arm: links that bodies can be, and gravity."""
+        """Return entries of the exported JSON object that only serial arms have: physically consistent links, and gravity."""
         links = []
         for name, ten in zip(self.chain.link_names, self.bodies.inertial, strict=True):
             mass, com, inertia = about_com(ten)
@@ -122,7 +122,7 @@ class CorrectedSerial(Corrected):
 
 
 def _said(bodies: Bodies, chain: SerialChain) -> tuple[str, ...]:
-    """Return what is to be said about links that were no bodies."""
+    """Return remarks on links that were not physically consistent as estimated."""
     if not bodies.changed:
         return ()
     names = ", ".join(f"`{chain.link_names[k]}`" for k in bodies.changed)
@@ -146,7 +146,7 @@ def correct_serial(
     notes: tuple[str, ...],
     diagnosis: Diagnosis,
 ) -> CorrectedSerial:
-    """Turn the values of a serial arm and the causes beside them into a corrected model; see `armgap.correct`."""
+    """Make a corrected model from the estimated parameters and causes of a serial arm; see `armgap.correct`."""
     assert arm.chain is not None
     n, chain = arm.n_joints, arm.chain
     theta, sigma = (np.array([getattr(v, name) for v in values]) for name in ("value", "sigma"))
@@ -201,7 +201,7 @@ def correct_serial(
 
 
 def _payload(cause: Cause, n: int) -> tuple[int, Array, Array]:
-    """Return link, change of its ten numbers by a point mass, and the variance of that change."""
+    """Return the link (from 0) with a payload, the change of its ten inertial parameters by the point mass, and the change's variance."""
     mass, com = value(cause, "mass"), np.array([value(cause, name) for name in _COM])
     sigma = [cause.parameters[name].sigma for name in ("mass", *_COM)]
     moved = [about_origin(mass + sigma[0], com, np.zeros((3, 3)))]
@@ -213,7 +213,7 @@ def _payload(cause: Cause, n: int) -> tuple[int, Array, Array]:
 
 
 def _nominal_link(cause: Cause, n: int) -> tuple[int, Array, Array]:
-    """Return link, change of its ten numbers, and the variance of that change."""
+    """Return the link (from 0) that a cause changes, the change of its ten inertial parameters, and the change's variance."""
     if cause.joint is None or not 1 <= cause.joint <= n:
         raise ExportError(f"the cause nominal_link is of joint {cause.joint}", remedy=f"joints: 1 to {n}")
     values = [cause.parameters[name] for name in INERTIAL_NAMES]
@@ -224,7 +224,7 @@ _ON_LINK = {"payload": _payload, "nominal_link": _nominal_link}
 
 
 def _turned(cause: Cause) -> Array:
-    """Return the rotation of a base that is turned about its horizontal axes by a rotation vector."""
+    """Return the rotation of the base, shape (3, 3), for a tilt given as a rotation vector about horizontal axes."""
     x, y = value(cause, "x"), value(cause, "y")
     angle = math.hypot(x, y)
     return np.eye(3) if angle == 0 else about_axis(np.array([x, y, 0.0]) / angle, angle)

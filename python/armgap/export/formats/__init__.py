@@ -1,1 +1,1 @@
-"""A corrected model in the formats of simulators, and in the user's own description."""
+"""Writing of a corrected model in the formats of simulators, and into the user's own description."""

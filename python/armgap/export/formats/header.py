@@ -1,4 +1,4 @@
-"""What every exported file says at its head."""
+"""Comment at the head of every exported file: origin of the model, and remarks."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _STAGES = {"with_causes": "re-estimated values with the causes found", "refit": 
 
 
 def lines(model: Corrected, form: str) -> list[str]:
-    """Return the remarks on a model in a format: where it comes from, what has no field, what was chosen."""
+    """Return the remarks on a model in a format: its origin, effects without a field, and choices."""
     return written(model, model.remarks(form))
 
 
 def written(model: Corrected, remarks: Iterable[str]) -> list[str]:
-    """Return where a model comes from, and remarks, as lines without line breaks."""
+    """Return the origin of a model, and remarks, as lines without line breaks."""
     first = f"{model.arm.name}: {_STAGES[model.stage]}, armgap {__version__}, verdict: {model.verdict}"
     return [_one_line(line) for line in (first, *remarks)]
 
@@ -33,7 +33,7 @@ def comment(line: str) -> Any:
 
 
 def in_comment(line: str) -> str:
-    """Return a line as it may stand in an XML comment, in which two hyphens must not meet."""
+    """Return a line made valid for an XML comment, in which two adjacent hyphens are not allowed."""
     while "--" in line:
         line = line.replace("--", "- -")
     return line

@@ -1,4 +1,4 @@
-"""MJCF: the format of MuJoCo."""
+"""Export to MJCF, the format of MuJoCo."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ if TYPE_CHECKING:
 
 __all__ = ["FAR", "SHARP", "render"]
 
-#: Beyond any position.
+#: Position beyond any motion [rad or m], for the end of a range without limit.
 FAR = 1e6
-#: Impedance of dry friction with which a joint that is held creeps by little.
+#: Impedance (`solimpfriction`) of dry friction in MuJoCo with which a loaded joint at rest creeps little.
 SHARP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 
 
 def render(model: Corrected) -> str:
-    """Return a complete MJCF file: bodies, joints, and one actuator per joint.
+    """Return the text of a complete MJCF file: bodies, joints, and one actuator per joint.
 
-    Dry friction in MuJoCo is a soft constraint; the time constant and impedance written for it let a joint that is held
-    creep by little. A position in this file is what the encoder shows.
+    Dry friction in MuJoCo is a soft constraint; with the time constant and impedance written, a loaded joint at rest
+    creeps little. Joint positions of the file are encoder readings.
 
     Raises
     ------
     ExportError
-        If no arm that could be built has these values.
+        If no physically possible arm has the corrected parameters.
     """
     arm = model.simulated("mjcf")
     root = ET.Element("mujoco", model=arm.name)

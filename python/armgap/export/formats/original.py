@@ -1,4 +1,4 @@
-"""Corrected values in the user's own description: everything that was not corrected stays as it is."""
+"""Writing of corrected parameters into the user's own URDF or MJCF description, whose other content stays."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ __all__ = ["CorrectedDescription", "into_description"]
 
 Array = NDArray[np.float64]
 
-#: Inertias that differ by less, relative to the largest number, are those of the file.
+#: Difference of inertial parameters, relative to the largest, below which the description's own numbers stay.
 _ROUNDING = 1e-12
 _RELATIVE_FILE = re.compile(rb"\s(?:filename|file)\s*=\s*[\"'](?!/|[a-z]+:)")
 
 
 @dataclass(frozen=True)
 class CorrectedDescription:
-    """A description with corrected values.
+    """A URDF or MJCF description with corrected parameters.
 
     Attributes
     ----------
     form : {"urdf", "mjcf"}
         Format of the file.
     content : bytes
-        The file.
+        Content of the file.
     remarks : tuple of str
-        What to know about it, one line each.
+        Remarks on the file, one line each.
     """
 
     form: str
@@ -48,22 +48,22 @@ class CorrectedDescription:
 
     @property
     def names_files(self) -> bool:
-        """Whether it names files, such as meshes, by paths relative to it."""
+        """Whether the description refers to files, such as meshes, by relative paths."""
         return _RELATIVE_FILE.search(self.content) is not None
 
 
 def into_description(
     model: Corrected, path: str | os.PathLike[str], *, frozen: Mapping[str, float] | None = None
 ) -> CorrectedDescription:
-    """Write corrected values into the description that the arm file was made of.
+    """Write corrected parameters into the description that the arm file was made from.
 
-    Of the links that one of the arm's links carries rigidly, the heaviest takes what was corrected; the others keep their inertias. Joints get
-    friction, and what else of the causes the format has a field for.
+    Of the description links fused into one of the arm's links, the heaviest takes the correction; the others keep their inertias. Joints get
+    friction, and all effects for which the format has a field.
 
     Parameters
     ----------
     model : CorrectedSerial
-        What was found about a serial arm.
+        Corrected model of a serial arm.
     path : path-like
         URDF or MJCF file with the arm's joints.
     frozen : mapping of str to float, optional
@@ -78,9 +78,9 @@ def into_description(
     ModelFileError
         If the file cannot be read, or is of another arm.
     ExportError
-        If the arm is planar, or a link's inertia has no place in it.
+        If the arm is planar, or a link's inertia has no place in the description.
     OptionError
-        If it is MJCF and MuJoCo is not installed.
+        If the file is MJCF and MuJoCo is not installed.
     """
     path = Path(path)
     if not isinstance(model, CorrectedSerial):
@@ -113,7 +113,7 @@ def into_description(
 
 
 def _heaviest(tree: Tree, carried: tuple[Carried, ...]) -> Carried:
-    """Return the link that takes what was corrected: the first of the heaviest ones that are fixed to the chain's link."""
+    """Return the description link that takes the correction: the first of the heaviest links fixed to the chain's link."""
     rigid = [body for body in carried if body.rigid]
     if not rigid:
         raise ExportError(

@@ -1,4 +1,4 @@
-"""Corrected values in an MJCF model, by MuJoCo's own description of it."""
+"""Writing of corrected parameters into an MJCF model, through MuJoCo's own model specification."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _ROOT = re.compile(r"<mujoco[^>]*>")
 def write_mjcf(
     model: CorrectedSerial, tree: Tree, located: Located, inertial: Mapping[str, Array]
 ) -> tuple[bytes, tuple[str, ...]]:
-    """Return the model with these inertias of bodies, and what to know about it.
+    """Return the text of an MJCF model with corrected inertias of bodies, and remarks.
 
     MuJoCo writes the file: included files become part of it, numbers have six digits.
 
@@ -137,7 +137,7 @@ class _Writer:
         self._drive(name, found, j)
 
     def _drive(self, name: str, found: Joint, j: int) -> None:
-        """Put gain, offset, limit, lag and delay that were found into the joint's actuators."""
+        """Write estimated gain, offset, limit, lag and delay into the actuators of a joint."""
         limited = any(c.effect == "torque_saturation" and c.joint == j + 1 for c in self.model.causes)
         if not (limited or found.offset or found.lag or found.delay or found.gain != 1.0):
             return

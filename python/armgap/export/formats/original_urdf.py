@@ -1,4 +1,4 @@
-"""Corrected values in the text of a URDF."""
+"""Writing of corrected parameters into the text of a URDF."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ __all__ = ["write_urdf"]
 Array = NDArray[np.float64]
 
 _DOWN = np.array([0.0, 0.0, -1.0])
-#: Directions of gravity that differ by less are the same.
+#: Difference of unit vectors of gravity below which the directions count as equal.
 _SAME = 1e-9
 
 
 def write_urdf(
     model: CorrectedSerial, path: Path, located: Located, inertial: Mapping[str, Array]
 ) -> tuple[bytes, tuple[str, ...]]:
-    """Return the URDF with these inertias of links, and what to know about it.
+    """Return the text of a URDF with corrected inertias of links, and remarks.
 
-    A tilt of the base turns the first joint of the chain about the origin of the base. An offset of an encoder turns its joint.
+    A tilt of the base rotates the first joint of the chain about the origin of the base. An encoder offset rotates the joint of the encoder.
     """
     data = read_text(path)
     root = parse(data, path)
@@ -100,7 +100,7 @@ def _tag(tag: str, entries: Mapping[str, Any]) -> str:
 
 
 def _mounting(model: CorrectedSerial, located: Located) -> tuple[str, ...]:
-    """Say where gravity has to act in the frame of the root, if not along -z."""
+    """Return a remark on the direction of gravity in the frame of the root, if it is not -z."""
     # The tilt that was found is in the file.
     nominal = located.rotation @ (model.tilt @ model.chain.gravity)
     size = float(np.linalg.norm(nominal))

@@ -1,4 +1,4 @@
-"""An arm file with the corrected values."""
+"""Export to an arm file with the corrected parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["render"]
 
 
 def render(model: Corrected) -> str:
-    """Return an arm file; causes that it has no field for stand in its head as options of ``armgap simulate``."""
+    """Return the text of an arm file; causes for which arm files have no field stand in its head as options of ``armgap simulate``."""
     head = [f"# {line}" for line in header.lines(model, "toml")]
     head.append(f"# sigma: the estimate's, but at least {LEAST_SIGMA:.0%} of the value")
     options = [

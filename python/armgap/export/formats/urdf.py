@@ -1,4 +1,4 @@
-"""URDF: the format of ROS and of most other simulators."""
+"""Export to URDF, the format of ROS and of most other simulators."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ __all__ = ["assumed", "inertia_entries", "render"]
 
 Array = NDArray[np.float64]
 
-#: URDF wants limits where a log tells none: beyond what any arm does, m and m/s (rad/s).
+#: Limit written where URDF requires one and none is known: beyond any motion of an arm, m and m/s (rad/s).
 _FAR = 1e3
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def render(model: Corrected) -> str:
-    """Return a complete URDF file.
+    """Return the text of a complete URDF file.
 
-    A position in this file is what the encoder shows. URDF has no gravity of its own: the base is mounted so that gravity acts along -z. It has
-    no field for rotor inertia either.
+    Joint positions of the file are encoder readings. URDF has no gravity of its own: the base is mounted so that gravity acts along -z. URDF
+    has no field for rotor inertia.
 
     Raises
     ------
     ExportError
-        If no arm that could be built has these values.
+        If no physically possible arm has the corrected parameters.
     """
     arm = model.simulated("urdf")
     root = ET.Element("robot", name=arm.name)
@@ -64,7 +64,7 @@ def render(model: Corrected) -> str:
 
 
 def assumed(arm: SimulatorModel) -> list[str]:
-    """Return what a simulator has to be told besides the file."""
+    """Return remarks on settings that a simulator needs besides the URDF file."""
     lines = [f"gravity is {np.linalg.norm(arm.chain.gravity):g} m/s^2 along -z: set it in the simulator"]
     if rotors := [
         f"{name} {number(joint.armature)}"
@@ -78,7 +78,7 @@ def assumed(arm: SimulatorModel) -> list[str]:
 
 
 def inertia_entries(ten: Array) -> list[tuple[str, dict[str, str]]]:
-    """Return the elements inside `inertial` of a link with their attributes."""
+    """Return the elements inside a link's ``inertial`` element, with their attributes, for ten inertial parameters."""
     mass, com, i = about_com(ten)
     six = {"ixx": i[0, 0], "ixy": i[0, 1], "ixz": i[0, 2], "iyy": i[1, 1], "iyz": i[1, 2], "izz": i[2, 2]}
     return [
@@ -89,7 +89,7 @@ def inertia_entries(ten: Array) -> list[tuple[str, dict[str, str]]]:
 
 
 def _mounting(gravity: Array) -> Array | None:
-    """Roll, pitch and yaw of the base in a world in which gravity acts along -z; None for a base that stands upright."""
+    """Return roll, pitch and yaw [rad] of the base in a world with gravity along -z; None for an upright base."""
     size = float(np.linalg.norm(gravity))
     if size == 0 or np.array_equal(gravity / size, _DOWN):
         return None
@@ -132,7 +132,7 @@ def _joint(root: ET.Element, arm: SimulatorModel, j: int, base: str) -> None:
 
 
 def _limits(arm: SimulatorModel, j: int) -> tuple[dict[str, float], bool]:
-    """Return the limits that URDF wants of a joint, none of a continuous joint without any; and whether one of them is not known."""
+    """Return the limits of a URDF joint, none for a continuous joint, and whether one of them is unknown."""
     chain, values = arm.chain, arm.joints[j]
     low, high, speed = float(chain.lower[j]), float(chain.upper[j]), float(chain.speed[j])
     effort = values.limit if values.limit is not None else float(chain.effort[j])

@@ -1,1 +1,1 @@
-"""From a recording's own columns to positions and torques in SI units on one clock."""
+"""Conversion of a recording's columns to positions and torques in SI units on one clock."""

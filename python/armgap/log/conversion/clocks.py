@@ -1,6 +1,6 @@
-"""Times: their unit, and torques on a clock of their own.
+"""Conversion of times to seconds, and of torques with their own time stamps to the times of the positions.
 
-A torque that comes by another clock is held from its time until the next (zero order), which is what a drive does with it. Positions
+A torque with its own time stamps is held from its time until the next (zero-order hold), as a drive does. Positions
 stay as they were measured; nothing is interpolated.
 """
 
@@ -26,23 +26,23 @@ __all__ = ["in_seconds", "ticks"]
 
 Times = NDArray[np.float64] | NDArray[np.int64]
 
-# A sample period off by more than this factor from the arm file's is another unit of time.
+# Ratio of a sample period to the arm file's beyond which times are in another unit.
 _PERIOD_FACTOR = 30.0
-# A unit is recognised if the period then agrees with the arm file's to this part.
+# Relative difference from the arm file's period up to which a unit of time is recognised.
 _PERIOD_MATCH = 0.2
 _LONGEST_PERIOD_S = 0.2
 _SHORTEST_PERIOD_S = 2e-5
-# Stamps since 1970, in the years 2001 to 2096: their magnitude alone tells the unit.
+# Range of time stamps since 1970 [s], the years 2001 to 2096, by which a unit of time is recognised from the magnitude alone.
 _EPOCH_S = (1e9, 4e9)
-# A torque is held for at most so many of its own periods.
+# Longest time for which a torque is held, in its own sample periods.
 _HELD_PERIODS = 3.0
-# Moments of one finding that are kept to be drawn.
+# Times per finding that are kept for charts at most.
 _DRAWN = 200
 
 
 @dataclass(frozen=True)
 class _Clock:
-    """Times in seconds from a common start."""
+    """Times of one clock of a recording, in seconds from a common start."""
 
     t: NDArray[np.float64]
     name: str
@@ -77,7 +77,7 @@ def in_seconds(
 
 
 def ticks(raw: Raw, scales: Scales, names: Names, arm: Arm | None, place: Path | str) -> dict[str, float]:
-    """Return the seconds per unit of the time columns, by standard name; errors as `in_seconds`."""
+    """Return the seconds per unit of the time columns, by standard name; parameters and errors as for `in_seconds`."""
     factor = raw.tick_s or scales.t or _unit(raw.t, names.t, arm, place, [])
     if raw.t_tau is None or names.t_tau is None:
         return {"t": factor}
@@ -86,7 +86,7 @@ def ticks(raw: Raw, scales: Scales, names: Names, arm: Arm | None, place: Path |
 
 
 def _seconds(times: Times, start: np.int64 | np.float64, factor: float) -> NDArray[np.float64]:
-    """Return seconds; whole numbers, which may be stamps of many digits, are counted from the first one, exactly."""
+    """Return times in seconds from `start`; whole numbers, which may be stamps of many digits, are subtracted exactly."""
     if times.dtype.kind == "i":
         times = times - np.int64(start)
     seconds = np.array(times, dtype=np.float64)
@@ -95,7 +95,7 @@ def _seconds(times: Times, start: np.int64 | np.float64, factor: float) -> NDArr
 
 
 def _difference(a: np.int64 | np.float64, b: np.int64 | np.float64, a_factor: float, b_factor: float) -> float:
-    """Return what takes the second clock's zero to the first one's, given how `_seconds` counts."""
+    """Return the offset [s] between the zeros of two clocks, for times counted as by `_seconds`."""
     a_zero, b_zero = (int(x) if isinstance(x, np.integer) else 0 for x in (a, b))
     if a_factor == b_factor:
         return (a_zero - b_zero) * a_factor
@@ -107,7 +107,7 @@ def _period(times: Times) -> float:
 
 
 def _unit(times: Times, name: str, arm: Arm | None, place: Path | str, findings: list[Finding]) -> float:
-    """Return the seconds per unit of times that nothing says the unit of."""
+    """Return the seconds per unit of times without a stated unit."""
     period = _period(times)
     low, high, against = _SHORTEST_PERIOD_S, _LONGEST_PERIOD_S, "no arm is sampled so"
     if arm is not None:
@@ -127,7 +127,7 @@ def _unit(times: Times, name: str, arm: Arm | None, place: Path | str, findings:
 
 
 def _tau_unit(times: Times, factor: float, name: str, findings: list[Finding]) -> float:
-    """Return the seconds per unit of the torques' times: that of the positions', unless their stamps say otherwise."""
+    """Return the seconds per unit of the torques' times: that of the positions' times unless the stamps contradict it."""
     for unit, seconds in FACTORS["t"].items():
         if unit != "s" and _is_epoch(times, unit) and seconds != factor:
             findings.append(Finding("units", f"the torques' times `{name}` are stamps in {unit}; converted"))
@@ -152,7 +152,7 @@ def _reason(times: Times, unit: str, period: float, arm: Arm | None) -> str:
 
 
 def _hold(raw: Raw, t: _Clock, t_tau: _Clock, place: Path | str, findings: list[Finding]) -> Arrays:
-    """Hold torques until their next time, leave out positions without any, and report both."""
+    """Hold torques until their next time, leave out positions without a torque, and report both."""
     steps = np.diff(t_tau.t)
     bad = np.flatnonzero(steps <= 0)
     if len(bad):

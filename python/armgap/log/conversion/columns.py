@@ -1,4 +1,4 @@
-"""From a recording's own columns to ``t, q, tau, dq, tau_meas, q_link``, or ``q_ref, dq_ref`` in place of torques."""
+"""Selection of a recording's columns for ``t, q, tau, dq, tau_meas, q_link``, or ``q_ref, dq_ref`` in place of torques."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ OPTIONAL = {
     "q_link": "positions on the link's side",
     "dq_ref": "velocities",
 }
-"""Groups of columns that are used only where every joint has one, and what a message calls them."""
-#: Columns that a message lists at most.
+"""Optional groups of columns, used only if every joint has one, with their names in messages."""
+#: Columns that an error message lists at most.
 _LISTED = 24
 _TICKS_S = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}
 
 
 @dataclass(frozen=True)
 class Names:
-    """The recording's names of the columns in use, and the units it states for them; either `tau` or `q_ref` is empty."""
+    """Column names of the recording in use, and stated units of the columns; either `tau` or `q_ref` is empty."""
 
     t: str
     q: tuple[str, ...]
@@ -54,7 +54,7 @@ class Names:
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
-        """Standard name and column of everything in use."""
+        """Pairs of standard name and column, for all columns in use."""
         groups = (
             ("q", self.q), ("tau", self.tau), ("dq", self.dq or ()), ("tau_meas", self.tau_meas or ()), ("q_link", self.q_link or ()),
             ("q_ref", self.q_ref), ("dq_ref", self.dq_ref or ()),
@@ -64,18 +64,18 @@ class Names:
 
     @property
     def by_key(self) -> dict[str, str]:
-        """Column by standard name."""
+        """Columns in use by standard name."""
         return dict(self.pairs)
 
     def order(self, column: str) -> float:
-        """Return which part of the columns comes before this one."""
+        """Return the share of the recording's columns that come before a column."""
         columns = [name for _, name in self.pairs]
         return columns.index(column) / len(columns)
 
 
 @dataclass(frozen=True)
 class Arrays:
-    """Columns as arrays, not yet checked against each other; of a log of references torques have no columns."""
+    """Columns of a log as arrays, before checks; `tau` of a log of references has no columns."""
 
     t: NDArray[np.float64]
     q: NDArray[np.float64]
@@ -87,14 +87,14 @@ class Arrays:
     q_link: NDArray[np.float64] | None = None
 
     def rows(self, kept: NDArray[Any]) -> Arrays:
-        """Return some of the rows, by index or mask."""
+        """Return a selection of rows, by index or mask."""
         parts = (self.t, self.q, self.tau, self.dq, self.q_ref, self.dq_ref, self.tau_meas, self.q_link)
         return Arrays(*(None if x is None else x[kept] for x in parts))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
 class Raw:
-    """Columns as they stand in the file: times as numbers of any kind, torques on their own clock if they have one.
+    """Columns as in the file: times as numbers of any kind, torques with their own times if they have them.
 
     Attributes
     ----------
@@ -118,11 +118,11 @@ class Raw:
 def resolve(
     recording: Recording, place: Path | str, mapping: Mapping[str, str], arm: Arm | None
 ) -> tuple[Names, list[Finding]]:
-    """Find the columns in use.
+    """Find the columns of a recording for all standard names.
 
-    A name given in `mapping` must exist. The arm file's names come next; a log that has the standard name instead,
-    such as one that armgap wrote, is read by that. Of a serial arm columns called ``joint/position``, ``/velocity`` and ``/effort`` are found by
-    the names of the chain's joints. What none of these names is taken from what the file itself says.
+    A name given in `mapping` must exist. The arm file's names come next; a log with standard names instead,
+    such as one written by armgap, is read by these. For a serial arm columns called ``joint/position``, ``/velocity`` and ``/effort`` are found by
+    the names of the chain's joints. Remaining columns are taken as the file itself suggests.
     """
     index = Index(recording, place)
     names = {**_from_joints(index, arm), **_from_arm(index, arm), **mapping}
@@ -192,7 +192,7 @@ def _if_all(
 
 
 def _commanded(index: Index, names: Mapping[str, str], t: str, n: int, arm: Arm | None) -> bool:
-    """Whether a log holds references of a position controller in place of torques, which serial arms may be diagnosed by."""
+    """Whether a log holds references of a position controller in place of torques, which a serial arm can be diagnosed from."""
 
     def there(prefix: str) -> bool:
         keys = [f"{prefix}{j}" for j in range(1, n + 1)]
@@ -217,7 +217,7 @@ def _commanded(index: Index, names: Mapping[str, str], t: str, n: int, arm: Arm 
 
 
 def no_controller(arm: Arm, place: Path | str) -> ColumnError:
-    """Return the error of a log of references whose arm has no controller."""
+    """Return the error for a log of references whose arm has no controller."""
     return ColumnError(
         f"is missing, and {arm.path or arm.name} has no [controller] that makes torques of the references `q_ref1`",
         remedy="map torques with --columns tau1=NAME, or add [controller] with kp and kd to the arm file",
@@ -227,7 +227,7 @@ def no_controller(arm: Arm, place: Path | str) -> ColumnError:
 
 
 def _time(index: Index, names: Mapping[str, str], first: str | None) -> str:
-    """Return the time column of the positions; that of their own clock where a recording has several."""
+    """Return the time column of the positions: that of their own clock if the recording has several clocks."""
     t = index.find(names.get("t", "t"), "t", within=first)
     alone = len(index.recording.streams) == 1 and index.recording.suggest is None
     if "t" in names or first is None or alone:
@@ -239,7 +239,7 @@ def _time(index: Index, names: Mapping[str, str], first: str | None) -> str:
 
 
 def _check_once(index: Index, found: Names) -> None:
-    """Raise if a column stands for two things."""
+    """Raise if one column stands for two standard names."""
     seen: dict[str, str] = {}
     for key, column in found.pairs:
         if column in seen:
@@ -253,7 +253,7 @@ def _check_once(index: Index, found: Names) -> None:
 
 
 def _torque_clock(index: Index, names: Mapping[str, str], t: str, tau: tuple[str, ...]) -> str | None:
-    """Return the time column of the torques if it is another one than that of the positions."""
+    """Return the time column of the torques if it differs from that of the positions; else None."""
     given = index.find(names.get("t_tau", "t_tau"), "t_tau", within=tau[0])
     if given is None and "t_tau" in names:
         return _pick(index, names, "t_tau", tau[0])
@@ -273,7 +273,7 @@ def _torque_clock(index: Index, names: Mapping[str, str], t: str, tau: tuple[str
 
 
 def _one_clock(index: Index, t: str, columns: tuple[str, ...], what: str) -> None:
-    """Raise unless columns go by the clock of `t`."""
+    """Raise unless all columns have the clock of time column `t`."""
     stream = index.recording.stream_of(t)
     for column in columns:
         if column not in stream.columns:
@@ -286,7 +286,7 @@ def _one_clock(index: Index, t: str, columns: tuple[str, ...], what: str) -> Non
 
 
 def left_out(recording: Recording, names: Names, prefix: str) -> list[str]:
-    """Return the columns of a group in `OPTIONAL` that are left out because others are missing."""
+    """Return the columns of a group in `OPTIONAL` that are left out because the group is incomplete."""
     if getattr(names, prefix) is not None:
         return []
     used = [column for _, column in names.pairs]
@@ -305,7 +305,7 @@ def _from_arm(index: Index, arm: Arm | None) -> dict[str, str]:
 
 
 def _from_joints(index: Index, arm: Arm | None) -> dict[str, str]:
-    """Return the columns that are called after the joints of a chain; all of a kind where there is one, so that a missing one is named."""
+    """Return columns named after the joints of a chain, by standard name; all joints of a kind if one has one, so that errors name missing ones."""
     if arm is None or arm.chain is None:
         return {}
     names: dict[str, str] = {}
@@ -361,7 +361,7 @@ def _pick(index: Index, names: Mapping[str, str], key: str, within: str | None) 
 
 
 def extract(recording: Recording, place: Path | str, names: Names) -> Raw:
-    """Return the columns in use as finite arrays."""
+    """Return the columns in use as arrays of finite numbers."""
 
     def several(group: tuple[str, ...]) -> NDArray[np.float64]:
         values = np.empty((len(t), 0)) if not group else None
@@ -387,7 +387,7 @@ def extract(recording: Recording, place: Path | str, names: Names) -> Raw:
 def _times(
     recording: Recording, place: Path | str, name: str
 ) -> tuple[NDArray[np.float64] | NDArray[np.int64], float | None]:
-    """Return times as they stand, whole numbers exactly, and the seconds per unit if the type says so."""
+    """Return times as in the file, whole numbers exactly, and the seconds per unit if the column's type states it."""
     series = recording.stream_of(name).fetch(name)
     if isinstance(series.dtype, pl.Datetime | pl.Duration) and series.null_count() == 0:
         # The type says its own unit, so the conversion guesses nothing.
@@ -419,7 +419,7 @@ def _column(series: pl.Series, place: Path | str, name: str) -> NDArray[np.float
 
 
 def _numbers(series: pl.Series, place: Path | str, name: str) -> pl.Series:
-    """Return a column of numbers; texts that are numbers count as such."""
+    """Return a column as numbers; texts that spell numbers are converted."""
     if series.dtype.is_numeric() or series.dtype == pl.Null:
         return series
     if series.dtype != pl.String:

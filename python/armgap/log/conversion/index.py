@@ -1,4 +1,4 @@
-"""Finding a column by name: as it stands, without its unit, or by the end of its path."""
+"""Search for a column by name: exact, without its unit, or by the end of its path."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armgap.log.recording import Recording
 
 __all__ = ["QUANTITIES", "Index"]
 
-# What a ROS message calls the quantity of a standard column; `q1=elbow` finds `/joint_states/elbow/position`.
+# Name of a standard column's quantity in ROS messages, so that `q1=elbow` finds `/joint_states/elbow/position`.
 QUANTITIES = {
     "q": "position", "dq": "velocity", "tau": "effort", "q_ref": "reference", "dq_ref": "reference_velocity",
 }  # fmt: skip
@@ -19,7 +19,7 @@ QUANTITIES = {
 
 @dataclass(frozen=True)
 class Index:
-    """The columns of a recording, by the names that find them."""
+    """Index of a recording's columns by all names that find them."""
 
     recording: Recording
     place: Path | str
@@ -32,7 +32,7 @@ class Index:
         name : str
             Name to look for.
         key : str
-            Standard column it is looked for as, such as ``"q1"``.
+            Standard name of the column, such as ``"q1"``.
         within : str, optional
             Column whose clock comes first when several columns fit.
 

@@ -1,4 +1,4 @@
-"""Units as files spell them: ``q1 [deg]``, ``tau1 (N·m)``, ``t_ms``."""
+"""Spellings of units in files: ``q1 [deg]``, ``tau1 (N·m)``, ``t_ms``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _SUFFIX = re.compile(r"^(?P<name>t|t_tau|(?:q|tau|dq|tau_meas|q_link)[1-9][0-9]*
 
 
 def unit_of(text: str) -> str | None:
-    """Return the unit that a text spells, None if it spells none.
+    """Return the unit that a text spells; None if it spells no unit.
 
     Examples
     --------

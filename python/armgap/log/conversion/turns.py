@@ -1,4 +1,4 @@
-"""Jumps by a whole turn: where an encoder of one turn starts again from its other end."""
+"""Jumps of positions by a whole turn, where a single-turn encoder wraps around."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 __all__ = ["TURN", "turn_jumps", "unwrapped"]
 
 TURN = 2 * math.pi
-"""A turn [rad]."""
+"""One turn of a rotary joint [rad]."""
 
-# Without its turn a jump has to go on as the steps around it do: within this part of a turn (0.13 rad) beyond the largest of them.
+# Difference, in turns (0.13 rad), by which a jump less its turn may exceed the largest of the steps around it.
 _SMOOTH = 0.02
-# Steps to either side that a jump is compared with; a held position makes up to as many of them zero.
+# Steps to either side that a jump is compared with; a held position makes up to so many of them zero.
 _AROUND = 8
 
 
 def turn_jumps(q: NDArray[np.float64], turn: float = TURN) -> NDArray[np.intp]:
-    """Return, for each step of `q`, the turns that it holds too many: -1, 0 or 1.
+    """Return, for each step of `q`, the number of turns by which it wraps around: -1, 0 or 1.
 
     A step counts if the path goes on smoothly without the turn and jumps with it; fast motion, whose steps are all alike, has none.
 
@@ -28,7 +28,7 @@ def turn_jumps(q: NDArray[np.float64], turn: float = TURN) -> NDArray[np.intp]:
     q : ndarray, shape (n_samples,)
         Positions.
     turn : float, default 2 pi
-        A turn in the unit of `q`.
+        One turn in the unit of `q`.
 
     Returns
     -------
@@ -59,6 +59,6 @@ def turn_jumps(q: NDArray[np.float64], turn: float = TURN) -> NDArray[np.intp]:
 
 
 def unwrapped(q: NDArray[np.float64], turn: float = TURN) -> NDArray[np.float64]:
-    """Return positions with jumps by a turn taken out, the first as it is; `q` itself where there are none."""
+    """Return positions with jumps by a turn removed, the first position unchanged; `q` itself without jumps."""
     turns = turn_jumps(q, turn)
     return np.concatenate([q[:1], q[1:] - turn * np.cumsum(turns)]) if turns.any() else q

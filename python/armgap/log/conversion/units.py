@@ -1,4 +1,4 @@
-"""Units: conversion of what the user declares, and a look at magnitudes for what nobody declared."""
+"""Units of columns: conversion of declared units, and plausibility of magnitudes where no unit is declared."""
 
 from __future__ import annotations
 
@@ -33,34 +33,34 @@ FACTORS: dict[str, dict[str, float]] = {
 
 WORDS = {"t": "times", "q": "positions", "dq": "velocities", "tau": "torques"}
 
-# Six turns back and forth, and a joint speed beyond that of any arm: degrees taken for radians look like this.
+# Range of a joint's positions (six turns back and forth), and joint speed, above those of any arm: degrees taken for radians reach them.
 _FARTHEST_RAD = 12 * math.pi
 _FASTEST_RAD_S = 60.0
 _FARTHEST_M = 40.0
-# Speeds are taken over at least this time, so that the steps of a coarse encoder do not count as motion.
+# Shortest time over which speeds are taken [s], so that steps of a coarse encoder do not count as motion.
 _SPEED_SPAN_S = 0.02
-# Positions and velocities in different units disagree by 57.3 (degrees) or 1000 (mm), give or take noise.
+# Ratio of a differenced position to the velocity column that shows different units: 57.3 (degrees) or 1000 (mm), with a margin for noise.
 _DEGREE_RATIO = (40.0, 80.0)
-# So many samples tell the sample period, and whether positions move in whole encoder counts.
+# Samples that determine the sample period, and whether positions move in whole encoder counts, at most.
 _ENOUGH = 100_000
 _SURE_RATIO = (52.0, 63.0)
 _MILLI_RATIO = (700.0, 1400.0)
-# An arm's commanded torque does not exceed its limit by this factor, except in another unit.
+# Ratio of a commanded torque to the arm's limit above which the torque is in another unit.
 _TORQUE_FACTOR = 20.0
-# A unit changes all rows; what this share of them does is a defect of its own, seen later.
+# Share of rows with an implausible magnitude up to which it is a defect of the rows, not a unit.
 _WILD_SHARE = 0.002
 
 
 @dataclass(frozen=True)
 class Scales:
-    """Factors to SI by column group, and why they are not 1.
+    """Factors to SI units by group of columns, and the groups with a stated unit.
 
     Attributes
     ----------
     t, t_tau : float, optional
-        Of the times; None where nothing says it.
+        Seconds per unit of times; None where unknown.
     q, tau, dq, q_ref, dq_ref, tau_meas, q_link : ndarray, shape (n_joints,)
-        Of each column; references, measured torques and positions on the link's side are in the units of positions, velocities and torques
+        Factor of each column; references, measured torques and positions on the link's side are in the units of positions, velocities and torques
         unless the file says otherwise.
     settled : frozenset of str
         Groups whose unit is stated by the user or by the file.
@@ -127,7 +127,7 @@ def stated(names: Names, declared: Mapping[str, str], arm: Arm | None, place: Pa
 
 
 def scaled(arrays: Arrays, scales: Scales) -> Arrays:
-    """Return all columns but times in SI units."""
+    """Return all columns except times converted to SI units."""
 
     def by(values: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
         return values if np.all(factors == 1.0) else values * factors
@@ -173,15 +173,15 @@ def _factor(group: str, unit: str, arm: Arm | None) -> float:
 
 
 def _suits(group: str, unit: str, arm: Arm | None, j: int) -> bool:
-    """Whether a unit can be that of a column of joint `j`, from 0."""
+    """Whether a unit is possible for a column of joint `j` (from 0)."""
     angular = unit.startswith(("rad", "deg", "turns")) or unit.endswith("Nm")
     return arm is None or group == "t" or j >= arm.n_joints or angular == arm.rotary_joints[j]
 
 
 def recognised(arrays: Arrays, names: Names, arm: Arm | None, settled: frozenset[str]) -> tuple[Arrays, list[Finding]]:
-    """Convert degrees that give themselves away: by whole encoder counts, or by a velocity column in radians.
+    """Convert positions that are recognised as degrees, by whole encoder counts or by a velocity column in radians.
 
-    Nothing is converted where another joint speaks against it, or where the unit is stated; what merely looks large is left to `check`.
+    Nothing is converted if another joint contradicts it, or if the unit is stated; positions that are only large are left to `check`.
     """
     findings: list[Finding] = []
     turned = np.array([1.0 if _slides(arm, j) else _DEGREE for j in range(arrays.q.shape[1])])
@@ -201,7 +201,7 @@ def recognised(arrays: Arrays, names: Names, arm: Arm | None, settled: frozenset
 
 
 def _degrees(arrays: Arrays, names: Names, arm: Arm | None) -> str:
-    """Return the reason why positions must be in degrees; empty if there is none, or one against it."""
+    """Return the reason why positions must be in degrees; empty if there is none, or a reason against it."""
     reasons = []
     for j, name in enumerate(names.q):
         if _slides(arm, j):
@@ -219,7 +219,7 @@ def _degrees(arrays: Arrays, names: Names, arm: Arm | None) -> str:
 
 
 def si(rotary: bool | None) -> dict[str, str]:
-    """Return the SI unit of each group of columns; both kinds where it is not known whether the joints turn."""
+    """Return the SI unit of each group of columns; rotary and linear units if the kind of the joints is unknown."""
     turns = {"t": "s", "q": "rad", "dq": "rad/s", "tau": "N m"}
     slides = {"t": "s", "q": "m", "dq": "m/s", "tau": "N"}
     if rotary is None:
@@ -235,11 +235,11 @@ def in_file(
     Parameters
     ----------
     names, scales
-        Columns, and their factors to SI as far as they were declared or stated.
+        Columns, and their declared or stated factors to SI.
     ticks : mapping
         Seconds per unit of the time columns.
     arm : Arm, optional
-        Says whether joints turn.
+        Arm of the log, for the kinds of its joints.
     degrees : tuple of bool
         Whether positions and velocities were recognised as degrees.
     """
@@ -264,7 +264,7 @@ def in_file(
 
 
 def _named(group: str, factor: float, spelt: str | None, arm: Arm | None, j: int) -> str:
-    """Return the unit of a column with this factor: as the file spells it, or those that suit the joint."""
+    """Return the unit of a column with a given factor to SI: as the file spells it, or the units possible for the joint."""
     fits = [unit for unit, f in FACTORS[group].items() if math.isclose(f, factor) and _suits(group, unit, arm, j)]
     return spelt if spelt in fits else " or ".join(fits)
 
@@ -304,7 +304,7 @@ def _velocity(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
 
 
 def _reference(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) -> None:
-    """Raise where a reference covers a range that the positions do only in another unit."""
+    """Raise if a reference covers a range that the positions cover only in another unit."""
     if arrays.q_ref is None:
         return
     for j, name in enumerate(names.q_ref):
@@ -322,7 +322,7 @@ def _reference(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None)
 
 
 def _speed_ratio(arrays: Arrays, arm: Arm | None, j: int) -> float:
-    """Return the slope of the differenced position over the velocity column; 0 where there is none."""
+    """Return the slope of the differenced position of joint `j` over its velocity column; 0 without a velocity column."""
     assert arrays.dq is not None
     moved = np.diff(_without_turns(arrays, arm, j))
     said = 0.5 * (arrays.dq[1:, j] + arrays.dq[:-1, j]) * np.diff(arrays.t)
@@ -350,27 +350,27 @@ def _position(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) 
 
 
 def _peak_speed(arrays: Arrays, arm: Arm | None, j: int) -> float:
-    """Return the speed that is exceeded for 1 % of the log."""
+    """Return the speed of joint `j` that is exceeded for 1 % of the log."""
     stride = max(1, round(_SPEED_SPAN_S / float(np.median(np.diff(arrays.t[:_ENOUGH])))))
     t, q = arrays.t[::stride], _without_turns(arrays, arm, j)[::stride]
     return float(np.quantile(np.abs(np.diff(q) / np.diff(t)), 0.99)) if len(t) > 1 else 0.0
 
 
 def _travel(q: NDArray[np.float64]) -> float:
-    """Return the range of positions; a few wild rows do not count."""
+    """Return the range of positions, without a few outliers."""
     wild = int(_WILD_SHARE * len(q))
     ends = np.partition(q, (wild, len(q) - 1 - wild))
     return float(ends[len(q) - 1 - wild] - ends[wild])
 
 
 def _without_turns(arrays: Arrays, arm: Arm | None, j: int) -> NDArray[np.float64]:
-    """Return positions without the jumps of a wrapped encoder, in radians or in degrees: they are no speed. Lengths do not wrap."""
+    """Return positions of joint `j` without jumps of a wrapped encoder, by turns in radians or in degrees; lengths do not wrap."""
     q = arrays.q[:, j]
     return q if _slides(arm, j) else unwrapped(unwrapped(q, TURN), 360.0)
 
 
 def _moves_in_counts(arrays: Arrays, arm: Arm | None, j: int, factor: float) -> bool:
-    """Whether positions times `factor` change in whole encoder counts."""
+    """Whether positions of joint `j` times `factor` change in whole encoder counts."""
     if arm is None or arm.encoder_step is None:
         return False
     moved = np.diff(arrays.q[:_ENOUGH, j])
@@ -400,5 +400,5 @@ def _torque(arrays: Arrays, place: Path | str, names: Names, arm: Arm | None) ->
 
 
 def _slides(arm: Arm | None, j: int) -> bool:
-    """Whether joint `j`, from 0, is known to slide."""
+    """Whether joint `j` (from 0) is known to be linear."""
     return arm is not None and j < arm.n_joints and not arm.rotary_joints[j]

@@ -1,4 +1,4 @@
-"""Formats of logs: one file each, one line each in `FORMATS`."""
+"""Readers of log formats: one file per format, listed in `FORMATS`."""
 
 from armgap.log.formats.all import FORMATS, record
 from armgap.log.formats.format import Format

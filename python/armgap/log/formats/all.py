@@ -1,4 +1,4 @@
-"""All formats of logs, and which of them a file has."""
+"""List of all log formats, and recognition of a file's format."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ FORMATS: tuple[Format, ...] = (
     mcap.FORMAT,
     rosbag.FORMAT,
 )
-"""Formats, in the order in which they are asked whether a file is theirs."""
+"""Log formats, in the order in which a file is tested for them."""
 
-#: Bytes from the beginning of a file that tell its format.
+#: Bytes at the beginning of a file by which its format is recognised.
 _HEAD = 1024
 
 
 def record(path: str | Path) -> tuple[Recording, str, Path]:
-    """Return what a file holds, a name for it, and its path; ``-`` is standard input.
+    """Return a file's contents as a recording, a name for the log, and its path; ``-`` is standard input.
 
     Raises
     ------
     LogReadError, ColumnError
-        If it cannot be read; the file is named, and the place where it is known.
+        If the file cannot be read; the message names the file, and the place if known.
     """
     path = Path(path)
     if str(path) == "-":

@@ -1,6 +1,6 @@
-"""From named arrays, as NumPy, HDF5 and MATLAB files hold them, to streams of columns.
+"""Conversion of named arrays from NumPy, HDF5 and MATLAB files to streams of columns.
 
-Arrays of one length belong together. Where lengths differ, or where groups have times of their own, every length and group is a clock.
+Arrays of equal length form one stream. Where lengths differ, or where groups have their own times, every length and group is a clock.
 An array of n rows and k columns stands for columns ``name1`` to ``namek``.
 """
 
@@ -36,13 +36,13 @@ def record(
     arrays : mapping
         Arrays by path (``"log/q"``), as the file holds them.
     path : path-like
-        File, for errors.
+        File, for error messages.
     what : str
-        What the file is, for errors.
+        Format of the file in words, for error messages.
     units : mapping, optional
         Units by path, where the file states them.
     notes : tuple of Finding
-        What was noticed already.
+        Findings so far.
     """
     found: list[Finding] = list(notes)
     columns, stated = _columns(arrays, dict(units or {}), found)
@@ -75,7 +75,7 @@ def _columns(
 
 
 def _split(name: str, array: NDArray[Any], lengths: set[int], found: list[Finding]) -> list[tuple[str, NDArray[Any]]]:
-    """Return an array's columns with their names; nothing for what cannot be columns."""
+    """Return an array's columns with their names; empty for an array that cannot be columns."""
     if array.dtype.names:
         return [
             column
@@ -96,7 +96,7 @@ def _split(name: str, array: NDArray[Any], lengths: set[int], found: list[Findin
 
 
 def _line(array: NDArray[Any]) -> NDArray[Any] | None:
-    """Return a vector, also if it is stored as a single row or column; None for anything else."""
+    """Return a one-dimensional array, also for a stored single row or column; None for other shapes."""
     if array.dtype.names or array.dtype.kind not in "fiubmM":
         return None
     if array.ndim == 1:
@@ -105,7 +105,7 @@ def _line(array: NDArray[Any]) -> NDArray[Any] | None:
 
 
 def _clock(name: str, length: int, columns: Mapping[str, NDArray[Any]]) -> tuple[str, int]:
-    """Return the group whose times a column goes by, and its length."""
+    """Return the group with the times of a column, and the column's length."""
     group = name.rpartition("/")[0]
     while group:
         inside = (c for c, values in columns.items() if c.rpartition("/")[0] == group and len(values) == length)
@@ -126,7 +126,7 @@ def _stream(members: dict[str, NDArray[Any]], units: Mapping[str, str]) -> Strea
 
 
 def _plain(values: NDArray[Any]) -> NDArray[Any]:
-    """Return a contiguous array of the machine's own byte order."""
+    """Return a contiguous array in native byte order."""
     values = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("="))
     if values.dtype.kind == "f" and values.dtype.itemsize == 2:
         return values.astype(np.float32)

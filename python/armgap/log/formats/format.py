@@ -1,4 +1,4 @@
-"""What a format is, and what the readers share."""
+"""Interface of a log format, and helpers that the readers share."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class Format:
     Attributes
     ----------
     name : str
-        For people.
+        Name of the format for messages.
     endings : tuple of str
         Endings of file names, in lower case.
     read : callable
-        From a `Source` to a `Recording`.
+        Function that reads a `Source` into a `Recording`.
     recognises : callable
-        Whether the first bytes of a file are the format's, where it has such.
+        Function of a file's first bytes: whether they are those of the format.
     """
 
     name: str
@@ -43,7 +43,7 @@ def load(module: str, extra: str, what: str, path: Path) -> Any:
     Raises
     ------
     LogReadError
-        If it is not installed; the remedy names the extra.
+        If the library is not installed; the remedy names the extra.
     """
     try:
         return import_module(module)
@@ -57,7 +57,7 @@ def load(module: str, extra: str, what: str, path: Path) -> Any:
 
 @contextmanager
 def reading(what: str, path: Path) -> Iterator[None]:
-    """Turn whatever a library raises over a damaged file into one error that names the file."""
+    """Convert any exception of a library inside the ``with`` block, raised by a damaged file, to one error that names the file."""
     try:
         yield
     except ArmgapError:
@@ -72,6 +72,6 @@ def reading(what: str, path: Path) -> Iterator[None]:
 
 
 def first_line(error: BaseException) -> str:
-    """Return what an error says in at most one line."""
+    """Return the first line of an exception's text."""
     lines = str(error).strip().splitlines()
     return lines[0][:160] if lines else type(error).__name__

@@ -1,4 +1,4 @@
-"""HDF5: any data sets of numbers, in groups or not; MATLAB's own files of version 7.3 are such."""
+"""HDF5 files as logs: any data sets of numbers, in groups or not; MATLAB files of version 7.3 are HDF5 files too."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Held = tuple[dict[str, NDArray[Any]], dict[str, str], list[str]]
 
 
 def read(source: Source) -> Recording:
-    """Read what an HDF5 file holds."""
+    """Read an HDF5 file as a recording."""
     load("h5py", "formats", "HDF5 file", source.path)
     with reading("HDF5 file", source.path):
         held, units, left_out = guard.call("armgap.log.formats.hdf5", "content", source)
@@ -31,7 +31,7 @@ def read(source: Source) -> Recording:
 
 
 def content(source: Source) -> Held:
-    """Return arrays by path, units by path, and what was left out."""
+    """Return an HDF5 file's arrays by path, their units by path, and the data sets that were left out."""
     import h5py
 
     held: dict[str, NDArray[Any]] = {}

@@ -1,4 +1,4 @@
-"""MATLAB: files up to version 7 through SciPy, of version 7.3 as the HDF5 files that they are."""
+"""MATLAB files as logs: up to version 7 through SciPy, version 7.3 as HDF5."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from armgap.log.recording import Recording, Source
 
 __all__ = ["FORMAT"]
 
-#: Levels of structures within structures that are followed.
+#: Levels of nested MATLAB structures that are read.
 _DEEPEST = 8
 
 
 def read(source: Source) -> Recording:
-    """Read what a MATLAB file holds."""
+    """Read a MATLAB file as a recording."""
     if hdf5.SIGNATURE in source.head(1024):
         return hdf5.read(source)
     load("scipy.io", "formats", "MATLAB file", source.path)
@@ -35,7 +35,7 @@ def read(source: Source) -> Recording:
 
 
 def content(source: Source) -> tuple[dict[str, NDArray[Any]], list[str]]:
-    """Return arrays by path, fields of structures as ``name/field``, and what was left out."""
+    """Return a MATLAB file's arrays by path, fields of structures as ``name/field``, and the variables that were left out."""
     import scipy.io
 
     with source.open() as stream:
@@ -55,7 +55,7 @@ def content(source: Source) -> tuple[dict[str, NDArray[Any]], list[str]]:
 
 
 def _walk(path: str, value: Any, depth: int) -> Iterator[tuple[str, NDArray[Any] | None]]:
-    """Give the arrays below a value, None for what holds no numbers."""
+    """Yield the arrays below a MATLAB value by path, None for values without numbers."""
     if isinstance(value, np.ndarray) and value.dtype == object and value.size == 1:
         value = value.reshape(-1)[0]
     fields = getattr(value, "_fieldnames", None)

@@ -1,4 +1,4 @@
-"""MCAP files with ROS 2 messages."""
+"""MCAP files with ROS 2 messages as logs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MAGIC = b"\x89MCAP0\r\n"
 
 
 def read(source: Source) -> Recording:
-    """Read what an MCAP file holds; its checksums are verified."""
+    """Read an MCAP file as a recording, with its checksums verified."""
     reader = load("mcap.reader", "ros", "MCAP file", source.path)
     decoder = load("mcap_ros2.decoder", "ros", "MCAP file", source.path)
     with reading("MCAP file", source.path), source.open() as stream:
@@ -26,7 +26,7 @@ def read(source: Source) -> Recording:
 
 
 def _topics(file: Any, stream: Any) -> dict[str, str]:
-    """Return every topic and its type."""
+    """Return the topics of an MCAP file with their types."""
     summary = file.get_summary()
     if summary is not None and summary.channels:
         schemas = summary.schemas
@@ -38,7 +38,7 @@ def _topics(file: Any, stream: Any) -> dict[str, str]:
 
 
 def _count(file: Any, seen: dict[str, str]) -> int:
-    """Return the number of messages that will be read, as far as the file says it."""
+    """Return the number of messages to read, as far as the MCAP file states it."""
     summary = file.get_summary()
     if summary is None or summary.statistics is None:
         return 0

@@ -1,7 +1,7 @@
 """ROS messages as columns: joint states, commands as arrays of numbers, and joint trajectories.
 
-Every topic is a clock. The stamp in a message's header is its time; messages without one go by the recorder's time. Columns are
-called ``/topic/joint/position`` (``velocity``, ``effort``), those of arrays without names ``/topic/1`` and so on.
+Every topic is a clock. The stamp in a message's header is its time; messages without stamp have the recorder's time. Columns are
+named ``/topic/joint/position`` (``velocity``, ``effort``), columns of arrays without names ``/topic/1`` and so on.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ __all__ = ["KINDS", "Message", "record"]
 _QUANTITIES = ("position", "velocity", "effort")
 _LOOK = 5000  # messages
 _TORQUE_WORDS = ("effort", "torque", "tau")
-# A time (none if the message has no stamp), names of columns, names of joints, values.
+# Rows of a message: time in ns (None without a stamp), names of columns, names of joints, values.
 Rows = list[tuple[int | None, tuple[str, ...], tuple[str, ...], list[float]]]
 
 
 @dataclass(frozen=True)
 class Message:
-    """A message as a reader gives it: topic, type, the recorder's time [ns], and the decoded fields."""
+    """One decoded ROS message: topic, type, the recorder's time [ns], and the decoded fields."""
 
     topic: str
     kind: str
@@ -41,7 +41,7 @@ class Message:
 
 @dataclass
 class _Topic:
-    """Rows of one topic whose messages name the same joints."""
+    """Rows of one ROS topic whose messages have equal joint names."""
 
     topic: str
     kind: str
@@ -53,17 +53,17 @@ class _Topic:
 
     @property
     def stamped(self) -> bool:
-        """Whether every message has a time of its own."""
+        """Whether every message of the topic has a time stamp."""
         return all(self.stamps)
 
     @property
     def times(self) -> NDArray[np.int64]:
-        """Times of the rows [ns]: their own, or the recorder's for all if one has none."""
+        """Times of the topic's rows [ns]: message stamps, or the recorder's times for all rows if a stamp is missing."""
         return np.array(self.stamps if self.stamped else self.recorded, dtype=np.int64)
 
 
 def _stamp(header: Any) -> int:
-    """Return a header's time [ns]; ROS 1 and 2 spell its parts differently."""
+    """Return the time of a ROS message header [ns]; field names differ between ROS 1 and 2."""
     stamp = header.stamp
     return int(getattr(stamp, "sec", 0)) * 1_000_000_000 + int(
         getattr(stamp, "nanosec", getattr(stamp, "nanosecond", 0))
@@ -114,22 +114,22 @@ KINDS: Mapping[str, Callable[[Message], Rows]] = {
     "std_msgs/msg/Float32MultiArray": _array,
     "trajectory_msgs/msg/JointTrajectory": _trajectory,
 }
-"""How the rows of each type of message are made."""
+"""Functions that make rows of a ROS message, by type of message."""
 
 
 def record(messages: Iterable[Message], path: Path, seen: Mapping[str, str], count: int = 0) -> Recording:
-    """Return messages as a recording.
+    """Return ROS messages as a recording.
 
     Parameters
     ----------
     messages : iterable of Message
         Messages of the types in `KINDS`.
     path : Path
-        File, for errors.
+        File, for error messages.
     seen : mapping
-        Every topic of the file and its type, for errors.
+        Types of all topics of the file, for error messages.
     count : int, default 0
-        Messages that the file says it holds, of any topic; 0 if it does not say.
+        Number of messages that the file states, over all topics; 0 if unknown.
     """
     topics: dict[tuple[str, tuple[str, ...]], _Topic] = {}
     empty: dict[str, int] = {}
@@ -178,7 +178,7 @@ def _recording(topics: list[_Topic], findings: list[Finding], path: Path) -> Rec
 
 
 def _stream(topic: _Topic, name: str, findings: list[Finding]) -> Stream:
-    """Sort a topic's rows by time, leave out those that repeat, and say so."""
+    """Return a topic's rows sorted by time, without repeated rows, as a stream; findings report the repeats."""
     times, values = topic.times, np.array(topic.rows, dtype=np.float64)
     if not topic.stamped:
         findings.append(Finding("clock", f"{name} carries no time of its own; it goes by the recorder's time"))
@@ -197,7 +197,7 @@ def _stream(topic: _Topic, name: str, findings: list[Finding]) -> Stream:
 
 
 def _lags(topics: list[_Topic]) -> list[Finding]:
-    """Say how far the recorder's time lies behind the stamps, where topics go by one and the other."""
+    """Return findings on how far the recorder's time lags the message stamps, for topics with both."""
     if all(topic.stamped for topic in topics):
         return []
     return [
@@ -214,7 +214,7 @@ def _columns(name: str, topic: _Topic, times: NDArray[np.int64], values: NDArray
 
 
 def _suggest(known: list[tuple[_Topic, Stream]], n: int | None, mapped: Collection[str], path: Path) -> Suggestion:
-    """Name the joints by the one topic with positions, and their torques by the one with commands."""
+    """Suggest columns of joints from the only topic with positions, and of torques from the only topic with commands."""
     names: dict[str, str] = {}
     findings: list[Finding] = []
     if "q1" not in mapped:
@@ -268,7 +268,7 @@ def _check_joints(topic: _Topic, n: int | None, path: Path) -> None:
 def _torque(
     known: list[tuple[_Topic, Stream]], n: int, joints: tuple[str, ...], path: Path
 ) -> tuple[dict[str, str], str]:
-    """Return the columns of the torques, and what to say: a topic with commands comes before the joint states' effort."""
+    """Return the columns of the torques, and a remark: a topic with commands has precedence over the joint states' effort."""
     commands = [k for k in known if _commands(k[0], n, joints)]
     if commands:
         topic, stream = _only(commands, "torque commands", "tau1", path)
@@ -285,7 +285,7 @@ def _torque(
 
 
 def _commands(topic: _Topic, n: int, joints: tuple[str, ...]) -> bool:
-    """Whether a topic holds torque commands of these joints."""
+    """Whether a ROS topic holds torque commands of the given joints."""
     if topic.joints:
         return {name.rpartition("/")[2] for name in topic.names} == {"effort"} and set(joints) <= set(topic.joints)
     return len(topic.names) == n and any(word in topic.topic.lower() for word in _TORQUE_WORDS)

@@ -1,4 +1,4 @@
-"""NumPy archives: ``t`` (n,), ``q`` and ``tau`` (n, n_joints), or one array per column."""
+"""NumPy archives as logs: ``t`` (n,), ``q`` and ``tau`` (n, n_joints), or one array per column."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["FORMAT"]
 
 
 def read(source: Source) -> Recording:
-    """Read what a NumPy archive holds; pickled objects are never loaded."""
+    """Read a NumPy archive as a recording; pickled objects are never loaded."""
     held: dict[str, NDArray[Any]] = {}
     left_out = []
     with reading("NumPy archive", source.path), source.open() as stream, np.load(stream, allow_pickle=False) as archive:

@@ -1,4 +1,4 @@
-"""Parquet, column by column as columns are asked for."""
+"""Parquet files as logs, read column by column on demand."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MAGIC = b"PAR1"
 
 
 def read(source: Source) -> Recording:
-    """Read what a Parquet file holds."""
+    """Read a Parquet file as a recording."""
     _ends(source)
     with _careful(source.path):
         with source.open() as stream:
@@ -43,7 +43,7 @@ def _scan(source: Source) -> pl.LazyFrame:
 
 
 def _ends(source: Source) -> None:
-    """Raise unless the file starts and ends as Parquet does."""
+    """Raise unless a file starts and ends with the Parquet marker bytes."""
     with source.open() as stream:
         first = stream.read(len(_MAGIC))
         stream.seek(max(0, source.size - len(_MAGIC)))
@@ -58,7 +58,7 @@ def _ends(source: Source) -> None:
 
 @contextmanager
 def _careful(path: Path) -> Iterator[None]:
-    """Turn errors and panics of the decoder into one error of ours."""
+    """Convert errors and panics of the Parquet decoder inside the ``with`` block to one error that names the file."""
     try:
         with _silence():
             yield
@@ -72,7 +72,7 @@ def _careful(path: Path) -> Iterator[None]:
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Keep what the decoder writes to standard error by itself, when damaged data make it panic, from the user."""
+    """Discard what the Parquet decoder itself writes to standard error when damaged data make it panic."""
     try:
         kept = os.dup(2)
     except OSError:  # standard error is closed

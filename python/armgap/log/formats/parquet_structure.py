@@ -1,7 +1,7 @@
-"""The skeleton of a Parquet file, walked before its decoder is trusted with it.
+"""Check of a Parquet file's structure (footer and page headers) before the file is decoded.
 
 The decoder trusts sizes and counts in page headers; overwritten ones make it ask for more memory than there is, which ends the whole
-process before anyone can catch it (about 1 in 6000 files with a few random bytes overwritten). So the skeleton is walked first: the
+process before anyone can catch it (about 1 in 6000 files with a few random bytes overwritten). So the structure is checked first: the
 footer (Thrift compact protocol), and from there every page header. Sizes must lie within the file, values must add up to what the
 footer says, and checksums must hold where there are any.
 
@@ -26,7 +26,7 @@ _HEADER = 1 << 16  # a page header is tens of bytes; statistics may make it long
 _DEEPEST = 16
 _MOST_ENTRIES = 1 << 22
 _DATA_PAGE, _DATA_PAGE_V2 = 0, 3
-# Fields of the Thrift structures, by the numbers of parquet.thrift.
+# Field numbers of the Parquet metadata structures in parquet.thrift.
 _NUM_ROWS, _ROW_GROUPS = 3, 4
 _GROUP_COLUMNS, _GROUP_ROWS = 1, 3
 _META = 3
@@ -36,11 +36,11 @@ _VALUES_IN = {_DATA_PAGE: 5, _DATA_PAGE_V2: 8}
 
 
 class _BrokenError(Exception):
-    """The bytes do not form what they should."""
+    """Exception: the bytes do not form a valid Parquet structure."""
 
 
 class _Thrift:
-    """Reads structures of the compact protocol as dictionaries by field number."""
+    """Reader of structures in the Thrift compact protocol, as dictionaries by field number."""
 
     def __init__(self, data: bytes) -> None:
         self.data, self.at = data, 0
@@ -139,7 +139,7 @@ def check(stream: BinaryIO, path: Path) -> None:
 
 
 def _footer(stream: BinaryIO) -> tuple[dict[int, Any], int]:
-    """Return the footer and where the data end."""
+    """Return the footer of a Parquet file, and the offset at which the data end."""
     size = stream.seek(0, 2)
     stream.seek(size - _TAIL)
     (length,) = struct.unpack("<I", stream.read(4))
@@ -154,7 +154,7 @@ def _footer(stream: BinaryIO) -> tuple[dict[int, Any], int]:
 
 
 def _chunk(stream: BinaryIO, end: int, chunk: Any, place: str) -> None:
-    """Walk the pages of one column in one row group."""
+    """Check the pages of one column in one row group of a Parquet file."""
     meta = chunk.get(_META) if isinstance(chunk, dict) else None
     if not isinstance(meta, dict):
         raise _BrokenError(f"{place}: a column has no description")
@@ -175,7 +175,7 @@ def _chunk(stream: BinaryIO, end: int, chunk: Any, place: str) -> None:
 
 
 def _page(stream: BinaryIO, at: int, stop: int, place: str) -> tuple[int, int]:
-    """Return how many values a page holds and where it ends."""
+    """Return the number of values of a Parquet page, and the offset at which the page ends."""
     stream.seek(at)
     thrift = _Thrift(stream.read(min(_HEADER, stop - at)))
     try:

@@ -1,4 +1,4 @@
-"""ROS bags: folders of ROS 2 with SQLite or MCAP files inside, single ``.db3`` files, and ``.bag`` files of ROS 1."""
+"""ROS bags as logs: folders of ROS 2 with SQLite or MCAP files inside, single ``.db3`` files, and ``.bag`` files of ROS 1."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _MAGICS = (b"SQLite format 3\x00", b"#ROSBAG V2.0")
 
 
 def is_bag(folder: Path) -> bool:
-    """Whether a folder is a bag of ROS 2."""
+    """Whether a folder is a ROS 2 bag."""
     return (folder / "metadata.yaml").is_file()
 
 
 def read(source: Source) -> Recording:
-    """Read what a bag holds."""
+    """Read a ROS bag as a recording."""
     highlevel = load("rosbags.highlevel", "ros", "ROS bag", source.path)
     types = load("rosbags.typesys", "ros", "ROS bag", source.path)
     with reading("ROS bag", source.path):

@@ -1,4 +1,4 @@
-"""Tables as text: CSV in its dialects, read in blocks of lines, so that a long file needs no more memory than its numbers.
+"""Text tables as logs: CSV in its dialects, read in blocks of lines, so that a long file needs no more memory than its numbers.
 
 Separators are commas, semicolons, tabs or blanks; with any but commas, decimal commas are allowed. A byte order mark, comments, units
 in the header or in a row below it, and a separator at the end of every row are understood.
@@ -38,7 +38,7 @@ _MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BO
 
 @dataclass(frozen=True)
 class _Dialect:
-    """How the rows of a file are to be read."""
+    """Dialect of a text table: separator, decimal mark, names and units."""
 
     separator: str
     blanks: bool
@@ -49,13 +49,13 @@ class _Dialect:
 
     @property
     def width(self) -> int:
-        """Number of values in a row."""
+        """Number of values in a row of the text table."""
         return len(self.names) + self.trailing
 
 
 @dataclass
 class _Lines:
-    """Lines that hold something, and what was met on the way to them."""
+    """Iterator over the non-empty lines of a text table, with findings on skipped ones."""
 
     source: Source
     encoding: str
@@ -80,7 +80,7 @@ class _Lines:
 
 @dataclass
 class _Table:
-    """Blocks read so far, and what to tell about them."""
+    """Blocks of a text table read so far, with findings."""
 
     frames: list[pl.DataFrame] = field(default_factory=list)
     rows: int = 0
@@ -88,7 +88,7 @@ class _Table:
 
 
 def read(source: Source) -> Recording:
-    """Read what a text file holds."""
+    """Read a text table as a recording."""
     encoding = _encoding(source.head(1 << 16))
     lines = _Lines(source, encoding)
     rows = iter(lines)
@@ -122,7 +122,7 @@ def _encoding(head: bytes) -> str:
 def _dialect(
     first: str, comment: str, rows: Iterator[str], path: Path
 ) -> tuple[_Dialect, Iterator[str], list[Finding]]:
-    """Return how to read the rows, the rows, and what to tell."""
+    """Return the dialect of a text table, an iterator over its rows, and findings."""
     findings = []
     blanks = not any(mark in first for mark in _SEPARATORS)
     separator = "\t" if blanks else max(_SEPARATORS, key=first.count)
@@ -148,7 +148,7 @@ def _dialect(
 
 
 def _decimal_commas(sample: list[str]) -> bool:
-    """Whether numbers have decimal commas, and none has a decimal point."""
+    """Whether numbers in sample rows have decimal commas, and none has a decimal point."""
     return any(map(_COMMA.search, sample)) and not any(map(_POINT.search, sample))
 
 
@@ -168,13 +168,13 @@ def _no_header(cells: list[str], path: Path) -> ColumnError:
 
 
 def _is_units_row(cells: list[str]) -> bool:
-    """Whether a row below the header holds units and nothing else."""
+    """Whether a row below the header holds only units."""
     units = [unit_of(cell.strip("[]()")) for cell in cells]
     return any(units) and all(unit or cell in ("", "-") for unit, cell in zip(units, cells, strict=True))
 
 
 def _names(cells: list[str], below: list[str], path: Path) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Return names, and units from the row below by name."""
+    """Return column names, and units by name from the row below the header."""
     names = [cell or f"unnamed{i + 1}" for i, cell in enumerate(cells)]
     units = {name: unit for name, cell in zip(names, below, strict=False) if (unit := unit_of(cell.strip("[]()")))}
     for name in names:
@@ -189,7 +189,7 @@ def _names(cells: list[str], below: list[str], path: Path) -> tuple[tuple[str, .
 
 
 def _ends(dialect: _Dialect, cells: list[str], sample: list[str]) -> _Dialect:
-    """Settle whether a separator at the end of header or rows is more than that."""
+    """Return the dialect with a trailing separator of header or rows resolved: an empty last column, or none."""
     if not sample or dialect.blanks:
         return dialect
     first = _cells(sample[0], dialect.separator, dialect.blanks)
@@ -199,7 +199,7 @@ def _ends(dialect: _Dialect, cells: list[str], sample: list[str]) -> _Dialect:
 
 
 def _add(table: _Table, block: list[str], dialect: _Dialect, lines: _Lines, path: Path) -> None:
-    """Check a block of lines and add it to the table."""
+    """Check a block of lines of a text table and add it to the table."""
     if dialect.blanks:
         block = [re.sub(r"\s+", "\t", line.strip()) for line in block]
     if not lines.complete:
@@ -211,7 +211,7 @@ def _add(table: _Table, block: list[str], dialect: _Dialect, lines: _Lines, path
 
 
 def _drop_torn(table: _Table, block: list[str], dialect: _Dialect) -> None:
-    """Leave out a last line that was not written to its end."""
+    """Remove a last line of a text table that was not completely written."""
     torn = block[-1].count(dialect.separator) + 1 < dialect.width and '"' not in block[-1]
     if torn and table.rows + len(block) > 1:
         del block[-1]
@@ -219,7 +219,7 @@ def _drop_torn(table: _Table, block: list[str], dialect: _Dialect) -> None:
 
 
 def _check_widths(block: list[str], dialect: _Dialect, before: int, path: Path) -> None:
-    """Raise on the first row with more or fewer values than there are names."""
+    """Raise for the first row whose number of values differs from the number of names."""
     quoted = any('"' in line for line in block)
     separator = dialect.separator
     rows = csv.reader(block, delimiter=separator) if quoted else (line.split(separator) for line in block)
@@ -258,7 +258,7 @@ def _parse(block: list[str], dialect: _Dialect, path: Path) -> pl.DataFrame:
 
 
 def _whole(frames: list[pl.DataFrame]) -> pl.DataFrame:
-    """Put blocks together; a column that is numbers in one block and words in another becomes words."""
+    """Return blocks joined into one table; a column with numbers in one block and words in another becomes words."""
     if len(frames) == 1:
         return frames[0]
     columns = []

@@ -1,1 +1,1 @@
-"""What a diagnosis left open, as pairs of models."""
+"""Questions that a diagnosis left open, as pairs of models."""

@@ -1,4 +1,4 @@
-"""Questions as pairs of models, with the sizes that the effect in question could have."""
+"""Open questions of a diagnosis as pairs of models, with the sizes that the effect in question could have."""
 
 from __future__ import annotations
 
@@ -21,34 +21,34 @@ __all__ = ["HypothesisBuilder", "TestedQuestion"]
 Array = NDArray[np.float64]
 Data = dict[str, Any]
 
-#: An effect matters from so many noise floors on.
+#: Change of predictions by an effect, in noise floors, from which the effect matters.
 SEVERAL = 3.0
-#: Sizes are looked at from the one that matters up to so many times it, where no bound is known; a bound is followed down as far.
+#: Ratio of the largest to the smallest size of an effect that is tried: from the size that matters up, or from a known bound down.
 _REACH = 10.0
-#: Sizes that are looked at.
+#: Number of sizes of an effect that are tried.
 SIZES = 5
 #: Nodes and weights of the mean over a normal distribution (Gauss-Hermite, three points).
 NODES, WEIGHTS = (-math.sqrt(3.0), 0.0, math.sqrt(3.0)), (1 / 6, 2 / 3, 1 / 6)
-#: A stiffness is no better known than by this factor's logarithm.
+#: Standard deviation of the logarithm of a stiffness, at least, in the prior of a planned question.
 SPREAD = 1.0
-#: An effect may imitate another where, before its shape is fitted, it leaves less than this part of the other's evidence in a usual motion.
+#: An effect may imitate another if it leaves less than this part of the other's evidence in a usual motion, before its shape is fitted.
 IMITATES = 0.5
 
 
 @dataclass(frozen=True)
 class TestedQuestion:
-    """A question with its models.
+    """An open question with its pair of models.
 
     Attributes
     ----------
     question : Question
-        The question.
+        Effect in question and its rival.
     pair : HypothesisPair
-        Its models.
+        Models with and without the effect, at all sizes.
     quick : HypothesisPair
-        The same with few sizes, for the search.
+        Models with few sizes, for the search.
     consequence : float
-        Prediction error that the largest size would cost on a usual motion, in noise floors.
+        Prediction error by the largest size of the effect on a usual motion, in noise floors.
     sizes : tuple of (str, float, float), optional
         Parameter and range of its values that evidence is averaged over.
     """
@@ -61,16 +61,16 @@ class TestedQuestion:
 
 
 class HypothesisBuilder:
-    """Makes the models of questions from a diagnosis and a usual motion.
+    """Builder of the models for open questions, from a diagnosis and a usual motion.
 
     Parameters
     ----------
     data : dict
-        JSON object of the diagnosis.
+        Diagnosis as a JSON object.
     usual : PredictedMotion
         A usual motion within the limits, by which sizes are judged.
     scales : Scales
-        Typical sizes in it.
+        Typical torques, speeds and positions in the usual motion.
     base : tuple of EffectInstance
         Effects of the best model.
     """
@@ -84,7 +84,7 @@ class HypothesisBuilder:
         self._floor = np.array(data["gap"]["floor"], dtype=np.float64)
 
     def pose(self, question: Question) -> TestedQuestion | None:
-        """Return a question with its models; None where the limits leave no value that the logs have not covered."""
+        """Return a question with its models; None if the limits allow no value of the effect beyond those that the logs rule out."""
         without = tuple(e for e in self._base if (e.effect, e.joint) != question.place)
         groups = self._alternatives(question, without)
         if not groups:
@@ -99,9 +99,9 @@ class HypothesisBuilder:
         return TestedQuestion(question, pair, quick, size, self._range(question, [e for _, e in groups]))
 
     def look_alikes(self, tested: TestedQuestion) -> list[Question]:
-        """Return an effect's questions against those that may imitate it, the likest first.
+        """Return questions of an effect against effects that may imitate it, the most similar first.
 
-        They are of its joint or of the whole arm, and among those that the diagnosis looked for and did not find.
+        The imitating effects act on the same joint or the whole arm, and the diagnosis tried them without finding them.
         """
         effect, joint = tested.question.place
         middle = tested.pair.alternatives[len(tested.pair.alternatives) // 2]
@@ -120,7 +120,7 @@ class HypothesisBuilder:
         return [question for _, question in sorted(found, key=lambda x: x[0])]
 
     def _left_by(self, effect: EffectInstance, without: tuple[EffectInstance, ...], target: Array) -> float:
-        """What is left of a difference beside an effect and the arm's own values; infinite where it cannot be computed."""
+        """Return the square of a difference that remains beside an effect and the arm's parameters; infinite if not computable."""
         try:
             made = self._usual.difference(HypothesisPair(((1.0, (*without, effect)),), without))
         except ValueError:
@@ -143,7 +143,7 @@ class HypothesisBuilder:
         )
 
     def _estimated(self, question: Question) -> list[tuple[float, EffectInstance]]:
-        """The effect at the nodes of its estimate's distribution."""
+        """Return weighted effects at the quadrature nodes of the estimate's normal distribution."""
         assert question.estimate is not None
         values = {name: value for name, (value, _) in question.estimate.items()}
         spec = self._specs[question.effect][0]
@@ -164,7 +164,7 @@ class HypothesisBuilder:
         return [e for e in entries if (e["effect"], e["joint"]) == place]
 
     def _sizes(self, question: Question, shape: Shape, without: tuple[EffectInstance, ...]) -> Array:
-        """Sizes from the one that matters upwards, up to the bound where there is one."""
+        """Return sizes of the effect from the smallest that matters, up to its bound if one is known."""
         effect = EffectInstance(*question.place, shape.at(shape.typical))
         floors = self._usual.floors(HypothesisPair(((1.0, (*without, effect)),), without), 0, self._floor)
         matters = shape.typical * (SEVERAL / floors if floors > 0 else 1.0)
@@ -174,7 +174,7 @@ class HypothesisBuilder:
         return np.geomspace(max(min(matters, question.bound), question.bound / _REACH), question.bound, SIZES)
 
     def _rival(self, question: Question, rough: HypothesisPair) -> EffectInstance:
-        """The rival with the values that the diagnosis has, or with those that follow the effect best over the usual motion."""
+        """Return the rival effect with the diagnosis' values, or with values that best imitate the effect over the usual motion."""
         for entry in self._entries(question.rival):
             values = {name: float(p["value"]) for name, p in entry["parameters"].items()}
             return EffectInstance(*question.rival, {**values, **at_motor(entry.get("sides"))})
@@ -191,7 +191,7 @@ class HypothesisBuilder:
     def _tried(
         self, place: tuple[str, int | None], without: tuple[EffectInstance, ...], target: Array
     ) -> Iterable[EffectInstance]:
-        """The rival's shapes, each at the size that follows the target best to first order."""
+        """Yield the rival's shapes, each with the size that best fits the target to first order."""
         spec = self._specs[place[0]][0]
         for shape in shapes(*place, self._scales):
             typical = EffectInstance(*place, shape.at(shape.typical))
@@ -224,7 +224,7 @@ def _even(effects: Iterable[EffectInstance]) -> list[tuple[float, EffectInstance
 def _few(
     models: list[tuple[float, tuple[EffectInstance, ...]]],
 ) -> tuple[tuple[float, tuple[EffectInstance, ...]], ...]:
-    """At most four of the models with equal weights, small ones first: the search needs no more."""
+    """Return at most four of the models, small sizes first, with equal weights, for the search."""
     if len(models) <= len(NODES):
         return ((1.0, models[len(models) // 2][1]),)
     picked = [models[i] for first in range(0, len(models), SIZES) for i in (first, first + SIZES // 2)][:4]

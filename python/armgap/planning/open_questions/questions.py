@@ -1,4 +1,4 @@
-"""What a diagnosis left open: causes against their equivalents, effects that are undecided or were not excited, candidates."""
+"""Questions that a diagnosis left open: causes against their equivalents, effects that are undecided or were not excited, candidates."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ __all__ = ["NONE", "Question", "asked", "known_model", "open_questions"]
 
 Data = dict[str, Any]
 NONE = "none"
-"""What stands for the absence of an effect."""
+"""Word that stands for the absence of an effect in a question."""
 
 _ORDER = ("equivalents", "candidate", "undecided", "not excited")
 
 
 @dataclass(frozen=True)
 class Question:
-    """An effect against what else it could be.
+    """An open question: an effect against another effect, or against its absence.
 
     Attributes
     ----------
     effect, joint : str, int or None
-        The effect.
+        Effect in question and its joint.
     against, against_joint : str, int or None
         The other effect; ``"none"`` is the effect's absence.
     origin : {"asked", "equivalents", "candidate", "undecided", "not excited"}
-        Why it is open.
+        Reason why the question is open.
     estimate : dict of str to (value, sigma), optional
-        What the diagnosis has for the effect's parameters.
+        The diagnosis' estimates of the effect's parameters.
     bound : float, optional
-        Upper 95 % limit of its size.
+        Upper 95 % limit of the effect's size.
     why : str
-        The diagnosis' own words about it.
+        The diagnosis' remark on the effect.
     """
 
     effect: str
@@ -53,27 +53,27 @@ class Question:
 
     @property
     def place(self) -> tuple[str, int | None]:
-        """Effect and joint."""
+        """Name of the effect in question, and its joint."""
         return self.effect, self.joint
 
     @property
     def rival(self) -> tuple[str, int | None]:
-        """The other effect and its joint."""
+        """Name of the other effect, and its joint."""
         return self.against, self.against_joint
 
     @property
     def text(self) -> str:
-        """The question in a line, as ``backlash:2 against none``."""
+        """The question as one line, as ``backlash:2 against none``."""
         return f"{spelt(*self.place)} against {spelt(*self.rival) if self.against != NONE else NONE}"
 
 
 def spelt(effect: str, joint: int | None) -> str:
-    """Write an effect as an option has it."""
+    """Return an effect in the form of a command-line option, ``EFFECT:JOINT``."""
     return effect if joint is None else f"{effect}:{joint}"
 
 
 def known_model(data: Data, arm: Arm) -> tuple[Hypothesis, tuple[str, ...]]:
-    """Return a diagnosis' model with its causes, as far as they can be simulated, and what was left out of it."""
+    """Return a diagnosis' model with all causes that can be simulated, and remarks on causes left out."""
     full = Hypothesis.of(data, arm)
     names = {entry["name"] for entry in _native.effects()}
     kept = tuple(e for e in full.effects if e.effect in names and e.log is None)
@@ -83,12 +83,12 @@ def known_model(data: Data, arm: Arm) -> tuple[Hypothesis, tuple[str, ...]]:
 
 
 def open_questions(data: Data) -> tuple[list[Question], list[str]]:
-    """Return the questions that a diagnosis leaves open, and remarks on those that no motion is about.
+    """Return the questions that a diagnosis leaves open, and remarks on questions that no motion can settle.
 
     Parameters
     ----------
     data : dict
-        JSON object of a diagnosis.
+        Diagnosis as a JSON object.
     """
     found: list[Question] = []
     remarks: list[str] = []
@@ -122,14 +122,14 @@ def open_questions(data: Data) -> tuple[list[Question], list[str]]:
 
 
 def _would_stand_for(entry: Data, cause: Data) -> bool:
-    """Whether an undecided effect is said to do nearly as well in the place of a cause, which its reason names by title and joint."""
+    """Whether an undecided effect could replace a named cause, whose title and joint its reason mentions."""
     where = "" if cause["joint"] is None else f", joint {cause['joint']}"
     named = f"in place of {cause.get('title')}{where} "
     return entry["status"] == "undecided" and cause["effect"] in PLANNED and named in (entry.get("why") or "")
 
 
 def asked(texts: Sequence[str], data: Data, arm: Arm) -> list[Question]:
-    """Return the questions asked for, ``EFFECT:JOINT`` each: the effect against its absence, and against its equivalents.
+    """Return the questions requested by the user, ``EFFECT:JOINT`` each: the effect against its absence, and against its equivalents.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def _bound(entry: Data) -> float | None:
 
 
 def _once(questions: list[Question]) -> list[Question]:
-    """Drop what is asked twice; a pair that is asked from both sides counts once."""
+    """Return the questions without repeats; a pair asked from both sides counts once."""
     found: dict[frozenset[tuple[str, int | None]], Question] = {}
     for question in questions:
         found.setdefault(frozenset((question.place, question.rival)), question)
@@ -194,5 +194,5 @@ def _once(questions: list[Question]) -> list[Question]:
 
 
 def rank(question: Question) -> int:
-    """Return how a question is ordered by its origin: causes against equivalents first."""
+    """Return the sort key of a question by its origin: causes against equivalents first."""
     return _ORDER.index(question.origin) if question.origin in _ORDER else 0

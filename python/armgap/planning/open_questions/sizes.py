@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 PART = 0.05
 #: Typical elastic joint: natural frequency [1/s], motor's part of the inertia, damping ratio.
 SHAFT_RATE, MOTOR_SHARE, SHAFT_DAMPING = 100.0, 0.1, 0.2
-#: Steps in which the range of a threshold is looked at.
+#: Number of values that are tried over the range of a threshold.
 _STEPS = 5
 #: Stiffness of a contact, in torques per typical position; and its damping, in torques per typical speed.
 CONTACT_STIFFNESS, CONTACT_DAMPING = 30.0, 0.5
@@ -26,7 +26,7 @@ CONTACT_STIFFNESS, CONTACT_DAMPING = 30.0, 0.5
 
 @dataclass(frozen=True)
 class Scales:
-    """Typical sizes of an arm in some motion, one entry per joint.
+    """Typical torques, speeds and positions of an arm in a motion, one entry per joint.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Scales:
     period : float
         Sample period [s].
     length : float
-        Length of the last link, 0.3 where it is not known [m].
+        Length of the last link, 0.3 where unknown [m].
     gravity : float
         Acceleration of gravity [m/s^2].
     """
@@ -64,7 +64,7 @@ class Scales:
 
     @classmethod
     def of(cls, arm: Arm, motion: tuple[Array, Array], tau: Array, inertia: Array, **ranges: Array) -> Scales:
-        """Return the sizes of a motion: positions and velocities, and their torques, each of shape (n_samples, n_joints)."""
+        """Return the typical sizes for a motion: positions and velocities, and torques, each of shape (n_samples, n_joints)."""
         q, dq = motion
         torque = np.sqrt(np.mean(tau**2, axis=0))
         length = 0.3 if arm.link_length is None else float(arm.link_length[-1]) or 0.3
@@ -82,7 +82,7 @@ class Scales:
 
 @dataclass(frozen=True)
 class Shape:
-    """An effect but for its size.
+    """Shape of an effect: all of its parameters except the one that is its size.
 
     Attributes
     ----------
@@ -204,16 +204,16 @@ _SHAPES: dict[str, Callable[[Scales, int], list[Shape]]] = {
 _LEVELS = ("torque_saturation", "contact")
 
 PLANNED: tuple[str, ...] = (*_SHAPES, *_LEVELS)
-"""Effects for which a motion can be planned; an external push comes from outside."""
+"""Effects for which a motion can be planned; not an external disturbance."""
 
 
 def shapes(effect: str, joint: int | None, scales: Scales) -> list[Shape]:
-    """Return the shapes of an effect that are looked at; none for an effect that is a threshold."""
+    """Return the shapes of an effect that are tried; none for an effect that is a threshold."""
     return _SHAPES[effect](scales, (joint or 1) - 1) if effect in _SHAPES else []
 
 
 def levels(effect: str, joint: int | None, scales: Scales) -> list[dict[str, float]]:
-    """Return values of an effect that is a threshold, over the range beyond what the diagnosed logs reached."""
+    """Return values of an effect that is a threshold, over the range beyond that of the diagnosed logs."""
     j = (joint or 1) - 1
     if effect == "torque_saturation":
         most = float(scales.most_torque[j])

@@ -1,1 +1,1 @@
-"""Forms in which a report is shown."""
+"""Forms of a report: HTML, Markdown, notebook, terminal, replay."""

@@ -34,11 +34,11 @@ def render_html(diagnosis: Diagnosis | dict[str, Any]) -> str:
     Parameters
     ----------
     diagnosis : Diagnosis or dict
-        The diagnosis, or its JSON object.
+        Diagnosis, or its JSON object.
     """
     return page_of(diagnosis_document(diagnosis))
 
 
 def write_html(diagnosis: Diagnosis | dict[str, Any], path: str | Path) -> None:
-    """Write the report of a diagnosis to a file."""
+    """Write the report of a diagnosis to an HTML file."""
     write(path, render_html(diagnosis))

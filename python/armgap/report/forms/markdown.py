@@ -11,13 +11,13 @@ from armgap.report.words import SummaryAnswer
 
 __all__ = ["markdown_of"]
 
-#: Characters of a full bar.
+#: Characters of a full text bar.
 BAR = 12
 _SPECIAL = re.compile(r"([\\`*_\[\]<>|#~&])")
 
 
 def escape(text: str) -> str:
-    r"""Text that Markdown shows as it is: on one line, nothing in it is markup.
+    r"""Return a text escaped for Markdown, on one line, so that none of it is markup.
 
     Examples
     --------
@@ -67,7 +67,7 @@ def _section(section: Section) -> Iterator[str]:
 
 
 def _coded(text: str, *, cell: bool = False) -> str:
-    """Text whose words between backticks stay code; the rest of it escaped. A bar would end a cell even in code."""
+    """Return a text escaped for Markdown with its words between backticks as code; in a table cell a vertical bar is escaped too."""
     parts = text.split("`")
     if len(parts) % 2 == 0:
         return escape(text)
@@ -76,7 +76,7 @@ def _coded(text: str, *, cell: bool = False) -> str:
 
 
 def _escaped_within(text: str) -> str:
-    """Escaped text that keeps the blanks at its ends."""
+    """Return a text escaped for Markdown, with the blanks at its ends kept."""
     return _SPECIAL.sub(r"\\\1", re.sub(r"\s+", " ", text))
 
 
@@ -96,7 +96,7 @@ def _folded(summary: str, body: str) -> str:
 
 
 def _entities(text: str) -> str:
-    """Text inside an HTML element, where backslashes do not escape."""
+    """Return a text escaped for the inside of an HTML element, where backslashes do not escape."""
     from html import escape as as_html
 
     return as_html(" ".join(text.split()))
@@ -109,7 +109,7 @@ def _cell(cell: Cell) -> str:
 
 
 def bar(share: float, width: int = BAR) -> str:
-    """A share from 0 to 1 as a bar of text; what is there at all has a mark.
+    """Return a share from 0 to 1 as a bar of text; any share above 0 has a mark.
 
     Examples
     --------
@@ -122,7 +122,7 @@ def bar(share: float, width: int = BAR) -> str:
 
 
 def _heat(heat: HeatMap) -> tuple[list[str], list[list[str]]]:
-    """A map as a table; the tile that stands out is bold."""
+    """Return a heat map as header and rows of a table; the marked tile is bold."""
     width = max(len(tiles) for _, tiles in heat.rows)
     header = ["", *(["low"] + [""] * (width - 2) + ["high"] if width > 1 else [""])]
     rows = [
@@ -137,6 +137,6 @@ def _heat(heat: HeatMap) -> tuple[list[str], list[list[str]]]:
 
 
 def _tile(tile: Tile) -> str:
-    """The value of a tile, and its limits below it."""
+    """Return the value of a heat map's tile, with the limits of its range below."""
     text = f"**{escape(tile.text)}**" if tile.marked else escape(tile.text)
     return f"{text}<br>{escape(tile.low)} to {escape(tile.high)}" if tile.low else text

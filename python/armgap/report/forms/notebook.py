@@ -1,4 +1,4 @@
-"""A diagnosis in a notebook: a card, plots of its findings, and its findings as a table.
+"""A diagnosis in a notebook: a summary card, plots, and a table of candidates.
 
 Plots need matplotlib (``pip install 'armgap[notebook]'``); the card and the table do not.
 """
@@ -29,11 +29,11 @@ _OTHER = "of serial arms plot gap, prediction or error"
 
 
 class PlotLibraryMissingError(ArmgapError, ImportError):
-    """Plots were asked for and matplotlib is not installed."""
+    """Error: plots were requested but matplotlib is not installed."""
 
 
 class _EffectOnJoint(Protocol):
-    """What a cause and a look-alike have in common."""
+    """Attributes that causes and equivalent effects share."""
 
     @property
     def effect(self) -> str: ...
@@ -42,14 +42,14 @@ class _EffectOnJoint(Protocol):
 
 
 class NotebookDisplay:
-    """What a notebook shows of a result whose JSON object `to_dict` returns."""
+    """Base class of results with a notebook display, made from the JSON object of `to_dict`."""
 
     def to_dict(self) -> Data:
-        """Return the JSON object."""
+        """Return the result as a JSON object."""
         raise NotImplementedError
 
     def _repr_html_(self) -> str:
-        """Return the verdict and the three answers as a card."""
+        """Return verdict and answers of the result as an HTML card."""
         return card(self.to_dict())
 
     def plot(
@@ -60,13 +60,13 @@ class NotebookDisplay:
         Parameters
         ----------
         finding : {"gap", "where", "ranking", "prediction", "error"} or Cause, default "gap"
-            How far, where, the candidates, predicted against measured, their difference; or a cause against its own variable.
+            Gap, map, ranking of candidates, predicted and measured positions, their difference; or evidence of a cause.
         joint : int, default 1
             1-based joint of a prediction or an error.
         log : str, optional
             Held-out log of a prediction or an error; by default the first.
         ax : matplotlib.axes.Axes, optional
-            Where to draw; by default a new figure.
+            Axes to draw on; by default a new figure.
 
         Returns
         -------
@@ -77,7 +77,7 @@ class NotebookDisplay:
         PlotLibraryMissingError
             If matplotlib is not installed.
         OptionError
-            If there is no such finding.
+            If the finding does not exist.
         """
         data = self.to_dict()
         if not isinstance(finding, str):
@@ -90,7 +90,7 @@ class NotebookDisplay:
         return _PLOTS[finding](data, _axes(ax))
 
     def to_polars(self) -> pl.DataFrame:
-        """Return every candidate as a row: named causes first, then what was looked for and not found.
+        """Return every candidate as a row: named causes first, then candidates that were not found.
 
         Returns
         -------
@@ -105,7 +105,7 @@ class NotebookDisplay:
 
 
 def card(data: Data) -> str:
-    """The verdict and the three answers as HTML in the notebook's own colours, every string escaped."""
+    """Return verdict and answers as HTML in the notebook's own colours, every string escaped."""
     from jinja2 import Environment
 
     template = Environment(autoescape=True).from_string(_CARD)
@@ -241,7 +241,7 @@ def _curves(data: Data, what: str, joint: int, log: str | None, ax: Axes) -> Axe
 
 
 def _lifted(values: list[float], starts: list[int]) -> list[float]:
-    """A curve whose windows are not joined."""
+    """Return a curve with its windows separated by NaN."""
     first = set(starts[1:])
     return [float("nan") if i in first else v for i, v in enumerate(values)]
 

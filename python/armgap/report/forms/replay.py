@@ -1,4 +1,4 @@
-"""A log replayed: the measured arm and the predicted ones side by side, as a recording for the Rerun viewer.
+"""Replay of a log: measured and predicted arms side by side, as a recording for the Rerun viewer.
 
 Needs ``pip install 'armgap[rerun]'``. Every window of one horizon starts from the measured state and runs under the logged torque.
 """
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 __all__ = ["RerunMissingError", "models", "poses", "predicted", "write_replay"]
 
-#: Half width of the cubic that start velocities are read from, in samples.
+#: Half width of the local cubic that gives initial velocities, in samples.
 _HALF_WIDTH = 8
-#: Arms stand this many reaches apart.
+#: Distance between drawn arms, in reaches of the arm.
 APART = 2.4
 #: Thickness of a drawn link, as a part of the arm's reach.
 THICKNESS = 0.02
@@ -34,11 +34,11 @@ COLOURS = {"measured": charts.MEASURED, "arm file": charts.BEFORE, "with causes"
 
 
 class RerunMissingError(ArmgapError, ImportError):
-    """A replay was asked for and the Rerun SDK is not installed."""
+    """Error: a replay was requested but the Rerun SDK is not installed."""
 
 
 def models(arm: Arm, diagnosis: Diagnosis | None) -> dict[str, Hypothesis]:
-    """Return what predicts: the arm file as it is and, from a diagnosis, the model with causes."""
+    """Return the models that predict a replayed log: the arm file as it is and, from a diagnosis, the model with causes."""
     only_planar(arm, "replay")
     found = {"arm file": Hypothesis(arm, tuple(float(v) for v in arm.theta))}
     if diagnosis is not None:
@@ -51,7 +51,7 @@ def models(arm: Arm, diagnosis: Diagnosis | None) -> dict[str, Hypothesis]:
 
 
 def predicted(model: Hypothesis, log: Log, horizon: float) -> Array:
-    """Positions predicted window by window, shape (n_samples, n_joints); each window starts as measured.
+    """Return predicted positions, shape (n_samples, n_joints); each window starts from the measured state.
 
     Raises
     ------
@@ -76,9 +76,9 @@ def predicted(model: Hypothesis, log: Log, horizon: float) -> Array:
 
 
 def poses(arm: Arm, q: Array) -> Array:
-    """Return where the joints and the tip are, base first, shape (n_samples, n_joints + 1, 2) [m].
+    """Return the points of the joints and the tip, base first, shape (n_samples, n_joints + 1, 2) [m].
 
-    Rotary arms hang down at ``q = 0``; further joints turn relative to the link before. An axis is a slide along x.
+    Rotary arms hang down at ``q = 0``; further joints turn relative to the preceding link. An axis is a slide along x.
 
     Raises
     ------
@@ -106,9 +106,9 @@ def write_replay(curves: Mapping[str, Array], log: Log, arm: Arm, path: str | Pa
     curves : mapping of str to ndarray, shape (n_samples, n_joints)
         Predicted positions by the name of their model.
     log : Log
-        What was measured.
+        Measured log.
     arm : Arm
-        For its geometry.
+        Arm, for its geometry.
     path : path-like
         Recording to write (``.rrd``).
 
@@ -117,7 +117,7 @@ def write_replay(curves: Mapping[str, Array], log: Log, arm: Arm, path: str | Pa
     RerunMissingError
         If the Rerun SDK is not installed.
     ResultError
-        If it cannot be written.
+        If the recording cannot be written.
     """
     rr, blueprint = _rerun()
     shown = {"measured": log.q, **curves}
@@ -140,13 +140,13 @@ def write_replay(curves: Mapping[str, Array], log: Log, arm: Arm, path: str | Pa
 
 
 def _picture(strips: Array, place: int) -> Array:
-    """Links in the viewer's plane, whose y points down; each arm stands beside the last."""
+    """Return links in the viewer's plane, whose y points down, with arm number `place` shifted to its place."""
     reach = float(np.abs(strips).max()) or 1.0
     return np.asarray(strips * [1.0, -1.0] + [APART * reach * place, 0.0], dtype=np.float64)
 
 
 def _entity(name: str) -> str:
-    """A name as part of a path in the recording."""
+    """Return a name as part of a path in the Rerun recording."""
     return name.replace(" ", "_")
 
 

@@ -1,4 +1,4 @@
-"""How an arm and a log show themselves in a notebook: a heading, a line of facts, a table; as HTML and as Markdown."""
+"""Notebook display of an arm and of a log: a heading, a line of facts and a table, as HTML and as Markdown."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["Facts", "arm_facts", "log_facts"]
 
 @dataclass(frozen=True)
 class Facts:
-    """What is shown of something: every string may come from a user.
+    """Contents of a notebook display; every string may come from a user.
 
     Attributes
     ----------
@@ -44,13 +44,13 @@ class Facts:
     sketch: str = ""
 
     def html(self) -> str:
-        """Return HTML in the notebook's own colours."""
+        """Return the display as HTML in the notebook's own colours."""
         from jinja2 import Environment
 
         return Environment(autoescape=True).from_string(_CARD).render(f=self)
 
     def markdown(self) -> str:
-        """Return Markdown."""
+        """Return the display as Markdown."""
         lines = [self.header, ["---"] * len(self.header), *([escape(cell) for cell in row] for row in self.rows)]
         table = "\n".join(f"| {' | '.join(line)} |" for line in lines)
         return "\n\n".join([f"**{escape(self.title)}**", escape(self.lead), table, *map(escape, self.notes)]) + "\n"
@@ -68,7 +68,7 @@ _CARD = """\
 
 
 def arm_facts(arm: Arm) -> Facts:
-    """Return what is shown of an arm: its parameters with their trust, and its conventions."""
+    """Return the display of an arm: parameters with standard deviations, and conventions."""
     rows = [
         (name, parameter_text(arm.kind, name), value({"value": v, "sigma": s, "unit": unit}))
         for name, unit, v, s in zip(arm.parameter_names, arm.parameter_units, arm.theta, arm.sigma, strict=True)
@@ -86,14 +86,14 @@ def arm_facts(arm: Arm) -> Facts:
 
 
 def _with_units(values: Iterable[float], units: Sequence[str]) -> str:
-    """Return figures with one unit behind all of them, or each with its own."""
+    """Return figures as text with one unit after all of them, or each with its own unit."""
     if len(set(units)) == 1:
         return f"{', '.join(map(figure, values))} {units[0]}"
     return ", ".join(f"{figure(value)} {unit}" for value, unit in zip(values, units, strict=True))
 
 
 def log_facts(log: Log) -> Facts:
-    """Return what is shown of a log: its columns with their ranges, and what was noticed while reading."""
+    """Return the display of a log: columns with their ranges, and findings."""
     rotary = {"rad": True, "deg": True, "m": False, "mm": False}.get(log.units.get("q1", ""))
     units = si(rotary)
     rows = [("t", log.columns.get("t", ""), f"{figure(log.t[0])} to {figure(log.t[-1], 5)}", units["t"])]

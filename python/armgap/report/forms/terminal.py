@@ -1,4 +1,4 @@
-"""The three answers in a terminal, narrow or wide."""
+"""Summary of a diagnosis in a terminal, narrow or wide."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Data = dict[str, Any]
 
 
 def summary_table(diagnosis: Diagnosis | Data) -> RenderableType:
-    """Return what `rich` prints: verdict, the three answers, and the gap per joint.
+    """Return a diagnosis for `rich` to print: verdict, the three answers, and the gap per joint.
 
     Questions stand above their answers, so that a terminal of 60 columns holds them as well as a wide one.
     """
@@ -35,7 +35,7 @@ def summary_table(diagnosis: Diagnosis | Data) -> RenderableType:
 
 
 def _steps(data: Data) -> list[RenderableType]:
-    """What to do next, one thing a line."""
+    """Return the recommended next steps, one per line."""
     from rich.padding import Padding
     from rich.text import Text
 
@@ -46,7 +46,7 @@ def _steps(data: Data) -> list[RenderableType]:
 
 
 def answer_lines(answer: words.SummaryAnswer) -> list[RenderableType]:
-    """A question with its answer, and an empty line."""
+    """Return a question with its answer, and an empty line."""
     from rich.padding import Padding
     from rich.text import Text
 
@@ -58,7 +58,7 @@ def answer_lines(answer: words.SummaryAnswer) -> list[RenderableType]:
 
 
 def gap_table(data: Data) -> Table:
-    """The gap per joint: a row per joint, a column per model."""
+    """Return a table of the gap: a row per joint, a column per model."""
     from rich import box
     from rich.table import Table
     from rich.text import Text

@@ -1,4 +1,4 @@
-"""The logs and their quality; how everything was computed."""
+"""Report sections on the logs and their quality, and on the method."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["data_quality", "method"]
 
 
 def data_quality(data: Data) -> Section:
-    """The logs, what was noticed in them, and remarks."""
+    """Return the section on the logs, findings in them, and remarks."""
     logs = [(log, use) for use in ("training", "holdout") for log in data.get(use) or []]
     has_zeros = any(log.get("encoder_zero") for log, _ in logs)
     rows = [
@@ -33,7 +33,7 @@ def data_quality(data: Data) -> Section:
 
 
 def _zero(log: Data) -> str:
-    """What a log's encoders show where the model's positions are zero, joint by joint."""
+    """Return the encoder readings of a log at the model's zero positions, joint by joint."""
     zero = log.get("encoder_zero")
     if not zero:
         return ""
@@ -52,7 +52,7 @@ def _noise(data: Data) -> list[str]:
 
 
 def method(data: Data) -> Section:
-    """How it was computed, with which options, versions and seed."""
+    """Return the section on method, options, versions and seed of a diagnosis."""
     text = [_OF_SERIAL_ARMS if (data.get("arm") or {}).get("kind") == SERIAL else _OF_WINDOWS]
     return Section("How this was computed", text=text, tables=[Table(("what", "value"), _facts(data))])
 

@@ -1,4 +1,4 @@
-"""What to do next."""
+"""Report section on recommended next steps."""
 
 from __future__ import annotations
 
@@ -12,5 +12,5 @@ TITLE = "What to do next"
 
 
 def what_next(data: Data) -> Section:
-    """What follows from the verdict."""
+    """Return the section on next steps that follow from the verdict."""
     return Section(TITLE, points=next_steps(data), name="next")

@@ -40,4 +40,4 @@ SECTIONS: tuple[Callable[[Data], Section | None], ...] = (
     method,
     what_next,
 )
-"""Every section, in the order of the page; one that has nothing to say returns None."""
+"""Functions of all report sections, in the order of the page; a function returns None for an empty section."""

@@ -1,4 +1,4 @@
-"""Which: the evidence for each cause, the candidates against each other, and what looks alike."""
+"""Report sections on causes: evidence for each cause, ranking of candidates, and equivalent effects."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from armgap.several_joints import place_text
 
 __all__ = ["candidates", "evidence", "look_alikes", "ranking", "unnamed"]
 
-#: Shares below this are shown as this.
+#: Smallest share of the gap that is shown; smaller shares are shown as this value.
 _WORST_SHARE = -9.99
-#: Share explained from which on it is called all.
+#: Explained share of evidence from which it is written as "all".
 ALL = 0.995
-#: Candidates of the ranking that are shown at once.
+#: Candidates of the ranking that are shown unfolded.
 SHOWN = 8
 
 
 def evidence(data: Data) -> Section | None:
-    """Each cause against its own variable, with the fitted law through the data."""
+    """Return the section with evidence for each cause: residual torque over the cause's variable, with the fitted law."""
     laws = [law for law in data.get("laws") or [] if law.get("bins")]
     if not laws:
         return None
@@ -61,7 +61,7 @@ def _verdict(law: Data) -> str:
 
 
 def unnamed(data: Data) -> Section | None:
-    """What the rest depends on, as tables without a name."""
+    """Return the section with dependences of the remaining residual torque, as unnamed tables."""
     found = data.get("unnamed") or []
     if not found:
         return None
@@ -95,7 +95,7 @@ def unnamed(data: Data) -> Section | None:
 
 
 def ranking(data: Data) -> Section | None:
-    """The candidates against each other, with probabilities."""
+    """Return the section with the ranking of candidates by probability."""
     ranked = data.get("ranking") or []
     if not ranked:
         return None
@@ -138,7 +138,7 @@ def _cause(data: Data, ranked: Data) -> Any:
 
 
 def _course(data: Data) -> list[str]:
-    """How one cause after another came in."""
+    """Return sentences on the order in which the model search added the causes."""
     stages = data.get("stages") or []
     unit = small_unit(data)
     lines: list[str] = []
@@ -152,7 +152,7 @@ def _course(data: Data) -> list[str]:
 
 
 def candidates(data: Data) -> Section | None:
-    """Causes that were accepted but are not fit for the headline, and why."""
+    """Return the section with accepted causes that are not named in the headline, and the reasons."""
     found = data.get("candidates") or []
     if not found:
         return None
@@ -166,7 +166,7 @@ def candidates(data: Data) -> Section | None:
 
 
 def look_alikes(data: Data) -> Section | None:
-    """What these logs do not tell from the named causes, and why."""
+    """Return the section with effects that the logs do not distinguish from the named causes, and the reasons."""
     rows = [
         (
             f"{title(c['effect'])} ({place_text(c)})",

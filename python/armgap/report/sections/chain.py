@@ -1,4 +1,4 @@
-"""Along the chain: how much of the gap arises between command and measured position at which stage."""
+"""Report section on the drive chain: share of the gap at each stage between command and measured position."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _FIGURES = ("delay", "gain", "offset", "viscous", "inertia")
 
 
 def along_the_chain(data: Data) -> Section | None:
-    """Shares of drives, transmissions, mechanics and sensors, and the drives' figures."""
+    """Return the section with shares of drives, transmissions, mechanics and sensors, and the drives' parameters."""
     parts = data.get("chain") or []
     if not parts:
         return None

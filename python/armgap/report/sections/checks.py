@@ -1,4 +1,4 @@
-"""What was noticed about the input: contradictions between log and arm file, repairs, warnings."""
+"""Report section on checks of the input: contradictions between log and arm file, repairs, warnings."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from armgap.several_joints import joint_text
 __all__ = ["checks", "input_checks"]
 
 TITLE = "Checks of the input"
-#: Row ranges that are listed; of more, the number is said.
+#: Row ranges that a check lists at most, followed by the number of further ranges.
 LISTED = 3
-#: Severity to its word, gravest first.
+#: Words for the severities of checks, most severe first.
 _SEVERITY = {"error": "contradiction", "repaired": "repaired", "warning": "warning"}
 
 
 def checks(data: Data) -> Section | None:
-    """What was noticed, unless it stands before the answers already."""
+    """Return the section with checks of the input, unless it stands before the answers already."""
     return None if data["verdict"] == "input" else input_checks(data)
 
 
 def input_checks(data: Data) -> Section | None:
-    """What was noticed, errors first."""
+    """Return the section with checks of the input, errors first."""
     found = data.get("checks") or []
     if not found:
         return None
@@ -42,7 +42,7 @@ def input_checks(data: Data) -> Section | None:
 
 
 def _place(check: Data) -> str:
-    """Joint, log and rows, counted from 1 as in every message."""
+    """Return joint, log and rows of a check as text, all counted from 1."""
     joint = "" if check.get("joint") is None else joint_text(check["joint"])
     return ", ".join(filter(None, (joint, check.get("log"), _rows(check.get("rows") or []))))
 
@@ -55,6 +55,6 @@ def _rows(ranges: list[list[int]]) -> str:
 
 
 def _remedies(check: Data) -> str:
-    """Options and lines as code; several where no log tells them apart."""
+    """Return the remedies of a check, options and lines as code."""
     several = check.get("remedies") or list(filter(None, [check.get("remedy")]))
     return " or ".join(f"`{r}`" for r in several)

@@ -1,4 +1,4 @@
-"""How far, and where: the first picture, and the map in full."""
+"""Report sections on the size and location of the gap: first chart, and full map."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from armgap.report.words import error_text, figure, percent, unit_text, variable
 
 __all__ = ["first_picture", "gap_map"]
 
-#: Below this a tile shows one digit, to fit on a phone.
+#: Share below which a tile of the map shows one digit, to fit on a phone.
 SMALL = 0.01
-#: Where there is no gap, the map shows noise, and is this many times paler.
+#: Factor by which the map is paler for a diagnosis without a gap, whose map shows noise.
 PALE = 5.0
 #: A limit of a range counts as zero below this share of the largest limit of its row.
 NOTHING = 1e-4
 
 
 def first_picture(data: Data) -> Section:
-    """The gap before and after, and the map of where it lies."""
+    """Return the section with the gap before and after, and the map of the joints and regimes where it lies."""
     gap = data["gap"]
     unit = small_unit(data)
     joints = [f"joint {j + 1}" for j in range(len(gap["before"]))]
@@ -37,7 +37,7 @@ def first_picture(data: Data) -> Section:
 
 
 def _bars(data: Data) -> Table:
-    """The first chart as a table with bars of text, longest for the largest error."""
+    """Return the chart of the gap as a table with bars of text, longest for the largest error."""
     gap = data["gap"]
     shown = [*((label, key) for label, key, _ in model_labels(data)), ("sensor noise alone", "floor")]
     top = max((v for _, key in shown for v in gap[key]), default=0.0) or 1.0
@@ -50,7 +50,7 @@ def _bars(data: Data) -> Table:
 
 
 def _heats(data: Data, wanted: Sequence[tuple[str, str]]) -> list[HeatMap]:
-    """Maps of the residual torque, all on one scale: a row per joint and variable, a tile per range, low values first."""
+    """Return heat maps of the residual torque on one scale: a row per joint and variable, a tile per range, low values first."""
     regimes = data.get("regimes") or []
     if not regimes:
         return []
@@ -71,7 +71,7 @@ def _heats(data: Data, wanted: Sequence[tuple[str, str]]) -> list[HeatMap]:
 
 
 def _weights(data: Data) -> dict[int, tuple[float, float]]:
-    """What a torque of each joint weighs in its share of the gap, and that share."""
+    """Return per joint the weight of a residual torque in the joint's share of the gap, and the share."""
     share = {p["joint"]: p["share"] for p in data.get("where") or []}
     key = "before" if data["verdict"] == "parameters" else "refit"
     found: dict[int, tuple[float, float]] = {}
@@ -84,7 +84,7 @@ def _weights(data: Data) -> dict[int, tuple[float, float]]:
 
 
 def _row(regime: Data) -> str:
-    """Joint, variable and unit of a row."""
+    """Return joint, variable and unit as label of a row of the map."""
     unit = unit_text(regime["unit"]).replace(" ", "\N{NO-BREAK SPACE}")
     return f"joint {regime['joint']}: {variable_text(regime['variable'])}" + (f" [{unit}]" if unit else "")
 
@@ -101,13 +101,13 @@ def _tile(data: Data, regime: Data, i: int, value: float, depth: float) -> Tile:
 
 
 def _limit(regime: Data, k: int) -> str:
-    """A limit of a range; what is next to nothing beside the largest is none."""
+    """Return a limit of a range as text; zero where it is negligible beside the largest limit."""
     edge, largest = regime["edges"][k], max(abs(e) for e in regime["edges"])
     return figure(edge if abs(edge) > NOTHING * largest else 0.0, 2)
 
 
 def _stands_out(data: Data, regime: Data, i: int) -> bool:
-    """Whether a tile is the place that the first answer names."""
+    """Whether a tile is the joint and regime that the first answer names."""
     if data["verdict"] == "none" or not data.get("where"):
         return False
     place = data["where"][0]
@@ -137,7 +137,7 @@ def gap_map(data: Data) -> Section | None:
 
 
 def _energy(data: Data) -> Table:
-    """What the missing torque does with energy, per joint and model."""
+    """Return a table of the residual torque's power, per joint and model."""
     does = {"takes": "takes energy", "gives": "gives energy", "both": "takes and gives back"}
     labels = {key: label for label, key, _ in model_labels(data)}
     rows = [
@@ -168,7 +168,7 @@ def _energy(data: Data) -> Table:
 
 
 def _groups(regime: Data) -> list[str]:
-    """The ranges of a regime in words."""
+    """Return the ranges of a regime's variable (such as speed or position) in words."""
     if regime["variable"].startswith("reversal"):
         return ["away from reversals", "near a reversal"][: len(regime["count"])]
     unit = regime["unit"]

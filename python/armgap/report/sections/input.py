@@ -1,4 +1,4 @@
-"""What the figures are counted in: the arm's conventions, and each log's columns and units."""
+"""Report section on conventions of the arm, and on columns and units of each log."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ __all__ = ["conventions"]
 
 
 def conventions(data: Data) -> Section | None:
-    """Zero, positive direction, sign of the torque; and which column of which log was used in which unit."""
+    """Return the section on zero, positive direction and sign of torque of an arm, and on columns and units of each log."""
     given = data.get("input") or {}
     return section(str((data.get("arm") or {}).get("kind", "")), given.get("logs"), given.get("units"))

@@ -1,4 +1,4 @@
-"""The three models that a report compares, and the units of a diagnosis."""
+"""Labels of the three models that a report compares, and units of a diagnosis."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ def model_labels(data: Data) -> tuple[ModelLabel, ...]:
 
 
 def joint_unit(data: Data, joint: int) -> str:
-    """Unit of the position of a joint, counted from 1."""
+    """Return the unit of position of a joint, counted from 1."""
     units = joint_units(data)
     return units[joint - 1] if joint <= len(units) else str(data["gap"].get("unit", "rad"))
 
 
 def small_unit(data: Data) -> str:
-    """Unit of position errors, for headings: ``mrad``, ``mm``, or both."""
+    """Return the unit of position errors for headings: ``mrad``, ``mm``, or both."""
     return milli_unit(joint_units(data))
 
 
@@ -39,10 +39,10 @@ def _slides(data: Data) -> bool:
 
 
 def load_text(data: Data) -> str:
-    """What drives a joint of this arm."""
+    """Return the word for the load of a diagnosed arm's joints: force for linear joints, else torque."""
     return "force" if _slides(data) else "torque"
 
 
 def torque_unit(data: Data) -> str:
-    """Unit of torques."""
+    """Return the unit of torques of a diagnosis."""
     return "N" if _slides(data) else "N m"

@@ -1,4 +1,4 @@
-"""Predicted against measured: window by window, and in free run."""
+"""Report sections on predicted and measured positions: window by window, and in free run."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from armgap.report.words import each_joint, figure
 __all__ = ["free_run", "horizons", "predictions"]
 
 _ARROW = " \N{RIGHTWARDS ARROW} "
-#: How far beyond the measured positions a free run is drawn, in their range.
+#: Distance beyond the measured positions up to which a free run is drawn, in ranges of these.
 _REACH = 1.0
 
 
 def predictions(data: Data) -> Section | None:
-    """Positions and errors on held-out motion, zoomable together."""
+    """Return the section with predicted and measured positions and their errors on the holdout."""
     series = data.get("series") or []
     if not series:
         return None
@@ -59,7 +59,7 @@ def _error(data: Data, s: Data) -> Any:
 
 
 def horizons(data: Data) -> Section | None:
-    """The gap at several prediction horizons."""
+    """Return the section with the gap at several prediction horizons."""
     gap, units = data["gap"], joint_units(data)
     every = sorted([gap, *gap.get("horizons", [])], key=lambda h: float(h["horizon_s"]))
     if len(every) < 2:
@@ -81,7 +81,7 @@ def horizons(data: Data) -> Section | None:
 
 
 def free_run(data: Data) -> Section:
-    """The whole holdout from its first sample."""
+    """Return the section with a free run over the whole holdout from its first sample."""
     gap, units = data["gap"], joint_units(data)
     run = gap["free_run"]
     last = "with the causes" if data.get("causes") else "re-estimated"
@@ -98,7 +98,7 @@ def free_run(data: Data) -> Section:
 
 
 def _whole_run(s: Data, last: str) -> Any:
-    """A free run; one that runs away leaves the picture, not the scale."""
+    """Return a chart of a free run; a diverging curve does not change the scale."""
     curves = [
         ("measured", s["measured"], charts.MEASURED),
         ("arm file", s["before"], charts.BEFORE),

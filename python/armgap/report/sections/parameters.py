@@ -1,4 +1,4 @@
-"""The arm's parameters: arm file, re-estimated, with causes; how far they moved, and whether they are possible."""
+"""Report section on the arm's parameters: nominal, re-estimated, with causes; their changes and physical plausibility."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from armgap.report.words import figure, named, parameter_text, unit_text, value
 
 __all__ = ["parameters"]
 
-#: Half of the line on which values are shown, in sigmas of the arm file's trust; the shaded middle is two of them.
+#: Half width of the line on which parameters are drawn, in standard deviations of the arm file; the shaded middle is two of them.
 _REACH = 5.0
 MIDDLE = 2.0
 _LINK_NUMBERS = 10
 
 
 def parameters(data: Data) -> Section:
-    """Values with intervals, and physical plausibility."""
+    """Return the section with parameters, intervals, and physical plausibility."""
     text = [
         "Value ± one standard deviation; for the arm file, how far it is trusted. On the line, the shaded middle is two of these standard "
         "deviations around the arm file's value, the ends are five; yellow is re-estimated, blue with causes."
@@ -33,7 +33,7 @@ def _is_serial(data: Data) -> bool:
 
 
 def _values_of_serial_arm(data: Data) -> list[Table]:
-    """Causes, rotor inertias and friction; the links' numbers, ten each, folded."""
+    """Return tables for a serial arm: causes, rotor inertias and friction; and, folded, ten inertial parameters per link."""
     table, causes = _values(data), data.get("causes") or []
     count = _LINK_NUMBERS * int(data["arm"]["n_joints"])
     last = len(table.rows) - sum(len(cause["parameters"]) for cause in causes)
@@ -61,7 +61,7 @@ def _values(data: Data) -> Table:
 
 
 def _moved(entries: list[Any], *, causes: bool) -> Cell:
-    """Where the two estimates lie on a line of the arm file's sigmas."""
+    """Return a table cell with both estimates of a parameter on a line, in standard deviations of the arm file."""
     nominal, refit, final = entries
     if not all(isinstance(e, dict) for e in entries) or not nominal["sigma"]:
         return ""

@@ -1,4 +1,4 @@
-"""What was looked for and not found, and what the logs could not show."""
+"""Report sections on effects that were not found, and on effects that the logs could not show."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def _needs() -> dict[str, str]:
 
 
 def excited_by(effect: str) -> str:
-    """The motion that would show an effect."""
+    """Return the motion that would show an effect, in words."""
     return _needs().get(effect, "")
 
 
 def not_shown(data: Data) -> Section | None:
-    """Effects that could be there without a trace in these logs, and which motion would show them."""
+    """Return the section with effects that the logs do not excite, and motions that would show them."""
     silent = [r for r in data.get("ruled_out") or [] if r["status"] == "not excited"]
     if not silent:
         return None
@@ -37,7 +37,7 @@ def not_shown(data: Data) -> Section | None:
 
 
 def ruled_out(data: Data) -> Section | None:
-    """Every candidate that is no cause, with the bound on its size."""
+    """Return the section with every candidate that is no cause, and the bound on its size."""
     found = data.get("ruled_out") or []
     if not found:
         return None
@@ -52,7 +52,7 @@ def ruled_out(data: Data) -> Section | None:
 
 
 def bound_text(entry: Data) -> str:
-    """The bound on the size of an absent effect."""
+    """Return the bound on the size of an absent effect as text."""
     bound = entry.get("bound")
     if not bound:
         return ""

@@ -1,4 +1,4 @@
-"""Baselines: other methods that name a cause, answering the same sealed cases; one file each, one line in `BASELINES`."""
+"""Baselines: other methods that name causes of sealed cases, for comparison; one file each, listed in `BASELINES`."""
 
 from armgap.trial.baselines.all import BASELINES
 

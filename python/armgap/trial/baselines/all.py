@@ -1,4 +1,4 @@
-"""All baselines."""
+"""List of all baselines of a trial."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A constant guess: the answer of someone who has not looked at the log."""
+"""Baseline with a constant guess, independent of the logs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ GUESS = NamedCause("stribeck", 1, probability=1.0 / 24.0)
 
 
 def answer(case: SealedCase) -> Answer:
-    """Name the same cause whatever the logs."""
+    """Return the constant guess as answer, whatever the logs."""
     return Answer("constant", "effect", (GUESS,))
 
 

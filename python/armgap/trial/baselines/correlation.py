@@ -1,6 +1,6 @@
-"""Residual correlation: re-estimate the arm, then name the effect whose signature correlates best with what is left.
+"""Baseline by residual correlation: re-estimate the arm, then name the effect whose signature correlates best with the residual torque.
 
-Equation error, the picture one looks at first: torque residual against each candidate. The arm is re-estimated with the
+The residual is the equation error, compared with each candidate. The arm is re-estimated with the
 arm file's sigmas as prior; one cause is named if it explains at least a tenth of the residual's power.
 """
 
@@ -17,7 +17,7 @@ from armgap.trial.methods import Method
 
 __all__ = ["CORRELATION", "refit_residual"]
 
-#: Share of the residual's power that a named cause explains.
+#: Share of the residual's power that a named cause has to explain.
 _MIN_SHARE = 0.1
 
 
@@ -33,13 +33,13 @@ def answer(case: SealedCase) -> Answer:
 
 
 def _bic(s: Signature, share: float) -> float:
-    """BIC, so that signatures of several columns have no start on those of one."""
+    """Return the BIC of a signature, so that signatures of several columns have no advantage over those of one."""
     rows, columns = s.columns.shape
     return float(rows * np.log(max(1.0 - share, 1e-12)) + columns * np.log(rows))
 
 
 def refit_residual(arm: Arm, made: RegressionData) -> Array:
-    """Torques that the re-estimated arm leaves, with the arm file's sigmas as prior."""
+    """Return the residual torques of the re-estimated arm, with the arm file's sigmas as prior."""
     theta = arm.theta + _step(made.base, made.tau - made.base @ arm.theta, arm.sigma)
     left: Array = made.tau - made.base @ theta
     return left
@@ -52,7 +52,7 @@ def _step(base: Array, left: Array, sigma: Array) -> Array:
 
 
 def _explained(s: Signature, residual: Array) -> float:
-    """Squared multiple correlation with the residual."""
+    """Return the squared multiple correlation of a signature with the residual."""
     fitted = s.columns @ np.linalg.lstsq(s.columns, residual, rcond=None)[0]
     return float(fitted @ fitted / (residual @ residual))
 

@@ -1,6 +1,6 @@
-"""FROLS of SysIdentPy: forward orthogonal least squares over the same signatures, model order by BIC.
+"""Baseline by FROLS of SysIdentPy: forward orthogonal least squares over the effects' signatures, model order by BIC.
 
-The arm's own columns are projected out of the torques and of all signatures, so that what FROLS chooses from is what the
+The arm's own columns are projected out of the torques and of all signatures, so that FROLS explains what the
 re-estimated arm leaves. Terms enter as inputs of a NFIR model of degree one without lag. The probability of a named
 effect is the share of the residual's power that its terms remove (the sum of their error reduction ratios).
 
@@ -28,12 +28,12 @@ from armgap.trial.simulation.engine import TrialEngineMissingError
 
 __all__ = ["FROLS"]
 
-#: Terms that BIC chooses among, causes named at most, and the least share of power of a named cause.
+#: Terms that BIC selects from in FROLS, causes named at most, and the least share of power of a named cause.
 TERMS, MAX_CAUSES, _MIN_SHARE = 8, 4, 0.05
 
 
 def answer(case: SealedCase) -> Answer:
-    """Name the effects of the terms that FROLS keeps, most power first."""
+    """Return an answer with the effects of the terms that FROLS keeps, most power first."""
     made = regression_data(case)
     q, _ = np.linalg.qr(made.base)
     found = signatures(case.arm, made, made.motions[0])
@@ -59,7 +59,7 @@ def _named(terms: list[Signature], shares: list[float]) -> Answer:
 
 
 def _select(candidates: Array, target: Array) -> tuple[list[int], list[float]]:
-    """Columns chosen, and their error reduction ratios."""
+    """Return the chosen columns and their error reduction ratios, by FROLS."""
     library = _library()
     model = library.FROLS(
         order_selection=True,
@@ -90,7 +90,7 @@ def _library() -> Any:
 
 
 class _Library:
-    """What is used of SysIdentPy."""
+    """The functions of SysIdentPy that the baseline uses."""
 
     def __init__(self) -> None:
         selection = importlib.import_module("sysidentpy.model_structure_selection")

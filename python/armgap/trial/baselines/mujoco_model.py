@@ -1,7 +1,7 @@
 """The arm of an arm file as a MuJoCo model whose parameters and effects can be set, for `mujoco.sysid`.
 
-Base parameters fix the motion of an arm but not its masses; any masses with the same base parameters serve. Here the links
-are as light as positive inertias allow.
+Base parameters fix the motion of an arm but not its masses; any masses with equal base parameters give the same motion. The links are
+as light as positive inertias allow.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from armgap.trial.simulation.engine import mujoco
 
 __all__ = ["build_spec", "set_coulomb", "set_inertial"]
 
-#: Longest internal step, s. Friction is as stiff as the step allows, as in the making of the logs.
+#: Longest internal time step of the MuJoCo model, s, and impedance of friction: as stiff as the step allows, as for the logs.
 _STEP, IMPEDANCE = 2.5e-3, 0.9999
 TINY = 1e-9
 
 
 def build_spec(arm: Arm) -> Any:
-    """A model of the arm: joints ``joint0``, ..., one actuator and one position sensor each."""
+    """Return a MuJoCo model of the arm: joints ``joint0``, ..., one actuator and one position sensor each."""
     mj = mujoco()
     spec = mj.MjSpec()
     spec.option.timestep = arm.sample_period / np.ceil(arm.sample_period / _STEP - TINY)
@@ -50,17 +50,17 @@ def _add_motor(mj: Any, spec: Any, j: int) -> None:
 
 
 def set_coulomb(spec: Any, j: int, level: float) -> None:
-    """Dry friction of a joint."""
+    """Set the dry friction of a joint of a MuJoCo model [N m or N]."""
     spec.joint(f"joint{j}").frictionloss = max(level, TINY)
 
 
 def set_inertial(spec: Any, arm: Arm, theta: Array) -> None:
-    """Masses, lengths and inertias of some arm with these base parameters, and actuators without offset.
+    """Set masses, lengths and inertias of a MuJoCo model to those of an arm with base parameters `theta`, and actuators without offset.
 
     Raises
     ------
     ValueError
-        No arm has them.
+        No arm has the base parameters.
     """
     for j in range(arm.n_joints):
         spec.actuator(f"motor{j}").biasprm[0] = 0.0

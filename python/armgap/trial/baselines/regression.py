@@ -1,7 +1,7 @@
-"""What regression baselines share: the arm's regressor on measured motion, and the signature of every effect in the torque.
+"""Parts of the regression baselines: the arm's regressor on measured motion, and effects' signatures in the residual torque.
 
-A baseline sees ``residual = tau - Y theta``: the torque the arm file's model cannot account for, joint by joint, with ``Y``
-re-estimated or not. Each effect of the library leaves a known signature there, linear in its size once its shape
+A baseline uses ``residual = tau - Y theta``: the torque that the arm file's model leaves unexplained, joint by joint, with ``Y``
+re-estimated or not. Each effect of the library leaves a known signature in the residual, linear in its size once its shape
 (a velocity, a period, a level, ...) is fixed; shapes come from a grid. Velocities and accelerations are those of a cubic
 through the samples within 15 ms (Savitzky-Golay); torques go through the same cubic, and both sides are averaged over
 blocks of 10 ms, so that no side carries a phase the other lacks. Blocks in which a joint is slow, or turns round within
@@ -27,11 +27,11 @@ from armgap.trial.cases.sealed import SealedCase
 __all__ = ["Motion", "RegressionData", "motion", "regression_data", "regressor"]
 
 Array = NDArray[np.float64]
-#: Half the width of the smoothing cubic, and the length of a block, s.
+#: Half width of the smoothing cubic, and length of a block of averaged samples, s.
 _HALF_WIDTH, BLOCK = 0.015, 0.010
-#: Slow is below this share of a joint's usual top speed.
+#: Speed below which a joint is slow and its rows are left out, as a share of its usual top speed.
 SLOW = 0.02
-#: Torques are not trusted below this share of a joint's own.
+#: Standard deviation of a joint's residual torque, at least, as a share of its torque.
 _TRUST = 0.005
 
 
@@ -42,9 +42,9 @@ class Motion:
     Attributes
     ----------
     t : ndarray, shape (n,)
-        s, from the log's start.
+        Times from the log's start [s].
     q, dq, ddq, tau : ndarray, shape (n, n_joints)
-        SI.
+        Smoothed positions, velocities, accelerations and torques [SI].
     raw : ndarray, shape (n, n_joints)
         Commands as logged, before smoothing.
     half, block : int
@@ -61,7 +61,7 @@ class Motion:
     block: int
 
     def blocks(self, columns: Array) -> Array:
-        """Average columns of shape (n, ..) over blocks, edges left out."""
+        """Return columns of shape (n, ..) averaged over blocks of samples, edges left out."""
         inner = columns[self.half : len(columns) - self.half]
         n = len(inner) // self.block
         shape = (n, self.block, *columns.shape[1:])
@@ -69,26 +69,26 @@ class Motion:
         return means
 
     def smooth(self, column: Array) -> Array:
-        """The smoothing that positions and torques went through."""
+        """Return a column smoothed with the cubic that positions and torques of the motion are smoothed with."""
         return _savgol(column, self.half, 0, 1.0)
 
 
 @dataclass(frozen=True)
 class RegressionData:
-    """A set of logs as a regression: joints below one another, each scaled to residuals of size one.
+    """Regression of a set of logs: rows of all joints, each joint scaled to residuals of size one.
 
     Attributes
     ----------
     motions : tuple of Motion
-        One per log.
+        Smoothed motions, one per log.
     scale : ndarray, shape (n_joints,)
-        What a row of a joint is divided by.
+        Scale by which rows of each joint are divided.
     keep : ndarray of bool
         Rows in which the joint moves.
     base : ndarray, shape (m, n_parameters)
-        The arm's regressor.
+        Scaled regressor of the arm.
     tau : ndarray, shape (m,)
-        Torques.
+        Scaled torques.
     """
 
     motions: tuple[Motion, ...]
@@ -98,12 +98,12 @@ class RegressionData:
     tau: Array
 
     def rows(self, columns: list[Array]) -> Array:
-        """Columns per log, each (n, n_joints, k), as rows of this regression: (m, k)."""
+        """Return columns per log, each of shape (n, n_joints, k), as rows of the regression, shape (m, k)."""
         return _stack(self.motions, columns, self.scale)[self.keep]
 
 
 def motion(log: Log) -> Motion:
-    """Smooth a log."""
+    """Return the smoothed motion of a log."""
     h = float(np.median(np.diff(log.t)))
     half = max(3, round(_HALF_WIDTH / h))
     # The command at a sample is held to the next one; at the sample itself it is half the old and half the new.
@@ -113,7 +113,7 @@ def motion(log: Log) -> Motion:
 
 
 def regression_data(case: SealedCase, scale: Array | None = None, held_out: bool = False) -> RegressionData:
-    """Training or holdout logs of a case as a regression; by default scaled by the training's own residuals."""
+    """Return training or holdout logs of a case as a regression, by default scaled by the residuals of the training logs."""
     motions = tuple(motion(log) for log in (case.holdout if held_out else case.training))
     one = np.ones(case.arm.n_joints)
     keep = _stack(motions, [_moving(x)[..., None] for x in motions], one)[:, 0] > 1.0 - 1e-9
@@ -129,7 +129,7 @@ def regression_data(case: SealedCase, scale: Array | None = None, held_out: bool
 
 
 def _moving(x: Motion) -> Array:
-    """One where a joint moves over the whole smoothing cubic, zero where it is slow or turns round in it."""
+    """Return 1 where a joint moves over the whole smoothing cubic, 0 where it is slow or reverses within it."""
     from scipy.ndimage import minimum_filter1d
 
     fast = np.quantile(np.abs(x.dq), 0.95, axis=0)
@@ -138,14 +138,14 @@ def _moving(x: Motion) -> Array:
 
 
 def _stack(motions: tuple[Motion, ...], columns: list[Array], scale: Array) -> Array:
-    """All rows, joint after joint."""
+    """Return scaled columns of all logs as rows, joint after joint."""
     blocks = [x.blocks(c) / scale[:, None] for x, c in zip(motions, columns, strict=True)]
     rows: Array = np.concatenate([b[:, j] for j in range(scale.size) for b in blocks])
     return rows
 
 
 def regressor(arm: Arm, q: Array, dq: Array, ddq: Array) -> Array:
-    """The arm's regressor: ``Y theta = tau``, shape (n, n_joints, n_parameters).
+    """Return the arm's regressor `Y` in ``Y theta = tau``, shape (n, n_joints, n_parameters).
 
     References
     ----------
@@ -174,7 +174,7 @@ def _two_link(q: Array, dq: Array, ddq: Array) -> Array:
 
 
 def _savgol(columns: Array, half: int, order: int, h: float) -> Array:
-    """Derivative of a given order of the cubic through each sample's neighbours; at the edges, of the outermost cubic."""
+    """Return the derivative of a given order of the cubic through each sample's neighbours; at the edges, of the outermost cubic."""
     from scipy.signal import savgol_filter
 
     smooth: Array = savgol_filter(columns, 2 * half + 1, 3, deriv=order, delta=h, axis=0)

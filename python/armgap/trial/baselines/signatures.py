@@ -1,4 +1,4 @@
-"""Signatures of the effects in the torque residual, shapes on a grid; used by every regression baseline alike."""
+"""Signatures of the effects in the torque residual, with shapes on a grid, for all regression baselines."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from armgap.trial.baselines.regression import Array, Motion, RegressionData, reg
 
 __all__ = ["Signature", "signatures"]
 
-#: Width of a numerical derivative with respect to positions, rad.
+#: Step of numerical derivatives by positions, rad.
 POSITION_STEP = 1e-5
 DELAYS = (0.001, 0.002, 0.004, 0.008, 0.016)  # s
 LEVELS = (0.5, 0.65, 0.8, 0.9)
 _ORDERS = 12
 
-#: Columns (n, k) on the joint's own row, or (n, n_joints, k), for each shape.
+#: Signatures of an effect, one per shape: columns (n, k) in the joint's own rows, or (n, n_joints, k).
 Shapes = Iterator[Array]
 
 
 @dataclass(frozen=True)
 class Signature:
-    """One effect on one joint, of one shape: columns to be scaled and subtracted.
+    """Signature of one effect on one joint for one shape: torque columns that are linear in the effect's size.
 
     Attributes
     ----------
     effect, joint
-        As everywhere.
+        Name of the effect, and joint from 1.
     columns : ndarray, shape (m, k)
         Rows as in `RegressionData`.
     """
@@ -40,7 +40,7 @@ class Signature:
 
 
 def signatures(arm: Arm, made: RegressionData, ref: Motion) -> list[Signature]:
-    """All effects of the library on all their joints, every shape of the grid.
+    """Return signatures of all effects of the library on all their joints, for every shape of the grid.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def signatures(arm: Arm, made: RegressionData, ref: Motion) -> list[Signature]:
     made : RegressionData
         Motions and scale.
     ref : Motion
-        Motion by whose speeds, levels and travel the grid is laid out; the same for training and holdout.
+        Motion whose speeds, levels and travel set the grid; one for training and holdout.
     """
     found: list[Signature] = []
     for j in range(arm.n_joints):
@@ -72,7 +72,7 @@ def _built(effect: str, joint: int | None, made: RegressionData, shapes: Callabl
 
 
 def _placed(columns: Array, joint: int | None, n: int) -> Array:
-    """Columns on all joints' rows."""
+    """Return columns of one joint placed in the rows of all joints, zero in others."""
     if columns.ndim == 3 or joint is None:
         return columns
     full = np.zeros((len(columns), n, columns.shape[1]))
@@ -192,7 +192,7 @@ def _rotor(_: Arm, x: Motion, j: int, ref: Motion) -> Shapes:
 
 
 def _moved(arm: Arm, x: Motion, shift: Callable[[Array], tuple[Array, Array, Array]], j: int) -> Array:
-    """Change of the nominal torque when joint `j` is read differently, per unit of the shift."""
+    """Return the change of the nominal torque by a shift of joint `j`'s position reading, per unit of the shift."""
     parts = [x.q.copy(), x.dq.copy(), x.ddq.copy()]
     for part, moved in zip(parts, shift(np.column_stack([x.q[:, j], x.dq[:, j], x.ddq[:, j]])), strict=True):
         part[:, j] += POSITION_STEP * moved
@@ -299,9 +299,9 @@ PER_JOINT: dict[str, ShapeFunction] = {
     "cross_friction": _crossed,
 }
 PER_ARM: dict[str, ShapeFunction] = {"payload": _payload, "base_tilt": _tilt, "rotor_coupling": _coupling}
-#: Effects between two joints.
+#: Names of hidden effects that couple two joints.
 COUPLED = {"cross_friction", "rotor_coupling"}
-#: Effects that make no sense on a linear axis.
+#: Names of effects that do not exist on a linear axis.
 ROTARY = {
     "load_dependent_friction",
     "position_dependent_friction",

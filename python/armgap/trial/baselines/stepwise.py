@@ -1,9 +1,9 @@
-"""Stepwise regression by BIC on torque residuals, checked on the holdout.
+"""Baseline by stepwise regression on torque residuals by BIC, checked on the holdout.
 
 In every step the effect (with the best shape of its grid) that lowers BIC most is added; BIC counts a term per coefficient and
 one for the choice among shapes, twice the logarithm of their number. The arm's parameters are
-re-estimated each time with the arm file's sigmas as prior. Of those that lower BIC by more than ten the first is taken
-that lowers the held-out residual by two percent too (pushes are not asked to). At most four are named.
+re-estimated each time with the arm file's sigmas as prior. Of candidates that lower BIC by more than ten the first is taken
+that lowers the held-out residual by two percent too (not required of external pulses). At most four are named.
 
 References
 ----------
@@ -26,14 +26,15 @@ from armgap.trial.methods import Method
 
 __all__ = ["STEPWISE"]
 
-#: Causes at most, as the diagnosis; decrease of the BIC that a cause has to bring; factor on the holdout's error that it has to stay below.
+#: Causes named by stepwise regression at most, as in a diagnosis; decrease of the BIC that a cause has to bring; factor on the holdout's error that
+#: it has to stay below.
 MAX_CAUSES, EVIDENCE, HELD_OUT = 4, 10.0, 0.98
 EVENTS = ("external_pulse",)
 
 
 @dataclass
 class _Problem:
-    """Least squares with a prior: rows to learn from and rows to be judged on, and the columns so far."""
+    """Least squares with a prior: training rows, holdout rows, and the columns chosen so far."""
 
     columns: Array
     target: Array
@@ -42,26 +43,26 @@ class _Problem:
     rows: int
 
     def fit(self, extra: Array) -> tuple[float, Array]:
-        """Residual power, and coefficients, with more columns."""
+        """Return residual power and coefficients of the fit with further columns."""
         all_columns = np.hstack([self.columns, extra])
         coefficients = np.asarray(np.linalg.lstsq(all_columns, self.target, rcond=None)[0], dtype=np.float64)
         left = self.target - all_columns @ coefficients
         return float(left @ left), coefficients
 
     def bic(self, extra: Array, terms: int) -> float:
-        """BIC of a model with so many terms besides the arm's parameters."""
+        """Return the BIC of a model with `terms` terms besides the arm's parameters."""
         power, _ = self.fit(extra)
         return self.rows * float(np.log(max(power, 1e-300) / self.rows)) + terms * float(np.log(self.rows))
 
     def judged(self, extra: Array, held_extra: Array) -> float:
-        """Residual power on the holdout."""
+        """Return the residual power on the holdout of the fit with further columns."""
         _, coefficients = self.fit(extra)
         left = self.held_target - np.hstack([self.held, held_extra]) @ coefficients
         return float(left @ left)
 
 
 def answer(case: SealedCase) -> Answer:
-    """Name what stepwise selection keeps."""
+    """Return an answer with the effects that stepwise selection keeps."""
     problem, candidates = _problem(case)
     chosen: list[NamedCause] = []
     price = _price([s for s, _ in candidates])
@@ -89,7 +90,7 @@ ScoredCandidate = tuple[float, Signature, Signature]
 
 
 def _confirmed(problem: _Problem, scored: list[ScoredCandidate], limit: float) -> list[ScoredCandidate]:
-    """What is left once candidates before the first that the holdout confirms are gone; empty if none below the limit is."""
+    """Return the candidates from the first that the holdout confirms on; empty if no candidate below the BIC limit is confirmed."""
     for i, (value, s, held) in enumerate(scored):
         if value > limit:
             break
@@ -115,13 +116,13 @@ def _problem(case: SealedCase) -> tuple[_Problem, list[tuple[Signature, Signatur
 
 
 def _price(candidates: list[Signature]) -> dict[tuple[str, int | None], float]:
-    """What the choice among an effect's shapes costs."""
+    """Return the BIC penalty for the choice among an effect's shapes, by effect and joint."""
     count = Counter((s.effect, s.joint) for s in candidates)
     return {key: 2.0 * float(np.log(n)) for key, n in count.items()}
 
 
 def _padded(s: Signature, problem: _Problem) -> Array:
-    """The signature's columns, zero in the rows of the prior."""
+    """Return the signature's columns with zero in the rows of the prior."""
     padded = np.zeros((len(problem.target), s.columns.shape[1]))
     padded[: len(s.columns)] = s.columns
     return padded
@@ -136,7 +137,7 @@ def _holds(problem: _Problem, s: Signature, held: Signature) -> bool:
 
 
 def _weight(scored: list[ScoredCandidate], chosen: Signature) -> float:
-    """Posterior weight of an effect against all others, from their best BICs."""
+    """Return the posterior weight of an effect against all others, from their best BICs."""
     best: dict[tuple[str, int | None], float] = {}
     for value, s, _ in scored:
         key = (s.effect, s.joint)

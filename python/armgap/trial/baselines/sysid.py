@@ -1,6 +1,6 @@
-"""`mujoco.sysid`, the identification tool that comes with MuJoCo, asked which of its parameters moved.
+"""Baseline by `mujoco.sysid`, MuJoCo's identification tool: parameters that differ from neutral values name the effects.
 
-The parameters with which MuJoCo can express an effect of the library are freed at once, beside the arm's own, and fitted
+The parameters with which MuJoCo can express an effect of the library are freed at once, together with the arm's own, and fitted
 by `mujoco.sysid.optimize` to predictions over short windows. Left out are those that no fit separates from the arm's own or
 from another's: torque gain, armature of the first joint, payload, and tilt beside the first encoder's zero. The report
 gives an interval for every parameter and warns of those at a bound. An effect is named if its interval excludes the value
@@ -34,9 +34,9 @@ from armgap.trial.simulation.engine import TrialEngineMissingError
 
 __all__ = ["SYSID"]
 
-#: Windows it is fitted to, iterations at most, causes named at most, and trust in the arm file, in sigmas, as bounds.
+#: Windows that `mujoco.sysid` is fitted to, iterations at most, causes named at most, and bounds of parameters in the arm file's sigmas.
 _WINDOWS, ITERATIONS, MAX_CAUSES, _TRUST = 10, 10, 4, 4.0
-#: Effects among its parameters, and their equivalents.
+#: Effects that parameters of MuJoCo express, and their equivalents.
 EXPRESSED = frozenset(
     {
         "torque_offset",
@@ -51,14 +51,14 @@ EXPRESSED = frozenset(
         "base_tilt",
     }
 )
-#: Step of finite differences, as a share of the scales: above what the contact solver's tolerance leaves.
+#: Step of finite differences, as a share of the parameters' scales: above the error of the contact solver.
 FINITE_DIFFERENCE_STEP = 1e-4
 Set = Callable[[Any, float], None]
 
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """An effect as a parameter of a MuJoCo model: its neutral value, where to start, its bounds, and how it is set."""
+    """An effect as a parameter of a MuJoCo model: neutral value, initial value, bounds, and function that sets it."""
 
     effect: str
     joint: int | None
@@ -71,7 +71,7 @@ class EffectParameter:
 
     @property
     def name(self) -> str:
-        """Unique name."""
+        """Unique name of the parameter: the effect and its joint, as ``effect:joint``."""
         return f"{self.effect}:{self.joint or ''}"
 
 
@@ -100,7 +100,7 @@ def answer(case: SealedCase) -> Answer:
 
 
 def _scale(parameters: Any) -> Array:
-    """A tenth of each parameter's range, so that all are of one size to the optimiser."""
+    """Return a tenth of each parameter's range, which scales all parameters to one size for the optimiser."""
     low, high = parameters.get_bounds()
     scale: Array = 0.1 * (np.asarray(high) - np.asarray(low))
     return scale
@@ -124,12 +124,12 @@ def _named(effect_parameters: list[EffectParameter], x: Array, intervals: Array,
 
 
 def _confidence(away: float) -> float:
-    """Confidence of the largest interval that excludes the neutral value, for a normal estimate."""
+    """Return the confidence of the largest interval that excludes the neutral value, for a normal estimate `away` sigmas from it."""
     return math.erf(1.96 * away / math.sqrt(2.0))
 
 
 def _at_bounds(insights: Any) -> list[str]:
-    """Parameters the report warns of."""
+    """Return the parameters at a bound, by the warnings of `mujoco.sysid`."""
     warnings = [i["message"] for i in insights.get_context()["insights"] if i["type"] == "warning"]
     return [w.split("<b>")[1].split("</b>")[0] for w in warnings]
 
@@ -155,7 +155,7 @@ def _sequences(sysid: Any, arm: Arm, windows: list[Window]) -> Any:
 
 
 def _compare(sysid: Any, arm: Arm, windows: list[Window]) -> Callable[..., Any]:
-    """Predicted minus measured positions at the log's samples, in multiples of their scatter."""
+    """Return a function for predicted minus measured positions at the log's samples, in multiples of their scatter."""
     scale = np.std(np.concatenate([w.q - w.q0 for w in windows]), axis=0)
 
     def compare(params: Any, predicted: Any, measured: Any, model: Any, return_all: bool, *, state: Array) -> Any:
@@ -169,7 +169,7 @@ def _compare(sysid: Any, arm: Arm, windows: list[Window]) -> Callable[..., Any]:
 
 
 def _delayed(sysid: Any, effect_parameters: list[EffectParameter]) -> Callable[..., Any]:
-    """Rollouts whose commands come late by the delays and lags among the parameters, as a user's own rollout would do it."""
+    """Return a rollout function that delays and lags commands by the delays and lags among the parameters."""
     late = [k for k in effect_parameters if k.effect in ("actuator_delay", "actuator_lag")]
 
     def rollout(*, control_signal: Any, param_dicts: Any, **rest: Any) -> Any:
@@ -194,7 +194,7 @@ def _late(sysid: Any, control: Any, params: Any, late: list[EffectParameter]) ->
 
 
 def _lagged(u: Array, t: Array, constant: float) -> Array:
-    """First-order lag of commands held from step to step: its mean over each step."""
+    """Return the mean over each step of commands, held from step to step, behind a first-order lag."""
     from scipy.signal import lfilter
 
     dt = float(t[1] - t[0])
@@ -237,7 +237,7 @@ def _parameter(sysid: Any, parameter: EffectParameter) -> Any:
 
 
 def _effect_parameters(arm: Arm, windows: list[Window]) -> list[EffectParameter]:
-    """Effects that a parameter of MuJoCo expresses and a fit can separate; starts stand a little inside their bounds."""
+    """Return the effects that a parameter of MuJoCo expresses and a fit can separate; initial values lie slightly inside the bounds."""
     tau = np.concatenate([w.tau for w in windows])
     speed = np.quantile(np.abs([w.dq0 for w in windows]), 0.95, axis=0)
     travel = np.ptp([w.q0 for w in windows], axis=0)

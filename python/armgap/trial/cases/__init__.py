@@ -1,1 +1,1 @@
-"""Sealed cases: what is hidden, whether it can be seen, and the files they come to."""
+"""Sealed cases of a trial: hidden effects, their visibility, and the files of a case."""

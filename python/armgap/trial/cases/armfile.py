@@ -1,4 +1,4 @@
-"""The arm file of a case: what the diagnosis is told about the arm."""
+"""Arm file of a trial case: nominal parameters as given to the diagnosis."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 
 from armgap.trial.simulation.arms import TURN, TrialArm
 
-#: 1-sigma trust in the nominal values, relative.
+#: Relative standard deviation of the nominal parameters of a trial arm.
 SIGMA_INERTIAL = 0.05
 SIGMA_FRICTION = 0.20
 
 
 @dataclass(frozen=True)
 class Nominal:
-    """What the arm file says, and how far it says it can be trusted.
+    """Nominal parameters of a trial case's arm file, with their standard deviations.
 
     Attributes
     ----------
     theta, sigma : tuple of float
-        Inertial, viscous, Coulomb.
+        Parameters and standard deviations: inertial, viscous, Coulomb [SI].
     """
 
     theta: tuple[float, ...]
@@ -29,7 +29,7 @@ class Nominal:
 
 
 def draw_nominal(rng: np.random.Generator, arm: TrialArm, exact: bool) -> Nominal:
-    """Nominal values: the true ones, or off by draws from N(0, sigma)."""
+    """Return nominal parameters: the true ones, or the true ones plus draws from N(0, sigma)."""
     truth = np.array(arm.theta)
     # Beyond two and a half sigma the trust itself would be wrong.
     error = np.zeros(truth.size) if exact else np.clip(rng.standard_normal(truth.size), -2.5, 2.5)
@@ -38,7 +38,7 @@ def draw_nominal(rng: np.random.Generator, arm: TrialArm, exact: bool) -> Nomina
 
 
 def spread(arm: TrialArm, theta: tuple[float, ...]) -> tuple[float, ...]:
-    """One-sigma trust that an arm file states with values `theta`."""
+    """Return the standard deviations that an arm file states with parameters `theta`."""
     truth, stated = np.array(arm.theta), np.abs(theta)
     sigma = np.where(truth != 0, _relative(arm) * stated, SIGMA_INERTIAL * np.max(truth))
     return tuple(float(x) for x in sigma)
@@ -50,7 +50,7 @@ def _relative(arm: TrialArm) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
 
 
 def arm_toml(arm: TrialArm, nominal: Nominal, name: str, sha256: str) -> str:
-    """Arm file as text, with the hash of the sealed key."""
+    """Return the text of a case's arm file, with the hash of the sealed key."""
     base, n = len(arm.inertial), arm.n_joints
     inertial, viscous, coulomb = (slice(0, base), slice(base, base + n), slice(base + n, None))
     full_turn = 1.0 if arm.kind == "axis" else TURN

@@ -1,4 +1,4 @@
-"""One case: an arm, its motions, what is hidden in it, and the files it comes to."""
+"""One case of a trial: an arm, its motions, its hidden effects, and its files."""
 
 from __future__ import annotations
 
@@ -23,40 +23,40 @@ from armgap.trial.simulation.excitation import STYLES, Excitation, Tracked, acce
 from armgap.trial.simulation.plant import PlantConfig
 from armgap.trial.simulation.simulated_arm import SimulatedArm, Trace, run
 
-#: Motions drawn before a case is given up.
+#: Motions drawn for a case before it is given up.
 ATTEMPTS = 30
-#: An effect that cannot be seen is made larger this often, by this much each time.
+#: Steps by which an invisible hidden effect is made larger at most, and increase of its size per step.
 GROWTHS, _GROWTH = 8, 0.15
-#: One effect in this many is made as small as can still be seen, in at most so many steps of that size.
+#: One hidden effect in so many is made as small as is still visible, in at most so many steps of this reduction.
 SHRUNK_ONE_IN, _SHRINKS, SHRINK = 5, 6, 0.4
-#: An arm that goes farther or faster with its effects has run away, rad and rad/s (m and m/s).
+#: Position and speed beyond which a simulated arm counts as diverged, rad and rad/s (m and m/s).
 _REACH, SPEED = 10.0, 30.0
-#: Controllers tried on an altered arm, each half as stiff as the one before.
+#: Controllers tried on an arm with hidden effects, each half as stiff as the preceding one.
 DETUNINGS = 6
 
 EffectRequest = tuple[str, int | None]
-#: An effect as hidden, its size, and how far it stands out.
+#: Hidden effects, their size from 0 to 1, and their visibility.
 SizedEffects = tuple[list[HiddenEffect], float, Visibility]
 
 
 class NoMotionError(ArmgapError, RuntimeError):
-    """No acceptable motion was found for an arm; another seed will do."""
+    """No acceptable motion was found for an arm; another seed helps."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A finished case.
+    """A finished case of a trial.
 
     Attributes
     ----------
     name : str
-        For people.
+        Name of the case.
     arm_file : str
         Text of ``arm.toml``.
     logs : dict of str to Trace
         ``train-1``, ``holdout-1``, ...
     key : Key
-        What is hidden.
+        Key with the hidden effects.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Case:
     key: Key
 
     def write(self, folder: str | Path) -> Path:
-        """Write ``arm.toml``, one Parquet file per log, and ``key.json``."""
+        """Write ``arm.toml``, one Parquet file per log, and ``key.json`` into a case folder."""
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
         write(target / ARM_FILE, self.arm_file)
@@ -88,24 +88,24 @@ def make_case(
     n_train: int = 1,
     n_holdout: int = 1,
 ) -> Case:
-    """Make a case; the same arguments make the same case.
+    """Make a case of a trial; equal arguments make equal cases.
 
     Parameters
     ----------
     seed : int or sequence of int
-        Everything random follows from it.
+        Seed of all random draws.
     effects : sequence of (name, joint), default none
-        What to hide; joints from 1, None for an effect of the whole arm.
+        Effects to hide; joints from 1, None for an effect of the whole arm.
     model : {"direct-drive", "geared", "pendulum", "axis"}
-        Machine around which the arm is drawn.
+        Machine around whose parameters the arm is drawn.
     size : float, optional
-        From 0, just above detectable, to 1, large; drawn by default.
+        Size of the effects, from 0, just above detectable, to 1, large; drawn by default.
     nominal : {"off", "exact"}
         Whether the arm file's values are off by draws from their sigma.
     style : {"multisine", "paper", "tracked"}, optional
         Motion; drawn per log by default.
     sample_period : float, optional
-        s; drawn from 1 to 5 ms by default.
+        Sample period [s]; drawn from 1 to 5 ms by default.
     duration : float, default 10
         Length of each log, s.
     n_train, n_holdout : int, default 1
@@ -138,7 +138,7 @@ def make_case(
 
 
 def simulated_arm_of(arm: TrialArm, hidden: Sequence[HiddenEffect], log: str | None = None) -> SimulatedArm:
-    """Put hidden effects into a fresh simulated arm, as they act in one log."""
+    """Return a new simulated arm with hidden effects, as they act in one log."""
     sim = SimulatedArm(PlantConfig(arm))
     for h in hidden:
         if h.log in (None, log):
@@ -147,7 +147,7 @@ def simulated_arm_of(arm: TrialArm, hidden: Sequence[HiddenEffect], log: str | N
 
 
 def possible(kind: str, n_joints: int, families: Sequence[str] = ("library",)) -> list[EffectRequest]:
-    """All effects and joints that make sense on a kind of arm."""
+    """Return all pairs of effect and joint that are possible on a kind of arm."""
     requests: list[EffectRequest] = []
     for e in REGISTRY.values():
         if e.family in families and kind in e.kinds:
@@ -195,7 +195,7 @@ def _hide(
     plain: dict[str, Trace],
     duration: float,
 ) -> tuple[tuple[HiddenEffect, ...], dict[str, Trace], dict[str, Any]]:
-    """Draw the effects, enlarge those that cannot be seen, and run the logs with all of them."""
+    """Draw the hidden effects, enlarge invisible ones, and simulate the logs with all of them."""
     draws = [int(x) for x in rng.integers(0, 2**63, len(effects))]
     hidden: list[HiddenEffect] = []
     sizes, seen = [], {}
@@ -223,7 +223,7 @@ def _alone(
     duration: float,
     size: float,
 ) -> SizedEffects | None:
-    """One effect of a size, alone on the arm, and how far it stands out; None if the arm is driven away."""
+    """Return one effect of a size, alone on the arm, with its visibility; None if the arm diverges."""
     hidden = list(_draw_hidden([number], [size], arm, [request], list(plain.values()), list(plain)))
     logs = _measure(arm, hidden, motions, duration)
     if not _sane(logs):
@@ -234,7 +234,7 @@ def _alone(
 def _fit_size(
     number: int, size: float, may_shrink: bool, at: Callable[[float], SizedEffects | None]
 ) -> SizedEffects | None:
-    """Enlarge an effect until it can be seen, or as far as it goes; shrink one in :data:`SHRUNK_ONE_IN` to where it just can."""
+    """Enlarge an effect until it is visible, or as far as possible; shrink one in :data:`SHRUNK_ONE_IN` to the limit of visibility."""
     best = at(size)
     for growth in range(1, GROWTHS):
         if best is None or best[2].visible:
@@ -293,7 +293,7 @@ def _measure(
 
 
 def _log(arm: TrialArm, hidden: Sequence[HiddenEffect], name: str, motion: Excitation, duration: float) -> Trace:
-    """Run one log; a controller that oscillates on the altered arm is made softer first, as anyone would."""
+    """Simulate one log; the stiffness of a controller that oscillates on the altered arm is reduced first."""
     for _ in range(DETUNINGS):
         trace = run(simulated_arm_of(arm, hidden, name), motion.source(arm), duration)
         if not (isinstance(motion, Tracked) and rings(trace)):
@@ -303,7 +303,7 @@ def _log(arm: TrialArm, hidden: Sequence[HiddenEffect], name: str, motion: Excit
 
 
 def _sane(logs: dict[str, Trace]) -> bool:
-    """Whether no log runs away."""
+    """Whether no log of a case diverges."""
     return all(bool(np.max(np.abs(x.q)) < _REACH and np.max(np.abs(x.dq_true)) < SPEED) for x in logs.values())
 
 

@@ -1,6 +1,6 @@
-"""The demo's case: one arm, one hidden effect, two logs; everything from one number.
+"""Demo case: one arm, one hidden effect, two logs, all drawn from one seed.
 
-``python -m armgap.trial --seed 7 -o folder`` makes the case of that seed.
+``python -m armgap.trial --seed 7 -o folder`` makes the demo case of seed 7.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ import numpy as np
 
 from armgap.trial.cases.case import Case, NoMotionError, make_case
 
-#: Seed of the case that comes with the project.
+#: Seed of the demo case in the package.
 DEMO_SEED = 1997
-#: Effects the demo may hide.
+#: Effects that the demo case may hide.
 DEMO_EFFECTS = (
     "actuator_delay",
     "actuator_lag",
@@ -35,12 +35,12 @@ def make_demo_case(seed: int = DEMO_SEED) -> Case:
     Parameters
     ----------
     seed : int, default 1997
-        Any number.
+        Seed of all draws.
 
     Raises
     ------
     NoMotionError
-        No motion was found; rare, take another seed.
+        No acceptable motion was found; rare, another seed helps.
     """
     rng = np.random.default_rng([seed, 0])
     effect = str(rng.choice(DEMO_EFFECTS))

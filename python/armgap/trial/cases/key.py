@@ -1,4 +1,4 @@
-"""The sealed key of a case: what was hidden, and the hash that fixes it beforehand."""
+"""The sealed key of a case: hidden effects, and the hash that fixes them beforehand."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ SCHEMA = "armgap.key/1"
 
 
 class SealError(OptionError):
-    """A key that cannot be trusted: missing, not the sealed one, or of an arm file without a seal."""
+    """Error: the key of a case is missing, not the sealed one, or belongs to an arm file without a seal."""
 
 
 @dataclass(frozen=True)
 class HiddenEffect:
-    """One hidden effect.
+    """One hidden effect of a case.
 
     Attributes
     ----------
     effect : str
-        Standard name.
+        Standard name of the effect.
     joint : int or None
-        From 1; None for the whole arm.
+        Joint from 1; None for the whole arm.
     parameters : dict of str to float
-        SI.
+        True parameters [SI].
     log : str or None
-        The log it is in, for an event; None when it is in all of them.
+        Log with the effect, for an event; None for an effect in all logs.
     family : str
         ``"library"``, ``"further"`` or ``"outside"``.
     """
@@ -48,7 +48,7 @@ class HiddenEffect:
     family: str = "library"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object."""
+        """Return the hidden effect as a JSON object."""
         return {
             "effect": self.effect,
             "joint": self.joint,
@@ -60,20 +60,20 @@ class HiddenEffect:
 
 @dataclass(frozen=True)
 class Key:
-    """What a case hides.
+    """Key of a case: its hidden effects and true parameters.
 
     Attributes
     ----------
     effects : tuple of HiddenEffect
-        Empty for a case without effects.
+        Hidden effects; empty for a case without effects.
     nominal : {"exact", "off"}
-        Whether the arm file's values are the true ones.
+        Whether the arm file's parameters are exact or off.
     theta : tuple of float
         The arm's true parameters: inertial, viscous, Coulomb.
     details : dict
         How the case was made: seed, arm, motions, and how far the effects move the arm.
     nonce : str
-        Random; without it the hash of a short key could be searched for.
+        Random text, without which a short key could be found from its hash by search.
     """
 
     effects: tuple[HiddenEffect, ...]
@@ -96,12 +96,12 @@ class Key:
 
     @property
     def sha256(self) -> str:
-        """Hash of :meth:`to_json`, as the arm file states it."""
+        """SHA-256 of :meth:`to_json`, as stated in the arm file."""
         return hashlib.sha256(self.to_json().encode()).hexdigest()
 
     @classmethod
     def from_json(cls, text: str) -> Key:
-        """Read a key.
+        """Read a key from JSON.
 
         Raises
         ------
@@ -138,7 +138,7 @@ def open_key(case: str | Path) -> Key:
 
 
 def check_seal(case: str | Path) -> str:
-    """Check that the key of a case folder is the sealed one, without looking into it; return its sha256.
+    """Check that the key of a case folder is the sealed one, without returning its contents; return its SHA-256.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Where things lie in the folder of a trial."""
+"""Layout of the folder of a trial."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ __all__ = ["ANSWERS", "ARM_FILE", "MANIFEST", "MOST_CASES", "belongs", "case_fol
 MANIFEST = "trial.json"
 ANSWERS = "answers"
 ARM_FILE = "arm.toml"
-#: Cases of a trial at most.
+#: Largest number of cases of a trial.
 MOST_CASES = 100_000
 _CASE = "case-"
 
 
 def case_name(number: int) -> str:
-    """Name of a case's folder."""
+    """Return the name of a case's folder, by number."""
     return f"{_CASE}{number:04d}"
 
 
 def case_folders_in(folder: Path) -> list[Path]:
-    """Folders of the cases of a trial, in order; those that are being made have hidden names."""
+    """Return the folders of the cases of a trial, in order; unfinished ones have hidden names and are left out."""
     return sorted(p.parent for p in folder.glob(f"*/{ARM_FILE}") if not p.parent.name.startswith("."))
 
 
 def belongs(entry: Path) -> bool:
-    """Whether an entry of a trial's folder is one of the trial's own; pages of scores may lie beside them."""
+    """Whether an entry of a trial's folder belongs to the trial; pages of scores may lie beside these."""
     return entry.name in (MANIFEST, ANSWERS) or entry.name.startswith(_CASE) or (entry / ARM_FILE).exists()

@@ -1,6 +1,6 @@
-"""A trial on disk: numbered case folders beside one file that says what they are, never what they hide.
+"""Making of a trial on disk: numbered case folders beside a manifest, which does not reveal the hidden effects.
 
-Making goes on where it stopped: a case folder appears only when it is whole, and one that is there is left alone.
+An interrupted trial can be resumed: a case folder appears only when it is complete, and existing ones are kept.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ SCHEMA = "armgap.trial-cases/1"
 
 @dataclass(frozen=True)
 class Manifest:
-    """How a trial was made: with this, and the same versions, it can be made again.
+    """Settings with which a trial was made, sufficient to make it again with equal versions.
 
     Attributes
     ----------
     seed, cases : int
-        Seed and number of cases.
+        Seed of the trial and number of its cases.
     duration : float
-        Length of each log, s.
+        Length of each log [s].
     version, engine : str
-        Of armgap and of the physics engine.
+        Versions of armgap and of the physics engine.
     """
 
     seed: int
@@ -48,17 +48,17 @@ class Manifest:
     engine: str
 
     def to_json(self) -> str:
-        """Return it as JSON."""
+        """Return the manifest as JSON."""
         return json.dumps({"schema": SCHEMA, **self.__dict__}, indent=1) + "\n"
 
 
 def make_cases(folder: Path, seed: int, cases: int, duration: float = 10.0, workers: int = 1) -> Iterator[Path]:
-    """Make the cases of a trial that are not there yet.
+    """Make the missing cases of a trial.
 
     Parameters
     ----------
     folder : Path
-        New, empty, or of the same trial.
+        Folder of the trial: new, empty, or with cases of this trial.
     seed, cases : int
         Seed and number of cases.
     duration : float, default 10
@@ -74,7 +74,7 @@ def make_cases(folder: Path, seed: int, cases: int, duration: float = 10.0, work
     Raises
     ------
     OptionError
-        The folder holds something else.
+        The folder holds other files.
     """
     wanted = Manifest(seed, cases, duration, _native.__version__, f"mujoco {mujoco().__version__}")
     _claim(folder, wanted)
@@ -88,7 +88,7 @@ def make_cases(folder: Path, seed: int, cases: int, duration: float = 10.0, work
 
 
 def read_manifest(folder: str | Path) -> Manifest | None:
-    """How the cases of a folder were made; None where it does not say."""
+    """Return the manifest of a folder of cases; None if it has none."""
     path = Path(folder) / MANIFEST
     if not path.is_file():
         return None
@@ -100,12 +100,12 @@ def read_manifest(folder: str | Path) -> Manifest | None:
 
 
 def seal_of_all(cases: list[Path]) -> str:
-    """One hash over the seals of all cases."""
+    """Return one hash over the seals of all cases."""
     return hashlib.sha256("".join(sealed_hash(c) for c in cases).encode()).hexdigest()
 
 
 def _claim(folder: Path, wanted: Manifest) -> None:
-    """Take a new or empty folder, or go on in the folder of the same trial."""
+    """Write the manifest to a new or empty folder, or check that the folder's manifest is equal."""
     path = folder / MANIFEST
     if path.is_file():
         if _load(path) != json.loads(wanted.to_json()):

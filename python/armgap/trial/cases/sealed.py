@@ -15,16 +15,16 @@ __all__ = ["SealedCase", "case_folders"]
 
 @dataclass(frozen=True)
 class SealedCase:
-    """Arm, logs to learn from, logs to judge on.
+    """Case of a trial without its key: arm, training logs, and holdout logs.
 
     Attributes
     ----------
     name : str
         Name of the case's folder.
     arm : Arm
-        As the arm file states it.
+        Arm as in the arm file.
     training, holdout : tuple of Log
-        At least one each.
+        Training and holdout logs, at least one each.
     """
 
     name: str
@@ -48,12 +48,12 @@ class SealedCase:
 
 
 def case_folders(folder: str | Path) -> list[Path]:
-    """Folders of the cases of a trial, in order.
+    """Return the folders of the cases of a trial, in order.
 
     Raises
     ------
     OptionError
-        There are none.
+        The folder holds no cases.
     """
     found = case_folders_in(Path(folder))
     if not found:

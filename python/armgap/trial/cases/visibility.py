@@ -1,11 +1,11 @@
-"""Whether a hidden effect can be seen at all, after the arm's parameters have been estimated again.
+"""Visibility of hidden effects after re-estimation of the arm's parameters.
 
-An effect may leave a trace in two ways. Either predictions over short windows go on missing after re-estimation, by a
-multiple of what they miss by without it; or re-estimation swallows it, and the parameters end up far from where the
-arm file says they are. An effect that does neither cannot be found by anyone, and its case is counted apart.
+An effect may leave a trace in two ways. Either prediction errors over short windows remain after re-estimation, at a
+multiple of those without the effect; or re-estimation absorbs the effect, and the parameters end up far from the
+arm file's. An effect that does neither cannot be found by any method, and its case is counted apart.
 
-The floor is the same prediction made of the same motions without the effect: what encoder steps and the start states
-taken from them leave.
+The floor is the prediction error for the same motions without the effect: the part of encoder steps and of start states
+taken from them.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from armgap.trial.simulation.simulated_arm import Array, Trace
 
 __all__ = ["MULTIPLE", "VISIBLE_SIGMAS", "Visibility", "visibility"]
 
-#: Visible: the predictions' error is at least this multiple of the floor ...
+#: A hidden effect is visible if the prediction error is at least this multiple of the floor.
 MULTIPLE = 2.0
-#: ... or the parameters move by at least this many of the arm file's sigmas.
+#: A hidden effect is visible if re-estimation moves the parameters by at least so many of the arm file's sigmas.
 VISIBLE_SIGMAS = 5.0
-#: Errors are taken over this share of the windows, those that miss most: contacts and pushes are rare.
+#: Share of windows with the largest errors from which visibility is computed: contacts and external disturbances are rare.
 _SHARE = 0.1
 
 
 @dataclass(frozen=True)
 class Visibility:
-    """How far an effect stands out.
+    """Visibility of a hidden effect in the logs of a case.
 
     Attributes
     ----------
     above_floor : float
-        RMS error of predictions after re-estimation, as a multiple of the floor: joint and logs as below.
+        RMS error of predictions after re-estimation, as a multiple of the floor, at the joint where it is largest.
     moved : float
         Distance by which re-estimation moves the parameters, in the arm file's sigmas.
     """
@@ -48,16 +48,16 @@ class Visibility:
 
     @property
     def visible(self) -> bool:
-        """Whether it can be found."""
+        """Whether the hidden effect is visible, so that a method can find it."""
         return self.above_floor >= MULTIPLE or self.moved >= VISIBLE_SIGMAS
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object."""
+        """Return the visibility as a JSON object."""
         return {**asdict(self), "visible": self.visible}
 
 
 def visibility(arm: TrialArm, plain: dict[str, Trace], logs: dict[str, Trace], everywhere: bool = True) -> Visibility:
-    """How far one hidden effect stands out in the logs of a case.
+    """Return the visibility of one hidden effect in the logs of a case.
 
     Parameters
     ----------
@@ -66,8 +66,8 @@ def visibility(arm: TrialArm, plain: dict[str, Trace], logs: dict[str, Trace], e
     plain, logs : dict of str to Trace
         The logs without and with the effect.
     everywhere : bool, default True
-        Whether the effect acts in all logs. Then training and holdout must both show it, and the smaller counts; of a
-        push only the training logs, in which it is.
+        Whether the effect acts in all logs. If so, the smaller visibility of training and holdout
+        counts; for an external pulse only training logs, which hold it.
     """
     m = Mechanism(arm.kind, arm.gravity, arm.length)
     theta = np.array(arm.theta)
@@ -88,7 +88,7 @@ def _windows(logs: dict[str, Trace], part: str) -> list[Window]:
 
 
 def _worst(error: Array) -> Array:
-    """RMS per joint over the windows that miss most."""
+    """Return the RMS per joint over the windows with the largest errors."""
     squares = np.sort(np.mean(error**2, axis=1), axis=0)[::-1]
     rms: Array = np.sqrt(np.mean(squares[: max(1, round(_SHARE * len(squares)))], axis=0))
     return rms

@@ -1,7 +1,7 @@
-"""Short windows of a log, predicted from measured starts by the model that the arm file describes, and its re-estimation.
+"""Short windows of a log, predicted from measured starts by the arm file's model, and re-estimation of the model.
 
-What re-estimating an arm's parameters can absorb is a question about the model that is re-estimated; so here, unlike
-in the making of the logs, armgap's own arm predicts.
+The model that a diagnosis re-estimates decides what re-estimation can absorb; so armgap's own dynamics predict here,
+unlike in the simulation of the logs.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from armgap import _native
 Array = NDArray[np.float64]
 NativeEffect = tuple[str, int | None, dict[str, float]]
 
-#: Length of a window, s.
+#: Length of a prediction window, s.
 WINDOW = 0.2
-#: Start states come from a cubic through the samples within this time, s, and through this many at least.
+#: Half width of the local cubic that gives start states, s, and its number of samples at least.
 AROUND, FEWEST = 0.012, 4
-#: Tolerances of the simulation, rad (m), the next where one is not reached.
+#: Tolerances of a simulation, rad (m), tried in order until one is reached.
 TOLERANCES = (1e-8, 1e-6, 1e-4)
 _STEPS, _STEP = 8, 1e-4
 
 
 @dataclass(frozen=True)
 class Mechanism:
-    """What does not change in an arm when its parameters do."""
+    """Kind, gravity and lengths of an arm, which stay fixed when its parameters are estimated."""
 
     kind: str
     gravity: float
@@ -37,16 +37,16 @@ class Mechanism:
 
 @dataclass(frozen=True)
 class Window:
-    """One window: times and torques from its start on, the measured start, and the positions to predict.
+    """Prediction window of a log: times and torques from its start, measured start state, and positions to predict.
 
     Attributes
     ----------
     t : ndarray, shape (n + 1,)
-        s.
+        Times [s].
     tau : ndarray, shape (n + 1, n_joints)
-        Commands.
+        Commanded torques [N m or N].
     q0, dq0 : ndarray, shape (n_joints,)
-        Start, from the measured positions around it.
+        Start state, from the measured positions around the start.
     q : ndarray, shape (n, n_joints)
         Measured positions after the start.
     """
@@ -59,7 +59,7 @@ class Window:
 
 
 def cut(t: Array, q: Array, tau: Array, length: float = WINDOW) -> list[Window]:
-    """Cut a log into windows, end to end."""
+    """Return a log cut into consecutive prediction windows."""
     h = float(np.median(np.diff(t)))
     rows, margin = round(length / h), max(FEWEST, round(AROUND / h))
     return [_window(t, q, tau, s, rows, margin) for s in range(margin, len(t) - max(rows, margin) - 1, rows)]
@@ -74,7 +74,7 @@ def _window(t: Array, q: Array, tau: Array, s: int, rows: int, margin: int) -> W
 
 
 def misses(m: Mechanism, theta: Array, windows: Sequence[Window], effects: Sequence[NativeEffect] = ()) -> Array:
-    """Measured minus predicted positions, shape (n_windows, n, n_joints).
+    """Return measured minus predicted positions [rad or m], shape (n_windows, n, n_joints).
 
     Raises
     ------
@@ -102,18 +102,18 @@ def refit(
     noise: Array,
     effects: Sequence[NativeEffect] = (),
 ) -> Array:
-    """Estimate the arm's parameters by Gauss-Newton, from `theta` and with `sigma` around it as prior.
+    """Estimate the arm's parameters by Gauss-Newton, with a prior of mean `theta` and standard deviation `sigma`.
 
     Parameters
     ----------
     theta, sigma : ndarray, shape (n_parameters,)
-        Prior; a parameter of `sigma` zero stays.
+        Mean and standard deviation of the prior; a parameter with `sigma` zero is fixed.
     windows : sequence of Window
-        Data.
+        Windows to fit.
     noise : ndarray, shape (n_joints,)
-        Standard deviation of what a perfect model misses by, per joint.
+        Standard deviation of a perfect model's prediction error, per joint [rad or m].
     effects : sequence of (name, joint, parameters)
-        Held as they are.
+        Effects with fixed parameters.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Effects that cases hide. The registry holds one entry per effect, filled by the modules of this folder."""
+"""Hidden effects of trial cases, registered one entry per effect by the modules of this folder."""
 
 from armgap.trial.effects import drive, friction, sensor, structure
 from armgap.trial.effects.base import REGISTRY, Draw, JointUsage, NoTravelError, Parameters, TrialEffect, usage

@@ -1,4 +1,4 @@
-"""What a hidden effect is: how large to make it, and how to put it into the arm."""
+"""Definition of hidden effects: draw of their parameters, and their application to a simulated arm."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from armgap.trial.simulation.arms import TrialArm
 from armgap.trial.simulation.simulated_arm import Array, SimulatedArm, Trace
 
 Parameters = dict[str, float]
-#: Logs have a travel in common if it is at least this share of the smallest range of any of them.
+#: Smallest travel common to all logs of a case, as a share of the smallest range of positions in any log.
 COMMON = 0.2
 
 
 class NoTravelError(ValueError):
-    """A joint's positions in the logs of a case hardly overlap."""
+    """Error: a joint's ranges of position in the logs of a case hardly overlap."""
 
 
 @dataclass(frozen=True)
 class JointUsage:
-    """How one joint is used by a case's motions: the quantities sizes are stated against.
+    """Torques, speeds and positions of one joint in a case's motions, which scale the sizes of effects.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class JointUsage:
     span : float
         Range of positions of the log that has the smallest, rad.
     duration : float
-        s.
+        Length of a log [s].
     """
 
     torque: float
@@ -50,12 +50,12 @@ class JointUsage:
 
     @property
     def travel(self) -> float:
-        """``high - low``.
+        """Travel ``high - low`` of the joint that all logs have in common [rad or m].
 
         Raises
         ------
         NoTravelError
-            It is next to nothing: the logs are of different places, and a size stated against it would be without bound.
+            If the travel is negligible: the logs' positions do not overlap, and sizes relative to it would be unbounded.
         """
         if self.high - self.low < COMMON * self.span:
             raise NoTravelError
@@ -63,7 +63,7 @@ class JointUsage:
 
 
 def usage(traces: list[Trace], joint: int) -> JointUsage:
-    """Summarise how a joint (from 0) is used, over all logs of a case."""
+    """Return the usage of a joint (from 0) over all logs of a case."""
     tau = np.concatenate([x.tau[:, joint] for x in traces])
     dq = np.concatenate([x.dq_true[:, joint] for x in traces])
     return JointUsage(
@@ -85,7 +85,7 @@ def _rate(trace: Trace, joint: int) -> Array:
 
 @dataclass(frozen=True)
 class Draw:
-    """Randomness and scales for one effect's parameters; ``size`` runs from 0 (barely) to 1 (large)."""
+    """Random generator and scales for the draw of one effect's parameters; ``size`` runs from 0 (barely visible) to 1 (large)."""
 
     rng: np.random.Generator
     size: float
@@ -94,23 +94,23 @@ class Draw:
     use: JointUsage
 
     def between(self, low: float, high: float) -> float:
-        """Geometric interpolation by ``size``."""
+        """Return the geometric interpolation between two values by ``size``."""
         return float(low * (high / low) ** self.size)
 
     def uniform(self, low: float, high: float) -> float:
-        """Uniform draw."""
+        """Return a uniform random draw between two values."""
         return float(self.rng.uniform(low, high))
 
     def log_uniform(self, low: float, high: float) -> float:
-        """Log-uniform draw."""
+        """Return a log-uniform random draw between two values."""
         return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
 
     def sign(self) -> float:
-        """+1 or -1."""
+        """Return a random sign, +1 or -1."""
         return float(self.rng.choice([-1.0, 1.0]))
 
     def high_side(self) -> float:
-        """+1 if the joint reaches further up than down from zero, else -1; a draw where both will do."""
+        """Return +1 if the joint reaches further up than down from zero, else -1; a random sign where both are possible."""
         up, down = self.use.high, -self.use.low
         if min(up, down) > 0.5 * max(up, down):
             return self.sign()
@@ -118,33 +118,33 @@ class Draw:
 
     @property
     def coulomb(self) -> float:
-        """Nominal Coulomb level."""
+        """Nominal Coulomb friction of the joint [N m or N]."""
         return self.arm.coulomb[self.joint]
 
     @property
     def inertia(self) -> float:
-        """Diagonal inertia at ``q = 0``."""
+        """Diagonal entry of the inertia matrix at ``q = 0`` for the joint [kg m^2 or kg]."""
         return self.arm.joint_inertia[self.joint]
 
 
 @dataclass(frozen=True)
 class TrialEffect:
-    """One effect of the generator.
+    """Registry entry of one hidden effect.
 
     Attributes
     ----------
     name : str
-        Standard name.
+        Standard name of the effect.
     per_joint : bool
-        Whether it sits on one joint rather than the whole arm.
+        Whether the effect acts on one joint, not on the whole arm.
     family : {"library", "further", "outside"}
         One of the 24 standard effects; a known effect beyond them; one meant to be outside any library.
     kinds : tuple of str
-        Kinds of arm on which it makes sense.
+        Kinds of arm on which the effect is possible.
     draw : callable
-        Parameters for a :class:`Draw`.
+        Function that returns parameters for a :class:`Draw`.
     apply : callable
-        Puts it into a simulated arm, on a joint (from 0), for the log it is given.
+        Function that adds the effect to a joint (from 0) of a simulated arm, for one log.
     """
 
     name: str
@@ -171,7 +171,7 @@ def effect(
     family: str = "library",
     kinds: tuple[str, ...] = ANY,
 ) -> Callable[[Apply], Apply]:
-    """Register the decorated function as what puts effect ``name`` into a simulated arm."""
+    """Return a decorator that registers a function as the one that adds effect ``name`` to a simulated arm."""
 
     def register(apply: Apply) -> Apply:
         REGISTRY[name] = TrialEffect(name, per_joint, family, kinds, draw, apply)

@@ -1,4 +1,4 @@
-"""Effects of the drive: between the command and the joint."""
+"""Hidden effects of the drive: between the command and the joint."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SPAN = 2.0 * math.pi
 
 @effect("torque_offset", lambda d: {"offset": d.sign() * d.use.torque * d.between(0.01, 0.15)})
 def torque_offset(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """A constant torque."""
+    """Add a constant torque to the joint of a simulated arm."""
     torque_law(sim, joint, lambda x: p["offset"])
 
 
@@ -25,13 +25,13 @@ def _draw_gain(d: Draw) -> Parameters:
 
 @effect("torque_gain", _draw_gain)
 def torque_gain(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """``gain`` times the command."""
+    """Multiply the command of a joint of a simulated arm by ``gain``."""
     sim.actuators[joint].add(Gain(p["gain"]))
 
 
 @effect("actuator_lag", lambda d: {"time_constant": d.between(0.001, 0.02)})
 def actuator_lag(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """First-order lag of the torque."""
+    """Add a first-order lag to the torque of a joint."""
     sim.actuators[joint].add(Lag(p["time_constant"]))
 
 
@@ -43,19 +43,19 @@ def _draw_delay(d: Draw) -> Parameters:
 
 @effect("actuator_delay", _draw_delay)
 def actuator_delay(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Pure delay of the torque, a whole number of internal steps."""
+    """Delay the torque of a joint by a whole number of internal steps."""
     sim.actuators[joint].add(Delay(p["delay"]))
 
 
 @effect("torque_saturation", lambda d: {"level": d.use.peak * (1.0 - d.between(0.06, 0.5))})
 def torque_saturation(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Torque clipped at ``level``, below the peaks of every log."""
+    """Clip the torque of a joint at ``level``, below the peaks of every log."""
     sim.actuators[joint].add(Saturation(p["level"]))
 
 
 @effect("torque_dead_zone", lambda d: {"level": d.use.torque * d.between(0.02, 0.3)})
 def torque_dead_zone(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """No torque below ``level``, the excess over it above."""
+    """Add a dead zone to the torque of a joint: zero below ``level``, the excess above it."""
     sim.actuators[joint].add(DeadZone(p["level"]))
 
 
@@ -71,7 +71,7 @@ def _draw_ripple(d: Draw) -> Parameters:
 
 @effect("torque_ripple", _draw_ripple)
 def torque_ripple(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Torque ``amplitude sin(n q + phase)``, cogging."""
+    """Add the cogging torque ``amplitude sin(n q + phase)`` to a joint."""
     torque_law(sim, joint, lambda x: p["amplitude"] * math.sin(p["n"] * x.q + p["phase"]))
 
 
@@ -88,20 +88,20 @@ def _draw_elasticity(d: Draw) -> Parameters:
 
 @effect("joint_elasticity", _draw_elasticity)
 def joint_elasticity(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """A rotor, additional to the nominal arm, that drives the joint through a spring and damper.
+    """Add a rotor to the nominal arm that drives the joint through a spring and damper.
 
     The encoder and the friction are on the joint's side of the spring.
     """
     sim.config.rotors[joint] = Rotor(p["rotor_inertia"], p["stiffness"], p["damping"])
 
 
-#: Share of the joint's inertia that sits before the play.
+#: Rotor inertia on the motor side of backlash, as a share of the joint's inertia.
 BACKLASH_ROTOR = 0.12
 
 
 @effect("backlash", lambda d: {"gap": d.between(2e-3, 4e-2)}, kinds=("pendulum", "two-link"))
 def backlash(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Play of width ``gap`` between motor and joint, both ends together; the encoder is on the joint's side.
+    """Add backlash of total width ``gap`` between motor and joint; the encoder is on the joint's side.
 
     The motor's inertia is a share of the last link's, so that without play the arm is the nominal one.
     """
@@ -115,7 +115,7 @@ def backlash(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     family="outside",
 )
 def slew_limit(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Torque that changes by no more than ``rate`` per second."""
+    """Limit the rate of change of a joint's torque to ``rate`` per second."""
     sim.actuators[joint].add(SlewLimit(p["rate"]))
 
 
@@ -125,7 +125,7 @@ def slew_limit(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     family="outside",
 )
 def motor_hysteresis(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Part of the torque follows the command through a play, as the flux in magnetically hard iron."""
+    """Let part of a joint's torque follow the command through a play, like the flux in magnetically hard iron."""
     sim.actuators[joint].add(MagneticHysteresis(p["width"], p["share"]))
 
 
@@ -135,7 +135,7 @@ def motor_hysteresis(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     family="outside",
 )
 def torque_constant_variation(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Torque constant that varies with the rotor's position: ``tau (1 + amplitude sin(n q))``."""
+    """Let a joint's torque constant vary with the rotor's position: ``tau (1 + amplitude sin(n q))``."""
     torque_law(sim, joint, lambda x: x.tau * p["amplitude"] * math.sin(p["n"] * x.q))
 
 
@@ -148,5 +148,5 @@ def torque_constant_variation(sim: SimulatedArm, joint: int, p: Parameters) -> N
     family="outside",
 )
 def speed_ripple(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Torque ripple that grows with speed: ``amplitude dq sin(n q)``, from an uneven gear."""
+    """Add torque ripple that grows with speed to a joint: ``amplitude dq sin(n q)``, as by an uneven gear."""
     torque_law(sim, joint, lambda x: p["amplitude"] * x.dq * math.sin(p["n"] * x.q))

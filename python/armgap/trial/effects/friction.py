@@ -1,4 +1,4 @@
-"""Effects of friction. Coulomb levels are set on MuJoCo's ``frictionloss`` step by step."""
+"""Hidden effects of friction; Coulomb levels are set on MuJoCo's ``frictionloss`` step by step."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from armgap.trial.simulation.simulated_arm import SimulatedArm
 
 
 def torque_law(sim: SimulatedArm, joint: int, law: TorqueLaw) -> None:
-    """Add a torque on a joint."""
+    """Add a law for an additional torque to a joint."""
     sim.config.torque_laws.setdefault(joint, []).append(law)
 
 
 def friction_law(sim: SimulatedArm, joint: int, law: FrictionLaw) -> None:
-    """Add to a joint's Coulomb level."""
+    """Add a law for an additional Coulomb friction level to a joint."""
     sim.config.friction_laws.setdefault(joint, []).append(law)
 
 
 @effect("coulomb_asymmetry", lambda d: {"delta": d.sign() * d.coulomb * d.between(0.05, 0.5)})
 def coulomb_asymmetry(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Levels ``fc + delta`` forward and ``fc - delta`` backward.
+    """Set Coulomb friction of a joint to ``fc + delta`` forward and ``fc - delta`` backward.
 
-    At rest friction takes any value between the two, so this is symmetric friction moved by ``-delta``, always.
+    At rest friction takes any value between the two, so asymmetric friction equals symmetric friction plus the torque ``-delta``.
     """
     torque_law(sim, joint, lambda x: -p["delta"])
 
@@ -37,7 +37,7 @@ def _draw_stribeck(d: Draw) -> Parameters:
 
 @effect("stribeck", _draw_stribeck)
 def stribeck(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """``amplitude exp(-(dq / velocity)^2)`` on the Coulomb level."""
+    """Add the Stribeck term ``amplitude exp(-(dq / velocity)^2)`` to the Coulomb friction of a joint."""
     friction_law(sim, joint, lambda x, level: p["amplitude"] * math.exp(-((x.dq / p["velocity"]) ** 2)))
 
 
@@ -48,14 +48,14 @@ def _draw_quadratic(d: Draw) -> Parameters:
 
 @effect("quadratic_drag", _draw_quadratic)
 def quadratic_drag(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """``c dq |dq|``, MuJoCo's quadratic damping."""
+    """Add quadratic drag ``c dq |dq|`` to a joint, MuJoCo's quadratic damping."""
     quadratic, cubic = sim.config.drag.get(joint, (0.0, 0.0))
     sim.config.drag[joint] = (quadratic + p["c"], cubic)
 
 
 @effect("load_dependent_friction", lambda d: {"mu": d.between(0.05, 0.4)}, kinds=("pendulum", "two-link"))
 def load_dependent_friction(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """``mu |C dq + g|`` on the Coulomb level: the load that gravity and the other link put on the joint."""
+    """Add ``mu |C dq + g|`` to the Coulomb friction of a joint: a part of the load by gravity and the other link."""
     friction_law(sim, joint, lambda x, level: p["mu"] * abs(x.load))
 
 
@@ -66,7 +66,7 @@ def _draw_position(d: Draw) -> Parameters:
 
 @effect("position_dependent_friction", _draw_position, kinds=("pendulum", "two-link"))
 def position_dependent_friction(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """``a cos q + b sin q`` on the Coulomb level."""
+    """Add ``a cos q + b sin q`` to the Coulomb friction of a joint."""
     friction_law(sim, joint, lambda x, level: p["a"] * math.cos(x.q) + p["b"] * math.sin(x.q))
 
 
@@ -79,7 +79,7 @@ def _draw_warmup(d: Draw) -> Parameters:
 
 @effect("friction_warmup", _draw_warmup)
 def friction_warmup(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Viscous and Coulomb friction times ``1 + amplitude exp(-t / time_constant)``, from the start of each log."""
+    """Multiply viscous and Coulomb friction of a joint by ``1 + amplitude exp(-t / time_constant)``, from the start of each log."""
     viscous = sim.config.arm.viscous[joint]
 
     def excess(t: float) -> float:
@@ -96,14 +96,14 @@ def _draw_presliding(d: Draw) -> Parameters:
 
 @effect("presliding", _draw_presliding)
 def presliding(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Dahl friction beside the Coulomb friction: ``dz/dt = stiffness dq (1 - sgn(dq) z / amplitude)``."""
+    """Add Dahl friction to the Coulomb friction of a joint: ``dz/dt = stiffness dq (1 - sgn(dq) z / amplitude)``."""
     torque_law(sim, joint, Dahl(p["amplitude"], p["stiffness"]))
 
 
 class Dahl:
-    """Exact solution of Dahl's equation along the path: ``z`` tends to the amplitude with the distance travelled.
+    """Dahl friction, solved exactly along the path: ``z`` tends to the amplitude with the distance travelled.
 
-    A step that the plant undoes is followed by a call for an earlier time; the law then goes back one call.
+    A step that the plant undoes is followed by a call for an earlier time; the law then restores the state of the previous call.
     """
 
     def __init__(self, amplitude: float, stiffness: float) -> None:
@@ -111,7 +111,7 @@ class Dahl:
         self._now = self._before = (-math.inf, 0.0, 0.0)  # t, q, z
 
     def __call__(self, x: JointState) -> float:
-        """Torque on the joint."""
+        """Return the friction torque on the joint [N m or N]."""
         start = self._before if x.t <= self._now[0] else self._now
         _, q, z = start
         goal = math.copysign(self._amplitude, x.q - q)
@@ -127,13 +127,13 @@ def _draw_asymmetric(d: Draw) -> Parameters:
 
 @effect("viscous_asymmetry", _draw_asymmetric, family="further")
 def viscous_asymmetry(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Viscous coefficient ``b + delta`` forward and ``b - delta`` backward."""
+    """Set the viscous coefficient of a joint to ``b + delta`` forward and ``b - delta`` backward."""
     torque_law(sim, joint, lambda x: -p["delta"] * abs(x.dq))
 
 
 @effect("gear_efficiency", lambda d: {"loss": d.between(0.03, 0.3)}, family="further", kinds=ANY)
 def gear_efficiency(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Share ``loss`` of the motor's torque is lost while it drives (``tau dq > 0``), none while it is driven."""
+    """Let the share ``loss`` of a motor's torque be lost while it drives (``tau dq > 0``), none while it is driven."""
     torque_law(sim, joint, lambda x: -p["loss"] * x.tau if x.tau * x.dq > 0 else 0.0)
 
 
@@ -144,6 +144,6 @@ def gear_efficiency(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     kinds=TWO_LINK,
 )
 def cross_friction(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """``level sgn(dq)`` of the other joint's velocity, as in wrists that share a gear."""
+    """Add friction ``level sgn(dq)`` with the other joint's velocity ``dq`` to a joint, as in wrists that share a gear."""
     other = 1 - joint
     torque_law(sim, joint, lambda x: -p["level"] * math.tanh(x.others[other][1] / 0.01))

@@ -1,4 +1,4 @@
-"""Effects of the position sensor."""
+"""Hidden effects of the position sensor."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armgap.trial.simulation.simulated_arm import SimulatedArm
 
 @effect("encoder_offset", lambda d: {"offset": d.sign() * d.between(0.01, 0.15)}, kinds=ROTARY)
 def encoder_offset(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Measured ``q + offset``."""
+    """Add an offset to the encoder of a joint: measured ``q + offset``."""
     sim.encoders[joint].offset += p["offset"]
 
 
@@ -21,6 +21,6 @@ def _draw_eccentricity(d: Draw) -> Parameters:
 
 @effect("encoder_eccentricity", _draw_eccentricity, kinds=ROTARY)
 def encoder_eccentricity(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Measured ``q + a sin q + b cos q``."""
+    """Make the encoder of a joint eccentric: measured ``q + a sin q + b cos q``."""
     sim.encoders[joint].a += p["a"]
     sim.encoders[joint].b += p["b"]

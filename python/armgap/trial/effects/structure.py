@@ -1,4 +1,4 @@
-"""Effects of the structure: masses, gravity, springs, stops, and what touches the arm."""
+"""Hidden effects of the structure: masses, gravity, springs, stops, and external contacts."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ def _draw_payload(d: Draw) -> Parameters:
 
 @effect("payload", _draw_payload, per_joint=False, kinds=ROTARY)
 def payload(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """A point mass on the last link."""
+    """Add a point mass to the last link of a simulated arm."""
     sim.config.payload = (p["mass"], p["distance"])
 
 
 @effect("base_tilt", lambda d: {"angle": d.sign() * d.between(0.01, 0.15)}, per_joint=False, kinds=ROTARY)
 def base_tilt(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Base turned in the plane of motion: gravity sees ``q1 + angle``."""
+    """Tilt the base in the plane of motion: gravity acts as at ``q1 + angle``."""
     sim.config.tilt += p["angle"]
 
 
@@ -36,7 +36,7 @@ def _draw_spring(d: Draw) -> Parameters:
 
 @effect("joint_spring", _draw_spring)
 def joint_spring(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """``k (q - q0)``, MuJoCo's joint stiffness."""
+    """Add a spring ``k (q - q0)`` to a joint, MuJoCo's joint stiffness."""
     sim.config.spring[joint] = (p["k"], p["q0"], 0.0)
 
 
@@ -48,7 +48,7 @@ def _draw_armature(d: Draw) -> Parameters:
 
 @effect("rotor_inertia", _draw_armature)
 def rotor_inertia(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Inertia on the joint's own acceleration, MuJoCo's armature."""
+    """Add inertia on a joint's own acceleration, MuJoCo's armature."""
     sim.config.armature[joint] = p["inertia"]
 
 
@@ -63,7 +63,7 @@ def _draw_contact(d: Draw) -> Parameters:
 
 @effect("contact", _draw_contact)
 def contact(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Spring and damper beyond ``position``, on the side away from zero; it pushes and never pulls."""
+    """Add a unilateral spring and damper to a joint beyond ``position``, on the side away from zero."""
     side = math.copysign(1.0, p["position"])
 
     def push(x: JointState) -> float:
@@ -87,7 +87,7 @@ def _draw_pulse(d: Draw) -> Parameters:
 
 @effect("external_pulse", _draw_pulse)
 def external_pulse(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """A constant torque of the given impulse for ``duration`` around ``time``."""
+    """Add a constant torque of a given impulse to a joint, for ``duration`` around ``time``."""
     half, torque = 0.5 * p["duration"], p["impulse"] / p["duration"]
     torque_law(sim, joint, lambda x: torque if abs(x.t - p["time"]) < half else 0.0)
 
@@ -99,7 +99,7 @@ def _draw_hardening(d: Draw) -> Parameters:
 
 @effect("hardening_spring", _draw_hardening, family="further")
 def hardening_spring(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """``k (q - q0) + cubic (q - q0)^3``, MuJoCo's polynomial stiffness."""
+    """Add a spring ``k (q - q0) + cubic (q - q0)^3`` to a joint, MuJoCo's polynomial stiffness."""
     sim.config.spring[joint] = (p["k"], p["q0"], p["cubic"])
 
 
@@ -110,7 +110,7 @@ def _draw_coupling(d: Draw) -> Parameters:
 
 @effect("rotor_coupling", _draw_coupling, per_joint=False, family="further", kinds=TWO_LINK)
 def rotor_coupling(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Geared rotor of joint 2 on link 1: ``inertia (dq1 + gear dq2)^2 / 2``, MuJoCo's tendon armature."""
+    """Add a geared rotor of joint 2 to link 1: energy ``inertia (dq1 + gear dq2)^2 / 2``, MuJoCo's tendon armature."""
     sim.config.coupling = (p["inertia"], p["gear"])
 
 
@@ -120,7 +120,7 @@ def rotor_coupling(sim: SimulatedArm, joint: int, p: Parameters) -> None:
     family="further",
 )
 def cubic_drag(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """``c3 dq^3``, MuJoCo's cubic damping."""
+    """Add cubic drag ``c3 dq^3`` to a joint, MuJoCo's cubic damping."""
     quadratic, cubic = sim.config.drag.get(joint, (0.0, 0.0))
     sim.config.drag[joint] = (quadratic, cubic + p["c3"])
 
@@ -134,5 +134,5 @@ def _draw_flexure(d: Draw) -> Parameters:
 
 @effect("link_flexibility", _draw_flexure, per_joint=False, family="outside")
 def link_flexibility(sim: SimulatedArm, joint: int, p: Parameters) -> None:
-    """Outer part of the last link on a spring and damper: one more mode."""
+    """Mount the outer part of the last link on a spring and damper: one more vibration mode."""
     sim.config.flexure = Flexure(p["stiffness"], p["damping"])

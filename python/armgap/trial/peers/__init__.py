@@ -1,4 +1,4 @@
-"""Former name of `armgap.trial.baselines`; goes with 0.3.0."""
+"""Former name of the module `armgap.trial.baselines`; removed in 0.3.0."""
 
 from armgap._renamed import old_names
 

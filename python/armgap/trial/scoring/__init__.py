@@ -1,4 +1,4 @@
-"""Scoring answers against opened keys: per case, then over a trial."""
+"""Scoring of answers against opened keys, per case and over a trial."""
 
 from armgap.trial.scoring.case_score import CaseScore, score_case
 

@@ -1,4 +1,4 @@
-"""Whether probabilities mean what they say: of the causes named with 90 %, nine in ten should be right.
+"""Calibration of probabilities: of the causes named with 90 %, nine in ten should be right.
 
 References
 ----------
@@ -14,14 +14,14 @@ from dataclasses import dataclass
 
 __all__ = ["EDGES", "Bin", "Calibration", "calibrate", "wilson"]
 
-#: Edges of the bins of probability; a value on an edge belongs above it.
+#: Edges of the bins of probability; a probability on an edge belongs to the upper bin.
 EDGES = (0.0, 0.25, 0.5, 0.75, 0.9, 0.99, 1.0)
 Z_95 = 1.96
 
 
 @dataclass(frozen=True)
 class Bin:
-    """Causes named with a probability from `low` up to `high`: how many, how many right, their mean probability."""
+    """Causes named with a probability from `low` up to `high`: number, number of right ones, mean probability."""
 
     low: float
     high: float
@@ -37,7 +37,7 @@ class Calibration:
     Attributes
     ----------
     bins : tuple of Bin
-        Those that are not empty.
+        Bins that are not empty.
     brier : float or None
         Mean squared difference between probability and outcome; None without causes.
     ece : float or None
@@ -50,7 +50,7 @@ class Calibration:
 
 
 def calibrate(claims: Sequence[tuple[float, bool]]) -> Calibration:
-    """Calibration of causes, each with its probability and whether it was right.
+    """Return the calibration of named causes, each given by its probability and whether it was right.
 
     Examples
     --------
@@ -67,7 +67,7 @@ def calibrate(claims: Sequence[tuple[float, bool]]) -> Calibration:
 
 
 def wilson(right: int, of: int) -> tuple[float, float]:
-    """95 % interval of a share.
+    """Return Wilson's 95 % confidence interval of the share ``right / of``.
 
     Examples
     --------

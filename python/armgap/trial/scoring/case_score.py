@@ -1,4 +1,4 @@
-"""One answer against one opened key."""
+"""Score of one answer against one opened key."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armgap.trial.verdict import describe, equivalent
 
 __all__ = ["GROUPS", "CaseScore", "hidden_names", "score_case"]
 
-#: Groups of cases in the order of the tables, with what counts as right in each.
+#: Groups of cases in the order of the tables, with the rule for a right answer in each.
 GROUPS = {
     "one effect": "the first cause is the hidden one, on its joint, or its equivalent",
     "two effects": "the first cause is one of the two, or its equivalent",
@@ -27,31 +27,31 @@ GROUPS = {
 
 @dataclass(frozen=True)
 class CaseScore:
-    """What came of one case.
+    """Score of one method's answer to one case.
 
     Attributes
     ----------
     case, group, model, style : str
-        Its name, a key of :data:`GROUPS`, the machine, the motion of the first training log.
+        Name of the case, a key of :data:`GROUPS`, the machine, the style of motion of the first training log.
     hidden : tuple of (effect, joint)
         Distinct hidden effects.
     visible : float
-        How far the least visible hidden effect stands above what the measurement leaves; see
+        Prediction error by the least visible hidden effect as a multiple of the floor; see
         `armgap.trial.cases.visibility`.
     named : tuple of NamedCause
-        What was named, first cause first.
+        Named causes, the first cause first.
     matches : tuple of bool
-        Which of them are hidden, or equivalents of a hidden one.
+        Whether each named cause is hidden, or equivalent to a hidden one.
     right, exact : bool
-        By the rule of the group; without help of an equivalence.
+        Whether the answer is right by the rule of the group; whether it is right without an equivalence.
     listed : bool
-        Right, or a hidden effect stands among the look-alikes of the first cause.
+        Whether the answer is right, or a hidden effect is among the look-alikes of the first cause.
     found : int
-        Hidden effects among all causes.
+        Number of hidden effects among all named causes.
     located : bool, optional
-        The joint said to bear most of the gap is the hidden effects'; None where no joint is said, or they sit on several or on none.
+        Whether the joint named for most of the gap is that of the hidden effects; None if no joint is named, or they have no single joint.
     verdict, error, seconds
-        From the answer.
+        Verdict, error and CPU time [s] of the answer.
     """
 
     case: str
@@ -74,12 +74,12 @@ class CaseScore:
 
     @property
     def extra(self) -> int:
-        """Causes named that are not hidden."""
+        """Number of named causes that are not hidden."""
         return sum(not m for m in self.matches)
 
     @property
     def headline(self) -> str:
-        """Hidden and named, for people."""
+        """Hidden effects and named causes of the case in one line."""
         named = " and ".join(f"{describe([n.name])} p={n.probability:.2f}" for n in self.named)
         return f"{describe(list(self.hidden))} -> {named or self.verdict}"
 
@@ -117,7 +117,7 @@ def _located(answer: Answer, hidden: tuple[Name, ...], key: Key) -> bool | None:
 
 
 def hidden_names(key: Key) -> tuple[Name, ...]:
-    """Distinct effects and joints of a key, in its order."""
+    """Return distinct effects and joints of a key, in order."""
     return tuple(dict.fromkeys((e.effect, e.joint) for e in key.effects))
 
 
@@ -133,7 +133,7 @@ def _group(key: Key, hidden: Sequence[Name]) -> str:
 
 @cache
 def _library() -> frozenset[str]:
-    """Effects that armgap knows."""
+    """Return the names of the effects in armgap's library."""
     return frozenset(e["name"] for e in effects())
 
 

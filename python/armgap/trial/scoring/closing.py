@@ -1,9 +1,9 @@
-"""How much of the gap a method's model closes, against the best possible: the true form with its true sizes.
+"""Share of the gap that a method's model closes, against the best possible model: true effects with true sizes.
 
-Three models predict the same held-out windows from the same measured starts: the arm file as it is, the method's answer,
-and the truth of the key, as far as armgap can simulate it. What the truth still misses is noise. Left out are effects whose
-state at the start of a window no log holds: delays and lags of commands before the window, the deflection of springs,
-bristles and play. That the truth, made by MuJoCo, is predicted to the noise at all is a test of the effects' equations.
+Three models predict the holdout windows from their measured starts: the arm file as it is, the method's answer,
+and the true model by the key, as far as armgap can simulate it. The error of the true model is noise. Left out are effects with a
+latent state at the start of a window: delays and lags of commands before the window, the deflection of springs,
+bristles and play. That armgap's true model predicts MuJoCo's logs to within noise is a test of the effects' equations.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from armgap.trial.methods import HORIZON
 
 __all__ = ["HISTORY", "Closing", "closing", "model_error"]
 
-#: Effects with a state of their own.
+#: Names of effects with a latent state, which no log holds at the start of a window.
 HISTORY = frozenset({"actuator_lag", "actuator_delay", "presliding", "joint_elasticity", "backlash"})
-#: Effects of one log.
+#: Names of effects that act in one log of a case only.
 EVENTS = frozenset({"external_pulse"})
 _STEPS = 20
 
 
 @dataclass(frozen=True)
 class Closing:
-    """RMS errors per joint on held-out windows: arm file, answer, truth."""
+    """RMS errors per joint on held-out windows: of the arm file, the answer, and the true model."""
 
     case: str
     before: tuple[float, ...]
@@ -43,19 +43,19 @@ class Closing:
 
     @property
     def closed(self) -> float:
-        """Share of the gap above the truth's that is closed, over all joints."""
+        """Share of the gap above the true model's error that the answer closes, over all joints."""
         open_before = sum(max(b - t, 0.0) for b, t in zip(self.before, self.best, strict=True))
         open_after = sum(max(a - t, 0.0) for a, t in zip(self.after, self.best, strict=True))
         return 1.0 - open_after / open_before if open_before > 0 else 0.0
 
     @property
     def ratio(self) -> float:
-        """RMS error of the answer over that of the truth, joints pooled."""
+        """RMS error of the answer over that of the true model, joints pooled."""
         return math.hypot(*self.after) / math.hypot(*self.best)
 
 
 def closing(folder: Path, answer: Answer, key: Key) -> Closing | None:
-    """Compare an answer's model with arm file and truth; None where one of them cannot be simulated window by window."""
+    """Compare an answer's model with arm file and true model; None if one of them cannot be simulated window by window."""
     hidden = [(h.effect, h.joint, h.parameters) for h in key.effects if h.log is None]
     named = [(c.effect, c.joint, {k: x.value for k, x in c.sizes.items()}) for c in answer.causes]
     named = [n for n in named if n[0] not in EVENTS]
@@ -74,7 +74,7 @@ def closing(folder: Path, answer: Answer, key: Key) -> Closing | None:
 
 
 def model_error(arm: Arm, theta: Array, windows: Sequence[Window], placed: Sequence[NativeEffect]) -> Array:
-    """RMS error per joint of a model on windows, starts read through the encoders that it has."""
+    """Return the RMS error per joint of a model on windows, with starts corrected for the model's encoder errors."""
     lengths = () if arm.link_length is None else tuple(arm.link_length.tolist())
     error = misses(Mechanism(arm.kind, arm.gravity, lengths), theta, [_read(w, placed) for w in windows], placed)
     rms: Array = np.sqrt(np.mean(error**2, axis=(0, 1)))
@@ -87,7 +87,7 @@ def _simulable(placed: Sequence[NativeEffect]) -> bool:
 
 
 def _read(w: Window, placed: Sequence[NativeEffect]) -> Window:
-    """The window with its start as the joint has it, where the encoder shows something else."""
+    """Return a window with its start state corrected for encoder errors."""
     q, dq = w.q0.copy(), w.dq0.copy()
     for name, joint, p in placed:
         j = (joint or 1) - 1
@@ -100,7 +100,7 @@ def _read(w: Window, placed: Sequence[NativeEffect]) -> Window:
 
 
 def _inverse(shown: float, a: float, b: float) -> float:
-    """Solve ``q + a sin q + b cos q = shown`` by iteration; a and b are small."""
+    """Return ``q`` from ``q + a sin q + b cos q = shown`` by iteration; a and b are small."""
     q = shown
     for _ in range(_STEPS):
         q = shown - a * math.sin(q) - b * math.cos(q)

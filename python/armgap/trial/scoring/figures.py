@@ -1,4 +1,4 @@
-"""The figures of a trial: every case's score, summed up by what was hidden, and by method."""
+"""Figures of a trial: scores of all cases, summarised by hidden effect and by method."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from armgap.trial.scoring.sizes import BoundScore, SizeScore, bound_scores, size
 
 __all__ = ["BANDS", "CONFIDENT", "Figures", "Share", "figures", "opened_keys"]
 
-#: A cause with this probability or more is named with confidence.
+#: Probability from which a cause counts as named with confidence.
 CONFIDENT = 0.9
 #: Bands of visibility: lower edges, as multiples of the floor.
 BANDS = (0.0, 2.0, 10.0, 50.0, 250.0)
@@ -27,40 +27,40 @@ BANDS = (0.0, 2.0, 10.0, 50.0, 250.0)
 
 @dataclass(frozen=True)
 class Share:
-    """So many right of so many, and the 95 % interval of the share."""
+    """Share of right answers: numbers of right and of all answers, with the 95 % interval."""
 
     right: int
     of: int
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's 95 % interval."""
+        """Wilson's 95 % confidence interval of the share."""
         return wilson(self.right, self.of)
 
     @property
     def value(self) -> float:
-        """The share; 0 of 0 counts as 0."""
+        """Value of the share; 0 of 0 counts as 0."""
         return self.right / self.of if self.of else 0.0
 
 
 @dataclass(frozen=True)
 class Figures:
-    """What a method scored.
+    """Scores of one method over all cases of a trial.
 
     Attributes
     ----------
     method : str
-        Its name.
+        Name of the method.
     cases : tuple of CaseScore
-        Every case.
+        Scores of all cases.
     sizes : tuple of SizeScore
         Sizes of rightly named causes.
     bounds : tuple of BoundScore
-        Hidden effects that were called absent.
+        Bounds of hidden effects that were called absent.
     closings : tuple of Closing
-        The gap before and after, against the truth, of visible cases where that can be simulated.
+        Prediction errors of arm file, answer and true model, for visible cases that can be simulated.
     version : str
-        Version of the software that answered, all of them where there are several.
+        Version, or versions, of the software that answered.
     """
 
     method: str
@@ -72,12 +72,12 @@ class Figures:
 
     @property
     def visible(self) -> tuple[CaseScore, ...]:
-        """Cases with visible effects of the library: those that ask for a cause."""
+        """Cases with visible effects of the library, in which a cause has to be named."""
         return tuple(c for c in self.cases if c.group in ("one effect", "two effects"))
 
     @property
     def headline(self) -> Share:
-        """First cause and its joint right."""
+        """Share of visible cases whose first cause and joint are right."""
         return share(self.visible)
 
     @property
@@ -87,44 +87,44 @@ class Figures:
 
     @property
     def calibration(self) -> Calibration:
-        """Of all causes named in all cases."""
+        """Calibration of all causes named in all cases."""
         return calibrate([(n.probability, m) for c in self.cases for n, m in zip(c.named, c.matches, strict=True)])
 
     @property
     def confident(self) -> Share:
-        """Causes named with confidence, and how many of them are right."""
+        """Share of right causes among those named with confidence."""
         sure = [m for c in self.cases for n, m in zip(c.named, c.matches, strict=True) if n.probability >= CONFIDENT]
         return Share(sum(sure), len(sure))
 
     @property
     def extra(self) -> float:
-        """Causes named that are not there, per case."""
+        """Mean number of named causes per case that are not hidden."""
         return _mean([c.extra for c in self.cases])
 
     @property
     def alike(self) -> float:
-        """Look-alikes listed beside the first cause, per case with a cause."""
+        """Mean number of look-alikes listed with the first cause, per case with a cause."""
         return _mean([len(c.named[0].look_alikes) for c in self.cases if c.named])
 
     @property
     def size_error(self) -> float | None:
-        """Median error of the sizes of rightly named causes, as a share."""
+        """Median relative error of the sizes of rightly named causes."""
         return statistics.median(s.error for s in self.sizes) if self.sizes else None
 
     @property
     def coverage(self) -> Share:
-        """95 % intervals of sizes that hold the truth."""
+        """Share of 95 % intervals of sizes that contain the true size."""
         stated = [s.covered for s in self.sizes if s.covered is not None]
         return Share(sum(stated), len(stated))
 
     @property
     def bounds_hold(self) -> Share:
-        """95 % bounds of effects called absent that hold the hidden size."""
+        """Share of 95 % bounds of effects called absent that hold for the hidden size."""
         return Share(sum(b.holds for b in self.bounds), len(self.bounds))
 
     @property
     def closed(self) -> tuple[float, float] | None:
-        """Share of the gap that is closed against the best possible: median, and lower decile."""
+        """Share of the gap that is closed, against the best possible model: median, and lower decile."""
         if not self.closings:
             return None
         shares = sorted(c.closed for c in self.closings)
@@ -132,7 +132,7 @@ class Figures:
 
     @property
     def ratio(self) -> tuple[float, float] | None:
-        """RMS error on the holdout over the truth's: median, and upper decile."""
+        """RMS error on the holdout over the true model's: median, and upper decile."""
         if not self.closings:
             return None
         ratios = sorted(c.ratio for c in self.closings)
@@ -140,7 +140,7 @@ class Figures:
 
     @property
     def located(self) -> dict[str, Share]:
-        """By group: the joint said to bear most of the gap is that of the hidden effect."""
+        """Share of cases, by group, in which the joint named for most of the gap is that of the hidden effect."""
         groups: dict[str, list[bool]] = {}
         for c in self.cases:
             if c.located is not None:
@@ -156,7 +156,7 @@ class Figures:
     def by(
         self, key: Callable[[CaseScore], Iterable[str]], cases: Sequence[CaseScore] | None = None
     ) -> dict[str, Share]:
-        """Shares by what `key` says of a case, which may be several things."""
+        """Return shares of right cases by the labels that `key` gives a case."""
         found: dict[str, list[CaseScore]] = {}
         for case in self.cases if cases is None else cases:
             for name in key(case):
@@ -165,13 +165,13 @@ class Figures:
 
     @property
     def by_group(self) -> dict[str, Share]:
-        """By group, in their order."""
+        """Shares of right cases by group, in the groups' order."""
         found = self.by(lambda c: [c.group])
         return {group: found[group] for group in GROUPS if group in found}
 
     @property
     def by_band(self) -> dict[str, Share]:
-        """By how far the least visible effect stands above the floor."""
+        """Shares of right cases by band of visibility of the hidden effects."""
         found = self.by(lambda c: [band(c.visible)], self.visible)
         return {name: found[name] for name in map(_band_name, range(len(BANDS))) if name in found}
 
@@ -242,12 +242,12 @@ def _answer_to(case: Path, method: str) -> Answer:
 
 
 def share(cases: Sequence[CaseScore]) -> Share:
-    """How many cases are right."""
+    """Return the share of right cases."""
     return Share(sum(c.right for c in cases), len(cases))
 
 
 def band(visible: float) -> str:
-    """Name of the band of visibility."""
+    """Return the name of the band for a visibility, a multiple of the noise floor."""
     return _band_name(max(i for i, low in enumerate(BANDS) if visible >= low))
 
 

@@ -1,4 +1,4 @@
-"""The figures of a trial as a page of Markdown: what was asked, what came out, by method and by hidden effect."""
+"""Figures of a trial as a Markdown page: cases and scores, by method and by hidden effect."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ __all__ = ["page"]
 
 
 def page(all_figures: Sequence[Figures], manifest: Manifest | None, seal: str) -> str:
-    """Write the page.
+    """Return the figures of a trial as a Markdown page.
 
     Parameters
     ----------
     all_figures : sequence of Figures
-        One per method, armgap first.
+        Figures of all methods, armgap first.
     manifest : Manifest, optional
-        How the cases were made.
+        Manifest of the cases.
     seal : str
         Hash over all seals.
 
@@ -90,7 +90,7 @@ where there is none, with the arm file's values right or wrong. *Named wrongly*:
 
 
 def _partial(all_figures: Sequence[Figures]) -> str:
-    """On the cases a method can express, for those that do not express all."""
+    """Return lines with the scores of methods that cannot express all effects, on the cases that they can express."""
     lines = []
     for f in all_figures:
         can = methods()[f.method].expresses
@@ -246,7 +246,7 @@ def _method(all_figures: Sequence[Figures]) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table of Markdown."""
+    """Return a Markdown table."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
 

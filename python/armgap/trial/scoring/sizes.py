@@ -1,4 +1,4 @@
-"""How well sizes are stated: error of a named cause's size, intervals that hold the truth, bounds of what is called absent."""
+"""Scores of sizes: errors of named causes' sizes, coverage of intervals, bounds of effects called absent."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from armgap.trial.verdict import equivalent
 
 __all__ = ["BoundScore", "SizeScore", "bound_scores", "size_scores"]
 
-#: Two-sided 95 % of the normal distribution.
+#: Two-sided 95 % quantile of the normal distribution, in standard deviations.
 Z_95 = 1.96
 
-#: The number that stands for an effect's size, from its parameters; where one parameter is it, that parameter.
+#: Parameter that is the size of an effect, by name of the effect.
 MAIN: dict[str, str] = {
     "coulomb_asymmetry": "delta",
     "torque_offset": "offset",
@@ -45,24 +45,24 @@ MAIN: dict[str, str] = {
     "hardening_spring": "cubic",
     "rotor_coupling": "inertia",
 }
-#: Effects whose size is the length of a vector.
+#: Effects whose size is the length of a vector of two parameters, with the parameters' names.
 VECTOR = {"position_dependent_friction": ("a", "b"), "encoder_eccentricity": ("a", "b")}
-#: Sizes that count from another value than zero.
+#: Neutral value of an effect's size parameter, for effects whose neutral value is not zero.
 NEUTRAL = {"torque_gain": 1.0}
 
 
 @dataclass(frozen=True)
 class SizeScore:
-    """Size of one rightly named cause.
+    """Score of the size of one rightly named cause.
 
     Attributes
     ----------
     effect : str
-        Its name.
+        Name of the effect.
     error : float
         Difference from the hidden size, as a share of the hidden size.
     covered : bool or None
-        Whether value plus and minus 1.96 sigma holds the hidden size; None where no sigma is given.
+        Whether value plus and minus 1.96 sigma holds the hidden size; None without sigma.
     """
 
     effect: str
@@ -72,7 +72,7 @@ class SizeScore:
 
 @dataclass(frozen=True)
 class BoundScore:
-    """A hidden effect that was called absent: whether the bound holds its size."""
+    """Score of the bound on a hidden effect that was called absent."""
 
     effect: str
     joint: int | None
@@ -81,7 +81,7 @@ class BoundScore:
 
     @property
     def holds(self) -> bool:
-        """Whether the truth is within."""
+        """Whether the hidden size of the effect is within the stated 95 % bound."""
         return abs(self.truth) <= self.bound
 
 
@@ -119,7 +119,7 @@ def _size(cause: NamedCause, hidden: HiddenEffect) -> SizeScore:
 
 
 def _truth(hidden: HiddenEffect, key: str) -> float:
-    """Hidden size in the library's terms, from its neutral value."""
+    """Return the hidden size as defined by armgap's library, less its neutral value."""
     if hidden.effect == "rotor_coupling":  # the library states what the rotor adds off the diagonal
         return hidden.parameters["inertia"] * hidden.parameters["gear"]
     return hidden.parameters[key] - NEUTRAL.get(hidden.effect, 0.0)

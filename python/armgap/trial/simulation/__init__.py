@@ -1,1 +1,1 @@
-"""The arm of a trial in MuJoCo: plant, actuators, encoders, motions."""
+"""MuJoCo simulation of a trial's arm: plant, actuators, encoders, motions."""

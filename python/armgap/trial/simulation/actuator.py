@@ -14,22 +14,22 @@ from typing import Protocol
 
 
 class ActuatorBlock(Protocol):
-    """One block of an actuator model."""
+    """Interface of one block of an actuator model, such as a delay, a gain or a lag."""
 
     def __call__(self, u: float, dt: float) -> float:
-        """Torque out for torque in, over the next ``dt`` seconds."""
+        """Return the mean output torque for input torque `u`, over the next ``dt`` seconds."""
         ...
 
 
 @dataclass
 class Delay:
-    """``u(t - delay)``; before the first command that command is taken to have been held."""
+    """Delay block of an actuator: ``u(t - delay)``; the first command counts as held before its time."""
 
     delay: float
     _past: deque[float] = field(default_factory=deque)
 
     def __call__(self, u: float, dt: float) -> float:
-        """The command of ``delay`` ago."""
+        """Return the command of ``delay`` seconds ago."""
         if not self._past:
             self._past.extend([u] * round(self.delay / dt))
         self._past.append(u)
@@ -38,46 +38,46 @@ class Delay:
 
 @dataclass
 class Gain:
-    """``gain u``."""
+    """Gain block of an actuator: ``gain u``."""
 
     gain: float
 
     def __call__(self, u: float, dt: float) -> float:
-        """The scaled command."""
+        """Return the command times the gain."""
         return self.gain * u
 
 
 @dataclass
 class DeadZone:
-    """Nothing below ``level``, the excess over it above."""
+    """Dead-zone block of an actuator: zero below ``level``, the excess above it."""
 
     level: float
 
     def __call__(self, u: float, dt: float) -> float:
-        """The excess over the level."""
+        """Return the excess of the command over the level."""
         return math.copysign(max(abs(u) - self.level, 0.0), u)
 
 
 @dataclass
 class Saturation:
-    """``u`` clipped to ``[-level, level]``."""
+    """Saturation block of an actuator: ``u`` clipped to ``[-level, level]``."""
 
     level: float
 
     def __call__(self, u: float, dt: float) -> float:
-        """The clipped command."""
+        """Return the command clipped to the level."""
         return min(max(u, -self.level), self.level)
 
 
 @dataclass
 class Lag:
-    """First-order lag; gives the exact mean over the step."""
+    """First-order lag block of an actuator, with the exact mean over each step."""
 
     time_constant: float
     _y: float | None = None
 
     def __call__(self, u: float, dt: float) -> float:
-        """Mean of the lagged command over the step."""
+        """Return the mean of the lagged command over the step."""
         y = u if self._y is None else self._y
         decay = math.exp(-dt / self.time_constant)
         self._y = u + (y - u) * decay
@@ -86,13 +86,13 @@ class Lag:
 
 @dataclass
 class SlewLimit:
-    """Torque that changes by no more than ``rate`` per second."""
+    """Rate-limit block of an actuator: torque changes by no more than ``rate`` per second."""
 
     rate: float
     _y: float | None = None
 
     def __call__(self, u: float, dt: float) -> float:
-        """The command as far as the rate allows."""
+        """Return the command with its rate of change limited."""
         y = u if self._y is None else self._y
         self._y = y + min(max(u - y, -self.rate * dt), self.rate * dt)
         return self._y
@@ -100,40 +100,40 @@ class SlewLimit:
 
 @dataclass
 class MagneticHysteresis:
-    """Torque short of the command by a rate-independent loop: a play of ``width`` behind a gain of ``share``."""
+    """Hysteresis block of an actuator, a rate-independent loop: a play of ``width`` behind a gain of ``share``."""
 
     width: float
     share: float
     _z: float = 0.0
 
     def __call__(self, u: float, dt: float) -> float:
-        """The torque on the loop."""
+        """Return the torque on the hysteresis loop for command `u`."""
         self._z = min(max(self._z, u - self.width), u + self.width)
         return (1.0 - self.share) * u + self.share * self._z
 
 
-#: Order of the blocks from command to joint.
+#: Order of an actuator's blocks from command to joint.
 ORDER = (Delay, Gain, DeadZone, MagneticHysteresis, Saturation, SlewLimit, Lag)
 
 
 @dataclass
 class Actuator:
-    """The actuator of one joint: blocks in series, which run in :data:`ORDER` whatever the order they came in."""
+    """The actuator of one joint: blocks in series, in the order of :data:`ORDER`."""
 
     blocks: list[ActuatorBlock] = field(default_factory=list)
 
     def add(self, block: ActuatorBlock) -> None:
-        """Put a block where it belongs."""
+        """Add a block to the actuator, at its place in the order of blocks."""
         self.blocks.append(block)
         self.blocks.sort(key=lambda s: ORDER.index(type(s)))
 
     @property
     def constant(self) -> bool:
-        """Whether a held command gives a held torque."""
+        """Whether a constant command to the actuator gives a constant torque."""
         return all(isinstance(s, Gain | DeadZone | Saturation) for s in self.blocks)
 
     def __call__(self, u: float, dt: float) -> float:
-        """Torque at the joint."""
+        """Return the torque at the joint for command `u`."""
         for block in self.blocks:
             u = block(u, dt)
         return u
@@ -141,7 +141,7 @@ class Actuator:
 
 @dataclass
 class Encoder:
-    """Position as the encoder shows it: ``q + a sin q + b cos q + offset`` in whole steps."""
+    """Encoder of one joint, which reads ``q + a sin q + b cos q + offset`` rounded to whole steps."""
 
     step: float
     offset: float = 0.0
@@ -149,6 +149,6 @@ class Encoder:
     b: float = 0.0
 
     def __call__(self, q: float) -> float:
-        """What the encoder shows at ``q``."""
+        """Return the encoder reading at position ``q``."""
         shown = q + self.a * math.sin(q) + self.b * math.cos(q) + self.offset
         return round(shown / self.step) * self.step

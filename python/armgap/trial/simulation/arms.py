@@ -28,15 +28,15 @@ class TrialArm:
     kind : {"axis", "pendulum", "two-link"}
         Kind of arm, as in the arm file.
     mass, length, com, inertia : tuple of float
-        Per link: kg, m, m from the joint, kg m^2 about the centre of mass.
+        Mass [kg], length [m], centre of mass from the joint [m], inertia about the centre of mass [kg m^2] of each link.
     viscous, coulomb : tuple of float
-        Nominal friction: N m s/rad and N m (N s/m and N on an axis).
+        Nominal friction coefficients [N m s/rad, N m; N s/m, N on an axis].
     torque_limit : tuple of float
-        N m (N on an axis).
+        Torque limit [N m; N on an axis].
     step : tuple of float
         Encoder step, rad (m on an axis).
     sample_period : float
-        s.
+        Sample period [s].
     slope : float
         Inclination of an axis, rad; 0 is horizontal. Other kinds ignore it.
     """
@@ -61,7 +61,7 @@ class TrialArm:
 
     @property
     def inertial(self) -> Numbers:
-        """Base inertial parameters in the order of the arm file."""
+        """Base inertial parameters of the arm [SI], in the order of the arm file."""
         if self.kind == "axis":
             return (self.mass[0], self.mass[0] * self.gravity * math.sin(self.slope))
         if self.kind == "pendulum":
@@ -71,12 +71,12 @@ class TrialArm:
 
     @property
     def theta(self) -> Numbers:
-        """All parameters: inertial, viscous, Coulomb."""
+        """All parameters of the arm [SI]: inertial, viscous, Coulomb."""
         return self.inertial + self.viscous + self.coulomb
 
     @property
     def joint_inertia(self) -> Numbers:
-        """Diagonal of the inertia matrix at ``q = 0``."""
+        """Diagonal of the arm's inertia matrix at ``q = 0`` [kg m^2 or kg]."""
         if self.kind != "two-link":
             return (self.inertial[0],)
         t = self.inertial
@@ -94,7 +94,7 @@ class TrialArm:
         )
 
 
-#: Table I of Reyes and Kelly (1997), Coulomb friction of joint 1 at its mean, encoders of section 5.
+#: Direct-drive arm of Table I of Reyes and Kelly (1997), Coulomb friction of joint 1 at its mean, encoders of section 5.
 DIRECT_DRIVE = TrialArm(
     kind="two-link",
     mass=(23.902, 3.880),
@@ -107,7 +107,7 @@ DIRECT_DRIVE = TrialArm(
     step=(TURN / 1_024_000, TURN / 655_360),
 )
 
-#: A small arm with quasi-direct drives behind 6:1 gears.
+#: Parameters of a small arm with quasi-direct drives behind 6:1 gears.
 GEARED = TrialArm(
     kind="two-link",
     mass=(0.55, 0.63),
@@ -120,7 +120,7 @@ GEARED = TrialArm(
     step=(TURN / 98_304, TURN / 98_304),
 )
 
-#: One direct-drive joint under gravity.
+#: Parameters of a pendulum: one direct-drive joint under gravity.
 PENDULUM = TrialArm(
     kind="pendulum",
     mass=(4.0,),
@@ -133,7 +133,7 @@ PENDULUM = TrialArm(
     step=(TURN / 655_360,),
 )
 
-#: A horizontal ball-screw table with a linear scale of 1 um.
+#: Parameters of a horizontal ball-screw table with a linear scale of 1 um.
 AXIS = TrialArm(
     kind="axis",
     mass=(12.0,),
@@ -152,7 +152,7 @@ SAMPLE_PERIODS = (0.001, 0.002, 0.0025, 0.004, 0.005)
 
 
 def random_arm(rng: np.random.Generator, model: str = "direct-drive", sample_period: float | None = None) -> TrialArm:
-    """Spread one of :data:`MODELS` at random.
+    """Return one of :data:`MODELS` with randomly varied parameters.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def random_arm(rng: np.random.Generator, model: str = "direct-drive", sample_per
     model : str, default "direct-drive"
         Key of :data:`MODELS`.
     sample_period : float, optional
-        s; drawn from 1 to 5 ms by default.
+        Sample period [s]; drawn from 1 to 5 ms by default.
     """
     base = MODELS[model]
     size, weight = rng.uniform(0.8, 1.25), rng.uniform(0.7, 1.4)

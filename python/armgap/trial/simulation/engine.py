@@ -1,4 +1,4 @@
-"""What blind trials need besides armgap, loaded only when it is used: MuJoCo, and worker processes with a time limit."""
+"""Optional packages of blind trials, imported on use: MuJoCo, and pebble for worker processes with a time limit."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ class TrialEngineMissingError(ArmgapError, ImportError):
     Parameters
     ----------
     package : str, default "MuJoCo"
-        What is missing.
+        Name of the missing package.
     work : str
-        What needs it.
+        Work that needs the package.
     extra : str
-        The extra that brings it.
+        Optional extra of armgap that installs the package.
     """
 
     def __init__(self, package: str = "MuJoCo", work: str = "making trial cases", extra: str = "trial") -> None:
         super().__init__(f"{work} needs {package}, which is not installed", remedy=f"pip install 'armgap[{extra}]'")
 
     def __str__(self) -> str:
-        """Return the one-line text."""
+        """Return the error as one line of text."""
         return str(self.args[0])
 
 

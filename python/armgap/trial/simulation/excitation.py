@@ -1,8 +1,8 @@
 """Motions for trial logs: torques in open loop, and random trajectories tracked by a controller.
 
-Open loop is a multisine with random phases around a constant, or the paper's own torques, equations (31)-(32),
+An open-loop motion is a multisine with random phases around a constant, or the torques of Reyes and Kelly (1997), equations (31)-(32),
 scaled to the arm. A tracked motion is a random Fourier series followed by a PD controller on the measured positions;
-what is logged is the controller's command.
+the controller's command is logged.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from armgap.trial.simulation.arms import DIRECT_DRIVE, TrialArm
 from armgap.trial.simulation.simulated_arm import Array, CommandSource, Trace
 
 STYLES = ("multisine", "paper", "tracked")
-#: A tracked motion holds nothing above this frequency, Hz.
+#: Frequency above which a tracked motion has no content, Hz; commands above it show an oscillating controller.
 RINGING = 15.0
-#: Time over which torques and references fade in, s.
+#: Time over which torques and references of trial motions fade in, s.
 FADE_IN = 0.4
-#: Fewest reversals of a useful motion, per joint, 1/s.
+#: Smallest rate of reversals per joint of an acceptable motion, 1/s.
 REVERSAL_RATE = 0.6
 
 
 @dataclass(frozen=True)
 class Multisine:
-    """``(1 - exp(-rate t)) bias + sum amplitude sin(omega t + phase)``, per joint, faded in.
+    """Open-loop torque ``(1 - exp(-rate t)) bias + sum amplitude sin(omega t + phase)``, per joint, faded in.
 
     Attributes
     ----------
     bias, rate : ndarray, shape (n_joints,)
-        N m and 1/s.
+        Constant torque [N m] and rate of its rise [1/s].
     amplitude, omega, phase : ndarray, shape (n_joints, n_sines)
-        N m, rad/s, rad.
+        Amplitudes [N m], angular frequencies [rad/s] and phases [rad] of the sines.
     limit : ndarray, shape (n_joints,)
-        The command is clipped here, N m.
+        Limit to which the command is clipped [N m].
     """
 
     bias: Array
@@ -46,7 +46,7 @@ class Multisine:
     limit: Array
 
     def source(self, arm: TrialArm) -> CommandSource:
-        """Commands over time."""
+        """Return a function for the commanded torques over time."""
 
         def command(t: float, _q: list[float]) -> list[float]:
             waves = np.sum(self.amplitude * np.sin(self.omega * t + self.phase), axis=1)
@@ -58,14 +58,14 @@ class Multisine:
 
 @dataclass(frozen=True)
 class Tracked:
-    """A Fourier series around ``centre`` under PD control.
+    """Motion along a Fourier series around ``centre``, tracked by a PD controller.
 
     Attributes
     ----------
     centre : ndarray, shape (n_joints,)
-        rad (m).
+        Mean positions [rad or m].
     amplitude, omega, phase : ndarray, shape (n_joints, n_sines)
-        rad (m), rad/s, rad.
+        Amplitudes [rad or m], angular frequencies [rad/s] and phases [rad] of the series.
     stiffness, damping, limit : ndarray, shape (n_joints,)
         Controller gains and largest command, SI.
     """
@@ -79,7 +79,7 @@ class Tracked:
     limit: Array
 
     def reference(self, t: float) -> tuple[Array, Array]:
-        """Wanted positions and velocities."""
+        """Return reference positions and velocities at time `t` [s]."""
         angle = self.omega * t + self.phase
         blend, rise = fade(t, 1.0), fade_rate(t, 1.0)
         wave = self.centre + np.sum(self.amplitude * np.sin(angle), axis=1)
@@ -87,7 +87,7 @@ class Tracked:
         return blend * wave, blend * rate + rise * wave
 
     def source(self, arm: TrialArm) -> CommandSource:
-        """A fresh controller."""
+        """Return a new controller that tracks the motion."""
         last: list[Array] = []
 
         def command(t: float, q: list[float]) -> list[float]:
@@ -101,7 +101,7 @@ class Tracked:
         return command
 
     def softer(self) -> Tracked:
-        """Return this motion under a controller of half the stiffness."""
+        """Return the motion with a controller of half the stiffness."""
         return replace(self, stiffness=0.5 * self.stiffness, damping=0.6 * self.damping)
 
 
@@ -109,7 +109,7 @@ Excitation = Multisine | Tracked
 
 
 def rings(trace: Trace) -> bool:
-    """Whether a controller oscillates: most of the power of a command lies far above what it has to track."""
+    """Whether a controller oscillates: most of a command's power is far above the frequencies of the reference."""
     tau = trace.tau - np.mean(trace.tau, axis=0)
     power = np.abs(np.fft.rfft(tau, axis=0)) ** 2
     frequency = np.fft.rfftfreq(len(trace.t), trace.t[1] - trace.t[0])
@@ -117,12 +117,12 @@ def rings(trace: Trace) -> bool:
 
 
 def fade(t: float, length: float = FADE_IN) -> float:
-    """Rise smoothly from 0 to 1 over ``length`` seconds."""
+    """Return a smooth rise from 0 to 1 over ``length`` seconds."""
     return 0.5 * (1 - math.cos(math.pi * min(t / length, 1.0)))
 
 
 def fade_rate(t: float, length: float = FADE_IN) -> float:
-    """Rate of :func:`fade`."""
+    """Return the time derivative of :func:`fade` [1/s]."""
     return 0.5 * math.pi / length * math.sin(math.pi * t / length) if t < length else 0.0
 
 
@@ -136,7 +136,7 @@ def draw_excitation(rng: np.random.Generator, arm: TrialArm, style: str, vigour:
 
 
 def acceptable(trace: Trace, arm: TrialArm) -> tuple[bool, float]:
-    """Whether a motion is of use, and the factor by which to change its vigour if it is not."""
+    """Return whether a motion is acceptable, and the factor by which to change its vigour if not."""
     reach = np.max(np.abs(trace.q_true), axis=0)
     limit = np.array([0.9] if arm.kind == "axis" else [2.2, 2.8][: arm.n_joints])
     speed = np.quantile(np.abs(trace.dq_true), 0.95, axis=0)
@@ -148,7 +148,7 @@ def acceptable(trace: Trace, arm: TrialArm) -> tuple[bool, float]:
 
 
 def reversals(dq: Array) -> Array:
-    """Number of reversals per joint."""
+    """Return the number of velocity reversals per joint."""
     return np.array([_sign_changes(column) for column in dq.T])
 
 
@@ -195,7 +195,7 @@ def _multisine(rng: np.random.Generator, arm: TrialArm, vigour: float) -> Multis
 
 
 def _paper(rng: np.random.Generator, arm: TrialArm, vigour: float) -> Multisine:
-    """Equations (31)-(32), scaled by the arm's gravity and inertia against those of Table I, with random phases."""
+    """Return torques (31)-(32) of Reyes and Kelly (1997), scaled by the arm's gravity and inertia against those of Table I, random phases."""
     gravity = _gravity(arm) / _gravity(DIRECT_DRIVE)
     inertia = np.array(arm.joint_inertia) / np.array(DIRECT_DRIVE.joint_inertia)
     jitter = rng.uniform(0.85, 1.15, (2, 2))

@@ -10,7 +10,7 @@ from armgap.trial.simulation.plant import DEPTH, IMPEDANCE, REFINE, Flexure, Pla
 
 
 def compile_model(config: PlantConfig, dt: float) -> Any:
-    """Compile the model with an internal step of ``dt`` seconds."""
+    """Compile the MuJoCo model of a plant with an internal step of ``dt`` seconds."""
     mj = mujoco()
     spec = mj.MjSpec()
     _set_options(spec, mj, config, dt)

@@ -9,7 +9,7 @@ MuJoCo's ``frictionloss`` is a soft constraint, so its settings matter:
 * a step in which a joint reverses, stops, starts or meets an obstacle is undone and taken again in :data:`REFINE`
   parts, :data:`DEPTH` times over, so that the instant is known to about a tenth of a microsecond.
 
-Measured on the arm of Table I (joint 1 / joint 2): held at 95 % of its Coulomb level it creeps 0.08 / 0.47 urad in 1 s;
+Measured on the arm of Table I of Reyes and Kelly (1997) (joint 1 / joint 2): held at 95 % of its Coulomb level it creeps 0.08 / 0.47 urad in 1 s;
 windows of 0.25 s under the paper's torques end 0.09 / 0.33 urad RMS from an exact integration (encoder steps are 6.1 /
 9.6 urad). Without the cut steps these are 193 / 839 urad; with MuJoCo's default settings 7.1 / 31 mrad, and 3.4 / 19 mrad
 of creep.
@@ -29,19 +29,19 @@ from typing import Any
 from armgap.trial.simulation.arms import TrialArm
 from armgap.trial.simulation.engine import mujoco
 
-#: Largest internal time step, s.
+#: Largest internal time step of the MuJoCo simulation of a trial arm, s.
 TIME_STEP = 2.5e-4
-#: Parts into which a step with a reversal is cut, and how often.
+#: Parts into which a simulation step with a reversal is cut, and number of times this is repeated.
 REFINE = 8
 DEPTH = 4
-#: Joint speed below which a joint counts as standing, rad/s or m/s.
+#: Speed below which a joint counts as standing, rad/s or m/s.
 STANDING = 1e-5
 IMPEDANCE = 0.9999
 
 
 @dataclass
 class JointState:
-    """What a law sees of one joint: half a step ahead, SI."""
+    """State of one joint half a step ahead, input of torque and friction laws [SI]."""
 
     t: float
     q: float
@@ -72,7 +72,7 @@ class Rotor:
 
 @dataclass
 class Flexure:
-    """The last link cut in two; the outer part hangs on a spring and damper."""
+    """Flexibility of the last link: its outer part is mounted on a spring and damper."""
 
     stiffness: float
     damping: float
@@ -81,7 +81,7 @@ class Flexure:
 
 @dataclass
 class PlantConfig:
-    """Everything the engine is given: the nominal arm and what effects change in it.
+    """Configuration of the MuJoCo plant: the nominal arm and its changes by effects.
 
     Attributes
     ----------
@@ -118,12 +118,12 @@ class PlantConfig:
 
 
 class Plant:
-    """One arm in motion. Joints count from 0 here.
+    """Simulation of one arm in MuJoCo; joints count from 0.
 
     Parameters
     ----------
     config : PlantConfig
-        The arm and what is different about it.
+        Nominal arm and its changes by effects.
     """
 
     def __init__(self, config: PlantConfig) -> None:
@@ -148,7 +148,7 @@ class Plant:
 
     @property
     def time(self) -> float:
-        """Time since the start, s."""
+        """Time since the start of the simulation, s."""
         return float(self.data.time)
 
     def position(self) -> list[float]:
@@ -160,7 +160,7 @@ class Plant:
         return [float(self.data.qvel[i]) for i in self.dof]
 
     def place(self, q: list[float], dq: list[float], t: float = 0.0) -> None:
-        """Put the joints (and their rotors) in a state."""
+        """Set joints and their rotors to a state: positions, velocities, and time [s]."""
         self._mj.mj_resetData(self.model, self.data)
         self.data.time = t
         for j in range(self.n):
@@ -170,7 +170,7 @@ class Plant:
         self._slope = [0.0] * self.n
 
     def hold(self, tau: list[float]) -> None:
-        """Apply constant torques for one sample period, without state-dependent laws."""
+        """Advance by one sample period under constant torques, without state-dependent laws."""
         before = self._snapshot()
         self._drive(tau, self.dt)
         self._mj.mj_step(self.model, self.data, self.steps_per_sample)
@@ -182,7 +182,7 @@ class Plant:
             self._remember(before, self.dt * self.steps_per_sample)
 
     def step(self, tau: list[float]) -> None:
-        """Apply torques for one internal step."""
+        """Advance by one internal step under constant torques."""
         self._step(tau, self.dt, DEPTH)
 
     def _step(self, tau: list[float], dt: float, depth: int) -> None:

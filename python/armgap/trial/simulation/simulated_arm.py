@@ -1,4 +1,4 @@
-"""A run: plant, actuators, encoders and a source of commands, logged once per sample."""
+"""Simulated arm with plant, actuators and encoders, run under a source of commands and logged once per sample."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from armgap.trial.simulation.actuator import Actuator, Encoder
 from armgap.trial.simulation.plant import Plant, PlantConfig
 
 Array = NDArray[np.float64]
-#: Commands for the next sample from time and measured positions.
+#: Function that returns the commands for the next sample from time [s] and measured positions [rad or m].
 CommandSource = Callable[[float, list[float]], list[float]]
 
 
 @dataclass
 class SimulatedArm:
-    """What effects act on: the plant's configuration, an actuator and an encoder per joint."""
+    """Simulated arm that effects modify: the plant's configuration, an actuator and an encoder per joint."""
 
     config: PlantConfig
     actuators: list[Actuator] = field(default_factory=list)
@@ -33,16 +33,16 @@ class SimulatedArm:
 
 @dataclass(frozen=True)
 class Trace:
-    """One run: what the log shows, and the state that only the engine knows.
+    """Result of a simulated run: logged signals, and the true state.
 
     Attributes
     ----------
     t : ndarray, shape (n_samples,)
-        s.
+        Sample times [s].
     q, tau : ndarray, shape (n_samples, n_joints)
-        Measured positions and commanded torques.
+        Measured positions [rad or m] and commanded torques [N m or N].
     q_true, dq_true : ndarray, shape (n_samples, n_joints)
-        The joints' actual state.
+        True positions [rad or m] and velocities of the joints.
     """
 
     t: Array
@@ -53,7 +53,7 @@ class Trace:
 
 
 def run(sim: SimulatedArm, source: CommandSource, duration: float) -> Trace:
-    """Run the arm from rest at ``q = 0`` and log it once per sample period."""
+    """Simulate an arm from rest at ``q = 0`` and return the trace, sampled once per sample period."""
     plant = Plant(sim.config)
     period = sim.config.arm.sample_period
     n = round(duration / period)
