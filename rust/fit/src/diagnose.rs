@@ -1,4 +1,4 @@
-//! The diagnosis: where the gap lies, which effect causes it, how far it shrinks.
+//! Diagnosis of an arm with a closed-form model: where the gap lies, which effect causes it, how far it shrinks.
 
 use crate::disturbance::push::Conclusion;
 use crate::likelihood::context::{DiagnosisContext, WindowSet};
@@ -21,10 +21,10 @@ use std::time::Instant;
 const CROSSWISE: &str = "effects fitted to the training logs did not explain the holdout: every log was cut into stretches that were learnt \
      from and judged on by turns";
 
-/// Probability from which an external disturbance counts as named.
+/// Probability, 0 to 1, from which an external disturbance counts as named.
 const NAMED: f64 = 0.5;
 
-/// Diagnoses the gap between an arm and its logs; `observer` gets the progress and may cancel.
+/// Diagnoses the gap between an arm and its logs; `observer` receives the progress and may cancel the diagnosis.
 pub fn diagnose(
     arm: &ArmDescription,
     training: &[LogData<'_>],
@@ -38,7 +38,7 @@ pub fn diagnose(
     ended.ok_or(DiagnoseError::Parameters(arm.kind))?
 }
 
-/// What was asked for.
+/// Input of a diagnosis: arm, training and holdout logs, options and progress observer.
 pub(crate) struct Request<'a> {
     pub(crate) arm: &'a ArmDescription,
     pub(crate) training: &'a [LogData<'a>],
@@ -78,7 +78,7 @@ impl WithArm for Request<'_> {
 }
 
 impl Request<'_> {
-    /// The diagnosis by interleaved cross-validation, where it explains what the first one left open or took for external disturbances.
+    /// The diagnosis by interleaved cross-validation, where it explains what the diagnosis `first` left open or took for external disturbances.
     fn crosswise<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         arm: A,
@@ -110,7 +110,7 @@ impl Request<'_> {
         Ok((!pushed || conclusion.disturbances.is_empty()).then_some((context, conclusion)))
     }
 
-    /// Windows of both sets, scales and priors.
+    /// Diagnosis context with the windows of training and holdout logs, scales of the residual and priors of the arm's parameters.
     pub(crate) fn context<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         arm: A,
@@ -134,7 +134,7 @@ impl Request<'_> {
         Ok(DiagnosisContext { arm, prior, scales, training, holdout, noise, sides, custom_effects, progress })
     }
 
-    /// The custom effects at their initial guesses.
+    /// The custom effects of the options, each with its parameter at the initial guess.
     fn custom_effects<const N: usize>(&self, scales: &Scales<N>) -> Vec<EffectInstance> {
         let placed = |(index, joint): (usize, &usize)| {
             let law = custom_effect::law(index);

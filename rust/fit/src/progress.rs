@@ -1,10 +1,10 @@
 //! Progress reports and cancellation of long computations.
 //!
-//! Work is counted in units: a fit, a candidate's test. What is still to come is not known, for every cause that is found is followed by
-//! a search for the next; so a part of the work takes a share of what is left, and the fraction done never falls.
+//! Work is counted in units: a fit, or the test of a candidate. The remaining work is not known, for every cause that is found is followed by
+//! a search for the next cause; so each phase takes a share of the remaining fraction, and the fraction done never falls.
 //!
-//! A cancelled diagnosis unwinds from wherever it is (`resume_unwind`: no panic hook, no message; rayon hands it on) to
-//! `guarded`, which makes an error of it. Nothing outside this file sees the unwinding.
+//! A cancelled diagnosis unwinds from the running computation (`resume_unwind`: no panic hook, no message; rayon passes it on) to
+//! `guarded`, which turns it into an error. Nothing outside this file sees the unwinding.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -14,24 +14,24 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 /// Phase of a computation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// Fitting the model as far as it is known.
+    /// Fitting the arm's parameters and the causes found so far.
     Refit,
-    /// Testing every candidate to first order.
+    /// Score test of every candidate effect (first order).
     Screen,
-    /// Fitting the candidates that passed.
+    /// Rough fits of the candidate effects that passed the score test.
     Candidates,
-    /// Fitting the best of them to the end.
+    /// Full fits of the best candidate effects.
     Finalists,
     /// Looking for external disturbances.
     Pushes,
-    /// Assembling the result.
+    /// Assembling the result of the diagnosis.
     Result,
-    /// Simulating once more with half the steps.
+    /// Repeating a simulation with half the step length.
     Simulate,
 }
 
 impl Phase {
-    /// In words.
+    /// Name of the phase in plain words, for display.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Refit => "re-estimating the arm",
@@ -44,7 +44,7 @@ impl Phase {
         }
     }
 
-    /// Share of what is left that this phase takes, measured on logs with one cause: their search has two rounds.
+    /// Share, 0 to 1, of the remaining work that a phase takes, measured on logs with one cause (two rounds of search).
     const fn share(self) -> f64 {
         match self {
             Self::Refit => 0.09,
@@ -59,36 +59,36 @@ impl Phase {
     }
 }
 
-/// A progress report.
+/// Progress report: current phase and fraction done.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
-    /// Current phase.
+    /// Current phase of the computation.
     pub phase: Phase,
-    /// Estimated fraction of the work that is done, from 0 to 1; never falls.
+    /// Estimated fraction of the work that is done, 0 to 1; never falls.
     pub fraction: f64,
 }
 
-/// Answer of an observer.
+/// Answer of an observer to a progress report: continue or cancel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Control {
-    /// Continue.
+    /// Continue the computation.
     Go,
-    /// Cancel with an error, soon.
+    /// Cancel the computation with an error at its next progress check.
     ContactGuess,
 }
 
-/// Called often and from any thread; must be quick.
+/// Function that receives progress reports and may cancel; called often and from any thread, so it must be quick.
 pub type Observer = Arc<dyn Fn(Progress) -> Control + Send + Sync>;
 
 /// Counts units of work and reports progress to the observer.
 pub struct ProgressReporter {
     observer: Observer,
-    /// Index of the phase in `ORDER`.
+    /// Index of the current phase in `ORDER`.
     phase: AtomicUsize,
-    /// Units planned and done in the current phase.
+    /// Units of work planned and done in the current phase.
     planned: AtomicUsize,
     done: AtomicUsize,
-    /// Fractions where the current phase begins and ends, and the largest reported, as bits: positive numbers sort alike.
+    /// Fractions of the work, 0 to 1, at which the current phase begins and ends, and the largest one reported; as bits, which sort like positive numbers.
     from: AtomicU64,
     to: AtomicU64,
     reported: AtomicU64,
@@ -104,11 +104,11 @@ const ORDER: [Phase; 7] = [
     Phase::Simulate,
 ];
 
-/// What unwinds; found by its type.
+/// Payload of the unwinding that cancels a computation; recognised by its type.
 struct Stopped;
 
 impl ProgressReporter {
-    /// A count from nothing.
+    /// A reporter that starts at fraction 0 and reports to `observer`.
     pub fn new(observer: Observer) -> Self {
         let zero = || AtomicU64::new(0.0_f64.to_bits());
         let count = || AtomicUsize::new(0);
@@ -123,13 +123,13 @@ impl ProgressReporter {
         }
     }
 
-    /// A reporter whose units do not count: the observer sees the progress of this one as it was, and may cancel.
+    /// A reporter that counts no units: its observer sees the fraction reached by this reporter so far, and may cancel.
     pub fn aside(&self) -> Self {
         let (observer, now) = (Arc::clone(&self.observer), self.current());
         Self::new(Arc::new(move |_| observer(now)))
     }
 
-    /// Begins a phase of about so many units; the phase before is over.
+    /// Ends the current phase and begins `phase`, of about `units` units of work.
     pub fn begin(&self, phase: Phase, units: usize) {
         let from = f64::from_bits(self.to.load(Relaxed));
         self.phase.store(ORDER.iter().position(|w| *w == phase).unwrap_or(0), Relaxed);
@@ -140,13 +140,13 @@ impl ProgressReporter {
         self.check();
     }
 
-    /// One unit is done.
+    /// Counts one unit of work as done and reports to the observer.
     pub fn unit(&self) {
         self.done.fetch_add(1, Relaxed);
         self.check();
     }
 
-    /// Reports to the observer; does not return if it cancels.
+    /// Reports the current progress to the observer; does not return if the observer cancels.
     pub fn check(&self) {
         if (self.observer)(self.current()) == Control::ContactGuess {
             resume_unwind(Box::new(Stopped));
@@ -163,7 +163,7 @@ impl ProgressReporter {
     }
 }
 
-/// Runs `task`; none if it was cancelled.
+/// Runs `task`; `None` if the observer cancelled it.
 pub fn guarded<T>(task: impl FnOnce() -> T) -> Option<T> {
     match catch_unwind(AssertUnwindSafe(task)) {
         Ok(result) => Some(result),

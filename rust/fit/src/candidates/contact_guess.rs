@@ -1,35 +1,35 @@
-//! Initial guesses of contacts from the data: where a joint hits a joint limit, and how stiff that is.
+//! Initial guesses of contacts from logs: position and stiffness of a joint limit.
 //!
-//! Beyond a joint limit the residual torque is a hinge: it grows with depth and with speed and pushes back. The position is found by a
-//! line search, stiffness and damping at each position by least squares.
+//! Beyond a joint limit the residual torque grows with depth and with speed and pushes back, like a spring and damper. The position of the limit is
+//! found by a line search, stiffness and damping at each position by least squares.
 
 use crate::log::track::Track;
 use crate::model::hypothesis::Hypothesis;
 use crate::predict::residual_torque::{InverseDynamicsResidual, inverse_dynamics_residuals};
 use armgap_core::arm::Arm;
 
-/// Half width, in samples, of the local cubic that accelerations are taken from: an impact is short.
+/// Half width, in samples, of the local cubic that accelerations are taken from; an impact is short.
 const HALF_WIDTH: usize = 3;
 
-/// Fewest samples beyond a joint limit.
+/// Fewest samples beyond a joint limit for a guess of its stiffness.
 const FEWEST: usize = 5;
 
-/// Growth of the number of samples beyond, from one position that is tried to the next.
+/// Growth factor of the number of samples beyond a joint limit, from one tried position of the limit to the next.
 const GROWTH: f64 = 1.15;
 
-/// Largest part of the samples beyond a joint limit.
+/// Largest part of a joint's samples that may lie beyond a joint limit.
 const MOST: f64 = 0.8;
 
-/// A hinge explains at least this part of the residual torque beyond it.
+/// Least part of the squared residual torque beyond a joint limit that its spring and damper must explain.
 const EXPLAINS: f64 = 0.3;
 
-/// Speed below which friction is regularised, relative to the joint's RMS speed.
+/// Speed below which friction is regularised, relative to the joint's RMS speed, in the search for contacts.
 const SLOW: f64 = 0.02;
 
-/// A contact: position, stiffness and damping.
+/// Guess of a contact: position (rad or m), stiffness (N m/rad or N/m) and damping (N m s/rad or N s/m).
 pub type ContactGuess = [f64; 3];
 
-/// Residual torque of a joint at one sample.
+/// Position (rad or m), velocity (rad/s or m/s) and residual torque (N m or N) of a joint at one sample.
 #[derive(Debug, Clone, Copy)]
 struct ContactSample {
     q: f64,
@@ -37,10 +37,10 @@ struct ContactSample {
     residual: f64,
 }
 
-/// How much stiffer a second guess is: an impact that is over before the cubic has passed it seems softer than it is.
+/// Factor from the fitted stiffness of a contact to a second, stiffer guess: an impact shorter than the local cubic appears softer than it is.
 const HARDER: f64 = 8.0;
 
-/// Contacts of every joint that logs show under a model, at most one on either side, each as it seems and stiffer.
+/// Guesses of contacts that logs show under a model, per joint: at most one contact on either side, each with its fitted stiffness and a stiffer one.
 pub fn contact_guesses<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     tracks: &[Track<N>],
     arm: &A,
@@ -66,7 +66,7 @@ pub fn contact_guesses<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     })
 }
 
-/// The contact on one side of zero as it seems, and a stiffer one that an impact enters less deeply.
+/// Guesses of the contact on one side of zero (`side` = 1 or -1): as fitted, and stiffer with less depth.
 fn both(samples: &mut [ContactSample], side: f64) -> Vec<ContactGuess> {
     let Some(guess) = hinge(samples, side) else { return Vec::new() };
     let [position, stiffness, damping] = guess;
@@ -75,7 +75,7 @@ fn both(samples: &mut [ContactSample], side: f64) -> Vec<ContactGuess> {
     vec![guess, [position + depth - shallower, HARDER * stiffness, HARDER.sqrt() * damping]]
 }
 
-/// The hinge on one side of zero that explains most.
+/// Spring and damper on one side of zero (`side` = 1 or -1) that explain most of a joint's residual torque.
 fn hinge(samples: &mut [ContactSample], side: f64) -> Option<ContactGuess> {
     samples.sort_by(|a, b| (side * b.q).total_cmp(&(side * a.q)));
     let most = (MOST * samples.len() as f64) as usize;
@@ -89,7 +89,7 @@ fn hinge(samples: &mut [ContactSample], side: f64) -> Option<ContactGuess> {
     tried.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(guess, _)| guess)
 }
 
-/// Stiffness and damping of a contact that all these samples lie beyond, and the squared torque that it explains.
+/// Least-squares stiffness and damping of a contact at `position`, from the samples `beyond` it, and the squared torque explained.
 fn spring(beyond: &[ContactSample], position: f64, side: f64) -> Option<([f64; 2], f64)> {
     let [mut dd, mut dv, mut vv, mut dy, mut vy, mut yy] = [0.0; 6];
     for sample in beyond {

@@ -1,4 +1,4 @@
-//! Initial guesses of full fits: which candidates are worth one, and from which values.
+//! Selection of the candidates that are worth a full fit, and their initial guesses.
 
 use crate::candidates::contact_guess::contact_guesses;
 use crate::candidates::periodogram::periodogram_peaks;
@@ -12,25 +12,25 @@ use crate::progress::Phase;
 use armgap_core::arm::Arm;
 use armgap_core::effect::Trial;
 
-/// Candidates that get a full fit at each search node.
+/// Largest number of candidates that get a full fit at each node of the model search.
 const FULL_FITS: usize = 18;
 
-/// A candidate that leaves less than this part of its trace unexplained by the arm's own parameters shows only against the prior.
+/// Part of a candidate's sensitivity left unexplained by the arm's own parameters below which only their prior can reveal the candidate.
 const ABSORBED: f64 = 0.03;
 
-/// A candidate that leaves less than this part is imitated as exactly as derivatives can tell.
+/// Part of a candidate's sensitivity left unexplained by the arm's own parameters below which derivatives cannot tell it from them.
 const IMITATED: f64 = 1e-4;
 
-/// A candidate that to first order removes less than this part of the cost is not fitted.
+/// Least part of the training cost that a candidate must remove to first order to be fitted.
 const TRACE: f64 = 0.01;
 
-/// A candidate that to first order removes less than this part of a gap of no consequence is not fitted: only an effect that explains most
-/// of it would be named.
+/// Least part of the training cost that a candidate must remove to first order to be fitted where the gap is of no consequence: only an effect
+/// that explains most of such a gap would be named.
 const TRACE_IN_SMALL: f64 = 0.1;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Hypotheses that are worth a full fit: one candidate more than the fitted model. And the score tests of all candidates, the open ones
-    /// first, where they were made. `size` is that of the gap.
+    /// Hypotheses that are worth a full fit, each the fitted model with one more candidate, and the score tests of all candidates (open candidates
+    /// first; empty if none were made). `size` is the relative size of the gap.
     pub(crate) fn initial_guesses(
         &self,
         fit: &Fit<P>,
@@ -61,7 +61,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (initial_guesses, screened)
     }
 
-    /// Part of the training windows' cost above the floor that any one candidate removes to first order.
+    /// Largest part of the training windows' cost above the noise floor that a single candidate removes to first order.
     pub(crate) fn largest_gain(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> f64 {
         let (_, screened) = self.screened(fit, weights);
         let gains = screened.into_iter().map(|test| test.gain);
@@ -70,7 +70,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         gains.fold(0.0, f64::max) / (cost - rows * self.floor(weights)).max(1e-9 * cost)
     }
 
-    /// All candidates at their initial guesses, the open ones first, and their score tests.
+    /// All candidates at their initial guesses, those not in the model first, and the score test of each.
     fn screened(&self, fit: &Fit<P>, weights: &SplitWeighting<N>) -> (Vec<EffectInstance>, Vec<ScoreTest>) {
         let mut all = self.open_candidates(&fit.hypothesis);
         all.extend(self.ripple_guesses(&all, weights, fit));
@@ -80,14 +80,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (all, screened)
     }
 
-    /// Candidates not yet in the model.
+    /// Candidate effects that are not yet in `model`, at their initial guesses.
     pub fn open_candidates(&self, model: &Hypothesis<P>) -> Vec<EffectInstance> {
         let taken = |c: &EffectInstance| model.effects.iter().any(|e| e.same_place(c));
         let known = effect_instances(&self.scales, &self.sides, model.effects.is_empty()).into_iter();
         known.chain(self.custom_effects.iter().copied()).filter(|c| !taken(c)).collect()
     }
 
-    /// Further initial guesses of candidates that are periodic in position, from the periodogram of the residual.
+    /// Initial guesses of effects that are periodic in position, from the periodogram of the residual.
     fn ripple_guesses(
         &self,
         all: &[EffectInstance],
@@ -107,7 +107,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         open.iter().flat_map(initial_guesses).collect()
     }
 
-    /// Further initial guesses of contacts, which act beyond a position, from the residual torque.
+    /// Initial guesses of contacts, which act beyond a position, from the residual torque under `model`.
     fn contact_guesses(&self, all: &[EffectInstance], model: &Hypothesis<P>) -> Vec<EffectInstance> {
         let mut open: Vec<EffectInstance> = all.iter().filter(|c| c.is_contact()).copied().collect();
         open.sort_by_key(|c| c.joint);
@@ -126,10 +126,10 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         open.iter().flat_map(initial_guesses).collect()
     }
 
-    /// The model with the payload that brings its parameters closest to their prior values, the motion staying the same; none for effects
-    /// that are no payloads.
+    /// The model with the payload that brings the arm's parameters closest to their prior values at unchanged motion; `None` for effects other
+    /// than a payload.
     ///
-    /// For a given distance the parameters' shift is linear in the mass, so one line of candidates over the distance suffices.
+    /// For a given distance the parameters' shift is linear in the payload's mass, so a line search over the distance suffices.
     fn payload_guess(&self, model: &Hypothesis<P>, effect: EffectInstance) -> Option<Hypothesis<P>> {
         effect.law.payload(&effect.p)?;
         let off: Vec<f64> =
@@ -152,8 +152,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Some(initial_guess)
     }
 
-    /// The model with a candidate; where the arm's parameters can imitate it, they make room for it at once, and where they imitate it
-    /// to rounding, so that motion says nothing of its size, it gets the size that brings them closest to their prior values.
+    /// The model with one more candidate. Where the arm's parameters can imitate the candidate, they are shifted to compensate it; where they imitate
+    /// it to rounding, so that motion does not determine its size, the size brings them closest to their prior values.
     fn compensated(&self, model: &Hypothesis<P>, found: &ScoreTest) -> Hypothesis<P> {
         if found.distinct >= ABSORBED {
             return model.with(found.effect);
@@ -165,7 +165,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         model.with_values(&room).with(effect)
     }
 
-    /// A candidate at the size that brings the arm's parameters closest to their prior values, and that size.
+    /// A candidate at the size that brings the arm's parameters closest to their prior values, and this size.
     fn trusted(&self, model: &Hypothesis<P>, found: &ScoreTest) -> (EffectInstance, f64) {
         let parameter = &found.effect.law.spec().parameters[found.tested];
         let (mut along, mut off) = (0.0, 0.0);
@@ -181,7 +181,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// The best initial guess of each of the best-scoring candidates, and of those that only the prior can reveal.
+/// Best initial guess of each of the candidates with the largest gain (above `least`), and of each candidate that only the prior can reveal.
 fn promising(screened: &[ScoreTest], least: f64) -> Vec<&ScoreTest> {
     let mut order: Vec<&ScoreTest> = screened.iter().filter(|s| s.gain > 0.0).collect();
     order.sort_by(|a, b| b.gain.total_cmp(&a.gain));

@@ -1,7 +1,7 @@
-//! Which effects are worth a full fit, and from which values.
+//! Which effects are worth a full fit, and their initial guesses.
 //!
 //! * `contact_guess`: initial guesses of contacts from the residual torque.
-//! * `initial_guess`: candidates that pass, at their initial guesses.
+//! * `initial_guess`: candidates that pass the score test, at their initial guesses.
 //! * `periodogram`: initial guesses of ripple from the residual's periodogram over position.
 //! * `screen`: score tests of all candidates from one Jacobian.
 

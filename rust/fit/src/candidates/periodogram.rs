@@ -1,8 +1,8 @@
 //! Periodogram of the residual over position: initial guesses of ripple, with its cycles per turn of a joint.
 //!
-//! Over a short window a torque `sin(n q)` bends the prediction by nearly its double integral over the joint's own inertia. For
-//! every `n` of a grid its two phases are fitted to the residuals of all windows, each freed from an offset and a drift as an error
-//! of its initial state would leave: least-squares spectral analysis (Lomb 1976) over position in place of time.
+//! Over a short window a torque `sin(n q)` changes the predicted position by nearly its double integral over the joint's own inertia. For every
+//! `n` of a grid, sine and cosine are fitted to the residuals of all windows after removal of an offset and a drift, as an error of the
+//! initial state causes: least-squares spectral analysis (Lomb 1976) over position in place of time.
 
 use crate::likelihood::solve::FitProblem;
 use crate::model::hypothesis::Hypothesis;
@@ -12,38 +12,38 @@ use armgap_core::cpu::{Cpu, Kernel, Level};
 use armgap_core::trig::sin_cos;
 use rayon::prelude::*;
 
-/// Step of the grid, in cycles over the joint's travel: half the width of a peak.
+/// Step of the periodogram's grid, in cycles over the joint's travel: half the width of a peak.
 const RESOLUTION: f64 = 0.5;
 
-/// Fewest cycles over the travel; slower ripple is much like gravity and has fixed initial guesses.
+/// Fewest cycles of ripple over a joint's travel in the periodogram; slower ripple is much like gravity and has fixed initial guesses.
 const FEWEST: f64 = 2.0;
 
-/// Phase at most that a ripple turns by per sample at RMS speed, rad.
+/// Largest phase advance of ripple per sample at the joint's RMS speed, rad.
 const FASTEST: f64 = 2.5;
 
-/// Most points of the grid.
+/// Largest number of frequencies in a periodogram.
 const MOST_POINTS: usize = 600;
 
-/// Points of the grid per batch.
+/// Frequencies of the periodogram that are computed together as one vector.
 const BATCH: usize = 8;
 
-/// Peaks reported for a joint.
+/// Largest number of peaks reported for a joint's periodogram.
 const PEAKS: usize = 3;
 
 /// A torque `amplitude sin(cycles q + phase)` that would explain part of the residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpectralPeak {
-    /// Amplitude, N m or N.
+    /// Amplitude of the torque, N m or N.
     pub amplitude: f64,
-    /// Cycles per radian or metre, times 2 pi.
+    /// Angular frequency over position, rad per rad or per m: 2 pi times the cycles per radian or metre.
     pub cycles: f64,
-    /// Phase, rad.
+    /// Phase of the torque, rad.
     pub phase: f64,
-    /// Decrease of the windows' cost.
+    /// Decrease of the windows' cost by the fitted sine.
     pub gain: f64,
 }
 
-/// The highest peaks of the periodogram of a hypothesis's residual on joint `j`, best first.
+/// Highest peaks of the periodogram of the residual of hypothesis `base` on joint `j`, largest decrease of the cost first.
 pub fn periodogram_peaks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     base: &Hypothesis<P>,
@@ -68,19 +68,19 @@ pub fn periodogram_peaks<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     peaks(&groups.as_flattened()[..points])
 }
 
-/// One window's motion of one joint, with its residual.
+/// Motion of one joint in one window, with the residual of its predicted position.
 struct Path {
-    /// Positions halfway between samples, the first before the first row.
+    /// Positions of the joint halfway between samples, rad or m, from the interval that ends at the window's first predicted sample.
     q: Vec<f64>,
-    /// Acceleration per torque in units of the residual's scale.
+    /// Acceleration per unit torque of the joint, in units of the residual's scale.
     gain: Vec<f64>,
-    /// Lengths of the intervals.
+    /// Lengths of the sample intervals, s.
     h: Vec<f64>,
-    /// Residual without offset and drift.
+    /// Whitened position residual of the joint after removal of offset and drift.
     residual: Vec<f64>,
-    /// Orthonormal drift; the offset is constant.
+    /// Linear function of time with zero mean and unit norm: the drift that is removed from the residual.
     drift: Vec<f64>,
-    /// Robust weight of the window.
+    /// Robust weight of the window, 0 to 1.
     weight: f64,
 }
 
@@ -139,15 +139,15 @@ fn path<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     }
 }
 
-/// The periodogram of a residual over position: least squares of a sine and a cosine at evenly spaced frequencies.
+/// Periodogram of a residual over position: least squares of a sine and a cosine at evenly spaced frequencies.
 struct Spectrum<'a> {
     paths: &'a [Path],
-    /// The first frequency, in cycles per radian or metre times 2 pi, and their distance.
+    /// First angular frequency over position and the spacing of frequencies, 2 pi times cycles per radian or metre.
     first: f64,
     step: f64,
 }
 
-/// One number for each frequency of a batch.
+/// One number for each frequency of a batch of the periodogram.
 type Each = [f64; BATCH];
 
 impl Kernel for Spectrum<'_> {
@@ -172,7 +172,7 @@ impl Kernel for Spectrum<'_> {
 }
 
 impl Spectrum<'_> {
-    /// Inner products of the responses to `sin(n q)` and `cos(n q)` in one window, offset and drift removed, and with the residual.
+    /// Inner products, in one window, of the position responses to `sin(n q)` and `cos(n q)` without offset and drift, with each other and with the residual.
     #[inline(always)]
     fn products<C: Cpu>(&self, path: &Path) -> ([Each; 3], [Each; 2]) {
         let zero = [0.0; BATCH];
@@ -207,7 +207,7 @@ impl Spectrum<'_> {
         (squares, right)
     }
 
-    /// Sines and cosines of all frequencies at `q`, each rotated from the one before.
+    /// Sines and cosines of `n q` at all frequencies `n` of a batch, each from the previous frequency by rotation.
     #[inline(always)]
     fn phases<C: Cpu>(&self, q: f64) -> [Each; 2] {
         let (mut s, mut c) = sin_cos(self.first * q);
@@ -221,7 +221,7 @@ impl Spectrum<'_> {
     }
 }
 
-/// The solution for one frequency.
+/// Amplitude, phase and decrease of the cost at frequency `cycles`, from the normal equations of sine and cosine.
 fn fitted(cycles: f64, [ss, sc, cc]: [f64; 3], right: [f64; 2]) -> SpectralPeak {
     let determinant = ss * cc - sc * sc;
     if determinant.is_nan() || determinant <= 1e-9 * ss * cc {
@@ -237,7 +237,7 @@ fn fitted(cycles: f64, [ss, sc, cc]: [f64; 3], right: [f64; 2]) -> SpectralPeak 
     }
 }
 
-/// The highest local maxima.
+/// Highest local maxima of a spectrum, largest decrease of the cost first.
 fn peaks(spectrum: &[SpectralPeak]) -> Vec<SpectralPeak> {
     let gain = |i: usize| spectrum.get(i).map_or(0.0, |r| r.gain);
     let top = |i: &usize| gain(*i) > 0.0 && (*i == 0 || gain(*i) >= gain(*i - 1)) && gain(*i) > gain(*i + 1);

@@ -1,7 +1,7 @@
-//! Score tests: how much each candidate would reduce the cost, to first order, from one shared Jacobian.
+//! Score tests: expected decrease of the cost by each candidate, to first order, from one shared Jacobian.
 //!
-//! With `H` the inner products of the sensitivities of the free values (their prior precision included) and `s` their products with the
-//! residual, a further parameter with sensitivity `c` reduces the cost by `(s_c - H_c H^-1 s)^2 / (H_cc - H_c H^-1 H_c')` (Rao 1948).
+//! With `H` the inner products of the sensitivities of the free values (prior precision included) and `s` their products with the residual, a
+//! further parameter with sensitivity `c` reduces the cost by `(s_c - H_c H^-1 s)^2 / (H_cc - H_c H^-1 H_c')` (Rao 1948).
 
 use crate::likelihood::scale::Scales;
 use crate::likelihood::solve::{FitProblem, inverse_of_seen, neutral};
@@ -12,38 +12,38 @@ use armgap_core::transmission::Sides;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Size of the trial displacement of a candidate's first parameter, relative to its initial guess.
+/// Displacement of a candidate's tested parameter for its sensitivity, relative to its initial guess.
 const TRIAL: f64 = 1e-3;
 
-/// With encoder or friction at the motor the state behind a window takes as long to find as the window itself: beside other effects one of so
-/// many initial guesses is tried.
+/// Beside other effects, one of this many initial guesses of a transmission is tried where encoder or friction is on the motor's side: latent states
+/// before a window then take as long to simulate as the window itself.
 const MOTOR_GUESSES: usize = 3;
 
 /// Score test of a candidate at one initial guess.
 #[derive(Debug, Clone)]
 pub struct ScoreTest {
-    /// The effect, its first parameter at the value the test suggests.
+    /// The candidate effect, its tested parameter at the value that the score test suggests.
     pub effect: EffectInstance,
-    /// Expected decrease of the cost.
+    /// Expected decrease of the cost by the candidate.
     pub gain: f64,
-    /// Estimated deviation of the first parameter from neutral.
+    /// Estimated deviation of the tested parameter from its neutral value, in the parameter's unit.
     pub estimate: f64,
-    /// Its standard deviation, from the windows' scatter.
+    /// Standard deviation of the estimated deviation of the tested parameter, from the scatter between windows.
     pub sigma: f64,
-    /// Standard deviation if the residual were white with the weighting's scale: what the log determines at best.
+    /// Standard deviation of the tested parameter if the residual were white with the weighting's scale: the best that the logs allow.
     pub information_sigma: f64,
-    /// Changes of the model's own values that make room for the candidate, per unit of its size, to first order.
+    /// Changes of the model's free values that compensate the candidate, to first order, per unit of the tested parameter.
     pub imitation: Vec<f64>,
-    /// Deviation from neutral that the test suggests.
+    /// Deviation of the tested parameter from neutral that the score test suggests, within the parameter's bounds.
     pub size: f64,
-    /// Which of its parameters was tested.
+    /// Index of the candidate's parameter that the score test displaces.
     pub tested: usize,
-    /// Share of the candidate's trace that the arm's own parameters cannot imitate.
+    /// Share, 0 to 1, of the candidate's squared sensitivity that the model's free values cannot imitate.
     pub distinct: f64,
 }
 
-/// Every effect on every joint it can act on, at each of its initial guesses; a transmission with encoder and friction both on the link's side and
-/// both on the motor's, where they may be.
+/// Every effect of the library on every joint it can act on, at each initial guess; a transmission with encoder and friction both on the link's
+/// side and both on the motor's side, as far as `sides` allows.
 pub fn effect_instances<const N: usize>(
     scales: &Scales<N>,
     sides: &[Vec<Sides>; N],
@@ -81,14 +81,14 @@ pub fn effect_instances<const N: usize>(
     all
 }
 
-/// Of the sides that encoder and friction may be on, those with both on one side and a geared rotor; all where there are none.
+/// Sides with encoder and friction together on one side and a geared rotor; all given sides if there are none of this kind.
 fn whole(sides: &[Sides]) -> Vec<&Sides> {
     let both = |s: &&Sides| s.encoder_at_motor == s.friction_at_motor && !s.rotor_rides;
     let found: Vec<&Sides> = sides.iter().filter(both).collect();
     if found.is_empty() { sides.iter().collect() } else { found }
 }
 
-/// Scores all candidates around a fitted hypothesis.
+/// Score tests of all candidates around the fitted hypothesis `base`.
 pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     base: &Hypothesis<P>,
@@ -133,13 +133,13 @@ pub fn screen<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     candidates.iter().enumerate().map(score).collect()
 }
 
-/// What the test moves: the first amplitude whose trial value is not neutral.
+/// Index of the parameter that the score test displaces: the first amplitude of the candidate whose trial value is not neutral.
 fn tested(candidate: &EffectInstance) -> usize {
     let off = neutral(candidate);
     (0..candidate.len()).find(|&i| candidate.p[i] != off.p[i]).unwrap_or(0)
 }
 
-/// Sensitivity of the whitened prediction to the tested parameter at neutral, or the whole difference that the effect makes.
+/// Sensitivity of the whitened prediction to the tested parameter at neutral (or the full change by the effect, with its decrease of the cost).
 fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     base: &Hypothesis<P>,
@@ -166,7 +166,7 @@ fn trace<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     (residual.iter().zip(&there).map(|(here, there)| (here - there) / step).collect(), direct)
 }
 
-/// Student-t cost of a residual, summed over the windows.
+/// Student-t cost of a whitened residual, summed over the windows.
 fn student_t_total<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     problem: &FitProblem<A, N, P>,
     residual: &[f64],
@@ -179,7 +179,7 @@ fn student_t_total<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         .sum()
 }
 
-/// The test of one candidate; a parameter that would have to cross its bound has nothing to gain.
+/// Score test of one candidate from its information, slope and scatter; a parameter that would have to cross its bound has no gain.
 fn scored(effect: &EffectInstance, raw: f64, information: f64, slope: f64, scatter: f64) -> ScoreTest {
     let estimate = slope / information;
     let mut suggested = *effect;
@@ -216,7 +216,7 @@ fn scored(effect: &EffectInstance, raw: f64, information: f64, slope: f64, scatt
 }
 
 impl ScoreTest {
-    /// By how much the tested parameter of the suggestion differs from neutral, in the units of the test.
+    /// Deviation of the suggested tested parameter from neutral, in the unit of the score test.
     fn admissible(&self, candidate: &EffectInstance) -> f64 {
         let i = tested(candidate);
         match candidate.law.spec().trial {

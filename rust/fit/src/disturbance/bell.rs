@@ -1,45 +1,45 @@
-//! A push as the low-passed torque shows it: a bell over time.
+//! Gaussian pulse over time: a push on a joint as it appears in the low-passed residual torque.
 
 use super::residual::LOW_PASS;
 
-/// Two bells on the same joint are apart by this, s.
+/// Least distance in time between the centres of two Gaussian pulses on one joint, s.
 const APART: f64 = 0.3;
 
-/// A bell on one joint.
+/// Gaussian pulse of residual torque on one joint.
 #[derive(Debug, Clone, Copy)]
 pub struct Bell {
-    /// 0-based joint.
+    /// Joint that the pulse acts on, counted from 0.
     pub joint: usize,
-    /// Time of the centre, s.
+    /// Time of the pulse's centre, s.
     pub time: f64,
-    /// Standard deviation as it appears behind the low-pass, s.
+    /// Standard deviation of the Gaussian over time, after the low-pass of the residual torque, s.
     pub width: f64,
-    /// Height, N m.
+    /// Height of the pulse, N m or N.
     pub height: f64,
-    /// Standard deviation of the height.
+    /// Standard deviation of the pulse's height, N m or N.
     pub sigma: f64,
-    /// Size in standard deviations of what bells of its kind have elsewhere in the log.
+    /// Height in standard deviations, relative to the typical size of chance pulses of equal width on the joint.
     pub z: f64,
 }
 
 impl Bell {
-    /// Impulse, N m s.
+    /// Impulse of the pulse, N m s (N s).
     pub fn impulse(&self) -> f64 {
         self.height * self.width * std::f64::consts::TAU.sqrt()
     }
 
-    /// Length of the rectangle that is spread as far as the bell before the low-pass, s.
+    /// Length of a rectangular pulse, s, whose variance over time equals that of the Gaussian before the low-pass.
     pub fn duration(&self) -> f64 {
         12.0_f64.sqrt() * (self.width.powi(2) - LOW_PASS.powi(2)).max(0.0).sqrt()
     }
 
-    /// Its value at a time, per unit of height.
+    /// Value of the pulse at time `t`, per unit of height.
     pub fn at(&self, t: f64) -> f64 {
         let x = (t - self.time) / self.width;
         if x.abs() > 5.0 { 0.0 } else { (-0.5 * x * x).exp() }
     }
 
-    /// The bell at points of a regular grid, each from the one before: its logarithm is a parabola.
+    /// Values of the pulse, per unit of height, at the points `t` of a regular grid of spacing `step`, s, by a recurrence.
     pub fn over(&self, t: &[f64], step: f64) -> Vec<f64> {
         let step = step / self.width;
         let from = t.first().map_or(0.0, |t| (t - self.time) / self.width);
@@ -54,13 +54,13 @@ impl Bell {
         t.iter().map(next).collect()
     }
 
-    /// Whether two cannot both be pushes.
+    /// Whether two pulses lie on one joint and too close in time to be two pushes.
     pub fn touches(&self, other: &Self) -> bool {
         self.joint == other.joint && (self.time - other.time).abs() < APART
     }
 }
 
-/// All bells but one.
+/// All pulses except the one with index `i`.
 pub fn all_but(bells: &[Bell], i: usize) -> Vec<Bell> {
     bells.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, b)| *b).collect()
 }

@@ -1,4 +1,4 @@
-//! Sizes of a push by output error over the windows it touches: the push under which their predictions miss least.
+//! Output-error fit of a push: impulse, time and duration that minimise the prediction errors of the windows it touches.
 
 use super::own::Own;
 use super::push::{Disturbance, Place, PushState, SHORTEST};
@@ -10,42 +10,42 @@ use crate::predict::window::Dataset;
 use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// Windows this far from a push are left out, s.
+/// Largest distance in time, s, from a push's Gaussian pulse to a window that takes part in the fit of the push.
 const AROUND: f64 = 0.25;
 
-/// Longest push, s.
+/// Longest duration of a fitted push, s.
 const LONGEST: f64 = 2.5;
 
-/// A push that lowers the cost of the windows it touches by less than this share is not seen there.
+/// Least share of the windows' cost that a push must remove to be kept beside an unexplained remainder.
 const HELPS: f64 = 0.01;
 
-/// Beside a remainder, a push that lowers the cost of the windows it touches by less than this share is not seen there; the model fitted to
-/// the recording with the push is compared to that fitted without it.
+/// Least share of the windows' cost, with the model refitted to the recording, that a push must remove to be kept beside an unexplained remainder;
+/// the model fitted to the recording with the push is compared to that fitted without it.
 const HELPS_OWN: f64 = 0.02;
 
 /// Least share of the cost of the windows it touches that a push must explain before its size by output error is believed.
 const EXPLAINS: f64 = 0.5;
 
-/// How far, in its own durations and at least s, output error may move a push, and by what factor change its impulse.
+/// Largest shift of a push by output error, in its durations and at least in s, and largest factor by which its impulse may change.
 const MOVED: f64 = 0.3;
 const MOVED_LEAST: f64 = 0.1;
 const CHANGED: f64 = 1.5;
 
-/// Steps of the fit, attempts at each, and the relative decrease of the cost that ends it.
+/// Largest number of steps in the fit of a push, attempts at each step, and relative decrease of the cost that ends the fit.
 const ITERATIONS: usize = 12;
 const ATTEMPTS: usize = 6;
 const SETTLED: f64 = 1e-4;
 
-/// Durations that the search starts from beside the one seen, s.
+/// Durations, s, from which the fit of a push is started besides the duration seen in the residual torque.
 const LONGER: [f64; 2] = [0.04, 0.12];
 
-/// Times that the windows' starts and weights are made anew around the push.
+/// Rounds in which initial states and weights of the windows are recomputed around a fitted push.
 const ROUNDS: usize = 2;
 
-/// Part of a standard deviation by which a model's values are displaced for sensitivities.
+/// Displacement along a principal axis of the model's covariance for sensitivities, in standard deviations.
 const AXIS_STEP: f64 = 0.01;
 
-/// The windows that a push touches, and the residual they have under any push.
+/// Windows that a push touches, with the residual of their predictions under any values of the push.
 struct Touched<'a, A, const N: usize, const P: usize> {
     arm: &'a A,
     model: &'a Hypothesis<P>,
@@ -56,7 +56,7 @@ struct Touched<'a, A, const N: usize, const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Whether a log misses by so much that a push in it could be of consequence. Beside a remainder that is no condition.
+    /// Whether the prediction errors of a log are large enough for a push of consequence; always true where the model leaves an unexplained remainder.
     pub(super) fn could_hold_a_push(&self, (set, track): Place, state: &PushState<'_, N, P>) -> bool {
         if state.remainder {
             return true;
@@ -68,7 +68,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weighting.costs(&data, &residual).iter().sum::<f64>() > least_gain(whole, state)
     }
 
-    /// Weights around the model, every window from its measured start, and what it predicts.
+    /// Weighting around the model and the model's predictions, with every window at its measured initial state.
     fn at_measured_starts(&self, data: &Dataset<N>, state: &PushState<'_, N, P>) -> (Weighting<N>, Vec<f64>) {
         let offsets = state.zeros.offsets(data);
         let predicted = data.predict(&self.arm, state.model, &offsets);
@@ -76,11 +76,11 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (weighting.with_zeros(state.zeros.clone()), predicted)
     }
 
-    /// The push with the values that output error gives it, and what it explains.
+    /// The push `rough` with the impulse, time and duration fitted by output error, and the share of the cost it explains; `None` if it explains too little.
     ///
-    /// What it explains is counted from what the model misses, or the model fitted to its recording alone, if that misses less. Beside a
-    /// remainder it stays as it was where output error explains too little to be believed, if it helps at all, or helps that model;
-    /// without one, it then is none. `known` are the recording's other pushes.
+    /// The share counts from the cost of the model without the push, or of the model refitted to the recording alone if that is less. Where the model
+    /// leaves an unexplained remainder and the output error explains too little to be believed, `rough` is returned unchanged if it lowers the cost
+    /// under the model or under the refitted one. `known` are the recording's further pushes.
     pub(super) fn sized(
         &self,
         rough: Disturbance,
@@ -138,13 +138,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// What a push of consequence lowers the cost of its windows by, at least.
+/// Least decrease of the windows' cost by a push of consequence.
 fn least_gain<const N: usize, const P: usize>(sample: &WindowSet<N>, state: &PushState<'_, N, P>) -> f64 {
     state.min_relevance.powi(2) * sample.motion(&state.scale)
 }
 
-/// Whether output error has found the same push; beside a remainder also its size must be much the same, for the remainder may have
-/// gone into it.
+/// Whether the fitted push (impulse, time, duration) agrees with the seen one in time and sign; beside an unexplained remainder also in size, for
+/// the fit may have taken up part of the remainder.
 fn close(fitted: &Vector3<f64>, seen: &Vector3<f64>, remainder: bool) -> bool {
     let ratio = fitted[0] / seen[0];
     let near = (fitted[1] - seen[1]).abs() < (MOVED * seen[2]).max(MOVED_LEAST);
@@ -152,17 +152,17 @@ fn close(fitted: &Vector3<f64>, seen: &Vector3<f64>, remainder: bool) -> bool {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
-    /// The known pushes and one of these values.
+    /// The log's known pushes and one more push with impulse, time and duration `p`.
     fn with(&self, p: &Vector3<f64>) -> Vec<EffectInstance> {
         self.known.iter().copied().chain([EffectInstance { p: (*p).into(), ..self.push }]).collect()
     }
 
-    /// Whitened residual under a push of these values.
+    /// Whitened residual of the windows under a push with impulse, time and duration `p`.
     fn residual_of(&self, p: &Vector3<f64>) -> Vec<f64> {
         self.residual_under(self.model, p)
     }
 
-    /// Whitened residual under another model and a push of these values.
+    /// Whitened residual of the windows under `model` and a push with impulse, time and duration `p`.
     fn residual_under(&self, model: &Hypothesis<P>, p: &Vector3<f64>) -> Vec<f64> {
         let mut data = self.sample.data.clone();
         data.tracks[0].pushes = self.with(p);
@@ -170,7 +170,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         self.weighting.residual(&self.sample.measured, &predicted)
     }
 
-    /// Cost of a push under another model, whose starts are fitted to it.
+    /// Cost of the windows under the model `own`, initial states fitted to it, and a push with impulse, time and duration `p`.
     fn cost_under(&self, context: &DiagnosisContext<A, N, P>, own: &Hypothesis<P>, p: &Vector3<f64>) -> f64 {
         let mut data = self.sample.data.clone();
         data.tracks[0].pushes = self.with(p);
@@ -186,7 +186,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         self.weighting.total(&self.weighting.costs(&self.sample.data, r))
     }
 
-    /// The best of the minima that are reached from a first guess and from longer pushes around the same time.
+    /// Lowest of the minima reached from the first guess `p` and from longer pushes at the same time: impulse, time and duration, and cost.
     fn least(&self, p: Vector3<f64>) -> (Vector3<f64>, f64) {
         LONGER.iter().fold(self.minimise(p), |best, duration| {
             let other = self.minimise(Vector3::new(p[0], p[1], *duration));
@@ -194,7 +194,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         })
     }
 
-    /// Levenberg and Marquardt's method from a first guess: values and cost.
+    /// Levenberg-Marquardt minimum from the first guess `p`: impulse, time and duration of the push, and cost.
     fn minimise(&self, p: Vector3<f64>) -> (Vector3<f64>, f64) {
         let (mut p, mut r) = (p, self.residual_of(&p));
         let (mut cost, mut damping) = (self.cost(&r), 1e-2);
@@ -221,7 +221,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         (p, cost)
     }
 
-    /// Standard deviations of a push's values, for noise as large as what is left and a model known up to `covariance`.
+    /// Standard deviations of a push's impulse, time and duration, for noise as large as the residual and a model known up to `covariance`.
     fn sigma(&self, p: &Vector3<f64>, covariance: &DMatrix<f64>) -> Option<[f64; 3]> {
         let r = self.residual_of(p);
         let noise = (self.cost(&r) / (self.sample.data.rows * N) as f64).max(1.0);
@@ -238,7 +238,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         Some(std::array::from_fn(|i| inverse[(i, i)].sqrt()))
     }
 
-    /// How predictions change along the principal axes of what is not known of the model, each by its standard deviation.
+    /// Whitened changes of the predictions along the principal axes of the model's covariance, each by one standard deviation.
     fn doubts(&self, p: &Vector3<f64>, r: &[f64], covariance: &DMatrix<f64>) -> Vec<Vec<f64>> {
         let values = self.model.values();
         let scale = covariance.diagonal().map(|v| if v > 0.0 && v.is_finite() { v.sqrt() } else { 0.0 });
@@ -260,7 +260,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
         (0..scale.len()).filter(|k| axes.eigenvalues[*k] > 1e-9).map(column).collect()
     }
 
-    /// Derivatives of the prediction by impulse, time and duration.
+    /// Derivatives of the whitened prediction by a push's impulse, time and duration.
     fn jacobian(&self, p: &Vector3<f64>, r: &[f64]) -> [Vec<f64>; 3] {
         let steps = [1e-4 * p[0].abs().max(1e-12), 1e-5, 1e-5];
         let slope = |i: usize| {
@@ -272,7 +272,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> Touched<'_, A, N, P> {
     }
 }
 
-/// One damped step.
+/// One damped Gauss-Newton step of a push's impulse, time and duration; `None` for a singular normal matrix.
 fn damped_step(p: &Vector3<f64>, gram: &DMatrix<f64>, damping: f64) -> Option<Vector3<f64>> {
     let mut normal = gram.view((0, 0), (3, 3)).into_owned();
     for i in 0..3 {
@@ -284,7 +284,7 @@ fn damped_step(p: &Vector3<f64>, gram: &DMatrix<f64>, damping: f64) -> Option<Ve
     Some(Vector3::new(p[0] + change[0], p[1] + change[1], duration))
 }
 
-/// Windows of a push's log that it touches, as a dataset of that log alone.
+/// Windows that a push touches, as a dataset of the push's log alone.
 fn around<const N: usize>(sample: &WindowSet<N>, disturbance: &Disturbance) -> Dataset<N> {
     let track = &sample.data.tracks[disturbance.track];
     let [_, time, duration] = disturbance.push.p;

@@ -1,13 +1,13 @@
-//! How strongly each joint is disturbed: maximum likelihood intensities of random torques that explain the prediction errors.
+//! Maximum likelihood intensity of the random torque on each joint that explains the prediction errors.
 //!
-//! Between prediction and measurement of one window lies the motion that the residual torque `d` made, seen through the encoders' noise:
+//! The prediction error of a window is the motion due to the residual torque `d`, measured with the encoders' noise:
 //!
 //! ```text
 //! M(q) dde/dt2 = d,     y = e + v,     d white of intensity W = diag(w_1 .. w_n),     v white of the encoders' variances.
 //! ```
 //!
-//! The intensities are those of largest likelihood (innovations of the Kalman filter; Schweppe 1965), every window's initial state left open. So
-//! the encoders' noise is told from a torque by its spectrum, and what a coupled arm shows on one joint from what acts on the other.
+//! The intensities maximise the likelihood (innovations of the Kalman filter; Schweppe 1965), with the initial state of every window unknown. Noise of
+//! the encoders and torque are told apart by their spectra, and the joint on which a torque acts from coupled joints by the inertia matrix.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::scale::Scales;
@@ -19,45 +19,45 @@ use armgap_core::arm::Arm;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rayon::prelude::*;
 
-/// Factor on the standard deviations of a measured initial state, which leaves it open.
+/// Factor on the standard deviations of a measured initial state that makes it practically unknown to the Kalman filter.
 const OPEN: f64 = 100.0;
 
-/// The search begins at a torque of this part of the joint's typical one, held over one sample.
+/// First guess of the random torque on a joint, relative to the joint's typical torque, held over one sample.
 const FIRST: f64 = 1e-2;
 
-/// No joint is disturbed by less than this part of its typical torque.
+/// Smallest random torque on a joint, relative to the joint's typical torque.
 const FAINTEST: f64 = 1e-5;
 
-/// Factor of intensity between the corners of the first simplex.
+/// Ratio of intensities between the corners of the first Nelder-Mead simplex.
 const APART: f64 = 100.0;
 
-/// The search ends where the likelihoods of the simplex scatter by less.
+/// Standard deviation of the deviance over the Nelder-Mead simplex that ends the search for intensities.
 const SETTLED: f64 = 0.1;
 
-/// Evaluations stay in proportion to this.
+/// Largest number of Nelder-Mead iterations in the search for intensities; computation time is in proportion.
 const MAX_ITERATIONS: u64 = 60;
 
 type Matrix<const N: usize> = SMatrix<f64, N, N>;
 type Vector<const N: usize> = SVector<f64, N>;
 
-/// Prediction error at one sample of a window, time to the next, and the inverse inertia there.
+/// Prediction error at one sample of a window, time to the next sample, s, and inverse inertia matrix at the sample.
 struct PredictionError<const N: usize> {
     error: Vector<N>,
     step: f64,
     mobility: Matrix<N>,
 }
 
-/// Prediction errors of all windows, and the likelihood of intensities under them.
+/// Prediction errors of all windows, whose likelihood is a function of the torque intensities.
 struct PredictionErrors<const N: usize> {
     windows: Vec<(KalmanFilter<N>, Vec<PredictionError<N>>)>,
     noise: Matrix<N>,
-    /// Common logarithms of the intensities that [`FAINTEST`] stands for.
+    /// Common logarithms of the smallest intensities ([`FAINTEST`]).
     faintest: [f64; N],
 }
 
 /// Each joint's share of the kinetic energy that residual torques feed into the arm over the holdout, under a hypothesis: `w_j (M^-1)_jj`.
 ///
-/// The measure is that of Gauss's principle of least constraint, in which torques of unlike joints compare; shares add to one.
+/// The metric is that of Gauss's principle of least constraint, in which torques of unlike joints compare; shares add to one.
 pub fn shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     hypothesis: &Hypothesis<P>,
@@ -90,13 +90,13 @@ pub fn shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     std::array::from_fn(|j| if whole > 0.0 && whole.is_finite() { fed[j] / whole } else { 1.0 / N as f64 })
 }
 
-/// Common logarithm of the intensity of a torque of this part of each joint's typical one, drawn anew at every sample.
+/// Common logarithm of the intensity of a torque of the size `part` times each joint's typical torque, drawn anew at every sample.
 fn intensities<const N: usize>(scales: &Scales<N>, part: f64) -> [f64; N] {
     scales.torque.map(|torque| ((part * torque).powi(2) * scales.period).max(1e-300).log10())
 }
 
 impl<const N: usize> PredictionErrors<N> {
-    /// Common logarithms of the likeliest intensities.
+    /// Common logarithms of the intensities of largest likelihood, by Nelder-Mead search from `first`.
     fn likeliest(self, first: [f64; N]) -> [f64; N] {
         let corner = |i: usize| {
             let mut corner = first.to_vec();
@@ -117,7 +117,7 @@ impl<const N: usize> PredictionErrors<N> {
         std::array::from_fn(|j| found.as_ref().map_or(first[j], |found| found[j]).max(faintest[j]))
     }
 
-    /// Twice the negative logarithm of the likelihood, but for a constant.
+    /// Deviance of the intensities: twice the negative log-likelihood, up to a constant.
     fn deviance(&self, intensity: &Vector<N>) -> f64 {
         let of = |(start, misses): &(KalmanFilter<N>, Vec<PredictionError<N>>)| {
             let mut filter = start.clone();
@@ -139,19 +139,19 @@ impl<const N: usize> CostFunction for PredictionErrors<N> {
     }
 }
 
-/// Kalman filter of the prediction errors of positions and velocities: their estimates and covariance, in blocks.
+/// Kalman filter of the prediction errors of positions and velocities: estimates and blocks of their covariance.
 #[derive(Clone)]
 struct KalmanFilter<const N: usize> {
     e: Vector<N>,
     de: Vector<N>,
     position: Matrix<N>,
-    /// Covariance of positions (rows) and velocities (columns).
+    /// Covariance of position errors (rows) and velocity errors (columns).
     mixed: Matrix<N>,
     velocity: Matrix<N>,
 }
 
 impl<const N: usize> KalmanFilter<N> {
-    /// At the start of a window, where nothing is known yet.
+    /// Filter at the start of a window, with a practically unknown initial state.
     fn open(window: &Window<N>) -> Self {
         let variance = |entry: usize| {
             let of = |j: usize| OPEN * OPEN * window.initial_state.covariance[j][entry];
@@ -166,7 +166,7 @@ impl<const N: usize> KalmanFilter<N> {
         }
     }
 
-    /// Takes in one sample, goes on to the next, and returns what the sample adds to the deviance.
+    /// Updates the filter by one sample, predicts the next, and returns the sample's contribution to the deviance.
     fn step(&mut self, miss: &PredictionError<N>, noise: &Matrix<N>, intensity: &Vector<N>) -> f64 {
         let Some(innovation) = Cholesky::new(self.position + noise) else { return f64::NAN };
         let v = miss.error - self.e;
@@ -206,7 +206,7 @@ mod tests {
     const STEP: f64 = 2.5e-3;
     const NOISE: f64 = 1e-6;
 
-    /// Windows of a coupled arm that torques of these intensities moved away from what was predicted.
+    /// Prediction errors of a coupled two-joint arm under random torques of known intensities.
     fn misses(windows: usize, intensity: [f64; 2], seed: u64) -> PredictionErrors<2> {
         let mut random = Random(seed);
         let mobility = Matrix::<2>::new(0.4, -0.9, -0.9, 12.0);

@@ -1,10 +1,10 @@
-//! Laws in the place of pushes. A drive that does not give all the torque it is asked for lacks it at a few instants, and a joint that reaches
-//! a stop is driven back a few times: either looks as if something pushed.
+//! Effects in the place of pushes: a saturated drive lacks torque at a few instants, and a joint that reaches a stop is driven back a few times;
+//! both look like pushes.
 //!
-//! A cause shows in the typical window; a limit or a stop that one log reaches once or twice does not, and where the training logs do not
-//! reach it at all no fit to them knows where it is. So the pushes of a joint are compared with a law that could have made them, on the same
-//! footing: the model is fitted beside either to all windows of all logs, both are judged by the same Student-t likelihood, and both pay for
-//! their free values (Bayesian information criterion, Schwarz 1978). A push has three of them, and a law as many as it has however often it acts.
+//! A cause shows in the typical window; a torque limit or a stop that one log reaches once or twice does not, and training logs that do not reach
+//! it cannot locate it. So the pushes of a joint are compared with an effect that could have caused them, on equal terms: the model is fitted with
+//! either to all windows of all logs, both are judged by one Student-t likelihood, and both are penalised for their free values (Bayesian
+//! information criterion, Schwarz 1978). Each push has three values, an effect a fixed number however often it acts.
 
 use super::push::Disturbance;
 use crate::likelihood::context::DiagnosisContext;
@@ -20,65 +20,65 @@ use armgap_core::arm::Arm;
 use armgap_core::effect::{MAX_PARAMETERS, find};
 use rayon::prelude::*;
 
-/// Laws that act as pushes do, each on one joint.
+/// Effects that act like pushes, each on one joint, with the initial guess from a push.
 const LAWS: [LawGuess; 2] = [
     LawGuess { name: "torque_saturation", from_push: limit_guess },
     LawGuess { name: "contact", from_push: stop_guess },
 ];
 
-/// Halvings that find the level of one push.
+/// Bisection steps that find the torque limit from one push.
 const HALVINGS: usize = 40;
 
-/// Times that starts and weights of the windows are made anew around the model with a law.
+/// Rounds in which initial states and weights of the windows are recomputed around the model with an effect in the place of pushes.
 const ROUNDS: usize = 2;
 
-/// A contact's half sine of torque lasts this much longer than the constant torque that fits it best, and its peak is this much higher.
+/// Ratio of duration, and of peak, of a contact's half sine of torque to the constant torque that fits it best.
 const HALF_SINE: f64 = 1.3;
 
-/// First damping of a stop, as its torque at the push's mean speed relative to the mean torque.
+/// First guess of a stop's damping: damping torque at the push's mean speed relative to the mean torque.
 const DAMPED: f64 = 0.1;
 
-/// A law that a push can be the sign of.
+/// Effect of the library whose action can be mistaken for a push.
 struct LawGuess {
     name: &'static str,
-    /// Values of the law that acts at the push's time as the push does; none if the law cannot.
+    /// Parameters of the effect that acts like the push at the push's time; `None` if the effect cannot.
     from_push: fn(&PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]>,
 }
 
-/// What a joint does while it is pushed.
+/// Measured motion and commanded torque of a joint during a push.
 struct PushedMotion<'a> {
     /// Impulse, time and duration of the push.
     push: [f64; 3],
-    /// Sample times from about one duration before to one after it.
+    /// Sample times, s, from about one duration of the push before its centre to one after.
     t: &'a [f64],
-    /// The joint's positions at the times of the pushes.
+    /// Positions of the joint at the sample times around the push, rad or m.
     q: &'a [f64],
-    /// Mean command from each of those samples to the next.
+    /// Mean commanded torque of the joint from each sample around the push to the next, N m or N.
     torque: &'a [f64],
 }
 
-/// A law on a joint that may stand in the place of some of the pushes.
+/// An effect on a joint that may replace some of the pushes.
 struct Trial {
-    /// Its first guesses, one of each of those pushes.
+    /// First guesses of the effect, one from each push that it may replace.
     guesses: Vec<EffectInstance>,
-    /// Those pushes.
+    /// Pushes that the effect may replace.
     theirs: Vec<Disturbance>,
-    /// The other pushes.
+    /// Pushes that stay beside the effect.
     others: Vec<Disturbance>,
 }
 
-/// A model beside some of the pushes, fitted to all windows of all logs, and its likelihood.
+/// A model fitted with some of the pushes to all windows of all logs, and its likelihood.
 struct Explanation<const N: usize, const P: usize> {
     fit: Fit<P>,
-    /// Twice the negative logarithm of the likelihood, up to what all have in common: Student-t costs and prior cost.
+    /// Deviance up to a common constant: Student-t costs of the windows plus prior cost.
     cost: f64,
-    /// Sum of the windows' costs as they are.
+    /// Sum of the windows' costs without robust weights.
     raw: f64,
     weighting: Weighting<N>,
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The law that explains what pushes of a joint explain, with fewer values or no worse with as many, if there is one.
+    /// The effect that explains the logs as well as the pushes of a joint by the Bayesian information criterion, if there is one.
     pub(super) fn law_in_place(
         &mut self,
         alone: &Attribution<N, P>,
@@ -107,7 +107,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         best
     }
 
-    /// A law on a joint in the place of the pushes that could be its signs; of each side of zero by itself, as a stop has only one.
+    /// Trials of the effect `law` on a joint in the place of pushes that it could have caused; one trial per side of zero, as a stop has one side.
     fn trials(&self, joint: usize, law: &LawGuess, disturbances: &[Disturbance]) -> Vec<Trial> {
         let Some(effect) = find::<f64>(law.name) else { return Vec::new() };
         let guess = |e: &Disturbance| {
@@ -129,8 +129,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         [1.0, -1.0].map(of_side).into_iter().filter(|trial| !trial.guesses.is_empty()).collect()
     }
 
-    /// The law that stands for the pushes of a trial, if it explains the logs as well as they do, and by how much its information criterion is
-    /// lower. Pushes that are not of this trial are taken to have acted in either case.
+    /// The effect that replaces the pushes of a trial, and by how much it lowers the Bayesian information criterion; `None` if it does not lower it.
+    /// Pushes outside the trial are kept in both models.
     fn law_of(&self, trial: &Trial, pushed: &Explanation<N, P>) -> Option<(f64, Cause)> {
         let all = self.of_all_windows();
         let model = &pushed.fit.hypothesis;
@@ -167,13 +167,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Some((advantage, cause))
     }
 
-    /// This context with the windows of all logs to learn from and to judge on, as their pushes are now.
+    /// A diagnosis context with the windows of all logs as training and as holdout windows, under their current pushes.
     fn of_all_windows(&self) -> Self {
         self.on_windows(self.training.data.clone().and(self.holdout.data.clone()))
     }
 
-    /// A model fitted to the training windows, and its cost; starts and weights are made anew around it so many times, with `given` scales and the
-    /// given cost of a typical window.
+    /// The model refitted to the training windows, and its cost; initial states and weights are recomputed `rounds` times, at the scales and the typical
+    /// cost of the weighting `given`.
     fn explanation(&self, fit: Fit<P>, given: &Weighting<N>, rounds: usize) -> Explanation<N, P> {
         let mut fit = fit;
         for _ in 0..rounds {
@@ -188,7 +188,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Times, positions and mean commands of a pushed joint, from one duration before the push to one after it.
+/// Times (s), positions (rad or m) and mean commanded torques (N m or N) of a pushed joint, from one duration before the push to one after.
 fn pushed_motion<const N: usize>(track: &Track<N>, push: &EffectInstance) -> [Vec<f64>; 3] {
     let [_, time, duration] = push.p;
     let first = track.t.partition_point(|t| *t < time - duration);
@@ -201,7 +201,7 @@ fn pushed_motion<const N: usize>(track: &Track<N>, push: &EffectInstance) -> [Ve
     ]
 }
 
-/// Level beyond which the command around a push against it amounts to the push's impulse.
+/// First guess of a drive's torque limit: level at which the commanded torque beyond it, integrated around the push, equals the push's impulse.
 fn limit_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
     let impulse = motion.push[0];
     let against = |torque: &f64| -impulse.signum() * torque;
@@ -220,8 +220,8 @@ fn limit_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
     Some([low, 0.0, 0.0])
 }
 
-/// Stop that a push away from it, towards zero, would come from: entered when the push begins, left when it ends, and as stiff as the greatest
-/// depth asks for.
+/// First guess of a stop that a push towards zero could come from: entered when the push begins, left when it ends, with the stiffness that
+/// the greatest depth requires.
 fn stop_guess(motion: &PushedMotion<'_>) -> Option<[f64; MAX_PARAMETERS]> {
     let [impulse, time, duration] = motion.push;
     let side = -impulse.signum();

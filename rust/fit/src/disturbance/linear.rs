@@ -1,4 +1,4 @@
-//! All that a model could be wrong by and some bells, fitted together to the torque that one log lacks.
+//! Linear fit of possible model errors and of Gaussian pulses (pushes) to the residual torque of one log.
 
 use super::bell::Bell;
 use super::residual::{Joint, Residual};
@@ -8,48 +8,48 @@ use crate::numeric::products::{cross, product};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Correlation time of what a model lacks, s, where its columns are fitted and where pushes are judged.
+/// Correlation time of the residual torque, s, in the fit of model errors and in the test of pushes.
 const MODEL_TIME: f64 = 0.25;
 const JUDGED_TIME: f64 = 0.06;
 
-/// Scatter relative to the typical torque below which the columns are not fitted more closely: a joint that is hardly driven could
-/// otherwise be explained by parameters of next to nothing.
+/// Least scatter, relative to the joint's typical torque, in the weights of the fit of model errors: the torque of a joint that is hardly driven
+/// could otherwise be explained by parameters of no consequence.
 const MODEL_SCATTER: f64 = 0.05;
 
-/// A bell of which less is left by the other columns cannot be told from them.
+/// Least part of a Gaussian pulse that the further columns must leave unexplained for it to be told from them.
 const DISTINCT: f64 = 0.15;
 
-/// First guess of the scatter relative to the typical torque, and rounds until it follows the residual.
+/// First guess of the residual's scatter relative to the joint's typical torque, and rounds of re-estimation of the scatter.
 const FIRST_SCATTER: f64 = 0.15;
 const ROUNDS: usize = 4;
 
-/// Largest amplitude of a push relative to the typical torque of its joint.
+/// Prior standard deviation of a push's height relative to the typical torque of its joint.
 const LARGEST: f64 = 20.0;
 
-/// A linear fit of all columns and of some bells.
+/// Result of a linear fit of model errors and Gaussian pulses to residual torques.
 pub struct Fitted {
-    /// What is left, per joint.
+    /// Residual torque after the fit, per joint and grid point, N m or N.
     left: Vec<Vec<f64>>,
-    /// Inverse of the normal matrix.
+    /// Inverse of the normal matrix of the linear fit.
     inverse: DMatrix<f64>,
-    /// Bells in the fit.
+    /// Gaussian pulses that take part in the fit.
     pub bells: Vec<Bell>,
-    /// Weights per joint and point: those that bells are judged with, and those that the columns are fitted with.
+    /// Weights per joint and grid point: for the test of pulses, and for the fit of model errors.
     weights: Vec<[Vec<f64>; 2]>,
 }
 
-/// The fit's data and the scatter that weighs them.
+/// Data of the linear fit of model errors and pulses, with the scatter that sets its weights.
 pub struct Linear<'a, const N: usize> {
-    /// What the log lacks.
+    /// Residual torque of the log with the columns of possible model errors.
     pub residual: &'a Residual<N>,
-    /// Share of the time that each joint moves at each point.
+    /// Share of the time, 0 to 1, that each joint moves around each grid point.
     pub moving: Vec<Vec<f64>>,
-    /// Standard deviation of the residual torque, per joint and grid point.
+    /// Standard deviation of the residual torque, N m or N, per joint and grid point.
     scatter: Vec<Vec<f64>>,
 }
 
 impl<'a, const N: usize> Linear<'a, N> {
-    /// With a first guess of the scatter.
+    /// A linear fit of the residual torque with the first guess of its scatter.
     pub fn new(residual: &'a Residual<N>) -> Self {
         let moving = |x: &Joint| x.rest.iter().map(|r| (1.0 - r).clamp(0.0, 1.0)).collect();
         let first = |x: &Joint| vec![FIRST_SCATTER * x.typical.max(1e-9); residual.t.len()];
@@ -60,7 +60,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         }
     }
 
-    /// All columns and bells fitted, with the scatter that follows from what is left.
+    /// Fits all columns and the given pulses, and re-estimates the scatter from the residual.
     pub fn settle(&mut self, bells: &[Bell]) -> Option<Fitted> {
         let mut fitted = self.fit(bells)?;
         for _ in 0..ROUNDS {
@@ -109,7 +109,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         Some(Fitted { left, inverse, bells: bells.to_vec(), weights })
     }
 
-    /// Weights of joint `j`'s points where bells are judged, and where the columns are fitted.
+    /// Weights of joint `j`'s grid points for the test of pulses and for the fit of model errors.
     fn weights(&self, j: usize) -> [Vec<f64>; 2] {
         let tempering = self.residual.step / MODEL_TIME;
         let least = MODEL_SCATTER * self.residual.joints[j].typical;
@@ -119,7 +119,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         })
     }
 
-    /// Torque of joint `j` per unit of every column, then of every bell, which the model does not have.
+    /// Torque of joint `j` per unit of every column of model errors, then of every pulse, by grid point; pulses count negative.
     fn rows(&self, j: usize, bells: &[Bell]) -> DMatrix<f64> {
         let joint = &self.residual.joints[j];
         let c = joint.columns.len();
@@ -130,7 +130,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         })
     }
 
-    /// Size of a bell beside those of a fit, in standard deviations of a calm log, with its best height; zero where it is not distinct.
+    /// A Gaussian pulse with its best height beside a fit, and its size in standard deviations; zero where the fit's columns can imitate the pulse.
     pub fn weigh(&self, fitted: &Fitted, bell: &Bell) -> Bell {
         let (residual, j) = (self.residual, bell.joint);
         let (first, last) = self.reach(bell);
@@ -161,13 +161,13 @@ impl<'a, const N: usize> Linear<'a, N> {
         Bell { height: along / own, sigma, z: if distinct { size.abs() } else { 0.0 }, ..*bell }
     }
 
-    /// Times at which a bell lies within the log.
+    /// Range of times, s, in which a pulse of standard deviation `width` lies within the log.
     pub fn span(&self, width: f64) -> (f64, f64) {
         let t = &self.residual.t;
         (t[0] + 2.0 * width, t[t.len() - 1] - 2.0 * width)
     }
 
-    /// Grid points that a bell reaches.
+    /// Index range of the grid points within four standard deviations of a pulse.
     fn reach(&self, bell: &Bell) -> (usize, usize) {
         let t = &self.residual.t;
         let from = bell.time - 4.0 * bell.width;

@@ -1,16 +1,16 @@
-//! Torques from outside: pushes at one time of one log, and random torques on a joint.
+//! External torques: pushes at one time of one log, and random torques on a joint.
 //!
-//! * `bell`: a push as the low-passed torque shows it.
-//! * `fit`: sizes of a push by output error.
+//! * `bell`: Gaussian pulse of a push in the low-passed residual torque.
+//! * `fit`: size of a push by output error.
 //! * `intensity`: maximum likelihood intensities of random torques, and each joint's share of them.
-//! * `law`: laws in the place of pushes.
-//! * `linear`: all that a model could be wrong by and some bells, fitted together.
-//! * `outlying`: pushes in windows that the model misses by far more than others.
+//! * `law`: effects of the library in the place of pushes.
+//! * `linear`: linear fit of possible model errors and Gaussian pulses.
+//! * `outlying`: pushes in windows whose prediction errors are far larger than typical.
 //! * `own`: the model fitted to one recording alone.
 //! * `push`: pushes of all logs, and the conclusion with and without them.
-//! * `residual`: the torque that a whole log lacks under a model.
-//! * `scatter`: how far a joint's residual scatters at every point of a log.
-//! * `search`: pushes that stand out of the lacking torque of one log.
+//! * `residual`: residual torque of a whole log under a model.
+//! * `scatter`: standard deviation of a joint's residual torque at every point of a log.
+//! * `search`: pushes that stand out of the residual torque of one log.
 
 pub(crate) mod bell;
 pub(crate) mod fit;

@@ -1,8 +1,8 @@
-//! Pushes in windows that the model misses by far more than others.
+//! Pushes in windows whose prediction errors are far larger than typical.
 //!
-//! Accelerations are known from an encoder far worse than positions, so a light push may be lost in the scatter of the lacking torque and
-//! still move its joint by many times what predictions otherwise miss. Where the model describes all but a few windows of a log to the
-//! noise, those few are looked into: the push that would explain most of a window, to first order, is where its fit starts.
+//! Accelerations are known from an encoder far worse than positions, so a light push may be lost in the noise of the residual torque and still move
+//! its joint by many times the typical prediction error. Where the model describes all but a few windows of a log to the noise, these windows are
+//! examined: the fit starts from the push that would explain most of a window to first order.
 
 use super::own::Own;
 use super::push::{Disturbance, Place, PushState};
@@ -15,25 +15,25 @@ use armgap_core::effect::{Quantity, find};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// How many times the cost of a typical window one has to have.
+/// Cost of a window, relative to a typical window, from which a push is looked for in it.
 const OUTLYING: f64 = 30.0;
 
-/// Share of the cost of the windows it touches that a push has to explain.
+/// Least share of the cost of the windows it touches that a push in an outlying window must explain.
 const CLEAR: f64 = 0.8;
 
-/// Its impulse exceeds its standard deviation by this factor: what explains a window like that and is not known is something else, such as
-/// the wrong instant at which a joint comes to rest.
+/// Least impulse of a push in an outlying window, in its standard deviations: an uncertain one has some further reason, such as the wrong instant at
+/// which a joint comes to rest.
 const KNOWN: f64 = 5.0;
 
-/// Durations that are tried, s, and the distance of the times.
+/// Durations of pushes that are tried in an outlying window, s, and spacing of the times tried.
 const DURATIONS: [f64; 3] = [0.01, 0.05, 0.15];
 const STEP: f64 = 0.02;
 
-/// Impulse of the push that slopes are taken by, relative to the typical one.
+/// Impulse of a push, relative to its typical size, for derivatives by finite difference.
 const SLIGHT: f64 = 1e-6;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Adds to the pushes of a log those that explain what single windows miss beside them.
+    /// Adds to the pushes of a log those that explain outlying windows, at most up to `MAX_PUSHES`.
     pub(super) fn in_outlying_windows(
         &self,
         place: Place,
@@ -54,7 +54,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// The push that explains most of the window that is missed by most, if that is far more than typical.
+    /// The push that explains most of the window of largest cost, to first order; `None` if its cost is not far above typical.
     fn in_worst_window(
         &self,
         place: Place,
@@ -112,7 +112,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         })
     }
 
-    /// What a push at this time, of this duration, would explain to first order, and its impulse.
+    /// Decrease of the cost by a push at the time and of the duration of `push`, to first order, and the push with its best impulse.
     fn first_order(
         &self,
         sample: &WindowSet<N>,

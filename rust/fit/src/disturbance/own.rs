@@ -1,4 +1,4 @@
-//! One recording by itself: the model fitted to it alone, without pushes and with some.
+//! The model fitted to one recording alone, with and without pushes.
 
 use super::push::{Disturbance, Place, PushState};
 use crate::likelihood::context::DiagnosisContext;
@@ -7,7 +7,7 @@ use crate::predict::window::Dataset;
 use armgap_core::arm::Arm;
 use std::cell::OnceCell;
 
-/// A recording, and what the model becomes if nothing else counts.
+/// A recording, and the model refitted to this recording alone.
 pub(super) struct Own<'a, A, const N: usize, const P: usize> {
     whole: &'a DiagnosisContext<A, N, P>,
     places: &'a [Place],
@@ -25,12 +25,12 @@ impl<'a, A: Arm<f64, N, P>, const N: usize, const P: usize> Own<'a, A, N, P> {
         Self { whole, places, state, bare: OnceCell::new() }
     }
 
-    /// The model fitted without any push.
+    /// The model fitted to the recording without any push.
     pub fn bare(&self) -> &Hypothesis<P> {
         self.bare.get_or_init(|| self.beside(&[]))
     }
 
-    /// The model fitted with these pushes in their pieces.
+    /// The model fitted to the recording with the pushes `disturbances` acting in their logs.
     pub fn beside(&self, disturbances: &[&Disturbance]) -> Hypothesis<P> {
         let piece = |place: &Place| {
             let mut data =

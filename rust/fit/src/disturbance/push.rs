@@ -1,8 +1,8 @@
-//! Pushes from outside: torques that no log shows, at one time of one log, judged inside that log.
+//! External pushes: torques at one time of one log that are no part of the logged torque, judged within this log.
 //!
-//! `residual` is the torque that a log lacks under a model, beside everything the model could be wrong by; `search` finds in it what comes once
-//! and does not follow from the state; `outlying` finds what is too light for that; `fit` sizes it by output error, where the model is good
-//! enough for that; `law` tells it from what a limit of the drive or a stop does.
+//! `residual` is the residual torque of a log beside possible model errors; `search` finds pulses in it that occur once and do not depend on the state;
+//! `outlying` finds pushes too light for `search`; `fit` sizes a push by output error, where the model is good enough; `law` tells pushes from the
+//! action of a torque limit or a stop.
 
 use super::bell::Bell;
 use super::own::Own;
@@ -24,53 +24,53 @@ use rayon::prelude::*;
 /// Shortest push that is reported, s.
 pub(super) const SHORTEST: f64 = 0.005;
 
-/// Pieces of one log follow each other within this many sample periods.
+/// Largest gap between successive pieces of one recording, in sample periods.
 const FOLLOWS: f64 = 8.0;
 
-/// Part of a joint's travel that counts as its end.
+/// Part of a joint's travel next to either limit that counts as its end.
 const NEAR_END: f64 = 0.12;
 
-/// Probability left to a push beside a remainder that nothing explains.
+/// Probability left to a push where the model leaves an unexplained remainder.
 const REMAINDER_DOUBT: f64 = 0.5;
 
-/// Predictions that miss by more than this factor are much worse.
+/// Ratio of prediction errors with and without pushes above which the pushes are rejected.
 const MUCH_WORSE: f64 = 1.5;
 
-/// A push's impulse exceeds its standard deviation by this factor.
+/// Least impulse of a push, in its standard deviations, to be known as not zero.
 const KNOWN: f64 = 2.0;
 
-/// Shortest log that is judged, s.
+/// Shortest recording in which pushes are looked for, s.
 const SHORTEST_LOG: f64 = 1.5;
 
-/// A push that was found.
+/// A push found in a log, with its uncertainty and probability.
 #[derive(Debug, Clone)]
 pub struct Disturbance {
-    /// Whether it lies in a holdout log rather than a training log.
+    /// Whether the push lies in a holdout log rather than a training log.
     pub holdout: bool,
-    /// Index of the log.
+    /// Index of the log among the training or holdout logs.
     pub track: usize,
-    /// The push.
+    /// The push as an effect on a joint: impulse, time and duration.
     pub push: EffectInstance,
-    /// Standard deviations of its values.
+    /// Standard deviations of the push's impulse, N m s (N s), time, s, and duration, s.
     pub sigma: [f64; 3],
-    /// Share of the cost of the windows it touches that it explains.
+    /// Share, 0 to 1, of the cost of the windows it touches that the push explains.
     pub share: f64,
-    /// Probability that it is a push rather than something else that the model lacks.
+    /// Probability, 0 to 1, of a push rather than some other model error.
     pub probability: f64,
 }
 
-/// An attribution, and the external disturbances beside it.
+/// Attribution of the gap to causes, and the external disturbances found beside them.
 pub struct Conclusion<const N: usize, const P: usize> {
-    /// The attribution beside the disturbances.
+    /// Causes found with the external disturbances acting in their logs.
     pub attribution: Attribution<N, P>,
-    /// The one without them, where there are any.
+    /// Attribution without the external disturbances, if there are any.
     pub alone: Option<Attribution<N, P>>,
-    /// The disturbances.
+    /// External disturbances found in the logs.
     pub disturbances: Vec<Disturbance>,
 }
 
 impl<const N: usize, const P: usize> Conclusion<N, P> {
-    /// The attribution without external disturbances.
+    /// The attribution that was made without external disturbances.
     pub fn without_disturbances(&self) -> &Attribution<N, P> {
         self.alone.as_ref().unwrap_or(&self.attribution)
     }
@@ -80,33 +80,33 @@ impl<const N: usize, const P: usize> Conclusion<N, P> {
     }
 }
 
-/// What pushes are judged against.
+/// The model and scales against which pushes are judged.
 pub(super) struct PushState<'a, const N: usize, const P: usize> {
     /// The model with all named causes.
     pub(super) model: &'a Hypothesis<P>,
-    /// Covariance of its values.
+    /// Covariance of the model's free values.
     pub(super) covariance: &'a DMatrix<f64>,
-    /// Scales of the residuals under it.
+    /// Scale of each joint's residual under the model, rad or m.
     pub(super) scale: [f64; N],
-    /// Zeros of the recordings' encoders.
+    /// Zeros of the encoders of each recording.
     pub(super) zeros: &'a EncoderZeros<N>,
-    /// Whether it leaves more unexplained than noise.
+    /// Whether the model leaves more error unexplained than noise.
     pub(super) remainder: bool,
-    /// Improvement relative to the motion below which nothing is worth a name.
+    /// Least improvement, relative to the motion, of an effect or push to be named.
     pub(super) min_relevance: f64,
-    /// Improvement relative to the motion below which nothing is worth a name, for what stands far out of noise.
+    /// Least improvement, relative to the motion, of a push to be named in a window far above the noise.
     pub(super) faintest: f64,
 }
 
-/// Where a piece of a log is kept: whether in the holdout, and its index there.
+/// Index of a log: 0 for the training set or 1 for the holdout, then the index within the set.
 pub(super) type Place = (usize, usize);
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// An attribution of the logs as they are, with all pushes accounted for.
+    /// The conclusion of a diagnosis: the attribution `alone`, its external disturbances, and the attribution beside them.
     ///
-    /// Where that model describes the arm, pushes are looked for again under it. Beside a remainder they are kept as they were found: there
-    /// the second model was seen to take up a part of the pushes, and the second search to find fewer. Pushes beside which predictions miss
-    /// by much more than without are none. A law that explains some of them in their place stays beside the rest.
+    /// Where the model describes the arm, pushes are looked for again under the model fitted beside them. Where it leaves an unexplained remainder, the
+    /// first pushes are kept: the second model then takes up part of the pushes. Pushes are rejected if prediction errors beside them are much
+    /// larger than without. An effect that replaces some pushes stays in the model beside the remaining pushes.
     pub fn conclude(
         &mut self,
         mut alone: Attribution<N, P>,
@@ -144,7 +144,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Conclusion { attribution: beside, alone: Some(alone), disturbances }
     }
 
-    /// Pushes that the model of an attribution leaves unexplained, log by log; faint ones too where no greater cause was found without them.
+    /// Pushes that the model of an attribution leaves unexplained, by recording; `faint`: also faint pushes in outlying windows.
     fn disturbances(&self, attribution: &Attribution<N, P>, faint: bool) -> Vec<Disturbance> {
         let (first, last) = (&attribution.nodes[0], &attribution.nodes[attribution.nodes.len() - 1]);
         let state = PushState {
@@ -185,7 +185,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if disturbances.len() < MAX_PUSHES { disturbances } else { Vec::new() }
     }
 
-    /// Pushes that stand out of the torque that a recording lacks.
+    /// Pushes that stand out of the residual torque of a recording.
     fn of_bells(
         &self,
         places: &[Place],
@@ -205,7 +205,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         disturbances
     }
 
-    /// Whether a push and another one on its joint both drive it back from the same end of its travel: that is where it touches something.
+    /// Whether a push and a further one on its joint both drive it back from one end of its travel, as contact with a stop does.
     fn meets_an_end(&self, disturbance: &Disturbance, bells: &[Bell]) -> bool {
         let joint = disturbance.push.joint;
         let [from, to] = self.scales.travel[joint];
@@ -221,7 +221,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         own != 0 && bells.iter().filter(inside).filter(|b| end(at(b.time), b.height) == own).count() > 1
     }
 
-    /// A push as the lacking torque shows it.
+    /// First estimate of a push from a Gaussian pulse in the residual torque; `rest` is the size of the largest pulse that is no push.
     fn rough(&self, places: &[Place], bell: &Bell, rest: f64) -> Option<Disturbance> {
         let covers = |p: &&Place| self.track(**p).t[0] <= bell.time;
         let &(set, track) = places.iter().rfind(covers)?;
@@ -239,7 +239,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         })
     }
 
-    /// Logs as they were recorded: pieces of the same log that follow each other in time belong together.
+    /// Logs grouped by recording: consecutive pieces of one log belong together.
     fn recordings(&self) -> Vec<Vec<Place>> {
         let all = [&self.training, &self.holdout];
         let mut places: Vec<Place> =
@@ -266,7 +266,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         &[&self.training, &self.holdout][set].data.tracks[index]
     }
 
-    /// Puts pushes into the logs they belong to, in place of those known before.
+    /// Replaces the known pushes of all logs by `disturbances`.
     pub fn set_pushes(&mut self, disturbances: &[Disturbance]) {
         for (set, sample) in [&mut self.training, &mut self.holdout].into_iter().enumerate() {
             for (index, track) in sample.data.tracks.iter_mut().enumerate() {
@@ -278,17 +278,17 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 }
 
 impl Disturbance {
-    /// Whether its impulse is known not to be zero.
+    /// Whether the push's impulse is significantly different from zero.
     fn is_known(&self) -> bool {
         self.clarity() > KNOWN
     }
 
-    /// Its impulse in standard deviations.
+    /// Impulse of the push in standard deviations.
     pub fn clarity(&self) -> f64 {
         self.push.p[0].abs() / self.sigma[0]
     }
 
-    /// When, where and which way.
+    /// Gaussian pulse with the joint, time and sign of the push.
     fn as_bell(&self) -> Bell {
         let [height, time, width] = self.push.p;
         Bell { joint: self.push.joint, time, width, height, sigma: self.sigma[0], z: 0.0 }
@@ -299,7 +299,7 @@ impl Disturbance {
     }
 }
 
-/// Name of a log without what says which part of it this is.
+/// Name of a log up to the bracket that tells which part of the recording it is.
 fn stem(name: &str) -> &str {
     name.split(" (").next().unwrap_or(name)
 }

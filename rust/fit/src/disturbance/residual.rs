@@ -1,8 +1,8 @@
-//! The torque that a whole log lacks under a model, low-passed, and the torques that the model could still be wrong by.
+//! Low-passed residual torque of a whole log under a model, and columns of torques by which the model could be wrong.
 //!
-//! At every sample the measured motion needs a torque and the log gives one; their difference, and every column of the model beside
-//! it, goes through the same low-pass, so that neither a lag nor the noise of the acceleration enters one of them alone. A push is
-//! what no combination of the columns explains: it does not come back with the state.
+//! The residual torque is the torque that the measured motion needs minus the logged one. It and every column go through one low-pass, so that neither
+//! a lag nor noise of the acceleration enters only one of them. A push is a part of the residual torque that no combination of the columns
+//! explains: it does not recur with the state.
 
 use crate::likelihood::solve::Prior;
 use crate::log::track::Track;
@@ -14,68 +14,68 @@ use crate::predict::residual_torque::{
 use armgap_core::arm::Arm;
 use nalgebra::{SMatrix, SVector};
 
-/// Standard deviation of the low-pass, s: what elastic parts and delays do is faster, a push by hand slower.
+/// Standard deviation of the Gaussian low-pass of residual torques, s: elastic vibrations and delays are faster, a push by hand slower.
 pub const LOW_PASS: f64 = 0.045;
 
-/// Distance of grid points, s, and in sample periods at least.
+/// Spacing of the grid of the residual torque, s, and least spacing in sample periods.
 const GRID: f64 = 0.01;
 const GRID_SAMPLES: f64 = 2.0;
 
-/// How much of the dry friction the friction of a joint at rest may reach: static friction exceeds that of sliding.
+/// Ratio of the largest friction of a joint at rest to its Coulomb friction: static friction exceeds sliding friction.
 const STATIC: f64 = 1.1;
 
-/// Torques of unknown laws, as a part of the torque that a joint needs.
+/// Prior standard deviation of torques of unknown effects, relative to the joint's typical torque.
 const UNKNOWN: f64 = 0.05;
 
-/// Inertia of a rotor as a part of the joint's own, and of its coupling.
+/// Prior standard deviation of a missing rotor's inertia, and of its coupling, relative to the joint's own inertia.
 const ROTOR: f64 = 0.1;
 const COUPLING: f64 = 0.05;
 
-/// Zero of an encoder that is taken for possible, rad, and the turn over which its torque is taken.
+/// Prior standard deviation of an encoder's zero error, rad, and the displacement for its torque by finite difference.
 const ZERO: f64 = 0.05;
 const TURN: f64 = 1e-3;
 
-/// Lag of the torque that is taken for possible, s.
+/// Prior standard deviation of a lag of the torque, s.
 const LAG: f64 = 0.01;
 
-/// Laws of friction at low speed act below this part of the RMS speed.
+/// Speed below which low-speed friction effects act, relative to the joint's RMS speed.
 const LOW_SPEED: f64 = 0.4;
 
-/// Samples without which a log is not judged.
+/// Least number of samples of a log in which pushes are looked for.
 const FEWEST: usize = 100;
 
-/// Time over which the activity around a sample counts, s.
+/// Length of the moving mean of a log's activity, s.
 const ACTIVE: f64 = 0.1;
 
-/// What one joint lacks.
+/// Residual torque of one joint over the grid of a log.
 pub struct Joint {
-    /// Lacking torque, friction at rest not counted, N m.
+    /// Torque that the measured motion needs beyond the logged torque, without friction at rest, N m (N), by grid point.
     pub lack: Vec<f64>,
-    /// Torque per unit of every column.
+    /// Torque of the joint per unit of every possible model error, by grid point.
     pub columns: Vec<Vec<f64>>,
-    /// Share of the time around each grid point at which the joint may be at rest.
+    /// Share of the time, 0 to 1, around each grid point at which the joint may be at rest.
     pub rest: Vec<f64>,
-    /// Largest friction torque of the joint at rest, N m.
+    /// Largest friction torque of the joint at rest, N m (N).
     pub holding: f64,
-    /// Typical torque that the motion needs, N m.
+    /// RMS torque that the measured motion needs, N m (N).
     pub typical: f64,
 }
 
-/// What a log lacks.
+/// Residual torque of a log and all that is needed to explain it by model errors.
 pub struct Residual<const N: usize> {
-    /// Times on a regular grid, s.
+    /// Times of the regular grid, s.
     pub t: Vec<f64>,
-    /// Distance of grid points, s.
+    /// Spacing of the regular grid of times, s.
     pub step: f64,
-    /// Joint by joint.
+    /// Residual torque of each joint.
     pub joints: [Joint; N],
-    /// Expected value and standard deviation of every column's coefficient.
+    /// Prior mean and standard deviation of the coefficient of every column of model errors.
     pub prior: Vec<(f64, f64)>,
-    /// How violent the motion is around each point, by squared accelerations, speeds, torques and rates of torque; mean about one.
+    /// Activity of the motion around each grid point: squared accelerations, speeds, torques and rates of torque, each relative to its mean.
     pub activity: Vec<Vec<f64>>,
 }
 
-/// One sample with everything that is linear in the unknowns.
+/// Residual torque at one sample, with the columns of possible model errors.
 struct Row<const N: usize> {
     t: f64,
     lack: SVector<f64, N>,
@@ -87,7 +87,7 @@ struct Row<const N: usize> {
 }
 
 impl<const N: usize> Residual<N> {
-    /// The residual of a log under a model.
+    /// Residual torque of a log under a model; `None` for too few samples or a model that cannot be simulated.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         arm: &A,
         track: &Track<N>,
@@ -121,7 +121,7 @@ impl<const N: usize> Residual<N> {
     }
 }
 
-/// What is expected of every column's coefficient, in the order of [`columns`], lags last.
+/// Prior mean and standard deviation of the coefficient of every column of model errors, in the order of [`columns`], lags last.
 fn expected<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     prior: &Prior<P>,
@@ -146,8 +146,8 @@ fn expected<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     all
 }
 
-/// Torques that a model could be wrong by at one instant: its own parameters, then per joint a rotor, an offset, drag, friction at low
-/// speed, two springs or tilts, and friction under load; last the coupling of a rotor and the encoders' zeros.
+/// Torques by which a model could be wrong at one instant: columns of its regressor, then per joint a rotor, an offset, drag, friction at low
+/// speed, two springs or tilts, and load-dependent friction; last the coupling of a rotor and the encoders' zeros.
 fn columns<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     [q, dq, ddq]: [&SVector<f64, N>; 3],
@@ -191,7 +191,7 @@ fn columns<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     all
 }
 
-/// Every sample of one piece but those at its ends, whose acceleration is hardly known; none if the model cannot be simulated.
+/// Residual torque at every sample of a log except at its ends, where accelerations are uncertain; `None` if the model cannot be simulated.
 fn rows<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     track: &Track<N>,
@@ -210,7 +210,7 @@ fn rows<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     Some(samples.into_iter().map(row).collect())
 }
 
-/// Squared torques, rates of torque, accelerations and speeds of all joints around every grid point, relative to their means.
+/// Squared torques, rates of torque, accelerations and speeds of all joints around every grid point, each relative to its mean.
 fn activity<const N: usize>(rows: &[Row<N>], low: &LowPass) -> Vec<Vec<f64>> {
     let mut all = Vec::new();
     for j in 0..N {

@@ -1,34 +1,34 @@
-//! How far a joint's residual scatters at every point of a log: more where the motion is violent, less where it is calm.
+//! Standard deviation of a joint's residual torque at every point of a log: larger in violent motion, smaller in calm motion.
 //!
-//! The squared residual is taken as a sum of non-negative multiples of the log's activity (multiplicative updates of the likelihood of
-//! a scale mixture, so that single large values hardly count), and joined with the median of its size around each point.
+//! The squared residual is modelled as a sum of non-negative multiples of the log's activity (multiplicative updates of the likelihood of a scale
+//! mixture, robust to single large values), and combined with the local median of the residual's size.
 
 use super::residual::Residual;
 use crate::log::track::median;
 
-/// Degrees of freedom of the residual's tails.
+/// Degrees of freedom of the Student distribution assumed for the residual torque.
 const FREEDOM: f64 = 5.0;
 
-/// Updates of the multiples.
+/// Multiplicative updates of the coefficients of activity.
 const UPDATES: usize = 60;
 
-/// Standard deviations of quiet and violent places, relative to the typical one.
+/// Smallest and largest standard deviation of the residual torque by activity, relative to the typical one.
 const QUIET: f64 = 0.5;
 const VIOLENT: f64 = 8.0;
 
-/// Half width of the stretch that a local median is taken over, s.
+/// Half width of the stretch of a local median, s.
 const AROUND: f64 = 1.0;
 
-/// Points that a median is taken of at least.
+/// Least number of points for a local median.
 const FEWEST: usize = 40;
 
-/// From the median of absolute values to a standard deviation.
+/// Ratio of the standard deviation to the median absolute value of a normal variable.
 const NORMAL: f64 = 1.4826;
 
-/// What a model of this kind never does better than, relative to the torque that the joint needs.
+/// Least standard deviation of the residual torque, relative to the joint's typical torque.
 const FLOOR: f64 = 0.002;
 
-/// Standard deviation of joint `j`'s residual at every grid point.
+/// Standard deviation of joint `j`'s residual torque `left` at every grid point, N m or N.
 pub fn scatter<const N: usize>(residual: &Residual<N>, j: usize, left: &[f64]) -> Vec<f64> {
     let moves: Vec<bool> = residual.joints[j].rest.iter().map(|r| *r < 0.3).collect();
     let of_moving = |x: &[f64]| x.iter().zip(&moves).filter(|(_, m)| **m).map(|(x, _)| x.abs()).collect();
@@ -48,7 +48,7 @@ pub fn scatter<const N: usize>(residual: &Residual<N>, j: usize, left: &[f64]) -
     (0..left.len()).map(at).collect()
 }
 
-/// Variances by activity.
+/// Variance of the residual torque at every grid point by the activity of the motion.
 fn by_activity<const N: usize>(
     residual: &Residual<N>,
     j: usize,

@@ -1,9 +1,9 @@
-//! Pushes in the lacking torque of one log: bells that stand out once everything the model could be wrong by has been allowed for.
+//! Pushes in the residual torque of one log: Gaussian pulses that stand out beside all possible model errors.
 //!
-//! Parameters, unknown laws and pushes are fitted together, linearly; what a bell at one time, of one width, on one joint would gain is
-//! weighed against the scatter there and against how much of the bell the other columns could imitate (a generalised likelihood ratio).
-//! The largest are added one by one, for one push hides another by raising the scatter, and then the doubtful are taken out again; beside a
-//! remainder also those that stand out only as long as they are fitted.
+//! Parameters, unknown effects and pulses are fitted together, linearly; the gain of a pulse at one time, of one width, on one joint is compared with
+//! the scatter around it and reduced by the part that other columns could imitate (generalised likelihood ratio). The largest pulses are added one
+//! by one, for one push hides another by raising the scatter; doubtful pulses are then removed, and beside an unexplained remainder also those that
+//! stand out only while they are fitted.
 
 use super::bell::{Bell, all_but};
 use super::linear::{Fitted, Linear};
@@ -11,44 +11,44 @@ use super::residual::Residual;
 use crate::log::track::median;
 use rayon::prelude::*;
 
-/// Standard deviations of bells that are looked for, as they appear behind the low-pass, s.
+/// Standard deviations of the Gaussian pulses looked for, after the low-pass, s.
 const WIDTHS: [f64; 7] = [0.045, 0.055, 0.07, 0.09, 0.115, 0.145, 0.18];
 
-/// Distance of centres that are tried, s, coarse and fine, and how far a fine search goes.
+/// Spacing of the times of pulses tried, s, in the coarse and in the fine search, and half range of the fine search.
 const COARSE: f64 = 0.02;
 const FINE: f64 = 0.01;
 const REFINED: f64 = 0.08;
 
-/// Size, in standard deviations, from which a bell is tried, and from which it is a push: on an arm that the model describes; on one
-/// that it does not, if the bell also exceeds the joint's friction; on any.
+/// Size of a pulse, in standard deviations, from which it is tried, from which it is a push on an arm that the model describes, on one that it does
+/// not describe if the pulse exceeds the joint's friction, and on any arm.
 const TRIED: f64 = 2.5;
 const LIKELY: f64 = 5.0;
 const ABOVE_REMAINDER: f64 = 3.9;
 const CERTAIN: f64 = 12.0;
 
-/// Size that a bell has to have while what it consists of still counts as scatter. A log whose largest bell is smaller holds no push, not
-/// even ones that hide each other.
+/// Size of a pulse, in standard deviations, that the largest pulse of a log must have while it still counts as scatter. A log without one holds
+/// no push, not even pushes that hide each other.
 const STANDS_OUT: f64 = 3.6;
 
-/// Height, relative to the joint's friction at rest, from which a push exceeds it.
+/// Least height of a push beside an unexplained remainder, relative to the joint's friction at rest.
 const ABOVE_FRICTION: f64 = 1.2;
 
-/// Pushes that are looked for in one log; as many are no rare events.
+/// Largest number of pushes looked for in one log; as many are no rare events.
 pub const MAX_PUSHES: usize = 8;
 
-/// A joint that moves for less than this, s, is not judged.
+/// Least time that a joint must move in a log for pushes on it to be looked for, s.
 const MOVES: f64 = 0.5;
 
-/// The pushes of a log and the largest of what is left.
+/// Pushes found in a log, and the size of the largest pulse that is no push.
 pub struct Found {
-    /// Pushes, in the order in which they were found.
+    /// Gaussian pulses that count as pushes, in the order in which they were found.
     pub bells: Vec<Bell>,
-    /// Size of the largest bell that is none.
+    /// Size, in standard deviations, of the largest pulse that is no push.
     pub rest: f64,
 }
 
 impl Found {
-    /// Takes a bell out as no push.
+    /// Removes the pulse with index `bell` and keeps its size as that of a pulse that is no push.
     fn dismiss(&mut self, bell: usize) {
         self.rest = f64::max(self.rest, self.bells.remove(bell).z.min(LIKELY));
     }
@@ -56,13 +56,13 @@ impl Found {
 
 struct Search<'a, const N: usize> {
     linear: Linear<'a, N>,
-    /// Whether the model leaves more unexplained than noise.
+    /// Whether the model leaves more error unexplained than noise.
     remainder: bool,
-    /// Size of chance bells per joint and width, at least one.
+    /// Typical size of chance pulses, in standard deviations, per joint and width; at least one.
     chance: Vec<Vec<f64>>,
 }
 
-/// Looks for pushes in a log; `remainder` tells whether the model leaves more unexplained than noise.
+/// Looks for pushes in the residual torque of a log; `remainder` tells whether the model leaves more error unexplained than noise.
 pub fn search<const N: usize>(residual: &Residual<N>, remainder: bool) -> Option<Found> {
     let chance = vec![vec![1.0; WIDTHS.len()]; N];
     let mut search = Search { linear: Linear::new(residual), remainder, chance };
@@ -76,7 +76,7 @@ pub fn search<const N: usize>(residual: &Residual<N>, remainder: bool) -> Option
 }
 
 impl<const N: usize> Search<'_, N> {
-    /// The largest bells, one by one.
+    /// Adds the largest pulses one by one, each fitted in time and width; `None` if the linear fit is singular.
     fn gather(&mut self) -> Option<Vec<Bell>> {
         let mut bells: Vec<Bell> = Vec::new();
         loop {
@@ -95,7 +95,7 @@ impl<const N: usize> Search<'_, N> {
         }
     }
 
-    /// Takes out, the weakest first, what is no push beside the others.
+    /// Removes pulses that are no push beside the others, the weakest first.
     fn drop_doubtful(&mut self, found: &mut Found) -> Option<()> {
         while !found.bells.is_empty() {
             self.settle(&mut found.bells)?;
@@ -110,8 +110,8 @@ impl<const N: usize> Search<'_, N> {
         Some(())
     }
 
-    /// Takes out, the weakest first, what stands out only as long as it is fitted: beside a remainder a bell takes what the model lacks there
-    /// for its own, and so seems to stand in a calm place.
+    /// Removes pulses that stand out only while they are fitted, the weakest first: beside an unexplained remainder a pulse takes up model errors
+    /// around it and so appears in a calm stretch.
     fn drop_aided(&mut self, found: &mut Found) -> Option<()> {
         while !found.bells.is_empty() {
             let bells = &found.bells;
@@ -127,7 +127,7 @@ impl<const N: usize> Search<'_, N> {
         Some(())
     }
 
-    /// Bells where and as wide as they fit best beside each other, judged by the scatter that they leave.
+    /// Refines the times and widths of all pulses beside each other, with sizes relative to the scatter that they leave.
     fn settle(&mut self, bells: &mut Vec<Bell>) -> Option<()> {
         let fitted = self.linear.settle(bells)?;
         self.scan(&fitted);
@@ -135,13 +135,13 @@ impl<const N: usize> Search<'_, N> {
         Some(())
     }
 
-    /// Whether a bell is a push.
+    /// Whether a pulse is large enough to count as a push.
     fn stands(&self, bell: &Bell) -> bool {
         let above = bell.height.abs() > ABOVE_FRICTION * self.linear.residual.joints[bell.joint].holding;
         if self.remainder { bell.z > CERTAIN || (bell.z > ABOVE_REMAINDER && above) } else { bell.z > LIKELY }
     }
 
-    /// Size of a bell beside the others where it has to stand out of a scatter that it raises itself.
+    /// Size, in standard deviations, of the pulse with index `i` beside the others, with its own torque counted in the scatter.
     fn unaided(&mut self, bells: &[Bell], i: usize) -> Option<f64> {
         let others = all_but(bells, i);
         let fitted = self.linear.settle(&others)?;
@@ -149,7 +149,7 @@ impl<const N: usize> Search<'_, N> {
         Some(self.best_near(&fitted, &bells[i], true).z)
     }
 
-    /// Bells of all widths over the log; keeps what their sizes typically are, and gives the largest.
+    /// Scans pulses of all widths over the log, stores their typical sizes, and returns the largest pulse.
     fn scan(&mut self, fitted: &Fitted) -> Option<Bell> {
         let moves = |j: usize| self.linear.moving[j].iter().sum::<f64>() * self.linear.residual.step > MOVES;
         let kinds: Vec<(usize, usize)> =
@@ -164,7 +164,7 @@ impl<const N: usize> Search<'_, N> {
         largest
     }
 
-    /// Bells of one width on one joint: what their sizes typically are, and the largest in units of that.
+    /// Scans pulses of one width on one joint over the log: their typical size, and the largest pulse in units of it.
     fn scan_kind(&self, fitted: &Fitted, joint: usize, width: f64) -> (f64, Option<Bell>) {
         let (from, to) = self.linear.span(width);
         let count = ((to - from) / COARSE).floor().max(0.0) as usize;
@@ -179,7 +179,7 @@ impl<const N: usize> Search<'_, N> {
         (chance, best.map(|best| Bell { z: best.z / chance, ..best }))
     }
 
-    /// Size that bells of one kind have by chance in this log, where the joint moves; at least one.
+    /// Typical size, in standard deviations, of chance pulses of one width while the joint moves; at least one.
     fn typical(&self, joint: usize, tried: &[Bell]) -> f64 {
         let t = &self.linear.residual.t;
         let moves =
@@ -193,7 +193,7 @@ impl<const N: usize> Search<'_, N> {
         middle.max(sizes[sizes.len() * 9 / 10] / 1.645).max(1.0)
     }
 
-    /// Times and widths that fit each bell best beside the others.
+    /// Best times and widths of all pulses, each beside the others.
     fn refine(&self, bells: Vec<Bell>) -> Option<Vec<Bell>> {
         let mut bells = bells;
         for i in 0..bells.len() {
@@ -203,7 +203,7 @@ impl<const N: usize> Search<'_, N> {
         Some(bells)
     }
 
-    /// The bell that fits best near one that the fit leaves out, or the one that stands out most.
+    /// Best pulse near `bell` in time, of any width, beside a fit without it; `stands_out`: by size relative to chance pulses.
     fn best_near(&self, fitted: &Fitted, bell: &Bell, stands_out: bool) -> Bell {
         let mut best = Bell { z: -1.0, ..*bell };
         let mut largest = -1.0;

@@ -1,45 +1,45 @@
-//! Base parameters of a serial arm: which of its parameters are estimated, and what the others add to them.
+//! Base parameters of a serial arm: which parameters are estimated, and which combinations of dependent parameters they absorb.
 //!
 //! The regressor of the torques over all parameters has dependent columns, so motion determines only sums of parameters. With independent
 //! columns `Y_b` that span all, `Y = Y_b [I K]`, the torques are `Y_b (theta_b + K theta_d)` (Gautier 1991, *Numerical calculation of
-//! the base inertial parameters of robots*, Journal of Robotic Systems 8, 485-506). `Y` is stacked over random states and factorized by
-//! `Q R`; a column is dependent if nothing but rounding of the arm's geometry is left of it. Columns are taken from the base outwards, and in a link in an
-//! order in which, with joints about z axes, those left over are the ones that Khalil and Dombre (2002, section 9.4) eliminate.
+//! the base inertial parameters of robots*, Journal of Robotic Systems 8, 485-506). `Y` is stacked over random states and factorised by
+//! `Q R`; a column is dependent if only rounding of the arm's geometry is left of it. Columns are taken from the base outwards, within a link in an
+//! order in which, with joints about z axes, the dependent columns are those that Khalil and Dombre (2002, section 9.4) eliminate.
 
 use crate::model::chain::{ChainDescription, WithChain};
 use crate::numeric::random::Random;
 use armgap_core::chain::{Chain, LINK_PARAMETERS, PARAMETERS_PER_JOINT};
 use armgap_core::real::sgn;
 
-/// Share of a column's length below which what is independent of it is rounding. Right angles typed as 1.5708 leave 5e-6, a millimetre of an
-/// arm's geometry 1e-3 and more.
+/// Part of a regressor column's length below which its component independent of earlier columns counts as rounding. Right angles typed as 1.5708
+/// leave 5e-6, a millimetre of an arm's geometry 1e-3 and more.
 const INDEPENDENT: f64 = 1e-4;
-/// Share of the longest column below which a column shows nothing but rounding.
+/// Part of the longest regressor column's length below which a column counts as rounding.
 const VISIBLE: f64 = 1e-9;
-/// Share of the largest factor of a combination below which a factor is rounding of double precision.
+/// Share of the largest factor of a combination of parameters below which a factor is rounding of double precision.
 const ROUNDING: f64 = 1e-12;
-/// States per parameter of one joint.
+/// Random states per parameter of one joint in the stacked regressor.
 const STATES: usize = 4;
-/// A link's parameters in the order in which columns are taken.
+/// Order in which the ten inertial parameters of a link are examined for independence.
 const ORDER: [usize; LINK_PARAMETERS] = [9, 1, 2, 4, 5, 7, 8, 3, 6, 0];
 
-/// Base parameters among some of the `13 n` parameters and, at `13 n + j`, constant torques of the joints.
+/// Base parameters of a serial arm, among some of its `13 n` parameters and, at `13 n + j`, the constant torque of joint `j`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BaseParameters {
-    /// Estimated parameters, ascending.
+    /// Indices of the estimated parameters, ascending.
     pub columns: Vec<usize>,
-    /// The other ones, ascending.
+    /// Indices of the dependent parameters, ascending.
     pub dependent: Vec<usize>,
-    /// `K`, by rows: what each dependent parameter adds to each estimated one.
+    /// Matrix `K` by rows: what each dependent parameter (column) adds to each estimated one (row).
     pub combination: Vec<f64>,
 }
 
-/// The base parameters among these.
+/// Indices of the parameters among which base parameters are determined.
 #[derive(Debug, Clone, Copy)]
 pub struct AmongParameters<'a>(pub &'a [usize]);
 
 impl AmongParameters<'_> {
-    /// Those of a chain; `None` unless it has one to [`armgap_core::chain::MAX_JOINTS`] joints.
+    /// Base parameters of a chain; `None` unless it has one to [`armgap_core::chain::MAX_JOINTS`] joints.
     pub fn of(self, chain: &ChainDescription) -> Option<BaseParameters> {
         chain.dispatch(self)
     }
@@ -62,7 +62,7 @@ impl WithChain for AmongParameters<'_> {
     }
 }
 
-/// Place in the order in which columns are taken: links from the base, then rotors and friction.
+/// Position of a regressor column in the order of examination: links from the base, then rotors and friction.
 fn rank<const N: usize>(column: usize) -> usize {
     if column >= LINK_PARAMETERS * N {
         return column;
@@ -71,7 +71,7 @@ fn rank<const N: usize>(column: usize) -> usize {
     column / LINK_PARAMETERS * LINK_PARAMETERS + place
 }
 
-/// Columns of the torques' regressor over random states, one per parameter.
+/// Columns of the torque regressor, one per parameter, stacked over random states and joints.
 fn stacked<const N: usize>(chain: &Chain<f64, N>) -> Vec<Vec<f64>> {
     let states = STATES * (PARAMETERS_PER_JOINT + 1);
     let mut columns = vec![vec![0.0; states * N]; (PARAMETERS_PER_JOINT + 1) * N];
@@ -93,21 +93,21 @@ fn stacked<const N: usize>(chain: &Chain<f64, N>) -> Vec<Vec<f64>> {
     columns
 }
 
-/// `Q R` of the columns taken so far.
+/// `Q R` factorisation of the regressor columns examined so far.
 #[derive(Debug, Default)]
 struct Basis {
-    /// Length below which a column counts as zero.
+    /// Length of a column's independent component below which the column counts as dependent.
     least: f64,
-    /// Orthonormal columns.
+    /// Orthonormal columns of `Q`.
     q: Vec<Vec<f64>>,
-    /// Columns of `R` of the independent parameters.
+    /// Index of each independent parameter with its column of `R`.
     r: Vec<(usize, Vec<f64>)>,
-    /// `Q'` times the columns of the dependent ones.
+    /// Index of each dependent parameter with `Q'` times its regressor column.
     dependent: Vec<(usize, Vec<f64>)>,
 }
 
 impl Basis {
-    /// Takes the regressor's next column: as an independent one, or with its shares of those before it.
+    /// Adds a regressor column: as an independent column, or as a combination of the earlier ones.
     fn take(&mut self, parameter: usize, column: &[f64]) {
         let (length, mut rest) = (norm(column), column.to_vec());
         let mut along = vec![0.0; self.q.len()];
@@ -132,7 +132,7 @@ impl Basis {
         self.r.push((parameter, along));
     }
 
-    /// Back substitution: `R K = Q' Y_d`.
+    /// Base parameters by back substitution: `R K = Q' Y_d`.
     fn parameters(mut self) -> BaseParameters {
         self.dependent.sort_by_key(|(parameter, _)| *parameter);
         let mut order: Vec<usize> = (0..self.r.len()).collect();
@@ -145,7 +145,7 @@ impl Basis {
         }
     }
 
-    /// Shares of the independent columns in a dependent one.
+    /// Coefficients of the independent regressor columns in a dependent one, from its components `along` the columns of `Q`.
     fn solved(&self, along: &[f64]) -> Vec<f64> {
         let mut x = along.to_vec();
         x.resize(self.r.len(), 0.0);

@@ -1,8 +1,8 @@
-//! Parameters estimated without a diagnosis.
+//! Estimation of an arm's parameters without a diagnosis.
 //!
-//! * `base_parameters`: independent columns of a serial arm's regressor, and what the others add to them.
+//! * `base_parameters`: independent columns of a serial arm's regressor, and combinations of the dependent ones.
 //! * `output_error`: all parameters of an arm from one log by output error.
-//! * `refit`: the arm's parameters estimated again from the logs of a diagnosis, without any effect.
+//! * `refit`: the arm's parameters re-estimated from the logs of a diagnosis, without any effect.
 //! * `regression_rows`: rows of the filtered dynamic model over a whole log.
 
 pub mod base_parameters;

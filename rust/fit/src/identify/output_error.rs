@@ -1,8 +1,8 @@
-//! All parameters of an arm from one log by output error: Gauss-Newton over short windows, with exact dry friction.
+//! All parameters of an arm from one log by output error: Levenberg-Marquardt over short windows, with exact dry friction.
 //!
 //! Every window starts from its measured initial state and runs under the logged torque; the sum of squared differences of positions is
-//! minimised over `theta` by Levenberg's and Marquardt's method with forward differences. All windows of all displaced parameters
-//! are independent runs, which vector units and processors share (see [`armgap_core::rollout`]).
+//! minimised over `theta` by Levenberg's and Marquardt's method with forward differences. All windows under all displaced parameters
+//! are independent rollouts, distributed over vector units and processors (see [`armgap_core::rollout`]).
 
 use crate::likelihood::solve::scaled_inverse;
 use crate::log::track::Track;
@@ -14,52 +14,52 @@ use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Displacement for forward differences, relative to a parameter's first value; events are located well below.
+/// Displacement of a parameter for forward differences, relative to its first value; the error of event location is far smaller.
 const RELATIVE_STEP: f64 = 1e-6;
 
-/// Iterations at most.
+/// Largest number of Levenberg-Marquardt iterations.
 const MAX_ITERATIONS: usize = 50;
 
-/// A step that changes no parameter by more than this part of it is the last.
+/// Relative change of all parameters by a step below which the search ends.
 const SETTLED: f64 = 1e-8;
 
-/// Attempts at a step with ever more damping.
+/// Largest number of attempts at a step, each with more damping.
 const MAX_ATTEMPTS: usize = 8;
 
-/// A log to be fitted; rows of `q` and `tau` follow each other.
+/// A log to be fitted by output error; rows of `q` and `tau` (one entry per joint) follow each other.
 #[derive(Debug, Clone)]
 pub struct OutputError<'a> {
     /// Sample times, s.
     pub t: &'a [f64],
-    /// Positions.
+    /// Measured positions, rad or m, row by row.
     pub q: &'a [f64],
-    /// Torques held from each sample on.
+    /// Torques held from each sample to the next, N m or N, row by row.
     pub tau: &'a [f64],
-    /// Length of a window, s.
+    /// Length of a prediction window, s.
     pub horizon: f64,
-    /// Smallest steps of the position measurement, where they are known.
+    /// Encoder steps per joint, rad or m, where they are known.
     pub steps: Option<&'a [f64]>,
 }
 
-/// A minimum of the output error.
+/// Parameters at a minimum of the output error, with their uncertainty.
 #[derive(Debug, Clone)]
 pub struct Estimate {
-    /// Parameters.
+    /// Estimated parameters of the arm, SI.
     pub theta: Vec<f64>,
-    /// Their standard deviations, if the residuals were white.
+    /// Standard deviations of the estimated parameters, for white residuals.
     pub sigma: Vec<f64>,
-    /// RMS difference of positions, all joints together.
+    /// RMS difference of measured and predicted positions over all joints, rad or m.
     pub rms: f64,
-    /// Steps taken.
+    /// Number of Levenberg-Marquardt steps taken.
     pub iterations: usize,
-    /// Whether the last step changed nothing any more.
+    /// Whether the search converged: its last step changed no parameter beyond the tolerance.
     pub settled: bool,
 }
 
 impl WithArm for OutputError<'_> {
     type Output = Option<Estimate>;
 
-    /// The minimum reached from the arm's own parameters; none for a log without a whole window.
+    /// The minimum of the output error reached from the arm's own parameters `theta`; `None` for a log shorter than one window.
     fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
         self,
         arm: A,
@@ -83,7 +83,7 @@ struct OutputErrorProblem<'a, A, const N: usize> {
     offsets: Vec<InitialStateOffset<N>>,
 }
 
-/// Parameters with their residual and cost.
+/// Parameters with the residual and cost of their predictions.
 struct TrialPoint<const P: usize> {
     theta: [f64; P],
     residual: Vec<f64>,
@@ -101,7 +101,7 @@ impl<A, const N: usize> OutputErrorProblem<'_, A, N> {
         TrialPoint { theta, residual, cost }
     }
 
-    /// Derivatives of the prediction by the parameters.
+    /// Derivatives of the predicted positions by each parameter, by forward differences.
     fn sensitivities<const P: usize>(&self, at: &TrialPoint<P>, steps: &[f64; P]) -> Vec<Vec<f64>>
     where
         A: Arm<f64, N, P>,
@@ -171,7 +171,7 @@ impl<A, const N: usize> OutputErrorProblem<'_, A, N> {
     }
 }
 
-/// Normal matrix and right-hand side.
+/// Normal matrix and right-hand side of a linear least-squares problem.
 fn normal_equations(columns: &[Vec<f64>], residual: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
     let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
     let k = columns.len();
@@ -179,7 +179,7 @@ fn normal_equations(columns: &[Vec<f64>], residual: &[f64]) -> (DMatrix<f64>, DV
     (normal, DVector::from_vec(cross(&[residual], &columns)))
 }
 
-/// One damped step; friction coefficients stay non-negative.
+/// Parameters after one damped Gauss-Newton step; friction coefficients stay non-negative.
 fn moved<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     theta: &[f64; P],
     normal: &DMatrix<f64>,

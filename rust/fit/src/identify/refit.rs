@@ -1,8 +1,8 @@
-//! The arm's parameters estimated again without any effect, under the arm file's sigmas as prior.
+//! The arm's parameters re-estimated without any effect, under the arm file's standard deviations as prior.
 //!
-//! What the plausibility checks of the input compare: a log read as it stands, and read with a defect corrected. Scales follow the residual, so the cost
-//! has several minima: far from the logs the residual is large, the prior holds the parameters there, and the residual stays large. An arm that
-//! carries what its file does not know, or whose file is far off, is found from parameters that the logs say themselves.
+//! The plausibility checks of the input compare a log as it stands with the log after correction of a defect. Scales follow the residual, so the cost
+//! has several minima: far from the logs the residual is large, the prior holds the parameters, and the residual stays large. An arm with an unknown
+//! load, or with a wrong arm file, is found from parameters estimated from the logs.
 
 use crate::diagnose::Request;
 use crate::likelihood::context::WindowSet;
@@ -13,26 +13,26 @@ use crate::progress::{Observer, guarded};
 use crate::result::gap::rms;
 use armgap_core::arm::Arm;
 
-/// An arm without effects, fitted to training logs and judged on the holdout.
+/// Re-estimated parameters of an arm without effects, with prediction errors on the holdout.
 #[derive(Debug, Clone)]
 pub struct Refit {
-    /// Parameters.
+    /// Re-estimated parameters of the arm, SI.
     pub theta: Vec<f64>,
-    /// Their standard deviations.
+    /// Standard deviations of the re-estimated parameters.
     pub sigma: Vec<f64>,
-    /// RMS prediction error on the holdout per joint, the arm file as it is, rad or m.
+    /// RMS prediction error on the holdout per joint with the arm file as it is, rad or m.
     pub before: Vec<f64>,
-    /// The RMS prediction error with the parameters estimated again.
+    /// RMS prediction error on the holdout per joint with the re-estimated parameters, rad or m.
     pub refit: Vec<f64>,
-    /// RMS displacement within a window per joint: what predicting no motion would leave.
+    /// RMS displacement within a window per joint, rad or m: the error of predicting no motion.
     pub motion: Vec<f64>,
 }
 
-/// Estimates the arm's parameters again, from the arm file and from `start`; of the two the fit counts that predicts the training logs better.
+/// Re-estimates the arm's parameters from the arm file and from `start`; returns the fit that predicts the training logs better.
 ///
 /// # Errors
 ///
-/// As `diagnose`.
+/// The errors of `diagnose`.
 pub fn refit(
     arm: &ArmDescription,
     start: &[f64],

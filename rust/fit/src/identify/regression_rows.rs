@@ -1,7 +1,7 @@
 //! Rows of the filtered dynamic model over a whole log, `psi theta = y` (Reyes and Kelly 1997, equations 23 and 24).
 //!
-//! States lie half-way between samples, where a difference of positions is the velocity to second order; the torque changes at the
-//! sample between two of them.
+//! States lie half-way between samples, where a difference of positions gives the velocity to second order; the torque changes at the
+//! sample between two states.
 
 use crate::model::arm::WithArm;
 use armgap_core::arm::Arm;
@@ -10,25 +10,25 @@ use armgap_core::filter::Cutoff;
 use armgap_core::regression::{AllColumns, FilteredDynamic, SampleInterval, Snapshot, Variant};
 use nalgebra::SVector;
 
-/// A log whose rows are wanted; rows of `q` and `tau` follow each other.
+/// A log from which regression rows are computed; rows of `q` and `tau` (one entry per joint) follow each other.
 #[derive(Debug, Clone)]
 pub struct RegressionRows<'a> {
-    /// Cut-off of the filters, rad/s.
+    /// Cut-off of the first-order filters, rad/s.
     pub cutoff: f64,
     /// Sample times, s.
     pub t: &'a [f64],
-    /// Positions.
+    /// Measured positions, rad or m, row by row.
     pub q: &'a [f64],
-    /// Torques held from each sample on.
+    /// Torques held from each sample to the next, N m or N, row by row.
     pub tau: &'a [f64],
 }
 
-/// One row per sample and joint; NaN at the first two samples, which have none.
+/// Regression rows of the filtered dynamic model, one per sample and joint; NaN at the first two samples.
 #[derive(Debug, Clone, Default)]
 pub struct Rows {
-    /// Regressor: sample, joint, parameter.
+    /// Regressor entries, ordered by sample, joint, parameter.
     pub psi: Vec<f64>,
-    /// Filtered torques: sample, joint.
+    /// Filtered torques, N m or N, ordered by sample, joint.
     pub y: Vec<f64>,
 }
 
@@ -78,7 +78,7 @@ mod tests {
     use crate::model::arm::ArmDescription;
     use armgap_core::arm::ArmKind;
 
-    /// A mass under a constant force: `m ddq + b dq = f` holds row by row once the filters have settled.
+    /// Rows of a mass under constant force satisfy `m ddq + b dq = f` once the filters have settled.
     #[test]
     fn rows_times_parameters_are_the_torque() {
         let (m, b, f, h) = (2.0, 0.5, 3.0, 0.002);

@@ -1,4 +1,4 @@
-//! The context of a diagnosis: arm, prior, scales, training and holdout windows; and the weighting of their residuals.
+//! Context of a diagnosis: arm, prior, scales, training and holdout windows, and the weighting of their residuals.
 
 use crate::likelihood::encoder_zero::EncoderZeros;
 use crate::likelihood::scale::Scales;
@@ -10,62 +10,62 @@ use crate::progress::{Phase, ProgressReporter};
 use armgap_core::arm::Arm;
 use armgap_core::transmission::Sides;
 
-/// Rounds of re-weighting at most.
+/// Largest number of rounds in which a fit and the weights of its residuals are recomputed by turns.
 const MAX_ROUNDS: usize = 5;
 
-/// A round that changes every joint's scale by less than this factor is the last.
+/// Ratio of successive residual scales of every joint below which re-weighting ends.
 const SETTLED: f64 = 1.1;
 
-/// Rounds in which zeros and parameters are estimated by turns to see what zeros explain.
+/// Rounds of alternating estimation of encoder zeros and parameters, to find how much of the cost zeros explain.
 const ZERO_ROUNDS: usize = 2;
 
-/// Steps by which the zeros of holdout recordings are fitted; the training recordings' go on from round to round.
+/// Gauss-Newton steps in the fit of the encoder zeros of holdout recordings; those of training recordings continue from round to round.
 const HOLDOUT_ROUNDS: usize = 2;
 
-/// What a diagnosis works with: the arm, its prior, scales, and windows.
+/// Context of a diagnosis: the arm, its prior, scales, and windows.
 pub struct DiagnosisContext<A, const N: usize, const P: usize> {
-    /// The arm.
+    /// Model of the arm (dynamics without effects).
     pub arm: A,
     /// Prior of the arm's parameters.
     pub prior: Prior<P>,
-    /// Typical sizes.
+    /// Typical sizes of torques, speeds, positions and inertias on this arm and its logs.
     pub scales: Scales<N>,
-    /// Windows the hypotheses are fitted to.
+    /// Windows of the training logs, to which hypotheses are fitted.
     pub training: WindowSet<N>,
     /// Windows of the holdout, on which causes are judged.
     pub holdout: WindowSet<N>,
-    /// Standard deviation of the position measurement.
+    /// Standard deviation of the position measurement per joint, rad or m.
     pub noise: [f64; N],
-    /// Sides that encoder and friction of every joint may be on, both on one side first.
+    /// Per joint, the sides of the transmission that encoder and friction may be on, both on one side first.
     pub sides: [Vec<Sides>; N],
-    /// Custom effects at their initial guess.
+    /// Custom effects at their initial guesses.
     pub custom_effects: Vec<EffectInstance>,
-    /// Progress report and cancellation.
+    /// Receiver of progress reports, with cancellation.
     pub progress: ProgressReporter,
 }
 
-/// Windows with their measured positions.
+/// Windows of logs with their measured positions.
 pub struct WindowSet<const N: usize> {
-    /// The windows.
+    /// Logs cut into windows.
     pub data: Dataset<N>,
-    /// Measured positions in the order of the flat vector.
+    /// Measured positions of all windows, rad or m, by window, sample and joint.
     pub measured: Vec<f64>,
 }
 
 impl<const N: usize> WindowSet<N> {
-    /// Windows of the given dataset.
+    /// A window set of the given dataset, with its measured positions.
     pub fn new(data: Dataset<N>) -> Self {
         let measured = data.measured();
         Self { data, measured }
     }
 
-    /// Positions of an arm that stays at the initial position of each window, in the order of the flat vector.
+    /// Predictions of no motion: the measured initial position of each window at all its samples, by window, sample and joint.
     pub fn still(&self) -> Vec<f64> {
         let window = |w: &Window<N>| w.initial_state.q.as_slice().repeat(w.rows());
         self.data.windows.iter().flat_map(window).collect()
     }
 
-    /// Cost, in these scales, of predicting that every joint stays at the initial position of its window.
+    /// Cost, with residuals in units of `scale`, of predicting that every joint stays at the initial position of its window.
     pub fn motion(&self, scale: &[f64; N]) -> f64 {
         let moved = self.data.windows.iter().map(|window| {
             let rows = self.measured[window.range()].chunks_exact(N);
@@ -78,7 +78,7 @@ impl<const N: usize> WindowSet<N> {
     }
 }
 
-/// Encoder zeros, and the windows' offsets with them and with initial states fitted beside them.
+/// Fitted encoder zeros, the windows' offsets with these zeros, and offsets with initial states fitted too.
 struct FittedZeros<const N: usize> {
     zeros: EncoderZeros<N>,
     offsets: Vec<InitialStateOffset<N>>,
@@ -94,7 +94,7 @@ pub struct SplitWeighting<const N: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// This context with other windows, to learn from and to judge on.
+    /// A copy of this context with `data` as training and as holdout windows.
     pub(crate) fn on_windows(&self, data: Dataset<N>) -> Self {
         Self {
             arm: self.arm.clone(),
@@ -109,12 +109,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// The fitting problem on the training windows under this weighting.
+    /// Fitting problem on the training windows under this weighting.
     pub fn problem<'a>(&'a self, weighting: &'a Weighting<N>) -> FitProblem<'a, A, N, P> {
         self.on(&self.training, weighting)
     }
 
-    /// The problem on the holdout windows under this weighting.
+    /// Fitting problem on the holdout windows under this weighting.
     pub fn judge<'a>(&'a self, weighting: &'a Weighting<N>) -> FitProblem<'a, A, N, P> {
         self.on(&self.holdout, weighting)
     }
@@ -131,7 +131,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// The training recordings' zeros, and those of a sample's other recordings, fitted to a hypothesis.
+    /// Encoder zeros of the training recordings, and of the further recordings in a sample, fitted to a hypothesis.
     pub(crate) fn zeros_beside(
         &self,
         sample: &WindowSet<N>,
@@ -151,7 +151,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         zeros
     }
 
-    /// Weightings around a hypothesis, beside which initial states are fitted; scales are those given, encoder zeros those of `given`.
+    /// Weightings around a hypothesis with initial states fitted to it, residual scales `scale` and the encoder zeros of `given`.
     pub fn reweighted(
         &self,
         hypothesis: &Hypothesis<P>,
@@ -164,7 +164,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         SplitWeighting { training, holdout }
     }
 
-    /// The weighting of the training windows, beside which initial states and, where wanted, encoder zeros, from `zeros`, are fitted.
+    /// Weighting of the training windows with initial states and, if `with_zeros`, encoder zeros (from `zeros`) fitted to the hypothesis.
     fn training_weighting(
         &self,
         hypothesis: &Hypothesis<P>,
@@ -183,7 +183,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weighting.robust(&sample.data, &residual).with_zeros(zeros)
     }
 
-    /// The weighting whose initial states have been fitted to the hypothesis once and relinearised there, with given encoder zeros.
+    /// Weighting with given encoder zeros whose initial states have been fitted to the hypothesis once, and linearised around them.
     pub fn weighting(
         &self,
         sample: &WindowSet<N>,
@@ -197,8 +197,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weighting.robust(&sample.data, &residual).with_zeros(zeros.clone())
     }
 
-    /// The weighting around encoder zeros that have been fitted to the hypothesis once, from `zeros`, and initial states that were fitted beside them;
-    /// `fitted` are the zeros by the products of their columns.
+    /// Weighting around encoder zeros and initial states fitted to the hypothesis once, starting from `zeros`; `fitted` estimates zeros from the inner products
+    /// of their columns.
     fn fitting_zeros(
         &self,
         sample: &WindowSet<N>,
@@ -229,7 +229,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FittedZeros { zeros, offsets }
     }
 
-    /// The weighting around predictions with these offsets, their residual, and their derivatives by initial positions and velocities.
+    /// Weighting around predictions from initial states with these offsets, their residual, and their derivatives by initial positions and velocities.
     fn linearised(
         &self,
         sample: &WindowSet<N>,
@@ -246,12 +246,12 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (weighting, residual, sensitivities)
     }
 
-    /// Fits with scales that follow the residual, from rough scales down to the residual's own, beside encoder zeros that differ between recordings.
+    /// Fits with residual scales re-estimated by turns, from `scale` down to the residual's own, with encoder zeros that differ between recordings.
     pub fn settle(&self, start: &Hypothesis<P>, scale: [f64; N]) -> (Fit<P>, SplitWeighting<N>) {
         self.settled(start, scale, EncoderZeros::can_be_told_from(&self.training.data))
     }
 
-    /// The same with encoder zeros that are those of the model in every recording.
+    /// Fits with residual scales re-estimated by turns, with encoder zeros equal to the model's in every recording.
     pub(crate) fn settle_without_zeros(
         &self,
         start: &Hypothesis<P>,
@@ -288,8 +288,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (fit, weights)
     }
 
-    /// Cost of the training windows once parameters are estimated beside encoder zeros that differ between recordings, in the scales and by the typical
-    /// window of a weighting without them.
+    /// Cost of the training windows once parameters are estimated together with encoder zeros that differ between recordings, in the scales and with the typical
+    /// window of a weighting without such zeros.
     pub(crate) fn cost_with_zeros(&self, fit: &Fit<P>, weighting: &Weighting<N>) -> f64 {
         let mut beside = weighting.clone();
         let mut hypothesis = fit.hypothesis.clone();
@@ -301,8 +301,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         costs.into_iter().map(|cost| weighting.student_t_cost(cost)).sum()
     }
 
-    /// Scale of each joint's residual under a hypothesis: its RMS once initial states are fitted, widened by its correlation in time,
-    /// and never under the measurement's noise.
+    /// Scale of each joint's residual under a hypothesis, rad or m: RMS after the fit of initial states, widened by its correlation in time,
+    /// and at least the noise of the position measurement.
     pub fn residual_scale(&self, weighting: &Weighting<N>, hypothesis: &Hypothesis<P>) -> [f64; N] {
         let problem = self.problem(weighting);
         let residual = problem.residual(hypothesis);
@@ -320,7 +320,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         })
     }
 
-    /// First scales: the typical window's RMS error of the arm file as it is.
+    /// First scale of each joint's residual, rad or m: the typical window's RMS error of `hypothesis`, the arm file as it is.
     pub fn rough_scale(&self, hypothesis: &Hypothesis<P>) -> [f64; N] {
         let data = &self.training.data;
         let predicted = data.predict(&self.arm, hypothesis, &data.zero_offsets());
@@ -335,7 +335,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Runs `round(1)`, `round(2)`, … until one says it is the last.
+/// Runs `round(1)`, `round(2)`, … until a round returns that it is the last.
 fn loop_rounds(mut round: impl FnMut(usize) -> bool) {
     let mut count = 1;
     while !round(count) {
@@ -343,7 +343,7 @@ fn loop_rounds(mut round: impl FnMut(usize) -> bool) {
     }
 }
 
-/// Corrections of initial states, at most twenty standard deviations of the measured one; beyond, the model of the window is at fault.
+/// Offsets of initial states limited to twenty standard deviations of the measured state; beyond, the model of the window is at fault.
 fn bounded<const N: usize>(
     data: &Dataset<N>,
     offsets: Vec<InitialStateOffset<N>>,
@@ -360,7 +360,7 @@ fn bounded<const N: usize>(
     offsets
 }
 
-/// RMS of pooled windows by their robust weights, times the square root of the autocorrelation time in samples (at least one).
+/// RMS of pooled windows by their robust weights, times the square root of the residual's autocorrelation time in samples (at least one).
 fn correlated_rms(windows: &[Vec<f64>], robust_weight: &[f64]) -> f64 {
     let moment = |lag: usize| -> f64 {
         let product = |w: &Vec<f64>| w.iter().zip(w.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();

@@ -1,14 +1,14 @@
 //! Covariance of fitted values, by the jackknife over windows.
 //!
-//! Windows are the independent observations. Leaving window `w` out moves the fitted values, to first order, by
+//! Windows are the independent observations. Leaving window `w` out changes the fitted values, to first order, by
 //!
 //! ```text
 //! d_w = (H - H_w)^-1 g_w,
 //! ```
 //!
 //! with `H` the curvature of the cost, `H_w` the window's part of it and `g_w` its score. The sum of `d_w d_w'` is the jackknife's
-//! covariance (Efron and Stein 1981; CR3 of Bell and `McCaffrey` 2002): unlike the scatter of scores it knows that a window which alone
-//! bears a value has drawn that value to itself. How many windows bear a value says which Student distribution its error follows: with
+//! covariance (Efron and Stein 1981; CR3 of Bell and `McCaffrey` 2002): unlike the scatter of scores it allows for a window that alone determines
+//! a value and so fits it too well. The number of windows that determine a value sets the Student distribution of its error: with
 //! `a_w = H^-1 H_w H^-1`,
 //!
 //! ```text
@@ -19,29 +19,29 @@ use crate::likelihood::weighting::Gram;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// A window without which a value would be known by this factor less is indispensable.
+/// Factor by which a fitted value's variance would grow without a window from which the window is indispensable to the value.
 const INDISPENSABLE: f64 = 1e3;
 
-/// Keeps a curvature of unit diagonal invertible.
+/// Addition to the unit diagonal of a scaled curvature matrix that keeps it invertible.
 const JITTER: f64 = 1e-12;
 
-/// Beyond this many degrees of freedom a Student distribution is normal.
+/// Degrees of freedom beyond which a Student distribution is taken as normal.
 const NORMAL: f64 = 1e3;
 
-/// Two-sided 95 % of the normal distribution.
+/// Quantile of the standard normal distribution for a two-sided 95 % interval.
 pub const NORMAL_95: f64 = 1.96;
 
-/// Covariance of fitted values and what it rests on.
+/// Covariance of fitted values with the degrees of freedom of their variances.
 #[derive(Debug, Clone)]
 pub struct ParameterCovariance {
-    /// Covariance, with each window as one independent observation.
+    /// Covariance matrix, with each window as one independent observation.
     pub matrix: DMatrix<f64>,
-    /// Degrees of freedom of each value's variance.
+    /// Degrees of freedom of each fitted value's variance.
     pub degrees_of_freedom: Vec<f64>,
 }
 
 impl ParameterCovariance {
-    /// Infinite variances of `k` values.
+    /// Covariance with infinite variances of `k` values.
     fn unknown(k: usize) -> Self {
         Self {
             matrix: DMatrix::from_diagonal_element(k, k, f64::INFINITY),
@@ -49,8 +49,8 @@ impl ParameterCovariance {
         }
     }
 
-    /// Of values that were fitted with the inner products `gram`, under a prior of the precisions `prior_precision`. A value that changes no
-    /// prediction is as likely anywhere within its `range`.
+    /// Covariance of values fitted with the inner products `gram`, under a prior of the precisions `prior_precision`. A value that changes no
+    /// prediction is taken as uniform within its `range`.
     pub fn new(gram: &Gram, prior_precision: &[f64], range: &[f64]) -> Self {
         let k = prior_precision.len();
         let precision = |i: usize| gram.total[(i, i)] + prior_precision[i];
@@ -69,7 +69,7 @@ impl ParameterCovariance {
         spread
     }
 
-    /// Factor by which 95 % intervals are wider than those of a normal error.
+    /// Factor by which the 95 % interval of value `i` is wider than that of a normal error.
     pub fn student_t_factor(&self, i: usize) -> f64 {
         StudentsT::new(0.0, 1.0, self.degrees_of_freedom[i])
             .map_or(1.0, |t| (t.inverse_cdf(0.975) / NORMAL_95).max(1.0))
@@ -117,14 +117,14 @@ impl Determined {
     }
 }
 
-/// Cost of a window relative to the average over all, at least one.
+/// Cost of a window relative to the mean over all windows, at least one.
 fn relative_cost(gram: &Gram, window: usize) -> f64 {
     let left = |score: &DVector<f64>| score[score.len() - 1];
     let average = gram.scores.iter().map(left).sum::<f64>() / gram.scores.len() as f64;
     if average > 0.0 { (left(&gram.scores[window]) / average).max(1.0) } else { 1.0 }
 }
 
-/// Whether a part of the curvature still determines every value, given those before it.
+/// Whether part `rest` of the curvature `whole` still determines every value, given the earlier values.
 fn determines(rest: &Cholesky<f64, Dyn>, whole: &Cholesky<f64, Dyn>) -> bool {
     let (rest, whole) = (rest.l_dirty(), whole.l_dirty());
     (0..rest.nrows()).all(|i| rest[(i, i)].powi(2) * INDISPENSABLE > whole[(i, i)].powi(2))
@@ -135,7 +135,7 @@ mod tests {
     use super::*;
     use crate::numeric::random::Random;
 
-    /// Two values fitted to noise, whose columns have these sizes in each window: the values and their covariance.
+    /// Two values fitted to noise, with columns of these sizes in each window: the values and their covariance.
     fn fitted(sizes: &[[f64; 2]], random: &mut Random) -> ([f64; 2], ParameterCovariance) {
         let mut rows: Vec<Vec<[f64; 3]>> = sizes
             .iter()

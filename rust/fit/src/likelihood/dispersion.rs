@@ -1,25 +1,25 @@
 //! Dispersion factor: standard deviations widened by the difference between fits to the training logs and to the holdout.
 //!
-//! A covariance from one set of windows knows how they scatter around their own fit, not what they all err by: an initial state
-//! behind a gear, friction that is smoother than the model's. What differs from motion to motion shows when the same model is fitted
-//! to other motions. Deviations are widened by the factor by which the two fits differ more than they should (the dispersion
-//! ratio of Birge 1932, over all values that the logs determine, and each value's own share of it).
+//! A covariance from one set of windows contains their scatter around their common fit, but no error that they share: an initial state
+//! behind a gear, friction that is smoother than the model's. An error that differs from motion to motion shows when one model is fitted
+//! to further motions. Standard deviations are widened by the factor by which two fits differ more than they should (the dispersion
+//! ratio of Birge 1932, over all values that the logs determine, and each value's own contribution).
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::solve::{Effort, Fit};
 use armgap_core::arm::Arm;
 
-/// A value counts as determined by a log if that log narrows its prior deviation to this part.
+/// Ratio of a value's standard deviation to its prior standard deviation below which a fit counts as determining the value.
 const DETERMINED: f64 = 0.5;
 
-/// Weight of a value's own difference beside the dispersion of all: one observation of one degree of freedom.
+/// Weight of a value's own squared difference beside the dispersion of all values: one observation of one degree of freedom.
 const OWN: f64 = 0.5;
 
-/// Deviations are not widened beyond this factor.
+/// Largest dispersion factor of a standard deviation.
 const MOST: f64 = 1e3;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Multiplies the deviations of a fit by its dispersion factor against a fit of the same model to the holdout, and returns that one.
+    /// Widens the standard deviations of a fit by its dispersion factor against a fit of the same model to the holdout; returns the holdout fit.
     pub fn apply_dispersion_factor(&self, fit: &mut Fit<P>, weights: &SplitWeighting<N>) -> Fit<P> {
         let other = self.judge(&weights.holdout).solve(&fit.hypothesis, Effort::FULL);
         let squares = self.squared_differences(fit, &other);
@@ -45,7 +45,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         other
     }
 
-    /// Squared difference of every determined value in units of its variance.
+    /// Squared difference of every value between two fits in units of its variance; `None` for values that the logs do not determine.
     fn squared_differences(&self, here: &Fit<P>, there: &Fit<P>) -> Vec<Option<f64>> {
         let (a, b) = (here.hypothesis.values(), there.hypothesis.values());
         let one = |i: usize| {
@@ -58,7 +58,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Row and column of the entries of a square matrix, column by column.
+/// Row and column indices of the entries of an `n` by `n` matrix, column by column.
 fn indices(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(move |j| (0..n).map(move |i| (i, j)))
 }

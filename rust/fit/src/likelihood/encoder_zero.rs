@@ -1,50 +1,50 @@
-//! Zeros of the encoders, recording by recording: a nuisance.
+//! Encoder zeros of recordings: nuisance parameters of the fit.
 //!
-//! An incremental encoder finds its zero anew at every start of a robot, each time a little elsewhere. What all recordings share is a question about the
-//! arm (an encoder offset, a tilted base) and is left to the candidates. Their differences are random effects with mean zero and one standard
-//! deviation per joint, which is estimated from the training recordings by expectation maximisation with the uncertainty of what is shared in it (restricted
+//! An incremental encoder finds its zero anew at every start of a robot, with a random error. The error shared by all recordings is a question about the
+//! arm (an encoder offset, a tilted base) and is left to the candidates. Differences between recordings are random effects with mean zero and one standard
+//! deviation per joint, estimated from the training recordings by expectation maximisation with the uncertainty of the shared part (restricted
 //! maximum likelihood; Laird and Ware 1982, Biometrics 38, section 4);
-//! a recording's zero is then its posterior mean. Where recordings do not differ, the standard deviation goes to zero and the zeros with it.
+//! a recording's zero is its posterior mean. Where recordings do not differ, the standard deviation and the zeros go to zero.
 
 use crate::likelihood::solve::inverse_of_seen;
 use crate::likelihood::weighting::Gram;
 use crate::predict::window::{Dataset, InitialStateOffset};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-/// Standard deviation between recordings, rad or m, that its estimate starts from and does not exceed: six degrees, as of an arm that is set to its
+/// Largest and first standard deviation of encoder zeros between recordings, rad or m: six degrees, as of an arm that is set to its
 /// zero by hand against friction (docs/real-arm.md). More is no scatter of one zero but another zero, which the checks of the input look for.
 const LARGEST_SPREAD: f64 = 0.1;
 
-/// Rounds of expectation maximisation: tens settle a spread that is not zero, hundreds bring one that is zero down to it.
+/// Rounds of expectation maximisation: tens settle a non-zero standard deviation of the zeros, hundreds bring a vanishing one down to zero.
 const ROUNDS: usize = 300;
 
-/// Odds that encoders whose zeros scatter have an offset besides. At 1, the mean of three or four recordings' zeros is named as an offset at 0.67 and 0.75 on
-/// arms without one; at 0.01 an offset of four times the scatter of three recordings is doubtful.
+/// Prior odds that encoders whose zeros scatter have an offset besides. At 1, the mean of three or four recordings' zeros is named as an offset at 0.67 and
+/// 0.75 on arms without one; at 0.01 an offset of four times the scatter of three recordings is doubtful.
 const SHARED: f64 = 0.1;
 
-/// The zeros of the recordings' encoders, and the distribution that they were drawn from.
+/// Encoder zeros of recordings, and the normal distribution that they were drawn from.
 #[derive(Debug, Clone)]
 pub struct EncoderZeros<const N: usize> {
-    /// Per recording: its name, its zero and its standard deviation, rad or m: what the encoders show where the model's positions are zero.
+    /// Name, zero and its standard deviation of each recording; a zero is what an encoder shows where the model's position is zero, rad or m.
     pub recordings: Vec<RecordingZero<N>>,
     /// Standard deviation of each joint's zero between recordings, rad or m.
     pub spread: [f64; N],
-    /// What all training recordings share beyond their scatter; it is not taken out.
+    /// Mean of the zeros over all training recordings beyond their scatter, rad or m; not corrected for.
     common: SVector<f64, N>,
 }
 
-/// The zero of one recording's encoders.
+/// Encoder zeros of one recording, with their standard deviations.
 #[derive(Debug, Clone)]
 pub struct RecordingZero<const N: usize> {
-    /// Recording.
+    /// Name of the recording.
     pub source: String,
-    /// Zero, rad or m.
+    /// Encoder zero of each joint, rad or m: what the encoder shows where the model's position is zero.
     pub zero: SVector<f64, N>,
-    /// Its standard deviation.
+    /// Standard deviation of the encoder zero of each joint, rad or m.
     pub sigma: SVector<f64, N>,
 }
 
-/// What windows say about the zero of one recording's encoders: curvature and, around no displacement, slope of the log-likelihood.
+/// Likelihood of one recording's encoder zeros: curvature and, at zero displacement, slope of the log-likelihood.
 #[derive(Debug, Clone)]
 struct Evidence<const N: usize> {
     source: String,
@@ -53,17 +53,17 @@ struct Evidence<const N: usize> {
 }
 
 impl<const N: usize> EncoderZeros<N> {
-    /// No differences between recordings.
+    /// Encoder zeros that do not differ between recordings.
     pub fn none() -> Self {
         Self { recordings: Vec::new(), spread: [0.0; N], common: SVector::zeros() }
     }
 
-    /// Zero of a recording; none is known of others.
+    /// Encoder zero of a recording per joint, rad or m; zero for an unknown recording.
     pub fn of(&self, source: &str) -> SVector<f64, N> {
         self.recordings.iter().find(|r| r.source == source).map_or_else(SVector::zeros, |r| r.zero)
     }
 
-    /// Offsets of a dataset's windows: initial states as measured, counted from these zeros.
+    /// Offsets of a dataset's windows: initial states as measured, counted from these encoder zeros.
     pub fn offsets(&self, data: &Dataset<N>) -> Vec<InitialStateOffset<N>> {
         let of_track: Vec<SVector<f64, N>> = data.tracks.iter().map(|track| self.of(&track.source)).collect();
         let offset =
@@ -71,19 +71,19 @@ impl<const N: usize> EncoderZeros<N> {
         data.windows.iter().map(|window| offset(window.track)).collect()
     }
 
-    /// Whether recordings can tell their zeros from what they share.
+    /// Whether a dataset has logs of more than one recording, so that encoder zeros can be told from a shared offset.
     pub fn can_be_told_from(data: &Dataset<N>) -> bool {
         data.tracks.iter().any(|track| track.source != data.tracks[0].source)
     }
 
-    /// Whether all recordings of a dataset are among these.
+    /// Whether the zeros of all recordings of a dataset are among these.
     pub fn knows_all(&self, data: &Dataset<N>) -> bool {
         data.tracks.iter().all(|track| self.recordings.iter().any(|r| r.source == track.source))
     }
 
-    /// Zeros of the training recordings, and the distribution that they come from, by the products `gram` of the zeros' columns around these zeros.
+    /// Encoder zeros of the training recordings, and their distribution, from the inner products `gram` of the zeros' columns around these zeros.
     ///
-    /// A mean that does not stand out of their scatter is a part of it: only one that does is left to the candidates.
+    /// A mean of the zeros that does not stand out of their scatter is part of the scatter; a mean that does is left to the candidates.
     pub(crate) fn of_training(&self, data: &Dataset<N>, gram: &Gram) -> Self {
         let evidence = self.evidence(data, gram);
         let around_mean = Self::distribution(&evidence, [true; N]);
@@ -93,7 +93,7 @@ impl<const N: usize> EncoderZeros<N> {
         if has_mean == [true; N] { around_mean } else { Self::distribution(&evidence, has_mean) }
     }
 
-    /// Distribution of zeros over recordings, and each one's, by expectation maximisation; around a mean at the joints that have one.
+    /// Distribution of zeros over recordings, and each recording's zero, by expectation maximisation; with a mean at the joints of `has_mean`.
     fn distribution(evidence: &[Evidence<N>], has_mean: [bool; N]) -> Self {
         let mut found = Self { spread: [LARGEST_SPREAD; N], ..Self::none() };
         for _ in 0..ROUNDS {
@@ -113,7 +113,7 @@ impl<const N: usize> EncoderZeros<N> {
         found
     }
 
-    /// These zeros and those of recordings that are none of them, from the same distribution.
+    /// These encoder zeros, and the zeros of the dataset's further recordings by the distribution of these.
     pub(crate) fn and_of_others(&self, data: &Dataset<N>, gram: &Gram, known: usize) -> Self {
         let mut found = self.clone();
         found.recordings.truncate(known);
@@ -127,8 +127,8 @@ impl<const N: usize> EncoderZeros<N> {
         found
     }
 
-    /// Odds that the recordings' zeros of joint `j` have a mean, `shared` beside the differences that are these zeros, rather than scatter around
-    /// none: `SHARED`, times the likelihood ratio by the Bayesian information criterion of a normal sample (Schwarz 1978), whose likelihood ratio is that of Student's t test. None where recordings do not differ.
+    /// Odds that the recordings' zeros of joint `j` have a mean, `shared` beside these zeros, rather than mean zero: `SHARED` times the likelihood ratio by the
+    /// Bayesian information criterion of a normal sample (Schwarz 1978; Student's t test). `None` where recordings do not differ.
     pub fn odds_of_shared(&self, j: usize, shared: f64) -> Option<f64> {
         let n = self.recordings.len() as f64;
         if n < 2.0 || self.spread[j] <= 0.0 {
@@ -141,7 +141,7 @@ impl<const N: usize> EncoderZeros<N> {
         Some(SHARED * (1.0 + mean * mean / variance).powf(0.5 * n) / n.sqrt())
     }
 
-    /// Products of the zeros' columns, pooled over each recording's windows.
+    /// Likelihood of each recording's encoder zeros, from the inner products of their columns over the recording's windows.
     fn evidence(&self, data: &Dataset<N>, gram: &Gram) -> Vec<Evidence<N>> {
         let mut found: Vec<Evidence<N>> = Vec::new();
         let joints: Vec<usize> = (0..N).collect();
@@ -162,12 +162,12 @@ impl<const N: usize> EncoderZeros<N> {
         found
     }
 
-    /// Covariance between recordings.
+    /// Covariance of encoder zeros between recordings (diagonal).
     fn between(&self) -> SMatrix<f64, N, N> {
         SMatrix::from_diagonal(&SVector::from(self.spread.map(|s| s * s)))
     }
 
-    /// Posterior mean and covariance of one recording's zero; written so that a spread of zero is no division by it.
+    /// Posterior mean and covariance of one recording's encoder zero; in a form without division by a vanishing spread.
     fn posterior(&self, evidence: &Evidence<N>) -> (SVector<f64, N>, SMatrix<f64, N, N>) {
         let between = self.between();
         let covariance = (SMatrix::identity() + between * evidence.precision)
@@ -182,8 +182,8 @@ impl<const N: usize> EncoderZeros<N> {
         RecordingZero { source: evidence.source.clone(), zero, sigma }
     }
 
-    /// What all recordings share and its covariance, by generalised least squares: each weighs by the inverse of the scatter between recordings and of its
-    /// own.
+    /// Mean of the encoder zeros over all recordings and its covariance, by generalised least squares: weights are inverse to the scatter between recordings
+    /// plus each recording's own covariance.
     fn shared(&self, evidence: &[Evidence<N>], has_mean: [bool; N]) -> (SVector<f64, N>, SMatrix<f64, N, N>) {
         let mut normal = DMatrix::<f64>::zeros(N, N);
         let mut right = DVector::<f64>::zeros(N);
@@ -206,7 +206,7 @@ impl<const N: usize> EncoderZeros<N> {
 mod tests {
     use super::*;
 
-    /// Recordings whose windows say that their zeros are these, each with the same standard deviation.
+    /// Encoder zeros estimated from recordings with the likelihoods of the given zeros, each with standard deviation `sigma`.
     fn seen(zeros: &[f64], sigma: f64) -> EncoderZeros<1> {
         let track = |index: usize| {
             Track::new(&index.to_string(), &TIMES, &[0.0; TIMES.len()], &[0.0; TIMES.len()], Some([1e-3]))

@@ -1,24 +1,24 @@
-//! The Jacobian of the predictions by the free values, at a point of a fit.
+//! Jacobian of the predictions by the free values, at a point of a fit, with columns reused between neighbouring points.
 
 use crate::likelihood::solve::{FitProblem, scaled_inverse};
 use crate::likelihood::weighting::Gram;
 use crate::model::hypothesis::Hypothesis;
 use armgap_core::arm::Arm;
 
-/// A column of which the others leave less than this part is collinear: then no columns are reused.
+/// Part of a Jacobian column left independent by the other columns below which it is collinear, so that no columns are reused.
 const APART: f64 = 0.05;
 
-/// Jacobian columns of the free values, the first of them possibly reused from a neighbour, and their inner products.
+/// Jacobian columns of the free values, the first ones possibly reused from a neighbouring point, and their inner products.
 pub(crate) struct Jacobian<'a> {
     reused_columns: &'a [Vec<f64>],
     computed: Vec<Vec<f64>>,
     pub(crate) gram: Gram,
-    /// Whether it is that of an earlier point.
+    /// Whether the whole Jacobian is that of an earlier point of the fit.
     pub(crate) is_reused: bool,
 }
 
 impl<'a> Jacobian<'a> {
-    /// All columns at the current point.
+    /// Jacobian with all columns computed at the current point.
     pub(crate) fn new<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         problem: &FitProblem<A, N, P>,
         at: &Linearisation<P>,
@@ -26,7 +26,7 @@ impl<'a> Jacobian<'a> {
         Self::with(problem, at, &[])
     }
 
-    /// With the columns `known` reused for the first values, unless the others are collinear with them.
+    /// Jacobian with the columns `known` reused for the first values, unless the computed columns are collinear with them.
     pub(crate) fn reusing<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         problem: &FitProblem<A, N, P>,
         at: &Linearisation<P>,
@@ -51,7 +51,7 @@ impl<'a> Jacobian<'a> {
         jacobian
     }
 
-    /// Whether no computed column is collinear with the others.
+    /// Whether no computed Jacobian column is collinear with the other columns.
     fn are_distinct(&self) -> bool {
         let count = self.reused_columns() + self.computed.len();
         let normal = self.gram.total.view((0, 0), (count, count)).into_owned();
@@ -61,17 +61,17 @@ impl<'a> Jacobian<'a> {
         })
     }
 
-    /// Whether all columns belong to the current point.
+    /// Whether all Jacobian columns were computed at the current point.
     pub(crate) fn is_current(&self) -> bool {
         self.reused_columns() == 0 && !self.is_reused
     }
 
-    /// Number of reused columns.
+    /// Number of Jacobian columns reused from a neighbouring point.
     pub(crate) fn reused_columns(&self) -> usize {
         self.reused_columns.len()
     }
 
-    /// Reuses the columns at another point.
+    /// Reuses the Jacobian's columns at another point, with new inner products with the residual.
     pub(crate) fn reuse_at<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &mut self,
         problem: &FitProblem<A, N, P>,
@@ -84,7 +84,7 @@ impl<'a> Jacobian<'a> {
     }
 }
 
-/// A hypothesis with its residual and cost.
+/// A hypothesis with its whitened residual and its cost.
 pub(crate) struct Linearisation<const P: usize> {
     pub(crate) hypothesis: Hypothesis<P>,
     pub(crate) residual: Vec<f64>,

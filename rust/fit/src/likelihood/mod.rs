@@ -1,12 +1,12 @@
-//! How well a hypothesis explains the windows, and the values with which it does so best.
+//! Likelihood of the windows under a hypothesis, and the hypothesis's values of largest likelihood.
 //!
 //! * `context`: arm, prior, scales, training and holdout windows; re-weighting until the scales are those of the residual.
 //! * `covariance`: covariance of fitted values by the jackknife over windows.
 //! * `dispersion`: dispersion factor between fits to different motions.
-//! * `holdout`: cost of a fit on the holdout, beside noise and motion.
+//! * `holdout`: cost of a fit on the holdout, compared with noise and with the motion.
 //! * `jacobian`: Jacobian of the predictions, with columns reused between neighbouring points.
-//! * `scale`: typical sizes of quantities on this arm and these logs.
-//! * `solve`: Gauss-Newton over parameters and effects together.
+//! * `scale`: typical sizes of quantities on an arm and its logs.
+//! * `solve`: damped Gauss-Newton over the arm's parameters and effects together.
 //! * `weighting`: weights of residuals: initial states projected out, robust weights of windows.
 
 pub mod context;

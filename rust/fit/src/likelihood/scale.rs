@@ -1,4 +1,4 @@
-//! Typical sizes on a given arm and log, by quantity: what "small" and "large" mean for an effect's parameter.
+//! Typical sizes of quantities on a given arm and log, which set the scale of an effect's parameters.
 
 use crate::log::track::Track;
 use crate::model::hypothesis::EffectInstance;
@@ -7,18 +7,18 @@ use armgap_core::arm::Arm;
 use armgap_core::effect::{EffectParameter, NEVER, Quantity};
 use nalgebra::SVector;
 
-/// Typical sizes per joint.
+/// Typical sizes of torque, speed, position and inertia per joint, and of the arm's length, gravity and sample period.
 #[derive(Debug, Clone)]
 pub struct Scales<const N: usize> {
-    /// RMS torque.
+    /// RMS torque per joint, N m or N.
     pub torque: [f64; N],
-    /// RMS speed.
+    /// RMS speed per joint, rad/s or m/s.
     pub speed: [f64; N],
-    /// RMS deviation of position from its mean.
+    /// RMS deviation of position from its mean per joint, rad or m.
     pub position: [f64; N],
-    /// Smallest and largest position.
+    /// Smallest and largest position per joint, rad or m.
     pub travel: [[f64; 2]; N],
-    /// Own inertia at `q = 0`.
+    /// Inertia of each joint alone (diagonal of `M`) at `q = 0`, kg m^2 or kg.
     pub inertia: [f64; N],
     /// Median sample period, s.
     pub period: f64,
@@ -28,16 +28,16 @@ pub struct Scales<const N: usize> {
     pub gravity: f64,
 }
 
-/// A parameter this many times its typical size describes no arm; fits are kept below.
+/// Largest value of a parameter in a fit relative to its typical size; beyond, it describes no arm.
 const LARGEST: f64 = 50.0;
 
-/// Times are measured in sample periods; this many of them are possible.
+/// Longest admissible time constant of an effect, in sample periods.
 const LONGEST_TIME: f64 = 1000.0;
 
-/// A joint limit is soft if the joint's torque moves it by a share of the travel, hard if by this part of it.
+/// Ratio of the stiffness of the hardest joint limit to that of a soft one, which the joint's torque deflects by a share of the travel.
 const HARDEST: f64 = 1e4;
 
-/// Laws that change with speed do so below this many times the RMS speed, or they are other laws.
+/// Largest characteristic speed of a speed-dependent effect, relative to the joint's RMS speed; beyond, it resembles another effect.
 const FASTEST: f64 = 2.5;
 
 /// Natural frequency, 1/s, damping ratio, and the motor's share of the joint's inertia, of a typical elastic joint.
@@ -46,7 +46,7 @@ const SHAFT_DAMPING: f64 = 0.2;
 const MOTOR_SHARE: f64 = 0.1;
 
 impl<const N: usize> Scales<N> {
-    /// Sizes seen in `tracks` on this arm.
+    /// Typical sizes from the logs `tracks` of an arm with parameters `theta`.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         arm: &A,
         theta: &[f64; P],
@@ -74,12 +74,12 @@ impl<const N: usize> Scales<N> {
         }
     }
 
-    /// RMS speed of the slowest joint.
+    /// RMS speed of the slowest joint, rad/s or m/s.
     pub fn slowest(&self) -> f64 {
         self.speed.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Size of one quantity on joint `j`.
+    /// Typical size of a quantity on joint `j`, SI.
     pub fn size(&self, quantity: Quantity, j: usize) -> f64 {
         let value = match quantity {
             Quantity::Torque => self.torque[j],
@@ -104,13 +104,13 @@ impl<const N: usize> Scales<N> {
         if value.is_finite() && value > 0.0 { value } else { 1.0 }
     }
 
-    /// Middle of a joint's travel.
+    /// Middle of a joint's travel, rad or m.
     fn middle(&self, j: usize) -> f64 {
         let [from, to] = self.travel[j];
         0.5 * (from + to)
     }
 
-    /// Initial guess of a parameter of joint `j`, given in units of its size; none where the joint never gets there.
+    /// Initial guess of a parameter of joint `j`, from `value` in units of its typical size; `None` for a position outside the joint's travel.
     pub fn initial_guess(&self, quantity: Quantity, j: usize, value: f64) -> Option<f64> {
         match quantity {
             Quantity::Ratio => Some(value),
@@ -123,7 +123,7 @@ impl<const N: usize> Scales<N> {
         }
     }
 
-    /// Value that a parameter's size is counted from: neutral, or zero where none is; of a rest position the middle of the travel.
+    /// Value from which a parameter's size is counted: its neutral value, or zero without one; for a rest position the middle of the travel.
     pub fn centre(&self, parameter: &EffectParameter, j: usize) -> f64 {
         match parameter.quantity {
             Quantity::Rest => self.middle(j),
@@ -132,7 +132,7 @@ impl<const N: usize> Scales<N> {
         }
     }
 
-    /// Largest deviation from that centre that a parameter of joint `j` can have.
+    /// Largest admissible deviation of a parameter of joint `j` from its centre (neutral value, zero or middle of the travel).
     pub fn largest(&self, quantity: Quantity, j: usize) -> f64 {
         let most = match quantity {
             Quantity::Time => LONGEST_TIME,
@@ -143,7 +143,7 @@ impl<const N: usize> Scales<N> {
         most * self.size(quantity, j)
     }
 
-    /// Sizes of all parameters of an effect.
+    /// Typical sizes of all parameters of an effect on its joint, SI.
     pub fn of(&self, effect: &EffectInstance) -> Vec<f64> {
         effect.law.spec().parameters.iter().map(|p| self.size(p.quantity, effect.joint)).collect()
     }

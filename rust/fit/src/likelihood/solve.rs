@@ -1,4 +1,4 @@
-//! Gauss-Newton with Levenberg's damping over the arm's parameters and the effects' together (output error).
+//! Gauss-Newton with Levenberg's damping over the arm's parameters and those of the effects together (output error).
 //!
 //! Minimises `cost = |residual|^2 (weighted) + |(theta - nominal) / sigma|^2`, where the second term is the prior, from the arm
 //! file's values and sigmas, over the free values within their bounds.
@@ -14,115 +14,115 @@ use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Relative displacement for sensitivities; events are located to 1e-12, so a forward difference is good to 1e-6.
+/// Displacement of a value for sensitivities, relative to its size; events are located to 1e-12, so a forward difference is good to 1e-6.
 const RELATIVE_STEP: f64 = 1e-6;
 
-/// Where the cost falls as predicted to within this part of what ends a search, the Jacobian is reused at the new point.
+/// Largest error of the predicted decrease of the cost, relative to the decrease that ends a search, at which the Jacobian is reused.
 const FORESEEN: f64 = 0.5;
 
-/// A reused Jacobian ends a search if it predicts a decrease of less than this part of what ends it.
+/// Decrease of the cost predicted by a reused Jacobian, relative to the decrease that ends a search, below which the search ends.
 const LEAST: f64 = 0.1;
 
-/// Columns reused from a neighbour are reused again where the cost falls as predicted to within this part of the decrease.
+/// Largest error of the predicted decrease of the cost, relative to the decrease, at which columns reused from a neighbour are reused again.
 const SERVES: f64 = 0.25;
 
-/// How far a search is taken.
+/// Effort of a search for the minimum of the cost: limits of iterations and convergence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
-    /// Iterations at most.
+    /// Largest number of Gauss-Newton iterations.
     pub iterations: usize,
-    /// A decrease of the cost by less than this part of it ends the search.
+    /// Relative decrease of the cost by an iteration below which the search ends.
     pub enough: f64,
-    /// Whether the Jacobian of an earlier point may be reused and end the search.
+    /// Whether the Jacobian of an earlier point may be reused and may end the search.
     pub reuse_jacobian: bool,
 }
 
 impl Effort {
-    /// Far enough to rank candidates.
+    /// Effort of a rough fit, enough to rank candidates.
     pub const ROUGH: Self = Self { iterations: 4, enough: 1e-2, reuse_jacobian: true };
-    /// To the minimum.
+    /// Effort of a full fit, to the minimum of the cost.
     pub const FULL: Self = Self { iterations: 15, enough: 1e-4, reuse_jacobian: false };
 }
 
-/// Prior of the arm's parameters.
+/// Normal prior of the arm's parameters, independent for each parameter.
 #[derive(Debug, Clone, Copy)]
 pub struct Prior<const P: usize> {
-    /// Values of the arm file.
+    /// Nominal parameters, from the arm file.
     pub theta: [f64; P],
-    /// Their standard deviations.
+    /// Prior standard deviations of the parameters, from the arm file.
     pub sigma: [f64; P],
-    /// How many of the first parameters are inertial; the rest is friction and may not be negative.
+    /// Number of inertial parameters, which come first; the remaining ones are friction coefficients and may not be negative.
     pub inertial: usize,
 }
 
 impl<const P: usize> Prior<P> {
-    /// Prior cost: squared distance from the arm file's values in units of sigma.
+    /// Prior cost of the parameters `theta`: squared distance from the arm file's values in units of sigma.
     pub fn cost(&self, theta: &[f64; P]) -> f64 {
         (0..P).map(|i| ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2)).sum()
     }
 }
 
-/// Data and the weights to judge them by.
+/// Data of a fit with the weights of their residuals and the prior.
 pub struct FitProblem<'a, A, const N: usize, const P: usize> {
-    /// The arm.
+    /// Model of the arm (dynamics without effects).
     pub arm: &'a A,
     /// Logs cut into windows.
     pub data: &'a Dataset<N>,
-    /// Measured positions of the windows.
+    /// Measured positions of the windows, rad or m, by window, sample and joint.
     pub measured: &'a [f64],
-    /// Weights.
+    /// Weighting of the residuals.
     pub weighting: &'a Weighting<N>,
     /// Prior of the arm's parameters.
     pub prior: &'a Prior<P>,
     /// Typical sizes of the effects' parameters.
     pub scales: &'a Scales<N>,
-    /// Progress report and cancellation.
+    /// Receiver of progress reports, with cancellation.
     pub progress: &'a ProgressReporter,
 }
 
-/// The end of a search.
+/// Result of a fit: best hypothesis, its cost and the covariance of its values.
 #[derive(Debug, Clone)]
 pub struct Fit<const P: usize> {
-    /// Best hypothesis found.
+    /// Hypothesis of lowest cost found.
     pub hypothesis: Hypothesis<P>,
-    /// Cost of the data.
+    /// Cost of the data: weighted sum of squared residuals.
     pub data_cost: f64,
-    /// Prior cost.
+    /// Prior cost: squared distance of the arm's parameters from the arm file's values in units of sigma.
     pub prior_cost: f64,
-    /// Covariance of the free values.
+    /// Covariance of the hypothesis's free values.
     pub covariance: ParameterCovariance,
-    /// Cost of every window as it is.
+    /// Cost of every window without its robust weight.
     pub costs: Vec<f64>,
-    /// Whether the last Jacobian was its own, without reused columns.
+    /// Whether the last Jacobian was computed at the fitted point, without reused columns.
     pub own_jacobian: bool,
 }
 
 impl<const P: usize> Fit<P> {
-    /// Standard deviation of the free value `i`.
+    /// Standard deviation of the free value with index `i`.
     pub fn sigma(&self, i: usize) -> f64 {
         self.covariance.matrix[(i, i)].max(0.0).sqrt()
     }
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> {
-    /// Whitened residual, measured minus predicted.
+    /// Whitened residual of a hypothesis, measured minus predicted, by window, sample and joint.
     pub fn residual(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
         self.progress.check();
         let predicted = self.data.predict(self.arm, hypothesis, &self.weighting.offsets);
         self.weighting.residual(self.measured, &predicted)
     }
 
-    /// Student-t cost of every window.
+    /// Student-t cost of every window under a hypothesis.
     pub fn window_costs(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
         self.raw_costs(hypothesis).into_iter().map(|cost| self.weighting.student_t_cost(cost)).collect()
     }
 
-    /// Cost of every window as it is.
+    /// Cost of every window under a hypothesis, without robust weights.
     pub fn raw_costs(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
         self.weighting.costs(self.data, &self.residual(hypothesis))
     }
 
-    /// Whitened sensitivities of the prediction to the free values `which`, given the residual at `hypothesis`.
+    /// Whitened sensitivities of the prediction to the free values with indices `which`, given the residual at `hypothesis`.
     pub fn sensitivities(
         &self,
         hypothesis: &Hypothesis<P>,
@@ -142,13 +142,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
             .collect()
     }
 
-    /// Whitened Jacobian of the prediction by all free values.
+    /// Whitened Jacobian of the prediction by all free values, one column each.
     pub fn jacobian(&self, hypothesis: &Hypothesis<P>) -> Vec<Vec<f64>> {
         let all: Vec<usize> = (0..hypothesis.values().len()).collect();
         self.sensitivities(hypothesis, &self.residual(hypothesis), &all)
     }
 
-    /// Displacements for sensitivities, inward at an upper bound.
+    /// Displacements of the free values for sensitivities by forward differences, inward at an upper bound.
     fn steps(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
         let sizes = self.sizes(hypothesis);
         let (_, upper) = self.bounds(hypothesis);
@@ -161,14 +161,14 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
             .collect()
     }
 
-    /// Typical sizes of the free values.
+    /// Typical sizes of the free values (`theta`, then the effects' parameters), SI.
     pub fn sizes(&self, hypothesis: &Hypothesis<P>) -> Vec<f64> {
         let theta = (0..P).map(|i| self.prior.theta[i].abs().max(self.prior.sigma[i]));
         let effects = hypothesis.effects.iter().flat_map(|e| self.scales.of(e));
         theta.chain(effects).collect()
     }
 
-    /// Bounds of the free values.
+    /// Lower and upper bounds of the free values.
     fn bounds(&self, hypothesis: &Hypothesis<P>) -> (Vec<f64>, Vec<f64>) {
         let friction = |i: usize| {
             if i < self.prior.inertial { f64::NEG_INFINITY } else { 0.0 }
@@ -186,13 +186,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         (lower, upper)
     }
 
-    /// Minimises the cost from `initial_guess`, over all free values.
+    /// Minimises the cost over all free values, starting from `initial_guess`.
     pub fn solve(&self, initial_guess: &Hypothesis<P>, effort: Effort) -> Fit<P> {
         self.solve_reusing(initial_guess, effort, &[])
     }
 
     /// Minimises the cost from `initial_guess`, reusing a neighbour's Jacobian columns `known` for the first values as long as the cost falls as
-    /// they predict.
+    /// these columns predict.
     pub fn solve_reusing(&self, initial_guess: &Hypothesis<P>, effort: Effort, known: &[Vec<f64>]) -> Fit<P> {
         let (lower, upper) = self.bounds(initial_guess);
         let mut at = Linearisation::new(self, initial_guess.clone());
@@ -252,7 +252,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         }
     }
 
-    /// Cost at a hypothesis once its free values are estimated again to first order, with the Jacobian of a neighbour; infinite where it
+    /// Cost at a hypothesis after a first-order re-estimate of its free values, with the Jacobian of a neighbouring hypothesis; infinite where it
     /// cannot be computed.
     pub(crate) fn cost_refitted(&self, hypothesis: &Hypothesis<P>, jacobian: &[Vec<f64>]) -> f64 {
         let residual = self.residual(hypothesis);
@@ -266,7 +266,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         if cost.is_finite() { cost } else { f64::INFINITY }
     }
 
-    /// Normal matrix and right-hand side, the prior included.
+    /// Normal matrix and right-hand side of a Gauss-Newton step, with the prior.
     fn normal_equations(&self, gram: &Gram, hypothesis: &Hypothesis<P>) -> (DMatrix<f64>, DVector<f64>) {
         let k = gram.total.nrows() - 1;
         let mut normal = gram.total.view((0, 0), (k, k)).into_owned();
@@ -279,7 +279,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
         (normal, gradient)
     }
 
-    /// Covariance of the free values.
+    /// Covariance of the free values at a point of the fit.
     fn covariance(&self, gram: &Gram, at: &Linearisation<P>) -> ParameterCovariance {
         let (lower, upper) = self.bounds(&at.hypothesis);
         let prior_precision: Vec<f64> =
@@ -289,8 +289,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> FitProblem<'_, A, N, P> 
     }
 }
 
-/// A step that takes no value after the first `free` more than nine tenths of the way to its lower bound: an effect that is switched
-/// off has no derivative to come back by.
+/// Limits the values from index `free` on to nine tenths of their way to the lower bound in one step: an effect that is switched off has no
+/// derivative to return by.
 fn inside(now: &[f64], mut next: Vec<f64>, lower: &[f64], free: usize) -> Vec<f64> {
     for i in free..next.len() {
         if lower[i].is_finite() {
@@ -300,7 +300,7 @@ fn inside(now: &[f64], mut next: Vec<f64>, lower: &[f64], free: usize) -> Vec<f6
     next
 }
 
-/// One damped step; values at a bound that the step would leave stay there.
+/// Values after one damped Gauss-Newton step; values at a bound that the step would cross stay at the bound.
 fn step(
     normal: &DMatrix<f64>,
     gradient: &DVector<f64>,
@@ -342,8 +342,8 @@ pub fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(k, k, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
-/// Inverse of a normal matrix over the values that change some prediction; zero for those that change none, such as a stop's that no window
-/// reaches.
+/// Inverse of a normal matrix over the values that change some prediction; zero rows for values that change none, such as those of a stop that
+/// no window reaches.
 pub fn inverse_of_seen(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let seen: Vec<usize> = (0..normal.nrows()).filter(|&i| normal[(i, i)] > 0.0).collect();
     let reduced = DMatrix::from_fn(seen.len(), seen.len(), |a, b| normal[(seen[a], seen[b])]);
@@ -357,7 +357,7 @@ pub fn inverse_of_seen(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(whole)
 }
 
-/// The effect switched off: its amplitudes at neutral, its shape as it is.
+/// The effect switched off: amplitudes at their neutral values, shape parameters unchanged.
 pub fn neutral(effect: &EffectInstance) -> EffectInstance {
     let mut off = *effect;
     for (value, parameter) in off.p.iter_mut().zip(effect.law.spec().parameters).take(effect.amplitudes()) {

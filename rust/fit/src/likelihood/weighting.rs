@@ -22,41 +22,41 @@ use rayon::prelude::*;
 /// Factor on the standard deviations of a measured initial state.
 const INITIAL_STATE_INFLATION: f64 = 2.0;
 
-/// A local cubic errs by more where the acceleration jumps: the standard deviation of an initial state is raised to the offset it turned
-/// out to need, up to this many of its standard deviations.
+/// Largest factor on the standard deviation of a measured initial state: a local cubic errs by more where the acceleration jumps, so the deviation is
+/// raised to the offset that the fit required.
 const LARGEST_INFLATION: f64 = 20.0;
 
-/// Heaviness of the tail of windows' costs: a window this many times worse than typical has about half its weight.
+/// Cost of a window relative to a typical one at which its robust weight is about one half.
 const TAIL: f64 = 3.0;
 
-/// Displacements for the sensitivity to an initial state, in m or rad and per second.
+/// Displacement of an initial state for sensitivities, in m or rad and per second.
 const INITIAL_STATE_STEP: f64 = 1e-6;
 
-/// One window's projection.
+/// Projection of one window's residual off the errors of its initial state.
 #[derive(Debug, Clone)]
 struct Projection {
-    /// Rows of `Q` that belong to samples.
+    /// Rows of the orthonormal basis `Q` that belong to samples.
     samples: DMatrix<f64>,
-    /// Rows of `Q` that belong to the prior of the initial state.
+    /// Rows of the orthonormal basis `Q` that belong to the prior of the initial state.
     prior: DMatrix<f64>,
-    /// `-L' c`.
+    /// Residual of the initial state's prior, `-L' c`, with `c` the present offset and `L L'` the precision of the measured state.
     prior_residual: DVector<f64>,
-    /// `R^-1` of the same factorisation: corrections of the initial state from coordinates.
+    /// Matrix `R^-1` of the `Q R` factorisation: correction of the initial state from coordinates in the basis `Q`.
     back: DMatrix<f64>,
 }
 
 impl Projection {
-    /// Columns of the rows that belong to samples.
+    /// Columns of the sample rows of the orthonormal basis `Q`.
     fn basis(&self) -> Vec<&[f64]> {
         self.samples.as_slice().chunks_exact(self.samples.nrows()).collect()
     }
 
-    /// What the prior of the measured initial state adds to the residual's coordinates.
+    /// Contribution of the initial state's prior to the residual's coordinates in the basis `Q`.
     fn prior_coordinates(&self) -> DVector<f64> {
         self.prior.tr_mul(&self.prior_residual)
     }
 
-    /// Cost of a whitened residual.
+    /// Cost of a window's whitened residual after projection of its initial state.
     fn cost(&self, residual: &[f64]) -> f64 {
         let along = cross(&[residual], &self.basis());
         let coordinates =
@@ -64,8 +64,8 @@ impl Projection {
         (squares(&[residual])[0] + self.prior_residual.norm_squared() - coordinates).max(0.0)
     }
 
-    /// Products of each of the first `lead` columns, and of the residual, with every column and last the residual, row by row; then the
-    /// squares of the columns after the first `lead`.
+    /// Inner products, in one window, of each of the first `lead` columns and of the residual with every column and last the residual, row by row;
+    /// then the squares of the columns after the first `lead`.
     fn products(&self, lead: usize, columns: &[&[f64]], residual: &[f64]) -> Vec<f64> {
         let all: Vec<&[f64]> = columns.iter().copied().chain([residual]).collect();
         let (k, basis) = (columns.len(), self.basis());
@@ -94,36 +94,36 @@ impl Projection {
     }
 }
 
-/// Weighting of a dataset's residuals.
+/// Weighting of a dataset's residuals: scales, robust weights and projections of initial states.
 #[derive(Debug, Clone)]
 pub struct Weighting<const N: usize> {
-    /// Standard deviation each joint's residual is measured in.
+    /// Standard deviation of each joint's residual, rad or m, by which residuals are divided.
     pub scale: [f64; N],
-    /// Offset of each window's initial state that the predictions are made with.
+    /// Offset of each window's initial state from the measured one, in the predictions.
     pub offsets: Vec<InitialStateOffset<N>>,
-    /// Encoder zeros that the predictions are made with.
+    /// Encoder zeros of the recordings that the predictions are made with.
     pub zeros: EncoderZeros<N>,
-    /// Robust weight of each window; less than one where the model fails far beyond what is typical.
+    /// Robust weight of each window, 0 to 1; below one where the window's cost is far beyond the typical one.
     pub robust_weight: Vec<f64>,
-    /// Cost of a typical window under the hypothesis the weighting was made for.
+    /// Cost of a typical window under the hypothesis for which the weighting was made.
     pub typical: f64,
     projections: Vec<Projection>,
 }
 
-/// Inner products of columns under the weighting, the residual last.
+/// Inner products of columns under the weighting, with the residual as last column.
 #[derive(Debug, Clone, Default)]
 pub struct Gram {
-    /// Sum over windows.
+    /// Matrix of inner products, summed over windows.
     pub total: DMatrix<f64>,
-    /// Per window, the products of every column with the residual.
+    /// Inner products of every column with the residual, per window.
     pub scores: Vec<DVector<f64>>,
-    /// Per window, row by row, if all were taken.
+    /// Inner products of all columns per window, row by row; empty if not all were computed.
     products: Vec<Vec<f64>>,
     robust_weight: Vec<f64>,
 }
 
 impl Gram {
-    /// From the products of `k` columns and, last, the residual within each window.
+    /// Sums of the inner products of `k` columns and, last, the residual, given per window.
     #[cfg(test)]
     pub fn of(products: Vec<Vec<f64>>, k: usize) -> Self {
         let windows = products.iter().map(|p| DMatrix::from_row_slice(k + 1, k + 1, p));
@@ -132,7 +132,7 @@ impl Gram {
         Self { total, scores, robust_weight: vec![1.0; products.len()], products }
     }
 
-    /// Products of the columns `of` with each other within one window, each column in its `unit`; all of them have to have been taken.
+    /// Inner products, in one window, of the columns with indices `of`, each in its `unit`; requires the products of all columns.
     pub fn within(&self, window: usize, of: &[usize], unit: &[f64]) -> DMatrix<f64> {
         let columns = self.total.nrows();
         let (products, robust_weight) = (&self.products[window], self.robust_weight[window]);
@@ -143,7 +143,7 @@ impl Gram {
 }
 
 impl<const N: usize> Weighting<N> {
-    /// The weighting around a hypothesis that predicts `predicted`, with initial states displaced by `offsets`.
+    /// Weighting around a hypothesis with the predictions `predicted`, from initial states displaced by `offsets`.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         data: &Dataset<N>,
         arm: &A,
@@ -156,7 +156,7 @@ impl<const N: usize> Weighting<N> {
         Self::from_sensitivities(data, &sensitivities, scale, offsets)
     }
 
-    /// The weighting from the derivatives of the predictions by initial positions and velocities.
+    /// Weighting from the derivatives of the predictions by initial positions and velocities.
     pub fn from_sensitivities(
         data: &Dataset<N>,
         sensitivities: &[Vec<f64>],
@@ -173,8 +173,8 @@ impl<const N: usize> Weighting<N> {
         Self { scale, offsets, zeros: EncoderZeros::none(), robust_weight, typical: 1.0, projections }
     }
 
-    /// Whitened derivatives of the residual's predictions by the zeros of the encoders, from those by the initial positions: the arm starts the other way,
-    /// and all that is shown moves along.
+    /// Whitened derivatives of the predicted encoder positions by the encoder zeros, from those by the initial positions: the arm starts displaced by
+    /// minus the zero, and all shown positions are displaced by the zero.
     pub fn zero_columns(&self, sensitivities: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let column = |j: usize| {
             let mut column: Vec<f64> = sensitivities[j].iter().map(|s| -s).collect();
@@ -185,12 +185,12 @@ impl<const N: usize> Weighting<N> {
         (0..N).map(column).collect()
     }
 
-    /// Says which encoder zeros its offsets count from.
+    /// The weighting with the encoder zeros from which its offsets count.
     pub fn with_zeros(self, zeros: EncoderZeros<N>) -> Self {
         Self { zeros, ..self }
     }
 
-    /// Sets the robust weights of the windows by how well a hypothesis of this residual explains them.
+    /// The weighting with robust weights of the windows by their costs under a hypothesis with this residual.
     pub fn robust(mut self, data: &Dataset<N>, residual: &[f64]) -> Self {
         let costs = self.costs(data, residual);
         self.typical = crate::log::track::median(costs.clone()).max(f64::MIN_POSITIVE);
@@ -198,25 +198,25 @@ impl<const N: usize> Weighting<N> {
         self
     }
 
-    /// Student-t cost of a window: the negative log-likelihood of a multivariate Student variable, linear for typical windows and logarithmic
-    /// far beyond.
+    /// Student-t cost of a window with plain cost `cost`: negative log-likelihood of a multivariate Student variable, linear for typical windows and
+    /// logarithmic far beyond.
     pub fn student_t_cost(&self, cost: f64) -> f64 {
         self.typical * (1.0 + TAIL) * (cost / (TAIL * self.typical)).ln_1p()
     }
 
-    /// Sum of the windows' costs, each by its robust weight.
+    /// Sum of the windows' costs, each times its robust weight.
     pub fn total(&self, costs: &[f64]) -> f64 {
         costs.iter().zip(&self.robust_weight).map(|(cost, robust_weight)| cost * robust_weight).sum()
     }
 
-    /// Whitened residual, measured minus predicted.
+    /// Whitened residual, measured minus predicted positions in units of the joints' scales, by window, sample and joint.
     pub fn residual(&self, measured: &[f64], predicted: &[f64]) -> Vec<f64> {
         let mut residual: Vec<f64> = measured.iter().zip(predicted).map(|(y, p)| y - p).collect();
         self.whiten(&mut residual);
         residual
     }
 
-    /// Divides a flat vector by the joints' scales.
+    /// Divides the entries of a column (by window, sample and joint) by the joints' scales.
     pub fn whiten(&self, column: &mut [f64]) {
         for row in column.chunks_exact_mut(N) {
             for (value, scale) in row.iter_mut().zip(self.scale) {
@@ -225,13 +225,12 @@ impl<const N: usize> Weighting<N> {
         }
     }
 
-    /// Inner products of whitened `columns` and, last, a whitened `residual`.
+    /// Inner products of whitened `columns` and, last, a whitened `residual`, with initial states projected out.
     pub fn gram(&self, data: &Dataset<N>, columns: &[&[f64]], residual: &[f64]) -> Gram {
         self.gram_with(columns.len(), data, columns, residual)
     }
 
-    /// Inner products of whitened `columns` and, last, a whitened `residual`, without those of two different columns after the first `lead`:
-    /// these stay zero.
+    /// Inner products of whitened `columns` and, last, a whitened `residual`; products of two different columns after the first `lead` stay zero.
     pub fn gram_with(&self, lead: usize, data: &Dataset<N>, columns: &[&[f64]], residual: &[f64]) -> Gram {
         let k = columns.len();
         let one = |(window, projection): (&crate::predict::window::Window<N>, &Projection)| {
@@ -262,13 +261,13 @@ impl<const N: usize> Weighting<N> {
         Gram { total, scores, products, robust_weight: self.robust_weight.clone() }
     }
 
-    /// Cost of every window for a whitened residual.
+    /// Cost of every window for a whitened residual, without robust weights.
     pub fn costs(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
         let windows = data.windows.iter().zip(&self.projections);
         windows.map(|(window, projection)| projection.cost(&residual[window.range()])).collect()
     }
 
-    /// Squared residual of every window that is left once its initial state is fitted without regard to the measured one.
+    /// Squared residual of every window that remains after a fit of its initial state without prior.
     pub fn beside_free_states(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
         let windows = data.windows.iter().zip(&self.projections);
         windows
@@ -280,7 +279,7 @@ impl<const N: usize> Weighting<N> {
             .collect()
     }
 
-    /// The residual that is left once the initial states are fitted, whitened, in the order of the flat vector.
+    /// Whitened residual that remains after the fit of the initial states, by window, sample and joint.
     pub fn remainder(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<f64> {
         let mut left = residual.to_vec();
         for (window, projection) in data.windows.iter().zip(&self.projections) {
@@ -295,7 +294,7 @@ impl<const N: usize> Weighting<N> {
         left
     }
 
-    /// The offsets of all initial states that fit a whitened residual best.
+    /// Offsets of all initial states that fit a whitened residual best.
     pub fn refit_initial_states(&self, data: &Dataset<N>, residual: &[f64]) -> Vec<InitialStateOffset<N>> {
         let windows = data.windows.iter().zip(&self.projections).zip(&self.offsets);
         windows
@@ -347,7 +346,7 @@ pub fn initial_state_sensitivities<A: Arm<f64, N, P>, const N: usize, const P: u
         .collect()
 }
 
-/// The projection of one window from the sensitivities to its initial state, scales and covariance.
+/// Projection of one window from the sensitivities to its initial state, the joints' scales and the covariance of the measured state.
 fn projection<const N: usize>(
     columns: &[&[f64]],
     scale: &[f64; N],
@@ -376,7 +375,7 @@ fn projection<const N: usize>(
     }
 }
 
-/// `L'` with `L L'` the precision of a measured initial state, positions first, then velocities.
+/// Matrix `L'`, with `L L'` the precision of a measured initial state; positions first, then velocities.
 fn initial_state_precision_root<const N: usize>(
     start: &InitialState<N>,
     shift: &InitialStateOffset<N>,

@@ -1,32 +1,32 @@
-//! A torque that depends on one variable of the motion, as a table.
+//! Torque that depends on one variable of the motion, as a table.
 
 use nalgebra::SVector;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// What a law may depend on; joints from 0.
+/// Variable of the motion that a residual torque may depend on; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MotionVariable {
-    /// Position of a joint.
+    /// Position of a joint, rad or m.
     Position(usize),
-    /// Its velocity.
+    /// Velocity of a joint, rad/s or m/s.
     Velocity(usize),
-    /// Its acceleration.
+    /// Acceleration of a joint, rad/s^2 or m/s^2.
     Acceleration(usize),
-    /// Its commanded torque.
+    /// Commanded torque of a joint, N m or N.
     Torque(usize),
-    /// Time since the log began.
+    /// Time since the log began, s.
     Time,
 }
 
 impl MotionVariable {
-    /// All variables of `n` joints, those of joint `own` first.
+    /// All variables of the motion of `n` joints, those of joint `own` (from 0) first.
     pub fn all(n: usize, own: usize) -> Vec<Self> {
         let of_joint = |i| [Self::Position(i), Self::Velocity(i), Self::Acceleration(i), Self::Torque(i)];
         (0..n).flat_map(|i| of_joint((own + i) % n)).chain(std::iter::once(Self::Time)).collect()
     }
 
-    /// Its name: `q1`, `dq1`, `ddq1`, `tau1` and so on, or `t`.
+    /// Name of the variable in results: `q1`, `dq1`, `ddq1`, `tau1` and so on, or `t`.
     pub fn name(self) -> String {
         match self {
             Self::Position(i) => format!("q{}", i + 1),
@@ -37,7 +37,7 @@ impl MotionVariable {
         }
     }
 
-    /// Its unit.
+    /// SI unit of the variable, for rotary or linear joints.
     pub fn unit(self, rotary: bool) -> &'static str {
         let [rotary_unit, linear_unit] = match self {
             Self::Position(_) => ["rad", "m"],
@@ -49,7 +49,7 @@ impl MotionVariable {
         if rotary { rotary_unit } else { linear_unit }
     }
 
-    /// Its value where the motion (position, velocity, acceleration), the commanded torque and the time since the log began are these.
+    /// Value of the variable in a motion (position, velocity, acceleration) under the commanded torque `tau`, at time `t` since the log began.
     pub fn of<const N: usize>(
         self,
         [q, dq, ddq]: &[SVector<f64, N>; 3],
@@ -66,42 +66,42 @@ impl MotionVariable {
     }
 }
 
-/// A dependence of the residual torque that no effect of the library explains.
+/// Dependence of a joint's residual torque on a variable of the motion that no effect of the library explains.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Dependence {
-    /// 1-based joint that the torque acts on.
+    /// Joint that the torque acts on, counted from 1.
     #[schemars(range(min = 1))]
     pub joint: usize,
-    /// What it depends on: `q1`, `dq1`, `ddq1`, `tau1` and so on, or `t`, the time since the log began.
+    /// Name of the variable that the torque depends on: `q1`, `dq1`, `ddq1`, `tau1` and so on, or `t`, the time since the log began.
     pub variable: String,
-    /// The same, to evaluate.
+    /// Variable that the torque depends on, in a form that can be evaluated.
     #[serde(skip)]
     pub depends_on: MotionVariable,
-    /// Unit of the variable.
+    /// SI unit of the variable that the torque depends on.
     pub unit: &'static str,
-    /// Share of the joint's residual torque, beyond noise, that the law predicts in logs that it was not fitted to (variance).
+    /// Share, 0 to 1, of the variance of the joint's residual torque beyond noise that the fitted table predicts in logs it was not fitted to.
     #[schemars(range(min = 0, max = 1))]
     pub share: f64,
-    /// The law.
+    /// Torque as a table over the variable.
     pub law: DependenceLaw,
 }
 
-/// A torque as a table over a variable, beside the mean of the residual torque and the laws before it.
+/// Torque as a table over one variable, beside the mean residual torque and earlier tables of the joint.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct DependenceLaw {
-    /// Mean of the variable in each class, rising.
+    /// Mean of the variable in each class, ascending, in the variable's SI unit.
     pub x: Vec<f64>,
-    /// Torque there, N m or N.
+    /// Torque in each class of the variable, beside `constant`, N m or N.
     pub torque: Vec<f64>,
-    /// Its standard deviation, from the scatter over blocks.
+    /// Standard deviation of the torque in each class, from the scatter over blocks of one second, N m or N.
     pub sigma: Vec<f64>,
-    /// Torque that `torque` stands beside.
+    /// Mean torque to which the table's torques are added, N m or N.
     #[serde(skip)]
     pub constant: f64,
 }
 
 impl DependenceLaw {
-    /// Whole torque at a value of the variable: straight lines between the classes, and that of the outermost ones beyond them.
+    /// Torque at the value `x` of the variable, N m or N: `constant` plus linear interpolation of the table, held constant beyond its ends.
     pub fn at(&self, x: f64) -> f64 {
         let (Some(first), Some(last)) = (self.torque.first(), self.torque.last()) else { return 0.0 };
         self.constant

@@ -1,50 +1,50 @@
 //! Energy balance of the residual torque.
 //!
 //! Power is torque times velocity. Friction that a model leaves out only takes energy from the joint; a spring, an inertia or a tilt
-//! takes and gives it back; a motor that delivers more than its command supplies it. So the work of the residual torque, relative to
-//! all that it exchanges, tells kinds of causes apart before any is named. What noise adds to the residual torque takes and gives at
-//! random: it makes the balance smaller in size and leaves its sign.
+//! takes energy and gives it back; a motor that delivers more than its command supplies energy. So the work of the residual torque, relative to
+//! all the energy it exchanges, tells kinds of causes apart before any is named. Noise in the residual torque takes and gives energy at
+//! random: it reduces the size of the balance and keeps its sign.
 
 use crate::locate::regimes::{ResidualTorque, ResidualTorques};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// A balance beyond this is that of a torque that on the whole takes, or gives.
+/// Size of the energy balance (-1 to 1) beyond which a residual torque counts as mainly taking or mainly giving energy.
 const ONE_WAY: f64 = 0.5;
 
-/// Which way the energy of a residual torque goes.
+/// Direction in which a residual torque exchanges energy with the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum EnergyKind {
-    /// It leaves the arm, as with friction that the model lacks.
+    /// Energy leaves the arm, as by friction that the model lacks.
     Takes,
-    /// It comes into the arm.
+    /// Energy is supplied to the arm, as by a motor that delivers more than its command.
     Gives,
-    /// What is taken is given back, as by a spring.
+    /// Energy is taken and given back, as by a spring.
     Both,
 }
 
-/// Energy that the residual torque of one joint takes and gives.
+/// Energy that the residual torque of one joint exchanges with the arm.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Energy {
-    /// 1-based joint.
+    /// Joint that the residual torque acts on, counted from 1.
     #[schemars(range(min = 1))]
     pub joint: usize,
-    /// The model it belongs to: `before` (the arm file as it is), `refit` or `after`.
+    /// Model whose residual torque is meant: `before` (the arm file as it is), `refit` (parameters re-estimated) or `after` (with the causes).
     pub model: &'static str,
     /// Mean power of the residual torque, W; negative: the model leaves out a loss.
     pub power: f64,
-    /// Mean of its size, W: what is taken and given.
+    /// Mean absolute power of the residual torque, W: energy taken and given.
     pub exchanged: f64,
-    /// Mean size of the commanded torque's power, W.
+    /// Mean absolute power of the commanded torque, W.
     pub commanded: f64,
-    /// `power / exchanged`, from -1 (it only takes) to 1 (it only gives).
+    /// Energy balance `power / exchanged`, from -1 (the residual torque only takes energy) to 1 (it only gives energy).
     pub balance: f64,
-    /// Which way the energy goes.
+    /// Direction in which the residual torque exchanges energy.
     pub kind: EnergyKind,
 }
 
-/// The balance of every joint under every model.
+/// Energy balance of the residual torque of every joint under every model.
 pub fn energy<const N: usize>(residuals: &ResidualTorques<N>) -> Vec<Energy> {
     let models = [("before", &residuals.before), ("refit", &residuals.refit), ("after", &residuals.after)];
     models.iter().flat_map(|(model, residuals)| of_model(model, residuals)).collect()
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
     use nalgebra::Vector1;
 
-    /// One joint that oscillates under a torque of its position and its velocity.
+    /// Residual torques of one joint that oscillates, as a function of its position and velocity.
     fn oscillation(residual: fn(f64, f64) -> f64) -> Vec<ResidualTorque<1>> {
         (0..1000)
             .map(|i| {

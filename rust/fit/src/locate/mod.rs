@@ -1,9 +1,9 @@
-//! Where the gap lies: on which joint, in which regime of its motion, and on which variables it depends.
+//! Where the gap lies: on which joint, in which regime of its motion, and on which variables its residual torque depends.
 //!
 //! * `dependence`: a torque as a table over one variable of the motion.
 //! * `energy`: energy balance of the residual torque.
 //! * `regimes`: residual torque in windows, by regime.
-//! * `unnamed`: laws without a name: tables that predict logs which were left out.
+//! * `unnamed`: torques that depend on one variable without a named effect, as tables validated on left-out logs.
 //! * `variable_classes`: a variable cut into classes of equal count.
 
 pub mod dependence;

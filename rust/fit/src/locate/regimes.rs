@@ -1,7 +1,7 @@
 //! Where the gap lies: residual torque of each joint over the regimes of its motion.
 //!
-//! The prediction of a window and the measurement run under the same torque, so their difference is smooth; its second derivative
-//! is the residual acceleration, and `M(q)` times that the residual torque.
+//! The prediction of a window and its measurement run under one logged torque, so their difference is smooth; its second derivative
+//! is the residual acceleration, and `M(q)` times the residual acceleration is the residual torque.
 
 use crate::log::track::Track;
 use crate::model::hypothesis::Hypothesis;
@@ -13,34 +13,34 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Half width, in samples, of the cubic whose curvature is the residual acceleration.
+/// Half width, in samples, of the local cubic whose curvature is the residual acceleration.
 const HALF_WIDTH: usize = 8;
 
-/// A joint is near a reversal if its velocity changes sign within this time, s.
+/// Time from a sign change of a joint's velocity within which the joint counts as near a reversal, s.
 const REVERSAL_S: f64 = 0.05;
 
-/// Bins of a regime variable.
+/// Bins of a variable over which residual torques are averaged.
 const BINS: usize = 6;
 
-/// A regime stands out if its mean square residual is this many times the joint's.
+/// Mean square residual torque of a regime, relative to the joint's, from which the regime stands out.
 const STANDS_OUT: f64 = 1.6;
 
-/// One sample's state and residual torque, per joint.
+/// State and residual torque of all joints at one sample.
 #[derive(Debug, Clone, Copy)]
 pub struct ResidualTorque<const N: usize> {
-    /// Index of the log.
+    /// Index of the sample's log.
     pub track: usize,
     /// Time within the log, s.
     pub t: f64,
-    /// Positions.
+    /// Measured positions, rad or m.
     pub q: SVector<f64, N>,
-    /// Velocities.
+    /// Measured velocities, rad/s or m/s.
     pub dq: SVector<f64, N>,
-    /// Commanded torques.
+    /// Commanded torques, N m or N.
     pub tau: SVector<f64, N>,
     /// Whether each joint is near a reversal.
     pub reversal: [bool; N],
-    /// Residual torques.
+    /// Residual torques, N m or N: `M` times the second derivative of measured minus predicted position.
     pub residual: SVector<f64, N>,
 }
 
@@ -78,7 +78,7 @@ pub fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize, const
     std::array::from_fn(|h| windows.iter().flatten().map(|residuals| residuals[h]).collect())
 }
 
-/// Measured state at sample `k` of a log, with zero residual torque.
+/// Measured state at sample `k` of the log with number `index`, with zero residual torque.
 fn measured_state<const N: usize>(track: &Track<N>, index: usize, k: usize) -> ResidualTorque<N> {
     ResidualTorque {
         track: index,
@@ -95,7 +95,7 @@ fn velocity(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> f64 {
     local_cubic(t, q, k, 6).dq
 }
 
-/// Whether the direction of motion differs between the two halves of the reversal time around `k`.
+/// Whether the sign of a joint's mean velocity differs before and after sample `k`, over the reversal time on either side.
 fn reverses(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> bool {
     let near = |x: f64| t.partition_point(|&s| s < x).min(t.len() - 1);
     let (a, b) = (near(t[k] - REVERSAL_S), near(t[k] + REVERSAL_S));
@@ -105,57 +105,57 @@ fn reverses(t: &[f64], q: impl Fn(usize) -> f64, k: usize) -> bool {
 /// RMS residual torque of one joint over bins of one variable.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Regime {
-    /// 1-based joint.
+    /// Joint, counted from 1.
     #[schemars(range(min = 1))]
     pub joint: usize,
-    /// The variable, for example `abs(dq1)`.
+    /// Variable that the bins belong to, for example `abs(dq1)`.
     pub variable: String,
-    /// Its unit.
+    /// Unit of the binned variable.
     pub unit: String,
-    /// Bin edges.
+    /// Edges of the bins, ascending, in the variable's unit.
     pub edges: Vec<f64>,
-    /// Unit of the RMS figures.
+    /// Unit of the RMS residual torques: N m or N.
     pub torque_unit: &'static str,
-    /// RMS residual torque with the arm file as it is.
+    /// RMS residual torque in each bin with the arm file as it is.
     pub before: Vec<f64>,
-    /// With parameters re-estimated.
+    /// RMS residual torque in each bin with the arm's parameters re-estimated.
     pub refit: Vec<f64>,
-    /// With the causes.
+    /// RMS residual torque in each bin with the causes of the diagnosis.
     pub after: Vec<f64>,
     /// Samples in each bin.
     pub count: Vec<usize>,
 }
 
-/// Where most of a joint's gap lies.
+/// Share of the gap that a joint bears, and the regime of its motion in which the residual torque stands out.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Location {
-    /// 1-based joint.
+    /// Joint, counted from 1.
     #[schemars(range(min = 1))]
     pub joint: usize,
-    /// Share of the whole gap that this joint bears.
+    /// Share of the whole gap that this joint bears, 0 to 1.
     #[schemars(range(min = 0, max = 1))]
     pub share: f64,
-    /// Name of the regime.
+    /// Name of the regime in which the joint's residual torque stands out.
     pub regime: String,
-    /// The regime in figures.
+    /// Range of the variable that defines the regime, as text with its unit.
     pub detail: String,
-    /// The regime as a range of a variable; none where the gap is spread evenly.
+    /// Range of the variable that defines the regime; `None` where the gap is spread evenly.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range: Option<VariableRange>,
 }
 
-/// A range of a variable.
+/// Range of a variable of the motion.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct VariableRange {
-    /// The variable.
+    /// Name of the variable of the motion, for example `abs(dq1)`.
     pub variable: String,
-    /// Lower end.
+    /// Lower end of the range, in the variable's unit.
     pub from: f64,
-    /// Upper end.
+    /// Upper end of the range, in the variable's unit.
     pub to: f64,
 }
 
-/// A variable that regimes are cut along.
+/// Variable of the motion over which residual torques are binned.
 struct RegimeVariable<const N: usize> {
     name: String,
     unit: &'static str,
@@ -202,7 +202,7 @@ fn variables<const N: usize>(joint: usize, rotary: bool) -> Vec<RegimeVariable<N
     ]
 }
 
-/// Bin edges: quantiles, except for a variable with two values.
+/// Edges of the bins of a variable's values: quantiles; 0, 0.5 and 1 for a variable with the two values 0 and 1.
 fn edges(mut values: Vec<f64>) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
     let (first, last) = (values[0], values[values.len() - 1]);
@@ -219,17 +219,17 @@ fn bin(edges: &[f64], value: f64) -> usize {
     edges[1..edges.len() - 1].partition_point(|edge| *edge <= value)
 }
 
-/// Residual torques of the three hypotheses, sample by sample.
+/// Residual torques under the three models of a diagnosis, sample by sample.
 pub struct ResidualTorques<const N: usize> {
-    /// Arm file as it is.
+    /// Residual torques with the arm file as it is.
     pub before: Vec<ResidualTorque<N>>,
-    /// Parameters re-estimated.
+    /// Residual torques with the arm's parameters re-estimated.
     pub refit: Vec<ResidualTorque<N>>,
-    /// With the causes.
+    /// Residual torques with the causes of the diagnosis.
     pub after: Vec<ResidualTorque<N>>,
 }
 
-/// The gap over every joint and regime.
+/// RMS residual torque of every joint over the bins of every variable.
 pub fn regimes<const N: usize>(residuals: &ResidualTorques<N>, rotary: bool) -> Vec<Regime> {
     let mut all = Vec::new();
     if residuals.refit.is_empty() {
@@ -275,14 +275,14 @@ fn binned<const N: usize>(
     (rms.collect(), count)
 }
 
-/// Each joint's share of the gap and the regime that stands out in it, most of the gap first.
+/// Location of the gap on every joint, largest of the `shares` first, with the regime that stands out.
 pub fn places<const N: usize>(shares: &[f64; N], regimes: &[Regime]) -> Vec<Location> {
     let mut places: Vec<Location> = (0..N).map(|j| standing_out(j, shares[j], regimes)).collect();
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     places
 }
 
-/// The regime of joint `j` in which the mean square residual exceeds the joint's own most.
+/// Location of the gap on joint `j` (from 0), at the regime whose mean square residual torque exceeds the joint's by the largest ratio.
 fn standing_out(j: usize, share: f64, regimes: &[Regime]) -> Location {
     let mut best: Option<(f64, &Regime, usize)> = None;
     for regime in regimes.iter().filter(|r| r.joint == j + 1) {

@@ -1,11 +1,11 @@
-//! What the rest depends on: laws without a name through the torque that a model lacks along the measured motion.
+//! Dependences of the residual torque that no effect explains: tables over one variable of the motion.
 //!
 //! For every joint the residual torque by inverse dynamics is regressed on one variable of the motion at a time, as a table over classes of equal count
-//! (the regressogram of Tukey 1961), beside the arm's own parameters: what is missing has moved these, and the residual torque of a fitted model is what they leave of
-//! it. Residual torque, regressor and classes go through the same low-pass, so that neither noise of the acceleration nor a lag enters one of them alone. Laws are
-//! added one after another (forward selection). A law counts if it predicts logs that it was not fitted to: each log in turn is left
-//! out, and what the law of the others leaves there is compared with what the parameters alone leave. The scatter of that over blocks of a second says
-//! whether chance would do the same.
+//! (the regressogram of Tukey 1961), beside the arm's own parameters: missing torques have shifted them, and the residual torque of a fitted model is what
+//! they leave. Residual torque, regressor and classes go through one low-pass, so that neither noise of the acceleration nor a lag enters only one of them.
+//! Tables are added one after another (forward selection). A table counts if it predicts logs that it was not fitted to: each log in turn is left
+//! out, and its residual under the table of the remaining logs is compared with its residual under the parameters alone. The scatter of the gain over blocks of
+//! one second says whether chance would do as well.
 
 use crate::locate::dependence::{Dependence, DependenceLaw, MotionVariable};
 use crate::locate::variable_classes::{CLASSES, Classes};
@@ -18,49 +18,49 @@ use crate::predict::residual_torque::{
 use armgap_core::arm::Arm;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-/// Standard deviation of the low-pass, s: its cut-off of 7 Hz is above the motion of arms, and the noise of most encoders' second differences below.
+/// Standard deviation of the low-pass of residual torques, s: cut-off 7 Hz, above arms' motion and below most noise of encoders' second differences.
 const LOW_PASS_S: f64 = 0.02;
 
-/// Distance of the points that count, s: about the low-pass's standard deviation.
+/// Spacing of the points at which residual torques are regressed, s: about the low-pass's standard deviation.
 const GRID_S: f64 = 0.02;
 
-/// Share of the time around a point at which a joint may be at rest, where friction is whatever holds it, from which the point does not count.
+/// Share of the time around a point at which a joint may be at rest, with undetermined friction, from which the point is left out of the regression.
 const AT_REST: f64 = 0.1;
 
-/// Length of the blocks over which the gain is taken as independent, s: residual torques have memories of 0.05 to 0.3 s.
+/// Length of the blocks over which gains in prediction are taken as independent, s: residual torques are correlated over 0.05 to 0.3 s.
 const BLOCK_S: f64 = 1.0;
 
-/// Points that count as one, as their errors are correlated by the low-pass and by the memory of the residual torque.
+/// Number of points that count as one independent point, for their errors are correlated by the low-pass and by the residual torque itself.
 const CORRELATED: f64 = 10.0;
 
-/// Gain in predicting logs that were left out, in its standard deviations, from which a law is believed. By chance a law predicts worse than none.
+/// Least gain of a table in predicting left-out logs, in its standard deviations. By chance a table predicts worse than none.
 const CERTAIN: f64 = 2.0;
 
-/// Share of the residual torque's variance beyond noise below which a law does not matter.
+/// Least share of the residual torque's variance beyond noise that a table must explain.
 const MATTERS: f64 = 0.15;
 
-/// Laws of one joint that are listed at most. There are none where what stays is no more than twice what the noise of positions makes.
+/// Largest number of tables listed for one joint. None is listed where the residual torque is at most twice what the noise of positions makes.
 pub const MOST: usize = 3;
 
-/// Fewest blocks in which a law is judged.
+/// Least number of blocks of logs in which tables are judged.
 const FEWEST_BLOCKS: usize = 6;
 
-/// The torque that one log lacks under a model, sample by sample.
+/// Residual torque of one log under a model by inverse dynamics, sample by sample.
 pub struct LogResidual<const N: usize> {
-    /// Samples but those at either end.
+    /// Samples of the log except a few at either end.
     pub samples: Vec<InverseDynamicsResidual<N>>,
-    /// Sample period, s.
+    /// Median sample period of the log, s.
     period: f64,
-    /// Standard deviation of the position measurement.
+    /// Standard deviation of the position measurement per joint, rad or m.
     noise: [f64; N],
-    /// Speeds below which a joint may be at rest.
+    /// Speeds below which a joint may be at rest, rad/s or m/s.
     slow: [f64; N],
-    /// Whether tables are taken from it; all logs judge which laws there are.
+    /// Whether tables are fitted to the log; all logs serve to judge which tables there are.
     teaches: bool,
 }
 
 impl<const N: usize> LogResidual<N> {
-    /// The residual torque of a log; none where the model cannot be simulated.
+    /// Residual torque of a log under a model; `None` where the model cannot be simulated.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         arm: &A,
         track: &Track<N>,
@@ -85,35 +85,35 @@ impl<const N: usize> LogResidual<N> {
     }
 }
 
-/// Residual torque of one joint, low-passed, with everything that it may depend on.
+/// Low-passed residual torque of one joint over all logs, with all variables that it may depend on.
 #[derive(Debug, Clone, Default)]
 struct Rest {
-    /// Variables that a law may depend on.
+    /// Variables that the residual torque may depend on, cut into classes.
     variables: Vec<Classes>,
-    /// Residual torque.
+    /// Residual torque at each point, N m or N.
     torque: Vec<f64>,
-    /// Variance that the noise of positions puts into all of it together.
+    /// Sum of squares, over all points, of the residual torque due to noise of the positions.
     noise: f64,
-    /// Torque of each of the arm's parameters per standard deviation of the arm file, and one.
+    /// Columns of the regression at each point: torque of each of the arm's parameters per standard deviation of the arm file, and a constant one.
     base: Vec<Vec<f64>>,
-    /// Log that each point belongs to.
+    /// Index of the log that each point belongs to.
     log: Vec<usize>,
-    /// Whether tables are taken from a log.
+    /// Whether tables are fitted to each log.
     teaches: Vec<bool>,
-    /// Block of a log that each point belongs to, counted through all logs.
+    /// Index of the block of one second that each point belongs to, counted through all logs.
     block: Vec<usize>,
 }
 
-/// Which laws are wanted.
+/// Options of the search for dependences of the residual torque.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted {
-    /// Laws of one joint at most.
+    /// Largest number of tables for one joint.
     pub most: usize,
-    /// Whether the joints are rotary.
+    /// Whether the joints are rotary rather than linear.
     pub rotary: bool,
 }
 
-/// What the torques that logs lack depend on, of all joints, strongest first; `sigma` are the standard deviations of the arm file's parameters.
+/// Dependences of all joints' residual torques on variables of the motion, strongest first; `sigma`: standard deviations of the parameters `theta`.
 pub fn dependences<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     theta: &[f64; P],
@@ -128,7 +128,7 @@ pub fn dependences<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 }
 
 impl Rest {
-    /// What logs lack at joint `j`.
+    /// Low-passed residual torque of joint `j` (from 0) over all logs, with all variables that it may depend on.
     fn of_joint<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         arm: &A,
         theta: &[f64; P],
@@ -182,7 +182,7 @@ impl Rest {
         self.teaches.len()
     }
 
-    /// The regression of the residual torque on the arm's parameters and on laws over these classes.
+    /// Regression of the residual torque on the arm's parameters and on tables over the variables `laws`.
     fn regression<'a>(&'a self, laws: Vec<&'a Classes>) -> Regression<'a> {
         let own = self.base.first().map_or(0, Vec::len);
         let k = own + CLASSES * laws.len();
@@ -204,7 +204,7 @@ impl Rest {
         }
     }
 
-    /// The laws of this joint, in the order in which they were added.
+    /// Dependences of the joint's residual torque, found by forward selection, in the order in which they were added.
     fn dependences(&self, joint: usize, wanted: Wanted) -> Vec<Dependence> {
         let mut found: Vec<Dependence> = Vec::new();
         if self.blocks() < FEWEST_BLOCKS || self.logs() < 2 {
@@ -241,7 +241,7 @@ impl Rest {
     }
 }
 
-/// Torque of parameter `i` per unit; the sign of friction is smoothed around rest.
+/// Torque of all joints per unit of the arm's parameter `i`; the sign in Coulomb friction is smoothed around rest.
 fn column<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     [q, dq, ddq]: &[SVector<f64, N>; 3],
@@ -255,7 +255,7 @@ fn column<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     regressor.column(i).into_owned()
 }
 
-/// A regression of a residual torque, with the normal equations of every log.
+/// Regression of a residual torque on parameters and tables, with the normal equations of every log.
 struct Regression<'a> {
     rest: &'a Rest,
     laws: Vec<&'a Classes>,
@@ -263,14 +263,14 @@ struct Regression<'a> {
     ridge: DMatrix<f64>,
 }
 
-/// The row of a point: the torques of the parameters, one, and the share of every class of each law.
+/// Regressor row of a point: torques of the parameters, one, and the share of every class of each table's variable.
 fn row(base: &[f64], laws: &[&Classes], point: usize) -> DVector<f64> {
     let shares = laws.iter().flat_map(|law| law.share[point]);
     DVector::from_iterator(base.len() + CLASSES * laws.len(), base.iter().copied().chain(shares))
 }
 
 impl Regression<'_> {
-    /// Sum of the normal equations of the logs that are wanted, with the prior.
+    /// Sum of the normal equations of the logs selected by `wanted`, with the prior precision.
     fn system(&self, wanted: impl Fn(usize) -> bool) -> (DMatrix<f64>, DVector<f64>) {
         let mut whole = (self.ridge.clone(), DVector::zeros(self.ridge.nrows()));
         for (_, (matrix, right)) in self.normal.iter().enumerate().filter(|(log, _)| wanted(*log)) {
@@ -284,12 +284,12 @@ impl Regression<'_> {
         row(&self.rest.base[point], &self.laws, point)
     }
 
-    /// What these values leave of a point.
+    /// Residual torque at a point after subtraction of the regression with the coefficients `values`.
     fn left(&self, values: &DVector<f64>, point: usize) -> f64 {
         self.rest.torque[point] - self.row(point).dot(values)
     }
 
-    /// What the other logs leave of each point, none where they determine nothing.
+    /// Residual torque of each point after the regression fitted to the other logs; `None` where they determine nothing.
     fn left_out(&self) -> Option<Vec<f64>> {
         let values: Vec<DVector<f64>> = (0..self.rest.logs())
             .map(|log| {
@@ -300,8 +300,8 @@ impl Regression<'_> {
         Some((0..self.rest.torque.len()).map(|i| self.left(&values[self.rest.log[i]], i)).collect())
     }
 
-    /// The last law, of the logs that it is taken from: its torque by class and its standard deviation from the scatter of the blocks' scores
-    /// (sandwich).
+    /// Last table of the regression, fitted to the logs meant for it: torque by class, and standard deviation from the scatter of the blocks' scores
+    /// (sandwich estimate).
     fn last_law(&self) -> Option<DependenceLaw> {
         let teaches = &self.rest.teaches;
         let (matrix, right) = self.system(|log| teaches[log]);
@@ -339,7 +339,7 @@ fn squares(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
 }
 
-/// By how much the squares fall from one list to the other, in standard deviations from the scatter over the blocks.
+/// Decrease of the sum of squares from residuals `before` to `after`, in standard deviations from its scatter over blocks.
 fn certainty(before: &[f64], after: &[f64], rest: &Rest) -> f64 {
     let mut gains = vec![0.0; rest.blocks()];
     for (block, (a, b)) in rest.block.iter().zip(before.iter().zip(after)) {
@@ -362,8 +362,8 @@ mod tests {
         dependences(&arm, &[0.1; 9], &[0.01; 9], logs, Wanted { most: MOST, rotary: true })
     }
 
-    /// Logs of two joints that swing at rates of their own, with a torque on each joint and noise; `memory` is the part of the noise that stays
-    /// from sample to sample.
+    /// Logs of two joints that oscillate at different rates, with a given torque on each joint and noise; `memory` is the part of the noise that
+    /// persists from sample to sample.
     fn logs(
         memory: f64,
         torque: impl Fn(usize, &InverseDynamicsResidual<2>) -> [f64; 2],

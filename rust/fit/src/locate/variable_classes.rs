@@ -1,26 +1,26 @@
-//! A variable of the motion cut into classes of equal count, and the share of the time around a point that each class takes.
+//! Variable of the motion cut into classes of equal count, and the share of the time around a point that each class takes.
 
 use crate::locate::dependence::MotionVariable;
 use crate::locate::unnamed::LogResidual;
 use crate::numeric::low_pass::LowPass;
 use crate::predict::residual_torque::InverseDynamicsResidual;
 
-/// Classes of a variable: a law that turns twice over the travel still shows, and each holds some hundred samples of a log of ten seconds.
+/// Classes of a variable: a torque with two periods over the travel is resolved, and each class holds some hundred samples of a log of ten seconds.
 pub const CLASSES: usize = 16;
 
-/// A variable cut into classes.
+/// Variable of the motion cut into classes of equal count.
 #[derive(Debug, Clone)]
 pub struct Classes {
-    /// The variable.
+    /// Variable that is cut into classes.
     pub variable: MotionVariable,
-    /// Mean of the variable in each class; none of an empty one.
+    /// Mean of the variable in each class, in its SI unit; `None` for an empty class.
     pub mean: [Option<f64>; CLASSES],
-    /// Share of the time around each point that each class takes.
+    /// Share of the low-pass's weight around each point that falls into each class.
     pub share: Vec<[f64; CLASSES]>,
 }
 
 impl Classes {
-    /// The classes of a variable over all logs, and their shares around the points that count.
+    /// Classes of a variable over all logs, and their shares around the points `kept` of each log.
     pub fn new<const N: usize>(
         variable: MotionVariable,
         logs: &[LogResidual<N>],
@@ -55,7 +55,7 @@ impl Classes {
     }
 }
 
-/// Edges between the classes of values: quantiles, equal values in one class.
+/// Edges between classes: quantiles of the values; equal values fall into one class.
 fn edges(mut values: Vec<f64>) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
     let mut edges: Vec<f64> = (1..CLASSES).map(|k| values[k * values.len() / CLASSES]).collect();

@@ -1,20 +1,20 @@
-//! Where logs are cut into windows: at a state that is measured well.
+//! Cuts logs into windows at states that are measured well.
 //!
-//! A window is predicted from its measured initial state. Next to a reversal the acceleration jumps by twice the dry friction; no local cubic
-//! follows that, and the velocity it gives errs by many times what its covariance says. A single such start made up to nine tenths of what a
-//! perfect model misses. So windows begin and end beside reversals, not on them; what lies between is predicted either way.
+//! A window is predicted from its measured initial state. At a reversal the acceleration jumps by twice the Coulomb friction; a local cubic cannot
+//! follow the jump, and its velocity errs by many times its standard deviation. One such initial state caused up to nine tenths of the error of a
+//! perfect model. So windows begin and end beside reversals, not on them; the motion between the edges is predicted in either case.
 
 use crate::log::track::{Smoothed, Track, median};
 
-/// Part of its window's length that an edge may move by. With 0.4 floors hardly fall further and windows differ by more than a factor of two.
+/// Largest shift of a window's edge, relative to the window's length. With 0.4 floors hardly fall further and windows differ by more than a factor of two.
 const REACH: f64 = 0.2;
 
 /// Squared error of a velocity that is measured at a reversal, in units of the variance of a typical one: errors of some ten standard deviations
-/// were seen. It only has to outweigh what variances differ by within reach; other values were not tried.
+/// were seen. It only has to exceed the differences of variances within reach; other values were not tried.
 const REVERSAL: f64 = 100.0;
 
-/// Index pairs `(first, last)` of consecutive windows of about `horizon` seconds, each edge at the sample within reach whose velocity is known
-/// best.
+/// Index pairs `(first, last)` of consecutive windows of about `horizon` seconds, each edge shifted to the nearby sample with the smallest error of
+/// the measured velocity.
 pub fn cut_at_smooth_motion<const N: usize>(track: &Track<N>, horizon: f64) -> Vec<(usize, usize)> {
     let windows = cut(&track.t, horizon);
     if windows.is_empty() {
@@ -44,8 +44,8 @@ pub fn cut_at_smooth_motion<const N: usize>(track: &Track<N>, horizon: f64) -> V
     found
 }
 
-/// Expected squared error of the velocities at every sample, in units of a typical variance, summed over the joints. None counts as better than
-/// typical: a cubic that is wider than its neighbours' is so by chance, and errs by more than its variance says.
+/// Expected squared error of the velocities at every sample, in units of a typical variance, summed over the joints. No sample counts as better than
+/// typical: a cubic wider than its neighbours' is so by chance, and errs by more than its variance says.
 fn velocity_errors<const N: usize>(smoothed: &[[Smoothed; N]]) -> Vec<f64> {
     let distances: [Vec<f64>; N] = std::array::from_fn(|j| to_reversal(smoothed, j));
     let typical: [f64; N] =
@@ -57,7 +57,7 @@ fn velocity_errors<const N: usize>(smoothed: &[[Smoothed; N]]) -> Vec<f64> {
     (0..smoothed.len()).map(|k| (0..N).map(|j| at(k, j)).sum()).collect()
 }
 
-/// Samples from each one to the nearest reversal of a joint.
+/// Distance, in samples, from each sample to the nearest reversal of joint `j`.
 fn to_reversal<const N: usize>(smoothed: &[[Smoothed; N]], j: usize) -> Vec<f64> {
     let mut distance = vec![f64::INFINITY; smoothed.len()];
     let reverses = |k: usize| smoothed[k][j].local.dq * smoothed[k + 1][j].local.dq <= 0.0;
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// A mass that friction brakes: its velocity is a triangle in time, with corners on either side of its reversals at 0.5 s, 1.5 s and so on.
+    /// A mass braked by friction: its velocity is a triangle in time, with corners on either side of its reversals at 0.5 s, 1.5 s and so on.
     fn track() -> Track<1> {
         let t: Vec<f64> = (0..1000).map(|k| 0.002 * f64::from(k)).collect();
         let jumping = |t: f64| (PI * t).sin() + 0.4 * (t - 0.5) * (t - 0.5).abs();

@@ -1,26 +1,26 @@
-//! What a diagnosis is given: logs as they come and options; and what of them cannot be worked with.
+//! Input of a diagnosis: logs and options, and errors for input that cannot be used.
 
 use crate::model::custom_effect;
 use armgap_core::arm::ArmKind;
 
-/// One log: sample times, positions and torques, row by row.
+/// One log as given to a diagnosis: sample times, positions and torques, row by row.
 #[derive(Debug, Clone)]
 pub struct LogData<'a> {
-    /// Name in results.
+    /// Name of the log in results.
     pub name: String,
-    /// Recording that it is the whole or a part of: its parts share the encoders' zeros.
+    /// Name of the recording that the log is the whole or a part of; parts of one recording share the encoder zeros.
     pub source: String,
     /// Sample times, s, increasing.
     pub t: &'a [f64],
-    /// Positions, one row per sample.
+    /// Measured positions, rad or m, one row of joints per sample.
     pub q: &'a [f64],
-    /// Torques, one row per sample, held until the next; none of a log that holds references in their place.
+    /// Commanded torques, N m or N, one row per sample, held until the next sample; empty for a log that holds references instead.
     pub tau: &'a [f64],
-    /// Positions that a controller was to reach, one row per sample, held until the next, and velocities where they are logged.
+    /// Reference positions of a controller, rad or m, one row per sample, held until the next sample, and reference velocities where they are logged.
     pub reference: Option<(&'a [f64], Option<&'a [f64]>)>,
     /// First moment of every torque about the middle of its interval, where it is the mean of several, N m s^2 (N s^2).
     pub moment: Option<&'a [f64]>,
-    /// Torque per unit of size of each custom effect, sample by sample.
+    /// Torque per unit of size of each custom effect, one value per sample.
     pub tables: Vec<&'a [f64]>,
 }
 
@@ -29,17 +29,17 @@ pub struct LogData<'a> {
 pub struct Options {
     /// Prediction horizon, s.
     pub horizon: f64,
-    /// Causes named at most.
+    /// Largest number of causes that are named.
     pub max_causes: usize,
-    /// Seed of the resampling that gives probabilities and intervals.
+    /// Seed of the resampling behind probabilities and intervals.
     pub seed: u64,
-    /// Half width of the test functions of a serial arm's equation of motion, s; none for the usual one. Logs that were low-passed before they were
-    /// written ask for one that is wider than that filter.
+    /// Half width of the test functions of a serial arm's equation of motion, s; `None` for the default. Logs that were low-passed before they were
+    /// written require a half width larger than that filter's.
     pub half_width: Option<f64>,
-    /// Whether the unit of a serial arm's torques is known by itself. Where it was taken from the arm file's masses, logs cannot say that one of these
+    /// Whether the unit of a serial arm's torques is known independently. Where it was inferred from the arm file's masses, logs cannot show that a mass
     /// is wrong too: loads, wrong links and gains are no candidates.
     pub known_units: bool,
-    /// Joints, from 0, of the custom effects; their torques lie in the logs' tables.
+    /// Joints, from 0, of the custom effects, whose torques lie in the logs' tables.
     pub custom_effects: Vec<usize>,
 }
 
@@ -56,36 +56,36 @@ impl Default for Options {
     }
 }
 
-/// Why there is no diagnosis.
+/// Reason why a diagnosis is impossible.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DiagnoseError {
     /// The number of parameters does not fit the kind of arm.
     Parameters(ArmKind),
-    /// Too few samples of `set` for windows of the horizon: found, needed.
+    /// The logs of `set` are too short: fewer windows of the horizon than needed.
     TooShort {
-        /// `training` or `holdout`.
+        /// Set of logs: `training` or `holdout`.
         set: &'static str,
-        /// Windows found.
+        /// Number of windows found.
         windows: usize,
-        /// Windows needed.
+        /// Number of windows needed.
         needed: usize,
     },
     /// A log holds a number that is not finite, or times that do not increase.
     BadSamples(String),
     /// The horizon is not a positive number of seconds.
     Horizon(f64),
-    /// A serial arm has this many joints; one to seven are possible.
+    /// The number of joints of a serial arm, as given, is outside one to seven.
     Joints(usize),
-    /// A serial arm has another number of parameters than its joints ask for.
+    /// The number of parameters of a serial arm does not fit its number of joints.
     Sizes {
-        /// Parameters found.
+        /// Number of parameters found.
         found: usize,
-        /// Parameters needed.
+        /// Number of parameters needed.
         needed: usize,
     },
-    /// Too many custom effects, one without a table of torques in some log, or on a joint that is not there.
+    /// Custom effects are too many, lack a table of torques in some log, or act on a joint that does not exist.
     CustomEffects,
-    /// A log holds no torques, and there is no controller that makes them from its references.
+    /// A log holds no torques, and no controller is known that computes them from its references.
     NoTorque(String),
     /// The observer cancelled the diagnosis.
     Stopped,
@@ -125,14 +125,14 @@ impl std::fmt::Display for DiagnoseError {
 
 impl std::error::Error for DiagnoseError {}
 
-/// Windows without which nothing can be said.
+/// Least number of windows in each set of logs for a diagnosis.
 pub(crate) const FEWEST_WINDOWS: usize = 4;
 
-/// Checks the options and the numbers of all logs.
+/// Checks the options and the numbers of all logs before a diagnosis.
 ///
 /// # Errors
 ///
-/// The first thing that cannot be worked with.
+/// The first defect found.
 pub(crate) fn validate(
     joints: usize,
     training: &[LogData<'_>],

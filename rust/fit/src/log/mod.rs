@@ -1,7 +1,7 @@
-//! A log as it comes and as it is measured: noise, smoothed motion, measured initial states.
+//! Logs as given and as measured: noise, smoothed motion, measured initial states.
 //!
-//! * `cut`: where windows begin: at states that are measured well.
-//! * `input`: logs and options as a diagnosis is given them, and what of them cannot be worked with.
+//! * `cut`: windows that begin and end at states that are measured well.
+//! * `input`: logs and options as given to a diagnosis, and errors for input that cannot be used.
 //! * `noise`: standard deviation of a position measurement.
 //! * `track`: one log: times, positions, held torques, smoothed motion.
 //! * `velocity`: velocities from positions.

@@ -1,47 +1,47 @@
-//! Standard deviation of a position measurement, whatever the arm does and however its samples were held.
+//! Standard deviation of a position measurement, for any motion of the arm and for samples held over several rows.
 //!
-//! Of seven samples, what no quintic passes through is `e = sum_i w_i q_i / |w|` with the weights of the sixth divided difference,
+//! The part of seven samples that no quintic explains is `e = sum_i w_i q_i / |w|` with the weights of the sixth divided difference,
 //! `w_i = 1 / prod_{k != i} (t_i - t_k)`. For white noise its standard deviation is that of the noise (variance estimation by
-//! differences: Hall, Kay and Titterington, Biometrika 77, 1990); its median size over a log is that of most places.
+//! differences: Hall, Kay and Titterington, Biometrika 77, 1990); its median size over a log is insensitive to exceptional places.
 //!
-//! White noise shows the same from samples that follow each other and from every second or fifth. Motion adds to what wide strides
-//! show; positions held over `h` rows add to every stride but multiples of `h`, and not to the rows at which they change. What is
-//! added only ever makes it larger: where one of these series shows clearly less than neighbouring samples do, the least is the noise.
+//! White noise gives one value from successive samples and from every second or fifth sample. Motion adds to the value of wide strides;
+//! positions held over `h` rows add to every stride except multiples of `h`, and not to the rows at which they change. Additions only
+//! make the value larger: where one of these series gives a clearly smaller value than successive samples, the smallest is the noise.
 
 use crate::log::track::median;
 
-/// Samples a difference takes: as many as leave one degree of freedom beside a quintic.
+/// Samples of one divided difference: as many as leave one degree of freedom beside a quintic.
 const TAKEN: usize = 7;
 
-/// Distances of the samples that a difference takes; positions that are held, are held over 2 to 6 rows.
+/// Strides, in rows, between the samples of a divided difference; held positions are held over 2 to 6 rows.
 const STRIDES: [usize; 6] = [1, 2, 3, 4, 5, 6];
 
-/// A series that shows less than this part of what neighbouring samples do shows it clearly: six estimates of the same noise, each of a
+/// Ratio to the noise of successive samples below which another series of samples shows clearly less: six estimates of one noise, each from a
 /// few hundred places, scatter by less.
 const CLEARLY: f64 = 0.75;
 
-/// Samples of a log at most around which its noise is estimated: the estimate is then good to three percent.
+/// Largest number of samples of a log around which its noise is estimated: the estimate is then good to three percent.
 const PLACES: usize = 4000;
 
-/// Rows at which the value changes, at least, for them to be a series of their own.
+/// Least number of rows with a changed value for these rows to be used as a series of their own.
 const FRESH: usize = 50;
 
 /// Median of a chi-squared variable with one degree of freedom, whose mean is one.
 const CHI_SQUARED_MEDIAN: f64 = 0.454_936;
 
-/// Smallest noise, rad or m, that a weight is ever derived from.
+/// Smallest standard deviation of a position, rad or m, from which a weight is derived.
 const LEAST: f64 = 1e-9;
 
 /// Noise of a position measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// Standard deviation, rad or m.
+    /// Standard deviation of the position measurement, rad or m.
     pub sigma: f64,
-    /// Whether neighbouring samples show clearly more than that, as positions do that are held.
+    /// Whether successive samples show clearly more noise than others, as positions held over several rows do.
     pub is_held: bool,
 }
 
-/// Noise of the measurement `q` at the times `t`, at least that of uniform rounding to `step` (zero where none is known).
+/// Noise of the measurement `q` at the times `t`, at least that of uniform rounding to `step` (zero where no step is known).
 pub fn noise(t: &[f64], q: &[f64], step: f64) -> Noise {
     let adjacent = scatter(t, q, 1).unwrap_or(0.0);
     let (fresh_t, fresh_q) = fresh(t, q);
@@ -53,12 +53,12 @@ pub fn noise(t: &[f64], q: &[f64], step: f64) -> Noise {
     Noise { sigma, is_held: sigma < CLEARLY * adjacent }
 }
 
-/// The samples at which the value changes.
+/// Times and values of the samples at which the value changes.
 fn fresh(t: &[f64], q: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (1..t.len().min(q.len())).filter(|&k| q[k] != q[k - 1]).map(|k| (t[k], q[k])).unzip()
 }
 
-/// Root of the typical squared difference over samples that lie `stride` apart; none of a log that is too short.
+/// Noise estimate from divided differences of samples `stride` rows apart; `None` for a log that is too short.
 fn scatter(t: &[f64], q: &[f64], stride: usize) -> Option<f64> {
     let last = t.len().checked_sub((TAKEN - 1) * stride)?;
     let squares: Vec<f64> =
@@ -66,7 +66,7 @@ fn scatter(t: &[f64], q: &[f64], stride: usize) -> Option<f64> {
     (!squares.is_empty()).then(|| (median(squares) / CHI_SQUARED_MEDIAN).sqrt())
 }
 
-/// The normalised sixth divided difference of the samples `first`, `first + stride`, ...
+/// Normalised sixth divided difference of the samples `first`, `first + stride`, ...
 fn difference(t: &[f64], q: &[f64], first: usize, stride: usize) -> f64 {
     let at = |i: usize| first + i * stride;
     let span = t[at(TAKEN - 1)] - t[first];
@@ -93,7 +93,7 @@ mod tests {
     }
     const PERIOD: f64 = 4e-3;
 
-    /// Ten seconds of a motion of 1.2 rad at up to `hertz`, measured with this noise.
+    /// Ten seconds of a motion of 1.2 rad at up to `hertz`, measured with Gaussian noise of standard deviation `noise`.
     fn log(hertz: f64, noise: f64) -> (Vec<f64>, Vec<f64>) {
         let mut random = Random(1);
         let t: Vec<f64> = (0..2500).map(|k| f64::from(k) * PERIOD).collect();

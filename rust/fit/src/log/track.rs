@@ -1,4 +1,4 @@
-//! One log, ready to be simulated against: times, positions, held torques, and what its noise looks like.
+//! One log prepared for simulation: times, positions, held torques, noise and smoothed motion.
 
 use crate::log::noise::noise;
 use crate::model::hypothesis::EffectInstance;
@@ -12,98 +12,98 @@ use std::sync::OnceLock;
 /// Half widths, in samples, that a local cubic may have.
 const HALF_WIDTHS: [usize; 8] = [3, 4, 6, 8, 11, 15, 20, 27];
 
-/// Half width of the confidence intervals that successive widths must share, in standard deviations.
+/// Half width, in standard deviations, of the confidence intervals that successive widths of a local cubic must share.
 const CONFIDENCE: f64 = 2.0;
 
-/// Mean square errors of a measured state, in units of its variance, are kept within these: one estimate from one window is no better
-/// known, and beyond the larger the positions are not what the arm did.
+/// Smallest and largest mean square error of a measured state, in units of its variance: an estimate from one window is no better
+/// known, and above the largest the positions are not those of the arm.
 const LEAST_ERROR: f64 = 0.25;
 const LARGEST_ERROR: f64 = 10.0;
 
-/// Samples that the widest local cubic rests on.
+/// Number of samples of the widest local cubic.
 const WIDEST: usize = 2 * HALF_WIDTHS[HALF_WIDTHS.len() - 1] + 1;
 
-/// One sample in so many says whether positions are smoother without what the torque makes of them.
+/// Stride of the samples that decide whether positions are smoother without the motion due to the torque.
 const ASKED: usize = 7;
 
-/// A log of `N` joints.
+/// A log of `N` joints, prepared for simulation.
 #[derive(Debug, Clone)]
 pub struct Track<const N: usize> {
-    /// Name in results.
+    /// Name of the log in results.
     pub name: String,
-    /// Recording that it is the whole or a part of.
+    /// Name of the recording that the log is the whole or a part of.
     pub source: String,
-    /// Sample times, s, increasing; starts where the log starts.
+    /// Sample times, s, increasing; the first is the start of the log.
     pub t: Vec<f64>,
-    /// Measured positions.
+    /// Measured positions, rad or m.
     pub q: Vec<SVector<f64, N>>,
-    /// Commanded torque, held until the next sample.
+    /// Commanded torque, N m or N, held until the next sample.
     pub held: Vec<[InputSegment<f64>; N]>,
-    /// Standard deviation of the position measurement, per joint.
+    /// Standard deviation of the position measurement, per joint, rad or m.
     pub noise: [f64; N],
-    /// Whether its samples are held over several rows, per joint.
+    /// Whether the joint's position samples are held over several rows, per joint.
     pub is_held: [bool; N],
-    /// Smallest step of the position measurement, per joint; zero where none is seen.
+    /// Smallest step of the position measurement, per joint, rad or m; zero where none is seen.
     pub step: [f64; N],
-    /// Known external disturbances.
+    /// Known external disturbances that act in the log.
     pub pushes: Vec<EffectInstance>,
-    /// Torque per unit of size of each custom effect, sample by sample.
+    /// Torque per unit of size of each custom effect, one value per sample.
     pub tables: Vec<Vec<f64>>,
-    /// Reference of a position controller, of a log that holds one in place of torques.
+    /// Reference of a position controller, for a log that holds references instead of torques.
     pub reference: Option<Reference<N>>,
-    /// Acceleration that the torque gives each joint from a sample to the next, `M(q)^-1 tau`; none for a joint whose measured motion is no
+    /// Acceleration by which the torque drives each joint from sample to sample, `M(q)^-1 tau`; `None` for a joint whose measured motion is no
     /// smoother without it.
     driven: [Option<Vec<f64>>; N],
-    /// Smoothed motion, once it is asked for.
+    /// Smoothed motion, computed at first use.
     path: OnceLock<Vec<MeasuredState<N>>>,
-    /// Local cubics, once they are asked for.
+    /// Local cubics at all samples, computed at first use.
     smoothed: OnceLock<Vec<[Smoothed; N]>>,
 }
 
-/// The reference of a position controller, row by row, held until the next sample.
+/// Reference of a position controller, row by row, held until the next sample.
 #[derive(Debug, Clone)]
 pub struct Reference<const N: usize> {
-    /// Positions.
+    /// Reference positions, rad or m.
     pub q: Vec<[f64; N]>,
-    /// Velocities, where they are logged.
+    /// Reference velocities, rad/s or m/s, where they are logged.
     pub dq: Option<Vec<[f64; N]>>,
 }
 
-/// A local cubic as wide as the motion around its sample allows.
+/// Local cubic whose width is adapted to the motion around its sample.
 #[derive(Debug, Clone, Copy)]
 pub struct Smoothed {
-    /// The cubic.
+    /// Local cubic that is used for the sample's state.
     pub local: Local,
-    /// The widest that is consistent with it.
+    /// Widest local cubic that is consistent with all narrower ones.
     pub wider: Local,
-    /// Samples on either side that it rests on.
+    /// Half width of the local cubic, in samples.
     pub half_width: usize,
 }
 
-/// Measured state at one sample.
+/// Measured position and velocity of all joints at one sample.
 #[derive(Debug, Clone, Copy)]
 pub struct MeasuredState<const N: usize> {
-    /// Positions.
+    /// Positions, rad or m.
     pub q: SVector<f64, N>,
-    /// Velocities.
+    /// Velocities, rad/s or m/s.
     pub dq: SVector<f64, N>,
 }
 
-/// A measured initial state: position and velocity of each joint with their covariance.
+/// Measured initial state of a window: position and velocity of each joint with their covariance.
 #[derive(Debug, Clone, Copy)]
 pub struct InitialState<const N: usize> {
-    /// Positions.
+    /// Positions, rad or m.
     pub q: SVector<f64, N>,
-    /// Velocities.
+    /// Velocities, rad/s or m/s.
     pub dq: SVector<f64, N>,
-    /// Per joint: variance of position, covariance, variance of velocity.
+    /// Per joint: variance of the position, covariance of position and velocity, variance of the velocity, SI.
     pub covariance: [[f64; 3]; N],
     /// Per joint: mean square error of position and of velocity, bias of the local cubic included, in units of their variance.
     pub mean_square: [[f64; 2]; N],
 }
 
 impl<const N: usize> Track<N> {
-    /// A track from columns; `counts_per_rev` gives encoder steps where the arm file knows them.
+    /// A track from columns `t`, `q` and `tau`; `steps` are the encoder steps per joint, rad or m, where the arm file knows them.
     pub fn new(name: &str, t: &[f64], q: &[f64], tau: &[f64], steps: Option<[f64; N]>) -> Self {
         let rows = |x: &[f64]| -> Vec<[f64; N]> {
             x.chunks_exact(N).map(|row| std::array::from_fn(|j| row[j])).collect()
@@ -133,12 +133,12 @@ impl<const N: usize> Track<N> {
         track
     }
 
-    /// Says which recording it is a part of.
+    /// The track with the name of the recording that it is a part of.
     pub fn of_source(self, source: &str) -> Self {
         Self { source: source.to_owned(), ..self }
     }
 
-    /// Replaces held torques by straight lines of the same mean and these first moments about the middle of each interval.
+    /// Replaces held torques by linear segments of equal mean with the given first moments about the middle of each interval.
     pub fn with_moments(mut self, moments: Option<&[f64]>) -> Self {
         let Some(moments) = moments else { return self };
         for (k, row) in moments.chunks_exact(N).enumerate() {
@@ -150,18 +150,18 @@ impl<const N: usize> Track<N> {
         self
     }
 
-    /// Adds the torques of the custom effects to the log.
+    /// The track with the torques of the custom effects, one table per effect.
     pub fn with_tables(mut self, tables: Vec<Vec<f64>>) -> Self {
         self.tables = tables;
         self
     }
 
-    /// Lets local cubics describe what is left of the measured motion without what the torque makes of it.
+    /// Makes local cubics describe the measured motion minus the motion due to the torque.
     ///
-    /// A torque that jumps from sample to sample, as that of a controller with a noisy velocity does, leaves no cubic through more than a
-    /// few samples. How far it moves the arm within some samples follows from the inertia `M(q)` alone; the rest, friction, gravity and what
-    /// the model lacks, is as smooth as its causes. Where the arm is not so driven (a wrong sign or unit, a motor behind a spring) the motion is no
-    /// smoother without it, and is taken as measured.
+    /// A torque that jumps from sample to sample, as that of a controller with a noisy velocity does, allows cubics through a few samples only.
+    /// The motion due to the torque over some samples follows from the inertia `M(q)` alone; the rest, due to friction, gravity and what
+    /// the model lacks, is smooth. Where the arm is not driven in this way (a wrong sign or unit, a motor behind a spring) the motion is no
+    /// smoother without the torque's part, and is taken as measured.
     pub fn smoothed_beside_torque<A: Arm<f64, N, P>, const P: usize>(
         mut self,
         arm: &A,
@@ -186,13 +186,13 @@ impl<const N: usize> Track<N> {
         self
     }
 
-    /// Mean logarithm of the variance of the velocities of a joint: low where cubics are wide.
+    /// Mean logarithm of the variance of a joint's velocities by local cubics: low where cubics are wide.
     fn roughness(&self, j: usize, driven: Option<&[f64]>) -> f64 {
         (0..self.len()).step_by(ASKED).map(|k| self.widest(j, k, driven).local.covariance[2].ln()).sum()
     }
 
-    /// Positions of joint `j` for cubics around a sample, from the returned one on: without the distance that these accelerations make from
-    /// there.
+    /// Index of the first sample and positions of joint `j` for cubics around sample `at`, minus the displacement since the first sample due to the
+    /// accelerations `driven`.
     fn positions_near(&self, j: usize, at: usize, driven: Option<&[f64]>) -> (usize, [f64; WIDEST]) {
         let (first, count) = samples_near(&self.t, at, WIDEST / 2);
         let mut positions = [0.0; WIDEST];
@@ -217,7 +217,7 @@ impl<const N: usize> Track<N> {
         (first, positions)
     }
 
-    /// One track of pieces that follow each other in time.
+    /// One track of pieces that follow each other in time; `None` for no pieces.
     pub fn joined(pieces: &[&Self]) -> Option<Self> {
         let (first, rest) = pieces.split_first()?;
         // A joint is taken beside its torque only where all pieces are.
@@ -246,17 +246,17 @@ impl<const N: usize> Track<N> {
         Some(whole)
     }
 
-    /// Positions of one joint.
+    /// Measured positions of joint `j`, rad or m.
     pub fn column(&self, j: usize) -> Vec<f64> {
         self.q.iter().map(|q| q[j]).collect()
     }
 
-    /// Number of samples.
+    /// Number of samples of the track.
     pub fn len(&self) -> usize {
         self.t.len()
     }
 
-    /// Whether there is no sample.
+    /// Whether the track has no sample.
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }
@@ -266,7 +266,7 @@ impl<const N: usize> Track<N> {
         median(self.t.windows(2).map(|w| w[1] - w[0]).collect())
     }
 
-    /// The measured state at a sample, from a local cubic in each joint.
+    /// Measured state at sample `at`, from a local cubic in each joint.
     pub fn initial_state(&self, at: usize) -> InitialState<N> {
         let mut start = InitialState {
             q: self.q[at],
@@ -285,7 +285,7 @@ impl<const N: usize> Track<N> {
         start
     }
 
-    /// Smoothed motion at every sample.
+    /// Smoothed positions and velocities at every sample.
     pub fn path(&self) -> &[MeasuredState<N>] {
         self.path.get_or_init(|| {
             let moving = |smoothed: &[Smoothed; N]| MeasuredState {
@@ -296,28 +296,28 @@ impl<const N: usize> Track<N> {
         })
     }
 
-    /// The local cubics of all joints at every sample.
+    /// Local cubics of all joints at every sample.
     pub fn smoothed(&self) -> &[[Smoothed; N]] {
         let at = |k: usize| std::array::from_fn(|j| self.nested(j, k));
         self.smoothed.get_or_init(|| (0..self.len()).into_par_iter().map(at).collect())
     }
 
-    /// The local cubic of joint `j` around a sample, as wide as the motion there allows.
+    /// Local cubic of joint `j` around sample `at`, with a width adapted to the motion.
     ///
-    /// Widths grow while the confidence intervals of their velocities still have a point in common; a jump of the acceleration
-    /// nearby ends that early, smooth motion late (intersection of confidence intervals, Goldenshluger and Nemirovski 1997). The
-    /// widest that passes may still err by several of its standard deviations, as its neighbours cannot tell; the one before
-    /// errs by a third of that and has the larger deviation, so it is the one that keeps what its covariance promises.
+    /// The width grows while the confidence intervals of the velocities have a point in common; a jump of the acceleration nearby ends the
+    /// growth early, smooth motion late (intersection of confidence intervals, Goldenshluger and Nemirovski 1997). The widest cubic that passes
+    /// may still err by several of its standard deviations, unseen by its neighbours; the next narrower one errs by a third of
+    /// this and has the larger standard deviation, so its error agrees with its covariance.
     pub fn local(&self, j: usize, at: usize) -> Local {
         self.nested(j, at).local
     }
 
-    /// That local cubic, and the widest that passes.
+    /// Local cubic of joint `j` around sample `at`, together with the widest that passes the test of confidence intervals.
     fn nested(&self, j: usize, at: usize) -> Smoothed {
         self.widest(j, at, self.driven[j].as_deref())
     }
 
-    /// The widest local cubic but one that is consistent with all narrower ones.
+    /// Widest local cubic but one that is consistent with all narrower ones, after subtraction of the motion due to the accelerations `driven`.
     fn widest(&self, j: usize, at: usize, driven: Option<&[f64]>) -> Smoothed {
         let (first, positions) = self.positions_near(j, at, driven);
         let fit = |half: usize| (local_cubic(&self.t, |k| positions[k - first], at, half), half);
@@ -336,10 +336,10 @@ impl<const N: usize> Track<N> {
         Smoothed { local: before.0, wider: widest.0, half_width: before.1 }
     }
 
-    /// Mean square error of a local cubic's position and velocity in units of their variance: what it leaves of its samples is more than
-    /// noise where no cubic passes through the motion, and so is its distance from the sample itself, and from a wider cubic.
+    /// Mean square errors of a local cubic's position and velocity in units of their variance: raised where its residuals exceed the noise because
+    /// no cubic describes the motion, and by its distance from the sample and from a wider cubic.
     ///
-    /// Where positions are held, what a cubic leaves says nothing about the motion.
+    /// Where positions are held over several rows, the residuals of a cubic say nothing about the motion.
     fn mean_square(&self, j: usize, at: usize, smoothed: &Smoothed) -> [f64; 2] {
         if self.is_held[j] {
             return [1.0; 2];
@@ -354,7 +354,7 @@ impl<const N: usize> Track<N> {
     }
 }
 
-/// Median of a list; zero for an empty one.
+/// Median of a list of numbers; zero for an empty list.
 pub fn median(mut x: Vec<f64>) -> f64 {
     if x.is_empty() {
         return 0.0;
@@ -363,7 +363,7 @@ pub fn median(mut x: Vec<f64>) -> f64 {
     *x.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Smallest non-zero difference that repeats throughout a column, if the column sits on such a grid.
+/// Step of the grid on which the values `q` lie: their smallest repeated non-zero difference; zero without a grid.
 fn smallest_step(q: &[f64]) -> f64 {
     let mut steps: Vec<f64> = q.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 1e-12).collect();
     if steps.len() < 20 {
@@ -384,7 +384,7 @@ mod tests {
     const INERTIA: f64 = 0.5;
     const STEP: f64 = 1e-7;
 
-    /// A pendulum's inertia under a torque that is new in every sample, and a slow motion beside it; positions, torques and true velocities.
+    /// Positions, torques and true velocities of a pendulum's inertia under a torque that is random in every sample, beside a slow motion.
     fn jerky(sign: f64) -> (Track<1>, Vec<f64>) {
         let (h, mut random) = (0.0025, Random(1));
         let (mut q, mut dq) = (0.0, 0.0);

@@ -1,20 +1,20 @@
-//! Velocities from positions, for schemes that need them at the samples.
+//! Velocities from positions, for estimation schemes that need them at the samples.
 
 use crate::numeric::smooth::local_cubic;
 
-/// How velocities are estimated from positions.
+/// Method of estimating velocities from positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Velocity {
-    /// The paper's: mean velocity of the period before; zero at the first sample.
+    /// Mean velocity over the sample interval before (Reyes and Kelly 1997); zero at the first sample.
     Backward,
-    /// Slope of the parabola through a sample and its neighbours.
+    /// Slope of the parabola through a sample and its two neighbours.
     Central,
-    /// Local cubic least squares.
+    /// Slope of a cubic fitted to neighbouring samples by least squares.
     LocalCubic,
 }
 
 impl Velocity {
-    /// The method with this name.
+    /// Velocity method with this name; `None` for an unknown name.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "backward" => Some(Self::Backward),
@@ -24,7 +24,7 @@ impl Velocity {
         }
     }
 
-    /// Velocities of one joint at all samples.
+    /// Velocities of one joint at all samples, rad/s or m/s; `half_width` in samples is that of a local cubic.
     pub fn of(self, t: &[f64], q: &[f64], half_width: usize) -> Vec<f64> {
         let slope = |a: usize, b: usize| (q[b] - q[a]) / (t[b] - t[a]);
         let last = t.len().saturating_sub(1);

@@ -1,42 +1,42 @@
-//! From an arm's description at run time to one of the arms known at compile time.
+//! Choice of the arm type known at compile time from a description at run time.
 
 use armgap_core::arm::{Arm, ArmKind, Axis, Pendulum, TwoLink};
 use armgap_core::transmission::Sides;
 
-/// An arm as an arm file describes it; lists have one entry per parameter or joint.
+/// Arm as described by an arm file; lists have one entry per parameter or joint.
 #[derive(Debug, Clone)]
 pub struct ArmDescription {
-    /// Kind of arm.
+    /// Kind of arm, which fixes its equation of motion.
     pub kind: ArmKind,
     /// Acceleration of gravity, m/s^2.
     pub gravity: f64,
-    /// Prior values of all parameters.
+    /// Nominal values of all parameters, SI.
     pub theta: Vec<f64>,
-    /// Their prior standard deviations.
+    /// Prior standard deviations of all parameters, SI.
     pub sigma: Vec<f64>,
-    /// Encoder counts per revolution.
+    /// Encoder counts per revolution (per metre on a linear joint), per joint.
     pub counts_per_rev: Option<Vec<f64>>,
-    /// Torque limit per joint.
+    /// Torque limit per joint, N m or N.
     pub torque_limit: Option<Vec<f64>>,
     /// Link lengths, m.
     pub link_length: Option<Vec<f64>>,
-    /// Per joint, whether the encoder measures the motor's position; none where that is unknown.
+    /// Per joint, whether the encoder measures the motor's position; `None` where that is unknown.
     pub encoder_at_motor: Option<Vec<Option<bool>>>,
-    /// Per joint, whether friction acts on the motor; none where that is unknown.
+    /// Per joint, whether friction acts on the motor; `None` where that is unknown.
     pub friction_at_motor: Option<Vec<Option<bool>>>,
-    /// Turns of the motor per turn of the joint.
+    /// Gear ratio per joint: turns of the motor per turn of the joint.
     pub gear_ratio: Option<Vec<f64>>,
 }
 
-/// A rotor behind a smaller gear ratio than this rides on the joints before it.
+/// Gear ratio below which a rotor may ride on the preceding link, so that it turns with the joints before it.
 const RIDES: f64 = 2.0;
 
-/// A computation with an arm whose numbers of joints and parameters the compiler knows.
+/// Computation with an arm whose numbers of joints and parameters are known at compile time.
 pub trait WithArm {
-    /// Result.
+    /// Type of the computation's result.
     type Output;
 
-    /// Does it; `R = P + N` is the number of parameters with one asymmetry per joint.
+    /// Runs the computation for `arm` with parameters `theta`; `R = P + N` is the number of parameters with one friction asymmetry per joint.
     fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
         self,
         arm: A,
@@ -45,7 +45,7 @@ pub trait WithArm {
 }
 
 impl ArmDescription {
-    /// An arm of which no more is known than its parameters, each trusted to one unit.
+    /// An arm of which only the parameters are known, each with a standard deviation of one unit.
     pub fn plain(kind: ArmKind, gravity: f64, theta: Vec<f64>, link_length: Option<Vec<f64>>) -> Self {
         Self {
             kind,
@@ -61,13 +61,13 @@ impl ArmDescription {
         }
     }
 
-    /// Smallest steps of the position measurement, where encoders are known.
+    /// Smallest steps of the position measurement per joint, rad or m, where the encoders are known.
     pub fn steps(&self) -> Option<Vec<f64>> {
         let whole = if self.kind.rotary() { std::f64::consts::TAU } else { 1.0 };
         self.counts_per_rev.as_ref().map(|counts| counts.iter().map(|count| whole / count).collect())
     }
 
-    /// Sides of joint `j` that encoder and friction may be on, both on one side first.
+    /// Sides of joint `j`'s transmission that encoder and friction may be on, both on one side first.
     pub fn sides(&self, j: usize) -> Vec<Sides> {
         let known =
             |list: &Option<Vec<Option<bool>>>| list.as_ref().and_then(|l| l.get(j).copied().flatten());
@@ -88,7 +88,7 @@ impl ArmDescription {
             .collect()
     }
 
-    /// Runs `work` with the arm of this kind; `None` if the number of parameters does not fit the kind.
+    /// Runs `work` with the arm type of this kind; `None` if the number of parameters does not fit the kind.
     pub fn dispatch<W: WithArm>(&self, work: W) -> Option<W::Output> {
         let gravity = self.gravity;
         let first_length = self.link_length.as_ref().and_then(|l| l.first().copied());

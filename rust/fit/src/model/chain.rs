@@ -1,4 +1,4 @@
-//! From a chain's description at run time to one of the chains known at compile time, of one to seven joints; its dynamics row by row.
+//! Choice of the chain type of one to seven joints known at compile time from a description at run time; chain dynamics row by row.
 
 use crate::model::arm::WithArm;
 use armgap_core::chain::{
@@ -8,18 +8,18 @@ use armgap_core::chain::{
 /// A serial arm of one to [`armgap_core::chain::MAX_JOINTS`] joints.
 #[derive(Debug, Clone)]
 pub struct ChainDescription {
-    /// Its joints, from the base.
+    /// Joints of the chain, from the base.
     pub joints: Vec<ChainJoint<f64>>,
     /// Acceleration of gravity in the base frame, m/s^2.
     pub gravity: [f64; 3],
 }
 
-/// Something to be done with a chain whose size is known at compile time.
+/// Computation with a chain whose number of joints is known at compile time.
 pub trait WithChain {
-    /// Result.
+    /// Type of the computation's result.
     type Output;
 
-    /// Does it.
+    /// Runs the computation for `chain`.
     fn call<const N: usize>(self, chain: &Chain<f64, N>) -> Self::Output;
 }
 
@@ -63,50 +63,50 @@ impl ChainDescription {
         by_size!(self.joints.len(), call)
     }
 
-    /// Names and units of its parameters, in the order of `theta`.
+    /// Names and units of the chain's parameters, in the order of `theta`.
     pub fn parameters(&self) -> Vec<(String, &'static str)> {
         let kinds: Vec<JointKind> = self.joints.iter().map(|joint| joint.kind).collect();
         let all = (0..).map_while(|i| parameter(&kinds, i));
         all.map(|p| (p.to_string(), p.unit)).collect()
     }
 
-    /// The chain, if it has `N` joints.
+    /// The chain as a type of `N` joints; `None` for another number of joints.
     fn chain<const N: usize>(&self) -> Option<Chain<f64, N>> {
         Some(Chain::new(self.joints.as_slice().try_into().ok()?, self.gravity))
     }
 }
 
-/// What is to be computed of a chain at every row.
+/// Dynamic quantity of a chain that is computed at every row of states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Inertia matrix with rotors, `(n, n)`.
     Inertia,
-    /// `C dq + g`, `(n,)`.
+    /// Bias torque `C dq + g`, `(n,)`.
     Bias,
-    /// Torques of a motion with accelerations, without friction, `(n,)`.
+    /// Torques of a motion with given accelerations, without friction, `(n,)`.
     InverseDynamics,
     /// Derivatives of the torques of a motion by positions, `(n, n)`; rows are torques.
     TorqueByPosition,
-    /// Derivatives of the torques of a motion by velocities, `(n, n)`.
+    /// Derivatives of the torques of a motion by velocities, `(n, n)`; rows are torques.
     TorqueByVelocity,
-    /// Accelerations under torques, without friction, `(n,)`.
+    /// Accelerations under given torques, without friction, `(n,)`.
     Acceleration,
     /// Regressor of the torque over the links' parameters, `(n, 10 n)`.
     Regressor,
-    /// Regressor of the momentum, `(n, 10 n)`.
+    /// Regressor of the momentum `M dq` over the links' parameters, `(n, 10 n)`.
     MomentumRegressor,
-    /// Regressor of `g - dK/dq`, `(n, 10 n)`.
+    /// Regressor of `g - dK/dq` over the links' parameters, with `K` the kinetic energy, `(n, 10 n)`.
     PotentialRegressor,
-    /// Regressor of the energy above rest at `q = 0`, `(10 n,)`.
+    /// Regressor of the energy above rest at `q = 0` over the links' parameters, `(10 n,)`.
     EnergyRegressor,
-    /// Kinetic energy with rotors, one number.
+    /// Kinetic energy with rotors, J, one number.
     KineticEnergy,
-    /// Potential energy above `q = 0`, one number.
+    /// Potential energy above that at `q = 0`, J, one number.
     PotentialEnergy,
 }
 
 impl Quantity {
-    /// Shape at one row for `n` joints.
+    /// Shape of the quantity at one row for a chain of `n` joints.
     pub fn shape(self, n: usize) -> Vec<usize> {
         match self {
             Self::Inertia | Self::TorqueByPosition | Self::TorqueByVelocity => vec![n, n],
@@ -120,25 +120,25 @@ impl Quantity {
     }
 }
 
-/// A quantity of a chain at many states; lists by rows, one entry per joint in each.
+/// A dynamic quantity of a chain at many states; arrays by rows, one entry per joint in each row.
 #[derive(Debug, Clone)]
 pub struct ChainRows<'a> {
-    /// What is to be computed.
+    /// Quantity that is computed at every row.
     pub quantity: Quantity,
-    /// 13 parameters per joint; of no account for regressors.
+    /// Parameters of the chain, 13 per joint; unused by regressors.
     pub theta: &'a [f64],
-    /// Positions.
+    /// Positions, rad or m, by rows.
     pub q: &'a [f64],
-    /// Velocities; of no account for what does not depend on them.
+    /// Velocities, rad/s or m/s, by rows; unused by quantities that do not depend on velocity.
     pub dq: &'a [f64],
-    /// Accelerations of inverse dynamics, its derivatives and the torque's regressor, torques of [`Quantity::Acceleration`].
+    /// Accelerations for inverse dynamics, its derivatives and the torque regressor; torques for [`Quantity::Acceleration`].
     pub input: &'a [f64],
 }
 
 impl WithChain for ChainRows<'_> {
     type Output = Vec<f64>;
 
-    /// All entries by rows; missing velocities, inputs and parameters count as zero.
+    /// All entries of the quantity by rows; missing velocities, inputs and parameters count as zero.
     fn call<const N: usize>(self, chain: &Chain<f64, N>) -> Vec<f64> {
         let width: usize = self.quantity.shape(N).iter().product();
         let rows = self.q.len() / N;
@@ -155,7 +155,7 @@ impl WithChain for ChainRows<'_> {
     }
 }
 
-/// Inertial parameters of a chain.
+/// Inertial parameters of a chain's links and rotors.
 struct Model<const N: usize> {
     links: [LinkInertia<f64>; N],
     rotors: [f64; N],
@@ -170,14 +170,14 @@ impl<const N: usize> Model<N> {
         }
     }
 
-    /// The rotors on the diagonal.
+    /// Inertia of the rotors, a diagonal matrix.
     fn constant_inertia(&self) -> [[f64; N]; N] {
         std::array::from_fn(|i| std::array::from_fn(|j| if i == j { self.rotors[j] } else { 0.0 }))
     }
 }
 
 impl Quantity {
-    /// Writes the quantity of a chain in the state `[q, dq, input]`.
+    /// Writes the quantity of a chain in the state `[q, dq, input]` to `out`.
     fn write<const N: usize>(
         self,
         chain: &Chain<f64, N>,

@@ -1,20 +1,20 @@
 //! Custom effects: a torque per unit of size, given by the user at every sample of every log.
 //!
-//! What a function of time, position, velocity and torque says along the *measured* motion is a torque of its own on the joint; its size
-//! is fitted and takes part in the ranking like any other. Within a window the predicted motion stays close to the measured one, so
-//! evaluating the function there and not along the prediction is an error of second order.
+//! A function of time, position, velocity and torque evaluated along the *measured* motion is a torque on the joint; its size
+//! is fitted and ranked like that of any effect. Within a window the predicted motion stays close to the measured one, so
+//! evaluation along the measured motion rather than the prediction causes an error of second order.
 
 use armgap_core::effect::{
     Effect, EffectParameter, Hooks, InputSegment, MAX_PARAMETERS, Quantity, Scope, Spec, Trial,
 };
 
-/// Most custom effects in one diagnosis.
+/// Largest number of custom effects in one diagnosis.
 pub const MAX_CUSTOM_EFFECTS: usize = 4;
 
-/// Index of the table of a law without a name, after those of the user.
+/// Index of the table of torques for an unnamed dependence, after the tables of custom effects.
 pub const UNNAMED: usize = MAX_CUSTOM_EFFECTS;
 
-/// The law of custom effect `index`; its torques lie in the logs' tables.
+/// Effect whose torques are table `.0` of the logs, as given by the user.
 #[derive(Debug)]
 struct Tabulated(usize);
 
@@ -54,17 +54,17 @@ impl Effect<f64> for Tabulated {
     }
 }
 
-/// The law of custom effect `index`, or that of the law without a name.
+/// Effect whose torques are table `index` of the logs: a custom effect, or the unnamed dependence at index [`UNNAMED`].
 pub fn law(index: usize) -> &'static dyn Effect<f64> {
     &LAWS[index]
 }
 
-/// Index of a law among the custom effects, if it is one.
+/// Index of an effect among the custom effects, if it is one.
 fn index(law: &dyn Effect<f64>) -> Option<usize> {
     SPECS.iter().position(|spec| std::ptr::eq(spec, law.spec()))
 }
 
-/// Applies a law to one joint's commands: its own rule, or the user's table.
+/// Applies an effect to one joint's commanded torques: by the effect's own rule, or from the user's table.
 pub fn command(
     law: &dyn Effect<f64>,
     p: &[f64; MAX_PARAMETERS],

@@ -1,4 +1,4 @@
-//! A hypothesis about the arm: parameter values, widths of the friction regularisation, and effects on joints.
+//! Hypothesis about the arm: parameter values, widths of the friction regularisation, and effects on joints.
 
 use crate::model::custom_effect;
 use armgap_core::arm::Arm;
@@ -9,16 +9,16 @@ use armgap_core::plant::Plant;
 use armgap_core::transmission::Sides;
 use nalgebra::SVector;
 
-/// An effect on a joint, with values for its parameters.
+/// Effect on a joint, with values for its parameters.
 #[derive(Clone, Copy)]
 pub struct EffectInstance {
-    /// The law.
+    /// Effect of the library or custom effect.
     pub law: &'static dyn Effect<f64>,
-    /// 0-based joint; 0 for effects of the whole arm.
+    /// Joint that the effect acts on, counted from 0; 0 for effects of the whole arm.
     pub joint: usize,
-    /// Parameter values, SI.
+    /// Values of the effect's parameters, SI.
     pub p: [f64; MAX_PARAMETERS],
-    /// Where encoder and friction sit; of effects with a transmission.
+    /// Sides of the transmission that encoder and friction are on; for effects with a transmission.
     pub sides: Sides,
 }
 
@@ -29,27 +29,27 @@ impl std::fmt::Debug for EffectInstance {
 }
 
 impl EffectInstance {
-    /// An effect with encoder and friction on the link's side.
+    /// An effect with encoder and friction on the link's side of the transmission.
     pub fn new(law: &'static dyn Effect<f64>, joint: usize, p: [f64; MAX_PARAMETERS]) -> Self {
         Self { law, joint, p, sides: Sides::LINK }
     }
 
-    /// The same effect with encoder and friction elsewhere.
+    /// An effect with unchanged values and encoder and friction on the given sides of the transmission.
     pub fn with_sides(self, sides: Sides) -> Self {
         Self { sides, ..self }
     }
 
-    /// Number of parameters in use.
+    /// Number of the effect's parameters.
     pub fn len(&self) -> usize {
         self.law.spec().parameters.len()
     }
 
-    /// An effect without parameters does not exist.
+    /// Always false: every effect has parameters.
     pub fn is_empty(&self) -> bool {
         false
     }
 
-    /// Number of its first parameters that switch it off together at their neutral values.
+    /// Number of leading parameters that together switch the effect off at their neutral values.
     pub fn amplitudes(&self) -> usize {
         match self.law.spec().trial {
             Trial::Amplitudes(count) => count,
@@ -58,50 +58,50 @@ impl EffectInstance {
         }
     }
 
-    /// Whether `other` is the same effect on the same joint, whatever its values.
+    /// Whether `other` is the same effect on the same joint, at any parameter values.
     pub fn same_place(&self, other: &Self) -> bool {
         self.law.spec().name == other.law.spec().name && self.joint == other.joint
     }
 
-    /// Whether it acts beyond a position: its parameters are that, stiffness and damping.
+    /// Whether the effect is a contact, acting beyond a position: its parameters are position, stiffness and damping.
     pub fn is_contact(&self) -> bool {
         self.law.spec().parameters.first().is_some_and(|p| p.quantity == Quantity::Reach)
     }
 
-    /// Whether it repeats with position: its parameters are amplitude, cycles per turn and phase.
+    /// Whether the effect is periodic in position: its parameters are amplitude, cycles per turn and phase.
     pub fn is_periodic(&self) -> bool {
         self.law.spec().parameters.iter().any(|p| p.quantity == Quantity::Cycles)
     }
 
-    /// 1-based joint, or none for effects of the whole arm.
+    /// Joint that the effect acts on, counted from 1; `None` for effects of the whole arm.
     pub fn joint_number(&self) -> Option<usize> {
         (self.law.spec().scope == Scope::Joint).then_some(self.joint + 1)
     }
 }
 
-/// Everything a simulation needs besides the log.
+/// Hypothesis about the arm: everything that a simulation needs besides the log.
 #[derive(Debug, Clone)]
 pub struct Hypothesis<const P: usize> {
-    /// The arm's parameters.
+    /// Parameters of the arm, SI.
     pub theta: [f64; P],
-    /// Joint by joint, the width of the rounded sign of friction, rad/s (m/s); zero for exact dry friction.
+    /// Width of the friction regularisation of each joint, rad/s (m/s); zero for exact dry friction.
     pub rounding: [f64; MAX_JOINTS],
-    /// Effects with their values.
+    /// Effects with the values of their parameters.
     pub effects: Vec<EffectInstance>,
 }
 
 impl<const P: usize> Hypothesis<P> {
-    /// The arm without effects.
+    /// Hypothesis of an arm with parameters `theta`, without effects and with exact dry friction.
     pub fn rigid(theta: [f64; P]) -> Self {
         Self { theta, rounding: [0.0; MAX_JOINTS], effects: Vec::new() }
     }
 
-    /// Whether the friction of any joint is rounded.
+    /// Whether the friction of any joint is regularised.
     pub fn is_rounded(&self) -> bool {
         self.rounding.iter().any(|width| *width > 0.0)
     }
 
-    /// This hypothesis with friction rounded over these widths.
+    /// The hypothesis with friction regularised over these widths, rad/s (m/s) per joint.
     pub fn rounded_over<const N: usize>(&self, widths: [f64; N]) -> Self {
         let mut other = self.clone();
         for (slot, width) in other.rounding.iter_mut().zip(widths) {
@@ -110,20 +110,20 @@ impl<const P: usize> Hypothesis<P> {
         other
     }
 
-    /// This hypothesis with one more effect.
+    /// The hypothesis with one more effect.
     pub fn with(&self, effect: EffectInstance) -> Self {
         let mut more = self.clone();
         more.effects.push(effect);
         more
     }
 
-    /// Free values: `theta`, then the effects' parameters.
+    /// Free values of the hypothesis: `theta`, then the effects' parameters.
     pub fn values(&self) -> Vec<f64> {
         let effects = self.effects.iter().flat_map(|e| e.p[..e.len()].iter().copied());
         self.theta.iter().copied().chain(effects).collect()
     }
 
-    /// This hypothesis with other values of `theta` and of the effects' parameters.
+    /// The hypothesis with other values of `theta` and of the effects' parameters.
     pub fn with_values(&self, values: &[f64]) -> Self {
         let mut other = self.clone();
         let mut rest = values.iter().copied();
@@ -139,7 +139,7 @@ impl<const P: usize> Hypothesis<P> {
         other
     }
 
-    /// The simulator of this hypothesis; `None` if it names more effects than a plant carries.
+    /// Simulator of the hypothesis; `None` if it has more effects than a plant carries.
     pub fn plant<A: Arm<f64, N, P>, const N: usize>(&self, arm: &A) -> Option<Plant<f64, A, N, P>> {
         let widths = std::array::from_fn(|j| self.rounding.get(j).copied().unwrap_or(0.0));
         let plant = Plant::new(arm.clone(), self.theta).with_rounding(widths);
@@ -149,7 +149,7 @@ impl<const P: usize> Hypothesis<P> {
         })
     }
 
-    /// Rewrites the held commands of a log into the torque that reaches the joints; `pushes` are added last, `tables` are those of the
+    /// Torques that reach the joints under the held commands of a log; `pushes` are added last, `tables` hold the torques of the
     /// custom effects.
     pub fn command<const N: usize>(
         &self,
@@ -173,7 +173,7 @@ impl<const P: usize> Hypothesis<P> {
         Some(torque)
     }
 
-    /// The state of joints whose encoders show these positions and velocities.
+    /// State of the joints, given the positions and velocities that their encoders show.
     pub fn initial_state<const N: usize>(&self, q: SVector<f64, N>, dq: SVector<f64, N>) -> State<f64, N> {
         if !self.distorts() {
             return State::new(q, dq);
@@ -182,13 +182,13 @@ impl<const P: usize> Hypothesis<P> {
         State::new(at, SVector::from_fn(|j, _| dq[j] / self.stretch(j, at[j])))
     }
 
-    /// Position that joint `j`'s encoder shows.
+    /// Position that joint `j`'s encoder shows when the joint is at `q`, rad or m.
     pub fn measured(&self, j: usize, q: f64) -> f64 {
         let on_joint = self.effects.iter().filter(|e| e.law.spec().hooks.measured && e.joint == j);
         on_joint.fold(q, |q, e| e.law.measured(&e.p, q))
     }
 
-    /// Position of joint `j` that its encoder shows as `reading`, by fixed-point iteration.
+    /// Position of joint `j` at which its encoder shows `reading`, rad or m, by fixed-point iteration.
     pub fn actual(&self, j: usize, reading: f64) -> f64 {
         let mut q = reading;
         for _ in 0..4 {
@@ -197,13 +197,13 @@ impl<const P: usize> Hypothesis<P> {
         q
     }
 
-    /// How much faster joint `j`'s encoder moves than the joint itself at `q`, by central difference.
+    /// Ratio of the velocity that joint `j`'s encoder shows to the joint's own velocity at `q`, by central difference.
     pub fn stretch(&self, j: usize, q: f64) -> f64 {
         let step = 1e-5;
         (self.measured(j, q + step) - self.measured(j, q - step)) / (2.0 * step)
     }
 
-    /// Whether any effect changes what the encoders show.
+    /// Whether any effect of the hypothesis changes what the encoders show.
     pub fn distorts(&self) -> bool {
         self.effects.iter().any(|e| e.law.spec().hooks.measured)
     }

@@ -1,19 +1,19 @@
-//! A Gaussian low-pass from uneven samples onto a regular grid, and differences on it.
+//! Gaussian low-pass from uneven samples onto a regular grid, and differences on the grid.
 
 use crate::numeric::products::product;
 
-/// A Gaussian low-pass from uneven samples onto a regular grid.
+/// Gaussian low-pass from uneven samples onto a regular grid.
 pub struct LowPass {
     /// Times of the grid, s.
     pub grid: Vec<f64>,
-    /// Their distance, s.
+    /// Spacing of the grid, s.
     pub step: f64,
-    /// For every grid point, the first sample that counts and the weights from there on.
+    /// For every grid point, the index of the first sample within reach and the weights of the samples from it on.
     pub kernels: Vec<(usize, Vec<f64>)>,
 }
 
 impl LowPass {
-    /// The low-pass of standard deviation `width`, s, from these times onto a grid of this step.
+    /// Low-pass of standard deviation `width`, s, from samples at the times `t` onto a grid of spacing `step`, s.
     pub fn new(t: &[f64], step: f64, width: f64) -> Self {
         let (first, last) = (t[0], t[t.len() - 1]);
         let count = ((last - first) / step).floor() as usize;
@@ -22,13 +22,13 @@ impl LowPass {
         Self { grid, step, kernels }
     }
 
-    /// Means around every grid point.
+    /// Weighted means of the samples `x` around every grid point.
     pub fn apply(&self, x: &[f64]) -> Vec<f64> {
         self.kernels.iter().map(|(first, weights)| product(weights, &x[*first..])).collect()
     }
 }
 
-/// Weights of the samples around one instant, from the first that counts; they count by the time they stand for.
+/// Weights of the samples around the instant `at`, from the first within reach; each sample weighs in proportion to its time interval.
 fn kernel(t: &[f64], at: f64, step: f64, width: f64) -> (usize, Vec<f64>) {
     let reach = 4.0 * width;
     let (a, b) = (t.partition_point(|&t| t < at - reach), t.partition_point(|&t| t <= at + reach));
@@ -46,7 +46,7 @@ fn kernel(t: &[f64], at: f64, step: f64, width: f64) -> (usize, Vec<f64>) {
     (a, weights)
 }
 
-/// Central differences.
+/// Derivative of values on a grid of spacing `step` by central differences.
 pub fn slope(x: &[f64], step: f64) -> Vec<f64> {
     let at = |i: usize| {
         let (a, b) = (i.saturating_sub(1), (i + 1).min(x.len() - 1));

@@ -1,4 +1,4 @@
-//! The least value of a function of one number between bounds, by Brent's method.
+//! Minimum of a function of one variable between bounds, by Brent's method.
 
 use argmin::core::{CostFunction, Error, Executor, State};
 use argmin::solver::brent::BrentOpt;
@@ -14,7 +14,7 @@ impl<F: Fn(f64) -> f64> CostFunction for Function<F> {
     }
 }
 
-/// Where `f` is least between `low` and `high`, after so many evaluations at most.
+/// Argument between `low` and `high` at which `f` is smallest, after at most this many evaluations.
 pub fn minimum(f: impl Fn(f64) -> f64, [low, high]: [f64; 2], evaluations: u64) -> Option<f64> {
     let found = Executor::new(Function(f), BrentOpt::new(low, high))
         .configure(|state| state.max_iters(evaluations))

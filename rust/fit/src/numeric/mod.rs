@@ -1,9 +1,9 @@
-//! Numerical methods that know nothing of arms.
+//! Numerical methods that are independent of arms.
 //!
-//! * `low_pass`: a Gaussian low-pass from uneven samples onto a regular grid.
+//! * `low_pass`: Gaussian low-pass from uneven samples onto a regular grid.
 //! * `minimum`: minimum of a function of one variable.
 //! * `products`: inner products of long columns.
-//! * `random`: random numbers that are the same everywhere.
+//! * `random`: pseudo-random numbers that are reproducible on every machine.
 //! * `smooth`: local cubic least squares with uneven sample times.
 
 pub(crate) mod low_pass;

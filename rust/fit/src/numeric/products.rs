@@ -1,14 +1,14 @@
-//! Inner products of long columns, with the vector unit of the processor at hand.
+//! Inner products of long columns, on the vector unit of the processor in use.
 
 use armgap_core::cpu::{Cpu, Kernel, Level};
 
-/// Entries per vector.
+/// Entries of a vector in inner products.
 const LANES: usize = 8;
 
-/// Columns per pass: their sums need not wait for each other.
+/// Columns processed in one pass of an inner product: their sums are independent and need not wait for each other.
 const COLUMNS_AT_ONCE: usize = 4;
 
-/// `x . y` for several `y` of the length of `x`.
+/// Inner products `x . y` of one column `x` with `K` columns `y` of equal length.
 #[inline(always)]
 fn dots<C: Cpu, const K: usize>(x: &[f64], y: [&[f64]; K]) -> [f64; K] {
     let (lead, tail) = x.as_chunks::<LANES>();
@@ -28,14 +28,14 @@ fn dots<C: Cpu, const K: usize>(x: &[f64], y: [&[f64]; K]) -> [f64; K] {
     })
 }
 
-/// The sum of all lanes. Where it is inlined, compilers arrange the lanes in pairs to suit it, and every step before pays for that; where it
-/// is shown the lanes instead of a copy, they may be kept in memory all along.
+/// Sum of all lanes of a vector. Not inlined, and given a copy: inlined, compilers arrange the lanes in pairs to suit the sum, at a cost in every
+/// step before; given a reference, they may keep the lanes in memory all along.
 #[inline(never)]
 fn total(sums: [f64; LANES]) -> f64 {
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
 }
 
-/// Every product of a column of `left` with a column of `right`; row by row of `left`.
+/// Inner product of every column of `left` with every column of `right`; row by row of `left`.
 struct Cross<'a> {
     left: &'a [&'a [f64]],
     right: &'a [&'a [f64]],
@@ -60,12 +60,12 @@ impl Kernel for Cross<'_> {
     }
 }
 
-/// Every product of a column of `left` with a column of `right`; row by row of `left`.
+/// Inner product of every column of `left` with every column of `right`; row by row of `left`.
 pub fn cross(left: &[&[f64]], right: &[&[f64]]) -> Vec<f64> {
     Level::detect().run(Cross { left, right })
 }
 
-/// One product.
+/// Two columns whose inner product is computed.
 struct Pair<'a>(&'a [f64], &'a [f64]);
 
 impl Kernel for Pair<'_> {
@@ -77,13 +77,13 @@ impl Kernel for Pair<'_> {
     }
 }
 
-/// `x . y` over the shorter of the two.
+/// Inner product `x . y` over the length of the shorter column.
 pub fn product(x: &[f64], y: &[f64]) -> f64 {
     let count = x.len().min(y.len());
     Level::detect().run(Pair(&x[..count], &y[..count]))
 }
 
-/// The squared length of every column.
+/// Squared Euclidean length of every column.
 pub fn squares(columns: &[&[f64]]) -> Vec<f64> {
     columns.iter().map(|column| product(column, column)).collect()
 }

@@ -1,6 +1,6 @@
-//! Random numbers that are the same everywhere.
+//! Pseudo-random numbers that are reproducible on every machine.
 
-/// A small generator of uniform numbers (splitmix64, Steele, Lea and Flood 2014), so that a seed gives the same result everywhere.
+/// Small generator of uniform pseudo-random numbers (splitmix64, Steele, Lea and Flood 2014); one seed gives one sequence on every machine.
 pub struct Random(pub u64);
 
 impl Random {
@@ -12,12 +12,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// A number from 0 to `n - 1`.
+    /// Uniform random integer from 0 to `n - 1`.
     pub fn below(&mut self, n: usize) -> usize {
         (self.next() % n.max(1) as u64) as usize
     }
 
-    /// Roughly normal, of mean 0 and variance 1: twelve uniform numbers.
+    /// Approximately normal random number of mean 0 and variance 1, from the sum of twelve uniform numbers.
     pub fn normal(&mut self) -> f64 {
         const PARTS: usize = 1 << 20;
         (0..12).map(|_| self.below(PARTS) as f64 / PARTS as f64).sum::<f64>() - 6.0

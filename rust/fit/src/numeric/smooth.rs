@@ -2,28 +2,28 @@
 
 use nalgebra::{Matrix4, Vector4};
 
-/// What a local cubic says of the sample it is centred on.
+/// Position and derivatives from a local cubic at its centre sample, with their variances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Local {
-    /// Position.
+    /// Position, rad or m.
     pub q: f64,
-    /// Velocity.
+    /// Velocity, rad/s or m/s.
     pub dq: f64,
-    /// Acceleration.
+    /// Acceleration, rad/s^2 or m/s^2.
     pub ddq: f64,
-    /// Variance of position, covariance, and variance of velocity, for a measurement of variance one.
+    /// Variance of position, covariance of position and velocity, and variance of velocity, for a measurement of variance one.
     pub covariance: [f64; 3],
     /// Variance of the acceleration, for a measurement of variance one.
     pub ddq_variance: f64,
-    /// Mean square residual per degree of freedom.
+    /// Mean square residual of the local cubic per degree of freedom, rad^2 or m^2.
     pub misfit: f64,
 }
 
-/// A step between samples this many times as long as the mean one is a hole in the log, over which no cubic reaches.
+/// Ratio of a sample interval to the mean one from which it is a gap in the log, over which no local cubic reaches.
 pub const HOLE: f64 = 10.0;
 
-/// First sample and number of samples of those that a cubic of this half width around `at` rests on: `half` on either side, and where the log ends
-/// or has a hole, those missing on the one side are taken on the other.
+/// Index of the first sample and number of samples of a local cubic of half width `half` around `at`: `half` on either side; at an end of the log
+/// or a gap, samples missing on one side are taken on the other.
 pub fn samples_near(t: &[f64], at: usize, half: usize) -> (usize, usize) {
     let longest = HOLE * (t[t.len() - 1] - t[0]) / (t.len() - 1).max(1) as f64;
     let joined = |k: usize| t[k + 1] - t[k] <= longest;
@@ -33,7 +33,7 @@ pub fn samples_near(t: &[f64], at: usize, half: usize) -> (usize, usize) {
     (at.saturating_sub(half).clamp(low, high + 1 - count), count)
 }
 
-/// Fits a cubic to the samples within `half` of `at` (fewer at the ends of the log and beside holes in it) and evaluates it there.
+/// Cubic fitted to the samples within `half` of `at` (fewer at the ends of the log and beside gaps), evaluated at sample `at`.
 pub fn local_cubic(t: &[f64], q: impl Fn(usize) -> f64, at: usize, half: usize) -> Local {
     let (first, count) = samples_near(t, at, half);
     let scale = (t[first + count - 1] - t[first]).max(f64::MIN_POSITIVE) / 2.0;

@@ -1,7 +1,7 @@
 //! Latent states, which no encoder measures, at the start of every window: simulated along the measured motion from the start of the log.
 //!
 //! The hysteresis state of a joint depends on its path, and a motor behind a shaft or backlash moves under the logged torque against the
-//! measured position of its link; neither needs an initial guess.
+//! measured position of its link; neither requires an initial guess.
 
 use crate::log::track::{MeasuredState, Track};
 use armgap_core::arm::Arm;
@@ -10,23 +10,23 @@ use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::{Mode, Plant};
 use armgap_core::transmission::{LatentState, Sides, Transmission};
 
-/// Natural frequency of the motor times the step length, at most.
+/// Largest product of a motor's natural frequency, rad/s, and step length in the simulation of latent states.
 const STEP: f64 = 1.0;
 
-/// The same for an arm whose measured states are put in place at every sample, so that the steps only have to be stable.
+/// Largest product of natural frequency, rad/s, and step length where measured states are inserted at every sample, so that steps need only be stable.
 const STABLE: f64 = 1.5;
 
-/// Time in which a link behind the encoder of its motor is drawn to where the motor's torque balance has it, s: long beside a sample, as
+/// Time constant with which a link behind its motor's encoder is drawn to the deflection by the motor's torque balance, s: long beside a sample, as
 /// accelerations are noisy, short beside the ringing of a shaft with little damping, which would carry an error along the log.
 const MEMORY: f64 = 0.25;
 
-/// Steps per sample at most.
+/// Largest number of steps per sample in the simulation of latent states.
 const MAX_STEPS: usize = 8;
 
-/// A position or its rate beyond this [SI] is cut: the hypothesis is wrong, and its cost will say so.
+/// Largest latent position or rate [SI]; beyond, the hypothesis is wrong and the value is cut, as its cost will show.
 const LIMIT: f64 = 1e3;
 
-/// Latent states of a plant at every sample of a track up to `last`, under these torques.
+/// Latent states of a plant at every sample of a track up to sample `last`, under the commanded torques `torque`.
 pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     track: &Track<N>,
     plant: &Plant<f64, A, N, P>,
@@ -62,8 +62,8 @@ pub fn latent_states<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     all
 }
 
-/// Latent states of an arm of which some encoders measure motors, or friction brakes them: the whole arm is simulated from sample to sample, and
-/// what encoders measure is put in its place at each.
+/// Latent states of an arm with encoders on motors or friction on motors: the whole arm is simulated from sample to sample, and measured
+/// positions and velocities are inserted at each sample.
 fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     track: &Track<N>,
     plant: &Plant<f64, A, N, P>,
@@ -132,7 +132,7 @@ fn beside_measured<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     all
 }
 
-/// One measured motor over one sample interval.
+/// Measured motion of one motor over one sample interval.
 struct Motor<'a, const N: usize> {
     path: [&'a MeasuredState<N>; 2],
     h: f64,
@@ -140,7 +140,7 @@ struct Motor<'a, const N: usize> {
 }
 
 impl<const N: usize> Motor<'_, N> {
-    /// Deflection of the shaft that the motor's acceleration asks for, at this rate; none where the motor may stick.
+    /// Deflection of the shaft by the torque balance of the measured motor, at deflection rate `rate`; `None` where the motor may stick.
     fn deflection<A: Arm<f64, N, P>, const P: usize>(
         &self,
         plant: &Plant<f64, A, N, P>,
@@ -165,7 +165,7 @@ impl<const N: usize> Motor<'_, N> {
     }
 }
 
-/// These latent states with rigid flanks: a rotor behind a flank is put onto it.
+/// Latent states with rigid backlash flanks: a rotor beyond a flank is put onto it.
 fn rigid<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     state: &LatentState<f64, N>,
     plant: &Plant<f64, A, N, P>,
@@ -182,12 +182,12 @@ fn rigid<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     rigid
 }
 
-/// One motor over one sample interval.
+/// A motor simulated over one sample interval, with known motion of its link.
 struct MotorMotion<'a> {
     transmission: &'a Transmission<f64>,
     torque: &'a InputSegment<f64>,
     h: f64,
-    /// Position and velocity of the link at both ends.
+    /// Position and velocity of the link at the start and the end of the interval.
     ends: [(f64, f64); 2],
 }
 
@@ -200,25 +200,25 @@ impl MotorMotion<'_> {
         (q0 + s * (d0 + s * (c2 + s * c3)), (d0 + s * (2.0 * c2 + 3.0 * s * c3)) / self.h)
     }
 
-    /// Torque on the motor, and position and velocity of the link, at the fraction `s` of the interval.
+    /// Torque on the motor, and position and velocity of the link, at the fraction `s` of the sample interval.
     fn drawn(&self, s: f64) -> [f64; 3] {
         let (q, dq) = self.link(s);
         [self.torque.at(s), q, dq]
     }
 
-    /// Acceleration of the motor under this torque, against this link.
+    /// Acceleration of the motor at position `at` and velocity `rate`, under a torque and against a link position and velocity.
     fn slope(&self, [torque, q, dq]: &[f64; 3], at: f64, rate: f64) -> f64 {
         (torque - self.transmission.transmitted(at - q, rate - dq)) / self.transmission.inertia
     }
 
-    /// Acceleration at the fraction `s` of the interval of a motor at rest at zero, on a shaft without backlash.
+    /// Acceleration, at the fraction `s` of the sample interval, of a motor at rest at zero on a shaft without backlash.
     fn push(&self, s: f64) -> f64 {
         let (q, dq) = self.link(s);
         (self.torque.at(s) + self.transmission.stiffness * q + self.transmission.damping * dq)
             / self.transmission.inertia
     }
 
-    /// Position and velocity of the motor at the end of the interval.
+    /// Position and velocity of the motor at the end of the sample interval, from `e` and `v` at its start.
     fn advance(&self, e: f64, v: f64) -> (f64, f64) {
         if self.transmission.backlash > 0.0 {
             return self.steps((e, v), |s| self.drawn(s), |here, e, v| self.slope(here, e, v));
@@ -229,8 +229,8 @@ impl MotorMotion<'_> {
         self.steps((e, v), |s| self.push(s), |push, e, v| push - pull * e - brake * v)
     }
 
-    /// Position and velocity of the motor at the end of the interval by Runge-Kutta, given its input at a fraction of the interval and the
-    /// acceleration under that input.
+    /// Position and velocity of the motor at the end of the sample interval by Runge-Kutta, given its input `drawn` at a fraction of the interval and
+    /// its acceleration `slope` under an input.
     #[inline(always)]
     fn steps<D>(
         &self,

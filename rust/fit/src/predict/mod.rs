@@ -1,8 +1,8 @@
-//! What a hypothesis predicts: rollouts of short windows and whole logs, and the torque that the measured motion needs.
+//! Predictions of a hypothesis: rollouts of short windows and whole logs, and the torque that the measured motion needs.
 //!
 //! * `latent_states`: states that no encoder measures, simulated along the measured motion to each window's start.
 //! * `residual_torque`: residual torque by inverse dynamics, sample by sample.
-//! * `simulate`: whole logs through the core's integrator.
+//! * `simulate`: simulation of whole logs with the integrator of armgap-core.
 //! * `window`: short windows and their rollouts.
 
 pub(crate) mod latent_states;

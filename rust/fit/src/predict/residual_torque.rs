@@ -1,4 +1,4 @@
-//! Residual torque of a log under a model by inverse dynamics: what the measured motion needs beyond the given torque.
+//! Residual torque of a log under a model by inverse dynamics: torque that the measured motion needs minus the given torque.
 
 use crate::log::track::Track;
 use crate::model::hypothesis::{EffectInstance, Hypothesis};
@@ -8,28 +8,28 @@ use armgap_core::arm::Arm;
 use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
 
-/// Half width of the local cubic that accelerations are taken from, s, and in samples at least.
+/// Half width of the local cubic from which accelerations are taken, s, and its least half width in samples.
 const CUBIC: f64 = 0.014;
 const CUBIC_SAMPLES: usize = 3;
 
-/// A joint slower than this part of its RMS speed, or than the noise of its velocity times the other, may be at rest.
+/// Ratio to a joint's RMS speed, and to the noise of its velocity, below which the joint may be at rest; the larger speed counts.
 pub const SLOW: f64 = 0.05;
 const SLOW_NOISE: f64 = 4.0;
 
-/// Residual torque at one sample.
+/// Residual torque of all joints at one sample, with the measured motion.
 pub struct InverseDynamicsResidual<const N: usize> {
     /// Time of the sample, s.
     pub t: f64,
-    /// Position, velocity and acceleration.
+    /// Position, velocity and acceleration of all joints, SI.
     pub motion: [SVector<f64, N>; 3],
-    /// Given torque, mean of the intervals before and after.
+    /// Given torque, N m or N: mean of the intervals before and after the sample.
     pub tau: SVector<f64, N>,
-    /// Residual torque.
+    /// Residual torque, N m or N: torque that the motion needs minus the given torque.
     pub residual: SVector<f64, N>,
 }
 
-/// Every sample of a log but the `half` at either end, with derivatives from local cubics of that half width, friction regularised below
-/// the speed `slow`, and the disturbances `pushes` given; none if the model cannot be simulated.
+/// Residual torques of a log at all samples except `half` at either end, with derivatives from local cubics of that half width, friction regularised below
+/// the speed `slow`, rad/s or m/s, and the disturbances `pushes` acting; `None` if the model cannot be simulated.
 pub fn inverse_dynamics_residuals<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     track: &Track<N>,
@@ -62,7 +62,7 @@ pub fn inverse_dynamics_residuals<A: Arm<f64, N, P>, const N: usize, const P: us
     Some((half..track.len().saturating_sub(half)).map(sample).collect())
 }
 
-/// Measured position, velocity and acceleration at a sample.
+/// Measured position, velocity and acceleration of all joints at sample `k`, from local cubics.
 pub fn measured_motion<const N: usize>(track: &Track<N>, k: usize) -> [SVector<f64, N>; 3] {
     let half = half_width(track);
     let at: [Local; N] = std::array::from_fn(|j| local_cubic(&track.t, |i| track.q[i][j], k, half));
@@ -70,19 +70,19 @@ pub fn measured_motion<const N: usize>(track: &Track<N>, k: usize) -> [SVector<f
     [of(|x| x.q), of(|x| x.dq), of(|x| x.ddq)]
 }
 
-/// Samples on either side of the local cubic that accelerations are taken from.
+/// Half width, in samples, of the local cubic from which accelerations are taken.
 pub fn half_width<const N: usize>(track: &Track<N>) -> usize {
     ((CUBIC / track.period().max(1e-9)).round() as usize).max(CUBIC_SAMPLES)
 }
 
-/// RMS speed of every joint.
+/// RMS speed of every joint, rad/s or m/s, from local cubics.
 pub fn rms_speeds<const N: usize>(track: &Track<N>) -> [f64; N] {
     let half = half_width(track);
     let places = || (0..track.len()).step_by((track.len() / 1000).max(1));
     std::array::from_fn(|j| rms(places().map(|k| local_cubic(&track.t, |i| track.q[i][j], k, half).dq)))
 }
 
-/// Speeds below which a joint may be at rest for all that its encoder says.
+/// Speeds of every joint, rad/s or m/s, below which the joint may be at rest within the accuracy of its encoder.
 pub fn slow_speeds<const N: usize>(track: &Track<N>, speed: &[f64; N]) -> [f64; N] {
     std::array::from_fn(|j| {
         let middle = local_cubic(&track.t, |i| track.q[i][j], track.len() / 2, half_width(track));
@@ -91,7 +91,7 @@ pub fn slow_speeds<const N: usize>(track: &Track<N>, speed: &[f64; N]) -> [f64; 
     })
 }
 
-/// Root mean square.
+/// Root mean square of numbers.
 pub fn rms(x: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = x.fold((0.0, 0.0), |(s, n), x| (s + x * x, n + 1.0));
     if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 }

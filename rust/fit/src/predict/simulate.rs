@@ -9,52 +9,52 @@ use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::kinematics::JointState;
 use nalgebra::SVector;
 
-/// Sub-steps per sample beyond which a tolerance is given up.
+/// Sub-steps per sample beyond which the error tolerance of a simulation is given up.
 const MAX_SUBSTEPS: usize = 256;
 
-/// Samples between two progress/cancellation checks.
+/// Samples of a simulation between two checks for progress and cancellation.
 const LOOK: usize = 4096;
 
-/// A simulation to be run.
+/// Input of a simulation: sample times, torques, initial state, effects and tolerance.
 #[derive(Clone)]
 pub struct Simulation<'a> {
     /// Sample times, s.
     pub t: &'a [f64],
-    /// Torques held from each sample to the next, row by row.
+    /// Torques held from each sample to the next, N m or N, row by row.
     pub tau: &'a [f64],
-    /// Positions at the first sample.
+    /// Positions at the first sample, rad or m.
     pub q0: &'a [f64],
-    /// Velocities at the first sample.
+    /// Velocities at the first sample, rad/s or m/s.
     pub dq0: &'a [f64],
-    /// Effects with their values.
+    /// Effects with the values of their parameters.
     pub effects: &'a [EffectInstance],
-    /// Largest admissible change of any position when the sub-steps are halved.
+    /// Largest admissible change of any position when the sub-steps are halved, rad or m.
     pub tolerance: f64,
-    /// Joint by joint, the width of the rounded sign of friction, rad/s (m/s); zero for exact dry friction, and where none is given.
+    /// Width of the friction regularisation of each joint, rad/s (m/s); zero for exact dry friction, also where none is given.
     pub smoothing: &'a [f64],
-    /// Progress report and cancellation.
+    /// Receiver of progress reports, with cancellation.
     pub progress: &'a ProgressReporter,
 }
 
-/// Positions and velocities at the samples, row by row.
+/// Simulated positions and velocities at the samples, row by row.
 #[derive(Debug, Clone)]
 pub struct Trajectory {
-    /// Positions as the encoders show them.
+    /// Positions as the encoders show them, rad or m.
     pub q: Vec<f64>,
-    /// Velocities.
+    /// Velocities, rad/s or m/s.
     pub dq: Vec<f64>,
     /// Sub-steps per sample that met the tolerance.
     pub substeps: usize,
 }
 
-/// Why a simulation has no result.
+/// Reason why a simulation has no result.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SimulationError {
-    /// More effects than a plant carries, or an effect on a joint the arm does not have.
+    /// The effects are more than a plant carries, or one acts on a joint that the arm does not have.
     Effects,
-    /// The motion left every finite range at this sample (0-based).
+    /// The simulated motion diverged at this sample (from 0).
     Diverged(usize),
-    /// Halving the sub-steps still changes a position by this much, more than the tolerance.
+    /// Halving the sub-steps still changes a position by this much, rad or m, more than the tolerance.
     Tolerance(f64),
 }
 
@@ -71,7 +71,7 @@ impl std::fmt::Display for SimulationError {
 impl WithArm for Simulation<'_> {
     type Output = Result<Trajectory, SimulationError>;
 
-    /// Doubles the sub-steps until the positions change by less than the tolerance.
+    /// Simulates with twice as many sub-steps each time, until the positions change by less than the tolerance.
     fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
         self,
         arm: A,
@@ -99,7 +99,7 @@ impl WithArm for Simulation<'_> {
 }
 
 impl Simulation<'_> {
-    /// Sub-steps that keep the stiffest part of the arm stable.
+    /// Number of sub-steps per sample that keeps the stiffest part of the arm stable.
     fn first_substeps<A: Arm<f64, N, P>, const N: usize, const P: usize>(
         &self,
         arm: &A,
@@ -150,16 +150,16 @@ impl Simulation<'_> {
 /// Inertia matrices of an arm with effects at the positions `q`, row by row.
 #[derive(Debug, Clone)]
 pub struct InertiaMatrices<'a> {
-    /// Positions.
+    /// Positions, rad or m, row by row.
     pub q: &'a [f64],
-    /// Effects with their values.
+    /// Effects with the values of their parameters.
     pub effects: &'a [EffectInstance],
 }
 
 impl WithArm for InertiaMatrices<'_> {
     type Output = Option<Vec<f64>>;
 
-    /// All entries of all matrices by rows; none for more effects than a plant carries.
+    /// Entries of all inertia matrices, row by row; `None` for more effects than a plant carries.
     fn call<A: Arm<f64, N, P>, const N: usize, const P: usize, const R: usize>(
         self,
         arm: A,

@@ -17,39 +17,39 @@ use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-/// A prediction that left this range [rad or m] has diverged; it is kept there so that its cost stays finite.
+/// Size of a predicted position [rad or m] beyond which it has diverged; it is cut there so that its cost stays finite.
 pub(crate) const DIVERGED: f64 = 1e3;
 
-/// Sub-steps per sample are capped here; what is too stiff for them is refused by its cost.
+/// Largest number of sub-steps per sample in a window; a stiffer hypothesis is rejected by its cost.
 const MAX_SUBSTEPS: usize = 4;
 
-/// Most sub-steps per sample for motors that oscillate against their links.
+/// Largest number of sub-steps per sample for motors that oscillate against their links.
 const MAX_SUBSTEPS_DRIVEN: usize = 5;
 
-/// Most sub-steps per sample for joints that hit a joint limit.
+/// Largest number of sub-steps per sample for joints that hit a joint limit.
 const MAX_SUBSTEPS_IMPACT: usize = 12;
 
-/// Most sub-steps per sample for joints whose viscous friction stops them within less than a sample, as that of a geared wrist does whose rotor
-/// the model lacks.
+/// Largest number of sub-steps per sample for joints whose viscous friction stops them within less than a sample, as that of a geared wrist without
+/// its rotor in the model does.
 const MAX_SUBSTEPS_STIFF: usize = 100;
 
-/// Samples `first ..= last` of one track; row 0 is sample `first + 1`.
+/// Window of a log: samples `first ..= last` of one track, with predictions from sample `first + 1` (row 0) on.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<const N: usize> {
     /// Index of the track.
     pub track: usize,
-    /// Sample the window starts from.
+    /// Index of the sample that the window starts from.
     pub first: usize,
-    /// Last sample predicted.
+    /// Index of the last predicted sample.
     pub last: usize,
-    /// Where its rows begin in the flat vector, in rows.
+    /// Index of the window's first row in the flat vector of predictions.
     pub offset: usize,
-    /// Measured initial state.
+    /// Measured initial state of the window, at its first sample.
     pub initial_state: InitialState<N>,
 }
 
 impl<const N: usize> Window<N> {
-    /// Number of predicted samples.
+    /// Number of predicted samples of the window.
     pub fn rows(&self) -> usize {
         self.last - self.first
     }
@@ -60,26 +60,26 @@ impl<const N: usize> Window<N> {
     }
 }
 
-/// Several logs cut into windows.
+/// Logs cut into windows.
 #[derive(Debug, Clone)]
 pub struct Dataset<const N: usize> {
-    /// The logs.
+    /// Logs that the windows are cut from.
     pub tracks: Vec<Track<N>>,
-    /// The windows, in order.
+    /// Windows in the order of their rows in the flat vector.
     pub windows: Vec<Window<N>>,
-    /// Predicted samples in all.
+    /// Number of predicted samples of all windows.
     pub rows: usize,
 }
 
 impl<const N: usize> Dataset<N> {
-    /// These windows, with all known external disturbances removed from their logs.
+    /// A copy of the dataset, with all known external disturbances removed from its logs.
     pub fn without_pushes(&self) -> Self {
         let mut bare = self.clone();
         bare.tracks.iter_mut().for_each(|track| track.pushes.clear());
         bare
     }
 
-    /// The windows of one track that are wanted, as a dataset of that track alone.
+    /// The windows of one track selected by `wanted`, as a dataset of this track alone.
     pub fn of_track(&self, track: usize, wanted: impl Fn(&Window<N>) -> bool) -> Self {
         let (mut windows, mut rows) = (Vec::new(), 0);
         for window in self.windows.iter().filter(|w| w.track == track && wanted(w)) {
@@ -89,7 +89,7 @@ impl<const N: usize> Dataset<N> {
         Self { tracks: vec![self.tracks[track].clone()], windows, rows }
     }
 
-    /// The windows of both.
+    /// One dataset with the windows of both.
     pub fn and(mut self, other: Self) -> Self {
         let (tracks, rows) = (self.tracks.len(), self.rows);
         let moved = |w: Window<N>| Window { track: w.track + tracks, offset: w.offset + rows, ..w };
@@ -99,7 +99,7 @@ impl<const N: usize> Dataset<N> {
         self
     }
 
-    /// Cuts every track into windows of about `horizon` seconds, where its state is measured best; a gap in the samples ends a window.
+    /// Cuts every track into windows of about `horizon` seconds, with edges where the state is measured best; a gap in the samples ends a window.
     pub fn new(tracks: Vec<Track<N>>, horizon: f64) -> Self {
         let mut windows = Vec::new();
         let mut rows = 0;
@@ -118,7 +118,7 @@ impl<const N: usize> Dataset<N> {
         Self { tracks, windows, rows }
     }
 
-    /// Measured positions in the order of the flat vector.
+    /// Measured positions of all windows, rad or m, by window, sample and joint.
     pub fn measured(&self) -> Vec<f64> {
         let samples = |w: &Window<N>| {
             let track = w.track;
@@ -131,12 +131,12 @@ impl<const N: usize> Dataset<N> {
             .collect()
     }
 
-    /// Zero offsets: initial states as measured.
+    /// Zero offsets for all windows, that is, initial states as measured.
     pub fn zero_offsets(&self) -> Vec<InitialStateOffset<N>> {
         vec![InitialStateOffset::none(); self.windows.len()]
     }
 
-    /// Predicted positions of all windows, each from its measured initial state displaced by its entry of `offsets`.
+    /// Predicted positions of all windows, rad or m, each from its measured initial state displaced by its entry of `offsets`.
     pub fn predict<A: Arm<f64, N, P>, const P: usize>(
         &self,
         arm: &A,
@@ -151,7 +151,7 @@ impl<const N: usize> Dataset<N> {
         })
     }
 
-    /// The same, run by run: for arms whose equation is too long to be worth the lanes of a vector unit.
+    /// Predicted positions of all windows, one rollout at a time: for arms whose long equation of motion gains nothing from vector lanes.
     pub fn predict_singly<A: Arm<f64, N, P>, const P: usize>(
         &self,
         arm: &A,
@@ -162,7 +162,7 @@ impl<const N: usize> Dataset<N> {
         })
     }
 
-    /// Predictions of which `rollout` simulates the runs that need no latent state and come near no edge.
+    /// Predicted positions of all windows; `rollout` simulates those without latent states and away from torque discontinuities.
     fn predict_by<A: Arm<f64, N, P>, const P: usize>(
         &self,
         arm: &A,
@@ -223,7 +223,7 @@ impl<const N: usize> Dataset<N> {
         predicted
     }
 
-    /// Whether a joint comes close to where a torque jumps, within a window.
+    /// Whether a joint comes close to a position of discontinuous torque within a window.
     fn is_near_edge<A: Arm<f64, N, P>, const P: usize>(
         &self,
         window: &Window<N>,
@@ -238,7 +238,7 @@ impl<const N: usize> Dataset<N> {
         })
     }
 
-    /// Latent states at every track's samples, up to the start of its last window; none for a plant without any.
+    /// Latent states at every track's samples, up to the start of its last window; `None` for a plant without latent states.
     fn latent<A: Arm<f64, N, P>, const P: usize>(
         &self,
         plant: &Plant<f64, A, N, P>,
@@ -256,31 +256,31 @@ impl<const N: usize> Dataset<N> {
     }
 }
 
-/// An offset of a window's initial state, and of the zero that its log's encoders count from.
+/// Offset of a window's initial state from the measured one, and the zero of its log's encoders.
 #[derive(Debug, Clone, Copy)]
 pub struct InitialStateOffset<const N: usize> {
-    /// Added to the positions.
+    /// Displacement of the initial positions from the measured ones, rad or m.
     pub q: SVector<f64, N>,
-    /// Added to the velocities.
+    /// Displacement of the initial velocities from the measured ones, rad/s or m/s.
     pub dq: SVector<f64, N>,
-    /// What the encoders show where the model's angles are zero.
+    /// Encoder zero of each joint, rad or m: what the encoder shows where the model's position is zero.
     pub zero: SVector<f64, N>,
 }
 
 impl<const N: usize> InitialStateOffset<N> {
-    /// An initial state without offset.
+    /// Zero offset of an initial state, with zero encoder zeros.
     pub fn none() -> Self {
         Self { q: SVector::zeros(), dq: SVector::zeros(), zero: SVector::zeros() }
     }
 }
 
-/// A position this part of a window's travel beyond it is one that a prediction may reach.
+/// Distance beyond a window's measured travel, relative to this travel, within which a prediction may reach a discontinuity of the torque.
 const NEAR_EDGE: f64 = 0.3;
 
-/// Runs that share the lanes of one vector unit: enough that few lanes are idle at the end.
+/// Rollouts simulated as one group over vector lanes: enough that few lanes are idle at the end.
 const GROUP: usize = 4 * WIDTH;
 
-/// Gives a state at the positions that encoders show its latent states: a link behind the encoder of its motor lies by the deflection off it.
+/// Adds latent states to a state whose positions are those that the encoders show: a link behind its motor's encoder is displaced by the deflection.
 fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     plant: &Plant<f64, A, N, P>,
     state: &mut State<f64, N>,
@@ -296,7 +296,7 @@ fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     });
 }
 
-/// Simulates one run by the scalar integrator, in as many steps per sample as its plant needs.
+/// Simulates one rollout by the scalar integrator, with as many steps per sample as its plant needs.
 fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
     let most = match (run.plant.jumps(), run.plant.drivetrain().any()) {
         (true, _) => MAX_SUBSTEPS_IMPACT,
@@ -324,7 +324,7 @@ fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'
     }
 }
 
-/// Simulates one run in as many steps per sample as keep its viscous friction stable.
+/// Simulates one rollout with as many steps per sample as keep its viscous friction stable.
 fn run_stiff<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
     let state = &mut run.state;
     for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
@@ -339,7 +339,7 @@ fn run_stiff<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_
     }
 }
 
-/// Steps per sample that keep Runge-Kutta stable against smoothed friction of this rate times the sample period.
+/// Steps per sample that keep Runge-Kutta stable; `stiffness` is the rate of smoothed friction times the sample period.
 fn substeps(stiffness: f64) -> usize {
     ((stiffness / 1.5).ceil() as usize).max(1)
 }
