@@ -1,4 +1,4 @@
-//! From an attribution to the diagnosis as data.
+//! Assembly of the diagnosis as data from the result of a model search.
 
 use crate::disturbance::intensity::shares;
 use crate::disturbance::push::Disturbance;
@@ -27,13 +27,13 @@ use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 use rayon::prelude::*;
 
-/// A part of the gap that is not worth a search for the joint it lies on.
+/// Share of the gap below which its distribution over the joints is not computed.
 const NEGLIGIBLE: f64 = 1e-3;
 
-/// Part of a joint's error that known encoder zeros take away where they are worth a remark.
+/// Part of a joint's error that known encoder zeros must take away to be worth a remark.
 const ZEROS_MATTER: f64 = 0.1;
 
-/// The diagnosis as data.
+/// The diagnosis as data, from the named causes of a model search.
 pub fn assemble<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     headline: &Headline<N, P>,
@@ -140,10 +140,10 @@ fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     ResidualTorques { before, refit, after }
 }
 
-/// Each joint's share of the gap: what causes explain lies on their joints, weighted by their probability; the rest by residual torque.
+/// Share of each joint in the gap: what causes explain lies on their joints, weighted by their probability; the rest is shared by residual torque.
 ///
-/// A residual torque on one joint changes the motion of all, and an error of its coupling shows on the others; so where a cause is known,
-/// its own joint says more than the residual torque does.
+/// A residual torque on one joint changes the motion of all, and an error of its coupling shows on the others; so where a cause is known, its own joint says more
+/// than the residual torque does.
 fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     Headline { attribution, weights, causes, disturbances, .. }: &Headline<N, P>,
@@ -171,7 +171,7 @@ fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     std::array::from_fn(|j| told[j] + open * whole[j] + left * rest[j])
 }
 
-/// What was found and is not named.
+/// Causes and external disturbances that were found and are not named, with reasons.
 fn unnamed<A, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     headline: &Headline<N, P>,
@@ -182,7 +182,7 @@ fn unnamed<A, const N: usize, const P: usize>(
     effects.chain(pushes).map(|(cause, why)| report::Candidate { cause, why: why.clone() }).collect()
 }
 
-/// Parameters before and after their estimation.
+/// Parameters of the arm before and after their estimation.
 fn estimates<const P: usize>(fit: &Fit<P>, description: &ArmDescription) -> Vec<Estimate> {
     let one = |i: usize| Estimate {
         nominal: description.theta[i],
@@ -219,7 +219,7 @@ fn cause(cause: &crate::search::belief::Cause, joints: usize, rotary: bool) -> C
     }
 }
 
-/// An external disturbance as a cause.
+/// An external disturbance in the form of a cause.
 fn push<A, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     disturbance: &Disturbance,
@@ -370,7 +370,7 @@ fn noise<A, const N: usize, const P: usize>(context: &DiagnosisContext<A, N, P>)
     Noise { position_sigma: context.noise.to_vec(), encoder_step: step.to_vec() }
 }
 
-/// Remarks on the result: what was fitted beside the causes, what is left, what was not allowed, and what is hard to believe.
+/// Remarks on the result: what was fitted beside the causes, what gap is left, what was not allowed, and what is hard to believe.
 fn notes<const N: usize, const P: usize>(
     headline: &Headline<N, P>,
     max_causes: usize,
@@ -406,7 +406,7 @@ fn notes<const N: usize, const P: usize>(
     notes
 }
 
-/// What encoder zeros that differ between recordings make of the gap, where that matters.
+/// Remark on how encoder zeros that differ between recordings change the gap; none where the change is small.
 fn zeros_matter<const N: usize>(
     halves: &SecondHalves,
     zeros: &EncoderZeros<N>,
@@ -426,7 +426,7 @@ fn zeros_matter<const N: usize>(
     })
 }
 
-/// Which standard deviations of the arm file were taken for smaller ones.
+/// Remark on the standard deviations of the arm file that are replaced by smaller ones; none where there are none.
 fn narrowed(description: &ArmDescription) -> Option<String> {
     let bounded = bounded_sigma(description.kind, &description.theta, &description.sigma);
     let parameters = description.kind.parameters().iter();

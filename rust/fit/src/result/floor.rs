@@ -1,4 +1,4 @@
-//! The floor of a gap: by how much a perfect model's predictions miss, as they start from measured states and are held against measured positions.
+//! Noise floor of a gap: the error of a perfect model's predictions, which start from measured states and are compared with measured positions.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::weighting::Weighting;
@@ -9,26 +9,25 @@ use crate::numeric::random::Random;
 use crate::predict::window::{Dataset, InitialStateOffset, Window};
 use armgap_core::arm::Arm;
 
-/// Displaced initial states from which a perfect model's errors are estimated: the mean square of one window is then known to some 40 %, that
-/// of forty windows to 6 %.
+/// Displaced initial states from which the errors of a perfect model are estimated: six give the mean square of one window to some 40 %, that of forty windows to
+/// 6 %.
 const DISPLACED: usize = 6;
 
-/// A window is consistent with its noise and its measured initial state up to this cost per sample and joint: the noise is known to 3 %, and
-/// of some hundred values the mean square scatters by 15 %.
+/// Cost per sample and joint up to which a window is consistent with its noise and its measured initial state: the noise is known to 3 %, and of some hundred
+/// values the mean square scatters by 15 %.
 const CONSISTENT: f64 = 1.5;
 
-/// A torque that the model lacks leaves 1/36 of the squared errors it makes once the initial state is fitted, if it is constant over the window, and
-/// more if it is not. What is left beyond noise, with two standard deviations of it, times this may be a quarter of the squared errors at most in a
-/// window that a displaced initial state explains.
+/// A displaced initial state explains a window if the squares that it leaves beyond noise, with two standard deviations of them, times this factor are below the
+/// squared errors. A missing torque that is constant over the window leaves 1/36 of the squared errors it makes once the initial state is fitted, any other more;
+/// such a torque may make a quarter of the squared errors at most.
 const TORQUE_SHARE: f64 = 4.0 * 36.0;
 
-/// Share of the windows that displaced initial states have to explain before any is taken to be: where most are not explained, those that seem to be
-/// are the ones in which the model errs least, and what it misses by there is not what their initial states err by. With 0.7 as many of 42 floors are
-/// right, with 0.9 one fewer.
+/// Share of the windows that displaced initial states have to explain before any window counts as explained: where most are not explained, those that seem to be
+/// are the ones in which the model errs least, and their errors are not errors of initial states. With 0.7 as many of 42 floors are right, with 0.9 one fewer.
 const MAJORITY: f64 = 0.5;
 
-/// Mean square of a perfect model's errors: noise of the sample itself, and the error of the measured initial state carried along the
-/// window.
+/// Mean square position error of a perfect model by joint, rad^2 or m^2: noise of the samples, and errors of the measured initial states carried along the
+/// windows.
 pub(crate) fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     data: &Dataset<N>,
@@ -56,19 +55,19 @@ pub(crate) fn floor<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     })
 }
 
-/// Whether noise and a displaced initial state explain what the model misses by in a window of so many `values`: the displacement is within the covariance
-/// of the measured state (`cost`), or leaves so little of the squared errors (`left` of `square`, in units of the noise) that no torque can have made them.
+/// Whether noise and a displaced initial state explain a model's error in a window of `values` values: the displacement is within the covariance of the measured
+/// state (`cost`), or leaves so little of the squared errors (`left` of `square`, in units of the noise) that no torque can have made them.
 fn explained(values: usize, square: f64, cost: f64, left: f64) -> bool {
     let values = values as f64;
     let beyond_noise = left - values + 2.0 * (2.0 * values).sqrt();
     cost < CONSISTENT * values || TORQUE_SHARE * beyond_noise < square
 }
 
-/// Mean square error of a perfect model from the mean squares that the model missed window by window, and those that noise and the covariance of initial
-/// states make one expect.
+/// Mean square error of a perfect model from the mean squares by window that a model missed by (`missed`) and that noise and the covariance of initial states make
+/// one expect (`expected`).
 ///
-/// In an explained window a perfect model misses by as much. Elsewhere it misses by what is expected, times what the errors of explained windows are of theirs,
-/// and by no more than the model. Where most windows are not explained, none is taken to be.
+/// In an explained window a perfect model errs as the model does. In any other window it errs by what is expected, times the ratio of missed to expected in
+/// explained windows, and by no more than the model. Where most windows are not explained, none counts as explained.
 fn perfect_error(missed: &[f64], expected: &[f64], explained: &[bool]) -> f64 {
     let count = explained.iter().filter(|e| **e).count() as f64;
     let most = count >= MAJORITY * explained.len() as f64;
@@ -80,7 +79,7 @@ fn perfect_error(missed: &[f64], expected: &[f64], explained: &[bool]) -> f64 {
     (0..missed.len()).map(square).sum::<f64>() / missed.len() as f64
 }
 
-/// Mean square, window by window, of what displaced initial states change in the predictions.
+/// Mean square change of the predictions when initial states are displaced at random within their covariance, by window and joint, rad^2 or m^2.
 fn carried<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     data: &Dataset<N>,
@@ -103,7 +102,7 @@ fn carried<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     sum
 }
 
-/// An error of a measured initial state, drawn from its covariance and its bias.
+/// Random error of a measured initial state, drawn from its covariance and bias.
 fn displaced<const N: usize>(state: &InitialState<N>, random: &mut Random) -> InitialStateOffset<N> {
     let mut offset = InitialStateOffset::none();
     for j in 0..N {
@@ -117,7 +116,7 @@ fn displaced<const N: usize>(state: &InitialState<N>, random: &mut Random) -> In
     offset
 }
 
-/// Mean square difference of each joint, window by window.
+/// Mean square difference of two position series by window and joint, rad^2 or m^2.
 fn window_squares<const N: usize>(data: &Dataset<N>, one: &[f64], other: &[f64]) -> Vec<[f64; N]> {
     let of = |window: &Window<N>| -> [f64; N] {
         let mut sum = [0.0; N];

@@ -1,4 +1,4 @@
-//! How far predictions miss on the holdout: windows from measured initial states, and whole logs from their first sample.
+//! Prediction errors on the holdout: windows from measured initial states, and whole logs from their first sample.
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting, WindowSet};
 use crate::likelihood::encoder_zero::EncoderZeros;
@@ -16,41 +16,41 @@ use rayon::prelude::*;
 /// Points of a drawn curve at most.
 const DRAWN: usize = 2500;
 
-/// Holdout logs that are drawn.
+/// Holdout logs whose curves are drawn at most.
 const DRAWN_LOGS: usize = 3;
 
-/// Resamples of the holdout windows for the interval of the closed share.
+/// Resamples of the holdout windows for the confidence interval of the closed share.
 const RESAMPLES: usize = 500;
 
-/// Further prediction horizons, s.
+/// Prediction horizons at which the gap is reported besides the chosen one, s.
 pub(crate) const HORIZONS: [f64; 3] = [0.1, 0.5, 1.0];
 
-/// Free-run errors are cut here, rad or m: beyond, only "it diverged" is meant.
+/// Largest free-run error that is reported, rad or m: a larger one only says that the run diverged.
 const FREE_RUN_LIMIT: f64 = 100.0;
 
-/// The three hypotheses a report compares.
+/// The three hypotheses that a report compares.
 pub struct Compared<const P: usize> {
-    /// The arm file as it is.
+    /// The arm file as it is, without effects.
     pub before: Hypothesis<P>,
-    /// Parameters re-estimated.
+    /// The arm with its parameters re-estimated, without effects.
     pub refit: Hypothesis<P>,
-    /// Causes added.
+    /// The arm with its parameters re-estimated and the named causes.
     pub after: Hypothesis<P>,
 }
 
-/// Predictions on the holdout from measured initial states, and their squared errors.
+/// Predicted positions on the holdout from measured initial states for the three compared models, and their noise floor.
 pub struct Errors<const N: usize> {
     before: Vec<f64>,
     refit: Vec<f64>,
     after: Vec<f64>,
-    /// The last with encoder zeros of the holdout's recordings.
+    /// Predicted positions of the model with causes, rad or m, with the encoder zeros fitted to the holdout's recordings.
     with_zeros: Vec<f64>,
-    /// Mean square that measured initial states and the measurement itself put into the errors, per joint.
+    /// Noise floor by joint as a mean square, rad^2 or m^2: what errors of measured initial states and measurement noise contribute.
     floor: [f64; N],
 }
 
 impl<const N: usize> Errors<N> {
-    /// Predictions of the three hypotheses.
+    /// Predicts the holdout with the three compared hypotheses; `zeros` are encoder zeros of its recordings.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         context: &DiagnosisContext<A, N, P>,
         compared: &Compared<P>,
@@ -70,12 +70,12 @@ impl<const N: usize> Errors<N> {
         }
     }
 
-    /// RMS error per joint of the model with causes, with encoder zeros of the holdout's recordings: what their own scatter does not explain.
+    /// RMS error per joint, rad or m, of the model with causes and the encoder zeros fitted to the holdout's recordings, so that their scatter does not count.
     pub fn beside_zeros(&self, measured: &[f64]) -> Vec<f64> {
         rms::<N>(measured, &self.with_zeros)
     }
 
-    /// Measured and predicted positions for drawing.
+    /// Measured and predicted positions of the holdout windows, for drawing.
     pub fn series<A: Arm<f64, N, P>, const P: usize>(
         &self,
         context: &DiagnosisContext<A, N, P>,
@@ -88,7 +88,7 @@ impl<const N: usize> Errors<N> {
     }
 }
 
-/// RMS difference of each joint.
+/// RMS difference of measured and predicted positions by joint, rad or m.
 pub fn rms<const N: usize>(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
     let rows = (measured.len() / N).max(1) as f64;
     let squares = |j: usize| -> f64 {
@@ -97,7 +97,7 @@ pub fn rms<const N: usize>(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
     (0..N).map(|j| (squares(j) / rows).sqrt()).collect()
 }
 
-/// The gap before, re-estimated, and with the causes.
+/// Gap on the holdout before, with parameters re-estimated, and with the named causes.
 pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     compared: &Compared<P>,
@@ -135,8 +135,8 @@ pub fn gap<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     }
 }
 
-/// Errors of a model on the second halves of the holdout logs, without and with the encoder zeros that the first halves show; none where recordings do not
-/// differ or a half has no window.
+/// RMS errors of a model on the second halves of the holdout logs, with positions as measured and with the encoder zeros that the first halves show; none where
+/// recordings do not differ or a half has no window.
 fn second_halves<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     model: &Hypothesis<P>,
@@ -165,7 +165,7 @@ fn second_halves<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     Some(SecondHalves { after, with_zeros })
 }
 
-/// The gap at another prediction horizon; none where the logs are shorter than two of it.
+/// Gap on the holdout at another prediction `horizon`, s; none where the logs hold less than two windows each.
 fn at_horizon<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     compared: &Compared<P>,
@@ -189,7 +189,7 @@ fn at_horizon<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     })
 }
 
-/// Share of the gap above the floor that is closed, over all joints.
+/// Share of the gap above the noise floor that is closed: `1 - sum max(after - floor, 0) / sum max(before - floor, 0)`, summed over joints.
 pub(crate) fn closed(before: &[f64], after: &[f64], floor: &[f64]) -> f64 {
     let above =
         |x: &[f64]| x.iter().zip(floor).map(|(x, f)| ((x - f) / before_scale(before)).max(0.0)).sum::<f64>();
@@ -201,7 +201,7 @@ fn before_scale(before: &[f64]) -> f64 {
     before.iter().copied().fold(f64::MIN_POSITIVE, f64::max)
 }
 
-/// 95 % interval of the closed share from resampled holdout windows.
+/// 95 % interval of the closed share of the gap, from resampled holdout windows.
 fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     errors: &Errors<N>,
@@ -235,7 +235,7 @@ fn closed_interval<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     [shares[RESAMPLES / 40], shares[RESAMPLES - 1 - RESAMPLES / 40]]
 }
 
-/// The holdout as one window per log.
+/// The logs of a data set as one window per log.
 pub(crate) fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
     let (mut windows, mut rows) = (Vec::new(), 0);
     for (index, track) in data.tracks.iter().enumerate() {
@@ -252,13 +252,13 @@ pub(crate) fn whole<const N: usize>(data: &Dataset<N>) -> Dataset<N> {
     Dataset { tracks: data.tracks.clone(), windows, rows }
 }
 
-/// Predictions kept within reach of the measurement, so that a diverged run stays a number.
+/// Predicted positions clamped to within `FREE_RUN_LIMIT` of the measured ones, rad or m, so that a diverged run stays finite.
 pub(crate) fn limited(measured: &[f64], predicted: &[f64]) -> Vec<f64> {
     let within = |p: &f64, m: &f64| m + (p - m).clamp(-FREE_RUN_LIMIT, FREE_RUN_LIMIT);
     predicted.iter().zip(measured).map(|(p, m)| within(p, m)).collect()
 }
 
-/// Whole logs of the holdout from their first sample.
+/// Simulations of whole holdout logs from their first sample, with the arm file as it is and with the causes.
 pub struct FreeRuns<const N: usize> {
     data: Dataset<N>,
     measured: Vec<f64>,
@@ -267,7 +267,7 @@ pub struct FreeRuns<const N: usize> {
 }
 
 impl<const N: usize> FreeRuns<N> {
-    /// Runs of the arm file as it is, and of the model with the causes.
+    /// Simulates the holdout logs with the arm file as it is and with the model with causes.
     pub fn new<A: Arm<f64, N, P>, const P: usize>(
         context: &DiagnosisContext<A, N, P>,
         compared: &Compared<P>,
@@ -280,13 +280,13 @@ impl<const N: usize> FreeRuns<N> {
         Self { data, measured, before, after }
     }
 
-    /// Curves for drawing.
+    /// Measured and simulated positions of the free runs, for drawing.
     pub fn series(&self) -> Vec<FreeRunSeries> {
         free_run_series(&self.data, &self.measured, [&self.before, &self.after])
     }
 }
 
-/// Curves of whole logs: measured positions, and predictions of the arm file as it is and of the model with causes.
+/// Curves of whole logs for drawing: measured positions, and positions simulated with the arm file as it is and with the causes, rad or m.
 pub(crate) fn free_run_series<const N: usize>(
     data: &Dataset<N>,
     measured: &[f64],
@@ -311,7 +311,7 @@ pub(crate) fn free_run_series<const N: usize>(
     all
 }
 
-/// Curves of windows: measured positions, and predictions of the arm file as it is, re-estimated, and with causes.
+/// Curves of windows for drawing: measured positions, and predictions of the arm file as it is, re-estimated, and with causes, rad or m.
 pub(crate) fn window_series<const N: usize>(
     data: &Dataset<N>,
     measured: &[f64],

@@ -1,4 +1,4 @@
-//! What is fit to be named: causes of which size, value and probability stand, as many as are allowed. The rest are candidates.
+//! Choice of the causes that a diagnosis names, by their size, value and probability, as many as are allowed. The rest become candidates.
 //!
 //! The model reported has the named causes only, so that the gap "after" is what a reader who applies them gets.
 
@@ -11,46 +11,46 @@ use crate::search::model_search::{Attribution, refresh};
 use armgap_core::arm::Arm;
 use armgap_core::effect::{NEVER, Trial};
 
-/// Probability below which nothing is named.
+/// Probability below which a cause is not named.
 const NAMEABLE: f64 = 0.3;
 
-/// Probability below which a value that arms hardly ever have is not named. Single logs of a real arm whose encoders start from another zero each
-/// gave negative stiffnesses up to 0.80 (docs/real-arm.md).
+/// Probability below which a fitted value that arms hardly ever have (a negative spring stiffness) is not named. Single logs of a real arm whose encoders start
+/// from another zero each gave negative stiffnesses up to 0.80 (docs/real-arm.md).
 const LIKELY: f64 = 0.9;
 
-/// Gains of a drive: beyond, a column's unit is wrong, not its drive.
+/// Gains of a drive, delivered over commanded torque: beyond this range, the unit of the torque column is wrong, not the drive.
 const GAINS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
-/// Something that was found and is not named, and why.
+/// A cause or disturbance that was found and is not named, with the reason.
 #[derive(Debug, Clone)]
 pub struct Unnamed<T> {
-    /// What was found.
+    /// The cause or disturbance that is not named.
     pub found: T,
-    /// Why it is not fit to be named.
+    /// Reason, in words, why the found cause or disturbance is not named.
     pub why: String,
 }
 
-/// What a diagnosis names, and the model that goes with it.
+/// Causes and disturbances that a diagnosis names or rejects, and the model with the named ones.
 pub struct Headline<const N: usize, const P: usize> {
-    /// The model search.
+    /// Result of the model search.
     pub attribution: Attribution<N, P>,
-    /// The model with the named causes.
+    /// Fitted model with the named causes alone.
     pub model: Fit<P>,
-    /// Weights around it.
+    /// Weights of the training and holdout windows under the reported model.
     pub weights: SplitWeighting<N>,
-    /// Whether the search leaves a cost beside it that is more than noise.
+    /// Whether the model search ended with a cost above what noise explains.
     pub open: bool,
     /// Named causes, strongest first.
     pub causes: Vec<Cause>,
-    /// Named external disturbances.
+    /// Named external disturbances, clearest first.
     pub disturbances: Vec<Disturbance>,
-    /// Causes that are not named.
+    /// Causes that were found and are not named, with reasons.
     pub candidates: Vec<Unnamed<Cause>>,
-    /// External disturbances that are not named.
+    /// External disturbances that were found and are not named, with reasons.
     pub disturbance_candidates: Vec<Unnamed<Disturbance>>,
 }
 
-/// Why an effect of this probability, with these standard deviations of its values, is not fit to be named; none if it is.
+/// Why an effect found with `probability`, whose values have standard deviations `sigma`, is not to be named; none if it may be.
 pub fn unfit(effect: &EffectInstance, sigma: &[f64], probability: f64) -> Option<String> {
     if probability < NAMEABLE {
         return Some(format!("its probability is {probability:.2}"));
@@ -58,7 +58,7 @@ pub fn unfit(effect: &EffectInstance, sigma: &[f64], probability: f64) -> Option
     impossible(effect, probability).or_else(|| uncertain(effect, sigma))
 }
 
-/// A value that no arm has.
+/// Reason why the value of an effect is one that no arm has (a gain beyond drives, a negative stiffness); none if the value is possible.
 fn impossible(effect: &EffectInstance, probability: f64) -> Option<String> {
     let value = effect.p[0];
     match effect.law.spec().name {
@@ -72,8 +72,8 @@ fn impossible(effect: &EffectInstance, probability: f64) -> Option<String> {
     }
 }
 
-/// A size that is not told from nothing. A standard deviation says so only of what grows from nothing in proportion to its size: that of a threshold or of
-/// a transmission is along its other values as well, and the search has compared the whole effect with its absence.
+/// Reason why the size of an effect cannot be told from zero: its standard deviation is as large as the size; none if it can be. Effects with a threshold or a
+/// transmission always pass, as their standard deviation is along other values too and the search has compared the whole effect with its absence.
 fn uncertain(effect: &EffectInstance, sigma: &[f64]) -> Option<String> {
     let spec = effect.law.spec();
     // Along a ray all values leave nothing together, and the first is the size.
@@ -90,7 +90,7 @@ fn uncertain(effect: &EffectInstance, sigma: &[f64]) -> Option<String> {
     })
 }
 
-/// Keeps what is fit to be named and hands back the rest; what is fit but one too many is not named either.
+/// Splits `all` into at most `allowed` items to be named, for which `why_not` gives no reason, and the rest with reasons; `most` is the limit in messages.
 fn sorted<T>(
     all: Vec<T>,
     allowed: usize,
@@ -113,10 +113,10 @@ fn sorted_causes(causes: &[Cause], most: usize) -> (Vec<Cause>, Vec<Unnamed<Caus
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// What is named of a conclusion, at most `most` causes and external disturbances together, and the model with that.
+    /// Names at most `most` causes and external disturbances of a search's `conclusion` together, and fits the model with them.
     ///
-    /// Effects come before disturbances, and of these the clearest first. Disturbances that are not named are taken out of the logs; where
-    /// none is left, the search without them counts.
+    /// Effects come before disturbances, and of disturbances the clearest first. Disturbances that are not named are taken out of the logs; if no disturbance is
+    /// named, the search without disturbances counts.
     pub fn headline(&mut self, conclusion: Conclusion<N, P>, most: usize) -> Headline<N, P> {
         let Conclusion { mut attribution, alone, mut disturbances } = conclusion;
         self.weigh(&mut attribution);
@@ -148,7 +148,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// The model with the named causes alone, weights around it, and whether the search leaves a gap beside it.
+    /// Model with the named causes alone, its window weights, and whether its gap is open; `changed` says that some found cause or disturbance is not named.
     fn reported(
         &self,
         attribution: &Attribution<N, P>,

@@ -1,13 +1,13 @@
-//! The diagnosis as data.
+//! Result of a diagnosis as data.
 //!
-//! * `assemble`: from the end of a search to the diagnosis.
-//! * `floor`: by how much a perfect model would miss.
+//! * `assemble`: the result, assembled from the end of a model search.
+//! * `floor`: noise floor of a gap, the prediction error that a perfect model would have.
 //! * `gap`: prediction errors and their resampled intervals.
-//! * `headline`: the causes that are named.
+//! * `headline`: choice of the causes that a diagnosis names.
 //! * `report`: types of the result (`armgap.diagnosis/1`), which are its JSON Schema.
-//! * `ruled_out`: what was looked for and not found.
-//! * `sanity`: whether re-estimated parameters are such as this arm can have.
-//! * `verdict`: the verdict, as a function of plain evidence.
+//! * `ruled_out`: status of every effect that was looked for and not found.
+//! * `sanity`: checks of re-estimated parameters against what the arm file allows.
+//! * `verdict`: the verdict of a diagnosis, as a function of prediction errors.
 
 pub mod assemble;
 mod floor;

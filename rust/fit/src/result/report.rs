@@ -1,4 +1,4 @@
-//! The diagnosis as data: the schema `armgap.diagnosis/1` and what a report draws besides.
+//! Types of the result: the schema `armgap.diagnosis/1`, and the curves that a report draws.
 
 use crate::locate::dependence::Dependence;
 use crate::locate::energy::Energy;
@@ -11,43 +11,43 @@ use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Named values, in alphabetical order of their names.
+/// Values by name, in alphabetical order of the names.
 pub type Named<T> = BTreeMap<String, T>;
 
-/// A number with its uncertainty.
+/// A number with its standard deviation and unit.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Value {
     /// Value, SI.
     pub value: f64,
-    /// Standard deviation.
+    /// Standard deviation of the value, SI.
     pub sigma: f64,
-    /// SI unit.
+    /// SI unit of the value and its standard deviation.
     pub unit: &'static str,
 }
 
-/// The same of several joints, in their order.
+/// Numbers of several joints, in the order of the joints, with their standard deviations and unit.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Values {
-    /// Values, SI.
+    /// Values by joint, SI.
     pub value: Vec<f64>,
-    /// Standard deviations.
+    /// Standard deviations of the values by joint, SI.
     pub sigma: Vec<f64>,
-    /// SI unit.
+    /// SI unit of the values and their standard deviations.
     pub unit: &'static str,
 }
 
-/// Value of a cause's parameter: a number, or one per joint of a cause on several.
+/// Value of a cause's parameter: a number, or one number per joint for a cause on several joints.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 #[serde(untagged)]
 pub enum CauseValue {
     /// Value of a cause on one joint, on two coupled joints, or on the whole arm.
     One(Value),
-    /// Of the same law on several joints.
+    /// Values, joint by joint, of a cause that is the same law on several joints.
     Each(Values),
 }
 
 impl CauseValue {
-    /// The number, of one.
+    /// The value of a cause that is not on several joints; none otherwise.
     pub const fn one(&self) -> Option<&Value> {
         match self {
             Self::One(value) => Some(value),
@@ -56,204 +56,204 @@ impl CauseValue {
     }
 }
 
-/// Where something is that is neither on one joint nor on the whole arm.
+/// Joints of a cause that acts on several joints, or on a sum or difference of two; empty for a cause on one joint or on the whole arm.
 #[derive(Debug, Clone, Default, JsonSchema, Serialize)]
 pub struct SeveralJoints {
-    /// 1-based joints, of what is on several at once.
+    /// 1-based numbers of the joints that a cause on several joints acts on.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = 1)))]
     pub joints: Option<Vec<usize>>,
-    /// Factors of two joints' motion, of what acts on a sum or a difference of them.
+    /// Factors of two joints' motion in the sum or difference that a cause acts on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row: Option<[i32; 2]>,
 }
 
-/// JSON Schema (draft 2020-12) of what the core says of a diagnosis.
+/// JSON Schema (draft 2020-12) of a diagnosis as the core writes it.
 pub fn schema() -> Schema {
     SchemaSettings::draft2020_12().for_serialize().into_generator().into_root_schema_for::<Diagnosis>()
 }
 
-/// A diagnosis.
+/// Result of a diagnosis.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Diagnosis {
-    /// Name of this schema.
+    /// Name of the schema.
     #[schemars(extend("const" = "armgap.diagnosis/1"))]
     pub schema: &'static str,
-    /// What it comes to.
+    /// Answer of the diagnosis in one word.
     pub verdict: Verdict,
-    /// How far.
+    /// Prediction errors on the holdout before and after, by joint.
     pub gap: Gap,
-    /// Where.
+    /// Share of each joint in the gap, and the regimes in which the gap is large.
     #[serde(rename = "where")]
     pub places: Vec<Location>,
     /// Energy balance of each joint's residual torque.
     pub energy: Vec<Energy>,
-    /// Which.
+    /// Named causes, strongest first.
     pub causes: Vec<Cause>,
-    /// What was found and is not fit to be named.
+    /// Causes that were found and are not named, with reasons.
     pub candidates: Vec<Candidate>,
     /// Effects that were looked for and not found.
     pub ruled_out: Vec<RuledOut>,
-    /// The arm's parameters.
+    /// Parameters of the arm: nominal, re-estimated, and re-estimated beside the causes.
     pub parameters: Parameters,
-    /// Re-estimated parameters, of the model reported, that are not to be believed as they stand.
+    /// Re-estimated parameters of the reported model that are not to be believed as they stand.
     pub sanity: Vec<Sanity>,
-    /// The arm.
+    /// Kind, joints and parameter names of the diagnosed arm.
     pub arm: ArmSummary,
-    /// Logs the model was fitted to.
+    /// Logs that the models were fitted to.
     pub training: Vec<LogSummary>,
-    /// Logs it was judged on.
+    /// Logs that the models were judged on.
     pub holdout: Vec<LogSummary>,
-    /// All fitted candidates of the first search node, best first.
+    /// All candidates that the first step of the model search fitted, best first.
     pub ranking: Vec<Ranked>,
-    /// The steps of the model search.
+    /// Steps of the model search, in order.
     pub stages: Vec<StageSummary>,
-    /// The gap by joint and regime.
+    /// Prediction errors by joint and regime of the motion.
     pub regimes: Vec<Regime>,
-    /// What the residual torque that the final model leaves depends on, strongest first.
+    /// Variables that the residual torque of the final model depends on, strongest first.
     pub unnamed: Vec<Dependence>,
-    /// Predictions on the holdout, window by window.
+    /// Measured and predicted positions on the holdout, window by window.
     pub series: Vec<Series>,
-    /// Predictions of the whole holdout from its first sample.
+    /// Measured positions of whole holdout logs, and positions simulated from their first sample.
     pub free_run_series: Vec<FreeRunSeries>,
-    /// What the position measurement looks like.
+    /// Noise and encoder steps of the position measurement.
     pub noise: Noise,
-    /// Settings.
+    /// Settings of the diagnosis.
     pub options: OptionSummary,
-    /// Version of this library.
+    /// Version of the armgap library that made the diagnosis.
     pub version: &'static str,
-    /// Time it took, s.
+    /// Computing time of the diagnosis, s.
     pub seconds: f64,
-    /// Remarks.
+    /// Remarks on the result, in words.
     pub notes: Vec<String>,
 }
 
-/// How far predictions miss on the holdout, RMS per joint.
+/// Position errors of predictions on the holdout, RMS per joint, rad or m.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Gap {
     /// Prediction horizon, s.
     pub horizon_s: f64,
     /// Unit of the position errors; of an arm with joints of both kinds that of its first joint (see `arm.joint_unit`).
     pub unit: &'static str,
-    /// Arm file as it is.
+    /// RMS position error by joint of the arm file as it is, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub before: Vec<f64>,
-    /// Parameters re-estimated.
+    /// RMS position error by joint with the arm's parameters re-estimated, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub refit: Vec<f64>,
-    /// The named causes added.
+    /// RMS position error by joint with parameters re-estimated and the named causes, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub after: Vec<f64>,
-    /// What measurement noise alone leaves.
+    /// Noise floor by joint: RMS position error of a perfect model, from measurement noise alone, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub floor: Vec<f64>,
-    /// RMS displacement of the arm over the horizon.
+    /// RMS displacement of the arm over the horizon by joint, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub motion: Vec<f64>,
-    /// Share of the gap above the floor that is closed.
+    /// Share of the gap above the noise floor that the named causes and re-estimated parameters close.
     #[schemars(range(max = 1))]
     pub closed: f64,
-    /// 95 % interval of it.
+    /// 95 % interval of the closed share of the gap.
     pub closed_ci: [f64; 2],
-    /// Share of the gap above the floor with parameters re-estimated that the named causes leave.
+    /// Share of the gap above the noise floor, with parameters re-estimated, that the named causes leave.
     #[schemars(range(min = 0, max = 1))]
     pub unexplained: f64,
-    /// RMS errors at other prediction horizons.
+    /// RMS position errors at other prediction horizons.
     pub horizons: Vec<AtHorizon>,
-    /// Over the whole holdout from its first sample.
+    /// RMS position errors of simulations of whole holdout logs from their first sample.
     pub free_run: FreeRun,
-    /// What encoder zeros that differ between recordings make of the gap; where they do.
+    /// Gap with the encoder zeros of each recording known; where encoder zeros differ between recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second_halves: Option<SecondHalves>,
 }
 
-/// RMS position errors, over the horizon, on the second half of each holdout log, with the named causes added.
+/// RMS position errors, over the horizon, on the second half of each holdout log, with the named causes.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct SecondHalves {
-    /// With positions as they were measured.
+    /// RMS position error by joint with positions as they were measured, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub after: Vec<f64>,
-    /// With the encoder zeros that the first half of each log shows.
+    /// RMS position error by joint, rad or m, with the encoder zeros that the first half of each log shows.
     #[schemars(inner(range(min = 0)))]
     pub with_zeros: Vec<f64>,
 }
 
-/// RMS errors at one prediction horizon, per joint.
+/// RMS position errors at one prediction horizon, per joint.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct AtHorizon {
     /// Prediction horizon, s.
     pub horizon_s: f64,
-    /// Arm file as it is.
+    /// RMS position error by joint of the arm file as it is, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub before: Vec<f64>,
-    /// Parameters re-estimated.
+    /// RMS position error by joint with the arm's parameters re-estimated, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub refit: Vec<f64>,
-    /// Causes added.
+    /// RMS position error by joint with parameters re-estimated and the named causes, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub after: Vec<f64>,
-    /// What measurement noise alone leaves.
+    /// Noise floor by joint: RMS position error of a perfect model, from measurement noise alone, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub floor: Vec<f64>,
 }
 
-/// RMS errors in free run.
+/// RMS position errors of free runs: whole holdout logs simulated from their first sample.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct FreeRun {
-    /// Arm file as it is.
+    /// RMS position error by joint of the arm file as it is in free run, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub before: Vec<f64>,
-    /// Causes added.
+    /// RMS position error by joint with the named causes in free run, rad or m.
     #[schemars(inner(range(min = 0)))]
     pub after: Vec<f64>,
 }
 
-/// One cause.
+/// A cause of the gap: an effect, where it acts, its values and its probability.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Cause {
-    /// Effect.
+    /// Name of the effect in the library.
     pub effect: &'static str,
-    /// Name for people.
+    /// Title of the effect for people.
     pub title: &'static str,
-    /// 1-based joint.
+    /// 1-based joint that the cause acts on; none for the whole arm or for several joints.
     #[schemars(range(min = 1))]
     pub joint: Option<usize>,
-    /// Its joints, where it is on several.
+    /// Joints of a cause on several joints.
     #[serde(flatten)]
     pub on: SeveralJoints,
-    /// Probability.
+    /// Probability that the effect, or one of its equivalents, is in the arm.
     #[schemars(range(min = 0, max = 1))]
     pub probability: f64,
-    /// Its parameters.
+    /// Fitted parameters of the effect, by name.
     pub parameters: Named<CauseValue>,
-    /// Share of the gap above the floor it removed when it was added.
+    /// Share of the gap above the noise floor that the cause removed when it was added.
     pub closed: f64,
-    /// What this log does not tell from it.
+    /// Effects that these logs do not tell from the cause.
     pub equivalents: Vec<EquivalentSummary>,
-    /// What it rests on; none for external disturbances.
+    /// Figures from which the probability of the cause follows; none for external disturbances.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub evidence: Option<crate::search::evidence::Evidence>,
-    /// Where encoder and friction sit; of effects with a transmission.
+    /// Sides of the transmission on which encoder and friction are; only for effects with a transmission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sides: Option<SidesSummary>,
-    /// The log that an external disturbance belongs to.
+    /// Name of the log in which an external disturbance happened.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,
 }
 
-/// Sides of a transmission: `motor` or `link`.
+/// Sides of a transmission, `motor` or `link`, on which encoder and friction are.
 #[derive(Debug, Clone, Copy, JsonSchema, Serialize)]
 pub struct SidesSummary {
-    /// Side that the encoder measures.
+    /// Side of the transmission that the encoder measures.
     pub encoder: &'static str,
-    /// Side that friction acts on.
+    /// Side of the transmission that friction acts on.
     pub friction: &'static str,
-    /// How the rotor of an elastic transmission moves with the joints before its own: `rides`, or `geared` where it hardly does.
+    /// Motion of the rotor of an elastic transmission with the joints before its own: `rides`, or `geared` where it hardly moves with them.
     pub rotor: &'static str,
 }
 
 impl SidesSummary {
-    /// In words.
+    /// Sides of a transmission in words.
     pub fn of(sides: Sides) -> Self {
         let word = |at_motor| if at_motor { "motor" } else { "link" };
         let rotor = if sides.rotor_rides { "rides" } else { "geared" };
@@ -261,219 +261,219 @@ impl SidesSummary {
     }
 }
 
-/// A cause that is not named.
+/// A cause that was found and is not named.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Candidate {
-    /// The cause.
+    /// Effect, joint, values and probability of the cause.
     #[serde(flatten)]
     pub cause: Cause,
-    /// Why it is not fit to be named.
+    /// Reason why the cause is not named.
     pub why: String,
 }
 
-/// A look-alike.
+/// An effect that these logs do not tell from a cause.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct EquivalentSummary {
-    /// Effect.
+    /// Name of the effect in the library.
     pub effect: &'static str,
-    /// 1-based joint.
+    /// 1-based joint that the effect acts on; none for the whole arm or for several joints.
     #[schemars(range(min = 1))]
     pub joint: Option<usize>,
-    /// Its joints, where it is on several.
+    /// Joints of an effect on several joints.
     #[serde(flatten)]
     pub on: SeveralJoints,
-    /// Why.
+    /// Reason why the effect and the cause cannot be told apart.
     pub why: String,
 }
 
-/// What is known of a candidate that is not a cause, the surest first.
+/// Status of an effect that was looked for and is not a cause, the surest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, JsonSchema, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// These logs would show it if it were larger than its bound.
+    /// The logs would show the effect if it were larger than its bound.
     Absent,
-    /// These logs neither show it nor rule it out.
+    /// The logs neither show the effect nor rule it out.
     Undecided,
-    /// The motion of these logs leaves no trace of it.
+    /// The motion of the logs leaves no trace of the effect.
     #[serde(rename = "not excited")]
     NotExcited,
 }
 
-/// A candidate that is not a cause.
+/// An effect that was looked for and is not a cause.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct RuledOut {
-    /// Effect.
+    /// Name of the effect in the library.
     pub effect: &'static str,
-    /// 1-based joint.
+    /// 1-based joint that the effect was looked for on; none for the whole arm or for several joints.
     #[schemars(range(min = 1))]
     pub joint: Option<usize>,
-    /// Its joints, where it is on several.
+    /// Joints of an effect on several joints.
     #[serde(flatten)]
     pub on: SeveralJoints,
-    /// What is known of it.
+    /// Whether the effect is absent, undecided or not excited.
     pub status: Status,
-    /// Upper bound of its size.
+    /// Upper bound of the effect's size.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound: Option<Bound>,
-    /// Reason.
+    /// Reason for the status of the effect.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
 }
 
-/// An upper bound.
+/// Upper confidence bound of the size of an effect that was not found.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Bound {
-    /// Parameter.
+    /// Name of the bounded parameter of the effect.
     pub parameter: &'static str,
-    /// Largest deviation from its neutral value.
+    /// Largest deviation of the parameter from its neutral value, SI.
     pub value: f64,
-    /// SI unit.
+    /// SI unit of the bound.
     pub unit: &'static str,
-    /// Confidence level.
+    /// Confidence level of the bound, 0 to 1.
     pub level: f64,
 }
 
-/// The arm's parameters before, re-estimated, and with the causes.
+/// Parameters of the arm by name: nominal, re-estimated, and re-estimated beside the causes.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Parameters {
-    /// Arm file.
+    /// Parameters of the arm file.
     pub nominal: Named<Value>,
-    /// Re-estimated.
+    /// Parameters re-estimated on the training logs without effects.
     pub refit: Named<Value>,
-    /// Re-estimated with the causes.
+    /// Parameters re-estimated on the training logs beside the named causes.
     pub with_causes: Named<Value>,
 }
 
-/// The arm in brief.
+/// Kind, joints and parameter names of the diagnosed arm.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct ArmSummary {
-    /// Kind.
+    /// Kind of arm.
     pub kind: &'static str,
-    /// Joints.
+    /// Number of joints.
     pub n_joints: usize,
-    /// Parameter names in the order of `theta`.
+    /// Names of the arm's parameters in the order of `theta`.
     pub parameter_names: Vec<String>,
-    /// Their units.
+    /// SI units of the arm's parameters in the order of `theta`.
     pub parameter_units: Vec<&'static str>,
-    /// Unit of each joint's position.
+    /// Unit of each joint's position, rad or m.
     pub joint_unit: Vec<&'static str>,
 }
 
-/// A log in brief.
+/// Name, length and windows of a log.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct LogSummary {
-    /// Name.
+    /// Name of the log.
     pub name: String,
-    /// Samples.
+    /// Number of samples in the log.
     pub samples: usize,
-    /// Duration, s.
+    /// Duration of the log, s.
     pub duration_s: f64,
-    /// Windows.
+    /// Number of prediction windows cut from the log.
     pub windows: usize,
-    /// What its encoders show where the model's positions are zero, beside what all recordings share; where there are several training recordings.
+    /// Encoder readings at the model's zero position in this log, less their part common to all recordings; where there are several training recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder_zero: Option<Values>,
 }
 
-/// A fitted candidate.
+/// An effect that the first step of the model search fitted as a candidate.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Ranked {
-    /// Effect.
+    /// Name of the candidate effect in the library.
     pub effect: &'static str,
-    /// Name for people.
+    /// Title of the candidate effect for people.
     pub title: &'static str,
-    /// 1-based joint.
+    /// 1-based joint that the candidate effect acts on; none for the whole arm.
     #[schemars(range(min = 1))]
     pub joint: Option<usize>,
-    /// Share of the holdout's gap above the floor it removes.
+    /// Share of the holdout's gap above the noise floor that the candidate removes.
     pub closed: f64,
-    /// Squared distance of the arm's parameters from their prior values, in sigmas, with it.
+    /// Squared distance of the arm's parameters, fitted with the candidate, from their prior values, in standard deviations.
     pub trust: f64,
-    /// RMS on the holdout per joint.
+    /// RMS position error on the holdout with the candidate, by joint, rad or m.
     pub rms: Vec<f64>,
-    /// Its parameters.
+    /// Fitted parameters of the candidate effect, by name.
     pub parameters: Named<Value>,
 }
 
 /// One step of the model search.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct StageSummary {
-    /// What the step added.
+    /// Effect that the step added; none for a step that added none.
     pub added: Option<EquivalentSummary>,
-    /// RMS on the holdout per joint before the step.
+    /// RMS position error on the holdout before the step, by joint, rad or m.
     pub rms: Vec<f64>,
-    /// Cost above the noise floor before the step, as a factor.
+    /// Cost of the holdout before the step over the cost that noise alone leaves.
     pub excess: f64,
-    /// Squared distance of the arm's parameters from their prior values, in sigmas, before the step.
+    /// Squared distance of the arm's parameters from their prior values before the step, in standard deviations.
     pub trust: f64,
-    /// RMS error before the step relative to the motion within the windows.
+    /// RMS position error before the step relative to the motion within the windows.
     pub relative_error: f64,
 }
 
-/// Measured and predicted positions of one joint.
+/// Measured and predicted positions of one joint in one log, window by window.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Series {
-    /// Log.
+    /// Name of the log.
     pub log: String,
     /// 1-based joint.
     #[schemars(range(min = 1))]
     pub joint: usize,
-    /// Times, s.
+    /// Times of the drawn samples, s.
     pub t: Vec<f64>,
-    /// Measured.
+    /// Measured positions of the joint, rad or m.
     pub measured: Vec<f64>,
-    /// Arm file as it is.
+    /// Positions predicted with the arm file as it is, rad or m.
     pub before: Vec<f64>,
-    /// Parameters re-estimated.
+    /// Positions predicted with the arm's parameters re-estimated, rad or m.
     pub refit: Vec<f64>,
-    /// Causes added.
+    /// Positions predicted with the named causes, rad or m.
     pub after: Vec<f64>,
-    /// Indices at which a new window starts.
+    /// Indices of the drawn samples at which a new window starts.
     pub window_start: Vec<usize>,
-    /// Measured position from which each window is predicted.
+    /// Measured position from which each window is predicted, rad or m.
     pub initial_position: Vec<f64>,
-    /// Measured velocity from which each window is predicted.
+    /// Measured velocity from which each window is predicted, rad/s or m/s.
     pub initial_velocity: Vec<f64>,
 }
 
-/// Measured and predicted positions in free run.
+/// Measured positions of one joint over a whole log, and positions simulated from the log's first sample.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct FreeRunSeries {
-    /// Log.
+    /// Name of the log.
     pub log: String,
     /// 1-based joint.
     #[schemars(range(min = 1))]
     pub joint: usize,
-    /// Times, s.
+    /// Times of the drawn samples, s.
     pub t: Vec<f64>,
-    /// Measured.
+    /// Measured positions of the joint, rad or m.
     pub measured: Vec<f64>,
-    /// Arm file as it is.
+    /// Positions simulated with the arm file as it is, rad or m.
     pub before: Vec<f64>,
-    /// Causes added.
+    /// Positions simulated with the named causes, rad or m.
     pub after: Vec<f64>,
 }
 
-/// Measurement noise.
+/// Noise and encoder steps of the position measurement, by joint.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct Noise {
-    /// Standard deviation of the positions per joint.
+    /// Standard deviation of the position noise by joint, rad or m.
     pub position_sigma: Vec<f64>,
-    /// Encoder step per joint, zero where none is seen.
+    /// Encoder step by joint, rad or m; zero where none is seen.
     pub encoder_step: Vec<f64>,
 }
 
 /// Settings of a diagnosis.
 #[derive(Debug, Clone, JsonSchema, Serialize)]
 pub struct OptionSummary {
-    /// Horizon, s.
+    /// Prediction horizon, s.
     pub horizon_s: f64,
-    /// Causes at most.
+    /// Largest number of causes that may be named.
     pub max_causes: usize,
-    /// Seed.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// Largest width over which the logs asked for friction to be smoothed, rad/s; zero for dry friction.
+    /// Largest width over joints for which the logs fit friction smoothed around standstill, rad/s or m/s; zero for dry friction.
     pub friction_smoothing: f64,
-    /// That width joint by joint.
+    /// Width by joint over which friction is smoothed around standstill, rad/s or m/s; zero for dry friction.
     pub friction_widths: Vec<f64>,
 }

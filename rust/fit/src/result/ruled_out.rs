@@ -1,4 +1,4 @@
-//! What was looked for and not found: a status for every candidate that is no cause.
+//! Status of every candidate effect that is no cause: absent, undecided, or not excited by the logs.
 
 use crate::candidates::screen::{ScoreTest, screen};
 use crate::likelihood::context::DiagnosisContext;
@@ -10,10 +10,10 @@ use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 use armgap_core::effect::{Scope, Spec, Trial, catalogue};
 
-/// An effect whose size this log pins down to no better than this part of a typical size has not been excited.
+/// Standard deviation of an effect's size, relative to a typical size, above which the logs have not excited the effect.
 const PINNED: f64 = 0.5;
 
-/// An effect that could be behind more than this part of what remains unexplained is not absent.
+/// Share of the remaining gap that an effect could explain above which it is not called absent.
 const COULD_BE: f64 = 0.1;
 
 /// Status of every candidate that is no cause, from its first-order test around the final model.
@@ -55,7 +55,7 @@ pub fn ruled_out<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     entries
 }
 
-/// Status of the effects that no test of candidates looks for.
+/// Status of the effects for which no candidate is tested.
 fn never_fitted<const N: usize>() -> Vec<RuledOut> {
     let laws = catalogue::<f64>().iter().map(|law| law.spec());
     let unsearched = laws.filter(|spec| spec.initial_guesses.is_empty() && spec.least_joints <= N);
@@ -129,7 +129,7 @@ fn status<A, const N: usize, const P: usize>(
     }
 }
 
-/// The named cause in whose place another effect would have done nearly as well, by the motion or by what it makes of the parameters.
+/// The named cause in whose place the effect `place` would have done nearly as well, by the motion or by what it makes of the arm's parameters.
 fn rivalled<const N: usize, const P: usize>(
     attribution: &Attribution<N, P>,
     place: &EffectInstance,
@@ -146,7 +146,7 @@ fn rivalled<const N: usize, const P: usize>(
     })
 }
 
-/// What would do nearly as well in place of a named cause is absent only if that is right.
+/// Makes an absent effect undecided that would do nearly as well in place of the named cause `instead`.
 fn leave_open(entry: &mut RuledOut, instead: &EffectInstance) {
     if entry.status == Status::Absent {
         (entry.status, entry.bound) = (Status::Undecided, None);
@@ -158,7 +158,7 @@ fn leave_open(entry: &mut RuledOut, instead: &EffectInstance) {
     }
 }
 
-/// Where a gap remains, an effect is absent only if the largest size it could have would explain next to nothing of it.
+/// Makes an absent effect undecided if its largest possible size would explain a part that matters of the remaining gap, of cost `remains`.
 fn doubt(entry: &mut RuledOut, test: &ScoreTest, remains: f64) {
     let most = entry.bound.as_ref().map_or(test.gain, |bound| (bound.value / test.information_sigma).powi(2));
     let share = (most / remains).min(1.0);

@@ -1,64 +1,64 @@
-//! Whether re-estimated parameters are such as this arm can have, and the standard deviations that an arm file may ask for.
+//! Checks of re-estimated parameters against what the arm file allows, and limits on the standard deviations of an arm file.
 
 use armgap_core::arm::{ArmKind, Parameter};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// A value this many standard deviations of the arm file away is none that the arm file allows: by chance, one in a million.
+/// Standard deviations of the arm file beyond which an estimated value is not one that the arm file allows: by chance, one in a million.
 const FAR: f64 = 5.0;
 
-/// A sign is known where the value is this many of its standard deviations from zero.
+/// Standard deviations from zero beyond which the sign of an estimated value is known.
 const KNOWN: f64 = 2.0;
 
-/// A nominal value smaller than this part of the estimated one stands for none, and so does its sign.
+/// Ratio of a nominal to an estimated value, in size, below which the nominal value counts as zero and its sign as unknown.
 const COMPARABLE: f64 = 0.2;
 
-/// Logs that leave more than this part of a parameter's prior deviation hardly say anything about it: less than the arm file does.
+/// Ratio of the estimated to the prior standard deviation above which the logs say less about a parameter than the arm file does.
 const UNSEEN: f64 = 0.71;
 
-/// What is said of values that stayed where they were.
+/// Message about parameters whose estimates stayed near the arm file's values while a gap remains.
 const STUCK: &str = "beside so large a gap the logs say less about the parameters than the arm file does, and their values stayed near \
      it; check signs, zeros and units first";
 
-/// Largest standard deviation, in the value's own size (or that of the largest parameter of its unit): what lies a value ten times as
-/// large away then costs one square, as good as nothing beside any log, and steps of finite differences, which go by it, stay on the arm.
+/// Largest standard deviation of a parameter relative to its value (or to the largest value of the same unit): a value ten times as large then costs one square,
+/// as good as nothing beside any log, and steps of finite differences, which go by the standard deviation, stay on the arm.
 const WIDEST: f64 = 10.0;
 
-/// What is wrong with a re-estimated value.
+/// Reason why a re-estimated parameter is not to be believed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// Gravity has turned over.
+    /// A gravity parameter has changed its sign.
     Sign,
-    /// Far outside what the arm file allows.
+    /// The value lies many standard deviations of the arm file from the nominal one.
     Sigma,
-    /// It stayed where it began, beside a gap.
+    /// The value stayed near the nominal one while a gap remains.
     Unmoved,
-    /// Friction that the arm file has is gone.
+    /// A friction coefficient that the arm file has was estimated as zero.
     Zero,
 }
 
 /// A re-estimated parameter that is not to be believed as it stands.
 #[derive(Debug, Clone, PartialEq, JsonSchema, Serialize)]
 pub struct Sanity {
-    /// Parameter.
+    /// Name of the parameter.
     pub parameter: &'static str,
-    /// What is wrong.
+    /// Reason why the re-estimated value of the parameter is not to be believed.
     pub kind: Kind,
-    /// The same in words.
+    /// Reason in words, with the nominal and the re-estimated value of the parameter.
     pub message: String,
 }
 
-/// A parameter before and after its estimation.
+/// A parameter before and after its estimation, SI.
 #[derive(Debug, Clone, Copy)]
 pub struct Estimate {
-    /// Value of the arm file.
+    /// Value of the parameter in the arm file, SI.
     pub nominal: f64,
-    /// Its standard deviation there.
+    /// Standard deviation of the parameter in the arm file, SI.
     pub prior: f64,
-    /// Estimated value.
+    /// Estimated value of the parameter, SI.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the estimated value, SI.
     pub sigma: f64,
 }
 
@@ -67,7 +67,7 @@ impl Estimate {
         (self.value - self.nominal).abs() / self.prior
     }
 
-    /// Whether both signs are known and differ.
+    /// Whether the signs of the nominal and the estimated value are both known and differ.
     fn is_turned(&self) -> bool {
         self.nominal * self.value < 0.0
             && self.value.abs() > KNOWN * self.sigma
@@ -79,12 +79,12 @@ impl Estimate {
     }
 }
 
-/// Whether a parameter of an arm, by its index, is a torque of gravity: an inertial one in the unit of a torque or force.
+/// Whether parameter `index` of an arm is a gravity torque: an inertial parameter with the unit of a torque or force.
 fn is_gravity(kind: ArmKind, index: usize) -> bool {
     index < kind.inertial() && matches!(kind.parameters()[index].unit, "N m" | "N")
 }
 
-/// What is wrong with re-estimated parameters; `remains` says whether they leave a gap.
+/// Reasons why re-estimated parameters are not to be believed; `remains` says whether they leave a gap.
 pub fn sanity(kind: ArmKind, estimates: &[Estimate], remains: bool) -> Vec<Sanity> {
     let stuck = remains && estimates.iter().all(Estimate::is_unmoved);
     let one = |(i, (parameter, estimate)): (usize, (&Parameter, &Estimate))| {
@@ -129,7 +129,7 @@ fn with_unit(value: f64, parameter: &Parameter) -> String {
     format!("{} {}", significant(value), parameter.unit)
 }
 
-/// Four digits, with an exponent where they stand far from the point.
+/// A number with four significant digits, with an exponent below 1e-3 and from 1e5 on.
 fn significant(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) {
@@ -139,7 +139,7 @@ fn significant(value: f64) -> String {
     format!("{value:.0$}", places as usize)
 }
 
-/// Standard deviations to estimate with, no wider than an arm can ask for.
+/// Standard deviations of parameters `theta`, limited to ten times the value (or the largest value of the same unit).
 pub fn bounded_sigma(kind: ArmKind, theta: &[f64], sigma: &[f64]) -> Vec<f64> {
     let parameters = kind.parameters();
     let largest = |unit: &str| {
@@ -159,7 +159,7 @@ mod tests {
 
     const PENDULUM: ArmKind = ArmKind::Pendulum;
 
-    /// Inertia, gravity, viscous and Coulomb friction as of the arm file, but for one.
+    /// Estimates of a pendulum's inertia, gravity, viscous and Coulomb friction near the arm file's values, with `odd` at `index`.
     fn with(index: usize, odd: Estimate) -> Vec<Estimate> {
         let nominal = [0.05, 0.6, 0.02, 0.1];
         let usual = |x: f64| Estimate { nominal: x, prior: 0.1 * x, value: 1.05 * x, sigma: 0.01 * x };

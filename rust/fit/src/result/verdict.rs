@@ -1,59 +1,59 @@
-//! The verdict, as a function of plain evidence: what the table of the gap shows and whether a cause is named.
+//! The verdict of a diagnosis, as a function of the prediction errors and of whether a cause is named.
 
 use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// A prediction error beyond this many claimed floors cannot be called noise. Four true ones are none: RMS errors of as few as ten windows, each with
-/// one start, scatter by less than twice. On one joint of twenty the floor that is claimed is 1.25 times the true one (docs/input-defects.md).
+/// Claimed noise floors beyond which a prediction error is not noise. Four true floors are not: RMS errors of as few as ten windows, each with one initial state,
+/// scatter by less than twice. On one joint of twenty the claimed floor is 1.25 times the true one (docs/input-defects.md).
 pub const ABOVE_NOISE: f64 = 3.2;
 
 /// Share of a joint's error that re-estimated parameters must remove to be called an improvement: less is of no use to anyone.
 const IMPROVEMENT: f64 = 0.2;
 
-/// An error below this many floors leaves nothing to improve: the floor itself is known to a factor of about 1.4.
+/// Ratio of an error to its noise floor below which nothing is left to improve: the floor itself is known to a factor of about 1.4.
 const IMPROVABLE: f64 = 2.0;
 
-/// What a diagnosis comes to.
+/// Verdict of a diagnosis in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// The gap is within noise, or of no consequence.
+    /// The gap is within noise, or of no consequence beside the motion.
     None,
-    /// Right structure, wrong values.
+    /// Re-estimated parameters close the gap: the structure of the model is right, its values were wrong.
     Parameters,
     /// One or more causes are named.
     Effect,
-    /// A gap that nothing named explains.
+    /// A gap remains that no named cause explains.
     Unexplained,
 }
 
-/// What a verdict rests on; lists have one entry per joint: RMS position errors on the holdout over the horizon, rad or m.
+/// Errors from which a verdict follows; lists have one entry per joint: RMS position errors on the holdout over the horizon, rad or m.
 #[derive(Debug, Clone, Copy)]
 pub struct Evidence<'a> {
     /// Whether a cause is named.
     pub named: bool,
-    /// Whether the model search ended beside a cost that is more than noise.
+    /// Whether the model search ended with a cost above what noise explains.
     pub open: bool,
-    /// The arm file as it is.
+    /// RMS position error by joint of the arm file as it is, rad or m.
     pub before: &'a [f64],
-    /// Parameters re-estimated.
+    /// RMS position error by joint with parameters re-estimated, rad or m.
     pub refit: &'a [f64],
-    /// The model reported.
+    /// RMS position error by joint of the reported model, rad or m.
     pub after: &'a [f64],
-    /// What measurement noise alone leaves.
+    /// Noise floor by joint: RMS position error of a perfect model, rad or m.
     pub floor: &'a [f64],
-    /// RMS displacement of the arm over the horizon, rad or m.
+    /// RMS displacement of the arm over the horizon by joint, rad or m.
     pub motion: &'a [f64],
 }
 
 impl Evidence<'_> {
-    /// Whether the model reported leaves a gap of consequence that is more than noise.
+    /// Whether the reported model leaves a gap of consequence that is more than noise.
     pub fn remains(&self) -> bool {
         self.open || self.stands_out(self.after)
     }
 
-    /// Whether some joint's error is several floors, and of consequence beside the joint's motion.
+    /// Whether the `error` of some joint, rad or m, is several noise floors and of consequence beside the joint's motion.
     fn stands_out(&self, error: &[f64]) -> bool {
         let limits = self.floor.iter().zip(self.motion);
         error
@@ -62,7 +62,7 @@ impl Evidence<'_> {
             .any(|(e, (floor, motion))| *e > ABOVE_NOISE * floor && *e > CONSEQUENTIAL_ERROR * motion)
     }
 
-    /// Whether re-estimated parameters bring some joint's error down.
+    /// Whether re-estimated parameters lower the error of some joint noticeably.
     fn is_improved(&self) -> bool {
         let steps = self.before.iter().zip(self.refit).zip(self.floor);
         steps.into_iter().any(|((before, refit), floor)| {
@@ -70,7 +70,7 @@ impl Evidence<'_> {
         })
     }
 
-    /// The verdict.
+    /// Verdict that follows from the errors and from whether a cause is named.
     pub fn verdict(&self) -> Verdict {
         match () {
             () if self.named => Verdict::Effect,
@@ -88,7 +88,7 @@ mod tests {
 
     const FLOOR: f64 = 1e-3;
 
-    /// Errors in floors: of the arm file, re-estimated, and of the model reported; the motion in units of the unit error.
+    /// Verdict on two joints, of which the second has errors of `errors` noise floors (arm file, re-estimated, reported model) and a motion of `motion` floors.
     fn of(errors: [f64; 3], motion: f64, open: bool, named: bool) -> Verdict {
         let [before, refit, after] = errors.map(|e| [0.1 * FLOOR, e * FLOOR]);
         let (floor, motion) = ([FLOOR; 2], [1.0, motion * FLOOR]);

@@ -1,7 +1,7 @@
-//! Acceptance criteria: what is accepted as a cause.
+//! Acceptance criteria of a cause in the model search.
 //!
-//! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the
-//! windows' own scatter, or when it brings the parameters back to their prior values.
+//! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the windows' own scatter, or when it
+//! brings the parameters back to their prior values.
 
 use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use crate::likelihood::holdout::is_plausible;
@@ -18,82 +18,82 @@ const CERTAIN_ENOUGH: f64 = 2.5;
 /// Mean advantage per holdout window, in standard errors, below which a cause is not accepted: on the holdout alone it must not fail.
 const HOLDOUT_CERTAIN: f64 = 1.0;
 
-/// Share of the gap above the floor below which an improvement does not matter.
+/// Share of the gap above the noise floor below which an improvement does not matter.
 pub const MATTERS: f64 = 0.1;
 
 /// Share of a gap of no consequence below which an improvement does not matter: only an effect that explains most of it counts.
 const MATTERS_IN_SMALL: f64 = 0.5;
 
-/// Cost above the floor, as a factor, below which there is nothing left to explain.
+/// Ratio of the cost to its noise floor below which there is nothing left to explain.
 pub const ABOVE_FLOOR: f64 = 1.25;
 
 /// Cost of a typical window, relative to what noise alone leaves, up to which a gap is that of a few windows.
 const AT_FLOOR: f64 = 1.5;
 
-/// What a candidate must take off those few, in costs of a typical window, and what others may lose by it, as a part of that.
+/// Least decrease of cost in the few windows that make a gap, in costs of a typical window; largest rise in other windows, as a part of the decrease.
 const OUTLYING: f64 = 25.0;
 const HARMLESS: f64 = 0.05;
 
 /// Decrease of the prior cost, in squared sigmas, that makes a cause on its own.
 pub const TRUST_GAIN: f64 = 16.0;
 
-/// Beside an unexplained gap larger than this part of the motion, implausible values are no evidence: the gap may have moved them.
+/// Gap, relative to the motion, above which implausible parameters are no evidence of a cause while the gap is unexplained: the gap may have moved them.
 const TRUSTWORTHY: f64 = 0.01;
 
-/// Candidates whose prior cost differs by less, in squared sigmas, are look-alikes.
+/// Difference of prior costs, in squared sigmas, below which two candidates are look-alikes.
 pub const ALIKE_TRUST: f64 = 6.0;
 
-/// Cost above the floor, as a factor, beyond which a gap without a cause is called unexplained.
+/// Ratio of the cost to its noise floor beyond which a gap without a cause is called unexplained.
 pub const UNEXPLAINED: f64 = 4.0;
 
 /// Improvement relative to the motion within a window below which an effect is of no consequence.
 pub const RELEVANT: f64 = 1e-4;
 
-/// A gap that is not worth a name by itself is looked into down to this size if it stands far above the floor.
+/// Smallest gap, relative to the motion, that is searched for causes: too small for a name by itself, but searched if it stands far above the noise floor.
 pub const FAINTEST: f64 = 5e-6;
-/// Cost above the floor, as a factor, from which such a gap is looked into.
+/// Ratio of the cost to its noise floor from which a gap too small for a name by itself is searched for causes.
 pub const CLEAR: f64 = 2.75;
 
-/// There a cause must explain this part of it, with this certainty, as no error of an integrator does.
+/// Share of a gap too small for a name by itself that a cause must explain, and its mean advantage in standard errors: no integrator error does.
 const MATTERS_IF_FAINT: f64 = 0.7;
 const CERTAIN_IF_FAINT: f64 = 5.0;
 
-/// How fast an unexplained remainder reduces the probability of the causes: effects that are in no library were seen to be imitated by
-/// two or three that are, for up to eight tenths of the gap.
+/// Power of the explained share of the gap in the probability of causes: effects that are in no library were seen to be imitated by two or three that are, for up
+/// to eight tenths of the gap.
 pub const REMAINDER_POWER: i32 = 6;
 
-/// Improvement relative to the first gap below which an effect is no cause of that gap.
+/// Improvement relative to the first gap below which an effect is no cause of the gap.
 const NOTICEABLE: f64 = 0.02;
 
-/// A fit that ends this close to the largest possible size has found no effect.
+/// Part of the largest possible size of an effect above which a fit has found no effect.
 const AT_BOUND: f64 = 0.98;
 
-/// Resamples of the windows.
+/// Resamples of the windows for the selection probability of a cause.
 pub const RESAMPLES: usize = 400;
 
 /// Look-alikes that are listed with a cause at most: what a reader takes in.
 pub const LOOK_ALIKES: usize = 3;
 
-/// A candidate with fewer parameters is preferred if it reaches this part of the best one's advantage.
+/// Part of the best candidate's advantage from which a candidate with fewer parameters is preferred.
 pub const ALMOST: f64 = 0.95;
 
-/// Part of the best one's advantage for that preference where even the best leaves most of the gap: there, further parameters fit other causes.
+/// Part of the best candidate's advantage from which one with fewer parameters is preferred if even the best leaves most of the gap to other causes.
 const ALMOST_IN_DOUBT: f64 = 0.6;
 
-/// A candidate that explains more than this part of the gap explains most of it.
+/// Share of the gap above which a candidate explains most of the gap.
 const MOST: f64 = 0.5;
 
-/// A candidate whose cost is within this part of the winner's advantage is a look-alike.
+/// Part of the winner's advantage within which the cost of a look-alike lies.
 const LOOK_ALIKE: f64 = 0.03;
 
-/// Minimum relevance of a cause: improvement relative to the motion below which it is not named, given the first gap. What is of
-/// consequence by itself is always named.
+/// Smallest improvement, RMS relative to the motion, for which a cause is named, given the relative error `first_gap` before any cause. What is of consequence by
+/// itself is always named.
 pub fn min_relevance(first_gap: f64) -> f64 {
     (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENTIAL_ERROR)
 }
 
 impl<const N: usize, const P: usize> SearchNode<N, P> {
-    /// Whether the data hardly prefer `best` to another candidate.
+    /// Whether the data hardly prefer candidate `best` to candidate `other`.
     pub fn is_alike(&self, best: &Candidate<P>, other: &Candidate<P>) -> bool {
         let advantage = self.base.score() - best.score();
         other.score() - best.score() < (LOOK_ALIKE * advantage).max(3.0) || best.z_over(other) < 1.0
@@ -101,8 +101,8 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
 
     /// Whether a candidate explains windows that stand far out of noise, in training and holdout, at no cost to any other.
     ///
-    /// An effect that shows in a few windows, such as a joint limit that is hardly touched, never has a mean advantage of many standard errors.
-    /// Where all other windows are at the floor, it needs none: their noise is known, and it is not noise that it takes away.
+    /// An effect that shows in a few windows, such as a joint limit that is hardly touched, never has a mean advantage of many standard errors. Where all other
+    /// windows are at the noise floor, it needs none: their noise is known, and what it takes away is not noise.
     fn settles_outliers(&self, candidate: &Candidate<P>) -> bool {
         let windows = self.base.holdout.len() as f64;
         self.weights.holdout.typical < AT_FLOOR * self.floor / windows
@@ -111,8 +111,7 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
             && self.settles(&candidate.holdout, &self.base.holdout)
     }
 
-    /// Whether one fit explains windows of the training or of the holdout that stand far out of noise under another, at no cost to any of
-    /// the rest.
+    /// Whether fit `fit` explains windows of the training or of the holdout that stand far out of noise under fit `other`, at no cost to any of the rest.
     pub fn takes_outliers(&self, fit: &Candidate<P>, other: &Candidate<P>) -> bool {
         self.settles(&fit.training, &other.training) || self.settles(&fit.holdout, &other.holdout)
     }
@@ -124,7 +123,7 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
         gain > OUTLYING * self.weights.holdout.typical && -loss < HARMLESS * gain
     }
 
-    /// Whether an effect would show in this gap: a small one may be an integrator's error, which is like a shift in time or a stiff shaft.
+    /// Whether an effect would show in the gap of this node: a small gap may be an integrator's error, which is like a shift in time or a stiff shaft.
     pub fn shows(&self, effect: Option<&EffectInstance>) -> bool {
         self.relative_error() > RELEVANT
             || effect.is_some_and(|e| {
@@ -134,16 +133,16 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     }
 }
 
-/// Why a candidate is accepted.
+/// Ground on which a candidate is accepted as a cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ground {
-    /// It moves predictions closer to the measurement.
+    /// The candidate moves predictions closer to the measurement.
     Motion,
-    /// It brings the parameters back to their prior values.
+    /// The candidate brings the parameters back to their prior values.
     Trust,
 }
 
-/// Index of the accepted candidate, and why, if any is accepted; friction regularisation is accepted once.
+/// Index of the accepted candidate and the ground for it, if any is accepted; friction regularisation is accepted unless `regularised` before.
 ///
 /// Improvements below `min_relevance`, relative to the motion, do not count.
 pub fn choose<const N: usize, const P: usize>(
@@ -177,8 +176,8 @@ pub fn is_possible<const P: usize>(candidate: &Candidate<P>) -> bool {
     candidate.size < AT_BOUND && !candidate.is_idle()
 }
 
-/// The candidate with the fewest parameters among those that do almost as well as the best: a spring with a far-off rest position is
-/// an offset, and a hysteresis over next to no path is rounded friction.
+/// The candidate with the fewest parameters among those that do almost as well as candidate `best`: a spring with a far-off rest position is an offset, and a
+/// hysteresis over next to no path is regularised friction.
 fn simplest<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     best: usize,
@@ -195,19 +194,19 @@ fn simplest<const N: usize, const P: usize>(
     fewest_values(&offers, best, almost)
 }
 
-/// What a choice for simplicity needs to know of a candidate.
+/// Figures of a candidate from which the simplest of several candidates is chosen.
 #[derive(Debug, Clone, Copy)]
 struct Offer {
-    /// Decrease of the cost.
+    /// Decrease of the cost by the candidate.
     advantage: f64,
-    /// Values that it is free in beyond the arm's; none if it is not to be chosen.
+    /// Number of the candidate's values beyond the arm's parameters; zero if the candidate is not to be chosen for its simplicity.
     values: usize,
-    /// Whether it would be accepted by itself.
+    /// Whether the candidate would be accepted by itself.
     moves: bool,
 }
 
-/// The offer with the fewest values among those that are accepted by themselves and reach more than the part `almost` of the best one's
-/// advantage, the first of several.
+/// Index of the offer with the fewest values among those that are accepted by themselves and reach more than the part `almost` of the advantage of offer `best`;
+/// the first of several.
 fn fewest_values(offers: &[Offer], best: usize, almost: f64) -> usize {
     let Offer { advantage, values, .. } = offers[best];
     if values == 0 {
@@ -218,8 +217,8 @@ fn fewest_values(offers: &[Offer], best: usize, almost: f64) -> usize {
     (0..offers.len()).filter(as_good).min_by_key(|i| (offers[*i].values, *i)).unwrap_or(best)
 }
 
-/// Values that a candidate is free in beyond the arm's: those of its effect, or the width of rounded friction while that is open. None of a
-/// candidate that is not to be chosen for its simplicity.
+/// Number of a candidate's free values beyond the arm's parameters: those of its effect, or one for the width of friction regularisation while that is open. Zero
+/// of a candidate that is not to be chosen for its simplicity.
 fn free_values<const P: usize>(candidate: &Candidate<P>, regularised: bool) -> usize {
     let width = usize::from(!regularised && candidate.fit.hypothesis.is_rounded());
     candidate.effect.as_ref().map_or(width, EffectInstance::len)
@@ -244,7 +243,7 @@ pub fn moves<const N: usize, const P: usize>(
         && (is_certain(node, candidate, certain) || node.settles_outliers(candidate))
 }
 
-/// Whether a candidate's advantage exceeds the windows' scatter, on the holdout alone too.
+/// Whether a candidate's advantage exceeds the windows' scatter, by `certain` standard errors on all windows, and on the holdout alone too.
 fn is_certain<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     candidate: &Candidate<P>,
@@ -261,7 +260,7 @@ pub fn is_regularisation<const N: usize, const P: usize>(
     node.share(candidate) > MOST && is_certain(node, candidate, CERTAIN_ENOUGH)
 }
 
-/// Whether a candidate explains implausible parameters by one effect.
+/// Whether a candidate is accepted for bringing implausible parameters back to their prior values by one effect.
 pub fn restores<const N: usize, const P: usize>(node: &SearchNode<N, P>, candidate: &Candidate<P>) -> bool {
     candidate.effect.is_some()
         && (node.relative_error() < TRUSTWORTHY || !node.is_open())

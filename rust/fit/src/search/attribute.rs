@@ -1,4 +1,4 @@
-//! Which effect: screening, full fits of what passes, and the holdout's decision, one cause after another.
+//! One node of the model search: candidate effects are screened, those that pass are fitted in full, and the holdout decides.
 
 use crate::candidates::screen::ScoreTest;
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
@@ -13,49 +13,49 @@ use armgap_core::effect::{MAX_PARAMETERS, Quantity, Trial, catalogue, find};
 use armgap_core::transmission::Sides;
 use rayon::prelude::*;
 
-/// Other sides of encoder and friction from which the best transmission is fitted again.
+/// Other assignments of encoder and friction to motor or link from which the best transmission is fitted again.
 const OTHER_SIDES: usize = 2;
 
-/// Candidates that are fitted again under the weights of the best.
+/// Candidates that are fitted again under window weights of the best candidate's residual.
 const FINALISTS: usize = 4;
 
 /// Candidates that are fitted with their own Jacobian before the finalists are chosen.
 const TAKEN_ON: usize = 2 * FINALISTS;
 
-/// Rounds in which the finalists are fitted under weights of the best one's residual.
+/// Rounds at most in which the finalists are fitted under window weights of the best candidate's residual.
 const MAX_REWEIGHTINGS: usize = 3;
 
-/// A residual whose scale has shrunk by less than this factor needs no new weights.
+/// Factor below which a decrease of the residual's scale requires no new window weights.
 const SHRUNK: f64 = 1.15;
 
-/// Finalists by prior cost lie within this many squared sigmas of the lowest.
+/// Squared sigmas above the lowest prior cost within which candidates become finalists for their prior cost.
 const TRUSTED: f64 = 10.0;
 
-/// Size relative to the largest possible below which nothing is left of an effect.
+/// Size of an effect relative to the largest possible below which nothing is left of the effect.
 const IDLE: f64 = 2e-5;
 
 /// Initial guess, relative to the typical size, of a parameter that a simpler law does not have.
 const LITTLE: f64 = 0.1;
 
-/// One alternative to the current model, fitted on the training windows and judged on the holdout.
+/// An alternative to the current model, fitted on the training windows and judged on the holdout.
 #[derive(Debug, Clone)]
 pub struct Candidate<const P: usize> {
     /// The added effect; none for the current model, with or without friction regularisation.
     pub effect: Option<EffectInstance>,
-    /// Size of the added effect's first parameter relative to the largest possible.
+    /// Deviation of the added effect's first parameter from neutral, relative to the largest possible.
     pub size: f64,
-    /// The fit.
+    /// Fit of the alternative to the training windows.
     pub fit: Fit<P>,
     /// Student-t cost of every training window.
     pub training: Vec<f64>,
     /// Student-t cost of every holdout window.
     pub holdout: Vec<f64>,
-    /// Cost of the holdout windows as they are, but for the worst few.
+    /// Squared error of the holdout windows without robust weights, but for the worst few windows.
     pub error: f64,
 }
 
 impl<const P: usize> Candidate<P> {
-    /// Cost on all windows plus the prior cost.
+    /// Cost on all training and holdout windows plus the prior cost.
     pub fn score(&self) -> f64 {
         self.training.iter().chain(&self.holdout).sum::<f64>() + self.fit.prior_cost
     }
@@ -65,7 +65,7 @@ impl<const P: usize> Candidate<P> {
         self.effect.is_some_and(|e| e.law.spec().trial == Trial::Whole) && self.size < IDLE
     }
 
-    /// Whether two are of the same effect on the same joint, or both of none.
+    /// Whether two candidates add the same effect on the same joint, or both add none.
     pub fn is_same(&self, other: &Self) -> bool {
         match (&self.effect, &other.effect) {
             (Some(a), Some(b)) => a.same_place(b),
@@ -74,24 +74,24 @@ impl<const P: usize> Candidate<P> {
         }
     }
 
-    /// Advantage over `other` of every window, training first.
+    /// Decrease of the cost of every window beside candidate `other`, training windows first.
     pub fn advantages(&self, other: &Self) -> Vec<f64> {
         let here = self.training.iter().chain(&self.holdout);
         other.training.iter().chain(&other.holdout).zip(here).map(|(b, a)| b - a).collect()
     }
 
-    /// Mean advantage over `other` per window, in units of its standard error.
+    /// Mean advantage over candidate `other` per window, in units of its standard error.
     pub fn z_over(&self, other: &Self) -> f64 {
         z_score(&self.advantages(other))
     }
 
-    /// Mean advantage over `other` per holdout window, in units of its standard error.
+    /// Mean advantage over candidate `other` per holdout window, in units of its standard error.
     pub fn holdout_z_over(&self, other: &Self) -> f64 {
         z_score(&self.advantages(other)[self.training.len()..])
     }
 }
 
-/// Mean in units of its standard error.
+/// Mean of `x` in units of its standard error.
 fn z_score(x: &[f64]) -> f64 {
     let n = x.len() as f64;
     let mean = x.iter().sum::<f64>() / n;
@@ -99,38 +99,37 @@ fn z_score(x: &[f64]) -> f64 {
     mean / (variance / n).sqrt().max(1e-12)
 }
 
-/// One search node: the current model and its candidates, under common weights.
+/// A node of the model search: the current model and its candidates, under common window weights.
 #[derive(Debug, Clone)]
 pub struct SearchNode<const N: usize, const P: usize> {
-    /// The current model, fitted under weights of its own residual.
+    /// The current model, fitted under window weights of its own residual.
     pub settled: Fit<P>,
-    /// The current model, fitted under the common weights.
+    /// The current model, fitted under the weights common to all candidates.
     pub base: Candidate<P>,
-    /// Alternatives, best first.
+    /// Alternatives to the current model, best first.
     pub candidates: Vec<Candidate<P>>,
-    /// Every candidate that was fitted, by the share of the gap it removes under the current model's own weights, best first.
+    /// Every candidate that was fitted, with the share of the gap it removes under the current model's own weights, best first.
     pub field: Vec<(Candidate<P>, f64)>,
-    /// First-order tests of all candidates around the settled model, the open ones first; none if they were not made under the weights in
-    /// force.
+    /// First-order tests of all candidates around the settled model, the open ones first; empty if they were made under other weights than the node has.
     pub screened: Vec<ScoreTest>,
-    /// Weights in force.
+    /// Weights of the training and holdout windows, common to all candidates.
     pub weights: SplitWeighting<N>,
-    /// Cost the measurement noise alone would leave on the holdout, under these weights.
+    /// Cost that measurement noise alone would leave on the holdout, under the node's weights.
     pub floor: f64,
-    /// Cost that predicting no motion at all within each window would have on the holdout.
+    /// Cost on the holdout of predicting no motion at all within each window.
     pub motion: f64,
 }
 
-/// The finalists and the current model at the end of the last round.
+/// The finalists and the current model after the last round of re-weighting.
 struct FinalRound<const N: usize, const P: usize> {
     base: Candidate<P>,
     candidates: Vec<Candidate<P>>,
-    /// Weights of the windows under the best candidate, where they differ from those that the candidates were compared under.
+    /// Window weights under the best candidate; none if they are those that the candidates were compared under before.
     weights: Option<SplitWeighting<N>>,
 }
 
 impl<const N: usize, const P: usize> SearchNode<N, P> {
-    /// Share of the holdout's cost above the floor that a candidate removes.
+    /// Share of the holdout's cost above the noise floor that a candidate removes.
     pub fn share(&self, candidate: &Candidate<P>) -> f64 {
         let base: f64 = self.base.holdout.iter().sum();
         let here: f64 = candidate.holdout.iter().sum();
@@ -147,7 +146,7 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
         (self.base.error / self.motion).sqrt()
     }
 
-    /// Whether the current model leaves a gap of consequence above the floor.
+    /// Whether the current model leaves a gap of consequence above the noise floor.
     pub fn is_open(&self) -> bool {
         self.relative_error() > CONSEQUENTIAL_ERROR && self.excess() > ABOVE_FLOOR
     }
@@ -157,24 +156,24 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
         self.relative_error() > CONSEQUENTIAL_ERROR && self.excess() > UNEXPLAINED
     }
 
-    /// Whether the current model leaves a gap above the floor in which an improvement of `min_relevance` size can lie.
+    /// Whether the current model leaves a gap above the noise floor large enough for an improvement of `min_relevance`, relative to the motion.
     pub fn is_worth_more(&self, min_relevance: f64) -> bool {
         self.relative_error() > min_relevance && self.excess() > ABOVE_FLOOR
     }
 
-    /// How far the current model's cost lies above the floor, as a factor.
+    /// Ratio of the current model's cost on the holdout to its noise floor.
     pub fn excess(&self) -> f64 {
         self.base.holdout.iter().sum::<f64>() / self.floor
     }
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The search node around the current model; improvements below `min_relevance`, relative to the motion, are not looked for.
+    /// The search node around the model `current`; improvements below `min_relevance`, relative to the motion, are not looked for.
     pub fn node(&self, current: &Hypothesis<P>, scale: [f64; N], min_relevance: f64) -> SearchNode<N, P> {
         self.node_around(self.settle(current, scale), min_relevance)
     }
 
-    /// The search node around a fit under weights of its own residual; improvements below `min_relevance` are not looked for.
+    /// The search node around a fit under weights of its own residual; improvements below `min_relevance`, relative to the motion, are not looked for.
     pub fn node_around(
         &self,
         (fit, weights): (Fit<P>, SplitWeighting<N>),
@@ -210,7 +209,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (effect.p[0] - centre).abs() / self.scales.largest(parameter.quantity, effect.joint)
     }
 
-    /// All fitted candidates with the share of the gap each removes.
+    /// All fitted candidates that add an effect, with the share of the gap each removes.
     fn field(
         &self,
         weights: &SplitWeighting<N>,
@@ -223,8 +222,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         fitted.iter().filter(|c| c.effect.is_some()).map(|c| (c.clone(), share(c))).collect()
     }
 
-    /// Fits all initial guesses and judges them, best first; `jacobian` is that of the model they add to, where it is known. What
-    /// diverged or came down to nothing is left out.
+    /// Fits all initial guesses and judges them, best first; `jacobian` is that of the model `base` they add to, where it is known. Candidates that diverged or
+    /// whose effect came down to nothing are left out.
     pub(crate) fn fit_candidates(
         &self,
         weights: &SplitWeighting<N>,
@@ -239,7 +238,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         ranked(initial_guesses.into_par_iter().map(fitted).collect())
     }
 
-    /// The best candidates, fitted again with their own Jacobian where they have reused columns of the model they add to.
+    /// The candidates in order of cost, after a fit of the best ones with their own Jacobian where they have reused columns of the model `base`.
     fn taken_on(
         &self,
         weights: &SplitWeighting<N>,
@@ -254,7 +253,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         ranked(candidates.into_par_iter().enumerate().map(on).collect())
     }
 
-    /// Fits an initial guess and judges it; its effect beyond the `known` ones is the one under test.
+    /// Fits an initial guess and judges it; the effect behind the first `known` ones is the one under test.
     pub(crate) fn candidate(
         &self,
         weights: &SplitWeighting<N>,
@@ -274,7 +273,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         Candidate { effect, size, fit, training, holdout, error }
     }
 
-    /// Re-weights by the best candidate's residual and fits the finalists and the current model again.
+    /// Re-weights the windows by the best candidate's residual and fits the finalists and the current model again.
     fn final_round(
         &self,
         current: &Hypothesis<P>,
@@ -316,8 +315,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FinalRound { base, candidates, weights: heavier }
     }
 
-    /// The model with a candidate whose effect is a transmission, with encoder and friction on other sides that they may be on: those that explain
-    /// the training windows best as it stands.
+    /// Alternatives to a candidate whose effect is a transmission: encoder and friction on other sides that they may be on, those that explain the training
+    /// windows best before another fit.
     fn other_sides(&self, candidate: &Candidate<P>, weights: &SplitWeighting<N>) -> Vec<Hypothesis<P>> {
         let Some(effect) = candidate.effect.filter(|effect| effect.law.has_transmission()) else {
             return Vec::new();
@@ -344,7 +343,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Candidates, best first, none twice; what diverged or came down to nothing is left out.
+/// Candidates ordered by cost, none twice, without those that diverged or whose effect came down to nothing.
 fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>> {
     candidates.retain(|c| c.score().is_finite() && !c.is_idle());
     candidates.sort_by(|a, b| a.score().total_cmp(&b.score()));
@@ -357,7 +356,7 @@ fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>
     best
 }
 
-/// Hypotheses to be fitted to the end: the best by cost, of those that are not hopeless, and the best by prior cost.
+/// Hypotheses to be fitted to the end: the best candidates by cost below `hopeless`, and the best by prior cost.
 fn finalists<const P: usize>(candidates: &[Candidate<P>], hopeless: f64) -> Vec<Hypothesis<P>> {
     let mut by_trust: Vec<usize> = (0..candidates.len()).collect();
     let prior = |i: &usize| candidates[*i].fit.prior_cost;
@@ -371,7 +370,7 @@ fn finalists<const P: usize>(candidates: &[Candidate<P>], hopeless: f64) -> Vec<
         .collect()
 }
 
-/// The model with another law at the candidate's values of the arm; none if it has that law there.
+/// The model with effect `law` added, at the candidate's values of the arm's parameters; none if the model has this effect already.
 fn with_law<const P: usize>(
     model: &Hypothesis<P>,
     candidate: &Candidate<P>,
@@ -382,7 +381,7 @@ fn with_law<const P: usize>(
     (!model.effects.iter().any(taken)).then(|| Hypothesis { theta, ..model.with(law) })
 }
 
-/// The model with what is left of a candidate's effect when its first parameter vanishes, if that is an effect of its own.
+/// The model with the simpler law that a candidate's effect becomes when its first parameter vanishes; none if it has no simpler law.
 fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> Option<Hypothesis<P>> {
     let effect = candidate.effect?;
     let law = find::<f64>(effect.law.simpler()?)?;
@@ -395,7 +394,7 @@ fn simpler<const P: usize>(model: &Hypothesis<P>, candidate: &Candidate<P>) -> O
     with_law(model, candidate, EffectInstance::new(law, effect.joint, p))
 }
 
-/// The model with the law of which a candidate's effect is the simplest case, with a small value of the parameter that the simple one does not have.
+/// The model with the law of which a candidate's effect is the simplest case, and a small value of the parameter that the simple law does not have.
 fn richer<const N: usize, const P: usize>(
     model: &Hypothesis<P>,
     candidate: &Candidate<P>,

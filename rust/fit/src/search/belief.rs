@@ -1,4 +1,4 @@
-//! Selection probability of a cause.
+//! Selection probability of a cause: how often it is preferred when the windows are drawn again.
 
 use crate::model::hypothesis::EffectInstance;
 use crate::numeric::random::Random;
@@ -9,29 +9,29 @@ use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::evidence::Evidence;
 use crate::search::rivals::equivalent;
 
-/// A cause that was accepted.
+/// An accepted cause with its probability, evidence and look-alikes.
 #[derive(Debug, Clone)]
 pub struct Cause {
     /// The effect with its values in the final model.
     pub effect: EffectInstance,
-    /// Standard deviations of its values.
+    /// Standard deviations of the effect's values, SI.
     pub sigma: Vec<f64>,
-    /// Probability that it, or one of its look-alikes, is in the arm.
+    /// Probability that the effect, or one of its look-alikes, is in the arm.
     pub probability: f64,
-    /// Share of the holdout's gap above the floor that it removed when it was added.
+    /// Share of the holdout's gap above the noise floor that the cause removed when it was added.
     pub share: f64,
-    /// RMS improvement on the holdout when it was added, relative to the motion.
+    /// RMS improvement on the holdout by the cause when it was added, relative to the motion.
     pub relevance: f64,
-    /// Effects that this log does not tell from it.
+    /// Effects that these logs do not tell from the cause.
     pub look_alikes: Vec<EffectInstance>,
-    /// What it rests on.
+    /// Figures from which the probability of the cause follows.
     pub evidence: Evidence,
-    /// Why it was accepted.
+    /// Ground on which the cause was accepted: predicted motion or the arm's parameters.
     pub ground: Ground,
 }
 
 impl<const N: usize, const P: usize> SearchNode<N, P> {
-    /// Whether no log of motion tells the effects of two candidates apart.
+    /// Whether no log of motion tells the effects of candidates `a` and `b` apart.
     fn are_equivalent(&self, a: usize, b: usize) -> bool {
         match (self.candidates[a].effect, self.candidates[b].effect) {
             (Some(a), Some(b)) => equivalent::are(&a, &b, N),
@@ -40,7 +40,7 @@ impl<const N: usize, const P: usize> SearchNode<N, P> {
     }
 }
 
-/// The chosen candidate as a cause, with its look-alikes and probability.
+/// The candidate of index `choice` as a cause, with its look-alikes and probability.
 pub fn name<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     choice: usize,
@@ -72,8 +72,8 @@ pub fn name<const N: usize, const P: usize>(
     }
 }
 
-/// How often the chosen candidate, one that is listed as its look-alike, or one that no motion tells from it, has the lowest cost when the
-/// windows are drawn again.
+/// Probability that the candidate `choice`, one of its look-alikes `listed`, or one that no motion tells from it, has the lowest cost when the windows are drawn
+/// again.
 fn probability<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     choice: usize,
@@ -101,7 +101,7 @@ fn probability<const N: usize, const P: usize>(
     (f64::from(wins) + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
-/// How often one candidate has a lower cost than another when the windows are drawn again.
+/// Probability that one candidate has a lower cost than another when the windows are drawn again.
 pub fn probability_over<const P: usize>(one: &Candidate<P>, other: &Candidate<P>, seed: u64) -> f64 {
     let advantages = one.advantages(other);
     let own = other.fit.prior_cost - one.fit.prior_cost;
@@ -113,8 +113,8 @@ pub fn probability_over<const P: usize>(one: &Candidate<P>, other: &Candidate<P>
     (wins as f64 + 0.5) / (RESAMPLES as f64 + 1.0)
 }
 
-/// Probability of the chosen candidate, or one that no motion tells from it, among all effects that would restore the prior values, from
-/// their prior costs.
+/// Probability of the candidate `choice`, or one that no motion tells from it, among all effects that would restore the prior values of the parameters, from their
+/// prior costs.
 fn trust_probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, choice: usize) -> f64 {
     let best = node.candidates[choice].fit.prior_cost;
     let free = |c: &Candidate<P>| c.effect.as_ref().map_or(0, EffectInstance::len) as f64;
@@ -135,12 +135,12 @@ fn trust_probability<const N: usize, const P: usize>(node: &SearchNode<N, P>, ch
     (ours / all) * plausible
 }
 
-/// Part of the first gap that the final model leaves without explanation.
+/// Share of the first node's gap that the last node leaves without explanation.
 pub fn left_over<const N: usize, const P: usize>(nodes: &[SearchNode<N, P>]) -> f64 {
     unexplained_of(nodes.first(), nodes.last())
 }
 
-/// Part of the gap that a first attribution ends with that a second one leaves without explanation.
+/// Share of the gap remaining after a first attribution that a second attribution leaves without explanation.
 pub fn left_beside<const N: usize, const P: usize>(
     first: &[SearchNode<N, P>],
     second: &[SearchNode<N, P>],
@@ -148,7 +148,7 @@ pub fn left_beside<const N: usize, const P: usize>(
     unexplained_of(first.last(), second.last())
 }
 
-/// Part of one node's gap that is left in a later one, where that is more than noise.
+/// Share of an earlier node's gap that is left at a last node; zero where no more than noise is left.
 fn unexplained_of<const N: usize, const P: usize>(
     earlier: Option<&SearchNode<N, P>>,
     last: Option<&SearchNode<N, P>>,
@@ -160,7 +160,7 @@ fn unexplained_of<const N: usize, const P: usize>(
     left_of(earlier, last)
 }
 
-/// Part of one node's gap that is left in a later one.
+/// Share of an earlier node's gap that is left at a last node, 0 to 1.
 fn left_of<const N: usize, const P: usize>(earlier: &SearchNode<N, P>, last: &SearchNode<N, P>) -> f64 {
     // As it is, the error may be that of one window that ran away; with its tail cut, it is that of all of them. Where it is of no
     // consequence by itself, both must say so.
@@ -170,7 +170,7 @@ fn left_of<const N: usize, const P: usize>(earlier: &SearchNode<N, P>, last: &Se
     left.min(1.0)
 }
 
-/// What a probability is multiplied by beside a part `left` of the gap that nothing explains: one for none, `least` for all of it.
+/// Factor on the probability of a cause beside a share `left` of the gap that nothing explains: one for none, `least` for all of it.
 pub fn belief_beside(left: f64, least: f64) -> f64 {
     least + (1.0 - least) * (1.0 - left).powi(REMAINDER_POWER)
 }

@@ -1,9 +1,9 @@
-//! Logs cut crosswise, for training logs that do not show what the holdout does.
+//! Interleaved cross-validation, for training logs that do not show what the holdout does.
 //!
-//! A stop that only the held-out motion reaches, a spring that only its speeds make worth telling from friction: no effect fitted to the
-//! training logs explains such a gap, and judged on both, the right one is worth nothing. So where a diagnosis ends beside a gap, every
-//! log is cut into stretches that are learnt from and judged on by turns. Both kinds of motion are then in both, and what explains
-//! nearly all of the gap there has been judged on stretches that it was not fitted to.
+//! A stop that only the motion of the holdout reaches, a spring that only its speeds make worth telling from friction: no effect fitted to the training logs
+//! explains such a gap, and judged on both sets of logs, the right effect is worth nothing. So where a diagnosis ends with a gap, every log is cut into stretches
+//! that are fitted to and judged on by turns. Both kinds of motion are then in both sets, and what explains nearly all of the gap has been judged on stretches
+//! that it was not fitted to.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::log::cut::cut;
@@ -13,24 +13,24 @@ use crate::search::belief::left_over;
 use crate::search::model_search::Attribution;
 use armgap_core::arm::Arm;
 
-/// Stretches that interleaved cross-validation cuts a log into, if it is long enough.
+/// Stretches that interleaved cross-validation cuts a log into, if the log is long enough.
 const STRETCHES: usize = 6;
 
-/// Windows in a stretch at least.
+/// Fewest windows in a stretch of a log.
 const WINDOWS: usize = 4;
 
-/// Part of the first gap that may be left for an attribution to logs cut crosswise to count.
+/// Part of the first gap that may be left for an attribution by interleaved cross-validation to count.
 const LEFT: f64 = 0.1;
 
-/// It counts beside a remainder too if that stands this much less above the floor than the remainder it was made for.
+/// Ratio of costs in noise floors, interleaved over plain cross-validation, below which an interleaved attribution counts although a gap remains.
 const MUCH_LESS: f64 = 0.1;
 
-/// Predictions miss by this factor more on the holdout, in the mean square, where it shows what the training logs do not.
+/// Ratio of mean square errors, holdout to training logs, above which the holdout shows what the training logs do not.
 const MORE: f64 = 2.0;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Whether a search ended with predictions that miss by much more on the holdout than on the training logs: only then can stretches
-    /// of both tell more than the logs as they are.
+    /// Whether a search ended with a much larger prediction error on the holdout than on the training logs: only then can interleaved cross-validation tell more
+    /// than the logs as they are.
     pub(crate) fn holdout_shows_more(&self, attribution: &Attribution<N, P>) -> bool {
         let Some(last) = attribution.nodes.last() else { return false };
         let per_row = |costs: &[f64], rows: usize| costs.iter().sum::<f64>() / rows as f64;
@@ -40,7 +40,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Training and holdout stretches; none where a log is too short for two.
+/// Training and holdout stretches of logs, interleaved; none where a log is too short for two stretches.
 pub fn crosswise<'a>(
     training: &[LogData<'a>],
     holdout: &[LogData<'a>],
@@ -63,7 +63,7 @@ pub fn crosswise<'a>(
     Some(sides)
 }
 
-/// A stretch of a log under the log's name.
+/// A stretch of a log, named by the log and its times.
 fn stretch<'a>(log: &LogData<'a>, range: std::ops::Range<usize>) -> LogData<'a> {
     let joints = log.q.len() / log.t.len();
     let rows = range.start * joints..range.end * joints;
@@ -84,12 +84,12 @@ fn stretch<'a>(log: &LogData<'a>, range: std::ops::Range<usize>) -> LogData<'a> 
     }
 }
 
-/// A time rounded to the millisecond.
+/// A time in s rounded to the millisecond.
 fn millis(t: f64) -> f64 {
     (t * 1e3).round() / 1e3
 }
 
-/// Whether an attribution to logs cut crosswise explains what one to the logs as they are has left.
+/// Whether an attribution by interleaved cross-validation explains what a plain attribution has left.
 pub fn explains<const N: usize, const P: usize>(
     crosswise: &Attribution<N, P>,
     plain: &Attribution<N, P>,

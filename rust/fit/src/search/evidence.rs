@@ -1,9 +1,9 @@
-//! What a cause rests on in the final model, and the probability that it is in the arm.
+//! Evidence for a cause in the final model, and the probability that the cause is in the arm.
 //!
-//! A real arm always lacks something that has no name, so what stays unexplained is no evidence against a cause by itself. What counts is
-//! how the cause's own part compares with it: an effect that is not there takes up a part of the rest, and another part under another motion.
-//! So the probability follows from three figures: how often the cause is chosen when the windows are drawn again, by how much predictions
-//! of the holdout miss more without it, and whether the holdout asks for the same size as the training logs.
+//! A real arm always lacks something that has no name, so an unexplained remainder is no evidence against a cause by itself. What counts is how the cause's own
+//! part compares with the remainder: an effect that is not in the arm takes up a part of the remainder, and another part under another motion. So the probability
+//! follows from three figures: how often the cause is chosen when the windows are drawn again, by how much the holdout's error rises without it, and whether the
+//! holdout asks for the same size as the training logs.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::holdout::is_plausible;
@@ -17,49 +17,49 @@ use armgap_core::effect::Trial;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Scatter of a size between logs, relative to it, that other missing effects make beside its standard deviation.
+/// Scatter of an effect's size between logs, relative to the size, that other missing effects make beside its standard deviation.
 const SAME: f64 = 0.15;
 
-/// Mean and scatter of the size that another log asks for, relative to the first, where the effect is not there.
+/// Mean and scatter of the size of an effect that is not in the arm, as fitted to one log relative to another.
 const OTHER: [f64; 2] = [0.7, 0.8];
 
-/// Odds of a cause that takes off as much as what stays beside it and whose size nothing confirms or contradicts. Fitted to names on arms of a
-/// simulator that is not the library's (docs/decisions/034-probability-of-a-cause.md), so it holds their base rate: most lack several effects of
-/// the library, two of five one that the library does not have. Halved, the log loss there grows by a fifth; doubled, it falls by a
-/// thirtieth, and of the names from 0.75 to 0.9 fewer are right than claimed.
+/// Odds of a cause that removes as much as remains with it and whose size nothing confirms or contradicts. Fitted to names on arms of a simulator that is not the
+/// library's (docs/decisions/034-probability-of-a-cause.md), so it holds their base rate: most lack several effects of the library, two of five one that the
+/// library does not have. Halved, the log loss on these arms grows by a fifth; doubled, it falls by a thirtieth, and of the names from 0.75 to 0.9 fewer are right
+/// than claimed.
 const PRIOR_ODDS: f64 = 2.0;
 
-/// Power of the gain in the odds, from the same names: gains that differ by what else an arm lacks say less than their ratio. At 1 the log loss
-/// is larger by a twelfth.
+/// Power of a cause's gain in its odds, fitted as `PRIOR_ODDS` is: gains that differ by what else an arm lacks say less than their ratio. At 1 the log loss is
+/// larger by a twelfth.
 const GAIN_POWER: f64 = 0.5;
 
-/// How fast a law without a name that does better takes odds from a cause, from the same names. At 1 the log loss is larger by a
-/// fifth, at 3 by a hundredth.
+/// Power, in the odds of a cause, of the gap left by a law without a name relative to the gap left by the cause; fitted as `PRIOR_ODDS` is. At 1 the log loss is
+/// larger by a fifth, at 3 by a hundredth.
 const RIVAL_POWER: i32 = 4;
 
-/// What a cause rests on.
+/// Evidence for a cause in the final model.
 #[derive(Debug, Clone, Copy, Default, JsonSchema, Serialize)]
 pub struct Evidence {
-    /// How often it has the lowest cost of all candidates when the windows are drawn again, at the node where it was added.
+    /// How often the cause has the lowest cost of all candidates when the windows are drawn again, at the search node where it was added, 0 to 1.
     pub selected: f64,
-    /// By how much the cost of the holdout rises without it, everything else fitted again, relative to the cost above the floor with it; none
-    /// where no more than noise stays.
+    /// Rise of the holdout's cost without the cause, everything else fitted again, relative to the cost above the noise floor with the cause; none where no more
+    /// than noise remains.
     pub gain: Option<f64>,
-    /// Standard error of that, from the scatter between the holdout's windows.
+    /// Standard error of the gain, from the scatter between the holdout's windows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain_sigma: Option<f64>,
-    /// The same for a law without a name in its place: by how much the cost falls with the table over one variable that predicts best what the
-    /// arm leaves without the cause; none where no table does.
+    /// Fall of the holdout's cost by a law without a name in the cause's place (the table over one variable that predicts best what the arm leaves without the
+    /// cause), relative to the cost above the noise floor with the cause; none where no table predicts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rival_gain: Option<f64>,
-    /// Size that the holdout asks for, relative to that of the training logs; none where a size has no direction.
+    /// Size of the effect that the holdout asks for, relative to that of the training logs; none where a size has no direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio: Option<f64>,
-    /// Standard deviation of that.
+    /// Standard deviation of the size ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio_sigma: Option<f64>,
-    /// Of an offset of the encoder's zero, or what is alike: odds that the recordings' zeros have a mean, rather than scatter around none; none where
-    /// recordings do not differ.
+    /// Odds that the encoder zeros of the recordings have a common mean, rather than scatter around none; only for an offset of the encoder's zero or its
+    /// equivalents, and none where recordings do not differ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub beyond_scatter: Option<f64>,
 }
@@ -76,13 +76,13 @@ impl Evidence {
         beyond * self.selected * odds / (1.0 + odds)
     }
 
-    /// What a law without a name in the cause's place leaves, relative to what the cause leaves: 0 to 1.
+    /// Gap left by a law without a name in the cause's place, relative to the gap that the cause leaves: 0 to 1.
     fn left_by_rival(&self) -> f64 {
         let (Some(gain), Some(rival)) = (self.gain, self.rival_gain) else { return 1.0 };
         (1.0 + gain - rival).clamp(0.0, 1.0)
     }
 
-    /// How much more likely the two sizes are for an effect that is there than for one that is not.
+    /// Likelihood ratio of the training and holdout sizes: effect in the arm over effect not in the arm.
     fn agreement(&self) -> f64 {
         let (Some(ratio), Some(sigma)) = (self.size_ratio, self.size_ratio_sigma) else { return 1.0 };
         let density = |mean: f64, scatter: f64| {
@@ -95,7 +95,7 @@ impl Evidence {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Gives the causes of an attribution their evidence and probability.
+    /// Computes evidence and probability of all causes of an attribution.
     pub(crate) fn weigh(&self, attribution: &mut Attribution<N, P>) {
         let Some(last) = attribution.nodes.last() else { return };
         if attribution.causes.is_empty() {
@@ -137,7 +137,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// The joint whose encoder an effect makes count from another zero, and that zero; a tilted base does the same to the first joint of an arm in a
+/// Joint (from 0) whose encoder an effect makes count from another zero, and that zero, rad or m; a tilted base does the same to the first joint of an arm in a
 /// plane.
 fn zero_of(effect: &EffectInstance) -> Option<(usize, f64)> {
     let [at_zero, at_one] = [0.0, 1.0].map(|q| effect.law.measured(&effect.p, q));
@@ -149,7 +149,7 @@ fn zero_of(effect: &EffectInstance) -> Option<(usize, f64)> {
     shifts.then_some((effect.joint, at_zero))
 }
 
-/// By how much the cost of every window lies higher in one model than in another.
+/// Differences in the cost of every window between a model of higher and one of lower cost.
 fn differences(higher: &[f64], lower: &[f64]) -> Vec<f64> {
     higher.iter().zip(lower).map(|(higher, lower)| higher - lower).collect()
 }
@@ -161,13 +161,13 @@ fn standard_error_of_sum(terms: &[f64]) -> f64 {
     (n / (n - 1.0).max(1.0) * terms.iter().map(|x| (x - mean).powi(2)).sum::<f64>()).sqrt()
 }
 
-/// Whether a search ended beside a cost that is more than noise.
+/// Whether a search ended at a node whose cost is more than noise.
 fn is_more_than_noise<const N: usize, const P: usize>(last: &SearchNode<N, P>) -> bool {
     last.excess() > if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED }
 }
 
-/// Size of an effect in one fit relative to another, along the first, and its standard deviation; none for an effect whose first
-/// parameter is no amplitude.
+/// Size of effect `place` in fit `other` relative to its size in fit `of`, along the values in `of`, and the ratio's standard deviation; none for an effect whose
+/// first parameter is no amplitude.
 fn size_ratio<const P: usize>(place: usize, of: &Fit<P>, other: &Fit<P>) -> Option<(f64, f64)> {
     let effects = &of.hypothesis.effects;
     let (one, two) = (&effects[place], &other.hypothesis.effects[place]);

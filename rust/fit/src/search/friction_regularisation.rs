@@ -1,9 +1,8 @@
 //! Friction regularisation: the widths over which the sign of friction changes around standstill, fitted as a nuisance.
 //!
-//! Dry friction jumps; the friction of many simulators, and of joints that creep, follows `tanh(dq / width)`, on every joint with a width of its
-//! own. The widths are no cause of a gap that has a name, but a model with others misses every reversal, and what it misses there hides
-//! small causes, or takes the name of an effect that acts at reversals too. So the model with the best widths is a rival of every candidate,
-//! and of every cause that is to stay.
+//! Dry friction jumps at standstill; the friction of many simulators, and of joints that creep, follows `tanh(dq / width)`, on every joint with a width of its
+//! own. The widths are no cause of a gap that has a name, but a model with wrong widths misses every reversal, and this error hides small causes, or takes the
+//! name of an effect that acts at reversals too. So the model with the best widths is a rival of every candidate, and of every cause that is to stay.
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::solve::{Effort, Fit, FitProblem};
@@ -13,20 +12,20 @@ use crate::search::acceptance::{ABOVE_FLOOR, is_regularisation};
 use crate::search::attribute::{Candidate, SearchNode};
 use armgap_core::arm::Arm;
 
-/// Widths that are tried on all joints at once, relative to the slowest joint's RMS speed.
+/// Widths of friction regularisation that are tried on all joints at once, relative to the slowest joint's RMS speed.
 const WIDTHS: [f64; 7] = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0];
 
-/// From the best of them the common width is searched by this factor either way, and from there each joint's own by the second.
+/// Factors, either way, of the searches for widths of friction regularisation: the common width around the best tried, each joint's around that.
 const REACH: [f64; 2] = [4.0, 20.0];
 
-/// Evaluations of each search, of the common width and of one joint's.
+/// Evaluations of the cost in each search for a width: of the common width, and of one joint's own.
 const EVALUATIONS: [u64; 2] = [6, 7];
 
-/// Times that the widths are searched again with the parameters fitted beside them.
+/// Times that the widths of friction regularisation are searched, with the parameters fitted between.
 const ROUNDS: usize = 2;
 
-/// The widths, joint by joint, that cost least, and what they cost: the best of those `tried` on all joints, then a common one beside it, then
-/// each joint's own.
+/// Widths of friction regularisation by joint, rad/s or m/s, of least cost, and that cost: the best of `tried` on all joints, then a common width near it, then
+/// one for each joint.
 fn least_widths<const N: usize>(
     cost: impl Fn([f64; N]) -> f64,
     tried: impl IntoIterator<Item = f64>,
@@ -61,8 +60,8 @@ fn least_widths<const N: usize>(
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The model with the widths that suit the training windows best, its values estimated again to first order from its `jacobian`; none
-    /// where no width does better than those that it has.
+    /// The model with the widths of friction regularisation that suit the training windows best, its values estimated again to first order from its `jacobian`;
+    /// none where no width does better than the model's own.
     pub(crate) fn with_best_widths(
         &self,
         problem: &FitProblem<A, N, P>,
@@ -76,7 +75,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (least < now).then(|| model.rounded_over(widths))
     }
 
-    /// The model with the widths of friction regularisation that suit it best, and with exact friction if it is regularised now.
+    /// Alternatives to a model: with the widths of friction regularisation that suit it best, and with dry friction if the model's friction is regularised now.
     pub fn regularisation_guesses(
         &self,
         model: &Hypothesis<P>,
@@ -88,8 +87,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         regularised.into_iter().chain(exact).collect()
     }
 
-    /// The best fit of a model to the training windows: with the widths of friction regularisation that it has, or with those that suit it
-    /// best. What a cause is compared with when it is taken out.
+    /// The best fit of a model to the training windows, with its own widths of friction regularisation or with those that suit it best: what a model with a
+    /// further cause is compared with.
     pub(crate) fn fit_with_any_rounding(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Fit<P> {
         let problem = self.problem(&weights.training);
         let fit = problem.solve(model, Effort::FULL);
@@ -102,7 +101,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if cost(&other) < cost(&fit) { other } else { fit }
     }
 
-    /// The current model with friction regularised over the best widths, if that explains most of the gap.
+    /// Fit of the current model with friction regularised over the best widths; none if this does not explain most of the gap.
     pub fn regularisation(&self, node: &SearchNode<N, P>) -> Option<Fit<P>> {
         if node.excess() < ABOVE_FLOOR {
             return None;
@@ -128,7 +127,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 mod tests {
     use super::*;
 
-    /// Squared distances of the widths' logarithms from those of the best.
+    /// Sum over joints of squared differences between the logarithms of given and best widths.
     fn apart<const N: usize>(best: [f64; N]) -> impl Fn([f64; N]) -> f64 {
         move |widths| (0..N).map(|j| (widths[j] / best[j]).ln().powi(2)).sum()
     }

@@ -1,13 +1,13 @@
-//! Which of the candidates are causes.
+//! Model search: which candidate effects are causes of the gap.
 //!
-//! * `acceptance`: acceptance criteria.
-//! * `attribute`: one search node: candidates fitted in full, under common weights.
+//! * `acceptance`: acceptance criteria of a cause.
+//! * `attribute`: one search node, candidates fitted in full under common weights.
 //! * `belief`: selection probability of a cause.
-//! * `crosswise`: logs cut into stretches that are learnt from and judged on by turns.
+//! * `crosswise`: interleaved cross-validation, logs cut into stretches that are fitted to and judged on by turns.
 //! * `evidence`: what a cause rests on in the final model.
 //! * `friction_regularisation`: width over which the sign of friction is regularised, a nuisance.
-//! * `model_search`: one cause after another, and causes that become idle.
-//! * `reconsider`: a rival in the place of its cause, once the others are known.
+//! * `model_search`: stepwise selection, one cause after another, and causes that become idle.
+//! * `reconsider`: a rival in the place of its cause, once the other causes are known.
 //! * `rivals`: close rivals compared in pairs, look-alikes, a table as the rival of a named cause.
 //! * `together`: two causes of which neither is accepted alone.
 

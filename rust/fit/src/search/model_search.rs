@@ -1,6 +1,6 @@
 //! The model search: one cause after another is added, and causes that have become idle are dropped.
 //!
-//! After every addition all causes are fitted together again, and one that has become idle is dropped.
+//! After every addition all causes are fitted together again.
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting};
 use crate::likelihood::encoder_zero::EncoderZeros;
@@ -14,27 +14,27 @@ use crate::search::belief::{Cause, name};
 use crate::search::together::Both;
 use armgap_core::arm::Arm;
 
-/// Result of a model search.
+/// Result of a model search: the models, the accepted causes and the search nodes.
 pub struct Attribution<const N: usize, const P: usize> {
-    /// Parameters re-estimated, no effects.
+    /// The arm with its parameters re-estimated and no effects.
     pub refit: Fit<P>,
-    /// The final model.
+    /// The final model, fitted to the training logs.
     pub model: Fit<P>,
-    /// The same model fitted to the holdout.
+    /// The final model, fitted to the holdout.
     pub on_holdout: Fit<P>,
     /// Accepted causes, strongest first.
     pub causes: Vec<Cause>,
-    /// Every search node, the last one being the one at which nothing was accepted.
+    /// Every search node in order; at the last one nothing was accepted.
     pub nodes: Vec<SearchNode<N, P>>,
 }
 
 impl<const N: usize, const P: usize> Attribution<N, P> {
-    /// The effect that was added after a node.
+    /// The effect that was added after search node `node`; none if none was.
     pub fn added(&self, node: usize) -> Option<&EffectInstance> {
         added(&self.nodes.iter().collect::<Vec<_>>(), node)
     }
 
-    /// RMS error of the final model on the holdout relative to the motion.
+    /// RMS error of the final model on the holdout relative to the motion within the windows.
     pub fn error(&self) -> f64 {
         self.nodes.last().map_or(f64::INFINITY, SearchNode::relative_error)
     }
@@ -45,7 +45,7 @@ impl<const N: usize, const P: usize> Attribution<N, P> {
     }
 }
 
-/// The effect that was added after one of these nodes.
+/// The effect that was added after the search node of index `node`; none if none was.
 pub(crate) fn added<'a, const N: usize, const P: usize>(
     nodes: &[&'a SearchNode<N, P>],
     node: usize,
@@ -55,23 +55,23 @@ pub(crate) fn added<'a, const N: usize, const P: usize>(
     effects(node + 1)?.iter().find(|e| !before.iter().any(|known| known.same_place(e)))
 }
 
-/// State of a model search.
+/// State of a model search: accepted causes, current and previous search nodes.
 pub(crate) struct ModelSearch<const N: usize, const P: usize> {
     pub causes: Vec<Cause>,
-    /// The nodes before this one.
+    /// Search nodes before the current one.
     pub nodes: Vec<SearchNode<N, P>>,
     pub node: SearchNode<N, P>,
     pub regularised: bool,
     /// Whether the friction regularisation has been fitted.
     pub regularisation_fitted: bool,
-    /// Improvements of this size count, relative to the motion.
+    /// Smallest improvement that counts, RMS on the holdout relative to the motion within the windows.
     pub threshold: f64,
     /// Whether a cause has been swapped for a rival before.
     pub turned: bool,
 }
 
 impl<const N: usize, const P: usize> ModelSearch<N, P> {
-    /// Adds two causes; returns the fit with both.
+    /// Adds two causes to the search; returns the fit with both.
     fn take_up(&mut self, both: Both<N, P>) -> Fit<P> {
         let fit = both.node.candidates[both.choice].fit.clone();
         self.causes.extend(both.causes);
@@ -81,7 +81,7 @@ impl<const N: usize, const P: usize> ModelSearch<N, P> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Attributes the gap to at most `max_causes` effects, one of which may be known beforehand.
+    /// Attributes the gap to at most `max_causes` effects, one of which (`known`) may be given beforehand.
     pub fn attribute(&self, max_causes: usize, seed: u64, known: Option<Cause>) -> Attribution<N, P> {
         let nominal = Hypothesis::rigid(self.prior.theta);
         let scale = self.rough_scale(&nominal);
@@ -120,8 +120,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
     /// The node around the arm with its parameters re-estimated, with or without encoder zeros that differ between recordings.
     ///
-    /// Zeros take up what a recording misses by on average, a large missing effect's part too, and then other effects fit what is left. So the first cause
-    /// is sought beside zeros where these explain more than it would, or where there is none; later nodes always have them.
+    /// Encoder zeros take up what a recording misses by on average, a large missing effect's part too, and then other effects fit what is left. So the first cause
+    /// is sought with zeros where these explain more than the cause would, or where no cause is found; later nodes always have zeros.
     fn first_node(
         &self,
         nominal: &Hypothesis<P>,
@@ -192,7 +192,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Drops the causes that stood in for rounded friction, once that is in the model, and goes on to the node without them.
+    /// Drops the causes that stood in for regularised friction, once friction is regularised in the model, and goes on to the node without them.
     fn drop_idle(&self, search: &mut ModelSearch<N, P>, min_relevance: f64) {
         let (mut model, known) = (search.node.settled.clone(), search.causes.len());
         self.prune(&mut model, &mut search.causes, &search.node);
@@ -201,8 +201,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Restarts a search that has ended with a gap from its first node with another pair of causes: the first cause may have stood in for
-    /// both. Only a pair that explains nearly all of the gap counts.
+    /// Restarts a search that has ended with a gap, from its first node with another pair of causes, as the first cause may have stood in for both. Only a pair
+    /// that explains nearly all of the gap counts.
     fn restarted(
         &self,
         mut search: ModelSearch<N, P>,
@@ -223,7 +223,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         search
     }
 
-    /// Goes on to the node around `next`.
+    /// Moves a search on to the node around the fit `next`.
     pub(crate) fn advance(&self, search: &mut ModelSearch<N, P>, next: &Fit<P>, min_relevance: f64) {
         let settled = self.settle(&next.hypothesis, search.node.weights.training.scale);
         let node = self.node_around(settled.clone(), min_relevance);
@@ -231,8 +231,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         search.threshold = self.look_closer(&mut search.node, settled, min_relevance, UNEXPLAINED);
     }
 
-    /// Looks into a gap that is too small to matter by itself, and yet stands above the floor by the factor `clear`; returns which
-    /// improvements count. `settled` is what the node was made around.
+    /// Searches for causes of a gap that is too small to matter by itself and yet exceeds the noise floor by the factor `clear`; returns the smallest improvement
+    /// that counts, relative to the motion. `settled` is the fit that `node` was made around.
     fn look_closer(
         &self,
         node: &mut SearchNode<N, P>,
@@ -247,7 +247,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FAINTEST
     }
 
-    /// Drops causes that the others have made idle, or rounded friction has.
+    /// Drops causes that the other causes, or regularised friction, have made idle.
     pub(crate) fn prune(&self, model: &mut Fit<P>, causes: &mut Vec<Cause>, node: &SearchNode<N, P>) {
         let mut i = 0;
         while (causes.len() > 1 || model.hypothesis.is_rounded()) && i < causes.len() {
@@ -276,7 +276,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Values and standard deviations of the causes from the final model.
+/// Updates the values and standard deviations of causes from the final model, and sorts the causes by relevance.
 pub(crate) fn refresh<const P: usize>(model: &Fit<P>, causes: &mut [Cause]) {
     for cause in causes.iter_mut() {
         let mut first = P;

@@ -1,10 +1,9 @@
-//! The way back to a choice between rivals that was made too early.
+//! Correction of a choice between rivals that was made too early in a model search.
 //!
-//! Of two effects that look alike, such as a lag and a delay, the better one may show only once the other causes are known: beside a gap
-//! ten times as large, what tells them apart is noise. And what a law with more values explained beyond one with fewer may have been the
-//! doing of a cause that was found later. So before a further cause is looked for, each rival takes the place of its cause beside all
-//! others; if it does better, or as well with fewer values, the search goes on from there again. The better end counts, if it is reached
-//! with no more causes: beside a gap, more are added by what they are not about.
+//! Of two effects that look alike, such as a lag and a delay, the better one may show only once the other causes are known: beside a gap ten times as large, what
+//! tells them apart is noise. And what a law with more values explained beyond one with fewer may have been the doing of a cause that was found later. So before a
+//! further cause is looked for, each rival takes the place of its cause beside all others; if it does better, or as well with fewer values, the search goes on
+//! from there again. The better end counts, if it is reached with no more causes: beside a gap, more are added by what they are not about.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;
@@ -17,39 +16,39 @@ use crate::search::model_search::{ModelSearch, added};
 use crate::search::rivals::equivalent;
 use armgap_core::arm::Arm;
 
-/// A rival explains at least this part of what its cause explained when that was added.
+/// Share of its cause's gain that a rival has to explain at the node where the cause was added.
 const RIVALS: f64 = 0.5;
 
-/// Rivals that are tried for each cause.
+/// Rivals that are tried for each cause at most.
 const TRIED: usize = 3;
 
-/// Mean advantage, in standard errors, from which a rival is better beside the other causes.
+/// Mean advantage per window, in standard errors, above which a rival is better beside the other causes.
 const BETTER: f64 = 2.0;
 
-/// A search from a rival with fewer values may end with predictions that miss by this factor more.
+/// Factor by which the prediction error may be larger at the end of a search from a rival with fewer values.
 const AS_WELL: f64 = 1.05;
 
-/// A search from a rival with more values has to end with predictions that miss by this factor less: a law that holds the other within it
-/// always fits a little better.
+/// Factor by which the prediction error has to be smaller at the end of a search from a rival with more values: a law that holds the other within it always fits a
+/// little better.
 const RICHER: f64 = 0.9;
 
-/// A rival that does better beside the other causes than the cause it could have been added for.
+/// A candidate that, beside the other causes, does better than the cause that was added in its place.
 struct Rival<const P: usize> {
-    /// The node in which it was passed over.
+    /// Index of the search node at which the rival was not chosen.
     node: usize,
-    /// The rival as it was fitted there.
+    /// The rival as fitted at the node where it was not chosen.
     fitted: Candidate<P>,
-    /// The effect that was added.
+    /// The effect that was added in place of the rival.
     instead_of: EffectInstance,
-    /// How sure it is that this one is better; none where it has fewer values and does as well.
+    /// Probability that the rival is better than its cause; none where it has fewer values and does as well.
     better: Option<f64>,
-    /// By what factor the predictions of a search from it may miss more than those of the other's.
+    /// Factor on the prediction error of the current search below which the error of a search from the rival has to be.
     allowed: f64,
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The search that adds a better rival of one of the causes in that one's place, if it ends better. Those with more values are tried
-    /// once a search has `ended`: before, what they explain beyond may still be the doing of another cause. The others have been tried by then.
+    /// The search that adds a better rival in the place of its cause, if it ends better. Rivals with more values than their cause are tried only once a search has
+    /// `ended`, and those with fewer or as many before: what more values explain may still be the doing of another cause.
     pub(crate) fn reconsidered(
         &self,
         search: &ModelSearch<N, P>,
@@ -68,13 +67,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         (as_good && self.needed(&other) <= self.needed(search)).then_some(other)
     }
 
-    /// The first rival that does better than its cause beside the others.
+    /// The first rival that does better than its cause beside the other causes.
     fn better_rival(&self, search: &ModelSearch<N, P>, ended: bool, seed: u64) -> Option<Rival<P>> {
         let all: Vec<&SearchNode<N, P>> = search.nodes.iter().chain([&search.node]).collect();
         (0..search.nodes.len()).find_map(|index| self.better_in(&all, index, ended, seed))
     }
 
-    /// The first rival that does better than its cause beside the others, among those that were not chosen at one node.
+    /// The best rival that does better than its cause beside the other causes, among the candidates not chosen at node `index`.
     fn better_in(&self, all: &[&SearchNode<N, P>], index: usize, ended: bool, seed: u64) -> Option<Rival<P>> {
         let (node, last, adopted) = (all[index], *all.last()?, added(all, index)?);
         let model = &last.settled.hypothesis;
@@ -125,7 +124,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         as_good.min_by_key(|(swapped, _)| size(swapped)).map(|(_, rival)| rival)
     }
 
-    /// Takes the search back to the node that chose another candidate than this rival, and continues it with the rival in its place.
+    /// Takes the search back to the node at which `rival` was not chosen, and continues with the rival in place of its cause.
     fn back_to(
         &self,
         search: &ModelSearch<N, P>,
@@ -166,7 +165,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         other
     }
 
-    /// Causes that a search ends with once the idle are dropped.
+    /// Number of causes that a search ends with once idle causes are dropped.
     fn needed(&self, search: &ModelSearch<N, P>) -> usize {
         let (mut model, mut causes) = (search.node.settled.clone(), search.causes.clone());
         self.prune(&mut model, &mut causes, &search.node);
@@ -174,7 +173,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Whether predictions of one candidate miss by hardly more than those of another.
+/// Whether the prediction error of one candidate is hardly larger than that of another.
 fn as_well<const P: usize>(one: &Candidate<P>, other: &Candidate<P>) -> bool {
     one.error < AS_WELL.powi(2) * other.error
 }

@@ -1,8 +1,8 @@
 //! Two causes at once: either leaves so much of the gap to the other that neither is accepted alone.
 //!
-//! A cause is judged by the part of the gap it removes. Of two of the same size each removes a half of it at most, and if the windows
-//! weigh by the worse of the two, much less. So before a search ends beside an open gap, the best candidates are each taken on trust:
-//! if another then closes nearly all of the gap, and neither can be spared, both are causes.
+//! A cause is judged by the part of the gap it removes. Of two causes of the same size each removes a half of the gap at most, and if the windows weigh by the
+//! worse of the two, much less. So before a search ends with an open gap, each of the best candidates is accepted on trial: if another then closes nearly all of
+//! the gap, and neither can be spared, both are causes.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;
@@ -12,31 +12,31 @@ use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::belief::{Cause, name};
 use armgap_core::arm::Arm;
 
-/// Part of the gap above the floor that two effects must explain to be accepted together.
+/// Share of the gap above the noise floor that two effects must explain to be accepted together.
 const NEARLY_ALL: f64 = 0.85;
 
-/// Part of what a second effect has to explain that it must explain to first order to be looked for.
+/// Part of the gain needed from a second effect that a candidate must bring to first order for the second effect to be looked for.
 const FORESEEN: f64 = 0.3;
 
-/// Candidates that are taken on trust.
+/// Candidates that are accepted on trial, as the first of two causes.
 const TRIED: usize = 3;
 
-/// Mean advantage, in standard errors, below which a candidate is not worth that, unless it brings implausible parameters back to
-/// their prior values.
+/// Mean advantage per window, in standard errors, below which a candidate is not tried as one of two causes, unless it brings implausible parameters back to their
+/// prior values.
 const HOPEFUL: f64 = 1.5;
 
-/// Two causes and the node in which the second was found.
+/// Two causes, and the search node at which the second was found.
 pub struct Both<const N: usize, const P: usize> {
-    /// Both, in the order in which they were found.
+    /// The two causes, in the order in which they were found.
     pub causes: [Cause; 2],
-    /// The node beside the first cause.
+    /// Search node around the model with the first cause, at which the second was found.
     pub node: SearchNode<N, P>,
-    /// The second cause in it.
+    /// Index of the second cause among the node's candidates.
     pub choice: usize,
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The two effects that explain together what none explains alone; the first of them is not `but`.
+    /// The two effects that together explain the gap of node `alone` where none explains it alone; the first of the two is not `but`.
     pub fn together(
         &self,
         alone: &SearchNode<N, P>,
@@ -62,7 +62,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
             .find_map(|first| self.beside(alone, first, min_relevance, seed))
     }
 
-    /// The effect that explains the rest beside `first`, if both are needed.
+    /// The pair of effect `first` and the effect that explains the rest of the gap of node `alone`; none if one of the two can be spared.
     fn beside(
         &self,
         alone: &SearchNode<N, P>,

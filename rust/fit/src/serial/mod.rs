@@ -1,10 +1,9 @@
 //! Diagnosis of serial arms of one to seven joints.
 //!
-//! A serial arm has dozens of parameters and hundreds of candidate effects, and its torques are mostly those of a controller or of measured
-//! currents: not an input that is independent of what the model lacks. So terms are sought in the equation of motion along the measured
-//! path, in its weak form, where all parameters and most terms are linear and no rollout is needed; predictions over short windows only say
-//! how far the gap shrinks. The way of the data is `weak_form` (a log's intervals, torques of terms, rows of the regression) ->
-//! `search` (which terms) -> `predict` (gap) -> `result`.
+//! A serial arm has dozens of parameters and hundreds of candidate effects, and its torques are mostly those of a controller or of measured currents: not an input
+//! that is independent of what the model lacks. So missing terms are sought in the equation of motion along the measured path, in its weak form, where all
+//! parameters and most terms are linear and no rollout is needed; predictions over short windows only say how far the gap shrinks. The data go through `weak_form`
+//! (intervals of a log, torques of terms, rows of the regression) -> `search` (which terms) -> `predict` (gap) -> `result`.
 
 mod constants;
 pub mod controller;
@@ -39,26 +38,26 @@ use weak_form::rows::{Prior, Rows, Signal};
 /// A serial arm as an arm file describes it.
 #[derive(Debug, Clone)]
 pub struct SerialArm {
-    /// Its joints, one to seven, and gravity.
+    /// Joints of the arm, one to seven, and gravity.
     pub chain: ChainDescription,
-    /// Thirteen parameters per joint: ten of each link, then rotor inertias, viscous and Coulomb coefficients.
+    /// Parameters of the arm, SI, thirteen per joint: ten of each link, then rotor inertias, viscous and Coulomb coefficients.
     pub theta: Vec<f64>,
-    /// Standard deviations of them; zero for a value that is not estimated.
+    /// Standard deviations of the arm's parameters, SI; zero for a value that is not estimated.
     pub sigma: Vec<f64>,
-    /// Smallest step of each position measurement.
+    /// Smallest step of each position measurement, rad or m; none where unknown.
     pub steps: Option<Vec<f64>>,
-    /// Position controller, behind logs that hold references in place of torques.
+    /// Position controller of the arm, for logs that hold references in place of torques.
     pub controller: Option<PositionController>,
 }
 
 impl SerialArm {
-    /// Whether each joint turns.
+    /// Whether each joint is revolute.
     pub fn rotary(&self) -> Vec<bool> {
         self.chain.joints.iter().map(|j| j.kind == JointKind::Revolute).collect()
     }
 }
 
-/// What was asked for.
+/// Arguments of a diagnosis of a serial arm.
 struct Request<'a> {
     arm: &'a SerialArm,
     training: &'a [LogData<'a>],
@@ -67,11 +66,11 @@ struct Request<'a> {
     observer: &'a Observer,
 }
 
-/// Diagnoses the gap between a serial arm and its logs; `observer` gets the progress and may cancel.
+/// Diagnoses the gap between a serial arm and its logs; `observer` is told the progress and may cancel.
 ///
 /// # Errors
 ///
-/// Logs or options that cannot be worked with.
+/// Logs or options that a diagnosis cannot work with.
 pub fn diagnose(
     arm: &SerialArm,
     training: &[LogData<'_>],
@@ -84,7 +83,7 @@ pub fn diagnose(
     guarded(|| by_size(&request)).ok_or(DiagnoseError::Stopped)?
 }
 
-/// The diagnosis with its number of joints known at compile time.
+/// Runs the diagnosis with the number of joints known at compile time.
 fn by_size(request: &Request<'_>) -> Result<Diagnosis, DiagnoseError> {
     match request.arm.chain.joints.len() {
         1 => request.run::<1, 13>(),
@@ -113,7 +112,7 @@ impl<const N: usize, const P: usize> Motion for Equation<N, P> {
     }
 }
 
-/// Logs, equation and windows of one set.
+/// Weak equation of motion and prediction windows of the training logs, or of the holdout.
 pub(crate) struct Set<const N: usize, const P: usize> {
     pub(crate) equation: Equation<N, P>,
     pub(crate) data: Dataset<N>,
@@ -175,7 +174,7 @@ impl Request<'_> {
         Ok(diagnosis)
     }
 
-    /// Prior of the arm's parameters and of the controller's gains that are estimated, as differences from the arm file.
+    /// Prior of the arm's parameters, and of those gains of the controller that are estimated, as differences from the arm file's gains.
     fn prior<const P: usize>(&self, theta: &[f64; P], controller: Option<&PositionController>) -> Prior {
         let gains: Vec<f64> = controller.map_or_else(Vec::new, |controller| {
             controller.estimated().into_iter().map(|(gain, j)| controller.sigma[gain][j]).collect()
@@ -219,7 +218,7 @@ impl Request<'_> {
     }
 }
 
-/// Settings of the controllers that may differ from the arm file's, at their initial guesses, grouped by place.
+/// Settings of the controllers that may differ from the arm file's, at their initial guesses, grouped by setting and joint.
 fn controller_settings(controller: &PositionController, inertia: &[f64], period: f64) -> Vec<Vec<Term>> {
     let group = |setting: Setting, joint: usize| {
         let guesses = setting.guesses(&controller.joints[joint], inertia[joint], period);
@@ -230,14 +229,14 @@ fn controller_settings(controller: &PositionController, inertia: &[f64], period:
     all.map(|(setting, joint)| group(setting, joint)).collect()
 }
 
-/// Half cycles of a ripple over a joint's travel, at most.
+/// Half cycles of a torque ripple over a joint's travel at most.
 const HALF_CYCLES: usize = 80;
 
-/// Torque within which a link crosses its backlash, in parts of the joint's RMS torque.
+/// Torques within which a link crosses its backlash, relative to the joint's RMS torque.
 const CROSSINGS: [f64; 2] = [0.03, 0.15];
 
-/// Every term at each of its initial guesses, grouped by place. Effects with latent states between motor and link, and those stated for the
-/// plane, are not among them.
+/// Every candidate term at each of its initial guesses, grouped by effect and joint. Effects with latent states between motor and link, and those stated for arms
+/// in a plane, are not among them.
 fn candidates<const N: usize, const P: usize>(
     arm: &Chain<f64, N>,
     theta: &[f64; P],

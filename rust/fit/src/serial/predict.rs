@@ -1,4 +1,4 @@
-//! Predictions of a serial arm with terms, over short windows and over whole logs.
+//! Predictions of a serial arm with missing terms added, over short windows and over whole logs.
 
 use crate::model::hypothesis::Hypothesis;
 use crate::predict::window::{Dataset, Window};
@@ -9,7 +9,7 @@ use armgap_core::arm::Arm;
 use armgap_core::chain::Chain;
 use nalgebra::SVector;
 
-/// An arm with parameters and terms, as the integrator takes it.
+/// A serial arm with parameters and terms in the form that the integrator takes.
 pub struct Model<const N: usize, const P: usize> {
     arm: Chain<f64, N>,
     hypothesis: Hypothesis<P>,
@@ -18,7 +18,7 @@ pub struct Model<const N: usize, const P: usize> {
 }
 
 impl<const N: usize, const P: usize> Model<N, P> {
-    /// The arm with these parameters and terms.
+    /// The serial arm with parameters `theta` and the terms added.
     pub fn new(arm: &Chain<f64, N>, theta: [f64; P], terms: &[Term]) -> Self {
         let mut model =
             Self { arm: *arm, hypothesis: Hypothesis::rigid(theta), closed_loop: None, rows: Vec::new() };
@@ -43,7 +43,7 @@ impl<const N: usize, const P: usize> Model<N, P> {
         model
     }
 
-    /// The model with position controllers in place of logged torques.
+    /// The model with position controllers (`closed_loop`) in place of logged torques.
     pub fn behind(self, closed_loop: Option<ClosedLoop<N>>) -> Self {
         Self { closed_loop, ..self }
     }
@@ -54,7 +54,7 @@ impl<const N: usize, const P: usize> Model<N, P> {
         }
     }
 
-    /// Predicted positions of all windows.
+    /// Predicted positions of all windows, sample by sample and joint by joint, rad or m.
     pub fn predict(&self, data: &Dataset<N>) -> Vec<f64> {
         if !self.rows.is_empty() {
             let tracks = data.tracks.iter().map(|track| without_rows(track, &self.rows)).collect();
@@ -72,7 +72,7 @@ impl<const N: usize, const P: usize> Model<N, P> {
     }
 }
 
-/// The arm with its base turned by this rotation vector about the horizontal axes of its frame: gravity turns the other way.
+/// The arm with its base turned by the rotation vector `by`, rad, about the horizontal axes of the base frame: gravity turns the other way.
 pub fn turned<const N: usize>(arm: &Chain<f64, N>, by: [f64; 2]) -> Chain<f64, N> {
     let g = *arm.gravity_vector();
     let angle = by[0].hypot(by[1]);
@@ -89,8 +89,8 @@ pub fn turned<const N: usize>(arm: &Chain<f64, N>, by: [f64; 2]) -> Chain<f64, N
     }))
 }
 
-/// Mean square, per joint, of the errors of a perfect model: noise of the sample itself, and the error of the measured initial state carried
-/// along the window.
+/// Noise floor: mean square position error of a perfect model by joint, rad^2 or m^2, from noise of the samples and errors of the measured initial states carried
+/// along the windows.
 pub fn floor<const N: usize>(data: &Dataset<N>, noise: &[f64; N]) -> [f64; N] {
     let square = |w: &Window<N>, j: usize| -> f64 {
         let track = &data.tracks[w.track];

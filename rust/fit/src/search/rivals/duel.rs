@@ -1,8 +1,8 @@
-//! Two effects that explain about the same, each under the weights it deserves.
+//! Comparison of two effects that explain about the same, each under window weights made around it.
 //!
-//! Windows are weighed, and their initial states fitted, around the best candidate. That flatters it: an initial state that had to be moved far for it
-//! is weighted less from then on, and lets the rival's advantage there pass. Of two that are close, each is therefore judged under
-//! weights made around either, and the one with the clearer win in its own has the last word.
+//! Windows are weighed, and their initial states fitted, around the best candidate. This favours it: an initial state that had to be moved far for the best
+//! candidate is weighted less from then on, and lets the rival's advantage in that window pass. Of two candidates that are close, each is therefore judged under
+//! weights made around either, and the weights under which the winner leads more clearly decide.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::solve::Effort;
@@ -12,11 +12,11 @@ use crate::search::attribute::{Candidate, SearchNode};
 use crate::search::rivals::equivalent;
 use armgap_core::arm::Arm;
 
-/// A rival that is worse by less than this, in standard errors of the mean advantage per window, is close.
+/// Standard errors of the mean advantage per window within which the best candidate leads a close rival.
 const CLOSE: f64 = 3.0;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The node under the weights of its best candidate or of the best one's rival, whichever wins more clearly there.
+    /// The node under window weights made around its best candidate or around the closest rival, whichever make the winner lead more clearly.
     pub(crate) fn duel(&self, node: SearchNode<N, P>) -> SearchNode<N, P> {
         let Some((best, rival)) = close_pair(&node) else { return node };
         let current = node.settled.hypothesis.clone();
@@ -25,7 +25,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         if lead(&other) > lead(&own) { other } else { own }
     }
 
-    /// The node with its finalists fitted under weights made around one of them.
+    /// The node with its finalists fitted under window weights made around candidate `one`.
     fn around(&self, current: &Hypothesis<P>, node: &SearchNode<N, P>, one: usize) -> SearchNode<N, P> {
         let chosen = &node.candidates[one].fit.hypothesis;
         let (_, weights) = self.settle(chosen, node.weights.training.scale);
@@ -38,7 +38,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// The best candidate and the first that is close to it, if motion can tell their effects apart.
+/// Indices of the best candidate and of the first one close to it, if motion can tell their effects apart.
 fn close_pair<const N: usize, const P: usize>(node: &SearchNode<N, P>) -> Option<(usize, usize)> {
     let (best, others) = node.candidates.split_first()?;
     if node.share(best) < MATTERS {
@@ -58,7 +58,7 @@ fn is_close<const N: usize, const P: usize>(
     alike && other.z_over(&node.base) > CLOSE && !equivalent::are(&a, &b, N)
 }
 
-/// By how much the best candidate of a node leads, in standard errors.
+/// Lead of a node's best candidate over the second, in standard errors of the mean advantage per window.
 fn lead<const N: usize, const P: usize>(node: &SearchNode<N, P>) -> f64 {
     match &node.candidates[..] {
         [best, second, ..] => best.z_over(second),

@@ -2,18 +2,18 @@
 
 use crate::model::hypothesis::EffectInstance;
 
-/// An effect that could stand in for another, and why.
+/// An effect that could stand in for a given effect, with the reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Equivalent {
-    /// Name of the effect.
+    /// Name of the effect in the library.
     pub effect: &'static str,
-    /// 1-based joint; none for effects of the whole arm.
+    /// 1-based joint of the effect; none for effects of the whole arm.
     pub joint: Option<usize>,
-    /// Why the two cannot be told apart.
+    /// Reason why the two effects cannot be told apart.
     pub why: String,
 }
 
-/// Effects that are the same as this one on an arm with `joints` joints, whatever the motion.
+/// Effects that give the same motion as `effect` on an arm with `joints` joints, under any torques.
 pub fn known(effect: &EffectInstance, joints: usize) -> Vec<Equivalent> {
     let joint = effect.joint_number();
     let one = |effect, joint, why: &str| vec![Equivalent { effect, joint, why: why.to_owned() }];
@@ -54,7 +54,7 @@ pub fn known(effect: &EffectInstance, joints: usize) -> Vec<Equivalent> {
     }
 }
 
-/// Whether two effects are the same, or the same whatever the motion, on an arm with `joints` joints.
+/// Whether two effects are the same, or give the same motion under any torques, on an arm with `joints` joints.
 pub fn are(a: &EffectInstance, b: &EffectInstance, joints: usize) -> bool {
     let among = |a: &EffectInstance, b: &EffectInstance| {
         let (name, joint) = (b.law.spec().name, b.joint_number());
@@ -63,12 +63,12 @@ pub fn are(a: &EffectInstance, b: &EffectInstance, joints: usize) -> bool {
     a.same_place(b) || among(a, b) || among(b, a)
 }
 
-/// Whether one effect is another where its further values are zero.
+/// Whether the law named `whole` becomes the law named `part` where its further values are zero.
 fn contains(whole: &str, part: &str) -> bool {
     (whole, part) == ("hardening_spring", "joint_spring")
 }
 
-/// The known equivalents and the look-alikes found in the data, none twice.
+/// Known equivalents of an effect and the look-alikes found in the data, none twice.
 pub fn all(effect: &EffectInstance, look_alikes: &[EffectInstance], joints: usize) -> Vec<Equivalent> {
     let mut list = known(effect, joints);
     for other in look_alikes {

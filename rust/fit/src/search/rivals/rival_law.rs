@@ -1,7 +1,7 @@
-//! The rival of every name: a torque without a name, as a table over the variable that predicts best what the arm lacks without the cause.
+//! The rival of every named cause: a torque without a name, as a table over the variable that predicts best what the arm lacks without the cause.
 //!
-//! An effect that is not in the arm is named where it imitates what is there better than the other effects do. A table has no form of its own to
-//! imitate with: where it explains much more of the holdout than the named effect, the form of the named effect is wrong.
+//! An effect that is not in the arm is named where it imitates the missing torque better than the other effects do. A table has no form of its own to imitate
+//! with: where it explains much more of the holdout than the named effect, the form of the named effect is wrong.
 
 use crate::likelihood::context::{DiagnosisContext, SplitWeighting, WindowSet};
 use crate::likelihood::solve::{Effort, Fit};
@@ -16,8 +16,8 @@ use armgap_core::arm::Arm;
 use nalgebra::SVector;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// What the torques that a model lacks depend on, strongest first: tables of the training logs that predict the holdout, each beside the model
-    /// with everything fitted again.
+    /// Variables that the torques missing in a model depend on, strongest first: tables fitted to the training logs that predict the holdout, each beside the
+    /// model with everything fitted again.
     pub(crate) fn laws_beside(
         &self,
         model: &Fit<P>,
@@ -33,7 +33,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         laws
     }
 
-    /// What the torques that a model lacks depend on by inverse dynamics, strongest first; tables are taken from the training logs.
+    /// Variables that the torques missing in a model depend on by inverse dynamics, strongest first; tables are taken from the training logs.
     fn dependences(&self, model: &Hypothesis<P>, wanted: Wanted) -> Vec<Dependence> {
         let of = |set: &WindowSet<N>, teaches| -> Vec<LogResidual<N>> {
             let tracks = &set.data.tracks;
@@ -44,13 +44,13 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         dependences(&self.arm, &model.theta, &self.prior.sigma, &logs, wanted)
     }
 
-    /// Cost of predictions of the holdout by a model with the best law without a name; none where no law predicts what the model lacks.
+    /// Holdout cost of a model with the best table of torque without a name added; none where no table predicts what the model lacks.
     pub(crate) fn rival_cost(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Option<f64> {
         let rival = self.dependences(model, Wanted { most: 1, rotary: true }).into_iter().next()?;
         Some(self.cost_beside(model, &rival, weights))
     }
 
-    /// Cost of predictions of the holdout by a model with the torques of a law, everything fitted again to the training logs.
+    /// Holdout cost of a model with the torques of a law added, everything fitted again to the training logs.
     fn cost_beside(&self, model: &Hypothesis<P>, law: &Dependence, weights: &SplitWeighting<N>) -> f64 {
         let beside = Self {
             training: WindowSet::new(with_torques(&self.training.data, law)),
@@ -63,7 +63,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// The same windows, with the torques of a law along the measured motion as a table of their logs.
+/// The same windows of data, with the torques of `law` along the measured motion added as a table to their logs.
 fn with_torques<const N: usize>(data: &Dataset<N>, law: &Dependence) -> Dataset<N> {
     let mut data = data.clone();
     for track in &mut data.tracks {

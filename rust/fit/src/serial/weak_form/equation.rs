@@ -1,4 +1,4 @@
-//! The weak equation of motion of an arm along its logs, and the torque of any term along the same motion.
+//! The weak equation of motion of a serial arm along its logs, and the torque of any term along the same motion.
 
 use crate::log::track::Track;
 use crate::model::hypothesis::EffectInstance;
@@ -15,41 +15,41 @@ use armgap_core::kinematics::{JointState, RigidArm};
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-/// Length of a block, s, over which what the model lacks may be correlated.
+/// Length of a block, s, over which the torque that the model lacks may be correlated.
 const BLOCK_S: f64 = 1.0;
 
-/// A row of which the joint is at rest for more than this share is no datum.
+/// Share of a row's test function beyond which a joint at rest makes the row no datum.
 const MOSTLY_AT_REST: f64 = 0.05;
 
-/// Time over which the rate of the inertia matrix along the motion is taken, s.
+/// Time step for the rate of the inertia matrix along the motion, s.
 const RATE_STEP: f64 = 1e-5;
 
-/// Poses in which the inertia matrix is looked at.
+/// Poses along the logs at which the inertia matrix is evaluated.
 const POSES: usize = 200;
 
-/// An arm along logs.
+/// The weak equation of motion of a serial arm along logs.
 pub struct Equation<const N: usize, const P: usize> {
-    /// The arm.
+    /// Kinematic chain of the arm.
     pub arm: Chain<f64, N>,
-    /// Rows.
+    /// Rows of the regression on the arm's parameters, by joint.
     pub rows: Rows,
     pub(in crate::serial) logs: Vec<Intervals<N>>,
     times: Vec<Vec<f64>>,
     held: Vec<Vec<[InputSegment<f64>; N]>>,
     pub(in crate::serial) functions: Vec<TestFunction>,
-    /// Test functions of each joint's rows.
+    /// Indices of the test functions during which each joint moves, by joint: one row each.
     pub(in crate::serial) kept: Vec<Vec<usize>>,
-    /// Torques of transmissions.
+    /// Cached torques of elastic joints and backlash.
     pub(in crate::serial) computed: Computed<P>,
-    /// The position controllers behind the torques, of logs that hold references in their place.
+    /// Position controllers that make the torques in logs with references; none for logs with torques.
     pub(in crate::serial) commanded: Option<Commanded<N>>,
 }
 
-/// Torques per interval of every log on the joints that a term acts on.
+/// Torques by joint, log and sample interval, N m or N; none on joints that a term does not act on.
 pub(in crate::serial) type Torques<const N: usize> = [Option<Vec<Vec<f64>>>; N];
 
 impl<const N: usize, const P: usize> Equation<N, P> {
-    /// The equation along these logs, weighed by test functions of this half width, s; `theta` are nominal values.
+    /// The weak equation along logs with test functions of `half_width`, s; `theta` are nominal parameters.
     pub fn new(arm: Chain<f64, N>, theta: &[f64; P], tracks: &[Track<N>], half_width: f64) -> Self {
         let logs: Vec<Intervals<N>> = tracks.iter().map(Intervals::new).collect();
         let functions: Vec<TestFunction> =
@@ -70,7 +70,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         equation
     }
 
-    /// Test functions during which joint `j` moves.
+    /// Indices of the test functions during which joint `j` moves.
     fn moving(&self, j: usize) -> Vec<usize> {
         let still = |phi: &TestFunction| -> f64 {
             let middles = &self.logs[phi.log].middles;
@@ -136,7 +136,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         Rows { joints, parameters: P, blocks: first_block[self.logs.len()] }
     }
 
-    /// Momentum and the rest of the torque in the middle of an interval, by joint and parameter.
+    /// Regressors of the momentum, and of the torque without the momentum's derivative, in the middle of an interval, by joint and parameter.
     fn regressors(&self, m: &Middle<N>) -> [Vec<f64>; 2] {
         let q = SVector::from(m.q);
         let momentum = self.arm.momentum_regressor(&q, &SVector::from(m.mean_dq));
@@ -146,7 +146,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         [momentum, rest].map(|x| (0..N).flat_map(|j| (0..P).map(move |i| (j, i))).map(|at| x[at]).collect())
     }
 
-    /// Standard deviation that noisy positions put into a row, through the momentum.
+    /// Standard deviation that noisy positions put into a row through the momentum, N m or N.
     fn floor(&self, phi: &TestFunction, inertia: &[f64; N]) -> f64 {
         let log = &self.logs[phi.log];
         let factors = phi.on_positions(&log.middles, [1.0, 0.0, 0.0]);
@@ -155,7 +155,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         (variance * square).sqrt()
     }
 
-    /// Row by row of joint `j`, how the sign of its velocity differs when it is regularised over `width`, rad/s (m/s), as `tanh(dq / width)`.
+    /// Change of the velocity sign's column in the rows of joint `j` when the sign is regularised over `width`, rad/s (m/s), as `tanh(dq / width)`.
     pub fn regularised(&self, j: usize, width: f64) -> Vec<f64> {
         let row = |i: &usize| {
             let phi = &self.functions[*i];
@@ -171,7 +171,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         change
     }
 
-    /// Regularises the Coulomb friction of every joint over a width; zero leaves it dry.
+    /// Regularises the Coulomb friction of every joint over a width, rad/s (m/s); zero leaves it dry.
     pub fn regularise(&mut self, widths: &[f64]) {
         for (j, width) in widths.iter().enumerate().filter(|(_, width)| **width > 0.0) {
             let change = self.regularised(j, *width);
@@ -182,7 +182,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// The torque of a term that the arm needs on top of its own, row by row: what it would take from the left-hand side.
+    /// Torque of a term by joint and row, on the left-hand side of the equation: what the arm needs on top of its own torque.
     pub fn signal(&self, term: &Term, theta: &[f64; P]) -> Signal {
         let mut signal = self.signal_with_mean(term, theta);
         for (j, values) in signal.iter_mut().enumerate() {
@@ -193,7 +193,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         signal
     }
 
-    /// The same before the mean over each log is left out of joints with an integral controller.
+    /// Torque of a term by joint and row, before the mean over each log is left out of joints with an integral controller.
     pub(in crate::serial) fn signal_with_mean(&self, term: &Term, theta: &[f64; P]) -> Signal {
         match term.kind {
             TermKind::Law(_) => match term.effect() {
@@ -214,7 +214,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// A change of one link's ten numbers.
+    /// Torque by joint and row of a change of one link's ten inertial parameters.
     fn of_link(&self, link: usize, change: &[f64; 10]) -> Signal {
         let joint = |(j, rows): (usize, &JointRows)| {
             (j <= link).then(|| {
@@ -225,7 +225,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.rows.joints.iter().enumerate().map(joint).collect()
     }
 
-    /// Averages of torques per interval over the test functions of each joint's rows.
+    /// Averages of torques over the test functions of each joint's rows.
     pub(in crate::serial) fn weak(&self, torques: &Torques<N>) -> Signal {
         let joint = |j: usize| {
             torques[j].as_ref().map(|torque| {
@@ -240,7 +240,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         (0..N).map(joint).collect()
     }
 
-    /// A law on one joint: a torque, a part of dry friction, an inertia, or a change of the command.
+    /// Torque by joint and row of a law on one joint: a torque, a part of dry friction, an inertia, or a change of the command.
     fn of_law(&self, effect: &EffectInstance, theta: &[f64; P]) -> Signal {
         let (spec, j) = (effect.law.spec(), effect.joint);
         let mut torques: Torques<N> = std::array::from_fn(|_| None);
@@ -272,7 +272,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         signal
     }
 
-    /// Torque of a law along a log, interval by interval.
+    /// Torque of a law along a log, interval by interval, N m or N.
     fn along(&self, log: &Intervals<N>, effect: &EffectInstance, theta: &[f64; P]) -> Vec<f64> {
         let (spec, j) = (effect.law.spec(), effect.joint);
         let viscous = self.arm.viscous(theta)[j];
@@ -306,7 +306,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         log.middles.iter().map(torque).collect()
     }
 
-    /// Measured positions that are not the joints': difference of the arm's own torque along both.
+    /// Torque by joint and row of an effect by which measured positions are not the joints': difference of the arm's own torque along both.
     fn displaced(&self, effect: &EffectInstance, theta: &[f64; P]) -> Signal {
         let j = effect.joint;
         let actual = |reading: f64| {
@@ -338,7 +338,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.weak_parts(&differences)
     }
 
-    /// Rows of a change of the momentum and of the rest of the torque, interval by interval.
+    /// Rows, by joint, of a change of the momentum and of the rest of the torque given for every interval of every log.
     pub(in crate::serial) fn weak_parts(&self, changes: &[Vec<[SVector<f64, N>; 2]>]) -> Signal {
         let joint = |joint: usize| {
             let row = |i: &usize| {
@@ -355,12 +355,12 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         (0..N).map(joint).collect()
     }
 
-    /// The logs, interval by interval.
+    /// Sample intervals of the logs, log by log.
     pub(in crate::serial) fn logs(&self) -> &[Intervals<N>] {
         &self.logs
     }
 
-    /// Mean inertia of every joint along the logs.
+    /// Mean inertia of every joint along the logs, kg m^2 or kg.
     pub fn mean_inertia(&self, theta: &[f64; P]) -> Vec<f64> {
         let mut total = [0.0; N];
         let mut count = 0.0;
@@ -372,13 +372,13 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         total.map(|t| t / count).to_vec()
     }
 
-    /// Some poses along the logs.
+    /// States at some 200 intervals along the logs.
     fn poses(&self) -> impl Iterator<Item = &Middle<N>> {
         let stride = (self.logs.iter().map(|log| log.middles.len()).sum::<usize>() / POSES).max(1);
         self.logs.iter().flat_map(move |log| log.middles.iter().step_by(stride))
     }
 
-    /// Smallest eigenvalue of the inertia matrix along the logs, of the matrix scaled to unit diagonal.
+    /// Smallest eigenvalue, along the logs, of the inertia matrix scaled to unit diagonal; -1 where a diagonal entry is not positive.
     pub fn conditioning(&self, theta: &[f64; P]) -> f64 {
         let smallest = |m: &Middle<N>| {
             let inertia = self.arm.inertia(theta, &SVector::from(m.q));
@@ -392,7 +392,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.poses().map(smallest).fold(1.0, f64::min)
     }
 
-    /// Momentum, and the rest of the torque: `C dq + g - dM/dt dq` and friction.
+    /// Momentum, and the torque without the momentum's derivative: `C dq + g - dM/dt dq` and friction.
     pub(in crate::serial) fn parts(&self, m: &Middle<N>, theta: &[f64; P]) -> [SVector<f64, N>; 2] {
         let (q, dq) = (SVector::from(m.q), SVector::from(m.dq));
         let momentum = self.arm.inertia(theta, &q) * SVector::from(m.mean_dq);
@@ -414,7 +414,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// Gravity from another direction.
+    /// Torque by joint and row of gravity turned with the base by `p`, rad about two horizontal axes.
     fn of_tilt(&self, p: &[f64], theta: &[f64; P]) -> Signal {
         let theta = SVector::from(*theta);
         if p[0] == 0.0 && p[1] == 0.0 {

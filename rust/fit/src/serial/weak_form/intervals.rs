@@ -1,70 +1,70 @@
-//! A log as its sample intervals: the state in the middle of each, the torque held over it, and the test functions it is weighed by.
+//! A log as its sample intervals: the state in the middle of each interval, the torque held over it, and the test functions of the weak form.
 //!
-//! The equation of motion is used in its weak form. With a smooth test function `phi` of compact support,
+//! With a smooth test function `phi` of compact support, the weak form of the equation of motion
 //!
 //! ```text
 //! - int phi' M(q) dq dt + int phi (g - dK/dq + f) dt = int phi tau dt
 //! ```
 //!
-//! needs no acceleration: it is the filtered dynamic regression of Reyes and Kelly (1997) with a symmetric filter of finite length in place of
-//! the first-order one. Velocities in the momentum are differences of positions over the interval, whose mean they are exactly; friction and
-//! whatever depends on the sign of a velocity take it from local cubics.
+//! needs no acceleration: it is the filtered dynamic regression of Reyes and Kelly (1997) with a symmetric filter of finite length in place of the first-order
+//! one. Velocities in the momentum are differences of positions over the interval, whose mean they are exactly; friction and whatever depends on the sign of a
+//! velocity take the velocity from local cubics.
 
 use crate::log::track::Track;
 use std::f64::consts::PI;
 
-/// Half width of a test function, s: its transfer function falls to one half at 0.5 / `HALF_WIDTH_S`, here 10 Hz. Friction torques of a
-/// reversal are smeared over it; the noise of positions enters with its inverse square.
+/// Half width of a test function, s: its transfer function falls to one half at 0.5 / `HALF_WIDTH_S`, here 10 Hz. Friction torques of a reversal are smeared over
+/// it; the noise of positions enters with its inverse square.
 pub const HALF_WIDTH_S: f64 = 0.05;
 
-/// Least half width in sample periods.
+/// Smallest half width of a test function, in sample periods.
 const FEWEST_PERIODS: f64 = 5.0;
 
-/// Distance between test functions, in half widths.
+/// Distance between neighbouring test functions, in half widths.
 const SPACING: f64 = 0.5;
 
-/// A joint is at rest where its velocity is below so many of its standard deviations; dry friction then is a bound and no datum.
+/// Standard deviations of a joint's velocity below which the joint is at rest; dry friction then is a bound and no datum.
 const AT_REST: f64 = 3.0;
 
-/// A joint slower than this share of its RMS speed is at rest too: it may creep, before it slides, under a torque below its Coulomb level. A reversal at
-/// a tenth of the largest acceleration is as slow as that for some milliseconds.
+/// Speed, relative to a joint's RMS speed, below which the joint counts as at rest: it may creep, before it slides, under a torque below its Coulomb level. A
+/// reversal at a tenth of the largest acceleration is as slow for some milliseconds.
 const SLOW: f64 = 0.01;
 
-/// The time between two samples in so many periods ends a stretch.
+/// Time between two samples, in sample periods, beyond which a stretch of a log ends.
 const GAP: f64 = 3.5;
 
 /// State and torque in the middle of a sample interval.
 #[derive(Debug, Clone, Copy)]
 pub struct Middle<const N: usize> {
-    /// Time since the start of the log, s.
+    /// Time in the middle of the interval since the start of the log, s.
     pub t: f64,
     /// Length of the interval, s.
     pub h: f64,
-    /// Positions.
+    /// Positions in the middle of the interval, rad or m.
     pub q: [f64; N],
-    /// Velocities from local cubics.
+    /// Velocities in the middle of the interval from local cubics, rad/s or m/s.
     pub dq: [f64; N],
-    /// Accelerations from local cubics.
+    /// Accelerations in the middle of the interval from local cubics, rad/s^2 or m/s^2.
     pub ddq: [f64; N],
-    /// Mean velocities: differences of positions.
+    /// Mean velocities over the interval from differences of positions, rad/s or m/s.
     pub mean_dq: [f64; N],
-    /// Mean torques over the interval.
+    /// Mean torques over the interval, N m or N.
     pub tau: [f64; N],
-    /// Whether each joint is at rest.
+    /// Whether each joint is at rest in the interval.
     pub rest: [bool; N],
 }
 
-/// A log's intervals.
+/// A log as its sample intervals.
 #[derive(Debug, Clone)]
 pub struct Intervals<const N: usize> {
-    /// Interval by interval.
+    /// States and torques in the middle of the sample intervals, in order of time.
     pub middles: Vec<Middle<N>>,
-    /// Standard deviation of the position measurement per joint.
+    /// Standard deviation of the position noise by joint, rad or m.
     pub noise: [f64; N],
 }
 
 impl<const N: usize> Intervals<N> {
-    /// The intervals of a log.
+    /// The sample intervals of a log.
     pub fn new(track: &Track<N>) -> Self {
         let smoothed = track.smoothed();
         let begin = track.t.first().copied().unwrap_or(0.0);
@@ -93,7 +93,7 @@ impl<const N: usize> Intervals<N> {
         Self { middles: (0..track.len().saturating_sub(1)).map(middle).collect(), noise: track.noise }
     }
 
-    /// Test functions over this log, of this half width, s, or wider where the log has few samples.
+    /// Test functions over the log of index `log`, with `half_width`, s, or a wider one where the log has few samples.
     pub fn test_functions(&self, log: usize, half_width: f64) -> Vec<TestFunction> {
         let period = crate::log::track::median(self.middles.iter().map(|m| m.h).collect());
         let half = half_width.max(FEWEST_PERIODS * period);
@@ -127,16 +127,16 @@ impl<const N: usize> Intervals<N> {
     }
 }
 
-/// A raised cosine of unit area.
+/// A test function of the weak form: a raised cosine of unit area over part of a log.
 #[derive(Debug, Clone, Copy)]
 pub struct TestFunction {
-    /// Index of the log.
+    /// Index of the log that the test function lies in.
     pub log: usize,
-    /// First interval that it reaches.
+    /// Index of the first sample interval inside the test function.
     pub first: usize,
-    /// One behind the last.
+    /// Index behind the last sample interval inside the test function.
     pub last: usize,
-    /// Time of its maximum since the start of the log, s.
+    /// Time of the test function's maximum since the start of the log, s.
     pub centre: f64,
     half: f64,
 }
@@ -151,13 +151,13 @@ impl TestFunction {
         area(m.t + 0.5 * m.h) - area(m.t - 0.5 * m.h)
     }
 
-    /// Mean derivative of the test function over an interval times its length.
+    /// Mean derivative of the test function over an interval times the interval's length, 1/s.
     pub fn rise<const N: usize>(&self, m: &Middle<N>) -> f64 {
         self.value(m.t + 0.5 * m.h) - self.value(m.t - 0.5 * m.h)
     }
 
-    /// Factors on the positions, sample by sample from that before the first interval on, of a row that takes `momentum` times the mean velocity
-    /// into its momentum, and takes from the torque `stiffness` times the position and `damping` times the velocity.
+    /// Factors on the positions, sample by sample from the start of the first interval on, in a row whose momentum holds `momentum` times the mean velocity, and
+    /// whose torque holds `stiffness` times the position and `damping` times the velocity.
     pub fn on_positions<const N: usize>(
         &self,
         middles: &[Middle<N>],
@@ -179,7 +179,7 @@ impl TestFunction {
         0.5 * (1.0 + (PI * x).cos()) / self.half
     }
 
-    /// Intervals it reaches.
+    /// Range of the sample intervals inside the test function.
     pub fn reach(&self) -> std::ops::Range<usize> {
         self.first..self.last
     }

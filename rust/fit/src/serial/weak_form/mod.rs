@@ -1,4 +1,4 @@
-//! The equation of motion in its weak form: intervals (log) -> equation (torques of terms) -> rows (regression on the arm's parameters).
+//! The weak form of the equation of motion: intervals of a log -> equation (torques of terms) -> rows (regression on the arm's parameters).
 
 pub(super) mod equation;
 pub(super) mod intervals;

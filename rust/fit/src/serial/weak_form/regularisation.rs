@@ -1,16 +1,16 @@
 //! Width over which the sign of each joint's dry friction is regularised: a nuisance, fitted and never named.
 //!
-//! Where friction comes from a soft constraint, as in some simulators, or from grease, its torque does not jump at a reversal. What a jump in
-//! the model leaves there looks like a delay of the torque.
+//! Where friction comes from a soft constraint, as in some simulators, or from grease, its torque does not jump at a reversal. A jump in the model leaves a
+//! residual there that looks like a delay of the torque.
 
 use crate::serial::constants::PRICE;
 use crate::serial::weak_form::rows::{Prior, Regression, Rows};
 
-/// Widths that are tried, rad/s (m/s).
+/// Widths of friction regularisation that are tried, rad/s (m/s).
 const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
 
-/// The width of every joint, zero for dry friction; `coulomb` is the first Coulomb coefficient among the parameters, `change(j, width)` what a width
-/// changes in the sign's column of joint `j`'s rows.
+/// Width of friction regularisation by joint, rad/s (m/s), zero for dry friction; `coulomb` is the index of the first Coulomb coefficient among the parameters,
+/// `change(j, width)` what a width changes in the sign's column of joint `j`'s rows.
 pub fn widths(
     rows: &Rows,
     prior: &Prior,

@@ -1,54 +1,54 @@
-//! Rows of the weak equation of motion, joint by joint, and their regression on the arm's parameters beside further torques.
+//! Rows of the weak equation of motion, joint by joint, and their regression on the arm's parameters beside given torques.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Residuals count as correlated over this many rows at most, a quarter of a second: disturbances have memories of 0.05 to 0.3 s, and what is correlated
-/// for longer is what the model lacks.
+/// Rows over which residuals count as correlated at most, a quarter of a second: disturbances have memories of 0.05 to 0.3 s, and what is correlated for longer is
+/// what the model lacks.
 const LONGEST_CORRELATION: usize = 10;
 
-/// Rounds in which weights follow from residuals.
+/// Rounds in which the weights of rows follow from residuals.
 const WEIGHT_ROUNDS: usize = 4;
 
-/// Rows of one joint: `y = psi theta + torques beside`.
+/// Rows of one joint: `y = psi theta + torques of terms`.
 #[derive(Debug, Clone)]
 pub struct JointRows {
-    /// Torque, one value per row.
+    /// Torque, one value per row, N m or N.
     pub y: Vec<f64>,
     /// Regressor, row by row.
     pub psi: Vec<f64>,
-    /// Block, of a second or so, that each row belongs to.
+    /// Index of the block, of a second or so, that each row belongs to.
     pub block: Vec<usize>,
-    /// Standard deviation that the noise of positions puts into each row.
+    /// Standard deviation that the noise of positions puts into each row, N m or N.
     pub floor: Vec<f64>,
 }
 
-/// Rows of all joints.
+/// Rows of the weak equation of motion of all joints.
 #[derive(Debug, Clone)]
 pub struct Rows {
-    /// By joint.
+    /// Rows of each joint.
     pub joints: Vec<JointRows>,
-    /// Number of parameters.
+    /// Number of columns of the regressor.
     pub parameters: usize,
-    /// Number of blocks.
+    /// Number of blocks, of a second or so, in all logs.
     pub blocks: usize,
 }
 
-/// A torque beside the arm's own, by joint and row; none on joints it does not act on.
+/// A torque beside the arm's own, by joint and row, N m or N; none on joints it does not act on.
 pub type Signal = Vec<Option<Vec<f64>>>;
 
 /// Prior of the parameters: values, standard deviations, and which may not be negative.
 #[derive(Debug, Clone)]
 pub struct Prior {
-    /// Values.
+    /// Prior values of the parameters, SI.
     pub theta: Vec<f64>,
-    /// Standard deviations; zero for a value that is not estimated.
+    /// Prior standard deviations of the parameters, SI; zero for a value that is not estimated.
     pub sigma: Vec<f64>,
-    /// Whether each is a coefficient that may not be negative.
+    /// Whether each parameter is a coefficient that may not be negative.
     pub positive: Vec<bool>,
 }
 
 impl Prior {
-    /// Squared distance in standard deviations.
+    /// Squared distance of `theta` from the prior values, in standard deviations.
     pub fn cost(&self, theta: &[f64]) -> f64 {
         let off = |i: usize| {
             if self.sigma[i] > 0.0 { ((theta[i] - self.theta[i]) / self.sigma[i]).powi(2) } else { 0.0 }
@@ -57,7 +57,7 @@ impl Prior {
     }
 }
 
-/// Sum of signals.
+/// Sum of torque signals, by joint and row.
 pub fn sum(rows: &Rows, signals: &[Signal]) -> Signal {
     let of = |j: usize| {
         let mut total: Option<Vec<f64>> = None;
@@ -73,7 +73,7 @@ pub fn sum(rows: &Rows, signals: &[Signal]) -> Signal {
 }
 
 impl JointRows {
-    /// What parameters and a torque beside leave of the rows.
+    /// Residuals of one joint's rows after the parameters' and a further torque (`beside`), N m or N.
     fn residual(&self, theta: &[f64], beside: Option<&Vec<f64>>) -> Vec<f64> {
         let p = theta.len();
         let row = |i: usize| {
@@ -85,13 +85,13 @@ impl JointRows {
 }
 
 impl Rows {
-    /// Residuals by joint.
+    /// Residuals by joint and row after the parameters' and a further torque (`beside`), N m or N.
     pub fn residual(&self, theta: &[f64], beside: &Signal) -> Vec<Vec<f64>> {
         self.joints.iter().zip(beside).map(|(rows, s)| rows.residual(theta, s.as_ref())).collect()
     }
 
-    /// Weight of each joint's rows from its residuals: one over their variance, times the number of rows that count as one because they are
-    /// correlated. A joint without rows weighs nothing.
+    /// Weight of each joint's rows from their residuals: one over the variance, and over the number of rows that count as one because they are correlated. A joint
+    /// without rows weighs nothing.
     pub fn weights(&self, residual: &[Vec<f64>]) -> Vec<f64> {
         let of = |(rows, r): (&JointRows, &Vec<f64>)| {
             let n = r.len() as f64;
@@ -116,7 +116,7 @@ impl Rows {
     }
 }
 
-/// Rows that count as one: one plus twice the sum of their residuals' correlations up to the first that is not positive.
+/// Number of rows that count as one: one plus twice the sum of their residuals' correlations up to the first that is not positive.
 fn correlation_length(r: &[f64]) -> f64 {
     let total: f64 = r.iter().map(|r| r * r).sum();
     let mut length = 1.0;
@@ -130,33 +130,33 @@ fn correlation_length(r: &[f64]) -> f64 {
     length
 }
 
-/// Regression of rows on the arm's parameters, with their prior.
+/// Regression of the weak equation's rows on the arm's parameters, with their prior.
 pub struct Regression<'a> {
-    /// Rows.
+    /// Rows of the weak equation of motion.
     pub rows: &'a Rows,
-    /// Prior.
+    /// Prior of the arm's parameters.
     pub prior: &'a Prior,
-    /// Weight of each joint's rows.
+    /// Weight of each joint's rows, 1/(N m)^2 or 1/N^2.
     pub weights: Vec<f64>,
-    /// Normal matrix of the data alone.
+    /// Normal matrix of the data without the prior.
     normal: DMatrix<f64>,
 }
 
 /// Parameters that fit best beside a given torque.
 #[derive(Debug, Clone)]
 pub struct Estimate {
-    /// Parameters.
+    /// Estimated parameters, SI.
     pub theta: Vec<f64>,
-    /// Residuals by joint.
+    /// Residuals by joint and row, N m or N.
     pub residual: Vec<Vec<f64>>,
-    /// Weighted squared residuals and squared distance from the prior.
+    /// Weighted squared residuals plus squared distance from the prior.
     pub cost: f64,
-    /// Of it, the distance from the prior.
+    /// Squared distance of the parameters from the prior, in standard deviations.
     pub prior_cost: f64,
 }
 
 impl<'a> Regression<'a> {
-    /// With these weights.
+    /// A regression with given weights of each joint's rows.
     pub fn new(rows: &'a Rows, prior: &'a Prior, weights: Vec<f64>) -> Self {
         let p = rows.parameters;
         let mut normal = DMatrix::zeros(p, p);
@@ -167,7 +167,7 @@ impl<'a> Regression<'a> {
         Self { rows, prior, weights, normal }
     }
 
-    /// With weights that follow from the residuals beside a torque.
+    /// A regression with weights that follow from the residuals beside the torque `beside`.
     pub fn reweighted(rows: &'a Rows, prior: &'a Prior, beside: &Signal) -> Self {
         let scale = |rows: &JointRows| {
             let square = rows.y.iter().map(|y| y * y).sum::<f64>() / rows.y.len().max(1) as f64;
@@ -181,7 +181,7 @@ impl<'a> Regression<'a> {
         regression
     }
 
-    /// `Psi' W s` for a signal.
+    /// Product `Psi' W s` of the weighted regressor with a signal.
     fn along(&self, signal: &Signal) -> DVector<f64> {
         let p = self.rows.parameters;
         let mut total = DVector::zeros(p);
@@ -195,7 +195,7 @@ impl<'a> Regression<'a> {
         total
     }
 
-    /// Weighted product of two signals.
+    /// Weighted inner product of two signals.
     fn product(&self, a: &Signal, b: &Signal) -> f64 {
         let of = |j: usize| match (&a[j], &b[j]) {
             (Some(a), Some(b)) => self.weights[j] * a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>(),
@@ -204,7 +204,7 @@ impl<'a> Regression<'a> {
         (0..a.len()).map(of).sum()
     }
 
-    /// Normal matrix with the prior's precision; values that are not estimated, or held, are pinned.
+    /// Cholesky factor of the normal matrix with the prior's precision, in which `held` values are pinned; none if it is not positive definite.
     fn system(&self, held: &[bool]) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
         let mut system = self.normal.clone();
         let p = self.rows.parameters;
@@ -220,12 +220,12 @@ impl<'a> Regression<'a> {
         system.cholesky()
     }
 
-    /// Values that are not estimated.
+    /// Whether each parameter is not estimated.
     fn fixed(&self) -> Vec<bool> {
         self.prior.sigma.iter().map(|s| *s <= 0.0).collect()
     }
 
-    /// Best parameters beside a torque; coefficients that would be negative are held at zero.
+    /// Best parameters beside the torque `beside`; coefficients that would be negative are held at zero.
     pub fn estimate(&self, beside: &Signal) -> Estimate {
         let p = self.rows.parameters;
         let torque: Signal = self
@@ -276,8 +276,8 @@ impl<'a> Regression<'a> {
         Estimate { theta: value, residual, cost: data + prior_cost, prior_cost }
     }
 
-    /// To first order, what further torques explain of a residual beside the parameters; `ridge` is the precision to which sizes are known to be
-    /// small.
+    /// First-order test of further torques (`columns`) against the residual of an estimate, the parameters fitted beside them; `ridge` is the prior precision by
+    /// which their sizes are near zero.
     pub fn score(&self, at: &Estimate, columns: &[Signal], ridge: &[f64]) -> Option<Score> {
         let k = columns.len();
         let fixed = self.fixed();
@@ -300,7 +300,7 @@ impl<'a> Regression<'a> {
         Some(Score { size: size.iter().copied().collect(), gain, information, inverse, solved })
     }
 
-    /// Covariance of the sizes from the scatter of their scores over blocks, at an estimate that includes them (sandwich).
+    /// Covariance of the sizes of further torques from the scatter of their scores over blocks, at an estimate that includes them (sandwich).
     pub fn sandwich(&self, at: &Estimate, columns: &[Signal], score: &Score) -> DMatrix<f64> {
         let (k, p) = (columns.len(), self.rows.parameters);
         let mut blocks = vec![DVector::<f64>::zeros(k); self.rows.blocks];
@@ -325,7 +325,7 @@ impl<'a> Regression<'a> {
         &score.inverse * scatter * &score.inverse * small_sample
     }
 
-    /// Standard deviations of the parameters from the curvature of the cost.
+    /// Standard deviations of the parameters from the curvature of the cost, SI.
     pub fn sigma(&self) -> Vec<f64> {
         let fixed = self.fixed();
         let inverse = self.system(&fixed).map(|s| s.inverse());
@@ -339,7 +339,7 @@ impl<'a> Regression<'a> {
 }
 
 impl Score {
-    /// Information on size `i` beside the parameters, without the ridge.
+    /// Information of the data on size `i` beside the parameters, without the ridge.
     pub fn information(&self, i: usize) -> f64 {
         self.information[(i, i)]
     }
@@ -350,18 +350,18 @@ impl Score {
     }
 }
 
-/// A first-order test of further torques.
+/// Result of a first-order test of further torques.
 #[derive(Debug, Clone)]
 pub struct Score {
-    /// Their sizes.
+    /// Estimated sizes of the tested torques.
     pub size: Vec<f64>,
-    /// Decrease of the cost.
+    /// Decrease of the cost to first order by the tested torques.
     pub gain: f64,
-    /// Information of the data on the sizes beside the parameters.
+    /// Information matrix of the data on the sizes beside the parameters.
     information: DMatrix<f64>,
-    /// Inverse of it with the ridge.
+    /// Inverse of the information matrix with the ridge added.
     inverse: DMatrix<f64>,
-    /// Parameters that imitate each torque.
+    /// Parameters that imitate each tested torque.
     solved: Vec<DVector<f64>>,
 }
 
@@ -372,7 +372,7 @@ mod tests {
 
     const ROWS: usize = 400;
 
-    /// Rows of one joint with two parameters, and what else acts: `y = 3 psi1 + 0.5 psi2 + size extra + noise`.
+    /// Rows of one joint with two parameters, and a further torque: `y = 3 psi1 + 0.5 psi2 + size extra + noise`.
     fn rows(size: f64, noise: f64) -> (Rows, Signal) {
         let mut random = Random(3);
         let at = |k: usize, rate: f64| (rate * k as f64).sin();
