@@ -179,7 +179,7 @@ def _read(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> Fit:
-    """Return the equation error with the logs, or the arm, corrected by a reading."""
+    """Return the equation error after logs and arm file are corrected for the one mistake that a reading supposes, such as a turned sign."""
     if reading.corrections.gravity is not None:
         weights = arm.gravity_parameters
         low, high = low.copy(), high.copy()

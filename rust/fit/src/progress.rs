@@ -85,8 +85,9 @@ pub struct ProgressReporter {
     observer: Observer,
     /// Index of the current phase in `ORDER`.
     phase: AtomicUsize,
-    /// Units of work planned and done in the current phase.
+    /// Units of work planned in the current phase.
     planned: AtomicUsize,
+    /// Units of work done in the current phase.
     done: AtomicUsize,
     /// Fractions of the work, 0 to 1, at which the current phase begins and ends, and the largest one reported; as bits, which sort like positive numbers.
     from: AtomicU64,

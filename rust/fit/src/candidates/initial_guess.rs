@@ -181,7 +181,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Best initial guess of each of the candidates with the largest gain (above `least`), and of each candidate that only the prior can reveal.
+/// Best initial guesses of the candidates to be fitted: those with the largest gains in the score test, above `least`, and those that the arm's
+/// parameters imitate to within `ABSORBED`, which only the prior of the parameters can tell from them.
 fn promising(screened: &[ScoreTest], least: f64) -> Vec<&ScoreTest> {
     let mut order: Vec<&ScoreTest> = screened.iter().filter(|s| s.gain > 0.0).collect();
     order.sort_by(|a, b| b.gain.total_cmp(&a.gain));

@@ -36,7 +36,7 @@ const MAX_SUBSTEPS_STIFF: usize = 100;
 /// Window of a log: samples `first ..= last` of one track, with predictions from sample `first + 1` (row 0) on.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<const N: usize> {
-    /// Index of the track.
+    /// Index of the log, or piece of a log, that the window is cut from.
     pub track: usize,
     /// Index of the sample that the window starts from.
     pub first: usize,
