@@ -1,8 +1,8 @@
-//! A law on all joints at once: found as one cause, in one decision.
+//! One law on several joints at once, found as one cause in one step of the model search.
 //!
-//! Friction laws, delays and lags usually sit on every joint. The candidate has an amplitude per joint, or one value for all where the law is a delay or a
-//! gain, and is judged as others are, by its own number of parameters. It has to be noticed on each joint that it keeps, on half of those that move, and what
-//! it explains beside the law on the one joint where that explains most has to be accepted by itself.
+//! Friction laws, delays and lags usually act on every joint. The candidate has an amplitude per joint, or one value for all joints where the law is a delay
+//! or a gain, and is judged as a term on one joint is, by its number of parameters. It has to be significant on each joint that it keeps and on half of the
+//! moving joints, and what it explains beyond the law on the one joint where the law explains most has to be accepted by itself.
 
 use crate::serial::constants::{ARM_WIDE, ARM_WIDE_FINALISTS, CONSEQUENCE, NOTICED, PRICE};
 use crate::serial::search::Search;
@@ -11,11 +11,11 @@ use crate::serial::search::fitting::Fitted;
 use crate::serial::term::Term;
 use crate::serial::weak_form::rows::Regression;
 
-/// A claim about the arm rests on so many joints at least, or on all of them.
+/// Number of joints that a law has to be found on to be one cause of the whole arm, or all moving joints where fewer move.
 const FEWEST_JOINTS: usize = 3;
 
 impl Search<'_> {
-    /// Models with one law more on several joints at once that is accepted; the laws that explain most to first order.
+    /// Fitted models with one more law on several joints, where accepted; tried for the laws that explain most to first order.
     pub(in crate::serial) fn on_several_joints(
         &self,
         regression: &Regression,
@@ -40,7 +40,7 @@ impl Search<'_> {
         finalists.filter_map(|(terms, _)| self.one_cause(regression, model, terms)).collect()
     }
 
-    /// Whether both are the same law, in the same unit, on whichever joint.
+    /// Whether two terms are the same law with parameters in the same units, on any joints.
     fn is_same_law(&self, a: &Term, b: &Term) -> bool {
         let units = |term: &Term| -> Vec<&'static str> {
             term.parameters(self.rotary_of(term)).iter().map(|p| p.unit).collect()
@@ -48,14 +48,14 @@ impl Search<'_> {
         a.is_of_a_joint() && a.name() == b.name() && units(a) == units(b)
     }
 
-    /// Joints that a claim about the whole arm needs.
+    /// Number of joints that a law has to be found on to be one cause of the whole arm.
     fn fewest(&self) -> usize {
         let moving = self.training.rows().joints.iter().filter(|r| !r.y.is_empty()).count();
         let half = (ARM_WIDE * moving as f64).ceil() as usize;
         half.max(FEWEST_JOINTS.min(moving)).max(2)
     }
 
-    /// The model with this law on all joints where it is noticed, if that is accepted as one cause.
+    /// The model with one law (`terms`, joint by joint) added on all joints where it is significant, if accepted as one cause.
     fn one_cause(&self, regression: &Regression, model: &Fitted, terms: Vec<Term>) -> Option<Fitted> {
         let last = model.terms.len();
         let with = |term: Term| {
@@ -85,7 +85,7 @@ impl Search<'_> {
         is_accepted.then_some(best)
     }
 
-    /// The law with one value, the mean of those on which it is noticed, on every joint that moves and has it not yet.
+    /// A law with one value, the mean of the joints in `noticed`, on every moving joint whose term in the model it would not repeat.
     fn on_every_joint(&self, model: &Fitted, noticed: &[Term]) -> Term {
         let rows = &self.training.rows().joints;
         let moves = |term: &Term| {
@@ -98,7 +98,7 @@ impl Search<'_> {
         Term::common(members).with(Term::common(noticed.to_vec()).p)
     }
 
-    /// Members of the last term that are noticed on their joints, in training logs and holdout.
+    /// Parts, joint by joint, of the term of index `last` that are significant on the training logs and lower the holdout's cost of their joint.
     fn noticed(&self, regression: &Regression, without: &Fitted, with: &Fitted, last: usize) -> Vec<Term> {
         let held = |set: &Fitted, joint: usize| set.costs[1][joint - 1].iter().sum::<f64>();
         let is_noticed = |member: &Term| {
@@ -115,7 +115,7 @@ impl Search<'_> {
         with.terms[last].members().into_iter().filter(is_noticed).collect()
     }
 
-    /// Whether what the last term explains beside the same law on the one joint where that explains most is accepted.
+    /// Whether the last term of `with` on its further joints is accepted beside the same law on the one joint where the law explains most.
     fn is_more_than_on_one_joint(&self, regression: &Regression, model: &Fitted, with: &Fitted) -> bool {
         let last = model.terms.len();
         let fell = |term: &Term| {
@@ -138,7 +138,7 @@ impl Search<'_> {
         self.evidence(regression, &alone, &apart, last + 1).is_accepted()
     }
 
-    /// The terms with one more; the same law on so many joints that it is one of the whole arm becomes one term.
+    /// The terms with `added`; terms of one law on enough joints to be a cause of the whole arm become one term.
     pub(in crate::serial) fn joined(&self, terms: Vec<Term>, added: Term) -> Vec<Term> {
         let first = added.members().swap_remove(0);
         let (same, mut joined): (Vec<Term>, Vec<Term>) =

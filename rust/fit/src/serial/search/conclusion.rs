@@ -1,4 +1,4 @@
-//! The end of a search: probabilities of its terms, what looks alike, and tests of what is not in the model.
+//! Results of a model search: probabilities of the found terms, their look-alikes, and tests of the terms that are not in the model.
 
 use crate::serial::constants::{ALIKE, ALIKE_COST, NAMED};
 use crate::serial::search::evidence::{consequence, stability, trust};
@@ -10,7 +10,7 @@ use crate::serial::weak_form::rows::{JointRows, Regression};
 use armgap_core::chain::LINK_PARAMETERS;
 
 impl Search<'_> {
-    /// Probabilities, look-alikes, and tests of what is not in the model.
+    /// Results of a model search: probabilities and look-alikes of the model's terms, and tests of the terms that are not in the model.
     pub(in crate::serial) fn concluded(
         &self,
         guesses: &[Vec<Guess>],
@@ -46,8 +46,8 @@ impl Search<'_> {
         }
     }
 
-    /// A model whose links are so near to those of the arm file that the inertia matrix is positive definite, with rotor inertias and friction
-    /// estimated again.
+    /// The model with its links' parameters moved towards the arm file's until the inertia matrix is positive definite, and rotor inertias and
+    /// friction estimated again.
     fn feasible(&self, regression: &Regression, model: Fitted) -> Fitted {
         if (self.is_feasible)(&model.estimate.theta) {
             return model;
@@ -69,7 +69,7 @@ impl Search<'_> {
         model
     }
 
-    /// Cost that noisy positions alone put into the holdout's rows, by joint.
+    /// Holdout cost (weighted squared residuals) that the noise of positions alone gives, by joint.
     fn floor(&self, regression: &Regression) -> Vec<f64> {
         let of = |(rows, w): (&JointRows, &f64)| w * rows.floor.iter().map(|f| f * f).sum::<f64>();
         self.holdout.rows().joints.iter().zip(&regression.weights).map(of).collect()
@@ -124,7 +124,7 @@ impl Search<'_> {
         Named { term, sigma, evidence, probability: wins * trust, alike }
     }
 
-    /// Tests of every place that is not in the model, beside it.
+    /// First-order tests, beside the model, of every candidate whose joint and effect are not in the model.
     fn tested(&self, guesses: &[Vec<Guess>], regression: &Regression, model: &Fitted) -> Vec<Tested> {
         let screened = self.screened(guesses, regression, model);
         let open = self.candidates.iter().filter_map(|group| group.first());

@@ -1,4 +1,4 @@
-//! What speaks for a term: the model with it against the model without, and what probability that makes.
+//! Evidence for a term of the model: comparison of the model with the term and the model without it, and the term's probability.
 
 use crate::numeric::random::Random;
 use crate::serial::constants::{
@@ -8,29 +8,29 @@ use crate::serial::search::Search;
 use crate::serial::search::fitting::Fitted;
 use crate::serial::weak_form::rows::{JointRows, Regression, Rows, Signal};
 
-/// What speaks for a term: the model with it against the model without.
+/// Evidence for a term: comparison of the model with the term and the model without it.
 #[derive(Debug, Clone, Copy)]
 pub struct Evidence {
-    /// Effective number of its parameters.
+    /// Effective number of the term's parameters.
     pub parameters: f64,
-    /// Decrease of the training cost, prior included.
+    /// Decrease of the cost (weighted squares) of the training logs and the prior by the term.
     pub gain: f64,
-    /// Of it, decrease of the distance from the prior.
+    /// Decrease, by the term, of the parameters' squared distance from the prior, in standard deviations.
     pub relief: f64,
-    /// Squared robust test statistic.
+    /// Squared robust test statistic of the term on the training logs (sandwich over blocks).
     pub statistic: f64,
-    /// Decrease of the holdout's cost, on the joints that the term acts on.
+    /// Decrease of the holdout's cost (weighted squared residuals) by the term, on the joints that the term acts on.
     pub holdout_gain: f64,
-    /// Size that the holdout gives the term, one being the training logs' (see [`Search::evidence`]), in its standard deviations.
+    /// Size of the term in the holdout, relative to the training logs, over the size's standard deviation (see [`Search::evidence`]).
     pub deviations: f64,
-    /// Largest share of one joint's holdout cost that it takes.
+    /// Share of one joint's holdout cost that the term removes, 0 to 1, of the joint with the largest share.
     pub share: f64,
-    /// Largest RMS torque beside that of the joint.
+    /// RMS torque of the term relative to the torque of the joint, of the joint with the largest ratio.
     pub consequence: f64,
 }
 
 impl Evidence {
-    /// Whether the logs ask for the term by what it explains.
+    /// Whether the term is accepted because of the residuals that it explains in training logs and holdout.
     pub fn explains(&self) -> bool {
         self.statistic > NOTICED
             && self.statistic + self.deviations.max(0.0).powi(2) > SIGNIFICANT
@@ -41,7 +41,7 @@ impl Evidence {
             && self.consequence > CONSEQUENCE
     }
 
-    /// Whether it brings the arm's parameters back to where the arm file has them, and the holdout does not speak against it.
+    /// Whether the term is accepted because it brings the arm's parameters back to the arm file's values, without contradiction by the holdout.
     pub fn restores(&self) -> bool {
         self.relief > RESTORES + RESTORES_EACH * self.parameters
             && self.gain > PRICE + 2.0 * self.parameters
@@ -49,19 +49,19 @@ impl Evidence {
             && self.consequence > CONSEQUENCE
     }
 
-    /// Whether the term is accepted.
+    /// Whether the term is accepted, for what it explains or for the arm file's values that it restores.
     pub fn is_accepted(&self) -> bool {
         self.explains() || self.restores()
     }
 }
 
 impl Search<'_> {
-    /// What speaks for term `index` of `with` beside the model `without` it.
+    /// Evidence for the term of index `index` in the model `with`, compared with the model `without` the term.
     ///
-    /// The holdout judges by a regression of what the model without the term leaves on what the term takes from it: a slope of one says that it is there as
-    /// the training logs have it, a slope of zero that it is not. It judges on the joints that the term acts on, as the scatter of the other joints'
-    /// parameters says nothing about it. The slope's standard deviation comes from the scatter of the blocks' scores. How unevenly an effect is spread over
-    /// the blocks does not count against it: a stop may be met twice in a log.
+    /// On the holdout, the residuals of the model without the term are regressed on the part of them that the term removes: a slope of one says that the
+    /// effect has the size that the training logs gave it, a slope of zero that it is absent. Only joints that the term acts on count, as the scatter of
+    /// the other joints' parameters says nothing about the term. The slope's standard deviation comes from the scatter of the blocks' scores. How unevenly
+    /// an effect is spread over the blocks does not count against the effect: a stop may be met twice in a log.
     pub(in crate::serial) fn evidence(
         &self,
         regression: &Regression,
@@ -96,7 +96,7 @@ impl Search<'_> {
     }
 }
 
-/// Slope of the holdout's residuals without a term on their change by it, over the slope's standard deviation from the scatter over blocks.
+/// Slope of the holdout's residuals without a term regressed on their change by the term, over the slope's standard deviation from the scatter over blocks.
 fn confirmed(joints: &[usize], weights: &[f64], rows: &Rows, [without, with]: [&Fitted; 2]) -> f64 {
     let mut information = 0.0;
     let mut product = 0.0;
@@ -118,7 +118,7 @@ fn confirmed(joints: &[usize], weights: &[f64], rows: &Rows, [without, with]: [&
     slope * information / (small_sample * scatter).sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Largest RMS torque of a signal beside that of the joint it acts on.
+/// RMS of a torque signal relative to the torque of the joint it acts on, of the joint with the largest ratio.
 pub(in crate::serial) fn consequence(rows: &Rows, signal: &Signal) -> f64 {
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     let of = |(rows, s): (&JointRows, &Option<Vec<f64>>)| match s {
@@ -128,7 +128,7 @@ pub(in crate::serial) fn consequence(rows: &Rows, signal: &Signal) -> f64 {
     rows.joints.iter().zip(signal).map(of).fold(0.0, f64::max)
 }
 
-/// Share of resamples of the blocks, of training and holdout, in which a model costs less than every rival.
+/// Share of resamples of the blocks of training logs and holdout in which a model costs less than every rival, 0 to 1.
 pub(in crate::serial) fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64) -> f64 {
     let by_block = |fitted: &Fitted| -> Vec<f64> {
         fitted
@@ -156,8 +156,8 @@ pub(in crate::serial) fn stability(model: &Fitted, rivals: &[&Fitted], seed: u64
     wins as f64 / RESAMPLES as f64
 }
 
-/// Probability that what a term explains is not something that no term of the library is: its own part of the joint's holdout cost over
-/// that and what stays beyond noise; of a term that restores the arm file's values, by how much it does.
+/// Probability that a term is not merely a substitute for an effect missing in the library: part of a joint's holdout cost that the term removes, over this
+/// part plus the cost left above noise (`floor`, by joint); for a term that restores the arm file's values, from the decrease of the prior's cost.
 pub(in crate::serial) fn trust(without: &Fitted, with: &Fitted, evidence: &Evidence, floor: &[f64]) -> f64 {
     let joint = |set: &Fitted, j: usize| set.costs[1][j].iter().sum::<f64>();
     let own = (0..floor.len()).max_by(|a, b| {
@@ -180,7 +180,7 @@ mod tests {
 
     const ROWS: usize = 240;
 
-    /// A holdout's residuals without a term and with it; the term takes `taken` of the row.
+    /// Test statistic of a term on simulated holdout residuals: `truth` plus noise without the term, less `taken` with the term, by index of the row.
     fn deviations(truth: impl Fn(usize) -> f64, taken: impl Fn(usize) -> f64) -> f64 {
         let mut random = Random(7);
         let noise: Vec<f64> = (0..ROWS).map(|_| 0.1 * random.normal()).collect();

@@ -1,4 +1,4 @@
-//! A model with terms, fitted to the training logs and judged on the holdout.
+//! Fits of a serial arm's model with terms to the training logs, and their costs on the holdout.
 
 use crate::serial::constants::{ENOUGH, ITERATIONS, LOOSE};
 use crate::serial::search::{Motion, Search};
@@ -7,27 +7,27 @@ use crate::serial::term::{Term, TermKind};
 use crate::serial::weak_form::rows::{Estimate, Regression, Signal, sum};
 use rayon::prelude::*;
 
-/// Relative step of numerical derivatives of a term's torque.
+/// Relative step of a parameter in numerical derivatives of a term's torque.
 const STEP: f64 = 1e-3;
 
-/// Precision to which an amplitude is zero that is not there.
+/// Prior precision (inverse variance) by which an amplitude that is not estimated is held at zero.
 const HELD: f64 = 1e30;
 
-/// A model with terms, fitted to the training logs and judged on the holdout.
+/// A serial arm's model with terms, fitted to the training logs, with its costs on training logs and holdout.
 #[derive(Debug, Clone)]
 pub struct Fitted {
-    /// Its terms.
+    /// Terms of the model, with fitted values.
     pub terms: Vec<Term>,
-    /// Parameters and what they leave of the training logs.
+    /// Estimated parameters of the arm, with the residuals and the cost of the training logs.
     pub estimate: Estimate,
-    /// Weighted squared residuals by joint and block: training, holdout.
+    /// Weighted squared residuals by joint and block: of the training logs, and of the holdout.
     pub costs: [Vec<Vec<f64>>; 2],
-    /// Residuals of the holdout by joint, in units of the torque that reaches it ([`Search::scales`]).
+    /// Residuals of the holdout by joint and row, N m or N, scaled to the torque that reaches the joint ([`Search::scales`]).
     pub held: Vec<Vec<f64>>,
 }
 
 impl Fitted {
-    /// Effective number of its terms' parameters.
+    /// Effective number of parameters of all terms of the model.
     pub(in crate::serial) fn parameters(&self) -> f64 {
         self.terms.iter().map(|t| t.degrees).sum()
     }
@@ -36,14 +36,14 @@ impl Fitted {
         self.costs[1].iter().flatten().sum()
     }
 
-    /// What ranks models: cost of training logs, prior and holdout, and the price of its parameters.
+    /// Criterion that ranks models, less is better: cost of training logs, prior and holdout, plus two per effective parameter of the terms.
     pub(in crate::serial) fn total(&self) -> f64 {
         self.estimate.cost + self.holdout_cost() + 2.0 * self.parameters()
     }
 }
 
 impl Search<'_> {
-    /// Torques of all terms together.
+    /// Sum of the torques of terms along logs at the arm's parameters `theta`, by joint and row, N m or N.
     pub(in crate::serial) fn beside(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Signal {
         if terms.is_empty() {
             return vec![None; self.rotary.len()];
@@ -52,8 +52,8 @@ impl Search<'_> {
         sum(motion.rows(), &signals)
     }
 
-    /// Fits the arm's parameters and those of all terms to the training logs (variable projection, Golub and Pereyra 1973), and judges them on
-    /// the holdout.
+    /// Fits the parameters of the arm and of all terms to the training logs (variable projection, Golub and Pereyra 1973), from `theta`, and
+    /// computes the costs on the holdout.
     pub fn fit(&self, regression: &Regression, terms: Vec<Term>, theta: &[f64]) -> Fitted {
         self.progress.check();
         let mut terms = terms;
@@ -100,7 +100,7 @@ impl Search<'_> {
         Fitted { terms, estimate, costs, held }
     }
 
-    /// Parameters beside these terms, and the cost in units of the torque that reaches the joints.
+    /// Estimate of the arm's parameters beside terms at fixed values, with the cost scaled to the torque that reaches the joints.
     pub(in crate::serial) fn estimated(
         &self,
         regression: &Regression,
@@ -118,9 +118,9 @@ impl Search<'_> {
         estimate
     }
 
-    /// By joint, the factor between squared residuals with these terms and without, for terms that change what a command becomes: what they leave
-    /// is to be seen beside the torque that reaches the joint, and beside the inertia that it moves. A term that makes torques smaller, and with them
-    /// all parameters, makes what stays of them smaller too, and explains nothing by that.
+    /// Factor on the squared residuals of each joint, for terms that change the torque that a command gives: residuals are compared relative to
+    /// the torque that reaches the joint and to the inertia that it moves. A term that makes torques, and with them all parameters, smaller also
+    /// makes the residuals smaller, and explains nothing by that.
     pub(in crate::serial) fn scales(&self, motion: &dyn Motion, terms: &[Term], theta: &[f64]) -> Vec<f64> {
         let mut scales = vec![1.0; self.rotary.len()];
         let taken = |term: &Term| match (term.share_of_command(), term.joint()) {
@@ -154,7 +154,7 @@ impl Search<'_> {
         term.joints().first().is_none_or(|j| self.rotary[j - 1])
     }
 
-    /// Terms moved by part of a step, within their bounds.
+    /// Terms with their parameters changed by the fraction `part` of a step, within the parameters' bounds.
     pub(in crate::serial) fn moved(&self, terms: &[Term], step: &[f64], part: f64) -> Vec<Term> {
         let mut rest = step;
         terms
@@ -167,7 +167,7 @@ impl Search<'_> {
             .collect()
     }
 
-    /// One term moved by part of a step, within its bounds.
+    /// A term with its parameters changed by the fraction `part` of a step, within the parameters' bounds.
     fn moved_one(&self, term: &Term, step: &[f64], part: f64) -> Term {
         let bounds = term.parameters(self.rotary_of(term));
         let p = term.p.iter().zip(&bounds).enumerate().map(|(i, (p, b))| {
@@ -185,7 +185,7 @@ impl Search<'_> {
         term.with(p.collect())
     }
 
-    /// Derivatives of the terms' torques by all their parameters.
+    /// Derivatives of the terms' torques along the training logs by each of their parameters, by joint and row.
     pub(in crate::serial) fn derivatives(&self, terms: &[Term], theta: &[f64]) -> Vec<Signal> {
         let places: Vec<(usize, usize)> =
             terms.iter().enumerate().flat_map(|(i, t)| (0..t.p.len()).map(move |k| (i, k))).collect();
@@ -204,12 +204,12 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Precision that holds what motion does not tell of the values of these terms.
+    /// Prior precision (inverse variance) of each parameter of the terms, for parameters that motion does not determine.
     pub(in crate::serial) fn ridge(&self, terms: &[Term]) -> Vec<f64> {
         terms.iter().flat_map(|term| self.ridge_of(term, term.p.len())).collect()
     }
 
-    /// The same of one term with so many columns: of a link's ten numbers by the arm file's trust in them, of laws none.
+    /// Prior precision of the first `columns` parameters of a term: of a link from the arm file's standard deviations, of laws zero.
     pub(in crate::serial) fn ridge_of(&self, term: &Term, columns: usize) -> Vec<f64> {
         match term.kind {
             TermKind::NominalLink(link) => {
@@ -224,7 +224,7 @@ impl Search<'_> {
     }
 }
 
-/// Difference of two signals over a step.
+/// Difference of two torque signals divided by a step; a missing signal counts as zero.
 pub(in crate::serial) fn difference(a: &Signal, b: &Signal, step: f64) -> Signal {
     a.iter()
         .zip(b)

@@ -1,4 +1,4 @@
-//! Which terms a serial arm's model lacks: added one after another, dropped when idle.
+//! Model search of serial arms: terms are added to the model one after another, and terms that become idle are dropped.
 
 pub(in crate::serial) mod arm_wide;
 pub(in crate::serial) mod conclusion;
@@ -13,82 +13,82 @@ use crate::serial::search::screening::Guess;
 use crate::serial::term::Term;
 use crate::serial::weak_form::rows::{Prior, Regression, Rows, Signal};
 
-/// Rows of an arm along some logs, and the torques of terms along them.
+/// Rows of an arm's weak equation of motion along a set of logs, and torques of terms along these logs.
 pub trait Motion: Sync {
-    /// The rows.
+    /// Rows of the weak equation of motion along the logs.
     fn rows(&self) -> &Rows;
-    /// Torque of a term, given the arm's parameters.
+    /// Torque of a term along the logs at the arm's parameters `theta`, by joint and row, N m or N.
     fn signal(&self, term: &Term, theta: &[f64]) -> Signal;
-    /// Mean inertia of every joint along the logs.
+    /// Mean inertia of every joint along the logs at the arm's parameters `theta`, kg m^2 or kg.
     fn inertia(&self, theta: &[f64]) -> Vec<f64>;
 }
 
-/// What a search works with.
+/// Data, prior, candidates and settings of a model search on a serial arm.
 pub struct Search<'a> {
-    /// Logs that terms are fitted to.
+    /// Training logs, which terms are fitted to.
     pub training: &'a dyn Motion,
-    /// Logs that they are judged on.
+    /// Holdout logs, which fitted terms are judged on.
     pub holdout: &'a dyn Motion,
-    /// Prior of the arm's parameters.
+    /// Prior of the arm's parameters: the arm file's values and standard deviations.
     pub prior: &'a Prior,
-    /// Every term at its initial guesses, grouped by place.
+    /// Candidate terms at their initial guesses; one group holds the guesses of one effect on one joint or pair of joints, or on the whole arm.
     pub candidates: Vec<Vec<Term>>,
-    /// Whether each joint turns.
+    /// Whether each joint is rotary; else it is linear.
     pub rotary: Vec<bool>,
-    /// Sample period, s. A delay or lag below it is the way in which torques and positions were sampled, and is not named.
+    /// Sample period, s. A delay below the sample period is an artefact of how torques and positions were sampled, and is not named.
     pub period: f64,
-    /// Whether an arm with these parameters has a positive definite inertia matrix along its logs.
+    /// Function that tells whether given parameters of the arm have a positive definite inertia matrix along the logs.
     pub is_feasible: &'a (dyn Fn(&[f64]) -> bool + Sync),
-    /// Progress report and cancellation.
+    /// Reporter of the search's progress, which also takes cancellation.
     pub progress: &'a ProgressReporter,
 }
 
-/// A term of the final model with what it rests on.
+/// A term of the final model with its uncertainty, evidence, probability and look-alikes.
 #[derive(Debug, Clone)]
 pub struct Named {
-    /// The term.
+    /// Term of the final model, with fitted values.
     pub term: Term,
-    /// Standard deviations of its parameters.
+    /// Standard deviations of the term's parameters, SI.
     pub sigma: Vec<f64>,
-    /// What speaks for it.
+    /// Evidence for the term: comparison of the models with and without it.
     pub evidence: Evidence,
-    /// Probability that it, or one of its look-alikes, is in the arm.
+    /// Probability that the term, or one of its look-alikes, is in the arm.
     pub probability: f64,
-    /// Terms that explain the same.
+    /// Look-alikes of the term: terms that explain the logs about as well in its stead.
     pub alike: Vec<Term>,
 }
 
-/// Tests of a place that is not in the final model.
+/// Result of the first-order test of a candidate that is not in the final model.
 #[derive(Debug, Clone)]
 pub struct Tested {
-    /// The term at its best guess.
+    /// Candidate term at the best of its initial guesses.
     pub term: Term,
-    /// Size and its robust standard deviation, relative to the term as given.
+    /// Estimated size of the candidate and the size's robust standard deviation, both as multiples of the term's values.
     pub size: [f64; 2],
-    /// RMS of its torque beside that of the joint's, per unit of size.
+    /// RMS torque of the candidate at size 1 relative to the torque of the joint it acts on.
     pub consequence: f64,
 }
 
-/// The end of a search.
+/// Result of a model search on a serial arm.
 pub struct Found {
-    /// The arm's own parameters, without terms.
+    /// The model without terms, with the arm's parameters re-estimated.
     pub refit: Fitted,
-    /// The same where the inertia matrix is positive definite, for predictions.
+    /// The re-estimated model without terms whose inertia matrix is positive definite, for predictions.
     pub refit_feasible: Fitted,
-    /// The model with all terms.
+    /// The final model with all terms that the search accepted.
     pub model: Fitted,
-    /// Its terms, strongest first.
+    /// Terms of the final model, by decreasing gain on training logs and holdout.
     pub named: Vec<Named>,
-    /// The model with those of them alone that are probable enough to be named.
+    /// The model with only those terms that are probable enough to be named, for predictions.
     pub reported: Fitted,
-    /// All other places, tested beside the final model.
+    /// First-order tests, beside the final model, of all candidates that are not in it.
     pub tested: Vec<Tested>,
-    /// Standard deviations of the arm's parameters: re-estimated, and with the terms.
+    /// Standard deviations of the arm's parameters, SI: of the re-estimated model without terms, and of the final model.
     pub sigma: [Vec<f64>; 2],
 }
 
 impl Search<'_> {
-    /// Runs the search for `most` decisions at most.
+    /// Runs the model search with at most `most` additions of a term; `seed` is of the resampling of blocks.
     pub fn run(&self, most: usize, seed: u64) -> Found {
         self.progress.begin(Phase::Refit, 1);
         let none = vec![None; self.rotary.len()];
@@ -111,7 +111,7 @@ impl Search<'_> {
         self.concluded(&guesses, &regression, [refit, model], sigma, seed)
     }
 
-    /// The term of the best decision; none where no candidate is accepted.
+    /// The term whose addition gives the accepted model of least total cost; none where no candidate is accepted.
     fn best_addition(&self, guesses: &[Vec<Guess>], regression: &Regression, model: &Fitted) -> Option<Term> {
         let screened = self.screened(guesses, regression, model);
         let single = self.finalists(regression, model, &screened);
@@ -123,7 +123,7 @@ impl Search<'_> {
         Some(best.terms[last].clone())
     }
 
-    /// Whether term `index` of the second model is accepted beside the first, which lacks it.
+    /// Whether the term of index `index` in the model `with` is accepted, compared with the model `without` the term.
     pub(in crate::serial) fn is_accepted(
         &self,
         regression: &Regression,
@@ -133,19 +133,19 @@ impl Search<'_> {
         !self.is_sampling(&with.terms[index]) && self.evidence(regression, without, with, index).is_accepted()
     }
 
-    /// Whether a term is a delay or lag of less than a sample period.
+    /// Whether a term is a delay of less than a sample period on all of its joints.
     fn is_sampling(&self, term: &Term) -> bool {
         term.is_delay() && term.members().iter().all(|member| member.p[0] < self.period)
     }
 
-    /// The model without term `index`, fitted.
+    /// The model without its term of index `index`, fitted again.
     pub(in crate::serial) fn without(&self, regression: &Regression, model: &Fitted, index: usize) -> Fitted {
         let mut terms = model.terms.clone();
         terms.remove(index);
         self.fit(regression, terms, &model.estimate.theta)
     }
 
-    /// Drops terms that are not accepted beside the others.
+    /// The model without the terms, before the last one, that are no longer accepted beside the model's other terms.
     fn without_idle(&self, regression: &Regression, model: Fitted) -> Fitted {
         let mut model = model;
         let mut index = 0;
@@ -176,7 +176,7 @@ mod tests {
     const ROWS: usize = 600;
     const SIGMA: f64 = 0.02;
 
-    /// Two joints, one parameter each; every law is a sine of its own rate along the joint it acts on.
+    /// Rows of two simulated joints, one parameter each; the torque of every law is a sine over the rows with a rate of the law's own.
     struct Sines {
         rows: Rows,
     }
@@ -187,7 +187,7 @@ mod tests {
 
     fn sine(term: &Term, phase: f64) -> Signal {
         if let TermKind::Row(row) = term.kind {
-            // Each amplitude has a rate of its own; the second joint feels the same with the row's factor.
+            // Each amplitude has a rate of its own; the second joint's torque is the first's times the row's factor.
             let wave = |k: usize| (1..=3).map(|i| term.p[i - 1] * (0.31 * (i * k) as f64).sin()).sum::<f64>();
             return [1.0, row.factor].map(|by| Some((0..ROWS).map(|k| by * wave(k)).collect())).into();
         }
@@ -199,7 +199,7 @@ mod tests {
     }
 
     impl Sines {
-        /// With these terms in the data; `seed` of the noise.
+        /// Simulated rows whose torques hold those of `terms`; `seed` is of the noise.
         fn with(terms: &[Term], seed: u64) -> Self {
             let mut random = Random(seed);
             let joint = |j: usize, random: &mut Random| {

@@ -1,4 +1,4 @@
-//! First-order tests of all candidates, and fits of those that pass.
+//! Screening of candidate terms: first-order tests of all candidates, and fits of the candidates that pass.
 
 use crate::progress::Phase;
 use crate::serial::constants::{FINALISTS, PRICE};
@@ -10,20 +10,20 @@ use crate::serial::weak_form::rows::{Estimate, Regression, Signal};
 use armgap_core::effect::Trial;
 use rayon::prelude::*;
 
-/// A first-order test is not trusted farther than so many initial guesses.
+/// Multiple of a term's initial guess up to which a first-order test may move the term's parameters.
 const FARTHEST: f64 = 50.0;
 
-/// Tilt of the base from which the first-order test follows, rad; its torque is smooth.
+/// Tilt of the base in the numerical derivative of its first-order test, rad; the torque of a tilt is smooth.
 const TILT_STEP: f64 = 1e-3;
 
-/// A term at an initial guess with the torques of its first-order test, along the training logs.
+/// A candidate term at an initial guess, with the torque signals of its first-order test along the training logs.
 pub struct Guess {
     pub(in crate::serial) term: Term,
     pub(in crate::serial) columns: Vec<Signal>,
 }
 
 impl Search<'_> {
-    /// Every candidate at every initial guess with the torques that test it.
+    /// Candidates at all of their initial guesses, with the torque signals of their first-order tests at an estimate.
     pub(in crate::serial) fn guesses(&self, regression: &Regression, at: &Estimate) -> Vec<Vec<Guess>> {
         let theta = &at.theta;
         let columns = |term: &Term| -> Vec<Signal> {
@@ -62,8 +62,8 @@ impl Search<'_> {
         self.candidates.par_iter().map(|group| group.iter().map(guess).collect()).collect()
     }
 
-    /// Effective number of a term's parameters (Moody 1992): where the arm's own parameters imitate it, only the directions in which the logs know more
-    /// than the arm file count, `trace(I diag(sigma)^2)` with the information `I` on its sizes beside the arm's parameters.
+    /// Effective number of a term's parameters (Moody 1992). Of a link or payload, which the arm's parameters can imitate, only directions that the logs
+    /// determine better than the arm file count: `trace(I diag(sigma)^2)`, `I` the information on the term's sizes beside the arm's parameters.
     fn degrees(&self, regression: &Regression, at: &Estimate, term: &Term, columns: &[Signal]) -> f64 {
         let link = match term.kind {
             TermKind::NominalLink(link) => link,
@@ -78,7 +78,7 @@ impl Search<'_> {
         })
     }
 
-    /// Tests a term to first order; returns it with the values that the test suggests, and the decrease of the cost.
+    /// Tests a term to first order; returns the term with the values that the test suggests, and the decrease of the cost.
     pub(in crate::serial) fn test(
         &self,
         regression: &Regression,
@@ -122,7 +122,7 @@ impl Search<'_> {
         let size = score.size[0];
         let information = score.gain / (size * size).max(f64::MIN_POSITIVE);
         let (p, size) = match trial {
-            // What a stop pushes back with is in proportion to stiffness and damping.
+            // The torque of a stop is in proportion to its stiffness and damping.
             Trial::Whole if matches!(term.kind, TermKind::Law(effect) if effect.is_contact()) => {
                 let share = size.clamp(0.0, FARTHEST);
                 (vec![term.p[0], share * term.p[1], share * term.p[2]], share)
@@ -154,7 +154,7 @@ impl Search<'_> {
         (gain > 0.0 && within(&term.p)).then_some((term, gain))
     }
 
-    /// Torque per unit of one amplitude, the others switched off.
+    /// Torque of a term along the training logs per unit of one of its amplitudes, with its other amplitudes at their neutral values.
     pub(in crate::serial) fn unit(&self, term: &Term, amplitude: usize, theta: &[f64]) -> Signal {
         let neutral = term.parameters(self.rotary_of(term));
         let mut p = term.p.clone();
@@ -164,7 +164,7 @@ impl Search<'_> {
         self.training.signal(&term.with(p), theta)
     }
 
-    /// Best initial guess of every place that is not in the model, best first.
+    /// Candidates that are not in the model, each with the values and the decrease of the cost of its best first-order test, largest decrease first.
     pub(in crate::serial) fn screened(
         &self,
         guesses: &[Vec<Guess>],
@@ -189,7 +189,7 @@ impl Search<'_> {
         found
     }
 
-    /// Models with one more term each, fitted: the finalists of the screening.
+    /// Fitted models with one more term each: one for each of the best candidates of the screening.
     pub(in crate::serial) fn finalists(
         &self,
         regression: &Regression,
@@ -211,7 +211,7 @@ impl Search<'_> {
     }
 }
 
-/// Tests inertia and friction along a row, none of which can be negative.
+/// First-order test of the inertia and friction of a transmission that couples two joints; parameters that would be negative are set to zero.
 fn test_row(regression: &Regression, at: &Estimate, guess: &Guess, row: RowTerm) -> Option<(Term, f64)> {
     let mut free: Vec<usize> = (0..guess.columns.len()).collect();
     loop {

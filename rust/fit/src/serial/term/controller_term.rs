@@ -3,31 +3,31 @@
 use crate::serial::controller::JointController;
 use crate::serial::term::TermParameter;
 
-/// A setting of one joint's controller.
+/// Difference of one setting of a joint's position controller from the arm file.
 #[derive(Debug, Clone, Copy)]
 pub struct ControllerTerm {
-    /// Which.
+    /// Setting of the controller that differs.
     pub setting: Setting,
-    /// Joint, from 0.
+    /// 0-based joint.
     pub joint: usize,
 }
 
-/// Settings that a log of references and positions tells something about.
+/// Settings of a position controller whose errors a log of references and positions can show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Setting {
-    /// `kp` is so many times that of the arm file.
+    /// Proportional gain `kp`; the parameter is a factor on the arm file's value.
     Gain,
-    /// `kd` is so much larger.
+    /// Derivative gain `kd`; the parameter is added to the arm file's value, N m s/rad or N s/m.
     Damping,
-    /// The reference arrives so much later.
+    /// Delay of the reference; the parameter is added to the arm file's value, s.
     ReferenceDelay,
 }
 
 impl Setting {
-    /// All of them.
+    /// All settings of a position controller that may be wrong.
     pub const ALL: [Self; 3] = [Self::Gain, Self::Damping, Self::ReferenceDelay];
 
-    /// Name in results.
+    /// Name of the term with this setting in results.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Gain => "controller_gain",
@@ -36,7 +36,7 @@ impl Setting {
         }
     }
 
-    /// Name for people.
+    /// Name of the term with this setting in reports.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Gain => "wrong proportional gain of the position controller",
@@ -45,7 +45,7 @@ impl Setting {
         }
     }
 
-    /// Its parameter.
+    /// Name, unit and bounds of the setting's parameter; `rotary` is whether the joint is rotary.
     pub fn parameter(self, rotary: bool) -> TermParameter {
         let (name, unit, bounds, neutral) = match self {
             Self::Gain => ("gain", "1", [0.05, 20.0], 1.0),
@@ -60,11 +60,11 @@ impl Setting {
         TermParameter { name, unit, bounds, neutral, inverse: None }
     }
 
-    /// Initial guesses of its parameter on a joint with this controller and of an inertia, at a sample period.
+    /// Initial guesses of the setting's parameter for a joint's controller, from the joint's inertia, kg m^2 or kg, and the log's sample period, s.
     pub fn guesses(self, controller: &JointController, inertia: f64, period: f64) -> Vec<f64> {
         match self {
             Self::Gain => vec![1.1],
-            // A tenth of the damping that is given, or of a critical one.
+            // A tenth of the larger of the given derivative gain and the critical damping.
             Self::Damping => {
                 vec![0.1 * controller.gains[1].max(2.0 * (controller.gains[0] * inertia).max(0.0).sqrt())]
             }
@@ -74,7 +74,7 @@ impl Setting {
 }
 
 impl ControllerTerm {
-    /// The controller with this setting at `value`.
+    /// A joint's controller with the term's setting changed by `value`: the factor of a gain, else the difference.
     pub fn on(&self, controller: &JointController, value: f64) -> JointController {
         let mut changed = *controller;
         match self.setting {

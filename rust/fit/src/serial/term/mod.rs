@@ -1,4 +1,4 @@
-//! Terms that a serial arm's model may lack: the library's laws joint by joint, and what changes the arm itself.
+//! Terms that a serial arm's model may lack: the library's effects on single joints, and changes of the arm's links, base, transmissions and controllers.
 
 pub(in crate::serial) mod controller_term;
 pub(in crate::serial) mod row_term;
@@ -13,50 +13,50 @@ use crate::serial::term::transmission::TransmissionLaw;
 use armgap_core::chain::LINK_NAMES;
 use armgap_core::effect::{JointPoint, Quantity, Scope, Trial};
 
-/// A term with values for its parameters.
+/// A term of a serial arm's model beside the nominal arm, with values of its parameters.
 #[derive(Debug, Clone)]
 pub struct Term {
-    /// What it is.
+    /// Kind of the term.
     pub kind: TermKind,
-    /// Values, SI.
+    /// Values of the term's parameters, SI.
     pub p: Vec<f64>,
-    /// Effective number of parameters: of a link's ten those that the logs know better than the arm file does.
+    /// Effective number of the term's parameters; of a link's ten inertial parameters only what the logs determine better than the arm file counts.
     pub degrees: f64,
 }
 
-/// What a term is.
+/// Kind of a term that a serial arm's model may lack.
 #[derive(Debug, Clone)]
 pub enum TermKind {
-    /// A law of the library on one joint; the values of the instance are an initial guess.
+    /// An effect of the library on one joint; the instance holds an initial guess of the parameters.
     Law(EffectInstance),
-    /// A load on the last link: mass and centre of mass in the link's frame, a point mass.
+    /// A point mass on the last link: parameters are the mass, kg, and the position in the link's frame, m.
     Payload,
-    /// The base turned about the two horizontal axes of its frame.
+    /// Tilt of the base about the two horizontal axes, x and y, of the base frame, rad.
     BaseTilt,
-    /// One link's mass, first moments and inertia differ from the nominal ones.
+    /// Difference of a link's mass, first moments and inertia from the nominal values; the number is the link's 0-based index.
     NominalLink(usize),
-    /// A shaft that twists, or backlash: its compliance or its gap.
+    /// Joint elasticity or backlash of a transmission; the parameter is the compliance or the gap.
     Transmission(TransmissionLaw),
-    /// A setting of a position controller.
+    /// A setting of a joint's position controller that differs from the arm file.
     Controller(ControllerTerm),
-    /// The same law on several joints.
+    /// One law that acts on several joints, as one term.
     Joints(SeveralJoints),
-    /// A term on a sum or a difference of two joints' motion.
+    /// A term that acts along the sum or the difference of two adjacent joints' positions.
     Row(RowTerm),
 }
 
-/// Name and unit of one parameter.
+/// Name, unit, bounds and neutral value of one parameter of a term.
 #[derive(Debug, Clone, Copy)]
 pub struct TermParameter {
-    /// Name in results.
+    /// Name of the parameter in results.
     pub name: &'static str,
-    /// SI unit.
+    /// SI unit of the parameter.
     pub unit: &'static str,
-    /// Bounds.
+    /// Lower and upper bound of the parameter, SI.
     pub bounds: [f64; 2],
-    /// Value at which it does nothing.
+    /// Value of the parameter at which the term has no effect, SI.
     pub neutral: f64,
-    /// Name and unit of its inverse, where results state that.
+    /// Name and unit of the parameter's inverse (stiffness of a compliance), where results state the inverse.
     pub inverse: Option<(&'static str, &'static str)>,
 }
 
@@ -64,13 +64,13 @@ const LOAD: [(&str, &str); 4] = [("mass", "kg"), ("com_x", "m"), ("com_y", "m"),
 const TURN: [(&str, &str); 2] = [("x", "rad"), ("y", "rad")];
 
 impl Term {
-    /// A law at its initial guess.
+    /// A term of one of the library's effects, with the instance's values.
     pub fn of_law(effect: EffectInstance) -> Self {
         let p = effect.p[..effect.len()].to_vec();
         Self { kind: TermKind::Law(effect), degrees: p.len() as f64, p }
     }
 
-    /// Neither load, nor tilt, nor change.
+    /// A term of a given kind with all of its parameters zero.
     pub fn neutral(kind: TermKind) -> Self {
         let count = match kind {
             TermKind::Law(effect) => effect.len(),
@@ -84,7 +84,7 @@ impl Term {
         Self { kind, p: vec![0.0; count], degrees: count as f64 }
     }
 
-    /// Name in results.
+    /// Name of the term in results.
     pub fn name(&self) -> &'static str {
         match self.kind {
             TermKind::Law(effect) => effect.law.spec().name,
@@ -98,7 +98,7 @@ impl Term {
         }
     }
 
-    /// Name for people.
+    /// Name of the term in reports.
     pub fn title(&self) -> &'static str {
         match self.kind {
             TermKind::Law(effect) => effect.law.spec().title,
@@ -112,7 +112,7 @@ impl Term {
         }
     }
 
-    /// 1-based joint; of a link, the joint that moves it; none for what belongs to the whole arm.
+    /// 1-based joint of the term; of a link, the joint that moves the link; none for a term on several joints or the whole arm.
     pub fn joint(&self) -> Option<usize> {
         match self.kind {
             TermKind::Law(effect) => effect.joint_number(),
@@ -123,12 +123,12 @@ impl Term {
         }
     }
 
-    /// Factors of two joints, of a term on a row over them.
+    /// Factors (1 and 1, or 1 and -1) of two adjacent joints' positions in the combination that a term acts along; none for other kinds.
     pub fn row(&self) -> Option<[i32; 2]> {
         if let TermKind::Row(row) = self.kind { Some(row.row()) } else { None }
     }
 
-    /// 1-based joints that it is on; none of what belongs to the whole arm.
+    /// 1-based joints that the term acts on; empty for a payload or a tilt of the base.
     pub fn joints(&self) -> Vec<usize> {
         match &self.kind {
             TermKind::Joints(of) => of.members.iter().filter_map(Self::joint).collect(),
@@ -137,15 +137,15 @@ impl Term {
         }
     }
 
-    /// Whether both are the same term, whatever their values; on several joints, whether they have one in common.
+    /// Whether two terms have the same name and the same joints, or a joint in common, whatever their values.
     pub fn same_place(&self, other: &Self) -> bool {
         let (own, others) = (self.joints(), other.joints());
         let overlap = self.row().is_none() && own.iter().any(|j| others.contains(j));
         self.name() == other.name() && self.row() == other.row() && (own == others || overlap)
     }
 
-    /// Whether it can be all that another term is, whatever the motion: a load on the last of so many links is a change of that link, and a heavier
-    /// last link is a load on it.
+    /// Whether the term can explain all that `other` explains, whatever the motion: a changed last link a payload, and a payload a heavier last link.
+    /// `links` is the number of links of the arm.
     pub fn includes(&self, other: &Self, links: usize) -> bool {
         match (&self.kind, &other.kind) {
             (TermKind::NominalLink(link), TermKind::Payload) => *link + 1 == links,
@@ -154,7 +154,7 @@ impl Term {
         }
     }
 
-    /// Its parameters; `rotary` tells of its joint.
+    /// Names, units and bounds of the term's parameters; `rotary` is whether its joint is rotary.
     pub fn parameters(&self, rotary: bool) -> Vec<TermParameter> {
         let free = |(name, unit): &(&'static str, &'static str)| TermParameter {
             name,
@@ -194,7 +194,7 @@ impl Term {
         }
     }
 
-    /// Number of its first parameters in which its torque is linear and that switch it off; none where the torque is not linear in any.
+    /// Number of leading parameters in which the term's torque is linear and which switch the term off together; 0 where the torque is linear in none.
     pub fn amplitudes(&self) -> usize {
         match self.kind {
             TermKind::Law(effect) => {
@@ -216,7 +216,7 @@ impl Term {
         }
     }
 
-    /// Whether it is sought on every joint by itself.
+    /// Whether the model search tries the term on every joint by itself.
     pub fn is_of_a_joint(&self) -> bool {
         match self.kind {
             TermKind::Law(effect) => effect.law.spec().scope == Scope::Joint,
@@ -229,7 +229,7 @@ impl Term {
         }
     }
 
-    /// Whether it changes the torque that a command becomes at the joint: of the command itself, or by a torque that depends on it.
+    /// Whether the term changes the torque that a command gives at the joint: by a change of the command, or by a torque that depends on the command.
     pub fn changes_command(&self) -> bool {
         if let TermKind::Joints(of) = &self.kind {
             return of.members[0].changes_command();
@@ -238,12 +238,12 @@ impl Term {
         effect.law.spec().hooks.command || depends(&effect, |x, value| x.tau = value)
     }
 
-    /// Factor that a controller's proportional gain puts on its torque; its derivative part is as good as viscous friction, which no factor tells of.
+    /// Factor on the controller's torque, of a term on the proportional gain; none for other terms (a derivative gain acts like viscous friction).
     pub fn share_of_command(&self) -> Option<f64> {
         matches!(self.kind, TermKind::Controller(of) if of.setting == Setting::Gain).then(|| self.p[0])
     }
 
-    /// Whether it is a factor on the command.
+    /// Whether the term is a factor on the torque command.
     pub fn is_gain(&self) -> bool {
         if let TermKind::Joints(of) = &self.kind {
             return of.members[0].is_gain();
@@ -253,7 +253,7 @@ impl Term {
         spec.hooks.command && spec.parameters.iter().all(|p| p.quantity == Quantity::Ratio)
     }
 
-    /// Whether it delays the command: a time is all that it has.
+    /// Whether the term delays the command or the reference: all of its parameters are times.
     pub fn is_delay(&self) -> bool {
         if let TermKind::Joints(of) = &self.kind {
             return of.members[0].is_delay();
@@ -265,12 +265,12 @@ impl Term {
         spec.hooks.command && spec.parameters.iter().all(|p| p.quantity == Quantity::Time)
     }
 
-    /// This term with other values.
+    /// The term with its parameters' values replaced by `p`, SI.
     pub fn with(&self, p: Vec<f64>) -> Self {
         Self { kind: self.kind.clone(), p, degrees: self.degrees }
     }
 
-    /// The library's effect with these values; none for what is no law.
+    /// The library's effect with the term's values; none for a term that is no effect of the library on one joint.
     pub fn effect(&self) -> Option<EffectInstance> {
         let TermKind::Law(mut effect) = self.kind else { return None };
         for (slot, value) in effect.p.iter_mut().zip(&self.p) {
@@ -280,7 +280,7 @@ impl Term {
     }
 }
 
-/// Whether a law's torque depends on what `set` changes of the joint's state.
+/// Whether an effect's torque depends on the quantity of the joint's state (position, velocity, torque) that `set` assigns.
 pub fn depends(effect: &EffectInstance, set: impl Fn(&mut JointPoint<f64>, f64)) -> bool {
     let torque = |value: f64| {
         let mut x = JointPoint {
@@ -299,8 +299,8 @@ pub fn depends(effect: &EffectInstance, set: impl Fn(&mut JointPoint<f64>, f64))
     torque(1.0) != torque(2.0)
 }
 
-/// Change of the last link's ten numbers under a point mass at `p = (mass, x, y, z)`: mass, first moments, inertia about the link's origin
-/// (xx, xy, yy, xz, yz, zz).
+/// Change of the last link's ten inertial parameters by a point mass `p = (mass, x, y, z)`, kg and m in the link's frame: mass, first moments,
+/// inertia about the link's origin (xx, xy, yy, xz, yz, zz).
 pub fn of_load(p: &[f64]) -> [f64; 10] {
     let [m, x, y, z] = [p[0], p[1], p[2], p[3]];
     [

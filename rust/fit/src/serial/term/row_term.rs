@@ -1,4 +1,4 @@
-//! Terms on a sum or a difference of two adjacent joints' motion: gears, belts and tendons that both joints turn, cables past both.
+//! Terms along the sum or the difference of two adjacent joints' positions: gears, belts and tendons that both joints turn, cables past both joints.
 //!
 //! With the row `r = (1, s)` of a coupled transmission (Siciliano 2009, section 5.1) and `q_r = q_j + s q_k`, a torque `tau_r` along it is the torque
 //! `r' tau_r` on the joints: `tau_r = inertia ddq_r + viscous dq_r + coulomb sign(dq_r)` of what turns with the row, and `k (q_r - q0)` of a spring on it.
@@ -12,28 +12,28 @@ use armgap_core::chain::JointKind;
 use armgap_core::effect::InputSegment;
 use nalgebra::SVector;
 
-/// A term on a row over two adjacent joints.
+/// A term that acts along the sum or the difference of two adjacent joints' positions, `q_r = q_j + factor q_k`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RowTerm {
-    /// First of the two joints, from 0.
+    /// 0-based index of the first of the two adjacent joints; the second follows it.
     pub first: usize,
-    /// Factor of the second joint's motion: 1 or -1; that of the first is 1.
+    /// Factor of the second joint's position in `q_r = q_first + factor q_second`: 1 or -1.
     pub factor: f64,
-    /// What acts along the row.
+    /// Law of the torque along the combination of the two joints' positions.
     pub law: RowLaw,
 }
 
-/// What acts along a row.
+/// Law of the torque along a sum or a difference of two joints' positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RowLaw {
-    /// Inertia, viscous and Coulomb friction; which of the three are there.
+    /// Inertia, viscous and Coulomb friction of a coupled transmission; each flag is whether that parameter is estimated, else it is zero.
     Transmission([bool; 3]),
-    /// A spring.
+    /// A linear spring with a stiffness and a rest position.
     Spring,
 }
 
 impl RowTerm {
-    /// Name in results.
+    /// Name of the term in results.
     pub fn name(&self) -> &'static str {
         match self.law {
             RowLaw::Transmission(_) => "coupled_transmission",
@@ -41,7 +41,7 @@ impl RowTerm {
         }
     }
 
-    /// Name in reports.
+    /// Name of the term in reports.
     pub fn title(&self) -> &'static str {
         match self.law {
             RowLaw::Transmission(_) => "transmission that couples two joints",
@@ -49,7 +49,7 @@ impl RowTerm {
         }
     }
 
-    /// Number of parameters.
+    /// Number of the term's parameters.
     pub fn len(&self) -> usize {
         match self.law {
             RowLaw::Transmission(_) => 3,
@@ -57,12 +57,12 @@ impl RowTerm {
         }
     }
 
-    /// Factors of the two joints.
+    /// Factors of the two joints' positions in the combination that the term acts along: 1 and 1, or 1 and -1.
     pub fn row(&self) -> [i32; 2] {
         [1, if self.factor > 0.0 { 1 } else { -1 }]
     }
 
-    /// Its parameters; `rotary` tells of both joints.
+    /// Names, units and bounds of the term's parameters; `rotary` is whether both joints are rotary.
     pub fn parameters(&self, rotary: bool) -> Vec<TermParameter> {
         let units: &[(&str, &str, f64)] = match (self.law, rotary) {
             (RowLaw::Transmission(_), true) => {
@@ -86,7 +86,7 @@ impl RowTerm {
         units.iter().map(of).collect()
     }
 
-    /// Momentum along the row, and the rest of the torque, in the middle of an interval.
+    /// Momentum, and torque without the momentum's derivative, along `q_j + factor q_k` in the middle of a sample interval, at parameters `p`.
     fn along<const N: usize>(&self, m: &Middle<N>, p: &[f64]) -> [f64; 2] {
         let of = |x: &[f64; N]| x[self.first] + self.factor * x[self.first + 1];
         match self.law {
@@ -98,7 +98,7 @@ impl RowTerm {
         }
     }
 
-    /// Torque on the two joints in the middle of an interval.
+    /// Torque along `q_j + factor q_k` in the middle of a sample interval, N m or N, at parameters `p`.
     fn torque<const N: usize>(&self, m: &Middle<N>, p: &[f64]) -> f64 {
         let inertia = match self.law {
             RowLaw::Transmission(_) => p[0] * (m.ddq[self.first] + self.factor * m.ddq[self.first + 1]),
@@ -112,7 +112,7 @@ fn direction(speed: f64) -> f64 {
     if speed == 0.0 { 0.0 } else { speed.signum() }
 }
 
-/// Every row over two adjacent joints of one kind, with the terms that are sought on it.
+/// Candidate terms along the sum and the difference of every two adjacent joints that are both rotary or both linear: coupled transmissions, springs.
 pub fn candidates(kinds: &[JointKind]) -> Vec<Vec<Term>> {
     let pairs = (1..kinds.len()).filter(|k| kinds[*k] == kinds[k - 1]).map(|k| k - 1);
     let laws = [RowLaw::Transmission([true; 3]), RowLaw::Spring];
@@ -123,7 +123,7 @@ pub fn candidates(kinds: &[JointKind]) -> Vec<Vec<Term>> {
 }
 
 impl<const N: usize, const P: usize> Equation<N, P> {
-    /// The torque of a term on a row over two joints.
+    /// Torque of a term along a sum or a difference of two joints, at parameters `p`, by joint and row of the weak form, N m or N.
     pub(in crate::serial) fn of_row(&self, row: &RowTerm, p: &[f64]) -> Signal {
         let changes: Vec<Vec<[SVector<f64, N>; 2]>> = self
             .logs()
@@ -147,7 +147,7 @@ impl RowTerm {
     }
 }
 
-/// The log with what terms on rows take along the measured path taken from its torques: no integrator knows them.
+/// A copy of a log with the torques of given terms, at given parameters, subtracted along the measured motion, as the integrator cannot simulate them.
 pub fn without_rows<const N: usize>(track: &Track<N>, rows: &[(RowTerm, Vec<f64>)]) -> Track<N> {
     let mut track = track.clone();
     let intervals = Intervals::new(&track);

@@ -1,18 +1,18 @@
-//! The same law on several joints at once: one decision, with an amplitude per joint or one value for all.
+//! One law on several joints as one term, accepted or rejected as a whole, with values per joint or one value for all joints.
 
 use crate::serial::term::{Term, TermKind};
 
-/// The same law on several joints.
+/// One law on several joints, as one term.
 #[derive(Debug, Clone)]
 pub struct SeveralJoints {
-    /// The law on each of the joints, at initial values.
+    /// The law on each of the term's joints, at initial values.
     pub members: Vec<Term>,
-    /// Whether one value holds for all joints; else each joint has its own.
+    /// Whether one value holds for all of the term's joints; else each joint has its own.
     pub common: bool,
 }
 
 impl Term {
-    /// The same law on all of these joints, each with its values.
+    /// One term of the same law on several joints, each joint with its own values.
     pub fn on_joints(mut members: Vec<Self>) -> Self {
         members.sort_by_key(Self::joint);
         let p = members.iter().flat_map(|m| m.p.clone()).collect();
@@ -20,7 +20,7 @@ impl Term {
         Self { kind: TermKind::Joints(SeveralJoints { members, common: false }), p, degrees }
     }
 
-    /// The same law on all of these joints with the mean of their values.
+    /// One term of the same law on several joints, with the mean of the members' values on all of them.
     pub fn common(mut members: Vec<Self>) -> Self {
         members.sort_by_key(Self::joint);
         let count = members.len() as f64;
@@ -29,7 +29,7 @@ impl Term {
         Self { kind: TermKind::Joints(SeveralJoints { members, common: true }), p, degrees }
     }
 
-    /// The law joint by joint; of what is not on several joints, the term itself.
+    /// The term split into one term per joint, at current values; a copy of the term alone if it is not one law on several joints.
     pub fn members(&self) -> Vec<Self> {
         let TermKind::Joints(of) = &self.kind else { return vec![self.clone()] };
         let values = |i: usize| {
@@ -40,7 +40,7 @@ impl Term {
         of.members.iter().enumerate().map(|(i, member)| member.with(values(i))).collect()
     }
 
-    /// The term that parameter `k` moves, and the parameter's number in it: of a law on several joints with values of their own, the law on one of them.
+    /// The term that parameter `k` belongs to and the parameter's index in it: the law on one joint where a law on several joints has values per joint.
     pub fn moved_by(&self, k: usize) -> (Self, usize) {
         match &self.kind {
             TermKind::Joints(of) if !of.common => {
@@ -51,12 +51,12 @@ impl Term {
         }
     }
 
-    /// Whether it has one value for several joints.
+    /// Whether the term has one value for several joints.
     pub fn has_common_value(&self) -> bool {
         matches!(&self.kind, TermKind::Joints(of) if of.common)
     }
 
-    /// Whether it is the same law on several joints.
+    /// Whether the term is one law on several joints.
     pub fn is_on_several_joints(&self) -> bool {
         matches!(self.kind, TermKind::Joints(_))
     }

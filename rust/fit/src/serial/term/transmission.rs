@@ -1,9 +1,9 @@
-//! Elastic joints and backlash in the weak form: what a deflection between motor and link changes in the equation of motion.
+//! Joint elasticity and backlash in the weak form: how a deflection between motor and link changes the equation of motion.
 //!
-//! The deflection between motor and link follows from the torque `T` that the transmission passes on: `T / stiffness` of a shaft (Spong 1987, without its
-//! damping), and half the gap on the side that `T` pushes to of backlash (Nordin and Gutman 2002). Where the encoder measures the motor, `T` is what
-//! rotor and friction leave of the motor's torque, and the links are where the motor is less the deflection; where it measures the link, `T` is the torque
-//! of the links, and rotor and friction are where the link is and the deflection more.
+//! The deflection between motor and link follows from the torque `T` that the transmission passes on: `T / stiffness` of a shaft (Spong 1987, without the
+//! damping), and half the gap towards the side that `T` pushes to of backlash (Nordin and Gutman 2002). Where the encoder measures the motor, `T` is the
+//! motor's torque less those of rotor inertia and friction, and the link's position is the motor's less the deflection; where the encoder measures the
+//! link, `T` is the torque of the links, and the motor's position, at which rotor inertia and friction act, is the link's plus the deflection.
 
 use crate::model::hypothesis::EffectInstance;
 use crate::serial::term::TermParameter;
@@ -19,31 +19,31 @@ use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Largest displacement for the derivative by the deflection, rad (m); torques are smooth in it.
+/// Largest displacement of a joint in numerical derivatives of torques by the deflection of a transmission, rad (m); torques are smooth in it.
 const DISPLACEMENT: f64 = 1e-3;
 
-/// A transmission that gives way.
+/// Elasticity or backlash of one joint's transmission.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TransmissionLaw {
-    /// 0-based joint.
+    /// 0-based joint of the transmission.
     pub joint: usize,
-    /// Whether the encoder measures the motor; else it measures the link.
+    /// Whether the joint's encoder measures the motor; else it measures the link.
     pub encoder_at_motor: bool,
-    /// How far it gives way.
+    /// Law of the deflection between motor and link under the transmitted torque.
     pub compliance: Compliance,
 }
 
-/// How far a transmission gives way under a torque.
+/// Law of a transmission's deflection between motor and link under the transmitted torque.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Compliance {
-    /// In proportion to it.
+    /// Elastic shaft: the deflection is in proportion to the transmitted torque.
     Elastic,
-    /// By half the gap towards the side it pushes to; the link crosses while the torque is within this one of zero, N m (N).
+    /// Backlash: half the gap to the side of the torque; the value is the torque around zero within which the link crosses the gap, N m (N).
     Backlash(f64),
 }
 
 impl Compliance {
-    /// Deflection under a torque, per unit of compliance or of gap.
+    /// Deflection between motor and link under a transmitted torque, N m (N), per unit of the compliance or of the gap.
     fn deflection(self, torque: f64) -> f64 {
         match self {
             Self::Elastic => torque,
@@ -52,14 +52,14 @@ impl Compliance {
     }
 }
 
-/// Damping ratio of a shaft in predictions; motion slower than its oscillation does not tell it.
+/// Damping ratio of an elastic joint in predictions; motion slower than the joint's oscillation does not determine it.
 const DAMPING: f64 = 0.1;
 
-/// A motor without a rotor inertia in the arm file has this part of its joint's, in predictions.
+/// Rotor inertia relative to the joint's inertia, for predictions, of a motor without a rotor inertia in the arm file.
 const ROTOR_SHARE: f64 = 0.03;
 
 impl TransmissionLaw {
-    /// Its effect in the library.
+    /// Effect of the library that the transmission term is simulated with: joint elasticity or backlash.
     fn effect(&self) -> &'static dyn Effect<f64> {
         let name = match self.compliance {
             Compliance::Elastic => "joint_elasticity",
@@ -68,17 +68,17 @@ impl TransmissionLaw {
         find(name).expect("the library has both")
     }
 
-    /// Name in results.
+    /// Name of the transmission term in results.
     pub fn name(&self) -> &'static str {
         self.effect().spec().name
     }
 
-    /// Name for people.
+    /// Name of the transmission term in reports.
     pub fn title(&self) -> &'static str {
         self.effect().spec().title
     }
 
-    /// What it is estimated by.
+    /// Name, unit and bounds of the estimated parameter, compliance or gap; `rotary` is whether the joint is rotary.
     pub fn parameter(&self, rotary: bool) -> TermParameter {
         let (name, unit, inverse) = match (self.compliance, rotary) {
             (Compliance::Elastic, true) => ("compliance", "rad/(N m)", Some(("stiffness", "N m/rad"))),
@@ -89,7 +89,7 @@ impl TransmissionLaw {
         TermParameter { name, unit, bounds: [0.0, f64::INFINITY], neutral: 0.0, inverse }
     }
 
-    /// The effect as the integrator takes it, and the rotor inertia that it takes from the arm's own.
+    /// The effect for simulation at a compliance or gap `size`, with the arm's `rotor` and the joint's `inertia`, and the rotor inertia moved into the effect.
     pub fn instance(&self, size: f64, rotor: f64, inertia: f64) -> (EffectInstance, f64) {
         let rotor_inertia = if rotor > 0.0 { rotor } else { ROTOR_SHARE * inertia };
         let (p, taken) = match self.compliance {
@@ -109,7 +109,7 @@ impl TransmissionLaw {
 }
 
 impl<const N: usize, const P: usize> Equation<N, P> {
-    /// The torque of a transmission of this compliance, rad/(N m), or gap, rad: to first order, and so in proportion to either.
+    /// Torque of a transmission with compliance, rad/(N m), or gap, rad, `size` by joint and row of the weak form: to first order, so in proportion to `size`.
     pub(in crate::serial) fn of_transmission(
         &self,
         law: &TransmissionLaw,
@@ -123,7 +123,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         unit.iter().map(|s| s.as_ref().map(|s| s.iter().map(|x| size * x).collect())).collect()
     }
 
-    /// Per unit of compliance or gap.
+    /// Torque of a transmission by joint and row of the weak form, to first order, per unit of compliance or gap.
     fn of_unit(&self, law: &TransmissionLaw, theta: &[f64; P]) -> Signal {
         let j = law.joint;
         let mut links = *theta;
@@ -150,20 +150,20 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         }
     }
 
-    /// What a motor passes on along its measured path: its torque less what its rotor and friction take.
+    /// Torque that the motor of joint `j` passes on along the measured motion, N m or N: its torque less those of rotor inertia and friction.
     fn motor_torque(&self, m: &Middle<N>, j: usize, theta: &[f64; P]) -> f64 {
         let friction = self.arm.friction(theta, &SVector::from(m.dq))[j];
         m.tau[j] - theta[10 * N + j] * m.ddq[j] - friction
     }
 
-    /// Torque of the links on all joints along their measured path.
+    /// Torque of the links on all joints along the measured motion, without rotors and friction, N m or N.
     fn link_torque(&self, m: &Middle<N>, links: &[f64; P]) -> SVector<f64, N> {
         let inertia = self.arm.inertia(links, &SVector::from(m.q));
         let bias = self.rigid(links).equation_terms(&JointState { q: m.q, dq: m.dq }).bias;
         inertia * SVector::from(m.ddq) + SVector::from(bias)
     }
 
-    /// Links behind the motor that the encoder measures: to first order in the deflection.
+    /// Change of the links' torque where the encoder of joint `j` measures the motor and the link is behind by the deflection, to first order.
     fn behind_motors(&self, j: usize, deflections: &[Vec<[f64; 2]>], links: &[f64; P]) -> Signal {
         let largest = deflections.iter().flatten().fold(0.0, |a: f64, d| a.max(d[0].abs()));
         if largest == 0.0 {
@@ -192,7 +192,7 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.weak_parts(&changes)
     }
 
-    /// Rotor and viscous friction of a motor that is ahead of the link that the encoder measures.
+    /// Change of the torque of rotor inertia and viscous friction where the encoder of joint `j` measures the link and the motor leads by the deflection.
     fn of_motor(&self, j: usize, deflections: &[Vec<[f64; 2]>], theta: &[f64; P]) -> Signal {
         let (rotor, viscous) = (theta[10 * N + j], self.arm.viscous(theta)[j]);
         if rotor == 0.0 && viscous == 0.0 {
@@ -215,14 +215,14 @@ impl<const N: usize, const P: usize> Equation<N, P> {
     }
 }
 
-/// Torques of transmissions, per unit, that were computed last: a fit asks for the same at several sizes.
+/// Cache of the last torques of transmissions per unit of compliance or gap; a fit needs each torque at several sizes.
 #[derive(Debug)]
 pub struct Computed<const P: usize>(Mutex<VecDeque<Entry<P>>>);
 
-/// A transmission and the arm's parameters with its torque.
+/// Cache entry: a transmission, the arm's parameters, and the transmission's torque per unit of compliance or gap.
 type Entry<const P: usize> = (TransmissionLaw, [f64; P], Arc<Signal>);
 
-/// Torques that are kept.
+/// Number of torque signals of transmissions that the cache holds.
 const KEPT: usize = 16;
 
 impl<const P: usize> Default for Computed<P> {
@@ -247,7 +247,7 @@ impl<const P: usize> Computed<P> {
     }
 }
 
-/// Deflections with their rates, from central differences.
+/// Deflections of a transmission at the middles of sample intervals, each with its rate from central differences.
 fn with_rates<const N: usize>(middles: &[Middle<N>], deflections: &[f64]) -> Vec<[f64; 2]> {
     let last = deflections.len().saturating_sub(1);
     let at = |k: usize| {
