@@ -480,12 +480,16 @@ armgap_status armgap_theta(const armgap_estimator *estimator, double *theta, siz
 /*
  Copies the `count` standard deviations of the estimated parameters, SI, as if prediction errors were white.
  */
-armgap_status armgap_sigma(const armgap_estimator *estimator, double *sigma, size_t count);
+armgap_status armgap_sigma(const armgap_estimator *estimator,
+                           double *sigma,
+                           size_t count);
 
 /*
  Copies the prediction errors of the last sample that was used, N m, J or W by scheme; `count` is `outputs` of the report.
  */
-armgap_status armgap_errors(const armgap_estimator *estimator, double *errors, size_t count);
+armgap_status armgap_errors(const armgap_estimator *estimator,
+                            double *errors,
+                            size_t count);
 
 /*
  Fills `report` with counts of samples, excitation and alarm of an estimator.
@@ -532,12 +536,16 @@ armgap_status armgap_theta_f32(const armgap_estimator_f32 *estimator, float *the
 /*
  Copies the `count` standard deviations of the estimated parameters, SI, as if prediction errors were white.
  */
-armgap_status armgap_sigma_f32(const armgap_estimator_f32 *estimator, float *sigma, size_t count);
+armgap_status armgap_sigma_f32(const armgap_estimator_f32 *estimator,
+                               float *sigma,
+                               size_t count);
 
 /*
  Copies the prediction errors of the last sample that was used, N m, J or W by scheme; `count` is `outputs` of the report.
  */
-armgap_status armgap_errors_f32(const armgap_estimator_f32 *estimator, float *errors, size_t count);
+armgap_status armgap_errors_f32(const armgap_estimator_f32 *estimator,
+                                float *errors,
+                                size_t count);
 
 /*
  Fills `report` with counts of samples, excitation and alarm of an estimator.
@@ -614,17 +622,23 @@ armgap_status armgap_chain_theta(const void *memory, double *theta, size_t count
 /*
  Copies the `count` diagonal entries of the covariance of the estimate, for a prediction error of unit variance.
  */
-armgap_status armgap_chain_variances(const void *memory, double *variances, size_t count);
+armgap_status armgap_chain_variances(const void *memory,
+                                     double *variances,
+                                     size_t count);
 
 /*
  Copies the `count` standard deviations of the estimated parameters, SI, as if prediction errors were white.
  */
-armgap_status armgap_chain_sigma(const void *memory, double *sigma, size_t count);
+armgap_status armgap_chain_sigma(const void *memory,
+                                 double *sigma,
+                                 size_t count);
 
 /*
  Copies the prediction errors of the last sample that was used, N m, J or W by scheme; `count` is `outputs` of the report.
  */
-armgap_status armgap_chain_errors(const void *memory, double *errors, size_t count);
+armgap_status armgap_chain_errors(const void *memory,
+                                  double *errors,
+                                  size_t count);
 
 /*
  Fills `report` with counts of samples, excitation and alarm of an estimator of a serial arm.
@@ -681,17 +695,23 @@ armgap_status armgap_chain_theta_f32(const void *memory, float *theta, size_t co
 /*
  Copies the `count` diagonal entries of the covariance of the estimate, for a prediction error of unit variance.
  */
-armgap_status armgap_chain_variances_f32(const void *memory, float *variances, size_t count);
+armgap_status armgap_chain_variances_f32(const void *memory,
+                                         float *variances,
+                                         size_t count);
 
 /*
  Copies the `count` standard deviations of the estimated parameters, SI, as if prediction errors were white.
  */
-armgap_status armgap_chain_sigma_f32(const void *memory, float *sigma, size_t count);
+armgap_status armgap_chain_sigma_f32(const void *memory,
+                                     float *sigma,
+                                     size_t count);
 
 /*
  Copies the prediction errors of the last sample that was used, N m, J or W by scheme; `count` is `outputs` of the report.
  */
-armgap_status armgap_chain_errors_f32(const void *memory, float *errors, size_t count);
+armgap_status armgap_chain_errors_f32(const void *memory,
+                                      float *errors,
+                                      size_t count);
 
 /*
  Fills `report` with counts of samples, excitation and alarm of an estimator of a serial arm.
