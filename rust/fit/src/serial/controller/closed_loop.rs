@@ -104,7 +104,7 @@ impl Servo {
         Past { t: t[begin..first].to_vec(), torque: self.measured[begin..first].to_vec() }
     }
 
-    /// What a prompt torque at `now`, held for `period`, becomes.
+    /// Torque that the drive delivers, by its laws of delay, lag and saturation, where the controller commands `torque` at `now` and holds it for `period`.
     fn delivered(&self, past: &mut Past, now: f64, period: f64, torque: f64) -> InputSegment<f64> {
         if self.laws.is_empty() {
             return InputSegment::held(torque);

@@ -206,7 +206,7 @@ mod tests {
     const VISCOUS: f64 = 0.9;
     /// Torque that the joint needs beside these, as of an offset, N m.
     const OFFSET: f64 = 1.3;
-    /// Torques of some 8 N m are met to this by test functions, local cubics and references that are straight between rows, N m.
+    /// Largest error of torques of some 8 N m computed from a log by test functions, local cubics and references that are straight between rows, N m.
     const MET: f64 = 0.02;
 
     /// One joint about the vertical, its inertial parameter and viscous friction known.

@@ -193,7 +193,7 @@ impl JointController {
         self.asked(errors).into_iter().map(|torque| torque.map(|tau| self.clipped(tau))).collect()
     }
 
-    /// The torque along the measured path.
+    /// Torque that this controller commands along the measured positions, late by its delay, one input segment for each sample interval.
     pub fn torque(&self, given: &Given) -> Vec<InputSegment<f64>> {
         let mut torque = self.prompt_torque(&self.errors(given));
         late(&given.t, self.delay, &mut torque);
