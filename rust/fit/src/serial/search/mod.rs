@@ -35,7 +35,7 @@ pub struct Search<'a> {
     pub candidates: Vec<Vec<Term>>,
     /// Whether each joint is rotary; else it is linear.
     pub rotary: Vec<bool>,
-    /// Sample period, s. A delay below the sample period is an artefact of how torques and positions were sampled, and is not named.
+    /// Sample period, s. A delay or lag below it is an artefact of how torques and positions were sampled, and is not named.
     pub period: f64,
     /// Function that tells whether given parameters of the arm have a positive definite inertia matrix along the logs.
     pub is_feasible: &'a (dyn Fn(&[f64]) -> bool + Sync),
@@ -133,7 +133,7 @@ impl Search<'_> {
         !self.is_sampling(&with.terms[index]) && self.evidence(regression, without, with, index).is_accepted()
     }
 
-    /// Whether a term is a delay of less than a sample period on all of its joints.
+    /// Whether a term is a delay or lag of less than a sample period on all of its joints.
     fn is_sampling(&self, term: &Term) -> bool {
         term.is_delay() && term.members().iter().all(|member| member.p[0] < self.period)
     }

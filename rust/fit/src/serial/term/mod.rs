@@ -253,7 +253,7 @@ impl Term {
         spec.hooks.command && spec.parameters.iter().all(|p| p.quantity == Quantity::Ratio)
     }
 
-    /// Whether the term delays the command or the reference: all of its parameters are times.
+    /// Whether the term is a delay or lag of the command or the reference: all of its parameters are times.
     pub fn is_delay(&self) -> bool {
         if let TermKind::Joints(of) = &self.kind {
             return of.members[0].is_delay();
