@@ -204,7 +204,7 @@ fn times<V: Number, const N: usize>(x: V, y: &[V; N]) -> [V; N] {
 
 /// > 0 if a joint's velocity `dq`, or at rest its acceleration `ddq`, contradicts the `direction` of its friction mode.
 #[inline(always)]
-fn contradiction<V: Number>(dq: V, ddq: V, direction: V, slides: V) -> V {
+pub(crate) fn contradiction<V: Number>(dq: V, ddq: V, direction: V, slides: V) -> V {
     // A joint that was just released stays at rest only if it is pulled back; `slides` is 1 there.
     let released = -(ddq * direction) * slides;
     dq.where_zero(released, dq.size() - dq * direction)

@@ -22,6 +22,7 @@ pub mod drivetrain;
 pub mod effect;
 pub mod filter;
 pub mod fixed_mode;
+pub mod hyperbolic;
 pub mod identify;
 pub mod integrate;
 pub mod kinematics;

@@ -1,7 +1,7 @@
 //! Small symmetric positive definite systems, solved in place without a library's panics.
 
 use crate::number::Number;
-use crate::real::{Real, lit};
+use crate::real::lit;
 
 /// Solves `a x = b` for symmetric positive definite `a` by `L D L'`; an indefinite `a` gives non-finite numbers, not a panic.
 #[inline(always)]
@@ -32,19 +32,19 @@ pub fn solve_positive_definite<V: Number, const N: usize>(mut a: [[V; N]; N], mu
 
 /// Inertia of joint `j` with all other joints free to move, kg m^2 (kg): the Schur complement `1 / (M^-1)_jj` of the inertia matrix.
 #[inline]
-pub fn free_inertia<T: Real, const N: usize>(inertia: &[[T; N]; N], j: usize) -> T {
+pub fn free_inertia<V: Number, const N: usize>(inertia: &[[V; N]; N], j: usize) -> V {
     if N <= 2 {
         let mut own = inertia[j][j];
         for i in 0..N {
             if i != j {
-                own -= inertia[j][i] * inertia[j][i] / inertia[i][i];
+                own = own - inertia[j][i] * inertia[j][i] / inertia[i][i];
             }
         }
         return own;
     }
-    let mut unit = [T::zero(); N];
-    unit[j] = T::one();
-    T::one() / solve_positive_definite(*inertia, unit)[j]
+    let mut unit = [V::of(lit(0.0)); N];
+    unit[j] = V::of(lit(1.0));
+    V::of(lit(1.0)) / solve_positive_definite(*inertia, unit)[j]
 }
 
 /// Solves two equations `a x = b` by Cramer's rule, which divides once.

@@ -95,12 +95,23 @@ pub fn advance<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
     }
     let dt = interval.h / lit(count as f64);
     for i in 0..count {
-        let from = dt * lit(i as f64);
-        if (0..N).all(|j| plant.is_rounded(j)) && !plant.drivetrain().has_backlash() {
-            *state = SubStep::new(plant, interval, state).smooth(state, from, dt);
-        } else {
-            SubStep::new(plant, interval, state).exact(state, from, dt);
-        }
+        substep(plant, state, interval, dt * lit(i as f64), dt);
+    }
+}
+
+/// Advances `state` over a part of a sample interval, `dt` seconds from `from` seconds after the sample.
+#[inline(never)]
+pub(crate) fn substep<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize>(
+    plant: &Plant<T, A, N, P>,
+    state: &mut State<T, N>,
+    interval: &Interval<T, N>,
+    from: T,
+    dt: T,
+) {
+    if (0..N).all(|j| plant.is_rounded(j)) && !plant.drivetrain().has_backlash() {
+        *state = SubStep::new(plant, interval, state).smooth(state, from, dt);
+    } else {
+        SubStep::new(plant, interval, state).exact(state, from, dt);
     }
 }
 

@@ -212,6 +212,12 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
         !(0..N).any(|j| self.is_rounded(j)) && !self.drivetrain.any() && !self.has_hysteresis
     }
 
+    /// Whether the plant has elastic joints or regularised friction, and no other latent states or torques that jump at a position.
+    #[inline]
+    pub fn is_elastic_or_regularised(&self) -> bool {
+        !self.is_plain() && !self.drivetrain.has_backlash() && !self.has_hysteresis && !self.jumps
+    }
+
     /// Hooks of the effects on joint `j`: whether they add a torque, and whether they change its Coulomb level.
     #[inline]
     pub(crate) fn hooks(&self, j: usize) -> Hooks {

@@ -48,14 +48,20 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
     /// Fastest rate of the plant at the positions `q`, 1/s: at which smoothed friction stops a joint, a motor oscillates against its link, or a joint meets a
     /// joint limit, as an impact that is to be resolved. Zero for a rigid arm with exact friction.
     pub fn fastest(&self, q: &SVector<T, N>) -> T {
-        let mut fastest = T::zero();
         let behind = self.jumps && (0..N).any(|j| self.edges(j).any(|edge| edge.is_behind(q[j])));
         if !(0..N).any(|j| self.is_rounded(j)) && !self.drivetrain.any() && !behind {
-            return fastest;
+            return T::zero();
         }
         let inertia = self.rigid.equation_terms(&JointState { q: (*q).into(), dq: [T::zero(); N] }).inertia;
+        self.fastest_with(q, &core::array::from_fn(|j| free_inertia(&inertia, j)))
+    }
+
+    /// Fastest rate of the plant at the positions `q`, 1/s, as [`Plant::fastest`] has it, given each joint's inertia with all other joints free to move, `free`.
+    #[inline]
+    pub(crate) fn fastest_with(&self, q: &SVector<T, N>, free: &[T; N]) -> T {
+        let mut fastest = T::zero();
         for j in 0..N {
-            let free = free_inertia(&inertia, j).max(lit(1e-9));
+            let free = free[j].max(lit(1e-9));
             if self.is_rounded(j) {
                 let x = self.point(j, T::zero(), q[j], T::zero(), T::zero(), T::zero());
                 let braked = match self.drivetrain.get(j) {
@@ -67,7 +73,7 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Plant<T, A, N, P>
             if let Some(transmission) = self.drivetrain.get(j).filter(|d| d.backlash <= T::zero()) {
                 fastest = fastest.max(transmission.rate(free));
             }
-            if behind {
+            if self.jumps {
                 let met = self.edges(j).filter(|edge| edge.is_behind(q[j]));
                 fastest = met.fold(fastest, |rate, edge| rate.max(edge.rate(free) * lit(FOLLOWED)));
             }

@@ -9,6 +9,8 @@
 mod batch;
 mod clock;
 mod cursor;
+mod elastic_batch;
+mod elastic_lanes;
 mod lane_step;
 mod plant_lanes;
 
@@ -19,6 +21,7 @@ use crate::integrate::State;
 use crate::plant::Plant;
 use crate::real::Real;
 use batch::LaneBatch;
+pub use elastic_batch::{ElasticRollout, stable_substeps};
 
 /// Number of runs that a batch rollout simulates at a time.
 pub const WIDTH: usize = 8;

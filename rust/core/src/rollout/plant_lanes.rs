@@ -13,12 +13,12 @@ use crate::trig::{Rotation, SinCos};
 use core::array::from_fn;
 
 /// State, torque and bias of a joint at an instant, copied for the effects' laws: compilers keep data in memory that a function not inlined can see.
-struct JointInstant<V> {
-    t: V,
-    q: V,
-    dq: V,
-    tau: V,
-    bias: V,
+pub(super) struct JointInstant<V> {
+    pub(super) t: V,
+    pub(super) q: V,
+    pub(super) dq: V,
+    pub(super) tau: V,
+    pub(super) bias: V,
 }
 
 impl<V: Copy> JointInstant<V> {
@@ -36,7 +36,7 @@ pub(super) struct PlantLanes<'a, T: Real, C, A, const W: usize, const N: usize, 
     /// Whether all lanes have the same plant.
     same_plant: bool,
     /// Hooks of effects in use on each joint, in any lane.
-    hooks: [Hooks; N],
+    pub(super) hooks: [Hooks; N],
     /// 1 in each lane where a joint has dry friction, else 0.
     pub(super) dry: [Lanes<T, C, W>; N],
 }
@@ -93,12 +93,14 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         rigid.tilt.0[l] = own.tilt;
     }
 
-    /// Coulomb level where joint `j` slides, and torque of the effects on joint `j`, N m (N).
+    /// Coulomb level of joint `j` in the lanes where it slides, in `direction`, and torque of the effects on joint `j`, N m (N); `other` is the direction in
+    /// which the next joint slides.
     #[inline(never)]
-    fn laws(
+    pub(super) fn laws(
         &self,
         at: &JointInstant<Lanes<T, C, W>>,
-        direction: &[Lanes<T, C, W>; N],
+        direction: Lanes<T, C, W>,
+        other: Lanes<T, C, W>,
         j: usize,
     ) -> [Lanes<T, C, W>; 2] {
         let mut x = [self.point(at, j, 0); W];
@@ -107,11 +109,11 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         }
         let (mut level, mut force) = (self.rigid.coulomb[j], Lanes::of(T::zero()));
         if self.hooks[j].coulomb {
-            level = self.levels(&x, direction[j], j);
+            level = self.levels(&x, direction, j);
         }
         if self.hooks[j].force {
             for l in 0..W {
-                x[l].other = direction[(j + 1) % N].0[l];
+                x[l].other = other.0[l];
             }
             force = self.forces(&x, j);
         }
@@ -173,7 +175,7 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
 
     /// Friction torque at rest of joint `j` less its Coulomb level, N m (N), in the lanes where the joint is stuck, else 0.
     #[inline(never)]
-    fn stiction_violations(
+    pub(super) fn stiction_violations(
         &self,
         at: &JointInstant<Lanes<T, C, W>>,
         friction_at_rest: Lanes<T, C, W>,
@@ -239,7 +241,8 @@ impl<
         for j in 0..N {
             let (mut level, viscous) = (self.0.rigid.coulomb[j], self.0.rigid.viscous[j]);
             if EFFECTS && (self.0.hooks[j].force || self.0.hooks[j].coulomb) {
-                let [own, force] = self.0.laws(&JointInstant::of(at, j), direction, j);
+                let [own, force] =
+                    self.0.laws(&JointInstant::of(at, j), direction[j], direction[(j + 1) % N], j);
                 (level, generalized_force[j]) = (own, generalized_force[j] + force);
             }
             // What is known first is subtracted first: the bias is not.

@@ -12,7 +12,7 @@ use armgap_core::cpu::Level;
 use armgap_core::effect::InputSegment;
 use armgap_core::integrate::{Interval, State, advance};
 use armgap_core::plant::{Mode, Plant};
-use armgap_core::rollout::{BatchRollout, Run, WIDTH};
+use armgap_core::rollout::{BatchRollout, ElasticRollout, Run, WIDTH, stable_substeps};
 use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
 use rayon::prelude::*;
@@ -143,12 +143,7 @@ impl<const N: usize> Dataset<N> {
         hypothesis: &Hypothesis<P>,
         offsets: &[InitialStateOffset<N>],
     ) -> Vec<f64> {
-        self.predict_by(arm, hypothesis, offsets, |batched| {
-            let level = Level::widest();
-            batched
-                .par_chunks_mut(GROUP)
-                .for_each(|group| BatchRollout { runs: group, limit: DIVERGED }.run_all(level));
-        })
+        self.predict_by(arm, hypothesis, offsets, true)
     }
 
     /// Predicted positions of all windows, one rollout at a time: for arms whose long equation of motion gains nothing from vector lanes.
@@ -157,18 +152,16 @@ impl<const N: usize> Dataset<N> {
         arm: &A,
         hypothesis: &Hypothesis<P>,
     ) -> Vec<f64> {
-        self.predict_by(arm, hypothesis, &self.zero_offsets(), |runs| {
-            runs.par_iter_mut().for_each(run_stiff);
-        })
+        self.predict_by(arm, hypothesis, &self.zero_offsets(), false)
     }
 
-    /// Predicted positions of all windows; `rollout` simulates those without latent states and away from torque discontinuities.
+    /// Predicted positions of all windows, in vector lanes (`side_by_side`) where the plant allows it, or one rollout at a time.
     fn predict_by<A: Arm<f64, N, P>, const P: usize>(
         &self,
         arm: &A,
         hypothesis: &Hypothesis<P>,
         offsets: &[InitialStateOffset<N>],
-        rollout: impl Fn(&mut [Run<'_, f64, A, N, P>]),
+        side_by_side: bool,
     ) -> Vec<f64> {
         let mut predicted = vec![DIVERGED; self.rows * N];
         let Some(plant) = hypothesis.plant(arm) else {
@@ -180,7 +173,8 @@ impl<const N: usize> Dataset<N> {
             .map(|track| hypothesis.command(&track.t, &track.held, &track.pushes, &track.tables))
             .collect();
         let latent = self.latent(&plant, &commands);
-        let (mut batched, mut scalar) = (Vec::with_capacity(self.windows.len()), Vec::new());
+        let (mut batched, mut elastic, mut scalar) =
+            (Vec::with_capacity(self.windows.len()), Vec::new(), Vec::new());
         let mut rest = predicted.as_mut_slice();
         for (window, shift) in self.windows.iter().zip(offsets) {
             let (positions, after) = rest.split_at_mut(window.rows() * N);
@@ -196,12 +190,25 @@ impl<const N: usize> Dataset<N> {
             let runs =
                 if plant.only_modes_change() || (plant.is_plain() && !self.is_near_edge(window, &plant)) {
                     &mut batched
+                } else if side_by_side && plant.is_elastic_or_regularised() {
+                    &mut elastic
                 } else {
                     &mut scalar
                 };
             runs.push(Run { plant: &plant, t, torque, state, positions });
         }
-        rollout(&mut batched);
+        if side_by_side {
+            let level = Level::widest();
+            batched
+                .par_chunks_mut(GROUP)
+                .for_each(|runs| BatchRollout { runs, limit: DIVERGED }.run_all(level));
+            let most_substeps = most_substeps(&plant);
+            elastic.par_chunks_mut(GROUP).for_each(|runs| {
+                ElasticRollout { runs, limit: DIVERGED, most_substeps }.run_all(level);
+            });
+        } else {
+            batched.par_iter_mut().for_each(run_stiff);
+        }
         scalar.par_chunks_mut(WIDTH).for_each(|group| group.iter_mut().for_each(run_scalar));
         if hypothesis.distorts() {
             for row in predicted.chunks_exact_mut(N) {
@@ -298,11 +305,7 @@ fn enter<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 
 /// Simulates one rollout by the scalar integrator, with as many steps per sample as its plant needs.
 fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_, f64, A, N, P>) {
-    let most = match (run.plant.jumps(), run.plant.drivetrain().any()) {
-        (true, _) => MAX_SUBSTEPS_IMPACT,
-        (false, true) => MAX_SUBSTEPS_DRIVEN,
-        (false, false) => MAX_SUBSTEPS,
-    };
+    let most = most_substeps(run.plant);
     let measures_motors = run.plant.drivetrain().measures_motors();
     let state = &mut run.state;
     for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
@@ -311,7 +314,7 @@ fn run_scalar<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'
         if run.plant.jumps() {
             rate = rate.max(run.plant.fastest(&(state.q + state.dq * h)));
         }
-        let substeps = substeps(h * rate).min(most);
+        let substeps = stable_substeps(h, rate, most);
         advance(run.plant, state, &Interval { t: run.t[k], h, torque: &run.torque[k] }, substeps);
         if !state.is_finite() || state.q.amax() > DIVERGED {
             break;
@@ -330,7 +333,7 @@ fn run_stiff<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_
     for (k, row) in run.positions.chunks_exact_mut(N).enumerate() {
         let h = run.t[k + 1] - run.t[k];
         let rate = run.plant.fastest(&state.q).max(run.plant.viscous_rate(&state.q));
-        let steps = substeps(h * rate).min(MAX_SUBSTEPS_STIFF);
+        let steps = stable_substeps(h, rate, MAX_SUBSTEPS_STIFF);
         advance(run.plant, state, &Interval { t: run.t[k], h, torque: &run.torque[k] }, steps);
         if !state.is_finite() || state.q.amax() > DIVERGED {
             break;
@@ -339,7 +342,11 @@ fn run_stiff<A: Arm<f64, N, P>, const N: usize, const P: usize>(run: &mut Run<'_
     }
 }
 
-/// Steps per sample that keep Runge-Kutta stable; `stiffness` is the rate of smoothed friction times the sample period.
-fn substeps(stiffness: f64) -> usize {
-    ((stiffness / 1.5).ceil() as usize).max(1)
+/// Largest number of sub-steps per sample for a plant.
+fn most_substeps<A: Arm<f64, N, P>, const N: usize, const P: usize>(plant: &Plant<f64, A, N, P>) -> usize {
+    match (plant.jumps(), plant.drivetrain().any()) {
+        (true, _) => MAX_SUBSTEPS_IMPACT,
+        (false, true) => MAX_SUBSTEPS_DRIVEN,
+        (false, false) => MAX_SUBSTEPS,
+    }
 }

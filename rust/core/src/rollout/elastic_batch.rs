@@ -1,0 +1,273 @@
+//! Batch rollouts of one plant with elastic joints or regularised friction: one run in each lane of a vector unit.
+//!
+//! Every lane divides its sample intervals into as many steps as keep Runge-Kutta stable. A step in which the friction mode of a joint changes is left to the
+//! scalar integrator ([`crate::integrate`]), in its lane alone.
+
+use super::cursor::{RunCursor, lane_values};
+use super::elastic_lanes::{ElasticLanes, ElasticModes, ElasticSpan, ElasticState};
+use super::{Run, WIDTH};
+use crate::arm::Arm;
+use crate::cpu::{Cpu, Kernel, Level};
+use crate::integrate::{State, substep};
+use crate::kinematics::JointState;
+use crate::lanes::Lanes;
+use crate::linear::free_inertia;
+use crate::number::Number;
+use crate::plant::Mode;
+use crate::real::{Real, lit};
+use core::array::from_fn;
+use nalgebra::SVector;
+
+/// Product of a step's length and the plant's fastest rate up to which a step is taken.
+const STABLE: f64 = 1.5;
+
+/// Number of steps of `h` seconds that keep Runge-Kutta stable with the plant's fastest rate, 1/s; at least 1, at most `most`.
+pub fn stable_substeps<T: Real>(h: T, rate: T, most: usize) -> usize {
+    let needed = h * rate / lit(STABLE);
+    (1..most).find(|count| needed <= lit(*count as f64)).unwrap_or(most.max(1))
+}
+
+/// Batch of runs of one plant ([`crate::plant::Plant::is_elastic_or_regularised`]), simulated [`WIDTH`] at a time; a run ends where a joint position exceeds
+/// `limit`, rad or m, or is NaN. Positions are those that the encoders show.
+pub struct ElasticRollout<'r, 'a, T: Real, A, const N: usize, const P: usize> {
+    /// Runs of the batch, all of the same plant.
+    pub runs: &'r mut [Run<'a, T, A, N, P>],
+    /// Largest size of a joint position, rad or m, beyond which a run ends.
+    pub limit: T,
+    /// Largest number of steps in one sample interval.
+    pub most_substeps: usize,
+}
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> ElasticRollout<'_, '_, T, A, N, P> {
+    /// Simulates all runs with the instruction set `level`.
+    pub fn run_all(self, level: Level) {
+        level.run_wide(self);
+    }
+}
+
+impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> Kernel for ElasticRollout<'_, '_, T, A, N, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<C: Cpu>(self) {
+        let Some(mut batch) = ElasticBatch::<T, C, A, WIDTH, N, P>::new(self) else { return };
+        while batch.moving > 0 {
+            batch.step();
+        }
+    }
+}
+
+/// Part of a sample interval that a lane takes in its next step.
+#[derive(Debug, Clone, Copy)]
+struct Substep<T> {
+    /// Number of the step within its interval, from 0.
+    index: usize,
+    /// Number of steps in the interval.
+    count: usize,
+    /// Length of the step, s.
+    h: T,
+}
+
+/// State of all lanes of a batch.
+struct ElasticBatch<'r, 'a, T: Real, C, A, const W: usize, const N: usize, const P: usize> {
+    rollout: ElasticRollout<'r, 'a, T, A, N, P>,
+    lanes: ElasticLanes<'a, T, C, A, W, N, P>,
+    state: ElasticState<Lanes<T, C, W>, N>,
+    modes: ElasticModes<Lanes<T, C, W>, N>,
+    span: ElasticSpan<Lanes<T, C, W>, N>,
+    substeps: [Substep<T>; W],
+    /// Whether each lane starts a sample interval.
+    starts: [bool; W],
+    /// Index of the run in each lane; `cursors` has the lane's position in the run, `None` if the lane has ended.
+    runs: [usize; W],
+    cursors: [Option<RunCursor<'a, T, N>>; W],
+    /// Number of lanes that have not ended.
+    moving: usize,
+    /// Index of the run that enters the next free lane.
+    waiting: usize,
+}
+
+impl<'r, 'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: usize>
+    ElasticBatch<'r, 'a, T, C, A, W, N, P>
+{
+    #[inline(always)]
+    fn new(rollout: ElasticRollout<'r, 'a, T, A, N, P>) -> Option<Self> {
+        let plant = rollout.runs.first()?.plant;
+        let (zero, one) = (Lanes::of(T::zero()), Lanes::of(T::one()));
+        let joints = JointState { q: [zero; N], dq: [zero; N] };
+        let mut batch = Self {
+            rollout,
+            lanes: ElasticLanes::new(plant),
+            state: ElasticState { joints, deflection: [zero; N], deflection_rate: [zero; N] },
+            modes: ElasticModes { direction: [one; N], any_stuck: false },
+            span: ElasticSpan { t: zero, h: zero, tau: [[zero; N]; 3] },
+            substeps: [Substep { index: 0, count: 1, h: T::zero() }; W],
+            starts: [false; W],
+            runs: [0; W],
+            cursors: from_fn(|_| None),
+            moving: W,
+            waiting: 0,
+        };
+        for l in 0..W {
+            batch.enter(l);
+        }
+        Some(batch)
+    }
+
+    /// Takes one step of every lane.
+    #[inline(always)]
+    fn step(&mut self) {
+        let kinematics = self.lanes.kinematics(&self.state.joints);
+        if self.starts.contains(&true) {
+            let inertia = &kinematics.equation_terms.inertia;
+            let mut free = [self.span.h; N];
+            for j in 0..N {
+                free[j] = free_inertia(inertia, j);
+            }
+            self.start_intervals(&free);
+        }
+        let start = self.state;
+        let step = self.lanes.step(&start, &kinematics, &self.span, &self.modes);
+        self.state = step.end;
+        for l in 0..W {
+            if self.cursors[l].is_none() {
+                continue;
+            }
+            if !(step.violation.0[l] <= T::zero()) {
+                self.put(l, &start);
+                self.take_alone(l);
+            }
+            self.arrive(l);
+        }
+    }
+
+    /// Divides the intervals that lanes start into steps; `free` is each joint's inertia with all other joints free to move.
+    #[inline(never)]
+    fn start_intervals(&mut self, free: &[Lanes<T, C, W>; N]) {
+        let plant = self.lanes.plant();
+        for l in 0..W {
+            let Some(RunCursor { interval: Some(interval), .. }) = &self.cursors[l] else { continue };
+            if !self.starts[l] {
+                continue;
+            }
+            self.starts[l] = false;
+            let q = SVector::from(lane_values(&self.state.joints.q, l));
+            let rate = plant.fastest_with(&q, &lane_values(free, l));
+            let count = stable_substeps(interval.h, rate, self.rollout.most_substeps);
+            self.substeps[l] = Substep { index: 0, count, h: interval.h / lit(count as f64) };
+            self.set_span(l);
+        }
+    }
+
+    /// Sets times and torques of the next step of lane `l`.
+    #[inline]
+    fn set_span(&mut self, l: usize) {
+        let Some(RunCursor { interval: Some(interval), .. }) = &self.cursors[l] else { return };
+        let Substep { index, h, .. } = self.substeps[l];
+        let from = h * lit(index as f64);
+        (self.span.t.0[l], self.span.h.0[l]) = (interval.t + from, h);
+        for (i, part) in [T::zero(), lit(0.5), T::one()].into_iter().enumerate() {
+            let tau = interval.torque_at(from + h * part);
+            for j in 0..N {
+                self.span.tau[i][j].0[l] = tau[j];
+            }
+        }
+    }
+
+    /// Takes the step of lane `l` with the scalar integrator.
+    #[inline(never)]
+    fn take_alone(&mut self, l: usize) {
+        let Some(RunCursor { interval: Some(interval), .. }) = &self.cursors[l] else { return };
+        let Substep { index, h, .. } = self.substeps[l];
+        let mut state = self.state_of(l);
+        substep(self.lanes.plant(), &mut state, interval, h * lit(index as f64), h);
+        self.set(l, &state);
+    }
+
+    /// Ends the step of lane `l`: the next step of its interval, the next interval or the next run follows.
+    #[inline]
+    fn arrive(&mut self, l: usize) {
+        let Substep { index, count, .. } = &mut self.substeps[l];
+        *index += 1;
+        if *index < *count {
+            return self.set_span(l);
+        }
+        let JointState { q, dq } = &self.state.joints;
+        let (q, dq): ([T; N], [T; N]) = (lane_values(q, l), lane_values(dq, l));
+        let within =
+            q.iter().all(|q| q.abs() <= self.rollout.limit) && dq.iter().all(|dq| (*dq - *dq) == T::zero());
+        if within && let Some(cursor) = &mut self.cursors[l] {
+            let drivetrain = self.lanes.plant().drivetrain();
+            let deflection: [T; N] = lane_values(&self.state.deflection, l);
+            cursor.arrive(from_fn(|j| {
+                if drivetrain.sides(j).encoder_at_motor { q[j] + deflection[j] } else { q[j] }
+            }));
+            if cursor.interval.is_some() {
+                self.starts[l] = true;
+                return;
+            }
+        }
+        self.rollout.runs[self.runs[l]].state = self.state_of(l);
+        self.enter(l);
+    }
+
+    /// Puts the next run into lane `l`, or ends the lane if there is none.
+    #[inline(never)]
+    fn enter(&mut self, l: usize) {
+        self.cursors[l] = None;
+        while self.waiting < self.rollout.runs.len() {
+            let run = &mut self.rollout.runs[self.waiting];
+            self.runs[l] = self.waiting;
+            self.waiting += 1;
+            let state = run.state;
+            self.cursors[l] = RunCursor::of(run);
+            if self.cursors[l].is_some() {
+                self.starts[l] = true;
+                return self.set(l, &state);
+            }
+        }
+        // Steps of zero length of an arm at rest.
+        self.moving -= 1;
+        self.span.h.0[l] = T::zero();
+        self.set(l, &State { modes: [Mode::Forward; N], ..State::new(SVector::zeros(), SVector::zeros()) });
+    }
+
+    /// State of lane `l`.
+    #[inline]
+    fn state_of(&self, l: usize) -> State<T, N> {
+        let ElasticState { joints, deflection, deflection_rate } = &self.state;
+        let mut state =
+            State::new(SVector::from(lane_values(&joints.q, l)), SVector::from(lane_values(&joints.dq, l)));
+        state.modes = lane_values(&self.modes.direction, l).map(Mode::of);
+        state.latent.deflection = lane_values(deflection, l).into();
+        state.latent.deflection_rate = lane_values(deflection_rate, l).into();
+        state
+    }
+
+    /// Sets the state of lane `l` to that of the same lane in `other`.
+    #[inline]
+    fn put(&mut self, l: usize, other: &ElasticState<Lanes<T, C, W>, N>) {
+        for j in 0..N {
+            self.state.joints.q[j].0[l] = other.joints.q[j].0[l];
+            self.state.joints.dq[j].0[l] = other.joints.dq[j].0[l];
+            self.state.deflection[j].0[l] = other.deflection[j].0[l];
+            self.state.deflection_rate[j].0[l] = other.deflection_rate[j].0[l];
+        }
+    }
+
+    /// Sets the state of lane `l`.
+    #[inline]
+    fn set(&mut self, l: usize, state: &State<T, N>) {
+        let plant = self.lanes.plant();
+        self.modes.any_stuck = false;
+        for j in 0..N {
+            self.state.joints.q[j].0[l] = state.q[j];
+            self.state.joints.dq[j].0[l] = state.dq[j];
+            self.state.deflection[j].0[l] = state.latent.deflection[j];
+            self.state.deflection_rate[j].0[l] = state.latent.deflection_rate[j];
+            self.modes.direction[j].0[l] =
+                if plant.is_rounded(j) { T::one() } else { state.modes[j].direction() };
+            self.modes.any_stuck |= self.modes.direction[j].any_zero();
+        }
+    }
+}

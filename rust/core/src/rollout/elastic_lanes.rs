@@ -1,0 +1,388 @@
+//! Dynamics of one plant with elastic joints, regularised friction, or both, in several runs side by side.
+//!
+//! The equations are those of [`Plant::acceleration`], with one run in each lane: the friction of a joint acts on its link or on its motor, is a smooth
+//! function of velocity where it is regularised, and elsewhere has the direction of its friction mode throughout a step.
+
+use super::plant_lanes::{JointInstant, PlantLanes};
+use crate::arm::Arm;
+use crate::cpu::Cpu;
+use crate::fixed_mode::contradiction;
+use crate::hyperbolic::tanh;
+use crate::kinematics::{AngleRange, JointState, KinematicState, rotated};
+use crate::lanes::Lanes;
+use crate::linear::solve_positive_definite;
+use crate::number::Number;
+use crate::plant::Plant;
+use crate::real::{Real, lit};
+use core::array::from_fn;
+
+/// Joint states of several runs side by side, with the deflections of elastic joints.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ElasticState<V, const N: usize> {
+    /// Positions and velocities of all joints.
+    pub(super) joints: JointState<V, N>,
+    /// Deflection of each joint's shaft, motor position less joint position, rad or m; zero for rigid joints.
+    pub(super) deflection: [V; N],
+    /// Rate of each deflection, rad/s or m/s.
+    pub(super) deflection_rate: [V; N],
+}
+
+/// Friction modes of all joints during a step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ElasticModes<V, const N: usize> {
+    /// Direction in which each joint, or the motor that carries its friction, slides: -1, 0 (stuck) or 1; 1 where friction is regularised.
+    pub(super) direction: [V; N],
+    /// Whether any joint is stuck in any lane.
+    pub(super) any_stuck: bool,
+}
+
+/// Part of a sample interval in every lane, with the motor torques over it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ElasticSpan<V, const N: usize> {
+    /// Time at its start, s.
+    pub(super) t: V,
+    /// Length, s.
+    pub(super) h: V,
+    /// Motor torques at the start, the middle and the end, N m (N).
+    pub(super) tau: [[V; N]; 3],
+}
+
+/// State at the end of a step of all lanes, and by how much the step contradicts what it assumed.
+pub(super) struct ElasticStep<V, const N: usize> {
+    pub(super) end: ElasticState<V, N>,
+    /// > 0 or NaN where friction modes contradict the motion, or where the motion is not finite or turns the arm beyond the angle range of a step.
+    pub(super) violation: V,
+}
+
+/// Shaft between motor and link of an elastic joint, the same in all lanes.
+#[derive(Clone, Copy)]
+struct Shaft<V, const N: usize> {
+    stiffness: V,
+    damping: V,
+    /// 1 over the inertia of the rotor, 1/(kg m^2) (1/kg).
+    inverse_inertia: V,
+    /// Rotor velocity per velocity of each joint.
+    rotor_jacobian: [V; N],
+}
+
+/// Motion at one Runge-Kutta stage.
+#[derive(Clone, Copy)]
+struct StageMotion<V, const N: usize> {
+    ddq: [V; N],
+    deflection_acceleration: [V; N],
+    /// Friction torque that keeps a stuck joint or motor at rest, and the torque of the motor on which it acts, N m (N); meaningless if none is stuck.
+    friction_at_rest: [V; N],
+    reaching: [V; N],
+}
+
+/// Velocities and motion at one Runge-Kutta stage.
+struct Stage<V, const N: usize> {
+    state: ElasticState<V, N>,
+    bias: [V; N],
+    motion: StageMotion<V, N>,
+}
+
+/// One plant with elastic joints or regularised friction, in `W` lanes.
+pub(super) struct ElasticLanes<'a, T: Real, C, A, const W: usize, const N: usize, const P: usize> {
+    lanes: PlantLanes<'a, T, C, A, W, N, P>,
+    shafts: [Option<Shaft<Lanes<T, C, W>, N>>; N],
+    /// Whether friction of each joint acts on its motor, which moves against its link.
+    at_motor: [bool; N],
+    /// 1 over the width over which friction of each joint is regularised, s/rad (s/m); `None` for exact dry friction.
+    inverse_width: [Option<Lanes<T, C, W>>; N],
+    /// Whether each joint has dry friction, or effects that may depend on the direction in which it slides.
+    is_dry: [bool; N],
+    has_effects: bool,
+}
+
+impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const P: usize>
+    ElasticLanes<'a, T, C, A, W, N, P>
+{
+    pub(super) fn new(plant: &'a Plant<T, A, N, P>) -> Self {
+        let lanes = PlantLanes::new(plant);
+        let shaft = |j: usize| {
+            plant.drivetrain().get(j).map(|transmission| Shaft {
+                stiffness: Lanes::of(transmission.stiffness),
+                damping: Lanes::of(transmission.damping),
+                inverse_inertia: Lanes::of(T::one() / transmission.inertia),
+                rotor_jacobian: transmission.rotor_jacobian(j).map(Lanes::of),
+            })
+        };
+        let inverse_width = |j: usize| plant.is_rounded(j).then(|| Lanes::of(T::one() / plant.rounding(j)));
+        Self {
+            shafts: from_fn(shaft),
+            at_motor: from_fn(|j| plant.drivetrain().sides(j).friction_at_motor),
+            inverse_width: from_fn(inverse_width),
+            is_dry: from_fn(|j| plant.is_dry(j)),
+            has_effects: lanes.has_effects(),
+            lanes,
+        }
+    }
+
+    /// Plant of all lanes.
+    #[inline(always)]
+    pub(super) fn plant(&self) -> &'a Plant<T, A, N, P> {
+        self.lanes.plants[0]
+    }
+
+    /// Kinematic state at the joint state `joints`.
+    #[inline(always)]
+    pub(super) fn kinematics(
+        &self,
+        joints: &JointState<Lanes<T, C, W>, N>,
+    ) -> KinematicState<Lanes<T, C, W>, N> {
+        self.lanes.rigid.kinematics(joints)
+    }
+
+    /// Velocity on which the friction of joint `j` acts, rad/s or m/s.
+    #[inline(always)]
+    fn friction_velocity(&self, j: usize, state: &ElasticState<Lanes<T, C, W>, N>) -> Lanes<T, C, W> {
+        if self.at_motor[j] { state.joints.dq[j] + state.deflection_rate[j] } else { state.joints.dq[j] }
+    }
+
+    /// Direction of the dry friction of joint `j` at the velocity `dq`, rad/s or m/s: that of its mode, or a smooth function of `dq` between -1 and 1.
+    #[inline(always)]
+    fn sliding(
+        &self,
+        j: usize,
+        dq: Lanes<T, C, W>,
+        modes: &ElasticModes<Lanes<T, C, W>, N>,
+    ) -> Lanes<T, C, W> {
+        match self.inverse_width[j] {
+            Some(inverse_width) => tanh(dq * inverse_width),
+            None => modes.direction[j],
+        }
+    }
+
+    /// Coulomb level and torque of the effects of joint `j`, N m (N), at the direction `along` of its friction.
+    #[inline(always)]
+    fn laws(
+        &self,
+        at: &JointInstant<Lanes<T, C, W>>,
+        along: Lanes<T, C, W>,
+        other: Lanes<T, C, W>,
+        j: usize,
+    ) -> [Lanes<T, C, W>; 2] {
+        if !self.has_effects {
+            return [self.lanes.rigid.coulomb[j], Lanes::of(T::zero())];
+        }
+        let along = if self.inverse_width[j].is_some() { sign(along) } else { along };
+        self.lanes.laws(at, along, other, j)
+    }
+
+    /// Motion of all lanes at the time `t` under the motor torques `tau`.
+    #[inline(always)]
+    fn motion(
+        &self,
+        t: Lanes<T, C, W>,
+        kinematics: &KinematicState<Lanes<T, C, W>, N>,
+        state: &ElasticState<Lanes<T, C, W>, N>,
+        tau: &[Lanes<T, C, W>; N],
+        modes: &ElasticModes<Lanes<T, C, W>, N>,
+    ) -> StageMotion<Lanes<T, C, W>, N> {
+        let (zero, one) = (Lanes::of(T::zero()), Lanes::of(T::one()));
+        let JointState { q, dq } = state.joints;
+        let bias = &kinematics.equation_terms.bias;
+        let viscous = &self.lanes.rigid.viscous;
+        let (mut slides, mut sliding, mut transmitted) = ([one; N], [zero; N], [zero; N]);
+        for j in 0..N {
+            slides[j] = modes.direction[j] * modes.direction[j];
+            sliding[j] = self.sliding(j, dq[j], modes);
+            if let Some(shaft) = &self.shafts[j] {
+                transmitted[j] =
+                    shaft.stiffness.fused(state.deflection[j], shaft.damping * state.deflection_rate[j]);
+            }
+        }
+        // Friction on motors leaves less of their torque.
+        let (mut braked, mut left) = ([zero; N], *tau);
+        for j in 0..N {
+            if !self.at_motor[j] {
+                continue;
+            }
+            let velocity = self.friction_velocity(j, state);
+            let along = self.sliding(j, velocity, modes);
+            let at =
+                JointInstant { t, q: q[j] + state.deflection[j], dq: velocity, tau: tau[j], bias: bias[j] };
+            let [level, _] = self.laws(&at, along, zero, j);
+            let moving = viscous[j].fused(velocity, level * along);
+            braked[j] = slides[j].fused(moving, (one - slides[j]) * (tau[j] - transmitted[j]));
+            left[j] = tau[j] - braked[j];
+        }
+        let mut reaching = left;
+        for j in 0..N {
+            let Some(shaft) = &self.shafts[j] else { continue };
+            let retained = left[j] - transmitted[j];
+            for k in 0..N {
+                reaching[k] = (-shaft.rotor_jacobian[k]).fused(retained, reaching[k]);
+            }
+        }
+        let (mut force, mut held) = (reaching, [one; N]);
+        for j in 0..N {
+            let at = JointInstant { t, q: q[j], dq: dq[j], tau: reaching[j], bias: bias[j] };
+            let [level, effects] = self.laws(&at, sliding[j], sliding[(j + 1) % N], j);
+            force[j] = reaching[j] - bias[j] + effects;
+            if !self.at_motor[j] {
+                force[j] = force[j] - viscous[j].fused(dq[j], level * sliding[j]);
+                held[j] = slides[j];
+            }
+        }
+        let (mut inertia, mut right) = (kinematics.equation_terms.inertia, force);
+        if modes.any_stuck {
+            for i in 0..N {
+                right[i] = right[i] * held[i];
+                for j in 0..i {
+                    let kept = inertia[i][j] * (held[i] * held[j]);
+                    (inertia[i][j], inertia[j][i]) = (kept, kept);
+                }
+            }
+        }
+        let ddq = solve_positive_definite(inertia, right);
+        let mut deflection_acceleration = [zero; N];
+        for j in 0..N {
+            let Some(shaft) = &self.shafts[j] else { continue };
+            let mut of_rotor = shaft.inverse_inertia * (left[j] - transmitted[j]);
+            for k in 0..N {
+                of_rotor = (-shaft.rotor_jacobian[k]).fused(ddq[k], of_rotor);
+            }
+            // A motor held by its friction does not move.
+            deflection_acceleration[j] = if self.at_motor[j] && modes.any_stuck {
+                slides[j].fused(of_rotor, (slides[j] - one) * ddq[j])
+            } else {
+                of_rotor
+            };
+        }
+        let mut friction_at_rest = force;
+        if modes.any_stuck {
+            for i in 0..N {
+                for k in 0..N {
+                    friction_at_rest[i] =
+                        (-kinematics.equation_terms.inertia[i][k]).fused(ddq[k], friction_at_rest[i]);
+                }
+                if self.at_motor[i] {
+                    (friction_at_rest[i], reaching[i]) = (braked[i], tau[i]);
+                }
+            }
+        }
+        StageMotion { ddq, deflection_acceleration, friction_at_rest, reaching }
+    }
+
+    /// State `dt` seconds after `start`, at the velocities of `at` and the accelerations of `motion`.
+    #[inline(always)]
+    fn moved(
+        start: &ElasticState<Lanes<T, C, W>, N>,
+        dt: Lanes<T, C, W>,
+        at: &ElasticState<Lanes<T, C, W>, N>,
+        motion: &StageMotion<Lanes<T, C, W>, N>,
+    ) -> ElasticState<Lanes<T, C, W>, N> {
+        let mut next = *start;
+        for j in 0..N {
+            next.joints.q[j] = dt.fused(at.joints.dq[j], start.joints.q[j]);
+            next.joints.dq[j] = dt.fused(motion.ddq[j], start.joints.dq[j]);
+            next.deflection[j] = dt.fused(at.deflection_rate[j], start.deflection[j]);
+            next.deflection_rate[j] = dt.fused(motion.deflection_acceleration[j], start.deflection_rate[j]);
+        }
+        next
+    }
+
+    /// Stiction violation of the stuck joints at a stage, N m (N): > 0 in lanes where one breaks away.
+    #[inline(always)]
+    fn stiction_violation(
+        &self,
+        t: Lanes<T, C, W>,
+        stage: &Stage<Lanes<T, C, W>, N>,
+        modes: &ElasticModes<Lanes<T, C, W>, N>,
+    ) -> Lanes<T, C, W> {
+        let mut worst = -Lanes::of(T::one());
+        for j in (0..N).filter(|j| self.inverse_width[*j].is_none()) {
+            let rests = stage.motion.friction_at_rest[j];
+            let violation = if self.lanes.hooks[j].coulomb {
+                let joints = &stage.state.joints;
+                let (q, dq, tau) = (joints.q[j], joints.dq[j], stage.motion.reaching[j]);
+                let at = JointInstant { t, q, dq, tau, bias: stage.bias[j] };
+                self.lanes.stiction_violations(&at, rests, modes.direction[j], j)
+            } else {
+                let slides = modes.direction[j] * modes.direction[j];
+                (rests.size() - self.lanes.rigid.coulomb[j]) * (Lanes::of(T::one()) - slides)
+            };
+            worst = worst.larger(violation);
+        }
+        worst
+    }
+
+    /// One classical Runge-Kutta step of all lanes from `start`.
+    #[inline(always)]
+    pub(super) fn step(
+        &self,
+        start: &ElasticState<Lanes<T, C, W>, N>,
+        kinematics: &KinematicState<Lanes<T, C, W>, N>,
+        span: &ElasticSpan<Lanes<T, C, W>, N>,
+        modes: &ElasticModes<Lanes<T, C, W>, N>,
+    ) -> ElasticStep<Lanes<T, C, W>, N> {
+        let c = |x: f64| Lanes::<T, C, W>::of(lit(x));
+        let (half, sixth) = (span.h * c(0.5), span.h * c(1.0 / 6.0));
+        let mut far = c(0.0);
+        let mut stage = |state: ElasticState<Lanes<T, C, W>, N>, dt: Lanes<T, C, W>, tau: usize| {
+            let mut by = state.joints.q;
+            for j in 0..N {
+                by[j] = by[j] - start.joints.q[j];
+            }
+            let (rotations, angle) = self.lanes.rigid.rotations(&by, AngleRange::Near);
+            far = angle.larger(far);
+            let there = self.lanes.rigid.rotated(&state.joints, rotated(&kinematics.sincos, &rotations));
+            let motion = self.motion(span.t + dt, &there, &state, &span.tau[tau], modes);
+            Stage { state, bias: there.equation_terms.bias, motion }
+        };
+        let motion = self.motion(span.t, kinematics, start, &span.tau[0], modes);
+        let s1 = Stage { state: *start, bias: kinematics.equation_terms.bias, motion };
+        let s2 = stage(Self::moved(start, half, start, &s1.motion), half, 1);
+        let s3 = stage(Self::moved(start, half, &s2.state, &s2.motion), half, 1);
+        let s4 = stage(Self::moved(start, span.h, &s3.state, &s3.motion), span.h, 2);
+        let (mut end, mut sum) = (*start, c(-0.0));
+        let after = |x: Lanes<T, C, W>, rates: [Lanes<T, C, W>; 4]| {
+            sixth.fused(rates[0] + c(2.0).fused(rates[1] + rates[2], rates[3]), x)
+        };
+        let states = [start, &s2.state, &s3.state, &s4.state];
+        let motions = [&s1.motion, &s2.motion, &s3.motion, &s4.motion];
+        for j in 0..N {
+            end.joints.q[j] = after(start.joints.q[j], states.map(|s| s.joints.dq[j]));
+            end.joints.dq[j] = after(start.joints.dq[j], motions.map(|m| m.ddq[j]));
+            if self.shafts[j].is_some() {
+                end.deflection[j] = after(start.deflection[j], states.map(|s| s.deflection_rate[j]));
+                end.deflection_rate[j] =
+                    after(start.deflection_rate[j], motions.map(|m| m.deflection_acceleration[j]));
+            }
+            sum = sum + end.joints.dq[j] + end.deflection_rate[j];
+        }
+        // Motion that is not finite leaves its mark in this.
+        let finite = sum * c(0.0);
+        let mut violation = AngleRange::Near.part(far) - c(1.0) + finite;
+        for j in (0..N).filter(|j| self.inverse_width[*j].is_none()) {
+            let direction = modes.direction[j];
+            let slides = direction * direction;
+            let mut acceleration = s1.motion.ddq[j];
+            if self.at_motor[j] {
+                acceleration = acceleration + s1.motion.deflection_acceleration[j];
+            }
+            let before = contradiction(self.friction_velocity(j, start), acceleration, direction, slides);
+            let reversed = -(self.friction_velocity(j, &end) * direction);
+            // A joint without dry friction is none the worse for a wrong direction.
+            let dry = if self.is_dry[j] { c(1.0) } else { c(1.0) - slides };
+            violation = violation.larger(before.larger(reversed) * dry);
+        }
+        if modes.any_stuck {
+            violation = violation.larger(self.stiction_violation(span.t, &s1, modes));
+            violation = violation.larger(self.stiction_violation(span.t + span.h, &s4, modes));
+        }
+        ElasticStep { end, violation: violation + finite }
+    }
+}
+
+/// -1 in lanes with a negative number, else 1.
+#[inline(always)]
+fn sign<T: Real, C: Cpu, const W: usize>(x: Lanes<T, C, W>) -> Lanes<T, C, W> {
+    let mut sign = x;
+    for l in 0..W {
+        sign.0[l] = if x.0[l] < T::zero() { -T::one() } else { T::one() };
+    }
+    sign
+}

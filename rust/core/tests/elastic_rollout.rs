@@ -1,0 +1,174 @@
+//! Tests of batch rollouts of plants with elastic joints and regularised friction against the scalar integrator.
+
+use armgap_core::arm::TwoLink;
+use armgap_core::cpu::Level;
+use armgap_core::effect::{Active, InputSegment, find};
+use armgap_core::integrate::{Interval, State, advance};
+use armgap_core::plant::Plant;
+use armgap_core::rollout::{ElasticRollout, Run, stable_substeps};
+use armgap_core::transmission::Sides;
+use nalgebra::Vector2;
+
+const THETA: [f64; 9] = [2.3516, 0.0838, 0.1019, 38.465, 1.827, 2.288, 0.175, 7.6, 1.734];
+const H: f64 = 0.0025;
+const ROWS: usize = 300;
+const RUNS: usize = 19;
+const MOST: usize = 5;
+
+type Arm = Plant<f64, TwoLink<f64>, 2, 9>;
+
+fn arm() -> Arm {
+    Plant::new(TwoLink::new(9.81, Some(0.45), &THETA), THETA)
+}
+
+fn with(plant: Arm, name: &str, joint: usize, p: [f64; 3]) -> Arm {
+    let law = find::<f64>(name).expect("in the catalogue");
+    plant.with_effect(Active { law, joint, p }).expect("room for it")
+}
+
+fn elastic(joint: usize, sides: Sides) -> Arm {
+    let (stiffness, inertia) = if joint == 0 { (4000.0, 0.3) } else { (150.0, 0.01) };
+    with(arm(), "joint_elasticity", joint, [stiffness, 0.004 * stiffness, inertia])
+        .with_sides(joint, sides)
+        .expect("a joint of the arm")
+}
+
+fn times() -> Vec<f64> {
+    (0..=ROWS).map(|k| H * k as f64 + 2e-4 * (k % 3) as f64).collect()
+}
+
+/// Torques, N m, under which joints slide, reverse, stick and break away, different for every run.
+fn torques(run: usize) -> Vec<[InputSegment<f64>; 2]> {
+    let size = 1.0 / (1.0 + 0.3 * run as f64);
+    let at = |t: f64| {
+        [
+            20.0 + 68.0 * size * (16.0 * t + 0.1).sin() + 9.0 * (20.0 * t).sin(),
+            8.0 * size * (26.0 * t + run as f64).sin(),
+        ]
+    };
+    let between = |a: f64, b: f64| InputSegment { start: a, middle: 0.4 * a + 0.6 * b, end: b };
+    times().windows(2).map(|t| std::array::from_fn(|j| between(at(t[0])[j], at(t[1] - 1e-3)[j]))).collect()
+}
+
+fn start(run: usize) -> State<f64, 2> {
+    let x = run as f64;
+    let still = run.is_multiple_of(3);
+    State::new(Vector2::new(0.3 * x, -0.2 * x), if still { Vector2::zeros() } else { Vector2::new(0.5, -x) })
+}
+
+/// Number of rows of a run.
+fn rows(run: usize) -> usize {
+    (ROWS * (run % 4)) / 3
+}
+
+/// Positions that the encoders show in a run of the scalar integrator.
+fn alone(plant: &Arm, run: usize) -> Vec<f64> {
+    let (t, torque) = (times(), torques(run));
+    let mut state = start(run);
+    let mut shown = Vec::new();
+    for k in 0..rows(run) {
+        let h = t[k + 1] - t[k];
+        let steps = stable_substeps(h, plant.fastest(&state.q), MOST);
+        advance(plant, &mut state, &Interval { t: t[k], h, torque: &torque[k] }, steps);
+        shown.extend(plant.drivetrain().shown(&state.q, &state.latent).iter());
+    }
+    shown
+}
+
+/// Largest distance of the runs side by side from those alone, rad.
+fn distance(plant: &Arm, level: Level) -> f64 {
+    let (t, torques): (_, Vec<_>) = (times(), (0..RUNS).map(torques).collect());
+    let mut out = vec![vec![f64::NAN; 2 * ROWS]; RUNS];
+    let mut runs: Vec<_> = out
+        .iter_mut()
+        .enumerate()
+        .map(|(run, positions)| Run {
+            plant,
+            t: &t[..=rows(run)],
+            torque: &torques[run][..rows(run)],
+            state: start(run),
+            positions: &mut positions[..2 * rows(run)],
+        })
+        .collect();
+    ElasticRollout { runs: &mut runs, limit: 1e3, most_substeps: MOST }.run_all(level);
+    let mut most = 0.0_f64;
+    for (run, positions) in out.iter().enumerate() {
+        let apart = positions.iter().zip(alone(plant, run)).map(|(a, b)| (a - b).abs());
+        most = apart.fold(most, |most, x| if x > most || x.is_nan() { x } else { most });
+        assert!(positions[2 * rows(run)..].iter().all(|q| q.is_nan()), "run {run} went on");
+    }
+    most
+}
+
+fn assert_same(plant: &Arm, what: &str) {
+    assert!(plant.is_elastic_or_regularised(), "{what}");
+    for level in [Level::PORTABLE, Level::detect(), Level::widest()] {
+        let off = distance(plant, level);
+        assert!(off < 1e-9, "{what}, {}: {off:e}", level.name());
+    }
+}
+
+const SIDES: [Sides; 4] = [
+    Sides::LINK,
+    Sides::MOTOR,
+    Sides { encoder_at_motor: false, friction_at_motor: true, rotor_rides: false },
+    Sides { encoder_at_motor: true, friction_at_motor: false, rotor_rides: true },
+];
+
+#[test]
+fn regularised_friction_in_lanes_is_that_of_one_run() {
+    for widths in [[0.05, 0.2], [0.02, 0.0], [0.0, 0.1]] {
+        assert_same(&arm().with_rounding(widths), "regularised");
+    }
+}
+
+#[test]
+fn elastic_joints_in_lanes_move_as_in_one_run() {
+    for (joint, sides) in [0, 1].into_iter().flat_map(|j| SIDES.map(|sides| (j, sides))) {
+        assert_same(&elastic(joint, sides), &format!("joint {joint}, {sides:?}"));
+        assert_same(
+            &elastic(joint, sides).with_rounding([0.05, 0.03]),
+            &format!("joint {joint}, {sides:?}, regularised"),
+        );
+    }
+}
+
+#[test]
+fn effects_act_beside_elastic_joints_and_regularised_friction() {
+    let effects = [
+        ("stribeck", 0, [2.0, 0.3, 0.0]),
+        ("stribeck", 1, [0.5, 0.3, 0.0]),
+        ("coulomb_asymmetry", 1, [0.4, 0.0, 0.0]),
+        ("torque_ripple", 1, [0.3, 7.0, 0.4]),
+        ("cross_friction", 0, [0.8, 0.0, 0.0]),
+        ("load_dependent_friction", 0, [0.1, 0.0, 0.0]),
+        ("payload", 0, [0.5, 0.3, 0.0]),
+        ("torque_saturation", 0, [50.0, 0.0, 0.0]),
+    ];
+    for (name, joint, p) in effects {
+        for sides in [Sides::LINK, Sides::MOTOR] {
+            assert_same(&with(elastic(joint, sides), name, joint, p), &format!("{name} {joint} {sides:?}"));
+        }
+        assert_same(&with(arm().with_rounding([0.05, 0.03]), name, joint, p), name);
+    }
+}
+
+#[test]
+fn a_run_that_leaves_the_limit_ends_alone() {
+    let (plant, t) = (elastic(1, Sides::MOTOR), times());
+    let mut torques: Vec<_> = (0..8).map(|run| torques(run + 1)).collect();
+    torques[2][50][0] = InputSegment::held(f64::NAN);
+    torques[5][20][1] = InputSegment::held(1e9);
+    let mut out = vec![vec![f64::NAN; 2 * ROWS]; 8];
+    let mut runs: Vec<_> = out
+        .iter_mut()
+        .zip(&torques)
+        .map(|(positions, torque)| Run { plant: &plant, t: &t, torque, state: start(1), positions })
+        .collect();
+    ElasticRollout { runs: &mut runs, limit: 1e3, most_substeps: MOST }.run_all(Level::widest());
+    assert!(out[2][99].is_finite() && out[2][100].is_nan());
+    assert!(out[5][2 * ROWS - 1].is_nan(), "what is thrown off goes on");
+    for run in [0, 1, 3, 4, 6, 7] {
+        assert!(out[run].iter().all(|q| q.is_finite()), "run {run}");
+    }
+}
