@@ -75,13 +75,6 @@ struct StageMotion<V, const N: usize> {
     reaching: [V; N],
 }
 
-/// Velocities and motion at one Runge-Kutta stage.
-struct Stage<V, const N: usize> {
-    state: ElasticState<V, N>,
-    bias: [V; N],
-    motion: StageMotion<V, N>,
-}
-
 /// One plant with elastic joints or regularised friction, in `W` lanes.
 pub(super) struct ElasticLanes<'a, T: Real, C, A, const W: usize, const N: usize, const P: usize> {
     lanes: PlantLanes<'a, T, C, A, W, N, P>,
@@ -284,32 +277,33 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         next
     }
 
-    /// Stiction violation of the stuck joints at a stage, N m (N): > 0 in lanes where one breaks away.
+    /// Stiction violation of the stuck joints at the time `t`, N m (N): > 0 in lanes where one breaks away.
     #[inline(always)]
     fn stiction_violation(
         &self,
         t: Lanes<T, C, W>,
-        stage: &Stage<Lanes<T, C, W>, N>,
+        joints: &JointState<Lanes<T, C, W>, N>,
+        bias: &[Lanes<T, C, W>; N],
+        motion: &StageMotion<Lanes<T, C, W>, N>,
         modes: &ElasticModes<Lanes<T, C, W>, N>,
     ) -> Lanes<T, C, W> {
-        let mut worst = -Lanes::of(T::one());
+        let (one, mut worst) = (Lanes::of(T::one()), -Lanes::of(T::one()));
         for j in (0..N).filter(|j| self.inverse_width[*j].is_none()) {
-            let rests = stage.motion.friction_at_rest[j];
-            let violation = if self.lanes.hooks[j].coulomb {
-                let joints = &stage.state.joints;
-                let (q, dq, tau) = (joints.q[j], joints.dq[j], stage.motion.reaching[j]);
-                let at = JointInstant { t, q, dq, tau, bias: stage.bias[j] };
-                self.lanes.stiction_violations(&at, rests, modes.direction[j], j)
+            let (rests, direction) = (motion.friction_at_rest[j], modes.direction[j]);
+            worst = worst.larger(if self.lanes.hooks[j].coulomb {
+                let (q, dq, tau) = (joints.q[j], joints.dq[j], motion.reaching[j]);
+                let at = JointInstant { t, q, dq, tau, bias: bias[j] };
+                self.lanes.stiction_violations(&at, rests, direction, j)
             } else {
-                let slides = modes.direction[j] * modes.direction[j];
-                (rests.size() - self.lanes.rigid.coulomb[j]) * (Lanes::of(T::one()) - slides)
-            };
-            worst = worst.larger(violation);
+                (rests.size() - self.lanes.rigid.coulomb[j]) * (one - direction * direction)
+            });
         }
         worst
     }
 
     /// One classical Runge-Kutta step of all lanes from `start`.
+    ///
+    /// The stages are a loop, so that their motion is compiled once.
     #[inline(always)]
     pub(super) fn step(
         &self,
@@ -319,63 +313,91 @@ impl<'a, T: Real, C: Cpu, A: Arm<T, N, P>, const W: usize, const N: usize, const
         modes: &ElasticModes<Lanes<T, C, W>, N>,
     ) -> ElasticStep<Lanes<T, C, W>, N> {
         let c = |x: f64| Lanes::<T, C, W>::of(lit(x));
-        let (half, sixth) = (span.h * c(0.5), span.h * c(1.0 / 6.0));
-        let mut far = c(0.0);
-        let mut stage = |state: ElasticState<Lanes<T, C, W>, N>, dt: Lanes<T, C, W>, tau: usize| {
-            let mut by = state.joints.q;
+        let zero = [c(0.0); N];
+        let (mut at, mut there) = (*start, *kinematics);
+        let mut sum = ElasticState {
+            joints: JointState { q: zero, dq: zero },
+            deflection: zero,
+            deflection_rate: zero,
+        };
+        let (mut violation, mut far) = (-c(1.0), c(0.0));
+        for stage in 0..4 {
+            let t = span.t + span.h * c(STAGE_TIME[stage]);
+            let motion = self.motion(t, &there, &at, &span.tau[stage.div_ceil(2)], modes);
+            let weight = c(STAGE_WEIGHT[stage]);
             for j in 0..N {
-                by[j] = by[j] - start.joints.q[j];
+                sum.joints.q[j] = weight.fused(at.joints.dq[j], sum.joints.q[j]);
+                sum.joints.dq[j] = weight.fused(motion.ddq[j], sum.joints.dq[j]);
+                sum.deflection[j] = weight.fused(at.deflection_rate[j], sum.deflection[j]);
+                sum.deflection_rate[j] =
+                    weight.fused(motion.deflection_acceleration[j], sum.deflection_rate[j]);
             }
-            let (rotations, angle) = self.lanes.rigid.rotations(&by, AngleRange::Near);
-            far = angle.larger(far);
-            let there = self.lanes.rigid.rotated(&state.joints, rotated(&kinematics.sincos, &rotations));
-            let motion = self.motion(span.t + dt, &there, &state, &span.tau[tau], modes);
-            Stage { state, bias: there.equation_terms.bias, motion }
-        };
-        let motion = self.motion(span.t, kinematics, start, &span.tau[0], modes);
-        let s1 = Stage { state: *start, bias: kinematics.equation_terms.bias, motion };
-        let s2 = stage(Self::moved(start, half, start, &s1.motion), half, 1);
-        let s3 = stage(Self::moved(start, half, &s2.state, &s2.motion), half, 1);
-        let s4 = stage(Self::moved(start, span.h, &s3.state, &s3.motion), span.h, 2);
-        let (mut end, mut sum) = (*start, c(-0.0));
-        let after = |x: Lanes<T, C, W>, rates: [Lanes<T, C, W>; 4]| {
-            sixth.fused(rates[0] + c(2.0).fused(rates[1] + rates[2], rates[3]), x)
-        };
-        let states = [start, &s2.state, &s3.state, &s4.state];
-        let motions = [&s1.motion, &s2.motion, &s3.motion, &s4.motion];
+            if stage == 0 {
+                violation = violation.larger(self.contradictions(start, &motion, modes));
+            }
+            if stage.is_multiple_of(3) && modes.any_stuck {
+                let bias = &there.equation_terms.bias;
+                violation = violation.larger(self.stiction_violation(t, &at.joints, bias, &motion, modes));
+            }
+            if stage < 3 {
+                at = Self::moved(start, span.h * c(STAGE_TIME[stage + 1]), &at, &motion);
+                let mut by = at.joints.q;
+                for j in 0..N {
+                    by[j] = by[j] - start.joints.q[j];
+                }
+                let (rotations, angle) = self.lanes.rigid.rotations(&by, AngleRange::Near);
+                far = angle.larger(far);
+                there = self.lanes.rigid.rotated(&at.joints, rotated(&kinematics.sincos, &rotations));
+            }
+        }
+        let (mut end, mut total) = (*start, c(-0.0));
         for j in 0..N {
-            end.joints.q[j] = after(start.joints.q[j], states.map(|s| s.joints.dq[j]));
-            end.joints.dq[j] = after(start.joints.dq[j], motions.map(|m| m.ddq[j]));
+            end.joints.q[j] = span.h.fused(sum.joints.q[j], start.joints.q[j]);
+            end.joints.dq[j] = span.h.fused(sum.joints.dq[j], start.joints.dq[j]);
             if self.shafts[j].is_some() {
-                end.deflection[j] = after(start.deflection[j], states.map(|s| s.deflection_rate[j]));
-                end.deflection_rate[j] =
-                    after(start.deflection_rate[j], motions.map(|m| m.deflection_acceleration[j]));
+                end.deflection[j] = span.h.fused(sum.deflection[j], start.deflection[j]);
+                end.deflection_rate[j] = span.h.fused(sum.deflection_rate[j], start.deflection_rate[j]);
             }
-            sum = sum + end.joints.dq[j] + end.deflection_rate[j];
+            total = total + end.joints.dq[j] + end.deflection_rate[j];
+        }
+        for j in (0..N).filter(|j| self.is_dry[*j] && self.inverse_width[*j].is_none()) {
+            violation = violation.larger(-(self.friction_velocity(j, &end) * modes.direction[j]));
         }
         // Motion that is not finite leaves its mark in this.
-        let finite = sum * c(0.0);
-        let mut violation = AngleRange::Near.part(far) - c(1.0) + finite;
+        let finite = total * c(0.0);
+        let far = AngleRange::Near.part(far) - c(1.0);
+        ElasticStep { end, violation: violation.larger(far) + finite }
+    }
+
+    /// > 0 in lanes where a joint's velocity, or at rest its acceleration, contradicts the direction of its friction mode.
+    #[inline(always)]
+    fn contradictions(
+        &self,
+        state: &ElasticState<Lanes<T, C, W>, N>,
+        motion: &StageMotion<Lanes<T, C, W>, N>,
+        modes: &ElasticModes<Lanes<T, C, W>, N>,
+    ) -> Lanes<T, C, W> {
+        let (one, mut worst) = (Lanes::of(T::one()), -Lanes::of(T::one()));
         for j in (0..N).filter(|j| self.inverse_width[*j].is_none()) {
             let direction = modes.direction[j];
             let slides = direction * direction;
-            let mut acceleration = s1.motion.ddq[j];
+            let mut acceleration = motion.ddq[j];
             if self.at_motor[j] {
-                acceleration = acceleration + s1.motion.deflection_acceleration[j];
+                acceleration = acceleration + motion.deflection_acceleration[j];
             }
-            let before = contradiction(self.friction_velocity(j, start), acceleration, direction, slides);
-            let reversed = -(self.friction_velocity(j, &end) * direction);
+            let off = contradiction(self.friction_velocity(j, state), acceleration, direction, slides);
             // A joint without dry friction is none the worse for a wrong direction.
-            let dry = if self.is_dry[j] { c(1.0) } else { c(1.0) - slides };
-            violation = violation.larger(before.larger(reversed) * dry);
+            worst = worst.larger(if self.is_dry[j] { off } else { off * (one - slides) });
         }
-        if modes.any_stuck {
-            violation = violation.larger(self.stiction_violation(span.t, &s1, modes));
-            violation = violation.larger(self.stiction_violation(span.t + span.h, &s4, modes));
-        }
-        ElasticStep { end, violation: violation + finite }
+        worst
     }
 }
+
+/// Times of the Runge-Kutta stages after the start of a step, as parts of its length.
+const STAGE_TIME: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
+
+/// Weights of the Runge-Kutta stages.
+const STAGE_WEIGHT: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
 
 /// -1 in lanes with a negative number, else 1.
 #[inline(always)]
