@@ -55,6 +55,7 @@ pub struct Track<const N: usize> {
     /// smoother without it.
     driven: [Option<Vec<f64>>; N],
     /// Smoothed motion, computed at first use.
+    period: OnceLock<f64>,
     path: OnceLock<Vec<MeasuredState<N>>>,
     /// Local cubics at all samples, computed at first use.
     smoothed: OnceLock<Vec<[Smoothed; N]>>,
@@ -121,6 +122,7 @@ impl<const N: usize> Track<N> {
             tables: Vec::new(),
             reference: None,
             driven: std::array::from_fn(|_| None),
+            period: OnceLock::new(),
             path: OnceLock::new(),
             smoothed: OnceLock::new(),
         };
@@ -229,6 +231,7 @@ impl<const N: usize> Track<N> {
                 .map(|all| all.concat())
         });
         let mut whole = Self {
+            period: OnceLock::new(),
             path: OnceLock::new(),
             smoothed: OnceLock::new(),
             pushes: Vec::new(),
@@ -263,7 +266,7 @@ impl<const N: usize> Track<N> {
 
     /// Median sample period, s.
     pub fn period(&self) -> f64 {
-        median(self.t.windows(2).map(|w| w[1] - w[0]).collect())
+        *self.period.get_or_init(|| median(self.t.windows(2).map(|w| w[1] - w[0]).collect()))
     }
 
     /// Measured state at sample `at`, from a local cubic in each joint.

@@ -143,7 +143,7 @@ impl<const N: usize> Dataset<N> {
         hypothesis: &Hypothesis<P>,
         offsets: &[InitialStateOffset<N>],
     ) -> Vec<f64> {
-        self.predict_by(arm, hypothesis, offsets, true)
+        self.predict_by::<SideBySide, A, P>(arm, hypothesis, offsets)
     }
 
     /// Predicted positions of all windows, one rollout at a time: for arms whose long equation of motion gains nothing from vector lanes.
@@ -152,16 +152,15 @@ impl<const N: usize> Dataset<N> {
         arm: &A,
         hypothesis: &Hypothesis<P>,
     ) -> Vec<f64> {
-        self.predict_by(arm, hypothesis, &self.zero_offsets(), false)
+        self.predict_by::<Singly, A, P>(arm, hypothesis, &self.zero_offsets())
     }
 
-    /// Predicted positions of all windows, in vector lanes (`side_by_side`) where the plant allows it, or one rollout at a time.
-    fn predict_by<A: Arm<f64, N, P>, const P: usize>(
+    /// Predicted positions of all windows, simulated in the way `R`.
+    fn predict_by<R: Rollouts, A: Arm<f64, N, P>, const P: usize>(
         &self,
         arm: &A,
         hypothesis: &Hypothesis<P>,
         offsets: &[InitialStateOffset<N>],
-        side_by_side: bool,
     ) -> Vec<f64> {
         let mut predicted = vec![DIVERGED; self.rows * N];
         let Some(plant) = hypothesis.plant(arm) else {
@@ -190,25 +189,15 @@ impl<const N: usize> Dataset<N> {
             let runs =
                 if plant.only_modes_change() || (plant.is_plain() && !self.is_near_edge(window, &plant)) {
                     &mut batched
-                } else if side_by_side && plant.is_elastic_or_regularised() {
+                } else if plant.is_elastic_or_regularised() {
                     &mut elastic
                 } else {
                     &mut scalar
                 };
             runs.push(Run { plant: &plant, t, torque, state, positions });
         }
-        if side_by_side {
-            let level = Level::widest();
-            batched
-                .par_chunks_mut(GROUP)
-                .for_each(|runs| BatchRollout { runs, limit: DIVERGED }.run_all(level));
-            let most_substeps = most_substeps(&plant);
-            elastic.par_chunks_mut(GROUP).for_each(|runs| {
-                ElasticRollout { runs, limit: DIVERGED, most_substeps }.run_all(level);
-            });
-        } else {
-            batched.par_iter_mut().for_each(run_stiff);
-        }
+        R::plain(&mut batched);
+        R::elastic(&mut elastic);
         scalar.par_chunks_mut(WIDTH).for_each(|group| group.iter_mut().for_each(run_scalar));
         if hypothesis.distorts() {
             for row in predicted.chunks_exact_mut(N) {
@@ -283,6 +272,45 @@ impl<const N: usize> InitialStateOffset<N> {
 
 /// Distance beyond a window's measured travel, relative to this travel, within which a prediction may reach a discontinuity of the torque.
 const NEAR_EDGE: f64 = 0.3;
+
+/// How rollouts of many windows are simulated.
+trait Rollouts {
+    /// Simulates rollouts of a plant in which nothing but friction modes changes ([`Plant::is_plain`]).
+    fn plain<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]);
+
+    /// Simulates rollouts of a plant with elastic joints or regularised friction ([`Plant::is_elastic_or_regularised`]).
+    fn elastic<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]);
+}
+
+/// Rollouts in vector lanes, several at a time.
+struct SideBySide;
+
+impl Rollouts for SideBySide {
+    fn plain<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
+        let level = Level::widest();
+        runs.par_chunks_mut(GROUP).for_each(|runs| BatchRollout { runs, limit: DIVERGED }.run_all(level));
+    }
+
+    fn elastic<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
+        let level = Level::widest();
+        let most_substeps = runs.first().map_or(MAX_SUBSTEPS, |run| most_substeps(run.plant));
+        runs.par_chunks_mut(GROUP)
+            .for_each(|runs| ElasticRollout { runs, limit: DIVERGED, most_substeps }.run_all(level));
+    }
+}
+
+/// Rollouts one at a time.
+struct Singly;
+
+impl Rollouts for Singly {
+    fn plain<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
+        runs.par_iter_mut().for_each(run_stiff);
+    }
+
+    fn elastic<A: Arm<f64, N, P>, const N: usize, const P: usize>(runs: &mut [Run<'_, f64, A, N, P>]) {
+        runs.par_iter_mut().for_each(run_scalar);
+    }
+}
 
 /// Rollouts simulated as one group over vector lanes: enough that few lanes are idle at the end.
 const GROUP: usize = 4 * WIDTH;
