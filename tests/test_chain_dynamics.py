@@ -1,10 +1,8 @@
-"""Dynamics of chains against Pinocchio and MuJoCo: random chains of one to seven joints, and published descriptions of arms."""
+"""Dynamics of chains against Pinocchio and MuJoCo: random chains of one to seven joints."""
 
 from __future__ import annotations
 
 import dataclasses
-import importlib.metadata
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -234,60 +232,6 @@ def test_random_chains_are_those_of_mujoco(n, seed):
     agree(kinetic, np.array(energy[1:])[:, 1], ROUNDING_MUJOCO)
     heights = np.array(energy)[:, 0]
     assert np.abs(potential - (heights[1:] - heights[0])).max() <= ROUNDING_MUJOCO * np.abs(heights).max()
-
-
-#: Arms of the package example-robot-data, and which of their joints make up the chain, by a part of their names; the others are locked.
-ARMS = {
-    "ur_description/urdf/ur3_robot.urdf": "",
-    "ur_description/urdf/ur5_robot.urdf": "",
-    "ur_description/urdf/ur10_robot.urdf": "",
-    "panda_description/urdf/panda.urdf": "panda_joint",
-    "kinova_description/robots/kinova.urdf": "joint_1 joint_2 joint_3 joint_4 joint_5 joint_6",
-    "xarm_description/urdf/xarm7.urdf": "",
-    "so_arm_description/urdf/so100.urdf": "",
-    "so_arm_description/urdf/so101.urdf": "",
-    "z1_description/urdf/z1.urdf": "",
-    # Seven of a linear joint and seven revolute ones, without the last of the wrist.
-    "tiago_description/robots/tiago_no_hand.urdf": "torso_lift_joint arm_1 arm_2 arm_3 arm_4 arm_5 arm_6",
-}
-
-
-def robots() -> Path:
-    try:
-        package = importlib.metadata.distribution("example-robot-data")
-    except importlib.metadata.PackageNotFoundError:
-        pytest.skip("the package example-robot-data is not installed")
-    return Path(str(package.locate_file("cmeel.prefix/share/example-robot-data/robots")))
-
-
-@pytest.mark.parametrize("name", ARMS)
-def test_published_arms_are_those_of_pinocchio(name):
-    model = pinocchio.buildModelFromUrdf(str(robots() / name))
-    wanted = ARMS[name].split()
-    locked = [i for i in range(1, model.njoints) if wanted and not any(part in model.names[i] for part in wanted)]
-    if locked:
-        model = pinocchio.buildReducedModel(model, locked, pinocchio.neutral(model))
-    n = model.nv
-    assert list(model.parents) == [0, *range(n)], "a chain"
-    kinds, axes = [], []
-    for joint in model.joints[1:]:
-        data = joint.createData()
-        joint.calc(data, np.array([0.0]) if joint.nq == 1 else np.array([1.0, 0.0]))
-        linear, angular = data.S.reshape(6)[:3], data.S.reshape(6)[3:]
-        kinds.append("prismatic" if np.any(linear) else "revolute")
-        axes.append(linear + angular)
-    model.armature = np.linspace(0.1, 0.4, n)
-    placements = list(model.jointPlacements)[1:]
-    description = Description(
-        kinds=kinds,
-        rotation=np.array([placement.rotation for placement in placements]),
-        translation=np.array([placement.translation for placement in placements]),
-        axis=np.array(axes),
-        gravity=np.array(model.gravity.linear),
-        links=np.array([inertia.toDynamicParameters() for inertia in list(model.inertias)[1:]]),
-        rotors=np.array(model.armature),
-    )
-    check_against_pinocchio(description, model, 0)
 
 
 def test_names_and_units_of_parameters():
