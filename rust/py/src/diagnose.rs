@@ -77,7 +77,7 @@ pub fn diagnosis_schema() -> PyResult<String> {
     serde_json::to_string(&schema()).map_err(|e| PyValueError::new_err(e.to_string()))
 }
 
-/// Diagnoses training and holdout logs and returns the result as JSON; `progress(title, fraction)` is called some times a second.
+/// Diagnoses training and holdout logs and returns the result as JSON; `progress(title, fraction)` is called several times a second.
 #[pyfunction]
 #[pyo3(signature = (arm, training, holdout, options, progress=None))]
 pub fn diagnose(

@@ -3,10 +3,12 @@
 use crate::kinematics::JointState;
 use crate::real::{Real, lit};
 
-/// Newton correction, as a part of a step, below which a straight line in time suffices: its error is of the order of the square.
+/// Newton correction of the instant of zero velocity, as a part of a step, below which the motion up to that instant is taken as linear in time: the
+/// error is quadratic in the correction.
 pub(super) const STRAIGHT: f64 = 1e-6;
 
-/// Newton correction, as a part of a step, below which a curve of constant jerk suffices: its error is of the order of the cube.
+/// Newton correction of the instant of zero velocity, as a part of a step, below which the motion up to that instant is taken as of constant jerk:
+/// the error is cubic in the correction.
 const CURVED: f64 = 1e-3;
 
 /// Part of a step below which the jerk, from accelerations at both ends of the part, is not known well enough.

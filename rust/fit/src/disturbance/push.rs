@@ -30,7 +30,7 @@ const FOLLOWS: f64 = 8.0;
 /// Part of a joint's travel next to either limit that counts as its end.
 const NEAR_END: f64 = 0.12;
 
-/// Probability left to a push where the model leaves an unexplained remainder.
+/// Largest probability of a push where the model leaves errors unexplained.
 const REMAINDER_DOUBT: f64 = 0.5;
 
 /// Ratio of prediction errors with and without pushes above which the pushes are rejected.
@@ -205,7 +205,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         disturbances
     }
 
-    /// Whether a push and a further one on its joint both drive it back from one end of its travel, as contact with a stop does.
+    /// Whether a push and a further one on its joint both drive the joint back from one end of the joint's travel, as contact with a stop does.
     fn meets_an_end(&self, disturbance: &Disturbance, bells: &[Bell]) -> bool {
         let joint = disturbance.push.joint;
         let [from, to] = self.scales.travel[joint];

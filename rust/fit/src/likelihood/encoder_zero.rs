@@ -76,7 +76,7 @@ impl<const N: usize> EncoderZeros<N> {
         data.tracks.iter().any(|track| track.source != data.tracks[0].source)
     }
 
-    /// Whether the zeros of all recordings of a dataset are among these.
+    /// Whether the zeros of all recordings of a dataset are known.
     pub fn knows_all(&self, data: &Dataset<N>) -> bool {
         data.tracks.iter().all(|track| self.recordings.iter().any(|r| r.source == track.source))
     }
@@ -113,7 +113,7 @@ impl<const N: usize> EncoderZeros<N> {
         found
     }
 
-    /// These encoder zeros, and the zeros of the dataset's further recordings by the distribution of these.
+    /// The known encoder zeros, and estimates of the zeros of the dataset's further recordings, with the known zeros' distribution as prior.
     pub(crate) fn and_of_others(&self, data: &Dataset<N>, gram: &Gram, known: usize) -> Self {
         let mut found = self.clone();
         found.recordings.truncate(known);

@@ -8,12 +8,16 @@ use armgap_core::arm::Arm;
 use armgap_core::transmission::LatentState;
 use nalgebra::SVector;
 
-/// Half width of the local cubic from which accelerations are taken, s, and its least half width in samples.
+/// Half width of the local cubic from which accelerations are taken, s.
 const CUBIC: f64 = 0.014;
+
+/// Least half width, in samples, of the local cubic from which accelerations are taken.
 const CUBIC_SAMPLES: usize = 3;
 
-/// Ratio to a joint's RMS speed, and to the noise of its velocity, below which the joint may be at rest; the larger speed counts.
+/// Speed below which a joint may be at rest, relative to the joint's RMS speed; the larger of this speed and that of `SLOW_NOISE` counts.
 pub const SLOW: f64 = 0.05;
+
+/// Speed below which a joint may be at rest, relative to the standard deviation of its measured velocity.
 const SLOW_NOISE: f64 = 4.0;
 
 /// Residual torque of all joints at one sample, with the measured motion.

@@ -370,7 +370,7 @@ fn noise<A, const N: usize, const P: usize>(context: &DiagnosisContext<A, N, P>)
     Noise { position_sigma: context.noise.to_vec(), encoder_step: step.to_vec() }
 }
 
-/// Remarks on the result: what was fitted beside the causes, what gap is left, what was not allowed, and what is hard to believe.
+/// Remarks on the result: nuisances fitted beside the causes, the remaining gap, limits set by the options, and implausible values.
 fn notes<const N: usize, const P: usize>(
     headline: &Headline<N, P>,
     max_causes: usize,

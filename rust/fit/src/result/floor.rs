@@ -63,8 +63,8 @@ fn explained(values: usize, square: f64, cost: f64, left: f64) -> bool {
     cost < CONSISTENT * values || TORQUE_SHARE * beyond_noise < square
 }
 
-/// Mean square error of a perfect model from the mean squares by window that a model missed by (`missed`) and that noise and the covariance of initial states make
-/// one expect (`expected`).
+/// Mean square error of a perfect model, from the mean square error of a model by window (`missed`) and the mean square error by window that noise
+/// and the covariance of initial states predict (`expected`).
 ///
 /// In an explained window a perfect model errs as the model does. In any other window it errs by what is expected, times the ratio of missed to expected in
 /// explained windows, and by no more than the model. Where most windows are not explained, none counts as explained.

@@ -4,8 +4,9 @@ use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Claimed noise floors beyond which a prediction error is not noise. Four true floors are not: RMS errors of as few as ten windows, each with one initial state,
-/// scatter by less than twice. On one joint of twenty the claimed floor is 1.25 times the true one (docs/input-defects.md).
+/// Ratio of a prediction error to the estimated noise floor above which the error is more than noise. Four times the true floor is more than noise,
+/// as RMS errors of even ten windows, each with one initial state, scatter by less than a factor of two; and on one joint of twenty the estimated
+/// floor is 1.25 times the true one (docs/input-defects.md).
 pub const ABOVE_NOISE: f64 = 3.2;
 
 /// Share of a joint's error that re-estimated parameters must remove to be called an improvement: less is of no use to anyone.

@@ -60,7 +60,8 @@ impl<const P: usize> Candidate<P> {
         self.training.iter().chain(&self.holdout).sum::<f64>() + self.fit.prior_cost
     }
 
-    /// Whether an effect that changes the arm wherever it sits has come down to nothing: its other parameters then stand for something else.
+    /// Whether the candidate's effect, of those tested by their whole change of the predictions, has a size near zero, so that its other parameters
+    /// have no meaning.
     pub fn is_idle(&self) -> bool {
         self.effect.is_some_and(|e| e.law.spec().trial == Trial::Whole) && self.size < IDLE
     }

@@ -23,18 +23,18 @@ const SAME: f64 = 0.15;
 /// Mean and scatter of the size of an effect that is not in the arm, as fitted to one log relative to another.
 const OTHER: [f64; 2] = [0.7, 0.8];
 
-/// Odds of a cause that removes as much as remains with it and whose size nothing confirms or contradicts. Fitted to names on arms of a simulator that is not the
-/// library's (docs/decisions/034-probability-of-a-cause.md), so it holds their base rate: most lack several effects of the library, two of five one that the
-/// library does not have. Halved, the log loss on these arms grows by a fifth; doubled, it falls by a thirtieth, and of the names from 0.75 to 0.9 fewer are right
-/// than claimed.
+/// Odds of a cause that removes as much of the gap as remains with it, and whose size the holdout neither confirms nor contradicts. Fitted to causes
+/// named on arms of another simulator (docs/decisions/034-probability-of-a-cause.md), of which most lack several effects of the library, and two of
+/// five an effect that the library does not have. With half the value the log loss on these arms grows by a fifth; with twice the value it falls by a
+/// thirtieth, but of the causes named at 0.75 to 0.9 fewer are right than claimed.
 const PRIOR_ODDS: f64 = 2.0;
 
 /// Power of a cause's gain in its odds, fitted as `PRIOR_ODDS` is: gains that differ by what else an arm lacks say less than their ratio. At 1 the log loss is
 /// larger by a twelfth.
 const GAIN_POWER: f64 = 0.5;
 
-/// Power, in the odds of a cause, of the gap left by a law without a name relative to the gap left by the cause; fitted as `PRIOR_ODDS` is. At 1 the log loss is
-/// larger by a fifth, at 3 by a hundredth.
+/// Power, in the odds of a cause, of the ratio of the gap left by an unnamed law (a table over one variable in place of the cause) to the gap left by
+/// the cause; fitted as `PRIOR_ODDS` is. At 1 the log loss is larger by a fifth, at 3 by a hundredth.
 const RIVAL_POWER: i32 = 4;
 
 /// Evidence for a cause in the final model.
@@ -48,8 +48,8 @@ pub struct Evidence {
     /// Standard error of the gain, from the scatter between the holdout's windows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain_sigma: Option<f64>,
-    /// Fall of the holdout's cost by a law without a name in the cause's place (the table over one variable that predicts best what the arm leaves without the
-    /// cause), relative to the cost above the noise floor with the cause; none where no table predicts.
+    /// Decrease of the holdout's cost by an unnamed law in the cause's place (the table over one variable that predicts best what the arm leaves
+    /// without the cause), relative to the cost above the noise floor with the cause; none where no table predicts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rival_gain: Option<f64>,
     /// Size of the effect that the holdout asks for, relative to that of the training logs; none where a size has no direction.
@@ -76,7 +76,7 @@ impl Evidence {
         beyond * self.selected * odds / (1.0 + odds)
     }
 
-    /// Gap left by a law without a name in the cause's place, relative to the gap that the cause leaves: 0 to 1.
+    /// Gap left by an unnamed law (a table over one variable) in the cause's place, relative to the gap that the cause leaves: 0 to 1.
     fn left_by_rival(&self) -> f64 {
         let (Some(gain), Some(rival)) = (self.gain, self.rival_gain) else { return 1.0 };
         (1.0 + gain - rival).clamp(0.0, 1.0)

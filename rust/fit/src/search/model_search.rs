@@ -120,8 +120,9 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
 
     /// The node around the arm with its parameters re-estimated, with or without encoder zeros that differ between recordings.
     ///
-    /// Encoder zeros take up what a recording misses by on average, a large missing effect's part too, and then other effects fit what is left. So the first cause
-    /// is sought with zeros where these explain more than the cause would, or where no cause is found; later nodes always have zeros.
+    /// Encoder zeros that differ between recordings also take up the mean error that a large missing effect makes in a recording; other effects would
+    /// then be fitted to the rest. So the first cause is sought with such zeros only where they explain more than the cause would, or where no cause
+    /// is found without them; later nodes always have them.
     fn first_node(
         &self,
         nominal: &Hypothesis<P>,
