@@ -239,7 +239,8 @@ def _ambiguous_delay(data: dict[str, Any], training: list[Log], arm: Arm) -> lis
 
 
 def _hidden_delay(data: dict[str, Any], given: PreparedInput) -> list[Check]:
-    """Return a warning of a time shift of the file that predictions support beside an unnamed gap, or beside equal delays or lags of all joints."""
+    """Return a warning that torques are shifted in time in the file, where predictions show it beside an unexplained gap, or beside equal delays or
+    lags of all joints."""
     late = {c["joint"] for c in data["causes"] if c["effect"] in ("actuator_delay", "actuator_lag")}
     asked = data["verdict"] == "unexplained" or len(late) == given.arm.n_joints > 1
     if not asked or given.arm.chain is not None or any(check.check == "time_shift" for check in given.checks):

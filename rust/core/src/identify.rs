@@ -86,7 +86,7 @@ enum Regression<T: Real, const N: usize, const P: usize> {
     Power(FilteredPower<T, N, P>),
 }
 
-/// Last sample, and what is needed of the sample before it; `seen` says which of the fields are set.
+/// Last sample that the online estimator used, with position and torque of the sample before; `seen` says which of the fields are set.
 #[derive(Debug, Clone, Copy)]
 struct Past<T, const N: usize> {
     seen: Seen,

@@ -1,6 +1,6 @@
 //! Online estimators of serial arms, in three sizes of memory; the number of joints and of parameters is chosen at run time.
 //!
-//! An arm of fewer joints than the size has room for is continued by joints that stand still and carry no mass.
+//! An arm of fewer joints than the size has room for is extended by massless joints that stand still.
 
 use super::monitored::MonitoredEstimator;
 use super::{EstimatorSettings, OnlineError, check_start};
@@ -44,7 +44,7 @@ impl ChainSize {
         }
     }
 
-    /// Smallest size that has room for so many joints and estimated parameters; `None` if there is none.
+    /// Smallest size that has room for this number of joints and of estimated parameters; `None` if there is none.
     pub fn of(joints: usize, parameters: usize) -> Option<Self> {
         Self::ALL.into_iter().find(|size| joints <= size.room()[0] && parameters <= size.room()[1])
     }

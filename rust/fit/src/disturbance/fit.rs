@@ -65,7 +65,7 @@ struct Touched<'a, A, const N: usize, const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Whether the prediction errors of a log are large enough for a push of consequence; always true where the model leaves an unexplained remainder.
+    /// Whether the prediction errors of a log leave room for a push that matters; always true where the model leaves errors unexplained.
     pub(super) fn could_hold_a_push(&self, (set, track): Place, state: &PushState<'_, N, P>) -> bool {
         if state.remainder {
             return true;
@@ -89,7 +89,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     /// share is too small.
     ///
     /// The share counts from the cost of the model without the push, or of the model refitted to the recording alone if that is less. Where the model
-    /// leaves an unexplained remainder and the output error explains too little to be believed, `rough` is returned unchanged if it lowers the cost
+    /// leaves errors unexplained and the output error explains too little to be believed, `rough` is returned unchanged if the push lowers the cost
     /// under the model or under the refitted one. `known` are the recording's further pushes.
     pub(super) fn sized(
         &self,
@@ -148,7 +148,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Least decrease of the windows' cost by a push of consequence.
+/// Least decrease of the windows' cost by a push that is large enough to matter.
 fn least_gain<const N: usize, const P: usize>(sample: &WindowSet<N>, state: &PushState<'_, N, P>) -> f64 {
     state.min_relevance.powi(2) * sample.motion(&state.scale)
 }

@@ -104,9 +104,9 @@ pub(super) type Place = (usize, usize);
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
     /// The conclusion of a diagnosis: the attribution `alone`, its external disturbances, and the attribution beside them.
     ///
-    /// Where the model describes the arm, pushes are looked for again under the model fitted beside them. Where it leaves an unexplained remainder, the
-    /// first pushes are kept: the second model then takes up part of the pushes. Pushes are rejected if prediction errors beside them are much
-    /// larger than without. An effect that replaces some pushes stays in the model beside the remaining pushes.
+    /// Where the model describes the arm, pushes are looked for again under the model fitted beside them. Where the model leaves errors unexplained,
+    /// the first pushes are kept, as the second model has taken up part of the pushes. Pushes are rejected if prediction errors with the model fitted
+    /// beside them are much larger than without. An effect that replaces some pushes stays in the model beside the remaining pushes.
     pub fn conclude(
         &mut self,
         mut alone: Attribution<N, P>,

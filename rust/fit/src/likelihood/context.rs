@@ -344,7 +344,8 @@ fn loop_rounds(mut round: impl FnMut(usize) -> bool) {
     }
 }
 
-/// Offsets of initial states limited to twenty standard deviations of the measured state; beyond, the model of the window is at fault.
+/// Offsets of initial states limited to twenty standard deviations of the measured state; a larger offset would mean that the model is wrong in the
+/// window.
 fn bounded<const N: usize>(
     data: &Dataset<N>,
     offsets: Vec<InitialStateOffset<N>>,

@@ -28,7 +28,7 @@ pub struct Scales<const N: usize> {
     pub gravity: f64,
 }
 
-/// Largest value of a parameter in a fit relative to its typical size; beyond, it describes no arm.
+/// Largest value of a parameter in a fit relative to its typical size; larger values are those of no arm.
 const LARGEST: f64 = 50.0;
 
 /// Longest admissible time constant of an effect, in sample periods.

@@ -9,7 +9,7 @@ use serde::Serialize;
 /// floor is 1.25 times the true one (docs/input-defects.md).
 pub const ABOVE_NOISE: f64 = 3.2;
 
-/// Share of a joint's error that re-estimated parameters must remove to be called an improvement: less is of no use to anyone.
+/// Share of a joint's error that re-estimated parameters must remove to be called an improvement.
 const IMPROVEMENT: f64 = 0.2;
 
 /// Ratio of an error to its noise floor below which nothing is left to improve: the floor itself is known to a factor of about 1.4.

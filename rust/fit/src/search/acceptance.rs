@@ -171,7 +171,7 @@ pub fn choose<const N: usize, const P: usize>(
         .map(|index| (index, Ground::Trust))
 }
 
-/// The best candidate that describes an arm; one with a value at its bound gives way to one that does almost as well without.
+/// The best candidate whose values are possible; a candidate with a value at its bound gives way to one that does almost as well without.
 pub fn best<const N: usize, const P: usize>(node: &SearchNode<N, P>, regularised: bool) -> Option<usize> {
     let open = |i: &usize| node.candidates[*i].effect.is_some() || !regularised;
     let first = (0..node.candidates.len()).find(open)?;

@@ -223,8 +223,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         fitted.iter().filter(|c| c.effect.is_some()).map(|c| (c.clone(), share(c))).collect()
     }
 
-    /// Fits all initial guesses and judges them, best first; `jacobian` is that of the model `base` they add to, where it is known. Candidates that diverged or
-    /// whose effect came down to nothing are left out.
+    /// Fits all initial guesses and judges them, best first; `jacobian` is that of the model `base` they add to, where it is known. Candidates that
+    /// diverged or whose effect vanished are left out.
     pub(crate) fn fit_candidates(
         &self,
         weights: &SplitWeighting<N>,
@@ -344,7 +344,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Candidates ordered by cost, none twice, without those that diverged or whose effect came down to nothing.
+/// Candidates ordered by cost, none twice, without those that diverged or whose effect vanished.
 fn ranked<const P: usize>(mut candidates: Vec<Candidate<P>>) -> Vec<Candidate<P>> {
     candidates.retain(|c| c.score().is_finite() && !c.is_idle());
     candidates.sort_by(|a, b| a.score().total_cmp(&b.score()));

@@ -1,9 +1,9 @@
 //! Interleaved cross-validation, for training logs that do not show what the holdout does.
 //!
-//! A stop that only the motion of the holdout reaches, a spring that only its speeds make worth telling from friction: no effect fitted to the training logs
-//! explains such a gap, and judged on both sets of logs, the right effect is worth nothing. So where a diagnosis ends with a gap, every log is cut into stretches
-//! that are fitted to and judged on by turns. Both kinds of motion are then in both sets, and what explains nearly all of the gap has been judged on stretches
-//! that it was not fitted to.
+//! A stop that only the motion of the holdout reaches, a spring that differs from friction only at the holdout's speeds: no effect fitted to the
+//! training logs explains such a gap, and judged on both sets of logs, the right effect is worth nothing. So where a diagnosis ends with a gap, every
+//! log is cut into stretches, of which every other one is fitted to and the rest judged on. Both kinds of motion are then in both sets, and what
+//! explains nearly all of the gap has been judged on stretches that it was not fitted to.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::log::cut::cut;

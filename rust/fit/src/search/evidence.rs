@@ -1,9 +1,9 @@
 //! Evidence for a cause in the final model, and the probability that the cause is in the arm.
 //!
-//! A real arm always lacks something that has no name, so an unexplained remainder is no evidence against a cause by itself. What counts is how the cause's own
-//! part compares with the remainder: an effect that is not in the arm takes up a part of the remainder, and another part under another motion. So the probability
-//! follows from three figures: how often the cause is chosen when the windows are drawn again, by how much the holdout's error rises without it, and whether the
-//! holdout asks for the same size as the training logs.
+//! A real arm always has effects that the library lacks, so an unexplained remainder of the gap is no evidence against a cause by itself. What counts
+//! is how the cause's own part compares with the remainder: an effect that is not in the arm takes up a part of the remainder, and another part under
+//! another motion. So the probability follows from three figures: how often the cause is chosen when the windows are drawn again, by how much the
+//! holdout's error rises without it, and whether fits to the holdout and to the training logs give it the same size.
 
 use crate::likelihood::context::DiagnosisContext;
 use crate::likelihood::holdout::is_plausible;
@@ -52,7 +52,7 @@ pub struct Evidence {
     /// without the cause), relative to the cost above the noise floor with the cause; none where no table predicts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rival_gain: Option<f64>,
-    /// Size of the effect that the holdout asks for, relative to that of the training logs; none where a size has no direction.
+    /// Size of the effect as fitted to the holdout, relative to its size fitted to the training logs; none where a size has no direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio: Option<f64>,
     /// Standard deviation of the size ratio.

@@ -48,8 +48,9 @@ struct Rival<const P: usize> {
 }
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// The search that adds a better rival in the place of its cause, if it ends better. Rivals with more values than their cause are tried only once a search has
-    /// `ended`, and those with fewer or as many before: what more values explain may still be the doing of another cause.
+    /// The search that adds a better rival in the place of its cause, if that search ends with a smaller error. Rivals with more values than their
+    /// cause are tried only once a search has `ended`, and those with fewer or as many before: what more values explain may still be due to another
+    /// cause.
     pub(crate) fn reconsidered(
         &self,
         search: &ModelSearch<N, P>,

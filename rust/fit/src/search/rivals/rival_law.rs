@@ -1,4 +1,4 @@
-//! The rival of every named cause: a torque without a name, as a table over the variable that predicts best what the arm lacks without the cause.
+//! The rival of every named cause: an unnamed torque, as a table over the variable that predicts best what the arm lacks without the cause.
 //!
 //! An effect that is not in the arm is named where it imitates the missing torque better than the other effects do. A table has no form of its own to imitate
 //! with: where it explains much more of the holdout than the named effect, the form of the named effect is wrong.
@@ -44,7 +44,7 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         dependences(&self.arm, &model.theta, &self.prior.sigma, &logs, wanted)
     }
 
-    /// Holdout cost of a model with the best table of torque without a name added; none where no table predicts what the model lacks.
+    /// Holdout cost of a model with the best table of an unnamed torque added; none where no table predicts what the model lacks.
     pub(crate) fn rival_cost(&self, model: &Hypothesis<P>, weights: &SplitWeighting<N>) -> Option<f64> {
         let rival = self.dependences(model, Wanted { most: 1, rotary: true }).into_iter().next()?;
         Some(self.cost_beside(model, &rival, weights))

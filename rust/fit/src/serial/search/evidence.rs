@@ -17,7 +17,8 @@ pub struct Evidence {
     pub gain: f64,
     /// Decrease, by the term, of the parameters' squared distance from the prior, in standard deviations.
     pub relief: f64,
-    /// Squared robust test statistic of the term on the training logs (sandwich over blocks).
+    /// Squared test statistic of the term on the training logs: estimated size over its standard deviation, robust to residuals correlated within
+    /// blocks.
     pub statistic: f64,
     /// Decrease of the holdout's cost (weighted squared residuals) by the term, on the joints that the term acts on.
     pub holdout_gain: f64,
