@@ -217,7 +217,8 @@ struct RkStage<V, const N: usize> {
     motion: StageMotion<V, N>,
 }
 
-/// Runge-Kutta stage `dt` seconds after the start, from velocities and accelerations of the previous stage; `tau` is the index of the torques in the span.
+/// Runge-Kutta stage `dt` seconds after the start, from velocities and accelerations of the previous stage; `tau` is the index of the torques in the
+/// span.
 #[inline(always)]
 fn rk_stage<V: Number, B: Dynamics<V, N>, const N: usize>(
     step: &FixedModeStep<'_, V, B, N>,

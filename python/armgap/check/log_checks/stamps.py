@@ -157,8 +157,7 @@ def _missing(t: Array, steps: Array, period: float) -> NDArray[np.intp]:
 
 
 def _settled(missing: NDArray[np.intp], late: Array, steps: Array, period: float) -> NDArray[np.intp]:
-    """Return the numbers of missing rows after a second pass: stamps between two long steps that are late by whole periods are moved by these
-    periods."""
+    """Return the numbers of missing rows after a second pass, which moves stamps between two long steps by the whole periods of their lateness."""
     if not missing.any():
         return missing
     edges = np.append(0, np.flatnonzero((steps > _LONG * period) | (missing > 0)) + 1)

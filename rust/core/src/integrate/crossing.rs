@@ -70,7 +70,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         first
     }
 
-    /// Event at which stuck joint `j` breaks away within the trial step, by linear interpolation of its friction torque at rest less the Coulomb level.
+    /// Event at which stuck joint `j` breaks away within the trial step, by linear interpolation of its friction torque at rest less the Coulomb
+    /// level.
     fn release(
         &self,
         j: usize,
@@ -211,8 +212,8 @@ impl<T: Real, A: Arm<T, N, P>, const N: usize, const P: usize> SubStep<'_, T, A,
         Located { length: s * dt, reached }
     }
 
-    /// Integrates to just beyond where static friction, or a closed flank, no longer holds: the Illinois variant of false position (Dowell and Jarratt 1971)
-    /// between the start of the step with the violation `ends[0] < 0` and its end with `ends[1] > 0`.
+    /// Integrates to just beyond where static friction, or a closed flank, no longer holds: the Illinois variant of false position (Dowell and
+    /// Jarratt 1971) between the start of the step with the violation `ends[0] < 0` and its end with `ends[1] > 0`.
     fn locate_beyond(
         &self,
         trial_step: &TrialStep<'_, T, N>,

@@ -33,8 +33,8 @@ impl<T: Real, const R: usize> Plain<T, R> {
         self.diagonal
     }
 
-    /// Updates covariance and estimate by rows of `Psi'` and their prediction errors; returns the leverage, or `None`, with nothing changed, if `P` would not
-    /// stay positive definite.
+    /// Updates covariance and estimate by rows of `Psi'` and their prediction errors; returns the leverage, or `None`, with nothing changed, if `P`
+    /// would not stay positive definite.
     #[inline(always)]
     pub(super) fn learn<C: Cpu, N: Count, const M: usize>(
         &mut self,

@@ -172,8 +172,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.on_windows(self.training.data.clone().and(self.holdout.data.clone()))
     }
 
-    /// The model refitted to the training windows, and its cost; initial states and weights are recomputed `rounds` times, at the scales and the typical
-    /// cost of the weighting `given`.
+    /// The model refitted to the training windows, and its cost; initial states and weights are recomputed `rounds` times, at the scales and the
+    /// typical cost of the weighting `given`.
     fn explanation(&self, fit: Fit<P>, given: &Weighting<N>, rounds: usize) -> Explanation<N, P> {
         let mut fit = fit;
         for _ in 0..rounds {

@@ -1,8 +1,8 @@
 //! External pushes: torques at one time of one log that are no part of the logged torque, judged within this log.
 //!
-//! `residual` is the residual torque of a log beside possible model errors; `search` finds pulses in it that occur once and do not depend on the state;
-//! `outlying` finds pushes too light for `search`; `fit` sizes a push by output error, where the model is good enough; `law` tells pushes from the
-//! action of a torque limit or a stop.
+//! `residual` is the residual torque of a log beside possible model errors; `search` finds pulses in it that occur once and do not depend on the
+//! state; `outlying` finds pushes too light for `search`; `fit` sizes a push by output error, where the model is good enough; `law` tells pushes from
+//! the action of a torque limit or a stop.
 
 use super::bell::Bell;
 use super::own::Own;

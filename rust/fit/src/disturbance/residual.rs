@@ -1,7 +1,7 @@
 //! Low-passed residual torque of a whole log under a model, and columns of torques by which the model could be wrong.
 //!
-//! The residual torque is the torque that the measured motion needs minus the logged one. It and every column go through one low-pass, so that neither
-//! a lag nor noise of the acceleration enters only one of them. A push is a part of the residual torque that no combination of the columns
+//! The residual torque is the torque that the measured motion needs minus the logged one. It and every column go through one low-pass, so that
+//! neither a lag nor noise of the acceleration enters only one of them. A push is a part of the residual torque that no combination of the columns
 //! explains: it does not recur with the state.
 
 use crate::likelihood::solve::Prior;

@@ -197,8 +197,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         weighting.robust(&sample.data, &residual).with_zeros(zeros.clone())
     }
 
-    /// Weighting around encoder zeros and initial states fitted to the hypothesis once, starting from `zeros`; `fitted` estimates zeros from the inner products
-    /// of their columns.
+    /// Weighting around encoder zeros and initial states fitted to the hypothesis once, starting from `zeros`; `fitted` estimates zeros from the
+    /// inner products of their columns.
     fn fitting_zeros(
         &self,
         sample: &WindowSet<N>,
@@ -229,7 +229,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FittedZeros { zeros, offsets }
     }
 
-    /// Weighting around predictions from initial states with these offsets, their residual, and their derivatives by initial positions and velocities.
+    /// Weighting around predictions from initial states with these offsets, their residual, and their derivatives by initial positions and
+    /// velocities.
     fn linearised(
         &self,
         sample: &WindowSet<N>,

@@ -6,7 +6,8 @@
 
 use crate::log::track::{Smoothed, Track, median};
 
-/// Largest shift of a window's edge, relative to the window's length. With 0.4 floors hardly fall further and windows differ by more than a factor of two.
+/// Largest shift of a window's edge, relative to the window's length. With 0.4 floors hardly fall further and windows differ by more than a factor of
+/// two.
 const REACH: f64 = 0.2;
 
 /// Squared error of a velocity that is measured at a reversal, in units of the variance of a typical one: errors of some ten standard deviations were

@@ -32,8 +32,8 @@ pub struct InverseDynamicsResidual<const N: usize> {
     pub residual: SVector<f64, N>,
 }
 
-/// Residual torques of a log at all samples except `half` at either end, with derivatives from local cubics of that half width, friction regularised below
-/// the speed `slow`, rad/s or m/s, and the disturbances `pushes` acting; `None` if the model cannot be simulated.
+/// Residual torques of a log at all samples except `half` at either end, with derivatives from local cubics of that half width, friction regularised
+/// below the speed `slow`, rad/s or m/s, and the disturbances `pushes` acting; `None` if the model cannot be simulated.
 pub fn inverse_dynamics_residuals<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     arm: &A,
     track: &Track<N>,

@@ -142,8 +142,8 @@ fn residual_torques<A: Arm<f64, N, P>, const N: usize, const P: usize>(
 
 /// Share of each joint in the gap: what causes explain lies on their joints, weighted by their probability; the rest is shared by residual torque.
 ///
-/// A residual torque on one joint changes the motion of all, and an error of its coupling shows on the others; so where a cause is known, its own joint says more
-/// than the residual torque does.
+/// A residual torque on one joint changes the motion of all, and an error of its coupling shows on the others; so where a cause is known, its own
+/// joint says more than the residual torque does.
 fn joint_shares<A: Arm<f64, N, P>, const N: usize, const P: usize>(
     context: &DiagnosisContext<A, N, P>,
     Headline { attribution, weights, causes, disturbances, .. }: &Headline<N, P>,

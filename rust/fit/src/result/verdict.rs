@@ -89,7 +89,8 @@ mod tests {
 
     const FLOOR: f64 = 1e-3;
 
-    /// Verdict on two joints, of which the second has errors of `errors` noise floors (arm file, re-estimated, reported model) and a motion of `motion` floors.
+    /// Verdict on two joints, of which the second has errors of `errors` noise floors (arm file, re-estimated, reported model) and a motion of
+    /// `motion` floors.
     fn of(errors: [f64; 3], motion: f64, open: bool, named: bool) -> Verdict {
         let [before, refit, after] = errors.map(|e| [0.1 * FLOOR, e * FLOOR]);
         let (floor, motion) = ([FLOOR; 2], [1.0, motion * FLOOR]);

@@ -1,7 +1,7 @@
 //! Acceptance criteria of a cause in the model search.
 //!
-//! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the windows' own scatter, or when it
-//! brings the parameters back to their prior values.
+//! A cause is accepted when it removes a part of the gap that matters, on windows of other motions too, and by more than the windows' own scatter, or
+//! when it brings the parameters back to their prior values.
 
 use crate::likelihood::holdout::CONSEQUENTIAL_ERROR;
 use crate::likelihood::holdout::is_plausible;
@@ -40,7 +40,8 @@ const HARMLESS: f64 = 0.05;
 /// Decrease of the prior cost, in squared sigmas, that makes a cause on its own.
 pub const TRUST_GAIN: f64 = 16.0;
 
-/// Gap, relative to the motion, above which implausible parameters are no evidence of a cause while the gap is unexplained: the gap may have moved them.
+/// Gap, relative to the motion, above which implausible parameters are no evidence of a cause while the gap is unexplained: the gap may have moved
+/// them.
 const TRUSTWORTHY: f64 = 0.01;
 
 /// Difference of prior costs, in squared sigmas, below which two candidates are look-alikes.
@@ -64,8 +65,8 @@ const MATTERS_IF_FAINT: f64 = 0.7;
 /// Mean advantage per window, in standard errors, that a cause of a gap too small to matter by itself must have.
 const CERTAIN_IF_FAINT: f64 = 5.0;
 
-/// Power of the explained share of the gap in the probability of causes: effects that are in no library were seen to be imitated by two or three that are, for up
-/// to eight tenths of the gap.
+/// Power of the explained share of the gap in the probability of causes: effects that are in no library were seen to be imitated by two or three that
+/// are, for up to eight tenths of the gap.
 pub const REMAINDER_POWER: i32 = 6;
 
 /// Improvement relative to the first gap below which an effect is no cause of the gap.
@@ -92,8 +93,8 @@ const MOST: f64 = 0.5;
 /// Part of the winner's advantage within which the cost of a look-alike lies.
 const LOOK_ALIKE: f64 = 0.03;
 
-/// Smallest improvement, RMS relative to the motion, for which a cause is named, given the relative error `first_gap` before any cause. What is of consequence by
-/// itself is always named.
+/// Smallest improvement, RMS relative to the motion, for which a cause is named, given the relative error `first_gap` before any cause. What is of
+/// consequence by itself is always named.
 pub fn min_relevance(first_gap: f64) -> f64 {
     (NOTICEABLE * first_gap).clamp(RELEVANT, CONSEQUENTIAL_ERROR)
 }
@@ -185,8 +186,8 @@ pub fn is_possible<const P: usize>(candidate: &Candidate<P>) -> bool {
     candidate.size < AT_BOUND && !candidate.is_idle()
 }
 
-/// The candidate with the fewest parameters among those that do almost as well as candidate `best`: a spring with a far-off rest position is an offset, and a
-/// hysteresis over next to no path is regularised friction.
+/// The candidate with the fewest parameters among those that do almost as well as candidate `best`: a spring with a far-off rest position is an
+/// offset, and a hysteresis over next to no path is regularised friction.
 fn simplest<const N: usize, const P: usize>(
     node: &SearchNode<N, P>,
     best: usize,
@@ -226,8 +227,8 @@ fn fewest_values(offers: &[Offer], best: usize, almost: f64) -> usize {
     (0..offers.len()).filter(as_good).min_by_key(|i| (offers[*i].values, *i)).unwrap_or(best)
 }
 
-/// Number of a candidate's free values beyond the arm's parameters: those of its effect, or one for the width of friction regularisation while that is open. Zero
-/// of a candidate that is not to be chosen for its simplicity.
+/// Number of a candidate's free values beyond the arm's parameters: those of its effect, or one for the width of friction regularisation while that
+/// is open. Zero of a candidate that is not to be chosen for its simplicity.
 fn free_values<const P: usize>(candidate: &Candidate<P>, regularised: bool) -> usize {
     let width = usize::from(!regularised && candidate.fit.hypothesis.is_rounded());
     candidate.effect.as_ref().map_or(width, EffectInstance::len)

@@ -111,7 +111,8 @@ pub struct SearchNode<const N: usize, const P: usize> {
     pub candidates: Vec<Candidate<P>>,
     /// Every candidate that was fitted, with the share of the gap it removes under the current model's own weights, best first.
     pub field: Vec<(Candidate<P>, f64)>,
-    /// First-order tests of all candidates around the settled model, the open ones first; empty if they were made under other weights than the node has.
+    /// First-order tests of all candidates around the settled model, the open ones first; empty if they were made under other weights than the node
+    /// has.
     pub screened: Vec<ScoreTest>,
     /// Weights of the training and holdout windows, common to all candidates.
     pub weights: SplitWeighting<N>,
@@ -174,7 +175,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         self.node_around(self.settle(current, scale), min_relevance)
     }
 
-    /// The search node around a fit under weights of its own residual; improvements below `min_relevance`, relative to the motion, are not looked for.
+    /// The search node around a fit under weights of its own residual; improvements below `min_relevance`, relative to the motion, are not looked
+    /// for.
     pub fn node_around(
         &self,
         (fit, weights): (Fit<P>, SplitWeighting<N>),
@@ -316,8 +318,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         FinalRound { base, candidates, weights: heavier }
     }
 
-    /// Alternatives to a candidate whose effect is a transmission: encoder and friction on other sides that they may be on, those that explain the training
-    /// windows best before another fit.
+    /// Alternatives to a candidate whose effect is a transmission: encoder and friction on other sides that they may be on, those that explain the
+    /// training windows best before another fit.
     fn other_sides(&self, candidate: &Candidate<P>, weights: &SplitWeighting<N>) -> Vec<Hypothesis<P>> {
         let Some(effect) = candidate.effect.filter(|effect| effect.law.has_transmission()) else {
             return Vec::new();

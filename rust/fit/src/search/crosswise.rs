@@ -29,8 +29,8 @@ const MUCH_LESS: f64 = 0.1;
 const MORE: f64 = 2.0;
 
 impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P> {
-    /// Whether a search ended with a much larger prediction error on the holdout than on the training logs: only then can interleaved cross-validation tell more
-    /// than the logs as they are.
+    /// Whether a search ended with a much larger prediction error on the holdout than on the training logs: only then can interleaved
+    /// cross-validation tell more than the logs as they are.
     pub(crate) fn holdout_shows_more(&self, attribution: &Attribution<N, P>) -> bool {
         let Some(last) = attribution.nodes.last() else { return false };
         let per_row = |costs: &[f64], rows: usize| costs.iter().sum::<f64>() / rows as f64;

@@ -29,8 +29,8 @@ const OTHER: [f64; 2] = [0.7, 0.8];
 /// thirtieth, but of the causes named at 0.75 to 0.9 fewer are right than claimed.
 const PRIOR_ODDS: f64 = 2.0;
 
-/// Power of a cause's gain in its odds, fitted as `PRIOR_ODDS` is: gains that differ by what else an arm lacks say less than their ratio. At 1 the log loss is
-/// larger by a twelfth.
+/// Power of a cause's gain in its odds, fitted as `PRIOR_ODDS` is: gains that differ by what else an arm lacks say less than their ratio. At 1 the
+/// log loss is larger by a twelfth.
 const GAIN_POWER: f64 = 0.5;
 
 /// Power, in the odds of a cause, of the ratio of the gap left by an unnamed law (a table over one variable in place of the cause) to the gap left by
@@ -42,8 +42,8 @@ const RIVAL_POWER: i32 = 4;
 pub struct Evidence {
     /// How often the cause has the lowest cost of all candidates when the windows are drawn again, at the search node where it was added, 0 to 1.
     pub selected: f64,
-    /// Rise of the holdout's cost without the cause, everything else fitted again, relative to the cost above the noise floor with the cause; none where no more
-    /// than noise remains.
+    /// Rise of the holdout's cost without the cause, everything else fitted again, relative to the cost above the noise floor with the cause; none
+    /// where no more than noise remains.
     pub gain: Option<f64>,
     /// Standard error of the gain, from the scatter between the holdout's windows.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -58,8 +58,8 @@ pub struct Evidence {
     /// Standard deviation of the size ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ratio_sigma: Option<f64>,
-    /// Odds that the encoder zeros of the recordings have a common mean, rather than scatter around none; only for an offset of the encoder's zero or its
-    /// equivalents, and none where recordings do not differ.
+    /// Odds that the encoder zeros of the recordings have a common mean, rather than scatter around none; only for an offset of the encoder's zero or
+    /// its equivalents, and none where recordings do not differ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub beyond_scatter: Option<f64>,
 }
@@ -137,8 +137,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
     }
 }
 
-/// Joint (from 0) whose encoder an effect makes count from another zero, and that zero, rad or m; a tilted base does the same to the first joint of an arm in a
-/// plane.
+/// Joint (from 0) whose encoder an effect makes count from another zero, and that zero, rad or m; a tilted base does the same to the first joint of
+/// an arm in a plane.
 fn zero_of(effect: &EffectInstance) -> Option<(usize, f64)> {
     let [at_zero, at_one] = [0.0, 1.0].map(|q| effect.law.measured(&effect.p, q));
     let tilt = effect.law.tilt(&effect.p);
@@ -166,8 +166,8 @@ fn is_more_than_noise<const N: usize, const P: usize>(last: &SearchNode<N, P>) -
     last.excess() > if last.is_open() { ABOVE_FLOOR } else { UNEXPLAINED }
 }
 
-/// Size of effect `place` in fit `other` relative to its size in fit `of`, along the values in `of`, and the ratio's standard deviation; none for an effect whose
-/// first parameter is no amplitude.
+/// Size of effect `place` in fit `other` relative to its size in fit `of`, along the values in `of`, and the ratio's standard deviation; none for an
+/// effect whose first parameter is no amplitude.
 fn size_ratio<const P: usize>(place: usize, of: &Fit<P>, other: &Fit<P>) -> Option<(f64, f64)> {
     let effects = &of.hypothesis.effects;
     let (one, two) = (&effects[place], &other.hypothesis.effects[place]);

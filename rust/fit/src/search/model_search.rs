@@ -202,8 +202,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         }
     }
 
-    /// Restarts a search that has ended with a gap, from its first node with another pair of causes, as the first cause may have stood in for both. Only a pair
-    /// that explains nearly all of the gap counts.
+    /// Restarts a search that has ended with a gap, from its first node with another pair of causes, as the first cause may have stood in for both.
+    /// Only a pair that explains nearly all of the gap counts.
     fn restarted(
         &self,
         mut search: ModelSearch<N, P>,
@@ -232,8 +232,8 @@ impl<A: Arm<f64, N, P>, const N: usize, const P: usize> DiagnosisContext<A, N, P
         search.threshold = self.look_closer(&mut search.node, settled, min_relevance, UNEXPLAINED);
     }
 
-    /// Searches for causes of a gap that is too small to matter by itself and yet exceeds the noise floor by the factor `clear`; returns the smallest improvement
-    /// that counts, relative to the motion. `settled` is the fit that `node` was made around.
+    /// Searches for causes of a gap that is too small to matter by itself and yet exceeds the noise floor by the factor `clear`; returns the smallest
+    /// improvement that counts, relative to the motion. `settled` is the fit that `node` was made around.
     fn look_closer(
         &self,
         node: &mut SearchNode<N, P>,

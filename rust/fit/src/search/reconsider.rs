@@ -29,8 +29,8 @@ const BETTER: f64 = 2.0;
 /// Factor by which the prediction error may be larger at the end of a search from a rival with fewer values.
 const AS_WELL: f64 = 1.05;
 
-/// Factor by which the prediction error has to be smaller at the end of a search from a rival with more values: a law that holds the other within it always fits a
-/// little better.
+/// Factor by which the prediction error has to be smaller at the end of a search from a rival with more values: a law that holds the other within it
+/// always fits a little better.
 const RICHER: f64 = 0.9;
 
 /// A candidate that, beside the other causes, does better than the cause that was added in its place.

@@ -148,7 +148,8 @@ impl RowTerm {
     }
 }
 
-/// A copy of a log with the torques of given terms, at given parameters, subtracted along the measured motion, as the integrator cannot simulate them.
+/// A copy of a log with the torques of given terms, at given parameters, subtracted along the measured motion, as the integrator cannot simulate
+/// them.
 pub fn without_rows<const N: usize>(track: &Track<N>, rows: &[(RowTerm, Vec<f64>)]) -> Track<N> {
     let mut track = track.clone();
     let intervals = Intervals::new(&track);
