@@ -171,8 +171,8 @@ impl<const N: usize, const P: usize> Equation<N, P> {
         self.weak(&torques)
     }
 
-    /// Torque of each integral part at the start of each log, N m or N, by log and joint, as the regression leaves it with parameters `theta` and
-    /// `terms`; zero for joints without an integral part.
+    /// Torque of each integral part at the start of each log, N m or N, by log and joint: the mean torque that the arm with parameters `theta` and
+    /// `terms` needs and the controller's proportional and derivative parts do not give; zero for joints without an integral part.
     pub fn held_before(&self, theta: &[f64], terms: &[Term]) -> Vec<[f64; N]> {
         let mut held = vec![[0.0; N]; self.logs.len()];
         let Some(commanded) = &self.commanded else { return held };
